@@ -1,0 +1,352 @@
+//! The result document: the wire shape of an [`Outcome`], and of what a run tells on its way.
+
+use serde::{Deserialize, Serialize};
+use uuid::Uuid;
+
+use crate::geometry::Point3;
+use crate::planner::{self, ConvergencePoint, CostFigures, Measures, Outcome};
+
+/// The document of `GET /plans/{id}/result` and of `noctule plan`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ResultDocument {
+    /// `None` when planned without a server.
+    pub plan_id: Option<Uuid>,
+    /// Name of the algorithm.
+    pub algorithm: String,
+    /// Of the run.
+    pub seed: u64,
+    /// Of the engine that found the route.
+    pub engine_version: String,
+    /// Of the accepted scenario document, hexadecimal.
+    pub scenario_sha256: String,
+    /// Whether the waypoints meet every constraint.
+    pub feasible: bool,
+    /// `iterations`, `converged`, `time-limit` or `cancelled`.
+    pub stop_reason: String,
+    /// Weighted terms and their sum.
+    pub cost: Cost,
+    /// Only with the paper's quadrature: the same route by the exact integral.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cost_integral: Option<Cost>,
+    /// Proven lower bound.
+    pub bound: Bound,
+    /// Start, free waypoints, target.
+    pub waypoints: Vec<Position>,
+    /// One fewer than the waypoints.
+    pub legs: Vec<Leg>,
+    /// The smoothed route, `null` when infeasible.
+    pub path: Option<Path>,
+    /// The certificate.
+    pub checks: Checks,
+    /// The curve of the search.
+    pub convergence: Vec<Convergence>,
+    /// Wall times.
+    pub timing: Timing,
+    /// Routes priced in all.
+    pub evaluations: u64,
+}
+
+/// A point in the request's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Position {
+    /// East, metres.
+    pub x: f64,
+    /// North, metres.
+    pub y: f64,
+    /// Up, metres.
+    pub z: f64,
+}
+
+/// Weighted terms of Eq. 1 and their sum.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "named and documented in planner::CostFigures")]
+pub struct Cost {
+    pub total: f64,
+    pub fuel: f64,
+    pub threat: f64,
+    pub altitude: f64,
+}
+
+/// Proven lower bound and the gap to it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "named and documented in planner::Bound")]
+pub struct Bound {
+    pub lower: f64,
+    pub gap: Option<f64>,
+}
+
+/// A straight piece of the route.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "named and documented in planner::Leg")]
+pub struct Leg {
+    pub length: f64,
+    pub turn_deg: f64,
+    pub climb_deg: f64,
+}
+
+/// The smoothed route.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "named and documented in planner::Path")]
+pub struct Path {
+    pub points: Vec<Position>,
+    pub length: f64,
+    pub degree: usize,
+    pub knots: Vec<f64>,
+    pub control_points: Vec<Position>,
+    pub duration_s: f64,
+}
+
+/// The certificate: what was measured, and what is broken.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Checks {
+    /// Along the waypoints.
+    pub waypoints: MeasuresDocument,
+    /// Along the path; `null` without one.
+    pub path: Option<MeasuresDocument>,
+    /// Empty when feasible.
+    pub violations: Vec<Violation>,
+}
+
+/// Measured along a polyline.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "named and documented in planner::Measures")]
+pub struct MeasuresDocument {
+    pub clearance: Vec<Clearance>,
+    pub min_agl: Option<f64>,
+    pub max_agl: Option<f64>,
+    pub max_turn_deg: f64,
+    pub max_climb_deg: f64,
+    pub min_leg: f64,
+}
+
+/// How close the route comes to a threat.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "named and documented in planner::Clearance")]
+pub struct Clearance {
+    pub threat: usize,
+    pub name: Option<String>,
+    pub distance: Option<f64>,
+}
+
+/// A broken constraint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Violation {
+    /// `threat`, `altitude`, `terrain`, `turn`, `climb`, `leg` or `area`.
+    pub kind: String,
+    /// Such as `leg 3`.
+    #[serde(rename = "where")]
+    pub place: String,
+    /// Metres or degrees beyond the limit.
+    pub amount: f64,
+    /// For people.
+    pub message: String,
+}
+
+/// A point of the curve of the search; also the data of a `convergence` event.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "named and documented in planner::ConvergencePoint")]
+pub struct Convergence {
+    pub iteration: usize,
+    pub evaluations: u64,
+    pub elapsed_ms: f64,
+    pub best_cost: Option<f64>,
+    pub best_violation: f64,
+    pub mean_cost: f64,
+    pub feasible_fraction: f64,
+}
+
+/// The data of an `incumbent` event.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "named and documented in planner::Incumbent")]
+pub struct Incumbent {
+    pub iteration: usize,
+    pub elapsed_ms: f64,
+    pub cost: f64,
+    pub feasible: bool,
+    pub waypoints: Vec<Position>,
+}
+
+/// Wall times, milliseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Timing {
+    /// From acceptance to the start of the run.
+    pub queued_ms: f64,
+    /// Of the run.
+    pub run_ms: f64,
+}
+
+/// What a result says of its origin beside the route itself.
+#[derive(Debug, Clone)]
+pub struct Origin {
+    /// `None` without a server.
+    pub plan_id: Option<Uuid>,
+    /// Name of the algorithm.
+    pub algorithm: String,
+    /// Of the run.
+    pub seed: u64,
+    /// See [`scenario_sha256`].
+    pub scenario_sha256: String,
+    /// Wall times.
+    pub timing: Timing,
+}
+
+/// Hexadecimal SHA-256 of an accepted scenario document.
+#[must_use]
+pub fn scenario_sha256(document: &str) -> String {
+    use sha2::{Digest, Sha256};
+    use std::fmt::Write as _;
+
+    Sha256::digest(document.as_bytes())
+        .iter()
+        .fold(String::with_capacity(64), |mut hex, byte| {
+            write!(hex, "{byte:02x}").expect("writing to a string cannot fail");
+            hex
+        })
+}
+
+impl ResultDocument {
+    /// The wire shape of `outcome`.
+    #[must_use]
+    pub fn new(outcome: &Outcome, origin: Origin) -> Self {
+        Self {
+            plan_id: origin.plan_id,
+            algorithm: origin.algorithm,
+            seed: origin.seed,
+            engine_version: env!("CARGO_PKG_VERSION").to_owned(),
+            scenario_sha256: origin.scenario_sha256,
+            feasible: outcome.feasible,
+            stop_reason: outcome.stop_reason.name().to_owned(),
+            cost: outcome.cost.into(),
+            cost_integral: outcome.cost_integral.map(Into::into),
+            bound: Bound {
+                lower: outcome.bound.lower,
+                gap: outcome.bound.gap,
+            },
+            waypoints: positions(&outcome.waypoints),
+            legs: outcome.legs.iter().copied().map(Into::into).collect(),
+            path: outcome.path.as_ref().map(Into::into),
+            checks: Checks {
+                waypoints: (&outcome.waypoint_checks).into(),
+                path: outcome.path_checks.as_ref().map(Into::into),
+                violations: outcome.violations.iter().map(Into::into).collect(),
+            },
+            convergence: outcome.convergence.iter().map(Into::into).collect(),
+            timing: origin.timing,
+            evaluations: outcome.evaluations,
+        }
+    }
+
+    /// As JSON text.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(self).expect("every map key is a string and every number is finite")
+    }
+}
+
+fn positions(points: &[Point3]) -> Vec<Position> {
+    points.iter().copied().map(Into::into).collect()
+}
+
+impl From<Point3> for Position {
+    fn from(point: Point3) -> Self {
+        Self {
+            x: point.x,
+            y: point.y,
+            z: point.z,
+        }
+    }
+}
+
+impl From<CostFigures> for Cost {
+    fn from(figures: CostFigures) -> Self {
+        Self {
+            total: figures.total,
+            fuel: figures.fuel,
+            threat: figures.threat,
+            altitude: figures.altitude,
+        }
+    }
+}
+
+impl From<planner::Leg> for Leg {
+    fn from(leg: planner::Leg) -> Self {
+        Self {
+            length: leg.length,
+            turn_deg: leg.turn_deg,
+            climb_deg: leg.climb_deg,
+        }
+    }
+}
+
+impl From<&planner::Path> for Path {
+    fn from(path: &planner::Path) -> Self {
+        Self {
+            points: positions(&path.points),
+            length: path.length,
+            degree: path.degree,
+            knots: path.knots.clone(),
+            control_points: positions(&path.control_points),
+            duration_s: path.duration_s,
+        }
+    }
+}
+
+impl From<&Measures> for MeasuresDocument {
+    fn from(measures: &Measures) -> Self {
+        Self {
+            clearance: measures.clearance.iter().map(Into::into).collect(),
+            min_agl: measures.min_agl,
+            max_agl: measures.max_agl,
+            max_turn_deg: measures.max_turn_deg,
+            max_climb_deg: measures.max_climb_deg,
+            min_leg: measures.min_leg,
+        }
+    }
+}
+
+impl From<&planner::Clearance> for Clearance {
+    fn from(clearance: &planner::Clearance) -> Self {
+        Self {
+            threat: clearance.threat,
+            name: clearance.name.clone(),
+            distance: clearance.distance,
+        }
+    }
+}
+
+impl From<&planner::Violation> for Violation {
+    fn from(violation: &planner::Violation) -> Self {
+        Self {
+            kind: violation.kind.to_owned(),
+            place: violation.place.clone(),
+            amount: violation.amount,
+            message: violation.message.clone(),
+        }
+    }
+}
+
+impl From<&ConvergencePoint> for Convergence {
+    fn from(point: &ConvergencePoint) -> Self {
+        Self {
+            iteration: point.iteration,
+            evaluations: point.evaluations,
+            elapsed_ms: point.elapsed_ms,
+            best_cost: point.best_cost,
+            best_violation: point.best_violation,
+            mean_cost: point.mean_cost,
+            feasible_fraction: point.feasible_fraction,
+        }
+    }
+}
+
+impl From<&planner::Incumbent> for Incumbent {
+    fn from(incumbent: &planner::Incumbent) -> Self {
+        Self {
+            iteration: incumbent.iteration,
+            elapsed_ms: incumbent.elapsed_ms,
+            cost: incumbent.cost,
+            feasible: incumbent.feasible,
+            waypoints: positions(&incumbent.waypoints),
+        }
+    }
+}

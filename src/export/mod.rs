@@ -1,0 +1,3 @@
+//! A delivered plan in the formats that people take away.
+
+pub mod document;

@@ -1,0 +1,11 @@
+//! A plan's life: its record, its states, its events.
+//!
+//! Deliberately absent: where records are kept, and how they travel.
+
+mod event;
+mod plan;
+pub mod state;
+
+pub use event::{Event, NumberedEvent};
+pub use plan::{Failure, Plan, PlanId, Submission};
+pub use state::Status;

@@ -1,0 +1,82 @@
+//! The record of a plan: everything a status document tells.
+
+use serde::{Deserialize, Serialize};
+use uuid::Uuid;
+
+use super::Status;
+
+/// Identifies a plan; version 7, so ids sort by the time of acceptance.
+pub type PlanId = Uuid;
+
+/// What a caller hands in, already validated.
+#[derive(Debug, Clone)]
+pub struct Submission {
+    /// A new id.
+    pub id: PlanId,
+    /// The scenario's name.
+    pub name: Option<String>,
+    /// The algorithm's name.
+    pub algorithm: String,
+    /// Of the run.
+    pub seed: u64,
+    /// Iterations asked for.
+    pub iterations: u64,
+    /// The accepted document, defaults filled in.
+    pub scenario: String,
+    /// Now, milliseconds since 1970.
+    pub created_ms: i64,
+}
+
+/// The record of a plan. Times are milliseconds since 1970.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// See [`PlanId`].
+    pub id: PlanId,
+    /// The scenario's name.
+    pub name: Option<String>,
+    /// Where it stands.
+    pub status: Status,
+    /// Why the search ended, once it has.
+    pub stop_reason: Option<String>,
+    /// Whether the best route so far meets every constraint; `None` before the first.
+    pub feasible: Option<bool>,
+    /// Of the best feasible route so far.
+    pub best_cost: Option<f64>,
+    /// Share of the iterations done, 0 to 1; 1 at a result.
+    pub progress: f64,
+    /// Iterations done.
+    pub iteration: u64,
+    /// Iterations asked for.
+    pub iterations: u64,
+    /// Routes priced so far.
+    pub evaluations: u64,
+    /// 1 for the next to run; `None` when not queued.
+    pub queue_position: Option<u64>,
+    /// The algorithm's name.
+    pub algorithm: String,
+    /// Of the run.
+    pub seed: u64,
+    /// When it was accepted.
+    pub created_ms: i64,
+    /// When the (last) run began.
+    pub started_ms: Option<i64>,
+    /// When it ended.
+    pub finished_ms: Option<i64>,
+    /// When its record will be removed; `None` is never.
+    pub expires_ms: Option<i64>,
+    /// Whether somebody asked for its end.
+    pub cancel_requested: bool,
+    /// What broke, when failed.
+    pub error: Option<Failure>,
+    /// Grows with every change of this record.
+    pub revision: u64,
+}
+
+/// Why a plan failed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Failure {
+    /// Last part of the problem's `type`, such as `planner-panic`.
+    pub kind: String,
+    /// For people.
+    pub detail: String,
+}

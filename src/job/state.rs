@@ -1,0 +1,71 @@
+//! The one table of what may follow what.
+
+use serde::{Deserialize, Serialize};
+
+/// Where a plan stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// Accepted, durable, waiting for a worker.
+    Queued,
+    /// A worker plans it.
+    Running,
+    /// It has a result, feasible or not.
+    Succeeded,
+    /// The planner broke; the plan says how.
+    Failed,
+    /// Ended on request, with the best route so far if it had begun.
+    Cancelled,
+}
+
+impl Status {
+    /// All of them, in the order of a plan's life.
+    pub const ALL: [Self; 5] = [
+        Self::Queued,
+        Self::Running,
+        Self::Succeeded,
+        Self::Failed,
+        Self::Cancelled,
+    ];
+
+    /// As on the wire.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Queued => "queued",
+            Self::Running => "running",
+            Self::Succeeded => "succeeded",
+            Self::Failed => "failed",
+            Self::Cancelled => "cancelled",
+        }
+    }
+
+    /// The status of that name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|status| status.name() == name)
+    }
+
+    /// Whether nothing follows it.
+    #[must_use]
+    pub fn is_final(self) -> bool {
+        self.next().is_empty()
+    }
+
+    /// Whether `next` may follow it.
+    #[must_use]
+    pub fn may_become(self, next: Self) -> bool {
+        self.next().contains(&next)
+    }
+
+    /// The transition table.
+    fn next(self) -> &'static [Self] {
+        match self {
+            // A queued plan that is cancelled has no route.
+            Self::Queued => &[Self::Running, Self::Cancelled],
+            // Back to the queue when its worker is lost or the service shuts down.
+            Self::Running => &[Self::Succeeded, Self::Failed, Self::Cancelled, Self::Queued],
+            Self::Succeeded | Self::Failed | Self::Cancelled => &[],
+        }
+    }
+}

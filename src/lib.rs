@@ -1,0 +1,12 @@
+//! Noctule plans 3-D routes for unmanned aircraft.
+//!
+//! The rooms, in reading order; each imports only from those above it.
+
+pub mod export;
+pub mod geometry;
+pub mod job;
+pub mod planner;
+pub mod scenario;
+pub mod store;
+pub mod terrain;
+pub mod threat;

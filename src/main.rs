@@ -1,0 +1,3 @@
+//! The `noctule` command.
+
+fn main() {}

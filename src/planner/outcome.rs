@@ -1,0 +1,186 @@
+//! What a run delivers. Lengths in metres, angles in degrees.
+
+use crate::geometry::Point3;
+
+/// The end of a run: the best route, its price, its certificate and how it was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Whether the waypoints meet every constraint.
+    pub feasible: bool,
+    /// Why the search ended.
+    pub stop_reason: StopReason,
+    /// The figures that were minimised.
+    pub cost: CostFigures,
+    /// With the paper's quadrature: the same route priced by the exact integral.
+    pub cost_integral: Option<CostFigures>,
+    /// How far from the optimum the route can be.
+    pub bound: Bound,
+    /// Start, the N free waypoints, target.
+    pub waypoints: Vec<Point3>,
+    /// N + 1 legs.
+    pub legs: Vec<Leg>,
+    /// The smoothed route; `None` when no feasible route was found.
+    pub path: Option<Path>,
+    /// Measured on the waypoints.
+    pub waypoint_checks: Measures,
+    /// Measured on the path; `None` without one.
+    pub path_checks: Option<Measures>,
+    /// Every constraint that the waypoints break.
+    pub violations: Vec<Violation>,
+    /// One point an iteration, the first evaluation included.
+    pub convergence: Vec<ConvergencePoint>,
+    /// Routes priced in all.
+    pub evaluations: u64,
+}
+
+/// Why a search ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StopReason {
+    /// All iterations were done.
+    Iterations,
+    /// The proven gap closed.
+    Converged,
+    /// The request's time limit passed.
+    TimeLimit,
+    /// Somebody asked for it.
+    Cancelled,
+}
+
+impl StopReason {
+    /// As on the wire.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Iterations => "iterations",
+            Self::Converged => "converged",
+            Self::TimeLimit => "time-limit",
+            Self::Cancelled => "cancelled",
+        }
+    }
+}
+
+/// The weighted terms of Eq. 1; `total` is their sum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CostFigures {
+    /// F.
+    pub total: f64,
+    /// w1 F1.
+    pub fuel: f64,
+    /// w2 F2.
+    pub threat: f64,
+    /// w3 F3.
+    pub altitude: f64,
+}
+
+/// A proven lower bound on the total cost of any route for the scenario.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bound {
+    /// No route costs less.
+    pub lower: f64,
+    /// `total / lower - 1`; `None` when infeasible or when `lower` is 0.
+    pub gap: Option<f64>,
+}
+
+/// One straight piece of the route.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Leg {
+    /// 3-D length.
+    pub length: f64,
+    /// Heading change at the leg's start, left positive; 0 on the first.
+    pub turn_deg: f64,
+    /// Up positive.
+    pub climb_deg: f64,
+}
+
+/// The smoothed route, Eq. 26-27: what a vehicle flies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    /// Samples of the spline; the polyline through them is free of violations.
+    pub points: Vec<Point3>,
+    /// Of that polyline.
+    pub length: f64,
+    /// Of the spline.
+    pub degree: usize,
+    /// `control_points + degree + 1` clamped knots.
+    pub knots: Vec<f64>,
+    /// Of the spline.
+    pub control_points: Vec<Point3>,
+    /// `length` over the cruise speed, seconds.
+    pub duration_s: f64,
+}
+
+/// What was measured along a polyline, continuously.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measures {
+    /// One a threat, in order.
+    pub clearance: Vec<Clearance>,
+    /// Least height above ground outside the terminal zones; `None` when the route never leaves them.
+    pub min_agl: Option<f64>,
+    /// Greatest height above ground outside the terminal zones.
+    pub max_agl: Option<f64>,
+    /// Largest heading change.
+    pub max_turn_deg: f64,
+    /// Steepest leg, up or down.
+    pub max_climb_deg: f64,
+    /// Shortest leg.
+    pub min_leg: f64,
+}
+
+/// How close a route comes to one threat.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Clearance {
+    /// Index in the scenario.
+    pub threat: usize,
+    /// The threat's name.
+    pub name: Option<String>,
+    /// Horizontal metres to its boundary, negative inside; `None` when the route is never between
+    /// its base and top.
+    pub distance: Option<f64>,
+}
+
+/// One broken constraint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Violation {
+    /// `threat`, `altitude`, `terrain`, `turn`, `climb`, `leg` or `area`.
+    pub kind: &'static str,
+    /// Such as `leg 3` or `waypoint 2`.
+    pub place: String,
+    /// Metres or degrees beyond the limit.
+    pub amount: f64,
+    /// For people.
+    pub message: String,
+}
+
+/// The state of the search after an iteration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConvergencePoint {
+    /// 0 is the first evaluation.
+    pub iteration: usize,
+    /// Routes priced so far.
+    pub evaluations: u64,
+    /// Since the run began, milliseconds.
+    pub elapsed_ms: f64,
+    /// Of the best feasible route; `None` until there is one.
+    pub best_cost: Option<f64>,
+    /// Total violation of the best route; 0 when feasible.
+    pub best_violation: f64,
+    /// Mean cost of the population.
+    pub mean_cost: f64,
+    /// Share of the population that is feasible.
+    pub feasible_fraction: f64,
+}
+
+/// A new best route.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Incumbent {
+    /// When it was found.
+    pub iteration: usize,
+    /// Since the run began, milliseconds.
+    pub elapsed_ms: f64,
+    /// Its total cost.
+    pub cost: f64,
+    /// Whether it meets every constraint.
+    pub feasible: bool,
+    /// Start, free waypoints, target.
+    pub waypoints: Vec<Point3>,
+}

@@ -1,0 +1,43 @@
+//! What the operator allows, with the defaults that `GET /limits` shows.
+
+/// Upper limits on a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes of a request body.
+    pub body_bytes: usize,
+    /// Threats of a scenario.
+    pub threats: usize,
+    /// Vertices of all polygons together.
+    pub polygon_vertices: usize,
+    /// Nodes of a terrain grid.
+    pub terrain_nodes: usize,
+    /// Peaks of an analytic terrain.
+    pub peaks: usize,
+    /// Free waypoints, N.
+    pub waypoints: usize,
+    /// Bats.
+    pub population: usize,
+    /// Iterations.
+    pub iterations: usize,
+    /// population * iterations * waypoints.
+    pub work: u64,
+    /// Samples of the delivered path.
+    pub path_samples: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            body_bytes: 8 * 1024 * 1024,
+            threats: 10_000,
+            polygon_vertices: 20_000,
+            terrain_nodes: 1_000_000,
+            peaks: 1_000,
+            waypoints: 200,
+            population: 10_000,
+            iterations: 100_000,
+            work: 4_000_000_000,
+            path_samples: 50_000,
+        }
+    }
+}

@@ -4,6 +4,7 @@
 
 pub mod export;
 pub mod geometry;
+pub mod http;
 pub mod job;
 pub mod planner;
 pub mod scenario;

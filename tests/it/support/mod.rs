@@ -1,0 +1,4 @@
+//! What several subjects need.
+
+pub(crate) mod plans;
+pub(crate) mod stores;

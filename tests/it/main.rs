@@ -3,3 +3,4 @@
 mod store_conformance;
 mod store_sqlite;
 mod support;
+mod worker;

@@ -11,3 +11,4 @@ pub mod scenario;
 pub mod store;
 pub mod terrain;
 pub mod threat;
+pub mod worker;

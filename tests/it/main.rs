@@ -1,7 +1,9 @@
-//! Integration tests, one binary, one module a subject.
-
-mod support;
+//! The integration tests: one module per subject.
 
 mod api;
 mod events;
 mod openapi;
+mod store_conformance;
+mod store_sqlite;
+mod support;
+mod worker;

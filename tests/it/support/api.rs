@@ -21,30 +21,30 @@ use tower::ServiceExt as _;
 use super::description;
 
 /// A service whose only worker is the test.
-pub struct Api {
-    pub store: Arc<dyn Store>,
-    pub state: AppState,
-    pub router: Router,
-    pub phase: watch::Sender<Phase>,
+pub(crate) struct Api {
+    pub(crate) store: Arc<dyn Store>,
+    pub(crate) state: AppState,
+    pub(crate) router: Router,
+    pub(crate) phase: watch::Sender<Phase>,
     _directory: TempDir,
 }
 
 /// An answer, read to its end.
 #[derive(Debug)]
-pub struct Answer {
-    pub status: StatusCode,
-    pub headers: HeaderMap,
-    pub body: Bytes,
+pub(crate) struct Answer {
+    pub(crate) status: StatusCode,
+    pub(crate) headers: HeaderMap,
+    pub(crate) body: Bytes,
 }
 
 impl Api {
     /// With room for a thousand plans.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self::with_queue(1000)
     }
 
     /// With room for `queue` plans.
-    pub fn with_queue(queue: usize) -> Self {
+    pub(crate) fn with_queue(queue: usize) -> Self {
         let directory = tempfile::tempdir().expect("a temporary directory");
         let options = Options {
             queue_limit: queue as u64,
@@ -74,7 +74,7 @@ impl Api {
     }
 
     /// Send a request with headers out of `(name, value)` pairs.
-    pub async fn send(
+    pub(crate) async fn send(
         &self,
         method: Method,
         uri: &str,
@@ -101,25 +101,25 @@ impl Api {
         }
     }
 
-    pub async fn get(&self, uri: &str) -> Answer {
+    pub(crate) async fn get(&self, uri: &str) -> Answer {
         self.send(Method::GET, uri, &[], Body::empty()).await
     }
 
-    pub async fn get_with(&self, uri: &str, headers: &[(&str, &str)]) -> Answer {
+    pub(crate) async fn get_with(&self, uri: &str, headers: &[(&str, &str)]) -> Answer {
         self.send(Method::GET, uri, headers, Body::empty()).await
     }
 
-    pub async fn post(&self, uri: &str, document: &Value) -> Answer {
+    pub(crate) async fn post(&self, uri: &str, document: &Value) -> Answer {
         let headers = [("content-type", "application/json")];
         self.send(Method::POST, uri, &headers, document.to_string()).await
     }
 
-    pub async fn delete(&self, uri: &str) -> Answer {
+    pub(crate) async fn delete(&self, uri: &str) -> Answer {
         self.send(Method::DELETE, uri, &[], Body::empty()).await
     }
 
     /// Post the small scenario; its address.
-    pub async fn submit(&self) -> String {
+    pub(crate) async fn submit(&self) -> String {
         let answer = self.post("/plans", &super::scenario()).await;
         assert_eq!(answer.status, 202, "{answer:?}");
         answer.header("location").to_owned()
@@ -127,11 +127,11 @@ impl Api {
 }
 
 impl Answer {
-    pub fn json(&self) -> Value {
+    pub(crate) fn json(&self) -> Value {
         serde_json::from_slice(&self.body).expect("JSON")
     }
 
-    pub fn header(&self, name: &str) -> &str {
+    pub(crate) fn header(&self, name: &str) -> &str {
         let value = self
             .headers
             .get(name)
@@ -141,7 +141,7 @@ impl Answer {
 
     /// Panics unless it is a problem of that kind.
     #[track_caller]
-    pub fn expect_problem(&self, status: u16, slug: &str) -> Value {
+    pub(crate) fn expect_problem(&self, status: u16, slug: &str) -> Value {
         assert_eq!(self.status, status, "{self:?}");
         assert_eq!(self.header("content-type"), "application/problem+json");
         let problem = self.json();

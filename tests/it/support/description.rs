@@ -8,12 +8,12 @@ use jsonschema::Validator;
 use serde_json::{Value, json};
 
 /// The description that the service serves.
-pub static DESCRIPTION: LazyLock<Value> = LazyLock::new(|| {
+pub(crate) static DESCRIPTION: LazyLock<Value> = LazyLock::new(|| {
     serde_yaml_ng::from_str(include_str!("../../../openapi.yaml")).expect("well-formed YAML")
 });
 
 /// Follow `$ref`s within the description.
-pub fn resolve(node: &'static Value) -> &'static Value {
+pub(crate) fn resolve(node: &'static Value) -> &'static Value {
     match node.get("$ref").and_then(Value::as_str) {
         Some(reference) => {
             let pointer = reference.strip_prefix('#').expect("references are local");
@@ -28,7 +28,7 @@ pub fn resolve(node: &'static Value) -> &'static Value {
 }
 
 /// The described path that `path` is an instance of.
-pub fn template(path: &str) -> Option<&'static str> {
+pub(crate) fn template(path: &str) -> Option<&'static str> {
     let paths = DESCRIPTION["paths"].as_object().expect("paths");
     let matches = |template: &str| {
         let (mut parts, mut given) = (template.split('/'), path.split('/'));
@@ -45,7 +45,7 @@ pub fn template(path: &str) -> Option<&'static str> {
 }
 
 /// Panics unless the description knows such an answer.
-pub fn check(method: &Method, path: &str, status: StatusCode, headers: &HeaderMap, body: &[u8]) {
+pub(crate) fn check(method: &Method, path: &str, status: StatusCode, headers: &HeaderMap, body: &[u8]) {
     let place = format!("{method} {path} -> {status}");
     assert!(
         headers.contains_key("x-request-id"),
@@ -119,7 +119,7 @@ fn parse(body: &[u8], place: &str) -> Value {
 }
 
 /// Panics unless `instance` is as `schema` says, references taken from the description.
-pub fn check_schema(schema: &Value, instance: &Value, place: &str) {
+pub(crate) fn check_schema(schema: &Value, instance: &Value, place: &str) {
     let faults: Vec<String> = validator(schema)
         .iter_errors(instance)
         .map(|error| format!("{}: {error}", error.instance_path()))

@@ -1,15 +1,19 @@
 //! What several subjects need: a service over a fresh store, and hands to play the worker with.
 
-pub mod api;
-pub mod description;
-pub mod run;
-pub mod server;
-pub mod sse;
+pub(crate) mod api;
+pub(crate) mod description;
+pub(crate) mod engines;
+pub(crate) mod faulty_store;
+pub(crate) mod plans;
+pub(crate) mod run;
+pub(crate) mod server;
+pub(crate) mod sse;
+pub(crate) mod stores;
 
 use serde_json::{Value, json};
 
 /// A small scenario that can be planned in no time.
-pub fn scenario() -> Value {
+pub(crate) fn scenario() -> Value {
     json!({
         "name": "two radars",
         "start": {"x": 200, "y": 100, "z": 0},

@@ -8,12 +8,12 @@ use noctule::job::{Event, Failure, PlanId, Status};
 use noctule::store::{Ending, Lease, Store};
 
 /// A point of the curve at a time of the run.
-pub fn convergence(iteration: usize, elapsed_ms: f64) -> Event {
+pub(crate) fn convergence(iteration: usize, elapsed_ms: f64) -> Event {
     Event::Convergence(curve(iteration, elapsed_ms))
 }
 
 /// A better route at a time of the run.
-pub fn incumbent(iteration: usize, elapsed_ms: f64) -> Event {
+pub(crate) fn incumbent(iteration: usize, elapsed_ms: f64) -> Event {
     Event::Incumbent(Incumbent {
         iteration,
         elapsed_ms,
@@ -24,7 +24,7 @@ pub fn incumbent(iteration: usize, elapsed_ms: f64) -> Event {
 }
 
 /// Take the only queued plan, tell `events`, and end with a result.
-pub async fn complete(store: &dyn Store, events: Vec<Event>) -> Lease {
+pub(crate) async fn complete(store: &dyn Store, events: Vec<Event>) -> Lease {
     let lease = store.claim().await.expect("a queued plan");
     store.append(&lease, events).await.expect("the lease holds");
     finish(store, &lease, Status::Succeeded).await;
@@ -32,7 +32,7 @@ pub async fn complete(store: &dyn Store, events: Vec<Event>) -> Lease {
 }
 
 /// End a run with a result.
-pub async fn finish(store: &dyn Store, lease: &Lease, status: Status) {
+pub(crate) async fn finish(store: &dyn Store, lease: &Lease, status: Status) {
     let stop_reason = match status {
         Status::Cancelled => "cancelled",
         _ => "iterations",
@@ -53,7 +53,7 @@ pub async fn finish(store: &dyn Store, lease: &Lease, status: Status) {
 }
 
 /// End a run without one.
-pub async fn fail(store: &dyn Store, lease: &Lease) {
+pub(crate) async fn fail(store: &dyn Store, lease: &Lease) {
     let failure = Failure {
         kind: "planner-panic".to_owned(),
         detail: "the planner broke".to_owned(),
@@ -66,7 +66,7 @@ pub async fn fail(store: &dyn Store, lease: &Lease) {
 }
 
 /// A result as the planner would write it.
-pub fn result(plan: PlanId, stop_reason: &str) -> ResultDocument {
+pub(crate) fn result(plan: PlanId, stop_reason: &str) -> ResultDocument {
     let leg = Leg {
         length: 300.0,
         turn_deg: 0.0,

@@ -9,14 +9,14 @@ use tokio::task::JoinHandle;
 use super::api::Api;
 
 /// Serves an [`Api`] until its phase is `Stopping`.
-pub struct Server {
-    pub address: SocketAddr,
-    pub serving: JoinHandle<()>,
+pub(crate) struct Server {
+    pub(crate) address: SocketAddr,
+    pub(crate) serving: JoinHandle<()>,
 }
 
 impl Server {
     /// On a free port.
-    pub async fn start(api: &Api) -> Self {
+    pub(crate) async fn start(api: &Api) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
         let address = listener.local_addr().expect("bound");
         let patience = Duration::from_secs(5);
@@ -29,7 +29,7 @@ impl Server {
     }
 
     /// The whole address of `path`.
-    pub fn url(&self, path: &str) -> String {
+    pub(crate) fn url(&self, path: &str) -> String {
         format!("http://{}{path}", self.address)
     }
 }

@@ -7,21 +7,21 @@ use super::description::check_schema;
 
 /// A block of a stream.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Block {
+pub(crate) enum Block {
     Retry(u64),
     Comment(String),
     Event { id: u64, name: String, data: Value },
 }
 
 /// A stream that is being read.
-pub struct Stream {
+pub(crate) struct Stream {
     response: Response,
     text: String,
 }
 
 impl Stream {
     /// Send the request and check the answer's head.
-    pub async fn open(request: RequestBuilder) -> Self {
+    pub(crate) async fn open(request: RequestBuilder) -> Self {
         let response = request.send().await.expect("an answer");
         assert_eq!(response.status(), 200);
         let header = |name: &str| {
@@ -42,7 +42,7 @@ impl Stream {
     }
 
     /// The next block; `None` when the server has closed the stream.
-    pub async fn next(&mut self) -> Option<Block> {
+    pub(crate) async fn next(&mut self) -> Option<Block> {
         loop {
             if let Some((block, rest)) = self.text.split_once("\n\n") {
                 let block = read(block);
@@ -58,7 +58,7 @@ impl Stream {
     }
 
     /// Everything up to the close.
-    pub async fn rest(mut self) -> Vec<Block> {
+    pub(crate) async fn rest(mut self) -> Vec<Block> {
         let mut blocks = Vec::new();
         while let Some(block) = self.next().await {
             blocks.push(block);
@@ -88,7 +88,7 @@ fn read(block: &str) -> Block {
 }
 
 /// The ids and names of the events among `blocks`.
-pub fn events(blocks: &[Block]) -> Vec<(u64, String)> {
+pub(crate) fn events(blocks: &[Block]) -> Vec<(u64, String)> {
     blocks
         .iter()
         .filter_map(|block| match block {

@@ -3,6 +3,7 @@
 mod api;
 mod events;
 mod openapi;
+mod scenario;
 mod store_conformance;
 mod store_sqlite;
 mod support;

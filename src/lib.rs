@@ -13,3 +13,4 @@ pub mod seeding;
 pub mod store;
 pub mod terrain;
 pub mod threat;
+pub mod worker;

@@ -3,6 +3,7 @@
 //! Deliberately absent: where records are kept, and how they travel.
 
 mod event;
+mod life;
 mod plan;
 pub mod state;
 

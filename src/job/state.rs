@@ -69,3 +69,55 @@ impl Status {
         }
     }
 }
+
+/// A step that the transition table does not allow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("a {} plan cannot become {}", from.name(), to.name())]
+pub struct Refused {
+    /// Where the plan stands.
+    pub from: Status,
+    /// What it was to become.
+    pub to: Status,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_transition_table() {
+        use Status::{Cancelled, Failed, Queued, Running, Succeeded};
+        let allowed = [
+            (Queued, Running),
+            (Queued, Cancelled),
+            (Running, Succeeded),
+            (Running, Failed),
+            (Running, Cancelled),
+            (Running, Queued),
+        ];
+        for from in Status::ALL {
+            for to in Status::ALL {
+                assert_eq!(
+                    from.may_become(to),
+                    allowed.contains(&(from, to)),
+                    "{from:?} -> {to:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_final() {
+        let finals = Status::ALL.into_iter().filter(|status| status.is_final());
+        assert!(finals.eq([Status::Succeeded, Status::Failed, Status::Cancelled]));
+    }
+
+    #[test]
+    fn names_are_those_of_the_wire_and_lead_back() {
+        for status in Status::ALL {
+            assert_eq!(Status::from_name(status.name()), Some(status));
+            assert_eq!(serde_json::json!(status), status.name());
+        }
+        assert_eq!(Status::from_name("Queued"), None);
+    }
+}

@@ -3,11 +3,14 @@
 //! A store holds the queue, the records, the documents and the events of all plans, and makes each
 //! step durable before it answers. Deliberately absent: what a plan means, and who may see it.
 
+pub mod sqlite;
+
 use std::sync::Arc;
 
 use async_trait::async_trait;
 use tokio::sync::watch;
 
+use crate::job::state::Refused;
 use crate::job::{Event, Failure, NumberedEvent, Plan, PlanId, Status, Submission};
 
 /// The queue, the records, the documents and the events of all plans.
@@ -21,9 +24,12 @@ pub trait Store: Send + Sync + 'static {
     /// [`StoreError::QueueFull`] when as many plans are queued as the store was opened for.
     async fn submit(&self, submission: Submission) -> Result<Plan, StoreError>;
 
-    /// Wait for the plan at the head of the queue and take it: queued -> running.
-    /// Dropping the future before it is done takes nothing.
-    async fn claim(&self, now_ms: i64) -> Result<Lease, StoreError>;
+    /// Wait for the plan at the head of the queue and take it: queued -> running, at the time that
+    /// the store's clock shows then. Dropping the future before it is done takes nothing.
+    ///
+    /// # Errors
+    /// [`StoreError::Unavailable`] when the store fails or is closed meanwhile.
+    async fn claim(&self) -> Result<Lease, StoreError>;
 
     /// Add what a run tells; convergence points also move the record's progress.
     ///
@@ -35,26 +41,31 @@ pub trait Store: Send + Sync + 'static {
     ///
     /// # Errors
     /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.
+    ///
+    /// # Panics
+    /// When the status of an [`Ending::Result`] is none of the two that have a result.
     async fn finish(&self, lease: &Lease, ending: Ending, now_ms: i64) -> Result<Plan, StoreError>;
 
-    /// Give a plan back, to the head of the queue: running -> queued.
+    /// Give a plan back, to its old place in the queue, which is the head: running -> queued. Its
+    /// next run begins again from its seed. When its end has been asked for, it is cancelled
+    /// instead, without a result.
     ///
     /// # Errors
     /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.
     async fn release(&self, lease: &Lease) -> Result<(), StoreError>;
 
-    /// Ask for the end of a plan. A queued one ends at once; a running one's lease is told; at the
-    /// end of its life nothing changes.
+    /// Ask for the end of a plan. A queued one ends at once, without a result; a running one's lease
+    /// is told; at the end of its life nothing changes.
     ///
     /// # Errors
     /// [`StoreError::NotFound`], [`StoreError::Gone`].
     async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError>;
 
-    /// Remove a plan and all that belongs to it, stopping it first; a tombstone remains. Removing
-    /// it again is no error.
+    /// Remove a plan and all that belongs to it; a running one's lease is told, and lost. A tombstone
+    /// remains for [`TOMBSTONE_MS`]; while it does, removing the plan again is no error.
     ///
     /// # Errors
-    /// [`StoreError::NotFound`] when there was never such a plan.
+    /// [`StoreError::NotFound`] when there is neither such a plan nor its tombstone.
     async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError>;
 
     /// The record.
@@ -75,11 +86,10 @@ pub trait Store: Send + Sync + 'static {
     /// As [`Store::get`].
     async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError>;
 
-    /// Newest first.
+    /// Newest first: by id, from the greatest down.
     async fn list(&self, query: ListQuery) -> Result<Vec<Plan>, StoreError>;
 
-    /// At most about `limit` events after the one numbered `after`, in order; none when there are
-    /// none yet.
+    /// At most `limit` events after the one numbered `after`, in order; none when there are none yet.
     ///
     /// # Errors
     /// As [`Store::get`].
@@ -92,11 +102,35 @@ pub trait Store: Send + Sync + 'static {
     /// Counts for the queue's head-room and `Retry-After`.
     async fn stats(&self) -> Result<Stats, StoreError>;
 
-    /// Whether the store can take a write now.
+    /// Whether the store can take a write now: it makes a small one durable.
     async fn health(&self) -> Result<(), StoreError>;
 
-    /// Finish what is being written and let go of files. Later calls fail.
+    /// Finish what is being written and let go of files. Waiting claims and later calls fail.
     async fn close(&self);
+}
+
+/// How long a deleted plan is remembered, milliseconds.
+pub const TOMBSTONE_MS: i64 = 24 * 60 * 60 * 1_000;
+
+/// Tells the time: milliseconds since 1970.
+pub type Clock = Arc<dyn Fn() -> i64 + Send + Sync>;
+
+/// The machine's clock.
+#[must_use]
+pub fn wall_clock() -> Clock {
+    Arc::new(|| {
+        let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+        i64::try_from(since.unwrap_or_default().as_millis()).unwrap_or(i64::MAX)
+    })
+}
+
+/// What a store is opened with.
+#[derive(Clone)]
+pub struct Options {
+    /// As many plans may wait; see [`StoreError::QueueFull`].
+    pub queue_limit: u64,
+    /// Of claims, tombstones and recovery.
+    pub clock: Clock,
 }
 
 /// The right to run one plan, from [`Store::claim`] to [`Store::finish`] or [`Store::release`].
@@ -134,6 +168,36 @@ pub enum Ending {
     },
     /// Without one.
     Failed(Failure),
+}
+
+impl Ending {
+    /// Change the record as this ending does; the result document is left to the store.
+    ///
+    /// # Errors
+    /// [`Refused`] when the plan is not running.
+    fn apply(&self, plan: &mut Plan, now_ms: i64) -> Result<(), Refused> {
+        match self {
+            Self::Result {
+                status,
+                stop_reason,
+                feasible,
+                best_cost,
+                evaluations,
+                iteration,
+                document: _,
+            } => {
+                plan.end(*status, now_ms)?;
+                plan.stop_reason = Some(stop_reason.clone());
+                plan.feasible = Some(*feasible);
+                plan.best_cost = *best_cost;
+                plan.progress = 1.0;
+                plan.iteration = *iteration;
+                plan.evaluations = *evaluations;
+                Ok(())
+            }
+            Self::Failed(failure) => plan.fail(failure.clone(), now_ms),
+        }
+    }
 }
 
 /// What [`Store::list`] returns.

@@ -1,0 +1,214 @@
+//! How each step of a plan's life changes its record. Every step goes through the transition table.
+
+use super::state::{Refused, Status};
+use super::{Failure, Plan, Submission};
+use crate::export::document::Convergence;
+
+impl Plan {
+    /// The record of a plan that has just been accepted as number `queue_position` in the queue.
+    #[must_use]
+    pub fn accepted(submission: &Submission, queue_position: u64) -> Self {
+        Self {
+            id: submission.id,
+            name: submission.name.clone(),
+            status: Status::Queued,
+            stop_reason: None,
+            feasible: None,
+            best_cost: None,
+            progress: 0.0,
+            iteration: 0,
+            iterations: submission.iterations,
+            evaluations: 0,
+            queue_position: Some(queue_position),
+            algorithm: submission.algorithm.clone(),
+            seed: submission.seed,
+            created_ms: submission.created_ms,
+            started_ms: None,
+            finished_ms: None,
+            expires_ms: None,
+            cancel_requested: false,
+            error: None,
+            revision: 1,
+        }
+    }
+
+    /// A worker begins with it: queued -> running.
+    ///
+    /// # Errors
+    /// [`Refused`] from any other status.
+    pub fn start(&mut self, now_ms: i64) -> Result<(), Refused> {
+        self.become_status(Status::Running)?;
+        self.started_ms = Some(now_ms);
+        self.queue_position = None;
+        Ok(())
+    }
+
+    /// Its worker is gone: running -> queued. The next run begins again from the seed, so nothing
+    /// of this one remains.
+    ///
+    /// # Errors
+    /// [`Refused`] from any other status.
+    pub fn requeue(&mut self) -> Result<(), Refused> {
+        self.become_status(Status::Queued)?;
+        self.started_ms = None;
+        self.feasible = None;
+        self.best_cost = None;
+        self.progress = 0.0;
+        self.iteration = 0;
+        self.evaluations = 0;
+        Ok(())
+    }
+
+    /// Somebody asked for its end, and a worker will see to it.
+    pub fn request_cancel(&mut self) {
+        self.cancel_requested = true;
+        self.revision += 1;
+    }
+
+    /// It ends on request without a result: no worker has it, or the one that had it is gone.
+    ///
+    /// # Errors
+    /// [`Refused`] when it had already ended.
+    pub fn cancel(&mut self, now_ms: i64) -> Result<(), Refused> {
+        self.end(Status::Cancelled, now_ms)?;
+        self.cancel_requested = true;
+        Ok(())
+    }
+
+    /// Its run broke.
+    ///
+    /// # Errors
+    /// [`Refused`] when it was not running.
+    pub fn fail(&mut self, failure: Failure, now_ms: i64) -> Result<(), Refused> {
+        self.end(Status::Failed, now_ms)?;
+        self.error = Some(failure);
+        Ok(())
+    }
+
+    /// It ends as `status`, one of the final ones.
+    ///
+    /// # Errors
+    /// [`Refused`] when the table does not allow it, or when `status` is not final.
+    pub fn end(&mut self, status: Status, now_ms: i64) -> Result<(), Refused> {
+        if !status.is_final() {
+            return Err(Refused {
+                from: self.status,
+                to: status,
+            });
+        }
+        self.become_status(status)?;
+        self.finished_ms = Some(now_ms);
+        self.queue_position = None;
+        Ok(())
+    }
+
+    /// Its run has come as far as `point`.
+    pub fn advance(&mut self, point: &Convergence) {
+        self.iteration = point.iteration as u64;
+        self.evaluations = point.evaluations;
+        self.best_cost = point.best_cost;
+        self.feasible = Some(point.best_cost.is_some());
+        self.progress = if self.iterations == 0 {
+            1.0
+        } else {
+            (self.iteration as f64 / self.iterations as f64).min(1.0)
+        };
+        self.revision += 1;
+    }
+
+    fn become_status(&mut self, next: Status) -> Result<(), Refused> {
+        if !self.status.may_become(next) {
+            return Err(Refused {
+                from: self.status,
+                to: next,
+            });
+        }
+        self.status = next;
+        self.revision += 1;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use uuid::Uuid;
+
+    fn accepted() -> Plan {
+        let submission = Submission {
+            id: Uuid::nil(),
+            name: None,
+            algorithm: "tms-sba".to_owned(),
+            seed: 7,
+            iterations: 200,
+            scenario: "{}".to_owned(),
+            created_ms: 1_000,
+        };
+        Plan::accepted(&submission, 3)
+    }
+
+    fn point(iteration: usize, best_cost: Option<f64>) -> Convergence {
+        Convergence {
+            iteration,
+            evaluations: 40,
+            elapsed_ms: 1.0,
+            best_cost,
+            best_violation: 0.0,
+            mean_cost: 9.0,
+            feasible_fraction: 0.5,
+        }
+    }
+
+    #[test]
+    fn a_requeued_plan_is_as_it_was_accepted_but_for_its_revision() {
+        let mut plan = accepted();
+        plan.start(2_000).expect("queued may run");
+        plan.advance(&point(50, Some(470.0)));
+        assert_eq!((plan.feasible, plan.best_cost), (Some(true), Some(470.0)));
+        assert!((plan.progress - 0.25).abs() < 1e-12);
+        plan.requeue().expect("running may be queued");
+        let fresh = accepted();
+        let again = Plan {
+            revision: fresh.revision,
+            queue_position: fresh.queue_position,
+            ..plan.clone()
+        };
+        assert_eq!(again, fresh);
+        assert_eq!(plan.revision, 4);
+    }
+
+    #[test]
+    fn progress_of_a_plan_without_iterations_is_whole() {
+        let mut plan = Plan {
+            iterations: 0,
+            ..accepted()
+        };
+        plan.start(2_000).expect("queued may run");
+        plan.advance(&point(0, None));
+        assert!((plan.progress - 1.0).abs() < 1e-12);
+        assert_eq!(plan.feasible, Some(false));
+    }
+
+    #[test]
+    fn a_refused_step_changes_nothing() {
+        let mut plan = accepted();
+        assert_eq!(
+            plan.end(Status::Succeeded, 5),
+            Err(Refused {
+                from: Status::Queued,
+                to: Status::Succeeded
+            })
+        );
+        plan.start(2_000).expect("queued may run");
+        let before = plan.clone();
+        assert!(plan.start(3_000).is_err());
+        assert!(plan.end(Status::Queued, 3_000).is_err());
+        assert_eq!(plan, before);
+        plan.cancel(4_000).expect("running may be cancelled");
+        let ended = plan.clone();
+        assert!(plan.cancel(5_000).is_err());
+        assert!(plan.requeue().is_err());
+        assert_eq!(plan, ended);
+        assert!(plan.cancel_requested && plan.finished_ms == Some(4_000));
+    }
+}

@@ -1,0 +1,248 @@
+//! The embedded store: one `SQLite` file in the data directory, written by one thread.
+//!
+//! Every acknowledged change is on the disk (WAL, `synchronous = FULL`); what was being run when a
+//! process died is queued again when the next one opens the file.
+
+mod changes;
+mod operations;
+mod read;
+mod row;
+mod schema;
+mod transaction;
+mod writer;
+
+use std::fs::{DirBuilder, File, TryLockError};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use async_trait::async_trait;
+use rusqlite::Connection;
+use tokio::sync::watch;
+
+use self::changes::Changes;
+use self::read::Readers;
+use self::writer::Writer;
+use super::{Clock, Ending, Lease, ListQuery, Options, Stats, Store, StoreError};
+use crate::job::state::Refused;
+use crate::job::{Event, NumberedEvent, Plan, PlanId, Status, Submission};
+
+/// Name of the database in the data directory.
+const DATABASE: &str = "noctule.db";
+
+/// Name of the file in the data directory whose lock keeps a second process out.
+const LOCK: &str = "noctule.lock";
+
+/// How long to wait for a person who holds the database in `sqlite3`.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// The embedded store.
+///
+/// Its methods want a tokio runtime. Dropping it finishes what has been sent to the writer.
+pub struct SqliteStore {
+    writer: Writer,
+    readers: Arc<Readers>,
+    changes: Arc<Changes>,
+    clock: Clock,
+}
+
+impl SqliteStore {
+    /// Open the store in `data_dir`, both created if need be, and give what an earlier process was
+    /// running back to the queue. Blocks on the disk.
+    ///
+    /// # Errors
+    /// [`StoreError::InUse`] when another process has it open; [`StoreError::Unavailable`] when the
+    /// directory or the file cannot be used, or was written by a newer version.
+    pub fn open(data_dir: &Path, options: Options) -> Result<Self, StoreError> {
+        create_directory(data_dir)?;
+        let lock = lock(data_dir)?;
+        let file = data_dir.join(DATABASE);
+        let connection = open_database(&file)
+            .map_err(|error| StoreError::Unavailable(format!("database {}: {error}", file.display())))?;
+        sync_directory(data_dir)?;
+        let changes = Arc::new(Changes::default());
+        let clock = Arc::clone(&options.clock);
+        Ok(Self {
+            writer: Writer::start(connection, lock, options, Arc::clone(&changes))?,
+            readers: Readers::new(file),
+            changes,
+            clock,
+        })
+    }
+}
+
+#[async_trait]
+impl Store for SqliteStore {
+    async fn submit(&self, submission: Submission) -> Result<Plan, StoreError> {
+        self.writer
+            .change(move |tx| operations::submit(tx, &submission))
+            .await
+    }
+
+    async fn claim(&self) -> Result<Lease, StoreError> {
+        self.writer.claim().await
+    }
+
+    async fn append(&self, lease: &Lease, events: Vec<Event>) -> Result<(), StoreError> {
+        let (id, attempt) = (lease.plan.id, lease.attempt);
+        self.writer
+            .change(move |tx| operations::append(tx, id, attempt, &events))
+            .await
+    }
+
+    async fn finish(&self, lease: &Lease, ending: Ending, now_ms: i64) -> Result<Plan, StoreError> {
+        if let Ending::Result { status, .. } = &ending {
+            assert!(
+                matches!(status, Status::Succeeded | Status::Cancelled),
+                "a {} plan has no result",
+                status.name()
+            );
+        }
+        let (id, attempt) = (lease.plan.id, lease.attempt);
+        self.writer
+            .change(move |tx| operations::finish(tx, id, attempt, &ending, now_ms))
+            .await
+    }
+
+    async fn release(&self, lease: &Lease) -> Result<(), StoreError> {
+        let (id, attempt) = (lease.plan.id, lease.attempt);
+        self.writer
+            .change(move |tx| operations::release(tx, id, attempt))
+            .await
+    }
+
+    async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
+        self.writer
+            .change(move |tx| operations::request_cancel(tx, id, now_ms))
+            .await
+    }
+
+    async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
+        self.writer
+            .change(move |tx| operations::delete(tx, id, now_ms))
+            .await
+    }
+
+    async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {
+        let now_ms = (self.clock)();
+        self.readers
+            .read(move |connection| read::get(connection, id, now_ms))
+            .await
+    }
+
+    async fn scenario(&self, id: PlanId) -> Result<String, StoreError> {
+        let now_ms = (self.clock)();
+        self.readers
+            .read(move |connection| read::scenario(connection, id, now_ms))
+            .await
+    }
+
+    async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError> {
+        let now_ms = (self.clock)();
+        self.readers
+            .read(move |connection| read::result(connection, id, now_ms))
+            .await
+    }
+
+    async fn list(&self, query: ListQuery) -> Result<Vec<Plan>, StoreError> {
+        self.readers
+            .read(move |connection| read::list(connection, query))
+            .await
+    }
+
+    async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<Vec<NumberedEvent>, StoreError> {
+        let now_ms = (self.clock)();
+        self.readers
+            .read(move |connection| read::events(connection, id, after, limit, now_ms))
+            .await
+    }
+
+    fn changes(&self, id: PlanId) -> watch::Receiver<u64> {
+        self.changes.subscribe(id)
+    }
+
+    async fn stats(&self) -> Result<Stats, StoreError> {
+        self.readers.read(read::stats).await
+    }
+
+    async fn health(&self) -> Result<(), StoreError> {
+        self.writer.change(operations::touch).await
+    }
+
+    async fn close(&self) {
+        self.readers.close().await;
+        self.writer.close().await;
+    }
+}
+
+impl From<rusqlite::Error> for StoreError {
+    fn from(error: rusqlite::Error) -> Self {
+        Self::Unavailable(error.to_string())
+    }
+}
+
+impl From<Refused> for StoreError {
+    fn from(refused: Refused) -> Self {
+        Self::Unavailable(refused.to_string())
+    }
+}
+
+fn closed() -> StoreError {
+    StoreError::Unavailable("the store is closed".to_owned())
+}
+
+fn create_directory(data_dir: &Path) -> Result<(), StoreError> {
+    let mut builder = DirBuilder::new();
+    builder.recursive(true);
+    #[cfg(unix)]
+    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+    builder.create(data_dir).map_err(|error| {
+        StoreError::Unavailable(format!(
+            "data directory {} cannot be made: {error}",
+            data_dir.display()
+        ))
+    })
+}
+
+fn lock(data_dir: &Path) -> Result<File, StoreError> {
+    let path = data_dir.join(LOCK);
+    let unusable = |error| StoreError::Unavailable(format!("lock file {}: {error}", path.display()));
+    let file = File::options()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(&path)
+        .map_err(unusable)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(StoreError::InUse(data_dir.to_owned())),
+        Err(TryLockError::Error(error)) => Err(unusable(error)),
+    }
+}
+
+fn open_database(file: &Path) -> Result<Connection, StoreError> {
+    let mut connection = Connection::open(file)?;
+    connection.busy_timeout(BUSY_TIMEOUT)?;
+    connection.set_prepared_statement_cache_capacity(64);
+    connection.pragma_update(None, "journal_mode", "WAL")?;
+    connection.pragma_update(None, "synchronous", "FULL")?;
+    connection.pragma_update(None, "foreign_keys", true)?;
+    // Pages of 4 KiB: the log is folded into the database at 16 MiB.
+    connection.pragma_update(None, "wal_autocheckpoint", 4_096)?;
+    connection.pragma_update(None, "journal_size_limit", 64 * 1_024 * 1_024)?;
+    schema::prepare(&mut connection)?;
+    Ok(connection)
+}
+
+/// A new file is only found again after a power failure when its directory is on the disk too.
+fn sync_directory(data_dir: &Path) -> Result<(), StoreError> {
+    #[cfg(unix)]
+    File::open(data_dir)
+        .and_then(|directory| directory.sync_all())
+        .map_err(|error| {
+            StoreError::Unavailable(format!("data directory {}: {error}", data_dir.display()))
+        })?;
+    #[cfg(not(unix))]
+    let _ = data_dir;
+    Ok(())
+}

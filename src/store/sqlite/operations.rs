@@ -1,0 +1,214 @@
+//! What changes the store, each as a step of the writer's transaction.
+
+use std::sync::Arc;
+
+use rusqlite::params;
+use tokio::sync::watch;
+
+use super::read::missing;
+use super::row::PlanRow;
+use super::transaction::{Effect, Transaction};
+use crate::job::{Event, Plan, PlanId, Status, Submission};
+use crate::store::{Ending, Lease, StoreError, TOMBSTONE_MS};
+
+pub(super) fn submit(tx: &mut Transaction<'_>, submission: &Submission) -> Result<Plan, StoreError> {
+    if tx.queued >= tx.queue_limit {
+        return Err(StoreError::QueueFull { queued: tx.queued });
+    }
+    let mut row = PlanRow {
+        seq: 0,
+        attempt: 0,
+        last_event: 0,
+        plan: Plan::accepted(submission, tx.queued + 1),
+    };
+    row.insert(tx.connection)?;
+    tx.connection
+        .prepare_cached("INSERT INTO scenarios (plan_seq, document) VALUES (?1, ?2)")?
+        .execute(params![row.seq, submission.scenario])?;
+    tx.queued += 1;
+    tell_status(tx, &mut row)?;
+    row.update(tx.connection)?;
+    Ok(row.plan)
+}
+
+/// `None` when nothing is queued.
+pub(super) fn claim(tx: &mut Transaction<'_>) -> Result<Option<Lease>, StoreError> {
+    let Some(mut row) = PlanRow::head(tx.connection)? else {
+        return Ok(None);
+    };
+    row.plan.start((tx.clock)())?;
+    row.attempt += 1;
+    tx.queued -= 1;
+    tell_status(tx, &mut row)?;
+    row.update(tx.connection)?;
+    let scenario: String = tx
+        .connection
+        .prepare_cached("SELECT document FROM scenarios WHERE plan_seq = ?1")?
+        .query_row([row.seq], |scenario| scenario.get(0))?;
+    let (cancel, cancelled) = watch::channel(false);
+    tx.effects.push(Effect::Leased(row.plan.id, cancel));
+    Ok(Some(Lease {
+        plan: row.plan,
+        scenario: Arc::from(scenario),
+        attempt: row.attempt,
+        cancel: cancelled,
+    }))
+}
+
+pub(super) fn append(
+    tx: &mut Transaction<'_>,
+    id: PlanId,
+    attempt: u64,
+    events: &[Event],
+) -> Result<(), StoreError> {
+    let mut row = leased(tx, id, attempt)?;
+    let last_point = events.iter().rev().find_map(|event| match event {
+        Event::Convergence(point) => Some(point),
+        _ => None,
+    });
+    if let Some(point) = last_point {
+        row.plan.advance(point);
+    }
+    tx.tell(&mut row, events)?;
+    row.update(tx.connection)?;
+    Ok(())
+}
+
+pub(super) fn finish(
+    tx: &mut Transaction<'_>,
+    id: PlanId,
+    attempt: u64,
+    ending: &Ending,
+    now_ms: i64,
+) -> Result<Plan, StoreError> {
+    let mut row = leased(tx, id, attempt)?;
+    ending.apply(&mut row.plan, now_ms)?;
+    if let Ending::Result { document, .. } = ending {
+        tx.connection
+            .prepare_cached("INSERT INTO results (plan_seq, document) VALUES (?1, ?2)")?
+            .execute(params![row.seq, document])?;
+    }
+    tell_end(tx, &mut row)?;
+    row.update(tx.connection)?;
+    tx.effects.push(Effect::Unleased(id));
+    Ok(row.plan)
+}
+
+pub(super) fn release(tx: &mut Transaction<'_>, id: PlanId, attempt: u64) -> Result<(), StoreError> {
+    let row = leased(tx, id, attempt)?;
+    give_back(tx, row)?;
+    tx.effects.push(Effect::Unleased(id));
+    Ok(())
+}
+
+/// Give back what an earlier process was running; nobody holds those leases any more.
+pub(super) fn recover(tx: &mut Transaction<'_>) -> Result<(), StoreError> {
+    let ids = tx
+        .connection
+        .prepare_cached("SELECT id FROM plans WHERE status = 'running' ORDER BY seq")?
+        .query_map([], |row| row.get::<_, String>(0))?
+        .collect::<Result<Vec<_>, _>>()?;
+    for id in ids {
+        let id = PlanId::parse_str(&id)
+            .map_err(|error| StoreError::Unavailable(format!("plan id {id:?}: {error}")))?;
+        if let Some(row) = PlanRow::load(tx.connection, id)? {
+            give_back(tx, row)?;
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn request_cancel(tx: &mut Transaction<'_>, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
+    let Some(mut row) = PlanRow::load(tx.connection, id)? else {
+        return Err(missing(tx.connection, id, (tx.clock)())?);
+    };
+    match row.plan.status {
+        Status::Queued => {
+            row.plan.cancel(now_ms)?;
+            tx.queued -= 1;
+            tell_end(tx, &mut row)?;
+            row.update(tx.connection)?;
+        }
+        Status::Running if !row.plan.cancel_requested => {
+            row.plan.request_cancel();
+            tell_status(tx, &mut row)?;
+            row.update(tx.connection)?;
+            tx.effects.push(Effect::Stop(id));
+        }
+        Status::Running | Status::Succeeded | Status::Failed | Status::Cancelled => {}
+    }
+    Ok(row.plan)
+}
+
+pub(super) fn delete(tx: &mut Transaction<'_>, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
+    bury_for_good(tx, now_ms)?;
+    let Some(row) = PlanRow::load(tx.connection, id)? else {
+        return match missing(tx.connection, id, now_ms)? {
+            StoreError::Gone(_) => Ok(()),
+            other => Err(other),
+        };
+    };
+    tx.connection
+        .prepare_cached("DELETE FROM plans WHERE seq = ?1")?
+        .execute([row.seq])?;
+    tx.connection
+        .prepare_cached("INSERT OR REPLACE INTO tombstones (id, deleted_ms) VALUES (?1, ?2)")?
+        .execute(params![id.to_string(), now_ms])?;
+    if row.plan.status == Status::Queued {
+        tx.queued -= 1;
+    }
+    tx.effects
+        .extend([Effect::Stop(id), Effect::Unleased(id), Effect::Changed(id)]);
+    Ok(())
+}
+
+/// Forget the tombstones that have expired.
+pub(super) fn bury_for_good(tx: &mut Transaction<'_>, now_ms: i64) -> Result<(), StoreError> {
+    tx.connection
+        .prepare_cached("DELETE FROM tombstones WHERE deleted_ms <= ?1")?
+        .execute([now_ms.saturating_sub(TOMBSTONE_MS)])?;
+    Ok(())
+}
+
+pub(super) fn touch(tx: &mut Transaction<'_>) -> Result<(), StoreError> {
+    tx.connection
+        .prepare_cached("UPDATE health SET checked_ms = ?1")?
+        .execute([(tx.clock)()])?;
+    Ok(())
+}
+
+/// The row of a plan that is run under that attempt.
+fn leased(tx: &Transaction<'_>, id: PlanId, attempt: u64) -> Result<PlanRow, StoreError> {
+    PlanRow::load(tx.connection, id)?
+        .filter(|row| row.plan.status == Status::Running && row.attempt == attempt)
+        .ok_or(StoreError::LeaseLost(id))
+}
+
+/// Back to the queue, or to its end when that was asked for.
+fn give_back(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<(), StoreError> {
+    if row.plan.cancel_requested {
+        row.plan.cancel((tx.clock)())?;
+        tell_end(tx, &mut row)?;
+        row.update(tx.connection)?;
+        return Ok(());
+    }
+    row.plan.requeue()?;
+    tx.queued += 1;
+    // Its place is counted over the others, so its own state must be in the table first.
+    row.update(tx.connection)?;
+    row = row.placed(tx.connection)?;
+    tell_status(tx, &mut row)?;
+    row.update(tx.connection)?;
+    Ok(())
+}
+
+fn tell_status(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
+    let status = Event::Status(Box::new(row.plan.clone()));
+    tx.tell(row, &[status])
+}
+
+fn tell_end(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
+    let status = Event::Status(Box::new(row.plan.clone()));
+    let end = Event::End(row.plan.status);
+    tx.tell(row, &[status, end])
+}

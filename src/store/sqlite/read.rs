@@ -1,0 +1,230 @@
+//! What is asked of the store, over a few read-only connections beside the writer's.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use rusqlite::types::Value;
+use rusqlite::{Connection, OpenFlags, OptionalExtension, params_from_iter};
+use tokio::sync::Semaphore;
+
+use super::row::{COLUMNS, PlanRow};
+use super::{BUSY_TIMEOUT, closed};
+use crate::job::{Event, NumberedEvent, Plan, PlanId, Status};
+use crate::store::{ListQuery, Stats, StoreError, TOMBSTONE_MS};
+
+/// Reads at the same time; more wait.
+const CONNECTIONS: u32 = 8;
+
+/// Runs that [`Stats::mean_run_ms`] looks back on.
+const RUNS: i64 = 20;
+
+/// The pool of read-only connections.
+pub(super) struct Readers {
+    file: PathBuf,
+    idle: Mutex<Vec<Connection>>,
+    permits: Arc<Semaphore>,
+}
+
+impl Readers {
+    pub(super) fn new(file: PathBuf) -> Arc<Self> {
+        Arc::new(Self {
+            file,
+            idle: Mutex::default(),
+            permits: Arc::new(Semaphore::new(CONNECTIONS as usize)),
+        })
+    }
+
+    /// Run `work` in one read transaction on a thread that may block.
+    pub(super) async fn read<T, W>(self: &Arc<Self>, work: W) -> Result<T, StoreError>
+    where
+        T: Send + 'static,
+        W: FnOnce(&Connection) -> Result<T, StoreError> + Send + 'static,
+    {
+        let permit = self.permits.clone().acquire_owned().await.map_err(|_| closed())?;
+        let readers = Arc::clone(self);
+        let task = tokio::task::spawn_blocking(move || {
+            let mut connection = readers.take()?;
+            let transaction = connection.transaction()?;
+            let result = work(&transaction);
+            drop(transaction);
+            readers.lock_idle().push(connection);
+            drop(permit);
+            result
+        });
+        task.await
+            .map_err(|broken| StoreError::Unavailable(format!("a read broke: {broken}")))?
+    }
+
+    /// Wait for the reads under way; later ones fail.
+    pub(super) async fn close(&self) {
+        let _every_permit = self.permits.acquire_many(CONNECTIONS).await;
+        self.permits.close();
+        self.lock_idle().clear();
+    }
+
+    fn take(&self) -> Result<Connection, StoreError> {
+        let idle = self.lock_idle().pop();
+        idle.map_or_else(|| self.open(), Ok)
+    }
+
+    fn open(&self) -> Result<Connection, StoreError> {
+        let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+        let connection = Connection::open_with_flags(&self.file, flags)?;
+        connection.busy_timeout(BUSY_TIMEOUT)?;
+        connection.set_prepared_statement_cache_capacity(32);
+        Ok(connection)
+    }
+
+    fn lock_idle(&self) -> std::sync::MutexGuard<'_, Vec<Connection>> {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+pub(super) fn get(connection: &Connection, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
+    match PlanRow::load(connection, id)? {
+        Some(row) => Ok(row.plan),
+        None => Err(missing(connection, id, now_ms)?),
+    }
+}
+
+pub(super) fn scenario(connection: &Connection, id: PlanId, now_ms: i64) -> Result<String, StoreError> {
+    let sql = "SELECT document FROM plans LEFT JOIN scenarios ON plan_seq = seq WHERE id = ?1";
+    let document = document(connection, sql, id, now_ms)?;
+    document.ok_or_else(|| StoreError::Unavailable(format!("plan {id} has lost its scenario")))
+}
+
+pub(super) fn result(connection: &Connection, id: PlanId, now_ms: i64) -> Result<Option<String>, StoreError> {
+    let sql = "SELECT document FROM plans LEFT JOIN results ON plan_seq = seq WHERE id = ?1";
+    document(connection, sql, id, now_ms)
+}
+
+fn document(
+    connection: &Connection,
+    sql: &str,
+    id: PlanId,
+    now_ms: i64,
+) -> Result<Option<String>, StoreError> {
+    let document: Option<Option<String>> = connection
+        .prepare_cached(sql)?
+        .query_row([id.to_string()], |row| row.get(0))
+        .optional()?;
+    match document {
+        Some(document) => Ok(document),
+        None => Err(missing(connection, id, now_ms)?),
+    }
+}
+
+pub(super) fn list(connection: &Connection, query: ListQuery) -> Result<Vec<Plan>, StoreError> {
+    let mut conditions = Vec::new();
+    let mut values = Vec::new();
+    if let Some(status) = query.status {
+        conditions.push("status = ?");
+        values.push(Value::from(status.name().to_owned()));
+    }
+    if let Some(before) = query.before {
+        conditions.push("id < ?");
+        values.push(Value::from(before.to_string()));
+    }
+    values.push(Value::from(i64::try_from(query.limit).unwrap_or(i64::MAX)));
+    let filter = if conditions.is_empty() {
+        String::new()
+    } else {
+        format!("WHERE {}", conditions.join(" AND "))
+    };
+    let mut statement = connection.prepare_cached(&format!(
+        "SELECT {COLUMNS} FROM plans {filter} ORDER BY id DESC LIMIT ?"
+    ))?;
+    let rows = statement
+        .query_map(params_from_iter(values), PlanRow::read)?
+        .collect::<Result<Vec<_>, _>>()?;
+
+    let some_queued = rows.iter().any(|row| row.plan.status == Status::Queued);
+    let queue = if some_queued {
+        queue(connection)?
+    } else {
+        Vec::new()
+    };
+    let placed = rows.into_iter().map(|mut row| {
+        let place = queue.binary_search(&row.seq).ok();
+        row.plan.queue_position = place.map(|place| place as u64 + 1);
+        row.plan
+    });
+    Ok(placed.collect())
+}
+
+/// The `seq` of each queued plan, in order.
+fn queue(connection: &Connection) -> rusqlite::Result<Vec<i64>> {
+    connection
+        .prepare_cached("SELECT seq FROM plans WHERE status = 'queued' ORDER BY seq")?
+        .query_map([], |row| row.get(0))?
+        .collect()
+}
+
+pub(super) fn events(
+    connection: &Connection,
+    id: PlanId,
+    after: u64,
+    limit: usize,
+    now_ms: i64,
+) -> Result<Vec<NumberedEvent>, StoreError> {
+    let seq: Option<i64> = connection
+        .prepare_cached("SELECT seq FROM plans WHERE id = ?1")?
+        .query_row([id.to_string()], |row| row.get(0))
+        .optional()?;
+    let Some(seq) = seq else {
+        return Err(missing(connection, id, now_ms)?);
+    };
+    let after = i64::try_from(after).unwrap_or(i64::MAX);
+    let mut statement = connection.prepare_cached(
+        "SELECT first_id, batch FROM events WHERE plan_seq = ?1 AND last_id > ?2 ORDER BY last_id",
+    )?;
+    let mut rows = statement.query([seq, after])?;
+    let mut events = Vec::new();
+    while events.len() < limit
+        && let Some(row) = rows.next()?
+    {
+        let first_id: i64 = row.get(0)?;
+        let batch: String = row.get(1)?;
+        let batch: Vec<Event> = serde_json::from_str(&batch)
+            .map_err(|error| StoreError::Unavailable(format!("events of plan {id}: {error}")))?;
+        let numbered = (first_id..).zip(batch).filter(|(id, _)| *id > after);
+        events.extend(numbered.map(|(id, event)| NumberedEvent {
+            id: id.cast_unsigned(),
+            event,
+        }));
+    }
+    events.truncate(limit);
+    Ok(events)
+}
+
+pub(super) fn stats(connection: &Connection) -> Result<Stats, StoreError> {
+    let count = |status: Status| -> rusqlite::Result<u64> {
+        connection
+            .prepare_cached("SELECT count(*) FROM plans WHERE status = ?1")?
+            .query_row([status.name()], |row| row.get::<_, i64>(0))
+            .map(i64::cast_unsigned)
+    };
+    let mean_run_ms = connection
+        .prepare_cached(
+            "SELECT avg(finished_ms - started_ms) FROM (SELECT started_ms, finished_ms FROM plans \
+             WHERE stop_reason IS NOT NULL ORDER BY finished_ms DESC LIMIT ?1)",
+        )?
+        .query_row([RUNS], |row| row.get(0))?;
+    Ok(Stats {
+        queued: count(Status::Queued)?,
+        running: count(Status::Running)?,
+        mean_run_ms,
+    })
+}
+
+/// Why there is no such plan.
+pub(super) fn missing(connection: &Connection, id: PlanId, now_ms: i64) -> Result<StoreError, StoreError> {
+    let deleted_ms: Option<i64> = connection
+        .prepare_cached("SELECT deleted_ms FROM tombstones WHERE id = ?1")?
+        .query_row([id.to_string()], |row| row.get(0))
+        .optional()?;
+    Ok(match deleted_ms {
+        Some(deleted_ms) if now_ms.saturating_sub(deleted_ms) < TOMBSTONE_MS => StoreError::Gone(id),
+        _ => StoreError::NotFound(id),
+    })
+}

@@ -1,0 +1,155 @@
+//! The pool: takes plans off the queue, runs a bounded number of them at a time, writes down what
+//! they tell and how they end.
+//!
+//! Planning has threads of its own, one a plan, so that it never holds up those that serve.
+//! Deliberately absent: what planning is, and how anybody learns of its progress.
+
+mod planning;
+mod run;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::watch;
+use tokio::task::JoinSet;
+
+use crate::job::Failure;
+use crate::planner::{Observer, Outcome, Stop};
+use crate::store::{Clock, Store};
+
+/// Plans an accepted scenario document, calling back as it goes. A panic of it fails its plan only.
+pub type Engine = Arc<dyn Fn(&str, &mut dyn Observer, &dyn Stop) -> Result<Outcome, Failure> + Send + Sync>;
+
+/// What a pool is started with.
+#[derive(Clone)]
+pub struct Settings {
+    /// Plans run at the same time; none are with 0.
+    pub workers: usize,
+    /// Of the time of ending.
+    pub clock: Clock,
+}
+
+/// The running pool.
+///
+/// [`Pool::drain`] it at the end. Dropping it leaves its plans to the next process, as a crash would.
+pub struct Pool {
+    phase: watch::Sender<Phase>,
+    slots: JoinSet<()>,
+}
+
+/// How far the end of the pool has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Phase {
+    /// Plans are claimed and run.
+    Open,
+    /// No plan is claimed any more.
+    Draining,
+    /// Those that still run go back to the queue.
+    Stopping,
+}
+
+impl Pool {
+    /// Start claiming.
+    ///
+    /// # Panics
+    /// Outside a tokio runtime.
+    #[must_use]
+    pub fn start(store: Arc<dyn Store>, settings: Settings, engine: Engine) -> Self {
+        let phase = watch::Sender::new(Phase::Open);
+        let slot = Slot {
+            number: 0,
+            store,
+            clock: settings.clock,
+            engine,
+            phase: phase.subscribe(),
+        };
+        let mut slots = JoinSet::new();
+        for number in 0..settings.workers {
+            let slot = Slot {
+                number,
+                ..slot.clone()
+            };
+            slots.spawn(slot.serve());
+        }
+        Self { phase, slots }
+    }
+
+    /// Claim nothing from now on, let what runs run for `grace` longer, then stop it and give it
+    /// back to the queue. Returns when all is quiet, which an engine that does not heed its stop delays.
+    pub async fn drain(mut self, grace: Duration) {
+        self.phase.send_replace(Phase::Draining);
+        if tokio::time::timeout(grace, self.quiet()).await.is_err() {
+            self.phase.send_replace(Phase::Stopping);
+            self.quiet().await;
+        }
+    }
+
+    async fn quiet(&mut self) {
+        while let Some(slot) = self.slots.join_next().await {
+            if let Err(error) = slot {
+                tracing::error!(%error, "a worker broke");
+            }
+        }
+    }
+}
+
+/// Runs one plan after another.
+#[derive(Clone)]
+struct Slot {
+    number: usize,
+    store: Arc<dyn Store>,
+    clock: Clock,
+    engine: Engine,
+    phase: watch::Receiver<Phase>,
+}
+
+impl Slot {
+    async fn serve(self) {
+        let mut pause = Pause::default();
+        loop {
+            let claim = tokio::select! {
+                biased;
+                () = reached(self.phase.clone(), Phase::Draining) => return,
+                claim = self.store.claim() => claim,
+            };
+            match claim {
+                Ok(lease) => {
+                    pause = Pause::default();
+                    self.run(lease).await;
+                }
+                Err(error) => {
+                    tracing::warn!(%error, worker = self.number, "no plan could be claimed; trying again");
+                    tokio::select! {
+                        () = reached(self.phase.clone(), Phase::Draining) => return,
+                        () = pause.wait() => {}
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Returns once the pool's end has come so far.
+async fn reached(mut phase: watch::Receiver<Phase>, wanted: Phase) {
+    // Without its sender the pool is gone, which is further than any phase.
+    let _ = phase.wait_for(|phase| *phase >= wanted).await;
+}
+
+/// Longer and longer waits between tries.
+#[derive(Debug)]
+struct Pause(Duration);
+
+impl Pause {
+    const LONGEST: Duration = Duration::from_secs(5);
+
+    async fn wait(&mut self) {
+        tokio::time::sleep(self.0).await;
+        self.0 = (self.0 * 2).min(Self::LONGEST);
+    }
+}
+
+impl Default for Pause {
+    fn default() -> Self {
+        Self(Duration::from_millis(20))
+    }
+}

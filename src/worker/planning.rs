@@ -1,0 +1,166 @@
+//! The thread that plans: it calls the engine, hands on what it tells, and makes its ending.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::time::Instant;
+
+use tokio::sync::{mpsc, oneshot};
+
+use super::Engine;
+use crate::export::document::{Origin, ResultDocument, Timing, scenario_sha256};
+use crate::job::{Event, Failure, Plan, Status};
+use crate::planner::{ConvergencePoint, Incumbent, Observer, Outcome, Stop, StopReason};
+use crate::store::{Ending, Lease};
+
+/// Why a run shall stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub(super) enum Reason {
+    /// Somebody asked for the end of the plan, and wants the best route so far.
+    Cancelled = 1,
+    /// Nobody wants its outcome: it will be run again, or is no longer this worker's.
+    Abandoned = 2,
+}
+
+/// Shared by a run's thread and those who may stop it.
+#[derive(Debug, Default)]
+pub(super) struct StopFlag(AtomicU8);
+
+impl StopFlag {
+    /// The first reason stands.
+    pub(super) fn raise(&self, reason: Reason) {
+        let _ = self
+            .0
+            .compare_exchange(0, reason as u8, Ordering::Relaxed, Ordering::Relaxed);
+    }
+
+    pub(super) fn is_abandoned(&self) -> bool {
+        self.0.load(Ordering::Relaxed) == Reason::Abandoned as u8
+    }
+
+    fn is_raised(&self) -> bool {
+        self.0.load(Ordering::Relaxed) != 0
+    }
+}
+
+/// Start planning on a thread of its own. The ending comes after the last event.
+///
+/// # Errors
+/// When the machine has no thread left.
+pub(super) fn start(
+    thread_name: String,
+    engine: Engine,
+    lease: &Lease,
+    events: mpsc::Sender<Event>,
+    stop: Arc<StopFlag>,
+) -> std::io::Result<oneshot::Receiver<Ending>> {
+    let (ended, ending) = oneshot::channel();
+    let (plan, scenario) = (lease.plan.clone(), Arc::clone(&lease.scenario));
+    std::thread::Builder::new().name(thread_name).spawn(move || {
+        let end = catch_unwind(AssertUnwindSafe(|| {
+            plan_to_its_end(&engine, &plan, &scenario, events, stop)
+        }));
+        // Nobody listens when the pool was dropped.
+        let _ = ended.send(end.unwrap_or_else(|payload| panicked(&plan, &*payload)));
+    })?;
+    Ok(ending)
+}
+
+fn plan_to_its_end(
+    engine: &Engine,
+    plan: &Plan,
+    scenario: &str,
+    events: mpsc::Sender<Event>,
+    stop: Arc<StopFlag>,
+) -> Ending {
+    let watch = Watch {
+        began: Instant::now(),
+        stop: Arc::clone(&stop),
+    };
+    let mut teller = Teller { events, stop };
+    match engine(scenario, &mut teller, &watch) {
+        Ok(outcome) => ending(&outcome, plan, scenario, watch.elapsed_ms()),
+        Err(failure) => Ending::Failed(failure),
+    }
+}
+
+fn ending(outcome: &Outcome, plan: &Plan, scenario: &str, run_ms: f64) -> Ending {
+    let started_ms = plan.started_ms.unwrap_or(plan.created_ms);
+    let origin = Origin {
+        plan_id: Some(plan.id),
+        algorithm: plan.algorithm.clone(),
+        seed: plan.seed,
+        scenario_sha256: scenario_sha256(scenario),
+        timing: Timing {
+            // The wall clock may have been set back between the two.
+            queued_ms: (started_ms - plan.created_ms).max(0) as f64,
+            run_ms,
+        },
+    };
+    Ending::Result {
+        status: match outcome.stop_reason {
+            StopReason::Cancelled => Status::Cancelled,
+            StopReason::Iterations | StopReason::Converged | StopReason::TimeLimit => Status::Succeeded,
+        },
+        stop_reason: outcome.stop_reason.name().to_owned(),
+        feasible: outcome.feasible,
+        best_cost: outcome.feasible.then_some(outcome.cost.total),
+        evaluations: outcome.evaluations,
+        iteration: outcome.convergence.last().map_or(0, |last| last.iteration as u64),
+        document: ResultDocument::new(outcome, origin).to_json(),
+    }
+}
+
+fn panicked(plan: &Plan, payload: &(dyn Any + Send)) -> Ending {
+    let message = payload
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("no message");
+    tracing::error!(plan = %plan.id, panic = message, "the planner panicked; its plan fails, the others go on");
+    Ending::Failed(Failure {
+        kind: "planner-panic".to_owned(),
+        detail: "the planner broke on this scenario; the service's log says where".to_owned(),
+    })
+}
+
+/// Hands events on; waits when they come faster than they can be stored.
+struct Teller {
+    events: mpsc::Sender<Event>,
+    stop: Arc<StopFlag>,
+}
+
+impl Teller {
+    fn tell(&self, event: Event) {
+        if self.events.blocking_send(event).is_err() {
+            self.stop.raise(Reason::Abandoned);
+        }
+    }
+}
+
+impl Observer for Teller {
+    fn iteration(&mut self, point: &ConvergencePoint) {
+        self.tell(Event::Convergence(point.into()));
+    }
+
+    fn incumbent(&mut self, incumbent: &Incumbent) {
+        self.tell(Event::Incumbent(incumbent.into()));
+    }
+}
+
+struct Watch {
+    began: Instant,
+    stop: Arc<StopFlag>,
+}
+
+impl Stop for Watch {
+    fn requested(&self) -> bool {
+        self.stop.is_raised()
+    }
+
+    fn elapsed_ms(&self) -> f64 {
+        self.began.elapsed().as_secs_f64() * 1_000.0
+    }
+}

@@ -1,0 +1,145 @@
+//! One plan's run, from its lease to its end in the store.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::{mpsc, watch};
+use tokio::time::Instant;
+
+use super::planning::{self, Reason, StopFlag};
+use super::{Pause, Phase, Slot, reached};
+use crate::job::Event;
+use crate::store::{Ending, Lease, StoreError};
+
+/// Events on their way from the planning thread; when there are more, it waits.
+const ON_THE_WAY: usize = 256;
+
+/// Events stored in one step, at most.
+const BATCH: usize = 512;
+
+/// Events are stored at the latest so long after they happened.
+const DELAY: Duration = Duration::from_millis(50);
+
+impl Slot {
+    /// Run the plan, store what it tells, and end it or give it back.
+    pub(super) async fn run(&self, lease: Lease) {
+        let plan = lease.plan.id;
+        tracing::info!(%plan, worker = self.number, attempt = lease.attempt, "plan started");
+        let stop = Arc::new(StopFlag::default());
+        let (events, told) = mpsc::channel(ON_THE_WAY);
+        let thread_name = format!("planner-{}", self.number);
+        let engine = Arc::clone(&self.engine);
+        let ending = match planning::start(thread_name, engine, &lease, events, Arc::clone(&stop)) {
+            Ok(ending) => ending,
+            Err(error) => {
+                tracing::error!(%plan, %error, "no thread to plan on; the plan goes back to the queue");
+                self.give_back(&lease).await;
+                // Soon there may be one.
+                return Pause::default().wait().await;
+            }
+        };
+        let kept = tokio::select! {
+            kept = self.keep_events(&lease, told) => kept,
+            never = stop_when_asked(&lease, self.phase.clone(), &stop) => match never {},
+        };
+        if !kept {
+            stop.raise(Reason::Abandoned);
+        }
+        let ending = ending
+            .await
+            .expect("the planning thread answers even when it panics");
+        match ending {
+            Ending::Result { .. } if stop.is_abandoned() => self.give_back(&lease).await,
+            ending => self.finish(&lease, ending).await,
+        }
+    }
+
+    /// Store events until there are no more; false when that became pointless.
+    async fn keep_events(&self, lease: &Lease, mut told: mpsc::Receiver<Event>) -> bool {
+        let mut batch = Vec::new();
+        let mut due = Instant::now();
+        loop {
+            let was_empty = batch.is_empty();
+            let room = BATCH - batch.len();
+            let more = tokio::select! {
+                count = told.recv_many(&mut batch, room) => Some(count > 0),
+                () = tokio::time::sleep_until(due), if !was_empty => None,
+            };
+            if was_empty {
+                due = Instant::now() + DELAY;
+            }
+            if more == Some(true) && batch.len() < BATCH {
+                continue;
+            }
+            if !batch.is_empty() {
+                let events = std::mem::take(&mut batch);
+                let append = || self.store.append(lease, events.clone());
+                if self.persist("events", append).await.is_none() {
+                    return false;
+                }
+            }
+            if more == Some(false) {
+                return true;
+            }
+        }
+    }
+
+    async fn finish(&self, lease: &Lease, ending: Ending) {
+        let finish = || self.store.finish(lease, ending.clone(), (self.clock)());
+        if let Some(plan) = self.persist("ending", finish).await {
+            let run_ms = plan
+                .finished_ms
+                .zip(plan.started_ms)
+                .map(|(end, start)| end - start);
+            tracing::info!(plan = %plan.id, status = plan.status.name(), run_ms, "plan ended");
+        }
+    }
+
+    async fn give_back(&self, lease: &Lease) {
+        let release = || self.store.release(lease);
+        if self.persist("release", release).await.is_some() {
+            tracing::info!(plan = %lease.plan.id, "plan given back to the queue");
+        }
+    }
+
+    /// Do a step of the store, again and again while the store fails; `None` when the plan is no
+    /// longer ours, or when the pool must end.
+    async fn persist<T, F>(&self, what: &str, step: impl Fn() -> F) -> Option<T>
+    where
+        F: Future<Output = Result<T, StoreError>>,
+    {
+        let mut pause = Pause::default();
+        loop {
+            let last_try = *self.phase.borrow() == Phase::Stopping;
+            match step().await {
+                Ok(done) => return Some(done),
+                Err(StoreError::LeaseLost(plan)) => {
+                    tracing::debug!(%plan, "the plan was taken from its worker");
+                    return None;
+                }
+                Err(error) if last_try => {
+                    tracing::error!(%error, what, "not stored; the next process runs the plan again");
+                    return None;
+                }
+                Err(error) => tracing::warn!(%error, what, "not stored yet; trying again"),
+            }
+            tokio::select! {
+                () = reached(self.phase.clone(), Phase::Stopping) => {}
+                () = pause.wait() => {}
+            }
+        }
+    }
+}
+
+/// Hand the wish to stop on to the planning thread.
+async fn stop_when_asked(lease: &Lease, phase: watch::Receiver<Phase>, stop: &StopFlag) -> Infallible {
+    let mut cancel = lease.cancel.clone();
+    tokio::select! {
+        // A cancelled plan keeps its best route, even at the end of the service.
+        biased;
+        Ok(_) = cancel.wait_for(|cancelled| *cancelled) => stop.raise(Reason::Cancelled),
+        () = reached(phase, Phase::Stopping) => stop.raise(Reason::Abandoned),
+    }
+    std::future::pending().await
+}

@@ -1,0 +1,6 @@
+//! The integration tests: one module per subject.
+
+mod store_conformance;
+mod store_sqlite;
+mod support;
+mod worker;

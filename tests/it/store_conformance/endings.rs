@@ -1,0 +1,263 @@
+//! From the claim to the end.
+
+use std::sync::Arc;
+
+use futures_util::future::join_all;
+use noctule::job::{Event, Status};
+use noctule::store::Ending;
+
+use crate::support::plans::{ending, failure, history, kind, point, statuses, submission, until};
+use crate::support::stores::on_every_backend;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_run_moves_the_record() {
+    on_every_backend(10, async |store| {
+        let id = store.submit(submission()).await.unwrap().id;
+        let lease = store.claim().await.unwrap();
+        store
+            .append(&lease, vec![point(0, None), point(1, None)])
+            .await
+            .unwrap();
+        let early = store.get(id).await.unwrap();
+        assert_eq!((early.feasible, early.best_cost), (Some(false), None));
+        store
+            .append(&lease, vec![point(2, Some(480.0)), point(4, Some(475.5))])
+            .await
+            .unwrap();
+        let later = store.get(id).await.unwrap();
+        assert_eq!((later.feasible, later.best_cost), (Some(true), Some(475.5)));
+        assert_eq!((later.iteration, later.evaluations), (4, 100));
+        assert!((later.progress - 0.4).abs() < 1e-12);
+        assert!(lease.plan.revision < early.revision && early.revision < later.revision);
+
+        let ended = store
+            .finish(&lease, ending(Status::Succeeded), 12_500)
+            .await
+            .unwrap();
+        assert_eq!(ended, store.get(id).await.unwrap());
+        assert_eq!(
+            (ended.status, ended.finished_ms),
+            (Status::Succeeded, Some(12_500))
+        );
+        assert_eq!((ended.best_cost, ended.evaluations), (Some(471.2), 220));
+        assert_eq!(ended.stop_reason.as_deref(), Some("iterations"));
+        assert!((ended.progress - 1.0).abs() < 1e-12 && ended.revision > later.revision);
+
+        let told = history(&**store, id).await;
+        assert_eq!(
+            statuses(&told),
+            [Status::Queued, Status::Running, Status::Succeeded]
+        );
+        assert_eq!(
+            told[2..6],
+            [
+                point(0, None),
+                point(1, None),
+                point(2, Some(480.0)),
+                point(4, Some(475.5))
+            ]
+        );
+        assert_eq!(
+            told[6..],
+            [Event::Status(Box::new(ended)), Event::End(Status::Succeeded)]
+        );
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_failed_run_tells_why() {
+    on_every_backend(10, async |store| {
+        let id = store.submit(submission()).await.unwrap().id;
+        let lease = store.claim().await.unwrap();
+        store.finish(&lease, failure(), 12_000).await.unwrap();
+        let plan = store.get(id).await.unwrap();
+        let Ending::Failed(expected) = failure() else {
+            unreachable!("that is what it makes")
+        };
+        assert_eq!((plan.status, plan.error), (Status::Failed, Some(expected)));
+        assert_eq!(plan.stop_reason, None);
+        assert_eq!(store.result(id).await.unwrap(), None);
+        assert_eq!(
+            history(&**store, id).await.last(),
+            Some(&Event::End(Status::Failed))
+        );
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_result_is_kept_byte_for_byte() {
+    on_every_backend(10, async |store| {
+        let id = store.submit(submission()).await.unwrap().id;
+        let lease = store.claim().await.unwrap();
+        store.finish(&lease, ending(Status::Succeeded), 0).await.unwrap();
+        let Ending::Result { document, .. } = ending(Status::Succeeded) else {
+            unreachable!("that is what it makes")
+        };
+        assert_eq!(store.result(id).await.unwrap().as_ref(), Some(&document));
+        let (plan, told) = (store.get(id).await.unwrap(), history(&**store, id).await);
+        store.reopen().await;
+        assert_eq!(store.result(id).await.unwrap(), Some(document));
+        assert_eq!(store.get(id).await.unwrap(), plan);
+        assert_eq!(history(&**store, id).await, told);
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_lease_that_is_over_changes_nothing() {
+    on_every_backend(10, async |store| {
+        let id = store.submit(submission()).await.unwrap().id;
+        let released = store.claim().await.unwrap();
+        store.release(&released).await.unwrap();
+        let recovered = store.claim().await.unwrap();
+        store.reopen().await;
+        let ended = store.claim().await.unwrap();
+        store.append(&ended, vec![point(0, None)]).await.unwrap();
+        for stale in [&released, &recovered] {
+            assert_eq!(
+                kind(store.append(stale, vec![point(5, None)]).await),
+                Err("lease lost")
+            );
+            assert_eq!(kind(store.finish(stale, failure(), 0).await), Err("lease lost"));
+            assert_eq!(kind(store.release(stale).await), Err("lease lost"));
+        }
+        store.finish(&ended, ending(Status::Succeeded), 0).await.unwrap();
+        let plan = store.get(id).await.unwrap();
+        let told = history(&**store, id).await;
+        assert_eq!(kind(store.append(&ended, vec![]).await), Err("lease lost"));
+        assert_eq!(kind(store.finish(&ended, failure(), 0).await), Err("lease lost"));
+        assert_eq!(kind(store.release(&ended).await), Err("lease lost"));
+        assert_eq!(store.get(id).await.unwrap(), plan);
+        assert_eq!(history(&**store, id).await, told);
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_queued_plan_is_cancelled_at_once_without_a_result() {
+    on_every_backend(10, async |store| {
+        let id = store.submit(submission()).await.unwrap().id;
+        let next = store.submit(submission()).await.unwrap().id;
+        let plan = store.request_cancel(id, 11_000).await.unwrap();
+        assert_eq!((plan.status, plan.finished_ms), (Status::Cancelled, Some(11_000)));
+        assert_eq!((plan.queue_position, &plan.stop_reason), (None, &None));
+        assert_eq!(store.result(id).await.unwrap(), None);
+        let told = history(&**store, id).await;
+        assert_eq!(statuses(&told), [Status::Queued, Status::Cancelled]);
+        assert_eq!(told.last(), Some(&Event::End(Status::Cancelled)));
+        // Once more changes nothing.
+        assert_eq!(store.request_cancel(id, 12_000).await.unwrap(), plan);
+        assert_eq!(history(&**store, id).await, told);
+        assert_eq!(store.get(next).await.unwrap().queue_position, Some(1));
+        assert_eq!(store.claim().await.unwrap().plan.id, next);
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_running_plan_is_told_to_stop_and_ends_with_its_result() {
+    on_every_backend(10, async |store| {
+        let id = store.submit(submission()).await.unwrap().id;
+        let mut lease = store.claim().await.unwrap();
+        assert!(!*lease.cancel.borrow());
+        let plan = store.request_cancel(id, 11_000).await.unwrap();
+        assert_eq!((plan.status, plan.cancel_requested), (Status::Running, true));
+        assert_eq!(store.request_cancel(id, 11_500).await.unwrap(), plan);
+        assert!(*lease.cancel.wait_for(|cancelled| *cancelled).await.unwrap());
+        store
+            .finish(&lease, ending(Status::Cancelled), 12_000)
+            .await
+            .unwrap();
+        let plan = store.request_cancel(id, 13_000).await.unwrap();
+        assert_eq!((plan.status, plan.finished_ms), (Status::Cancelled, Some(12_000)));
+        assert!(store.result(id).await.unwrap().is_some());
+        let told = history(&**store, id).await;
+        assert_eq!(
+            statuses(&told),
+            [
+                Status::Queued,
+                Status::Running,
+                Status::Running,
+                Status::Cancelled
+            ]
+        );
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_cancelled_run_that_comes_back_is_not_run_again() {
+    on_every_backend(10, async |store| {
+        let released = store.submit(submission()).await.unwrap().id;
+        let lease = store.claim().await.unwrap();
+        store.request_cancel(released, 11_000).await.unwrap();
+        store.release(&lease).await.unwrap();
+
+        let recovered = store.submit(submission()).await.unwrap().id;
+        let _lease = store.claim().await.unwrap();
+        store.request_cancel(recovered, 11_000).await.unwrap();
+        store.reopen().await;
+        for id in [released, recovered] {
+            let plan = store.get(id).await.unwrap();
+            assert_eq!((plan.status, plan.finished_ms), (Status::Cancelled, Some(10_000)));
+            assert_eq!(
+                history(&**store, id).await.last(),
+                Some(&Event::End(Status::Cancelled))
+            );
+        }
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plan_ends_once_however_its_endings_race() {
+    on_every_backend(300, async |store| {
+        for round in 0..150 {
+            let id = store.submit(submission()).await.unwrap().id;
+            let (claimer, canceller) = (store.share(), store.share());
+            // In half of the rounds the plan runs before anybody can cancel it.
+            let lease = if round % 2 == 0 {
+                Some(store.claim().await.unwrap())
+            } else {
+                None
+            };
+            let worker = tokio::spawn(async move {
+                let lease = match lease {
+                    Some(lease) => lease,
+                    None => claimer.claim().await.unwrap(),
+                };
+                claimer.append(&lease, vec![point(0, None)]).await.ok();
+                let ends = [
+                    claimer.finish(&lease, ending(Status::Succeeded), 1),
+                    claimer.finish(&lease, failure(), 2),
+                    claimer.finish(&lease, ending(Status::Cancelled), 3),
+                ];
+                let done = join_all(ends).await.into_iter().flatten().count();
+                assert_eq!(done, 1);
+            });
+            let cancels = (0..3).map(|_| {
+                let store = Arc::clone(&canceller);
+                tokio::spawn(async move { store.request_cancel(id, 4).await.map(|_| ()) })
+            });
+            let cancels = join_all(cancels.collect::<Vec<_>>()).await;
+            assert!(cancels.into_iter().all(|cancel| cancel.unwrap().is_ok()));
+            until(&**store, id, |plan| plan.status.is_final()).await;
+            worker.abort();
+            worker.await.ok();
+
+            let status = store.get(id).await.unwrap().status;
+            let told = history(&**store, id).await;
+            let ends = told.iter().filter(|event| matches!(event, Event::End(_))).count();
+            assert_eq!(ends, 1, "{told:?}");
+            assert_eq!(told.last(), Some(&Event::End(status)));
+            let path = statuses(&told);
+            assert!(
+                path.windows(2)
+                    .all(|step| step[0] == step[1] || step[0].may_become(step[1]))
+            );
+        }
+    })
+    .await;
+}

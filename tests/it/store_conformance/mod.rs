@@ -1,0 +1,8 @@
+//! What every store does, whatever it is made of. Each test runs on each backend of the table.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
+
+mod endings;
+mod model;
+mod queue;
+mod reading;

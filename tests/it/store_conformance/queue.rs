@@ -1,0 +1,179 @@
+//! From acceptance to the claim.
+
+use futures_util::FutureExt;
+use futures_util::future::join_all;
+use noctule::job::{Event, Status};
+use noctule::store::ListQuery;
+
+use crate::support::plans::{history, kind, point, submission, until};
+use crate::support::stores::on_every_backend;
+
+const ALL: ListQuery = ListQuery {
+    status: None,
+    before: None,
+    limit: 1_000,
+};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_accepted_plan_reads_back_as_it_was_handed_in() {
+    on_every_backend(10, async |store| {
+        let first = submission();
+        store.submit(submission()).await.unwrap();
+        let accepted = store.submit(first.clone()).await.unwrap();
+        let read = store.get(first.id).await.unwrap();
+        assert_eq!(read, accepted);
+        assert_eq!((read.status, read.queue_position), (Status::Queued, Some(2)));
+        assert_eq!((read.name, read.seed), (first.name, first.seed));
+        assert_eq!((read.iterations, read.created_ms), (10, 1_000));
+        assert_eq!(store.scenario(first.id).await.unwrap(), first.scenario);
+        assert_eq!(store.result(first.id).await.unwrap(), None);
+        assert_eq!(
+            history(&**store, first.id).await,
+            [Event::Status(Box::new(accepted))]
+        );
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn plans_run_in_the_order_of_acceptance() {
+    on_every_backend(20, async |store| {
+        let mut ids = Vec::new();
+        for _ in 0..20 {
+            ids.push(store.submit(submission()).await.unwrap().id);
+        }
+        for (place, id) in ids.iter().enumerate() {
+            let position = store.get(*id).await.unwrap().queue_position;
+            assert_eq!(position, Some(place as u64 + 1));
+        }
+        for id in ids {
+            let lease = store.claim().await.unwrap();
+            assert_eq!(lease.plan.id, id);
+            assert_eq!(&*lease.scenario, store.scenario(id).await.unwrap());
+            assert_eq!(store.get(id).await.unwrap(), lease.plan);
+            assert_eq!(lease.plan.started_ms, Some(10_000));
+        }
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_queue_is_full_at_its_limit_and_has_room_after_a_claim() {
+    on_every_backend(3, async |store| {
+        let tries = join_all((0..10).map(|_| store.submit(submission()))).await;
+        let accepted = tries.into_iter().flatten().count();
+        assert_eq!(accepted, 3);
+        assert_eq!(kind(store.submit(submission()).await), Err("queue full"));
+        assert_eq!(store.list(ALL).await.unwrap().len(), 3);
+
+        let lease = store.claim().await.unwrap();
+        assert_eq!(kind(store.submit(submission()).await), Ok(()));
+        assert_eq!(kind(store.submit(submission()).await), Err("queue full"));
+        // What comes back has been accepted already.
+        store.release(&lease).await.unwrap();
+        assert_eq!(store.stats().await.unwrap().queued, 4);
+        store.request_cancel(lease.plan.id, 0).await.unwrap();
+        assert_eq!(kind(store.submit(submission()).await), Err("queue full"));
+        let waiting = ListQuery {
+            status: Some(Status::Queued),
+            ..ALL
+        };
+        let youngest = store.list(waiting).await.unwrap()[0].id;
+        store.delete(youngest, 0).await.unwrap();
+        assert_eq!(kind(store.submit(submission()).await), Ok(()));
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_claim_waits_for_a_plan() {
+    on_every_backend(10, async |store| {
+        let mut claims: Vec<_> = (0..3).map(|_| Box::pin(store.claim())).collect();
+        for claim in &mut claims {
+            assert!(claim.now_or_never().is_none());
+        }
+        store.health().await.unwrap();
+        for claim in &mut claims {
+            assert!(claim.now_or_never().is_none());
+        }
+        let mut submitted = Vec::new();
+        for _ in 0..3 {
+            submitted.push(store.submit(submission()).await.unwrap().id);
+        }
+        let claimed = join_all(claims).await;
+        let mut claimed: Vec<_> = claimed.into_iter().map(|lease| lease.unwrap().plan.id).collect();
+        claimed.sort_unstable();
+        assert_eq!(claimed, submitted);
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_dropped_claim_takes_nothing() {
+    on_every_backend(10, async |store| {
+        // Dropped while it waits.
+        let mut waiting = Box::pin(store.claim());
+        assert!(waiting.as_mut().now_or_never().is_none());
+        drop(waiting);
+        let id = store.submit(submission()).await.unwrap().id;
+        let second = store.submit(submission()).await.unwrap().id;
+        assert_eq!(store.get(id).await.unwrap().status, Status::Queued);
+
+        // Dropped at any time after it has been sent, its answer on the way or already there.
+        for round in 0..50 {
+            let mut claim = Box::pin(store.claim());
+            assert!(claim.as_mut().now_or_never().is_none());
+            if round % 2 == 0 {
+                until(&**store, id, |plan| plan.status == Status::Running).await;
+            }
+            drop(claim);
+            until(&**store, id, |plan| plan.status == Status::Queued).await;
+        }
+        assert_eq!(store.claim().await.unwrap().plan.id, id);
+        assert_eq!(store.claim().await.unwrap().plan.id, second);
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_dropped_submission_is_still_told_to_claimers_and_followers() {
+    on_every_backend(10, async |store| {
+        let submission = submission();
+        let id = submission.id;
+        let mut changes = store.changes(id);
+        let mut submit = Box::pin(store.submit(submission));
+        assert!(submit.as_mut().now_or_never().is_none());
+        drop(submit);
+        changes.changed().await.unwrap();
+        assert_eq!(store.claim().await.unwrap().plan.id, id);
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_released_plan_is_next_and_begins_anew() {
+    on_every_backend(10, async |store| {
+        let ids = [
+            store.submit(submission()).await.unwrap().id,
+            store.submit(submission()).await.unwrap().id,
+            store.submit(submission()).await.unwrap().id,
+        ];
+        let first = store.claim().await.unwrap();
+        let second = store.claim().await.unwrap();
+        store.append(&first, vec![point(3, Some(480.0))]).await.unwrap();
+        store.release(&second).await.unwrap();
+        store.release(&first).await.unwrap();
+        let plan = store.get(ids[0]).await.unwrap();
+        assert_eq!((plan.status, plan.queue_position), (Status::Queued, Some(1)));
+        assert_eq!((plan.iteration, plan.evaluations, plan.best_cost), (0, 0, None));
+        assert_eq!((plan.feasible, plan.started_ms), (None, None));
+        assert_eq!(
+            history(&**store, ids[0]).await.last(),
+            Some(&Event::Status(Box::new(plan)))
+        );
+        for id in ids {
+            assert_eq!(store.claim().await.unwrap().plan.id, id);
+        }
+    })
+    .await;
+}

@@ -1,0 +1,176 @@
+//! What only the embedded store does.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
+
+use std::path::Path;
+
+use noctule::job::Status;
+use noctule::store::sqlite::SqliteStore;
+use noctule::store::{Options, Store, StoreError, wall_clock};
+use tempfile::TempDir;
+
+use crate::support::plans::{ending, submission};
+
+fn options() -> Options {
+    Options {
+        queue_limit: 1_000,
+        clock: wall_clock(),
+    }
+}
+
+/// The message with which opening is refused.
+fn refusal(data_dir: &Path) -> String {
+    match SqliteStore::open(data_dir, options()) {
+        Ok(_) => panic!("{} was opened", data_dir.display()),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[tokio::test]
+async fn the_data_directory_is_made_for_its_owner_alone() {
+    let parent = TempDir::new().unwrap();
+    let data_dir = parent.path().join("a/b");
+    let store = SqliteStore::open(&data_dir, options()).unwrap();
+    store.health().await.unwrap();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let mode = data_dir.metadata().unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o700);
+    }
+}
+
+#[tokio::test]
+async fn a_second_opener_is_refused_until_the_first_has_closed() {
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let second = SqliteStore::open(directory.path(), options());
+    assert!(matches!(second, Err(StoreError::InUse(path)) if path == directory.path()));
+    store.close().await;
+    let second = SqliteStore::open(directory.path(), options()).unwrap();
+    // Dropping is closing too.
+    drop(second);
+    SqliteStore::open(directory.path(), options()).unwrap();
+}
+
+#[tokio::test]
+async fn a_newer_schema_is_refused_and_left_alone() {
+    let directory = TempDir::new().unwrap();
+    SqliteStore::open(directory.path(), options()).unwrap();
+    let file = directory.path().join("noctule.db");
+    let database = rusqlite::Connection::open(&file).unwrap();
+    database.pragma_update(None, "user_version", 99).unwrap();
+    drop(database);
+    let message = refusal(directory.path());
+    assert!(
+        message.contains("schema version 99") && message.contains("up to 1"),
+        "{message}"
+    );
+    let database = rusqlite::Connection::open(&file).unwrap();
+    let version: i64 = database
+        .query_row("PRAGMA user_version", [], |row| row.get(0))
+        .unwrap();
+    assert_eq!(version, 99);
+}
+
+#[test]
+fn what_is_no_data_directory_is_refused_by_name() {
+    let directory = TempDir::new().unwrap();
+    let in_the_way = directory.path().join("file");
+    std::fs::write(&in_the_way, "").unwrap();
+    for data_dir in [in_the_way.clone(), in_the_way.join("below")] {
+        let message = refusal(&data_dir);
+        assert!(message.contains(data_dir.to_str().unwrap()), "{message}");
+    }
+
+    let no_database = directory.path().join("data");
+    std::fs::create_dir(&no_database).unwrap();
+    std::fs::write(
+        no_database.join("noctule.db"),
+        "a letter to my aunt, ".repeat(100),
+    )
+    .unwrap();
+    let message = refusal(&no_database);
+    assert!(
+        message.contains("noctule.db") && message.contains("not a database"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_directory_that_cannot_be_written_is_refused_by_name() {
+    let directory = TempDir::new().unwrap();
+    let data_dir = directory.path().join("data");
+    std::fs::create_dir(&data_dir).unwrap();
+    // A directory in the lock's place keeps out even those who may write anywhere.
+    std::fs::create_dir(data_dir.join("noctule.lock")).unwrap();
+    let message = refusal(&data_dir);
+    assert!(
+        message.contains("lock file") && message.contains("noctule.lock"),
+        "{message}"
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_person_can_read_the_file() {
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let submission = submission();
+    store.submit(submission.clone()).await.unwrap();
+    let lease = store.claim().await.unwrap();
+    store
+        .finish(&lease, ending(Status::Succeeded), 12_000)
+        .await
+        .unwrap();
+
+    let database = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
+    let row: (String, String, f64, String, bool) = database
+        .query_row(
+            "SELECT id, status, best_cost, scenarios.document, results.document LIKE '{%' FROM plans \
+             JOIN scenarios ON scenarios.plan_seq = seq JOIN results ON results.plan_seq = seq",
+            [],
+            |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, row.get(4)?)),
+        )
+        .unwrap();
+    let id = submission.id.to_string();
+    assert_eq!(
+        row,
+        (id, "succeeded".to_owned(), 471.2, submission.scenario, true)
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn one_failed_write_does_not_spoil_the_others() {
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let twice = submission();
+    store.submit(twice.clone()).await.unwrap();
+    let tries = (0..100).map(|nth| {
+        store.submit(if nth % 10 == 0 {
+            twice.clone()
+        } else {
+            submission()
+        })
+    });
+    let answers = futures_util::future::join_all(tries).await;
+    for (nth, answer) in answers.iter().enumerate() {
+        assert_eq!(answer.is_err(), nth % 10 == 0, "{nth}: {answer:?}");
+    }
+    assert_eq!(store.stats().await.unwrap().queued, 91);
+    let positions = answers.into_iter().flatten().map(|plan| plan.queue_position);
+    assert!(positions.eq((2..=91).map(Some)));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_write_waits_for_a_person_who_holds_the_file() {
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let person = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
+    person.execute_batch("BEGIN IMMEDIATE").unwrap();
+    let mut submit = store.submit(submission());
+    assert!(futures_util::FutureExt::now_or_never(&mut submit).is_none());
+    // Reading goes on meanwhile.
+    assert_eq!(store.stats().await.unwrap().queued, 0);
+    person.execute_batch("COMMIT").unwrap();
+    submit.await.unwrap();
+}

@@ -1,0 +1,102 @@
+//! A store that fails at every other step of a run, and is sound otherwise.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use async_trait::async_trait;
+use noctule::job::{Event, NumberedEvent, Plan, PlanId, Submission};
+use noctule::store::{Ending, Lease, ListQuery, Stats, Store, StoreError};
+use tokio::sync::watch;
+
+pub(crate) struct FaultyStore {
+    sound: Arc<dyn Store>,
+    steps: AtomicU64,
+}
+
+impl FaultyStore {
+    pub(crate) fn new(sound: Arc<dyn Store>) -> Self {
+        Self {
+            sound,
+            steps: AtomicU64::new(0),
+        }
+    }
+
+    /// Fails for the first, third, fifth caller and so on.
+    fn stumble(&self) -> Result<(), StoreError> {
+        match self.steps.fetch_add(1, Ordering::SeqCst) % 2 {
+            0 => Err(StoreError::Unavailable("disk full".to_owned())),
+            _ => Ok(()),
+        }
+    }
+}
+
+#[async_trait]
+impl Store for FaultyStore {
+    async fn submit(&self, submission: Submission) -> Result<Plan, StoreError> {
+        self.sound.submit(submission).await
+    }
+
+    async fn claim(&self) -> Result<Lease, StoreError> {
+        self.stumble()?;
+        self.sound.claim().await
+    }
+
+    async fn append(&self, lease: &Lease, events: Vec<Event>) -> Result<(), StoreError> {
+        self.stumble()?;
+        self.sound.append(lease, events).await
+    }
+
+    async fn finish(&self, lease: &Lease, ending: Ending, now_ms: i64) -> Result<Plan, StoreError> {
+        self.stumble()?;
+        self.sound.finish(lease, ending, now_ms).await
+    }
+
+    async fn release(&self, lease: &Lease) -> Result<(), StoreError> {
+        self.stumble()?;
+        self.sound.release(lease).await
+    }
+
+    async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
+        self.sound.request_cancel(id, now_ms).await
+    }
+
+    async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
+        self.sound.delete(id, now_ms).await
+    }
+
+    async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {
+        self.sound.get(id).await
+    }
+
+    async fn scenario(&self, id: PlanId) -> Result<String, StoreError> {
+        self.sound.scenario(id).await
+    }
+
+    async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError> {
+        self.sound.result(id).await
+    }
+
+    async fn list(&self, query: ListQuery) -> Result<Vec<Plan>, StoreError> {
+        self.sound.list(query).await
+    }
+
+    async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<Vec<NumberedEvent>, StoreError> {
+        self.sound.events(id, after, limit).await
+    }
+
+    fn changes(&self, id: PlanId) -> watch::Receiver<u64> {
+        self.sound.changes(id)
+    }
+
+    async fn stats(&self) -> Result<Stats, StoreError> {
+        self.sound.stats().await
+    }
+
+    async fn health(&self) -> Result<(), StoreError> {
+        self.sound.health().await
+    }
+
+    async fn close(&self) {
+        self.sound.close().await;
+    }
+}

@@ -1,0 +1,6 @@
+//! What several subjects need.
+
+pub(crate) mod engines;
+pub(crate) mod faulty_store;
+pub(crate) mod plans;
+pub(crate) mod stores;

@@ -2,12 +2,26 @@
 //!
 //! Plain functions: no async, no store, no clock of their own.
 
+mod certificate;
+mod encoding;
+mod objective;
 mod outcome;
+mod smoothing;
 
 pub use outcome::{
-    Bound, Clearance, ConvergencePoint, CostFigures, Incumbent, Leg, Measures, Outcome, Path, StopReason,
-    Violation,
+    Bound, Clearance, ConvergencePoint, Incumbent, Leg, Measures, Outcome, Path, StopReason, Violation,
 };
+
+pub use crate::cost::CostFigures;
+
+use crate::cost::Model;
+use crate::geometry::Point3;
+use crate::optimizer::{self, Algorithm, Optimizer, Settings};
+use crate::scenario::json::{AlgorithmRule, ParameterRule};
+use crate::scenario::{Quadrature, Scenario, Seeding};
+use crate::seeding;
+use encoding::Encoding;
+use objective::Routes;
 
 /// Follows a run. Called on the planning thread; must return quickly.
 pub trait Observer {
@@ -24,4 +38,370 @@ pub trait Stop {
     /// Milliseconds since the run began. It is reported, and compared to the request's time
     /// limit; no other decision may look at it.
     fn elapsed_ms(&self) -> f64;
+}
+
+/// The algorithms that a scenario may name, as the reader of scenarios wants them.
+#[must_use]
+pub fn algorithm_rules() -> Vec<AlgorithmRule> {
+    let rule = |parameter: &optimizer::Parameter| ParameterRule {
+        name: parameter.name,
+        min: parameter.min,
+        max: parameter.max,
+    };
+    let rules = |algorithm: &Algorithm| AlgorithmRule {
+        name: algorithm.name,
+        parameters: algorithm.parameters.iter().map(rule).collect(),
+    };
+    optimizer::ALL.iter().map(rules).collect()
+}
+
+/// Plan a route for `scenario`.
+///
+/// The outcome depends on the scenario alone, unless it sets a time limit or `stop` ends the run;
+/// `elapsed_ms` is the only figure that a clock has a part in.
+///
+/// # Panics
+/// When the scenario names an algorithm that is not in the table; its reader refuses those.
+pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -> Outcome {
+    let settings = &scenario.planner;
+    let algorithm =
+        optimizer::by_name(&settings.algorithm).expect("the reader accepts only names in the table");
+    let model = Model::new(scenario);
+
+    let mut routes = match settings.seeding {
+        // Routes along the tangents of the threats will join here.
+        Seeding::Random => Routes::new(Encoding::new(scenario), model.clone()),
+    };
+    let mut log = Log {
+        observer,
+        stop,
+        convergence: Vec::new(),
+        route: Vec::new(),
+    };
+    let mut search = (algorithm.start)(&search_settings(scenario, algorithm), &mut routes);
+    log.record(0, search.as_ref(), &routes);
+
+    let mut stop_reason = StopReason::Iterations;
+    for iteration in 1..=settings.iterations {
+        if let Some(reason) = why_stop(scenario, stop) {
+            stop_reason = reason;
+            break;
+        }
+        search.iterate(&mut routes, iteration as f64 / settings.iterations as f64);
+        log.record(iteration, search.as_ref(), &routes);
+    }
+
+    // Polishing the best route will stand here, as the last point of the curve.
+    let Log {
+        convergence, route, ..
+    } = log;
+    deliver(
+        &model,
+        route,
+        stop_reason,
+        convergence,
+        search.swarm().evaluations(),
+    )
+}
+
+fn search_settings(scenario: &Scenario, algorithm: &Algorithm) -> Settings {
+    let chosen = &scenario.planner.parameters;
+    Settings {
+        population: scenario.planner.population,
+        seed: scenario.planner.seed,
+        parameters: algorithm.parameters_with(|name| chosen.get(name).copied()),
+    }
+}
+
+fn why_stop(scenario: &Scenario, stop: &dyn Stop) -> Option<StopReason> {
+    if stop.requested() {
+        return Some(StopReason::Cancelled);
+    }
+    let limit = scenario.planner.time_limit_ms?;
+    (stop.elapsed_ms() >= limit as f64).then_some(StopReason::TimeLimit)
+}
+
+/// The curve of a run and its best route so far.
+struct Log<'o> {
+    observer: &'o mut dyn Observer,
+    stop: &'o dyn Stop,
+    convergence: Vec<ConvergencePoint>,
+    route: Vec<Point3>,
+}
+
+impl Log<'_> {
+    fn record(&mut self, iteration: usize, search: &dyn Optimizer, routes: &Routes) {
+        let swarm = search.swarm();
+        let (best, members) = (swarm.best_fitness(), swarm.fitness());
+        let count = members.len() as f64;
+        let elapsed_ms = self.stop.elapsed_ms();
+        let point = ConvergencePoint {
+            iteration,
+            evaluations: swarm.evaluations(),
+            elapsed_ms,
+            best_cost: best.is_feasible().then_some(best.cost),
+            best_violation: best.violation,
+            mean_cost: members.iter().map(|fitness| fitness.cost).sum::<f64>() / count,
+            feasible_fraction: members.iter().filter(|fitness| fitness.is_feasible()).count() as f64 / count,
+        };
+        let mut route = Vec::new();
+        routes.encoding.decode(swarm.best_position(), &mut route);
+        if route != self.route {
+            self.observer.incumbent(&Incumbent {
+                iteration,
+                elapsed_ms,
+                cost: best.cost,
+                feasible: best.is_feasible(),
+                waypoints: route.clone(),
+            });
+            self.route = route;
+        }
+        self.observer.iteration(&point);
+        self.convergence.push(point);
+    }
+}
+
+/// Price, smooth and certify the best route.
+fn deliver(
+    model: &Model,
+    route: Vec<Point3>,
+    stop_reason: StopReason,
+    mut convergence: Vec<ConvergencePoint>,
+    evaluations: u64,
+) -> Outcome {
+    let quadrature = model.scenario.planner.quadrature;
+    let cost = model.figures(&route, quadrature);
+    let violations = certificate::violations(model, &route);
+    let feasible = violations.is_empty();
+    if let Some(last) = convergence.last_mut().filter(|_| feasible) {
+        // The search aims at half the tolerance; what is delivered counts by the whole.
+        last.best_cost = Some(cost.total);
+        last.best_violation = 0.0;
+    }
+    let path = feasible.then(|| smoothing::smooth(model, &route)).flatten();
+    let lower = seeding::lower_bound(model.scenario);
+    Outcome {
+        feasible,
+        stop_reason,
+        cost,
+        cost_integral: (quadrature == Quadrature::Paper).then(|| model.figures(&route, Quadrature::Integral)),
+        bound: Bound {
+            lower,
+            gap: (feasible && lower > 0.0).then(|| cost.total / lower - 1.0),
+        },
+        legs: certificate::legs(&route),
+        waypoint_checks: certificate::measure(model, &route),
+        path_checks: path
+            .as_ref()
+            .map(|path| certificate::measure(model, &path.points)),
+        path,
+        violations,
+        waypoints: route,
+        convergence,
+        evaluations,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Point2, Rect};
+    use crate::scenario::{AltitudeBand, PlannerSettings, Smoothing, Vehicle, Weights};
+    use crate::terrain::{Flat, Terrain};
+    use crate::threat::{Cylinder, Shape, Threat};
+
+    /// Three radars on flat ground, as in the first scenario of the paper.
+    pub(super) fn scenario() -> Scenario {
+        let radar = |x, y, radius| Threat {
+            name: Some(format!("radar at {x}, {y}")),
+            shape: Shape::Cylinder(Cylinder {
+                center: Point2::new(x, y),
+                radius,
+                influence: radius + 30.0,
+            }),
+            base: None,
+            top: None,
+        };
+        Scenario {
+            name: None,
+            start: Point3::new(200.0, 100.0, 0.0),
+            target: Point3::new(800.0, 800.0, 150.0),
+            area: Rect {
+                min: Point2::new(0.0, 0.0),
+                max: Point2::new(1000.0, 1000.0),
+            },
+            threats: vec![
+                radar(350.0, 250.0, 60.0),
+                radar(500.0, 480.0, 70.0),
+                radar(680.0, 620.0, 60.0),
+            ],
+            terrain: Terrain::Flat(Flat { elevation: 0.0 }),
+            altitude: AltitudeBand { min: 0.0, max: 200.0 },
+            vehicle: Vehicle {
+                max_turn_deg: 60.0,
+                max_climb_deg: 45.0,
+                min_leg: 8.4,
+                cruise_speed: 15.0,
+                fuel_per_km: 1000.0,
+            },
+            weights: Weights {
+                fuel: 0.5,
+                threat: 1.0,
+                altitude: 1.0,
+            },
+            planner: PlannerSettings {
+                algorithm: "tms-sba".to_owned(),
+                waypoints: 10,
+                population: 60,
+                iterations: 60,
+                seed: 7,
+                time_limit_ms: None,
+                seeding: Seeding::Random,
+                polish: false,
+                smoothing: Smoothing {
+                    degree: 3,
+                    spacing: 5.0,
+                },
+                quadrature: Quadrature::Integral,
+                parameters: std::collections::BTreeMap::new(),
+            },
+        }
+    }
+
+    #[derive(Default)]
+    struct Diary {
+        points: Vec<ConvergencePoint>,
+        incumbents: Vec<Incumbent>,
+    }
+
+    impl Observer for Diary {
+        fn iteration(&mut self, point: &ConvergencePoint) {
+            self.points.push(*point);
+        }
+        fn incumbent(&mut self, incumbent: &Incumbent) {
+            self.incumbents.push(incumbent.clone());
+        }
+    }
+
+    /// A clock that only moves when looked at, and a stop after so many looks.
+    struct Looks {
+        count: std::cell::Cell<u32>,
+        stop_after: u32,
+    }
+
+    impl Looks {
+        fn until(stop_after: u32) -> Self {
+            Self {
+                count: std::cell::Cell::new(0),
+                stop_after,
+            }
+        }
+    }
+
+    impl Stop for Looks {
+        fn requested(&self) -> bool {
+            self.count.set(self.count.get() + 1);
+            self.count.get() > self.stop_after
+        }
+        fn elapsed_ms(&self) -> f64 {
+            f64::from(self.count.get())
+        }
+    }
+
+    #[test]
+    fn a_run_delivers_a_feasible_route_and_tells_its_story() {
+        let mut diary = Diary::default();
+        let outcome = plan(&scenario(), &mut diary, &Looks::until(u32::MAX));
+        assert!(outcome.feasible && outcome.violations.is_empty());
+        assert_eq!(outcome.stop_reason, StopReason::Iterations);
+        assert_eq!(outcome.convergence, diary.points);
+        assert_eq!(outcome.convergence.len(), 61);
+        let last = diary
+            .incumbents
+            .last()
+            .expect("the first evaluation is an incumbent");
+        assert_eq!(last.waypoints, outcome.waypoints);
+        assert_eq!(last.cost.to_bits(), outcome.cost.total.to_bits());
+        let mut before = f64::INFINITY;
+        for point in &outcome.convergence {
+            assert!(point.best_cost.unwrap_or(f64::INFINITY) <= before);
+            before = point.best_cost.unwrap_or(f64::INFINITY);
+        }
+        assert!(outcome.bound.lower <= outcome.cost.total);
+        let path = outcome.path.expect("a feasible route has a path");
+        let checks = outcome.path_checks.expect("and the path its certificate");
+        assert!(
+            checks
+                .clearance
+                .iter()
+                .all(|clearance| clearance.distance.expect("unbounded threats") >= -1e-6)
+        );
+        assert!(path.points.len() > 100);
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_bits_and_another_does_not() {
+        let run = |seed| {
+            let mut scenario = scenario();
+            scenario.planner.seed = seed;
+            plan(&scenario, &mut Diary::default(), &Looks::until(u32::MAX))
+        };
+        assert_eq!(run(1), run(1));
+        assert_ne!(run(1).waypoints, run(2).waypoints);
+    }
+
+    #[test]
+    fn a_stop_keeps_the_best_so_far() {
+        let outcome = plan(&scenario(), &mut Diary::default(), &Looks::until(5));
+        assert_eq!(outcome.stop_reason, StopReason::Cancelled);
+        assert_eq!(outcome.convergence.len(), 6);
+        let longer = plan(&scenario(), &mut Diary::default(), &Looks::until(u32::MAX));
+        assert_eq!(outcome.convergence[..], longer.convergence[..6]);
+    }
+
+    #[test]
+    fn a_time_limit_ends_the_run() {
+        let mut scenario = scenario();
+        scenario.planner.time_limit_ms = Some(10);
+        let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(u32::MAX));
+        assert_eq!(outcome.stop_reason, StopReason::TimeLimit);
+        assert_eq!(outcome.convergence.len(), 10);
+    }
+
+    #[test]
+    fn an_impossible_scenario_ends_with_its_violations() {
+        let mut scenario = scenario();
+        // A wall across the whole area.
+        scenario.threats[1].shape = Shape::Polygon(crate::threat::Polygon::new(
+            vec![
+                Point2::new(-100.0, 400.0),
+                Point2::new(1100.0, 400.0),
+                Point2::new(1100.0, 450.0),
+                Point2::new(-100.0, 450.0),
+            ],
+            0.0,
+        ));
+        let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(u32::MAX));
+        assert!(!outcome.feasible && outcome.path.is_none() && outcome.path_checks.is_none());
+        assert!(
+            outcome
+                .violations
+                .iter()
+                .any(|violation| violation.kind == "threat")
+        );
+        assert_eq!(outcome.bound.gap, None);
+    }
+
+    #[test]
+    fn the_papers_quadrature_reports_both_figures() {
+        let mut scenario = scenario();
+        scenario.planner.quadrature = Quadrature::Paper;
+        let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(u32::MAX));
+        let exact = outcome
+            .cost_integral
+            .expect("the integral is reported beside the samples");
+        assert_eq!(exact.fuel.to_bits(), outcome.cost.fuel.to_bits());
+        let last = outcome.convergence.last().expect("there is a curve");
+        assert_eq!(last.best_cost, Some(outcome.cost.total));
+    }
 }

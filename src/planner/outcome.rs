@@ -1,5 +1,6 @@
 //! What a run delivers. Lengths in metres, angles in degrees.
 
+use crate::cost::CostFigures;
 use crate::geometry::Point3;
 
 /// The end of a run: the best route, its price, its certificate and how it was found.
@@ -57,19 +58,6 @@ impl StopReason {
             Self::Cancelled => "cancelled",
         }
     }
-}
-
-/// The weighted terms of Eq. 1; `total` is their sum.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CostFigures {
-    /// F.
-    pub total: f64,
-    /// w1 F1.
-    pub fuel: f64,
-    /// w2 F2.
-    pub threat: f64,
-    /// w3 F3.
-    pub altitude: f64,
 }
 
 /// A proven lower bound on the total cost of any route for the scenario.

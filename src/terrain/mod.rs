@@ -2,7 +2,15 @@
 //!
 //! Adding a kind is one file beside `flat.rs` and one variant of [`Terrain`].
 
-use crate::geometry::Point2;
+mod flat;
+mod grid;
+mod peaks;
+
+pub use flat::Flat;
+pub use grid::Grid;
+pub use peaks::{Peak, Peaks};
+
+use crate::geometry::{Point2, Rect, Segment};
 
 /// The ground of a scenario.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,44 +23,89 @@ pub enum Terrain {
     Grid(Grid),
 }
 
-/// Level ground.
+/// Least and greatest height above ground along a part of a leg, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Flat {
-    /// Metres in the frame.
-    pub elevation: f64,
+pub struct HeightRange {
+    /// Least.
+    pub min: f64,
+    /// Greatest.
+    pub max: f64,
 }
 
-/// Mountains `base + sum height * exp(-(dx/sx)^2 - (dy/sy)^2)`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Peaks {
-    /// Elevation far from every peak, metres.
-    pub base: f64,
-    /// In the order of the request.
-    pub peaks: Vec<Peak>,
+impl HeightRange {
+    /// Of nothing: every range that is joined to it replaces it.
+    pub const EMPTY: Self = Self {
+        min: f64::INFINITY,
+        max: f64::NEG_INFINITY,
+    };
+
+    /// The range of both.
+    #[must_use]
+    pub fn join(self, other: Self) -> Self {
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+        }
+    }
 }
 
-/// One mountain.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Peak {
-    /// Of the summit.
-    pub center: Point2,
-    /// Above the base, metres.
-    pub height: f64,
-    /// `(sx, sy)`, metres, each > 0.
-    pub spread: Point2,
-}
+impl Terrain {
+    /// Elevation of the ground at `point`, metres in the frame. Beyond a grid's edge, that of the
+    /// edge; no waypoint may lie there.
+    #[must_use]
+    pub fn elevation(&self, point: Point2) -> f64 {
+        match self {
+            Self::Flat(flat) => flat.elevation,
+            Self::Peaks(peaks) => peaks.elevation(point),
+            Self::Grid(grid) => grid.elevation(point),
+        }
+    }
 
-/// Elevations at nodes, row-major from south to north; the ground between them is bilinear.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Grid {
-    /// The first (south-west) node.
-    pub origin: Point2,
-    /// Distance between nodes, metres, > 0.
-    pub cell: f64,
-    /// Nodes from west to east, >= 2.
-    pub columns: usize,
-    /// Nodes from south to north, >= 2.
-    pub rows: usize,
-    /// `rows * columns` metres.
-    pub elevations: Vec<f64>,
+    /// Least and greatest height above ground over the part `window` of `leg`: exact on flat
+    /// ground and grids, to a micrometre over peaks.
+    #[must_use]
+    pub fn height_range(&self, leg: &Segment, window: (f64, f64)) -> HeightRange {
+        match self {
+            Self::Flat(flat) => flat.height_range(leg, window),
+            Self::Peaks(peaks) => peaks.height_range(leg, window),
+            Self::Grid(grid) => grid.height_range(leg, window),
+        }
+    }
+
+    /// How far the part `window` of `leg` dips below `floor` and rises above `ceiling` (heights
+    /// above ground), metres, each >= 0. The same as by [`Terrain::height_range`], but cheap where
+    /// the leg keeps well within them.
+    #[must_use]
+    pub fn excess(&self, leg: &Segment, window: (f64, f64), floor: f64, ceiling: f64) -> (f64, f64) {
+        let range = match self {
+            Self::Peaks(peaks) => peaks.height_range_beyond(
+                leg,
+                window,
+                HeightRange {
+                    min: floor,
+                    max: ceiling,
+                },
+            ),
+            Self::Flat(_) | Self::Grid(_) => self.height_range(leg, window),
+        };
+        ((floor - range.min).max(0.0), (range.max - ceiling).max(0.0))
+    }
+
+    /// Where the ground is known; `None` is everywhere.
+    #[must_use]
+    pub fn extent(&self) -> Option<Rect> {
+        match self {
+            Self::Flat(_) | Self::Peaks(_) => None,
+            Self::Grid(grid) => Some(grid.extent()),
+        }
+    }
+
+    /// How exactly heights above this ground are known, metres: what a constraint may be missed by.
+    #[must_use]
+    pub fn tolerance(&self) -> f64 {
+        match self {
+            Self::Peaks(_) => 1e-3,
+            Self::Flat(_) | Self::Grid(_) => 0.0,
+        }
+    }
 }

@@ -3,7 +3,13 @@
 //!
 //! Adding a shape is one file beside `cylinder.rs` and one variant of [`Shape`].
 
-use crate::geometry::Point2;
+mod cylinder;
+mod polygon;
+
+pub use cylinder::Cylinder;
+pub use polygon::Polygon;
+
+use crate::geometry::{Point2, Point3, Rect, Segment};
 
 /// A threat of the scenario: a horizontal shape between two optional heights.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,22 +33,103 @@ pub enum Shape {
     Polygon(Polygon),
 }
 
-/// A disc that is never entered, and a soft zone that costs, Eq. 5.
+/// How one leg fares with one threat.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cylinder {
-    /// Of the axis.
-    pub center: Point2,
-    /// Never entered, metres; `d_min` of the paper.
-    pub radius: f64,
-    /// End of the soft zone, metres from the axis, >= `radius`; `d_max` of the paper.
-    pub influence: f64,
+pub struct Encounter {
+    /// Least horizontal distance to the boundary, metres, negative inside; `None` when the leg is
+    /// never between base and top.
+    pub clearance: Option<f64>,
+    /// Integral of `T(d)` along the leg, Eq. 4-5, square metres.
+    pub exposure: f64,
 }
 
-/// A simple ring that is never entered, and a soft zone outside it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Polygon {
-    /// Three or more, no repeated closing vertex, either orientation.
-    pub vertices: Vec<Point2>,
-    /// Width of the soft zone, metres.
-    pub margin: f64,
+impl Encounter {
+    /// With a threat whose soft zone the leg never reaches; the distance is not known exactly.
+    const FAR: Self = Self {
+        clearance: None,
+        exposure: 0.0,
+    };
+}
+
+impl Threat {
+    /// Whether `point` is strictly inside, between base and top.
+    #[must_use]
+    pub fn contains(&self, point: Point3) -> bool {
+        self.reaches(point.z)
+            && match &self.shape {
+                Shape::Cylinder(cylinder) => cylinder.distance(point.xy()) < 0.0,
+                Shape::Polygon(polygon) => polygon.contains(point.xy()),
+            }
+    }
+
+    /// `T(d)` of Eq. 5 at `point`, metres.
+    #[must_use]
+    pub fn intensity(&self, point: Point3) -> f64 {
+        if !self.reaches(point.z) {
+            return 0.0;
+        }
+        match &self.shape {
+            Shape::Cylinder(cylinder) => cylinder.intensity(point.xy()),
+            Shape::Polygon(polygon) => polygon.intensity(point.xy()),
+        }
+    }
+
+    /// Least horizontal distance of `leg` to the boundary, metres, negative inside; `None` when the
+    /// leg is never between base and top.
+    #[must_use]
+    pub fn clearance(&self, leg: &Segment) -> Option<f64> {
+        let window = leg.between_heights(self.base, self.top)?;
+        Some(match &self.shape {
+            Shape::Cylinder(cylinder) => cylinder.clearance(leg, window),
+            Shape::Polygon(polygon) => polygon.clearance(leg, window),
+        })
+    }
+
+    /// Clearance and exposure at once, cheaply nothing when `leg` is beyond the soft zone.
+    #[must_use]
+    pub fn encounter(&self, leg: &Segment) -> Encounter {
+        let reached = match &self.shape {
+            Shape::Cylinder(cylinder) => cylinder.may_reach(leg),
+            Shape::Polygon(polygon) => polygon.may_reach(leg),
+        };
+        let Some(window) = reached
+            .then(|| leg.between_heights(self.base, self.top))
+            .flatten()
+        else {
+            return Encounter::FAR;
+        };
+        match &self.shape {
+            Shape::Cylinder(cylinder) => Encounter {
+                clearance: Some(cylinder.clearance(leg, window)),
+                exposure: cylinder.exposure(leg, window),
+            },
+            Shape::Polygon(polygon) => Encounter {
+                clearance: Some(polygon.clearance(leg, window)),
+                exposure: polygon.exposure(leg, window),
+            },
+        }
+    }
+
+    /// The box round the shape and its soft zone.
+    #[must_use]
+    pub fn extent(&self) -> Rect {
+        match &self.shape {
+            Shape::Cylinder(cylinder) => cylinder.extent(),
+            Shape::Polygon(polygon) => polygon.extent(),
+        }
+    }
+
+    fn reaches(&self, z: f64) -> bool {
+        self.base.is_none_or(|base| z >= base) && self.top.is_none_or(|top| z < top)
+    }
+}
+
+/// `distance` from a shape's own edge of the soft zone inwards: `T(d)` of Eq. 5.
+fn intensity(influence: f64, distance: f64) -> f64 {
+    (influence - distance).max(0.0)
+}
+
+/// Exposure of a leg that has no horizontal extent: `T` is the same all along.
+fn hover_exposure(leg: &Segment, (t0, t1): (f64, f64), intensity_at: impl Fn(Point2) -> f64) -> f64 {
+    intensity_at(leg.at(0.5 * (t0 + t1)).xy()) * leg.length() * (t1 - t0)
 }

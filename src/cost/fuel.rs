@@ -1,0 +1,8 @@
+//! Eq. 2: fuel in proportion to the length flown.
+
+use crate::scenario::Vehicle;
+
+/// F1 of a route of `length` metres; with 1000 a kilometre, a metre costs 1.
+pub(super) fn fuel(vehicle: &Vehicle, length: f64) -> f64 {
+    vehicle.fuel_per_km / 1000.0 * length
+}

@@ -1,0 +1,58 @@
+//! An axis-aligned rectangle.
+
+use super::Point2;
+
+/// An axis-aligned rectangle of the horizontal plane, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rect {
+    /// South-west corner.
+    pub min: Point2,
+    /// North-east corner.
+    pub max: Point2,
+}
+
+impl Rect {
+    /// The smallest rectangle round `points`; `None` without points.
+    #[must_use]
+    pub fn around(points: impl IntoIterator<Item = Point2>) -> Option<Self> {
+        points.into_iter().fold(None, |rect: Option<Self>, point| {
+            let rect = rect.unwrap_or(Self {
+                min: point,
+                max: point,
+            });
+            Some(Self {
+                min: Point2::new(rect.min.x.min(point.x), rect.min.y.min(point.y)),
+                max: Point2::new(rect.max.x.max(point.x), rect.max.y.max(point.y)),
+            })
+        })
+    }
+
+    /// The rectangle with `margin` added on every side.
+    #[must_use]
+    pub fn grown(&self, margin: f64) -> Self {
+        Self {
+            min: Point2::new(self.min.x - margin, self.min.y - margin),
+            max: Point2::new(self.max.x + margin, self.max.y + margin),
+        }
+    }
+
+    /// Whether `point` lies inside or on the edge.
+    #[must_use]
+    pub fn contains(&self, point: Point2) -> bool {
+        self.excess(point) <= 0.0
+    }
+
+    /// How far `point` lies outside, metres; 0 inside.
+    #[must_use]
+    pub fn excess(&self, point: Point2) -> f64 {
+        let dx = (self.min.x - point.x).max(point.x - self.max.x).max(0.0);
+        let dy = (self.min.y - point.y).max(point.y - self.max.y).max(0.0);
+        (dx * dx + dy * dy).sqrt()
+    }
+
+    /// Length of the diagonal, metres.
+    #[must_use]
+    pub fn diagonal(&self) -> f64 {
+        (self.max - self.min).norm()
+    }
+}

@@ -1,0 +1,166 @@
+//! Population searches over a box of real numbers. They know an [`Objective`], not an aircraft.
+//!
+//! Adding an algorithm is one file beside `tms_sba.rs` and one row of [`ALL`].
+
+mod random;
+mod swarm;
+mod tms_sba;
+
+pub use random::Random;
+pub use swarm::Swarm;
+
+use std::cmp::Ordering;
+
+/// How good a position is, by Deb's rule: less violation first, then less cost.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fitness {
+    /// Total violation of the constraints, 0 when feasible.
+    pub violation: f64,
+    /// To be minimised.
+    pub cost: f64,
+}
+
+impl Fitness {
+    /// Worse than everything.
+    pub const WORST: Self = Self {
+        violation: f64::INFINITY,
+        cost: f64::INFINITY,
+    };
+
+    /// The total order of Deb's rule; better is less.
+    #[must_use]
+    pub fn rank(&self, other: &Self) -> Ordering {
+        self.violation
+            .total_cmp(&other.violation)
+            .then(self.cost.total_cmp(&other.cost))
+    }
+
+    /// Whether it is strictly better than `other`.
+    #[must_use]
+    pub fn beats(&self, other: &Self) -> bool {
+        self.rank(other) == Ordering::Less
+    }
+
+    /// Whether every constraint is kept.
+    #[must_use]
+    pub fn is_feasible(&self) -> bool {
+        self.violation <= 0.0
+    }
+}
+
+/// The box that positions are kept in, one interval a dimension.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bounds {
+    /// Least value of each dimension.
+    pub lower: Vec<f64>,
+    /// Greatest value of each dimension.
+    pub upper: Vec<f64>,
+}
+
+impl Bounds {
+    /// Number of dimensions.
+    #[must_use]
+    pub fn dimension(&self) -> usize {
+        self.lower.len()
+    }
+
+    /// Width of dimension `dim`.
+    #[must_use]
+    pub fn range(&self, dim: usize) -> f64 {
+        self.upper[dim] - self.lower[dim]
+    }
+
+    /// Bring `position` into the box.
+    pub fn clamp(&self, position: &mut [f64]) {
+        for (value, (lower, upper)) in position.iter_mut().zip(self.lower.iter().zip(&self.upper)) {
+            *value = value.clamp(*lower, *upper);
+        }
+    }
+}
+
+/// What is searched.
+pub trait Objective {
+    /// Where positions may lie.
+    fn bounds(&self) -> &Bounds;
+
+    /// Write a start position, by default uniform within the bounds.
+    fn draw(&mut self, random: &mut Random, position: &mut [f64]) {
+        let bounds = self.bounds();
+        for (dim, value) in position.iter_mut().enumerate() {
+            *value = random.between(bounds.lower[dim], bounds.upper[dim]);
+        }
+    }
+
+    /// Price `fitness.len()` positions, laid end to end.
+    fn evaluate(&mut self, positions: &[f64], fitness: &mut [Fitness]);
+}
+
+/// A running search.
+pub trait Optimizer {
+    /// Do one iteration; `progress` is the share of the run that is done, 0 to 1.
+    fn iterate(&mut self, objective: &mut dyn Objective, progress: f64);
+
+    /// The population and the best position so far.
+    fn swarm(&self) -> &Swarm;
+}
+
+/// One constant of an algorithm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// As in `planner.parameters`.
+    pub name: &'static str,
+    /// Used when the caller sets none.
+    pub default: f64,
+    /// Smallest value allowed.
+    pub min: f64,
+    /// Largest value allowed.
+    pub max: f64,
+    /// For people.
+    pub meaning: &'static str,
+}
+
+/// An algorithm by name.
+#[derive(Debug, Clone, Copy)]
+pub struct Algorithm {
+    /// As in `planner.algorithm`.
+    pub name: &'static str,
+    /// For people.
+    pub title: &'static str,
+    /// Where it was published.
+    pub source: &'static str,
+    /// Its constants.
+    pub parameters: &'static [Parameter],
+    /// Draw and price the first population.
+    pub start: fn(&Settings, &mut dyn Objective) -> Box<dyn Optimizer>,
+}
+
+/// How to run an algorithm.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Number of bats, particles or bees, >= 1.
+    pub population: usize,
+    /// Of all its random numbers.
+    pub seed: u64,
+    /// Value of each parameter, in the order of the algorithm's table.
+    pub parameters: Vec<f64>,
+}
+
+impl Algorithm {
+    /// The values of all parameters, `chosen` where it names one, defaults elsewhere.
+    #[must_use]
+    pub fn parameters_with(&self, chosen: impl Fn(&str) -> Option<f64>) -> Vec<f64> {
+        self.parameters
+            .iter()
+            .map(|p| chosen(p.name).unwrap_or(p.default))
+            .collect()
+    }
+}
+
+/// Every algorithm; the first is the default.
+pub const ALL: &[Algorithm] = &[tms_sba::ALGORITHM];
+
+/// The algorithm of that name.
+#[must_use]
+pub fn by_name(name: &str) -> Option<&'static Algorithm> {
+    ALL.iter().find(|algorithm| algorithm.name == name)
+}

@@ -1,0 +1,298 @@
+//! Eq. 26-27: a B-spline over the waypoints that keeps every constraint the waypoints keep.
+//!
+//! The control points are the waypoints. Where the curve, or the polyline through its samples,
+//! would cut into a threat, the ground or a limit, the corners that shape it there are drawn
+//! tighter: first two control points are added on the legs beside a corner, nearer and nearer, at
+//! last the corner itself is repeated until the curve passes through it. With all corners repeated
+//! the curve is the polyline of the waypoints, so a feasible route always has a path.
+
+use super::Path;
+use crate::cost::{Constraint, Model, Tolerance};
+use crate::geometry::Point3;
+use crate::geometry::bspline::BSpline;
+use crate::scenario::Quadrature;
+
+/// How tightly a corner is drawn: 0 is the bare waypoint, [`SHARP`] the repeated one.
+type Tightness = u32;
+
+/// The corner itself.
+const SHARP: Tightness = 7;
+
+/// Samples lie no farther than this from the curve's own bulge, metres.
+const SAGITTA: f64 = 0.02;
+
+/// The fine polyline that stands for the curve keeps this near to it, metres.
+const DEVIATION: f64 = 5e-4;
+
+/// What the curve may be missed by, less [`DEVIATION`]: 1 mm at threats, 1 cm at heights.
+const CURVE_TOLERANCE: Tolerance = Tolerance {
+    length_m: 4e-4,
+    height_m: 9e-3,
+    angle_deg: f64::INFINITY,
+};
+
+/// A chord of a curve may climb this much steeper than the limit, degrees.
+const CHORD_CLIMB_SLACK: f64 = 0.05;
+
+/// More samples than this are not delivered; the spacing grows instead.
+const MOST_SAMPLES: f64 = 200_000.0;
+
+/// A sample of the curve.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    point: Point3,
+    u: f64,
+    /// First control point of the polynomial piece that ends here.
+    piece: usize,
+}
+
+/// The smoothed path of `route`; `None` when even its polyline breaks a constraint.
+pub(super) fn smooth(model: &Model, route: &[Point3]) -> Option<Path> {
+    let smoothing = model.scenario.planner.smoothing;
+    let length: f64 = route.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum();
+    let spacing = smoothing.spacing.max(length / MOST_SAMPLES);
+    let mut tightness: Vec<Tightness> = vec![0; route.len()];
+    loop {
+        let (control_points, corners) = control_points(route, &tightness, smoothing.degree);
+        if control_points.len() <= smoothing.degree {
+            tighten(&mut tightness, 0..route.len());
+            continue;
+        }
+        let spline = BSpline::clamped_uniform(control_points, smoothing.degree);
+        let samples = sample(&spline, spacing);
+        let cutting = cutting_pieces(model, &spline, &samples);
+        if cutting.is_empty() {
+            return Some(deliver(model, spline, &samples));
+        }
+        let shaped_by = |piece: usize| corners[piece..=piece + spline.degree].iter().copied();
+        if !tighten(&mut tightness, cutting.into_iter().flat_map(shaped_by)) {
+            return None;
+        }
+    }
+}
+
+fn deliver(model: &Model, spline: BSpline, samples: &[Sample]) -> Path {
+    let points: Vec<Point3> = samples.iter().map(|sample| sample.point).collect();
+    let length = points.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum();
+    Path {
+        points,
+        length,
+        degree: spline.degree,
+        knots: spline.knots,
+        control_points: spline.control_points,
+        duration_s: length / model.scenario.vehicle.cruise_speed,
+    }
+}
+
+/// Draw each of `corners` one step tighter, once; whether any could be.
+fn tighten(tightness: &mut [Tightness], corners: impl IntoIterator<Item = usize>) -> bool {
+    let before = tightness.to_vec();
+    for corner in corners {
+        tightness[corner] = (before[corner] + 1).min(SHARP);
+    }
+    *tightness != *before
+}
+
+/// The control points, and the waypoint that each belongs to.
+fn control_points(route: &[Point3], tightness: &[Tightness], degree: usize) -> (Vec<Point3>, Vec<usize>) {
+    let last = route.len() - 1;
+    let mut points = vec![route[0]];
+    let mut corners = vec![0];
+    for corner in 1..last {
+        let at = route[corner];
+        // On the legs before and after, at 1/4, 1/8, ... of each.
+        let beside =
+            |neighbour: Point3| at + (neighbour - at) * 0.5_f64.powi(tightness[corner].cast_signed() + 1);
+        match tightness[corner] {
+            0 => points.push(at),
+            SHARP => points.extend(std::iter::repeat_n(at, degree)),
+            _ => points.extend([beside(route[corner - 1]), at, beside(route[corner + 1])]),
+        }
+        corners.resize(points.len(), corner);
+    }
+    points.push(route[last]);
+    corners.push(last);
+    (points, corners)
+}
+
+/// Samples of the curve, no farther apart than `spacing`, every knot among them.
+fn sample(spline: &BSpline, spacing: f64) -> Vec<Sample> {
+    let mut samples = vec![Sample {
+        point: spline.control_points[0],
+        u: 0.0,
+        piece: 0,
+    }];
+    for (piece, u0, u1) in spline.spans() {
+        let end = Sample {
+            point: spline.at(piece, u1),
+            u: u1,
+            piece,
+        };
+        let start = Sample {
+            point: spline.at(piece, u0),
+            u: u0,
+            piece,
+        };
+        bisect(spline, spacing, start, end, &mut samples);
+    }
+    // Where control points coincide, a piece has no extent.
+    samples.dedup_by(|next, before| {
+        let same = (next.point - before.point).norm() < SHORTEST_CHORD;
+        if same {
+            before.u = next.u;
+        }
+        same
+    });
+    let last = samples.len() - 1;
+    samples[0].point = spline.control_points[0];
+    samples[last].point = spline.control_points[spline.control_points.len() - 1];
+    samples
+}
+
+/// Samples nearer than this are one, metres.
+const SHORTEST_CHORD: f64 = 1e-6;
+
+fn bisect(spline: &BSpline, spacing: f64, start: Sample, end: Sample, samples: &mut Vec<Sample>) {
+    let u = 0.5 * (start.u + end.u);
+    let middle = Sample {
+        point: spline.at(start.piece, u),
+        u,
+        piece: start.piece,
+    };
+    let chord = end.point - start.point;
+    let length = chord.norm();
+    let bulge = if length < SHORTEST_CHORD {
+        (middle.point - start.point).norm()
+    } else {
+        (middle.point - start.point).cross(&chord).norm() / length
+    };
+    if length > spacing || bulge > SAGITTA {
+        bisect(spline, spacing, start, middle, samples);
+        bisect(spline, spacing, middle, end, samples);
+    } else {
+        samples.push(end);
+    }
+}
+
+/// The polynomial pieces at which the polyline of `samples`, or the curve itself, breaks a constraint.
+fn cutting_pieces(model: &Model, spline: &BSpline, samples: &[Sample]) -> Vec<usize> {
+    let mut cutting = Vec::new();
+    let points: Vec<Point3> = samples.iter().map(|sample| sample.point).collect();
+    model.assess(&points, Quadrature::Integral, model.tolerance, |breach| {
+        let counts = match breach.constraint {
+            Constraint::Threat | Constraint::Altitude | Constraint::Terrain | Constraint::Turn => true,
+            Constraint::Climb => breach.amount > CHORD_CLIMB_SLACK,
+            Constraint::Leg | Constraint::Area => false,
+        };
+        if counts {
+            // Leg k ends at sample k + 1; a turn at its start is shaped by the piece before too.
+            cutting.push(samples[breach.index + 1].piece);
+            if breach.constraint == Constraint::Turn {
+                cutting.push(samples[breach.index].piece);
+            }
+        }
+    });
+    if cutting.is_empty() {
+        let (curve, pieces) = fine_polyline(spline, samples);
+        model.assess(&curve, Quadrature::Integral, CURVE_TOLERANCE, |breach| {
+            if matches!(
+                breach.constraint,
+                Constraint::Threat | Constraint::Altitude | Constraint::Terrain
+            ) {
+                cutting.push(pieces[breach.index + 1]);
+            }
+        });
+    }
+    cutting.sort_unstable();
+    cutting.dedup();
+    cutting
+}
+
+/// A polyline within [`DEVIATION`] of the curve, and the piece that each of its points belongs to.
+fn fine_polyline(spline: &BSpline, samples: &[Sample]) -> (Vec<Point3>, Vec<usize>) {
+    let mut points = vec![samples[0].point];
+    let mut pieces = vec![samples[0].piece];
+    for ends in samples.windows(2) {
+        let (from, to) = (ends[0].u, ends[1].u);
+        // A curve keeps within |C''| width^2 / 8 of its chord.
+        let bulge = spline.curvature_bound(ends[1].piece) * (to - from) * (to - from) / 8.0;
+        let steps = (bulge / DEVIATION).sqrt().ceil().max(1.0);
+        let mut step = 1.0;
+        while step < steps {
+            points.push(spline.at(ends[1].piece, from + (to - from) * step / steps));
+            pieces.push(ends[1].piece);
+            step += 1.0;
+        }
+        points.push(ends[1].point);
+        pieces.push(ends[1].piece);
+    }
+    (points, pieces)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::tests::scenario;
+
+    fn points(route: &[[f64; 3]]) -> Vec<Point3> {
+        route.iter().map(|&point| Point3::from(point)).collect()
+    }
+
+    #[test]
+    fn a_route_in_the_open_keeps_its_waypoints_as_control_points() {
+        let scenario = scenario();
+        let route = points(&[
+            [200.0, 100.0, 0.0],
+            [150.0, 400.0, 100.0],
+            [300.0, 900.0, 100.0],
+            [800.0, 800.0, 150.0],
+        ]);
+        let path = smooth(&Model::new(&scenario), &route).expect("nothing is in the way");
+        assert_eq!(path.control_points, route);
+        assert_eq!(path.points[0], route[0]);
+        assert_eq!(path.points[path.points.len() - 1], route[3]);
+        let longest = path
+            .points
+            .windows(2)
+            .map(|ends| (ends[1] - ends[0]).norm())
+            .fold(0.0, f64::max);
+        assert!(longest <= scenario.planner.smoothing.spacing);
+        assert!((path.duration_s * scenario.vehicle.cruise_speed - path.length).abs() < 1e-9);
+    }
+
+    /// The corner stands on the edge of the disc (500, 480, 70); the bare spline would cut into it.
+    #[test]
+    fn a_corner_round_a_threat_is_drawn_tighter() {
+        let mut scenario = scenario();
+        let side = 70.01 * std::f64::consts::FRAC_1_SQRT_2;
+        let route = points(&[
+            [200.0, 100.0, 0.0],
+            [380.0, 120.0, 50.0],
+            [500.0 + side, 480.0 - side, 100.0],
+            [800.0, 600.0, 100.0],
+            [800.0, 800.0, 150.0],
+        ]);
+        for degree in 1..=5 {
+            scenario.planner.smoothing.degree = degree;
+            let model = Model::new(&scenario);
+            let path = smooth(&model, &route).expect("the polyline is clear");
+            assert!(
+                degree == 1 || path.control_points.len() > route.len(),
+                "degree {degree}"
+            );
+            assert_eq!(path.degree, degree);
+            let mut broken = 0;
+            model.assess(&path.points, Quadrature::Integral, model.tolerance, |breach| {
+                broken += usize::from(breach.constraint == Constraint::Threat);
+            });
+            assert_eq!(broken, 0, "degree {degree}");
+        }
+    }
+
+    #[test]
+    fn a_route_through_a_threat_has_no_path() {
+        let scenario = scenario();
+        let route = points(&[[200.0, 100.0, 0.0], [500.0, 480.0, 100.0], [800.0, 800.0, 150.0]]);
+        assert_eq!(smooth(&Model::new(&scenario), &route), None);
+    }
+}

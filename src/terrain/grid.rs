@@ -1,0 +1,194 @@
+//! Elevations at the nodes of a grid, bilinear between them.
+//!
+//! Along a leg the ground of one cell is a quadratic, so that a leg's least and greatest height
+//! over it is exact.
+
+use super::HeightRange;
+use crate::geometry::{Point2, Quadratic, Rect, Segment};
+
+/// Elevations at nodes, row-major from south to north; the ground between them is bilinear.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    /// The first (south-west) node.
+    pub origin: Point2,
+    /// Distance between nodes, metres, > 0.
+    pub cell: f64,
+    /// Nodes from west to east, >= 2.
+    pub columns: usize,
+    /// Nodes from south to north, >= 2.
+    pub rows: usize,
+    /// `rows * columns` metres.
+    pub elevations: Vec<f64>,
+}
+
+/// The ground of one cell: `z00 + x zx + y zy + x y zxy`, `x` and `y` in cells from its corner.
+struct Patch {
+    column: f64,
+    row: f64,
+    z00: f64,
+    zx: f64,
+    zy: f64,
+    zxy: f64,
+}
+
+impl Grid {
+    pub(super) fn extent(&self) -> Rect {
+        let size = nalgebra::Vector2::new((self.columns - 1) as f64, (self.rows - 1) as f64) * self.cell;
+        Rect {
+            min: self.origin,
+            max: self.origin + size,
+        }
+    }
+
+    pub(super) fn elevation(&self, point: Point2) -> f64 {
+        let (x, y) = self.in_cells(point);
+        let patch = self.patch(x, y);
+        let (x, y) = (x - patch.column, y - patch.row);
+        patch.z00 + x * patch.zx + y * (patch.zy + x * patch.zxy)
+    }
+
+    pub(super) fn height_range(&self, leg: &Segment, (t0, t1): (f64, f64)) -> HeightRange {
+        let (from, to) = (leg.at(t0), leg.at(t1));
+        let (x0, y0) = self.in_cells(from.xy());
+        let (x1, y1) = self.in_cells(to.xy());
+        let mut range = HeightRange::EMPTY;
+        let mut u = 0.0;
+        // u runs from 0 to 1 over the window; each cell ends at the next grid line in either direction.
+        while u < 1.0 || range == HeightRange::EMPTY {
+            let next = next_line(x0, x1, u).min(next_line(y0, y1, u)).min(1.0);
+            let middle = 0.5 * (u + next);
+            let patch = self.patch(x0 + (x1 - x0) * middle, y0 + (y1 - y0) * middle);
+            let height = patch.height_below((x0, y0), (x1, y1), (from.z, to.z));
+            let (min, max) = height.extremes(u, next);
+            range = range.join(HeightRange { min, max });
+            u = next;
+        }
+        range
+    }
+
+    /// `point` in cells from the first node, brought onto the grid.
+    fn in_cells(&self, point: Point2) -> (f64, f64) {
+        let offset = (point - self.origin) / self.cell;
+        let onto = |value: f64, nodes: usize| value.clamp(0.0, (nodes - 1) as f64);
+        (onto(offset.x, self.columns), onto(offset.y, self.rows))
+    }
+
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "both coordinates lie on the grid, between 0 and the number of nodes"
+    )]
+    fn patch(&self, x: f64, y: f64) -> Patch {
+        let column = (x as usize).min(self.columns - 2);
+        let row = (y as usize).min(self.rows - 2);
+        let south = row * self.columns + column;
+        let north = south + self.columns;
+        let z = &self.elevations;
+        Patch {
+            column: column as f64,
+            row: row as f64,
+            z00: z[south],
+            zx: z[south + 1] - z[south],
+            zy: z[north] - z[south],
+            zxy: z[north + 1] - z[north] - z[south + 1] + z[south],
+        }
+    }
+}
+
+/// The least `u` beyond `from` at which `a + (b - a) u` is a whole number; infinite when never.
+fn next_line(a: f64, b: f64, from: f64) -> f64 {
+    let way = b - a;
+    if way == 0.0 {
+        return f64::INFINITY;
+    }
+    let here = a + way * from;
+    let mut line = if way > 0.0 {
+        here.floor() + 1.0
+    } else {
+        here.ceil() - 1.0
+    };
+    loop {
+        let u = (line - a) / way;
+        // Rounding may find the line on which the leg already stands.
+        if u > from {
+            return u;
+        }
+        line += way.signum();
+    }
+}
+
+impl Patch {
+    /// Height above this patch's ground along the way from `(x0, y0)` to `(x1, y1)` at `z0` to `z1`.
+    fn height_below(&self, (x0, y0): (f64, f64), (x1, y1): (f64, f64), (z0, z1): (f64, f64)) -> Quadratic {
+        let (x, y) = (x0 - self.column, y0 - self.row);
+        let (dx, dy) = (x1 - x0, y1 - y0);
+        Quadratic {
+            a: -self.zxy * dx * dy,
+            b: (z1 - z0) - self.zx * dx - self.zy * dy - self.zxy * (x * dy + y * dx),
+            c: z0 - self.z00 - self.zx * x - self.zy * y - self.zxy * x * y,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point3;
+    use proptest::prelude::*;
+
+    fn hills() -> Grid {
+        let elevations = (0..35).map(|i| f64::from(i * i * 37 % 23)).collect();
+        Grid {
+            origin: Point2::new(-10.0, 5.0),
+            cell: 10.0,
+            columns: 7,
+            rows: 5,
+            elevations,
+        }
+    }
+
+    #[test]
+    fn nodes_and_the_middle_of_a_cell() {
+        let grid = hills();
+        assert_eq!(grid.elevation(Point2::new(-10.0, 5.0)), grid.elevations[0]);
+        assert_eq!(grid.elevation(Point2::new(50.0, 45.0)), grid.elevations[34]);
+        let mean = (grid.elevations[0] + grid.elevations[1] + grid.elevations[7] + grid.elevations[8]) / 4.0;
+        assert!((grid.elevation(Point2::new(-5.0, 10.0)) - mean).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_vertical_leg_has_a_range() {
+        let leg = Segment {
+            a: Point3::new(0.0, 10.0, 50.0),
+            b: Point3::new(0.0, 10.0, 80.0),
+        };
+        let ground = hills().elevation(Point2::new(0.0, 10.0));
+        assert_eq!(
+            hills().height_range(&leg, (0.0, 1.0)),
+            HeightRange {
+                min: 50.0 - ground,
+                max: 80.0 - ground
+            }
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn the_range_holds_every_sample_and_is_reached(
+            x0 in -10.0..50.0f64, y0 in 5.0..45.0f64, x1 in -10.0..50.0f64, y1 in 5.0..45.0f64,
+            z0 in 0.0..40.0f64, z1 in 0.0..40.0f64, t0 in 0.0..0.5f64, t1 in 0.5..1.0f64,
+        ) {
+            let grid = hills();
+            let leg = Segment { a: Point3::new(x0, y0, z0), b: Point3::new(x1, y1, z1) };
+            let range = grid.height_range(&leg, (t0, t1));
+            let mut seen = HeightRange::EMPTY;
+            for i in 0..=4000 {
+                let point = leg.at(t0 + (t1 - t0) * f64::from(i) / 4000.0);
+                let height = point.z - grid.elevation(point.xy());
+                seen = seen.join(HeightRange { min: height, max: height });
+            }
+            prop_assert!(range.min <= seen.min + 1e-9 && range.max >= seen.max - 1e-9, "{range:?} {seen:?}");
+            prop_assert!(seen.min - range.min < 0.1 && range.max - seen.max < 0.1, "{range:?} {seen:?}");
+        }
+    }
+}

@@ -2,6 +2,8 @@
 //!
 //! The rooms, in reading order; each imports only from those above it.
 
+pub mod cli;
+pub mod config;
 pub mod cost;
 pub mod export;
 pub mod geometry;
@@ -12,6 +14,7 @@ pub mod planner;
 pub mod scenario;
 pub mod seeding;
 pub mod store;
+pub mod telemetry;
 pub mod terrain;
 pub mod threat;
 pub mod worker;

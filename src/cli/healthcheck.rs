@@ -14,7 +14,11 @@ const TIMEOUT: Duration = Duration::from_secs(3);
 #[derive(Args)]
 pub(super) struct Arguments {
     /// What to ask
-    #[arg(long, env = "NOCTULE_HEALTHCHECK_URL", default_value = "http://127.0.0.1:8080/readyz")]
+    #[arg(
+        long,
+        env = "NOCTULE_HEALTHCHECK_URL",
+        default_value = "http://127.0.0.1:8080/readyz"
+    )]
     url: Uri,
 }
 
@@ -25,7 +29,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         bail!("{url} must begin with http://");
     }
     let authority = url.authority().context("the URL names no host")?;
-    let address = (authority.host().trim_matches(['[', ']']), authority.port_u16().unwrap_or(80));
+    let address = (
+        authority.host().trim_matches(['[', ']']),
+        authority.port_u16().unwrap_or(80),
+    );
     let path = url.path_and_query().map_or("/", |path| path.as_str());
     let head = ask(address, authority.as_str(), path).with_context(|| format!("no answer from {url}"))?;
     match head.split(' ').nth(1) {
@@ -40,7 +47,10 @@ fn ask(address: (&str, u16), host: &str, path: &str) -> anyhow::Result<String> {
     let mut stream = connect(address)?;
     stream.set_read_timeout(Some(TIMEOUT))?;
     stream.set_write_timeout(Some(TIMEOUT))?;
-    write!(stream, "GET {path} HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\n\r\n")?;
+    write!(
+        stream,
+        "GET {path} HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\n\r\n"
+    )?;
     let mut head = [0; 32];
     let mut filled = 0;
     while filled < head.len() {

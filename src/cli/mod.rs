@@ -46,7 +46,12 @@ pub fn run() -> ExitCode {
         Err(usage) => {
             // Nothing can be done about a closed terminal.
             let _ = usage.print();
-            return if usage.use_stderr() { exit::FAILED } else { exit::DONE }.into();
+            return if usage.use_stderr() {
+                exit::FAILED
+            } else {
+                exit::DONE
+            }
+            .into();
         }
     };
     let done = match command {

@@ -10,10 +10,10 @@ use std::time::Instant;
 use anyhow::Context;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use uuid::Uuid;
 
 use super::exit;
 use crate::export::document::{Origin, ResultDocument, Timing, scenario_sha256};
+use crate::job::draw_seed;
 use crate::planner::{self, ConvergencePoint, Incumbent, Observer, Outcome, Stop};
 use crate::scenario::Scenario;
 use crate::scenario::json::{self, Refusal, Rules};
@@ -91,26 +91,9 @@ fn document(scenario: &Scenario, outcome: &Outcome, run_ms: f64) -> String {
 fn report(file: &Path, refusal: &Refusal) {
     let file = file.display();
     match refusal {
-        Refusal::Syntax {
-            line,
-            column,
-            pointer,
-            detail,
-        } => eprintln!("{file}:{line}:{column}: not JSON: {detail} {pointer}"),
-        Refusal::Invalid(faults) => {
-            eprintln!("{file}: the scenario cannot be planned:");
-            for fault in faults {
-                let pointer = if fault.pointer.is_empty() { "(document)" } else { &fault.pointer };
-                eprintln!("  {pointer}: {}: {}", fault.code, fault.detail);
-            }
-        }
+        Refusal::Syntax { .. } => eprintln!("{file} is not JSON: {refusal}"),
+        Refusal::Invalid(_) => eprintln!("{file} cannot be planned:\n{refusal}"),
     }
-}
-
-/// From the operating system, below 2^53 so that every JSON reader keeps it.
-fn draw_seed() -> u64 {
-    let (_, low) = Uuid::new_v4().as_u64_pair();
-    low & ((1 << 53) - 1)
 }
 
 /// Ctrl-C ends the search with the best route so far; a second one ends the process.
@@ -123,18 +106,22 @@ impl Interrupt {
     fn watch() -> anyhow::Result<Self> {
         let requested = Arc::new(AtomicBool::new(false));
         let flag = requested.clone();
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_io().build()?;
-        std::thread::Builder::new().name("interrupt".to_owned()).spawn(move || {
-            runtime.block_on(async {
-                if tokio::signal::ctrl_c().await.is_err() {
-                    return;
-                }
-                flag.store(true, Ordering::Relaxed);
-                if tokio::signal::ctrl_c().await.is_ok() {
-                    std::process::exit(exit::FAILED.into());
-                }
-            });
-        })?;
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_io()
+            .build()?;
+        std::thread::Builder::new()
+            .name("interrupt".to_owned())
+            .spawn(move || {
+                runtime.block_on(async {
+                    if tokio::signal::ctrl_c().await.is_err() {
+                        return;
+                    }
+                    flag.store(true, Ordering::Relaxed);
+                    if tokio::signal::ctrl_c().await.is_ok() {
+                        std::process::exit(exit::FAILED.into());
+                    }
+                });
+            })?;
         Ok(Self {
             requested,
             begun: Instant::now(),

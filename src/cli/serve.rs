@@ -1,7 +1,6 @@
 //! `noctule serve`: put the parts together, and take them apart in the right order.
 
 use std::io::Write as _;
-use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -14,12 +13,16 @@ use tokio::time::Instant;
 use super::exit;
 use crate::config::Serve;
 use crate::http::{self, AppState, Capacity, Phase};
-use crate::scenario::json::Rules;
+use crate::job::Failure;
+use crate::scenario::json::{self, Rules};
 use crate::scenario::limits::Limits;
 use crate::store::sqlite::SqliteStore;
 use crate::store::{self, Store};
-use crate::worker::Pool;
+use crate::worker::{self, Engine, Pool};
 use crate::{planner, telemetry};
+
+/// A request's body must be complete after this.
+const BODY_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Serve until a signal.
 pub(super) fn run(config: &Serve) -> anyhow::Result<()> {
@@ -38,18 +41,24 @@ async fn serve(config: &Serve) -> anyhow::Result<()> {
         .with_context(|| format!("cannot listen on {}", config.listen))?;
     let store = open_store(config)?;
     let workers = config.workers();
-    let pool = Pool::start(store.clone(), workers);
+    let rules = Arc::new(Rules {
+        limits: Limits::default(),
+        algorithms: planner::algorithms(),
+    });
+    let settings = worker::Settings {
+        workers: workers.get(),
+        clock: store::wall_clock(),
+    };
+    let pool = Pool::start(store.clone(), settings, engine(rules.clone()));
     let (phase, watched) = watch::channel(Phase::Serving);
     let router = http::router(AppState {
         store: store.clone(),
-        rules: Arc::new(Rules {
-            limits: Limits::default(),
-            algorithms: planner::algorithms(),
-        }),
+        rules,
         capacity: Capacity {
             workers: workers.get(),
             queue: config.queue.get() as usize,
         },
+        body_timeout: BODY_TIMEOUT,
         phase: watched.clone(),
     });
     announce(&listener)?;
@@ -65,7 +74,7 @@ async fn serve(config: &Serve) -> anyhow::Result<()> {
         std::process::exit(exit::FAILED.into());
     });
     phase.send_replace(Phase::Draining);
-    pool.drain(signalled + times.runs).await;
+    drain(pool, &times).await;
     phase.send_replace(Phase::Stopping);
     server.await.context("the server broke")?;
     store.close().await;
@@ -73,8 +82,33 @@ async fn serve(config: &Serve) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// What the pool runs: the accepted document, read again, and planned.
+fn engine(rules: Arc<Rules>) -> Engine {
+    Arc::new(move |document, observer, stop| {
+        // The document names its seed; none is drawn.
+        let scenario = json::read(document.as_bytes(), &rules, 0).map_err(|refusal| Failure {
+            kind: "invalid-scenario".to_owned(),
+            detail: format!("this version of the service cannot read the accepted document: {refusal}"),
+        })?;
+        Ok(planner::plan(&scenario, observer, stop))
+    })
+}
+
+/// Let runs finish, then give them back; without those that do not heed their stop in time, which
+/// the next process finds as after a crash.
+async fn drain(pool: Pool, times: &Times) {
+    if tokio::time::timeout(times.runs + times.giving_back, pool.drain(times.runs))
+        .await
+        .is_err()
+    {
+        tracing::warn!("some runs did not stop in time; the next process runs them again");
+    }
+}
+
 fn open_store(config: &Serve) -> anyhow::Result<Arc<dyn Store>> {
-    let data_dir = config.data_dir().context("the user has no home; name a directory with --data-dir")?;
+    let data_dir = config
+        .data_dir()
+        .context("the user has no home; name a directory with --data-dir")?;
     let options = store::Options {
         queue_limit: config.queue.get().into(),
         clock: store::wall_clock(),
@@ -98,18 +132,20 @@ fn announce(listener: &TcpListener) -> anyhow::Result<()> {
 struct Times {
     /// Runs may finish until then.
     runs: Duration,
+    /// Then they are stopped and given back.
+    giving_back: Duration,
     /// Connections may finish their answers for so long, after the streams were told to end.
     connections: Duration,
 }
 
 impl Times {
-    /// Of the last fifth, at most two seconds, half goes to connections, half remains for giving
-    /// plans back and closing the store.
+    /// The last fifth, at most two seconds, is for giving back, for connections, and for the store.
     fn within(grace: Duration) -> Self {
         let reserve = (grace / 5).min(Duration::from_secs(2));
         Self {
             runs: grace - reserve,
-            connections: reserve / 2,
+            giving_back: reserve / 2,
+            connections: reserve / 4,
         }
     }
 }

@@ -1,19 +1,16 @@
 //! A JSON body: the right media type, not too long, not too slow.
 
-use std::time::Duration;
-
 use axum::body::Body;
 use axum::http::{HeaderMap, header};
 use bytes::Bytes;
 use http_body_util::{BodyExt, LengthLimitError, Limited};
 
+use super::AppState;
 use super::problem::Problem;
 
-/// A body must be complete after this.
-const READ_TIMEOUT: Duration = Duration::from_secs(30);
-
-/// The whole body, at most `limit` bytes.
-pub(super) async fn read_json(headers: &HeaderMap, body: Body, limit: usize) -> Result<Bytes, Problem> {
+/// The whole body.
+pub(super) async fn read_json(state: &AppState, headers: &HeaderMap, body: Body) -> Result<Bytes, Problem> {
+    let (limit, timeout) = (state.rules.limits.body_bytes, state.body_timeout);
     if !is_json(headers) {
         let found = headers.get(header::CONTENT_TYPE);
         return Err(Problem::UnsupportedMediaType(
@@ -23,14 +20,14 @@ pub(super) async fn read_json(headers: &HeaderMap, body: Body, limit: usize) -> 
     if announced_length(headers).is_some_and(|length| length > limit as u64) {
         return Err(Problem::BodyTooLarge(limit));
     }
-    match tokio::time::timeout(READ_TIMEOUT, Limited::new(body, limit).collect()).await {
+    match tokio::time::timeout(timeout, Limited::new(body, limit).collect()).await {
         Ok(Ok(collected)) => Ok(collected.to_bytes()),
         Ok(Err(error)) if error.is::<LengthLimitError>() => Err(Problem::BodyTooLarge(limit)),
         Ok(Err(error)) => {
             tracing::debug!(%error, "a body broke off");
             Err(Problem::BodyIncomplete)
         }
-        Err(_) => Err(Problem::BodyTooSlow(READ_TIMEOUT.as_secs())),
+        Err(_) => Err(Problem::BodyTooSlow(timeout)),
     }
 }
 

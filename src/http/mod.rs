@@ -22,6 +22,7 @@ mod status;
 mod throttle;
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use axum::Router;
 use axum::handler::Handler;
@@ -44,6 +45,8 @@ pub struct AppState {
     pub rules: Arc<Rules>,
     /// How much may be done at once.
     pub capacity: Capacity,
+    /// A request's body must be complete after this.
+    pub body_timeout: Duration,
     /// Where the service stands between its start and its end.
     pub phase: watch::Receiver<Phase>,
 }

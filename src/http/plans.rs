@@ -21,7 +21,7 @@ use super::prefer::{PREFERENCE_APPLIED, Wait};
 use super::problem::Problem;
 use super::status::{StatusDocument, etag, location};
 use super::{AppState, Phase, body, retry};
-use crate::job::{Plan, PlanId, Status, Submission};
+use crate::job::{self, Plan, PlanId, Status, Submission};
 use crate::scenario::json;
 use crate::store::{ListQuery, StoreError};
 
@@ -42,8 +42,7 @@ pub(super) async fn submit(
     if !validate_only {
         refuse_when_draining(&state).await?;
     }
-    let limit = state.rules.limits.body_bytes;
-    let bytes = body::read_json(&headers, body, limit).await?;
+    let bytes = body::read_json(&state, &headers, body).await?;
     let submission = accept(&state, bytes).await?;
     if validate_only {
         return Ok(valid(&submission));
@@ -93,9 +92,9 @@ async fn accept(state: &AppState, document: Bytes) -> Result<Submission, Problem
     let span = tracing::Span::current();
     let read = tokio::task::spawn_blocking(move || {
         span.in_scope(|| {
-            let scenario = json::read(&document, &rules, draw_seed())?;
+            let scenario = json::read(&document, &rules, job::draw_seed())?;
             Ok(Submission {
-                id: Uuid::now_v7(),
+                id: job::new_id(),
                 scenario: json::write(&scenario),
                 name: scenario.name,
                 algorithm: scenario.planner.algorithm,
@@ -118,13 +117,6 @@ async fn accept(state: &AppState, document: Bytes) -> Result<Submission, Problem
 fn valid(submission: &Submission) -> Response {
     let document = format!(r#"{{"valid":true,"scenario":{}}}"#, submission.scenario);
     ([(header::CONTENT_TYPE, "application/json")], document).into_response()
-}
-
-/// From the operating system, below 2^53 so that every JSON reader keeps it.
-fn draw_seed() -> u64 {
-    // The low 62 bits of a version 4 UUID are random.
-    let (_, low) = Uuid::new_v4().as_u64_pair();
-    low & ((1 << 53) - 1)
 }
 
 /// A page of the list.

@@ -5,6 +5,7 @@
 //! the operator should read goes to the log, not into a document.
 
 use std::any::Any;
+use std::time::Duration;
 
 use axum::body::Body;
 use axum::http::{HeaderValue, StatusCode, header};
@@ -38,8 +39,8 @@ pub(super) enum Problem {
     UnsupportedMediaType(Option<String>),
     /// The body is too long; the limit in bytes.
     BodyTooLarge(usize),
-    /// The body came too slowly; the limit in seconds.
-    BodyTooSlow(u64),
+    /// The body came too slowly; the limit.
+    BodyTooSlow(Duration),
     /// The body broke off.
     BodyIncomplete,
     /// The body is not JSON.
@@ -153,11 +154,11 @@ impl Problem {
                 "The body is too large",
                 format!("the body is longer than {limit} bytes, the limit body_bytes of GET /limits"),
             ),
-            Self::BodyTooSlow(limit_s) => (
+            Self::BodyTooSlow(limit) => (
                 StatusCode::REQUEST_TIMEOUT,
                 "request-timeout",
                 "The body came too slowly",
-                format!("the body was not complete after {limit_s} s"),
+                format!("the body was not complete after {} s", limit.as_secs_f64()),
             ),
             Self::BodyIncomplete => (
                 StatusCode::BAD_REQUEST,

@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use super::params::Params;
 use super::problem::Problem;
 use super::{AppState, Phase, events, plans, prefer, retry};
+use crate::optimizer::{self, Algorithm, Parameter};
 
 /// The description of this service, OpenAPI 3.1.
 const OPENAPI_YAML: &str = include_str!("../../openapi.yaml");
@@ -92,7 +93,26 @@ pub(super) async fn limits(State(state): State<AppState>, uri: Uri) -> Result<Re
 /// `GET /algorithms`.
 pub(super) async fn algorithms(uri: Uri) -> Result<Json<Value>, Problem> {
     Params::read(&uri, &[])?;
-    Ok(Json(json!({"algorithms": []})))
+    let algorithms: Vec<Value> = optimizer::ALL.iter().map(algorithm).collect();
+    Ok(Json(json!({"algorithms": algorithms})))
+}
+
+fn algorithm(algorithm: &Algorithm) -> Value {
+    let parameter = |parameter: &Parameter| {
+        json!({
+            "name": parameter.name,
+            "default": parameter.default,
+            "min": parameter.min,
+            "max": parameter.max,
+            "meaning": parameter.meaning,
+        })
+    };
+    json!({
+        "name": algorithm.name,
+        "title": algorithm.title,
+        "source": algorithm.source,
+        "parameters": algorithm.parameters.iter().map(parameter).collect::<Vec<_>>(),
+    })
 }
 
 /// `GET /openapi.yaml`.

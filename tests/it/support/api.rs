@@ -1,6 +1,7 @@
 //! The service without a socket, over a store of its own. Each answer is held to `openapi.yaml`.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use axum::Router;
 use axum::body::Body;
@@ -62,6 +63,7 @@ impl Api {
                 algorithms: planner::algorithms(),
             }),
             capacity: Capacity { workers: 2, queue },
+            body_timeout: Duration::from_secs(30),
             phase: watched,
         };
         Self {

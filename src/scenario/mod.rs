@@ -14,7 +14,7 @@ use crate::threat::Threat;
 
 /// A planning request, validated: every field is finite and within its range, the start and the
 /// target are clear of threats, above ground and inside the area.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// The caller's own name for it.
     pub name: Option<String>,

@@ -1,5 +1,6 @@
-//! The integration tests: one module per subject.
+//! The integration tests: one binary, one module a subject.
 
+mod scenario;
 mod store_conformance;
 mod store_sqlite;
 mod support;

@@ -1,48 +1,43 @@
 //! The wire document: read into a [`Scenario`] with every fault at once, and written back with
 //! its defaults filled in.
+//!
+//! Text becomes a tree (`tree`), the sections of the tree become the parts of a scenario (one file
+//! each), and whatever does not fit becomes a [`Fault`] while reading goes on. Null stands for an
+//! absent value only in `name`, `base`, `top`, `time_limit_ms` and `warm_start`: elsewhere it is
+//! what a careless client makes of NaN. Deliberately absent: the size of the body, which is
+//! checked before the text is here.
+
+mod document;
+mod ends;
+mod fault;
+mod fields;
+mod path;
+mod planner;
+mod point;
+mod ranges;
+mod ring;
+mod terrain;
+mod threats;
+mod tree;
+mod value;
+mod vehicle;
+mod writer;
+
+pub use fault::{CODES, Fault, MAX_LISTED, Refusal};
 
 use super::Scenario;
 use super::limits::Limits;
-
-/// What is wrong with one place of a scenario document.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Fault {
-    /// JSON pointer (RFC 6901) of the place.
-    pub pointer: String,
-    /// Stable code, such as `out-of-range`.
-    pub code: &'static str,
-    /// The offending value and what is allowed.
-    pub detail: String,
-}
-
-/// Why a document is refused.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Refusal {
-    /// It is not JSON.
-    Syntax {
-        /// From 1.
-        line: usize,
-        /// From 1.
-        column: usize,
-        /// Where the reader was, as far as it got.
-        pointer: String,
-        /// What the reader met.
-        detail: String,
-    },
-    /// It is JSON, but no scenario; every fault, in document order.
-    Invalid(Vec<Fault>),
-}
 
 /// A search algorithm that a document may name.
 #[derive(Debug, Clone)]
 pub struct AlgorithmRule {
     /// As in `planner.algorithm`.
     pub name: &'static str,
-    /// What `planner.parameters` may set.
+    /// What `planner.parameters` may set, besides `quadrature`.
     pub parameters: Vec<ParameterRule>,
 }
 
-/// One constant of an algorithm.
+/// One constant of an algorithm; both ends of its range are allowed.
 #[derive(Debug, Clone, Copy)]
 pub struct ParameterRule {
     /// As in `planner.parameters`.
@@ -62,18 +57,23 @@ pub struct Rules {
     pub algorithms: Vec<AlgorithmRule>,
 }
 
-/// Read a scenario document; `drawn_seed` is used where it names none.
+/// Read a scenario document; `drawn_seed` (modulo 2^53) is used where it names none.
 ///
 /// # Errors
 /// [`Refusal::Syntax`] when `text` is not JSON, else [`Refusal::Invalid`] with every fault.
 pub fn read(text: &[u8], rules: &Rules, drawn_seed: u64) -> Result<Scenario, Refusal> {
-    let _ = (text, rules, drawn_seed);
-    unreachable!()
+    let tree = tree::parse(text)?;
+    let mut faults = fault::Faults::default();
+    let scenario = document::document(&tree, rules, drawn_seed, &mut faults);
+    match (scenario, faults.finish(&tree)) {
+        (Some(scenario), faults) if faults.is_empty() => Ok(scenario),
+        (_, faults) => Err(Refusal::Invalid(faults)),
+    }
 }
 
-/// Write the accepted document, defaults filled in. Reading it again gives the same scenario.
+/// Write the accepted document, defaults filled in, as one line of JSON. Reading it again gives an
+/// equal scenario; equal scenarios give the same bytes.
 #[must_use]
 pub fn write(scenario: &Scenario) -> String {
-    let _ = scenario;
-    unreachable!()
+    writer::write(scenario)
 }

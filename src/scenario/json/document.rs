@@ -1,0 +1,224 @@
+//! The whole document: its sections, and what they must be to each other.
+
+use crate::geometry::{Point3, Rect};
+use crate::scenario::Scenario;
+use crate::terrain::Terrain;
+use crate::threat::Threat;
+
+use super::Rules;
+use super::ends;
+use super::fault::Faults;
+use super::fields::Fields;
+use super::path::Path;
+use super::planner::planner;
+use super::point::{area, point3};
+use super::terrain;
+use super::threats::threats;
+use super::tree::Node;
+use super::value::{At, figure, metres, name};
+use super::vehicle;
+
+const FIELDS: &[&str] = &[
+    "name",
+    "frame",
+    "altitude_datum",
+    "start",
+    "target",
+    "area",
+    "threats",
+    "terrain",
+    "altitude",
+    "vehicle",
+    "weights",
+    "planner",
+];
+
+/// An area may stick out of the terrain grid by rounding, metres; so much is cut off.
+const OVERHANG_M: f64 = 1e-6;
+/// The default area reaches at least this far beyond everything, metres.
+const MIN_PADDING_M: f64 = 10.0;
+
+/// Read the document; `None` has left at least one fault.
+pub(super) fn document(node: &Node, rules: &Rules, drawn_seed: u64, faults: &mut Faults) -> Option<Scenario> {
+    let fields = At {
+        node,
+        path: &Path::Root,
+    }
+    .fields(FIELDS, faults)?;
+    let name = fields.or("name", None, faults, name);
+    let local = is_local(&fields, faults);
+    let altitude = fields.required("altitude", faults, vehicle::altitude);
+    let draft = fields.or("vehicle", vehicle::DEFAULT, faults, vehicle::vehicle);
+    let weights = fields.or("weights", vehicle::default_weights(), faults, vehicle::weights);
+    let planner = section(&fields, "planner", &Node::Object(Box::default()), |at| {
+        planner(at, rules, drawn_seed, faults)
+    });
+    // Points of another frame are not faults of their own.
+    if !local {
+        return None;
+    }
+    let place = place(&fields, rules, faults);
+    let (place, planner) = (place?, planner?);
+    let distance = (place.target - place.start).norm();
+    check_samples(
+        distance,
+        planner.smoothing.spacing,
+        rules.limits.path_samples,
+        faults,
+    );
+    Some(Scenario {
+        name: name?,
+        start: place.start,
+        target: place.target,
+        area: place.area,
+        threats: place.threats,
+        terrain: place.terrain,
+        altitude: altitude?,
+        vehicle: draft?.finish(distance, planner.waypoints),
+        weights: weights?,
+        planner,
+    })
+}
+
+/// A section that reads the same whether it is absent or `empty`.
+fn section<T>(
+    fields: &Fields<'_>,
+    name: &str,
+    empty: &Node,
+    read: impl FnOnce(At<'_>) -> Option<T>,
+) -> Option<T> {
+    let path = Path::Key(fields.path, name);
+    read(At {
+        node: fields.find(name).unwrap_or(empty),
+        path: &path,
+    })
+}
+
+/// Whether the document speaks of the local frame, as far as can be told.
+fn is_local(fields: &Fields<'_>, faults: &mut Faults) -> bool {
+    let frame = fields.or("frame", Some("local"), faults, |at, faults| {
+        at.choice(&["local"], &["wgs84"], faults).map(Some)
+    });
+    if frame.is_some() && fields.has("altitude_datum") {
+        faults.add(
+            &Path::Key(fields.path, "altitude_datum"),
+            "not-applicable",
+            || "altitude_datum is given, must be left out where frame is local",
+        );
+    }
+    frame.is_some()
+}
+
+/// Everything that has coordinates.
+struct Place {
+    start: Point3,
+    target: Point3,
+    area: Rect,
+    threats: Vec<Threat>,
+    terrain: Terrain,
+}
+
+fn place(fields: &Fields<'_>, rules: &Rules, faults: &mut Faults) -> Option<Place> {
+    let start = fields.required("start", faults, point3);
+    let target = fields.required("target", faults, point3);
+    let given_area = fields.or("area", None, faults, |at, faults| area(at, faults).map(Some));
+    let threats = fields.or("threats", Vec::new(), faults, |at, faults| {
+        threats(at, &rules.limits, faults)
+    });
+    let ground = fields.or("terrain", terrain::DEFAULT, faults, |at, faults| {
+        terrain::terrain(at, &rules.limits, faults)
+    });
+    if let (Some(start), Some(target)) = (start, target) {
+        ends::check_apart(start, target, faults);
+    }
+    for (name, end) in [("start", start), ("target", target)] {
+        let Some(end) = end else { continue };
+        let in_area = given_area
+            .flatten()
+            .is_none_or(|area| ends::check_area(name, end, area, faults));
+        if let Some(terrain) = &ground
+            && in_area
+        {
+            ends::check_ground(name, end, terrain, faults);
+        }
+        if let Some(threats) = &threats {
+            ends::check_threats(name, end, threats, faults);
+        }
+    }
+    let given_area = match (given_area, &ground) {
+        (Some(Some(area)), Some(terrain)) => covered(area, terrain, faults).map(Some),
+        (given_area, _) => given_area,
+    };
+    let (start, target, terrain) = (start?, target?, ground?);
+    let threats: Vec<Threat> = threats?.into_iter().collect::<Option<_>>()?;
+    let area = given_area?.unwrap_or_else(|| default_area(start, target, &threats, &terrain));
+    Some(Place {
+        start,
+        target,
+        area,
+        threats,
+        terrain,
+    })
+}
+
+/// The given area, which a terrain grid must cover.
+fn covered(area: Rect, terrain: &Terrain, faults: &mut Faults) -> Option<Rect> {
+    let Terrain::Grid(grid) = terrain else {
+        return Some(area);
+    };
+    let ground = grid.extent();
+    if ground.excess(area.min).max(ground.excess(area.max)) > OVERHANG_M {
+        faults.add(&Path::Key(&Path::Root, "area"), "area-outside-terrain", || {
+            format!(
+                "area runs from ({}, {}) to ({}, {}), must lie in the terrain grid, from ({}, {}) to ({}, {})",
+                figure(area.min.x),
+                figure(area.min.y),
+                figure(area.max.x),
+                figure(area.max.y),
+                figure(ground.min.x),
+                figure(ground.min.y),
+                figure(ground.max.x),
+                figure(ground.max.y)
+            )
+        });
+        return None;
+    }
+    Some(Rect {
+        min: area.min.sup(&ground.min),
+        max: area.max.inf(&ground.max),
+    })
+}
+
+/// The area of a document that names none: a terrain grid's extent, else the box round the start,
+/// the target and every threat with its soft zone, wider on every side by a quarter of its
+/// diagonal and at least by 10 m.
+fn default_area(start: Point3, target: Point3, threats: &[Threat], terrain: &Terrain) -> Rect {
+    if let Some(extent) = terrain.extent() {
+        return extent;
+    }
+    let area = threats
+        .iter()
+        .map(Threat::extent)
+        .flat_map(|extent| [extent.min, extent.max])
+        .chain([start.xy(), target.xy()]);
+    let area = Rect::around(area).expect("start and target are there");
+    let padding = (area.diagonal() / 4.0).max(MIN_PADDING_M);
+    area.grown(padding)
+}
+
+/// The straight way from start to target must not already make more samples than the server takes.
+fn check_samples(distance: f64, spacing: f64, limit: usize, faults: &mut Faults) {
+    let samples = (distance / spacing).ceil() + 1.0;
+    if samples > limit as f64 {
+        let planner = Path::Key(&Path::Root, "planner");
+        let smoothing = Path::Key(&planner, "smoothing");
+        faults.add(&Path::Key(&smoothing, "spacing"), "too-many", || {
+            format!(
+                "spacing is {} over {} m from start to target, which makes {samples} samples, \
+                 must make at most {limit} (limit path_samples)",
+                figure(spacing),
+                metres(distance)
+            )
+        });
+    }
+}

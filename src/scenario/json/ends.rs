@@ -1,0 +1,123 @@
+//! Whether a route can begin at the start and end at the target: apart from each other, on the
+//! ground or above it, inside the area and the terrain, outside every threat.
+
+use crate::geometry::{Point3, Rect};
+use crate::terrain::Terrain;
+use crate::threat::{Shape, Threat};
+
+use super::fault::Faults;
+use super::path::Path;
+use super::value::{figure, metres, quote};
+
+/// So much below ground still counts as standing on it, metres; more than digits of a decimal
+/// can blur.
+const SUNK_M: f64 = 0.1 + 1e-9;
+/// Start and target closer than this, in space, are the same, metres.
+const SAME_M: f64 = 1e-6;
+/// Start and target closer than this, seen from above, give the route no direction, metres.
+const ABOVE_M: f64 = 1e-3;
+
+/// Start and target must be apart, and apart seen from above: the encoding of a route turns about
+/// the line between them.
+pub(super) fn check_apart(start: Point3, target: Point3, faults: &mut Faults) {
+    let path = Path::Key(&Path::Root, "target");
+    let (distance, horizontal) = ((target - start).norm(), (target.xy() - start.xy()).norm());
+    if distance <= SAME_M {
+        faults.add(&path, "target-is-start", || {
+            format!(
+                "target is {} m from start, must be more than {SAME_M} m away",
+                metres(distance)
+            )
+        });
+    } else if horizontal < ABOVE_M {
+        faults.add(&path, "target-above-start", || {
+            format!(
+                "target is {} m from start seen from above, must be at least {ABOVE_M} m",
+                metres(horizontal)
+            )
+        });
+    }
+}
+
+/// The start or the target beside the ground: `name` is its field.
+pub(super) fn check_ground(name: &str, end: Point3, terrain: &Terrain, faults: &mut Faults) {
+    let path = Path::Key(&Path::Root, name);
+    if let Some(extent) = terrain.extent().filter(|extent| !extent.contains(end.xy())) {
+        return outside(&path, "outside-terrain", "the terrain grid", end, extent, faults);
+    }
+    let ground = terrain.elevation(end.xy());
+    if ground - end.z > SUNK_M {
+        faults.add(&path, "below-ground", || {
+            format!(
+                "{name} has z {}, must be at most 0.1 m below the ground, which is at {}",
+                figure(end.z),
+                metres(ground)
+            )
+        });
+    }
+}
+
+/// The start or the target must lie in the area; whether it does.
+pub(super) fn check_area(name: &str, end: Point3, area: Rect, faults: &mut Faults) -> bool {
+    let contained = area.contains(end.xy());
+    if !contained {
+        let path = Path::Key(&Path::Root, name);
+        outside(&path, "outside-area", "the area", end, area, faults);
+    }
+    contained
+}
+
+/// The start or the target must lie in no threat; touching one is clear.
+pub(super) fn check_threats(name: &str, end: Point3, threats: &[Option<Threat>], faults: &mut Faults) {
+    let mut around = threats.iter().enumerate().filter_map(|(threat_idx, threat)| {
+        let threat = threat.as_ref()?;
+        threat.contains(end).then_some((threat_idx, threat))
+    });
+    let Some((threat_idx, threat)) = around.next() else {
+        return;
+    };
+    let more = around.count();
+    let code = if name == "start" {
+        "start-in-threat"
+    } else {
+        "target-in-threat"
+    };
+    faults.add(&Path::Key(&Path::Root, name), code, || {
+        let named = threat
+            .name
+            .as_deref()
+            .map(|name| format!(" ({})", quote(name)))
+            .unwrap_or_default();
+        let others = if more > 0 {
+            format!(" and {more} more")
+        } else {
+            String::new()
+        };
+        let place = match &threat.shape {
+            Shape::Cylinder(cylinder) => format!(
+                "{} m from the axis of threats/{threat_idx}{named}{others}, must be >= its radius {}",
+                metres((end.xy() - cylinder.center).norm()),
+                figure(cylinder.radius)
+            ),
+            Shape::Polygon(_) => {
+                format!("inside the polygon threats/{threat_idx}{named}{others}, must be outside")
+            }
+        };
+        format!("{name} is {place}")
+    });
+}
+
+fn outside(path: &Path<'_>, code: &'static str, what: &str, end: Point3, rect: Rect, faults: &mut Faults) {
+    faults.add(path, code, || {
+        format!(
+            "{} is at ({}, {}), must lie in {what}, from ({}, {}) to ({}, {})",
+            path.label(),
+            figure(end.x),
+            figure(end.y),
+            figure(rect.min.x),
+            figure(rect.min.y),
+            figure(rect.max.x),
+            figure(rect.max.y)
+        )
+    });
+}

@@ -1,0 +1,195 @@
+//! What is wrong with a document: the faults, their codes, and the collector that the readers fill.
+
+use std::fmt::{self, Display};
+
+use thiserror::Error;
+
+use super::path::Path;
+use super::tree::Node;
+
+/// Most faults listed in one refusal; a last fault counts the rest.
+pub const MAX_LISTED: usize = 100;
+
+/// Every code a [`Fault`] can carry, with what it says; `docs/PROBLEMS.md` has an example of each.
+pub const CODES: &[(&str, &str)] = &[
+    ("missing-field", "a required field is absent"),
+    ("unknown-field", "the object has no such field"),
+    ("duplicate-key", "the object names the same field twice"),
+    (
+        "wrong-type",
+        "the value has another JSON type than the field takes",
+    ),
+    ("out-of-range", "the number lies outside what the field takes"),
+    (
+        "not-an-integer",
+        "the number has a fraction where a whole number is needed",
+    ),
+    ("too-long", "the text has too many characters"),
+    (
+        "wrong-length",
+        "the array has another length than its neighbours imply",
+    ),
+    ("too-many", "a limit of this server is exceeded"),
+    (
+        "too-much-work",
+        "population * iterations * waypoints exceeds the limit of this server",
+    ),
+    ("unknown-value", "the text is none of the values the field takes"),
+    ("not-available", "a known value that this release does not offer"),
+    ("not-applicable", "the field has no meaning beside the others"),
+    ("unknown-algorithm", "no algorithm has this name"),
+    ("unknown-parameter", "the algorithm has no such parameter"),
+    (
+        "influence-below-radius",
+        "the soft zone of a cylinder ends inside its radius",
+    ),
+    ("base-above-top", "a threat is not higher than its base"),
+    (
+        "degenerate-polygon",
+        "the vertices enclose no area or repeat a point",
+    ),
+    ("self-crossing-polygon", "two edges of the polygon cross or touch"),
+    ("empty-area", "the area has no width or no height"),
+    ("area-outside-terrain", "the terrain grid does not cover the area"),
+    ("empty-altitude-band", "the altitude band is empty"),
+    (
+        "below-ground",
+        "the start or the target is more than 0.1 m below ground",
+    ),
+    ("start-in-threat", "the start lies inside a threat"),
+    ("target-in-threat", "the target lies inside a threat"),
+    ("outside-area", "the start or the target lies outside the area"),
+    (
+        "outside-terrain",
+        "the start or the target lies outside the terrain grid",
+    ),
+    ("target-is-start", "the target is the start"),
+    (
+        "target-above-start",
+        "the target is straight above or below the start",
+    ),
+    ("more-faults", "only the first faults are listed"),
+];
+
+/// What is wrong with one place of a scenario document.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{}: {detail} [{code}]", if pointer.is_empty() { "document" } else { pointer })]
+pub struct Fault {
+    /// JSON pointer (RFC 6901) of the place; a missing field is pointed at where it would stand.
+    pub pointer: String,
+    /// Stable code out of [`CODES`], such as `out-of-range`.
+    pub code: &'static str,
+    /// The offending value and what is allowed, a lowercase fragment.
+    pub detail: String,
+}
+
+/// Why a document is refused.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum Refusal {
+    /// It is not JSON.
+    #[error("line {line}, column {column}: {detail}")]
+    Syntax {
+        /// From 1.
+        line: usize,
+        /// From 1, counted in bytes.
+        column: usize,
+        /// Where the reader was, as far as it got.
+        pointer: String,
+        /// What the reader met.
+        detail: String,
+    },
+    /// It is JSON, but no scenario; the faults in document order, at most [`MAX_LISTED`] and one
+    /// more that counts the rest.
+    #[error("{}", Lines(.0))]
+    Invalid(Vec<Fault>),
+}
+
+/// The faults, one a line.
+struct Lines<'a>(&'a [Fault]);
+
+impl Display for Lines<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (fault_idx, fault) in self.0.iter().enumerate() {
+            let separator = if fault_idx == 0 { "" } else { "\n" };
+            write!(out, "{separator}{fault}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Collects faults while the readers walk on; keeps the first [`MAX_LISTED`] and counts the rest,
+/// so that a hostile document costs neither memory nor a huge answer.
+#[derive(Debug, Default)]
+pub(super) struct Faults {
+    listed: Vec<Fault>,
+    unlisted: usize,
+}
+
+impl Faults {
+    /// Note a fault; `detail` is only called when the fault will be listed.
+    pub(super) fn add<D: Into<String>>(
+        &mut self,
+        path: &Path<'_>,
+        code: &'static str,
+        detail: impl FnOnce() -> D,
+    ) {
+        debug_assert!(
+            CODES.iter().any(|(known, _)| *known == code),
+            "{code} is not in the table of codes"
+        );
+        if self.listed.len() < MAX_LISTED {
+            self.listed.push(Fault {
+                pointer: path.to_string(),
+                code,
+                detail: detail().into(),
+            });
+        } else {
+            self.unlisted += 1;
+        }
+    }
+
+    /// The faults in document order; empty when there was none.
+    pub(super) fn finish(mut self, document: &Node) -> Vec<Fault> {
+        self.listed
+            .sort_by_cached_key(|fault| rank(document, &fault.pointer));
+        if self.unlisted > 0 {
+            self.listed.push(Fault {
+                pointer: String::new(),
+                code: "more-faults",
+                detail: format!(
+                    "{} more faults are not listed, at most {MAX_LISTED} are",
+                    self.unlisted
+                ),
+            });
+        }
+        self.listed
+    }
+}
+
+/// Where a pointer stands in the document: the position at every level, last where nothing stands.
+fn rank(document: &Node, pointer: &str) -> Vec<usize> {
+    let mut node = Some(document);
+    let mut ranks = Vec::new();
+    for token in pointer.split('/').skip(1) {
+        let position = match node {
+            Some(Node::Object(entries)) => {
+                let key = token.replace("~1", "/").replace("~0", "~");
+                let position = entries.iter().position(|(known, _)| **known == *key);
+                node = position.map(|position| &entries[position].1);
+                position
+            }
+            Some(Node::Array(items)) => {
+                let position = token.parse().ok();
+                node = position.and_then(|position: usize| items.get(position));
+                position
+            }
+            Some(Node::Numbers(_)) => {
+                node = None;
+                token.parse().ok()
+            }
+            _ => None,
+        };
+        ranks.push(position.unwrap_or(usize::MAX));
+    }
+    ranks
+}

@@ -1,0 +1,50 @@
+//! Points of the local frame and the area.
+
+use crate::geometry::{Point2, Point3, Rect};
+
+use super::fault::Faults;
+use super::ranges::{AREA, COORDINATE, Range};
+use super::value::{At, figure};
+
+/// `{"x", "y", "z"}`, metres.
+pub(super) fn point3(at: At<'_>, faults: &mut Faults) -> Option<Point3> {
+    let fields = at.fields(&["x", "y", "z"], faults)?;
+    let x = fields.number("x", COORDINATE, faults);
+    let y = fields.number("y", COORDINATE, faults);
+    let z = fields.number("z", COORDINATE, faults);
+    Some(Point3::new(x?, y?, z?))
+}
+
+/// `{"x", "y"}`, metres.
+pub(super) fn point2(at: At<'_>, faults: &mut Faults) -> Option<Point2> {
+    pair(at, COORDINATE, faults)
+}
+
+/// `{"x", "y"}`, each within `range`.
+pub(super) fn pair(at: At<'_>, range: Range, faults: &mut Faults) -> Option<Point2> {
+    let fields = at.fields(&["x", "y"], faults)?;
+    let x = fields.number("x", range, faults);
+    let y = fields.number("y", range, faults);
+    Some(Point2::new(x?, y?))
+}
+
+/// `{"min", "max"}`, wider than nothing both ways.
+pub(super) fn area(at: At<'_>, faults: &mut Faults) -> Option<Rect> {
+    let fields = at.fields(&["min", "max"], faults)?;
+    let min = fields.required("min", faults, |at, faults| pair(at, AREA, faults));
+    let max = fields.required("max", faults, |at, faults| pair(at, AREA, faults));
+    let (min, max) = (min?, max?);
+    if min.x < max.x && min.y < max.y {
+        return Some(Rect { min, max });
+    }
+    faults.add(at.path, "empty-area", || {
+        format!(
+            "area runs from ({}, {}) to ({}, {}), must have min < max in both x and y",
+            figure(min.x),
+            figure(min.y),
+            figure(max.x),
+            figure(max.y)
+        )
+    });
+    None
+}

@@ -1,0 +1,287 @@
+//! Whether a polygon's vertices make a simple ring.
+//!
+//! A sweep over the vertices (Shamos and Hoey, "Geometric intersection problems", FOCS 1976) with
+//! exact orientation predicates: n log n comparisons, whatever the shape.
+
+use std::cmp::Ordering;
+
+use robust::{Coord, orient2d};
+
+use crate::geometry::Point2;
+
+/// Why vertices make no simple ring; places are indices of vertices, an edge has that of its first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum RingFault {
+    /// Fewer than three.
+    TooFew,
+    /// All on one line.
+    Flat,
+    /// Two vertices at the same place.
+    Repeated(usize, usize),
+    /// Two edges with more in common than the vertex between neighbours.
+    Crossing(usize, usize),
+}
+
+/// Check that the closed ring has an area and touches itself nowhere.
+///
+/// # Errors
+/// The first [`RingFault`] met; places are in ascending order.
+pub(super) fn check(vertices: &[Point2]) -> Result<(), RingFault> {
+    if vertices.len() < 3 {
+        return Err(RingFault::TooFew);
+    }
+    let mut order: Vec<usize> = (0..vertices.len()).collect();
+    order.sort_by(|a, b| along(vertices[*a], vertices[*b]).then(a.cmp(b)));
+    if let Some(pair) = order
+        .windows(2)
+        .find(|pair| along(vertices[pair[0]], vertices[pair[1]]).is_eq())
+    {
+        return Err(RingFault::Repeated(pair[0].min(pair[1]), pair[0].max(pair[1])));
+    }
+    let (first, last) = (vertices[order[0]], vertices[order[order.len() - 1]]);
+    if vertices.iter().all(|vertex| turn(first, last, *vertex).is_eq()) {
+        return Err(RingFault::Flat);
+    }
+    let mut sweep = Sweep {
+        vertices,
+        status: Vec::new(),
+    };
+    order.into_iter().try_for_each(|vertex| sweep.pass(vertex))
+}
+
+/// The order in which the sweep passes points: by x, then by y.
+fn along(a: Point2, b: Point2) -> Ordering {
+    a.x.partial_cmp(&b.x)
+        .and_then(|x| Some(x.then(a.y.partial_cmp(&b.y)?)))
+        .unwrap_or(Ordering::Equal)
+}
+
+/// Where `c` lies seen along a to b: `Greater` left, `Less` right, `Equal` on the line; exact.
+pub(super) fn turn(a: Point2, b: Point2, c: Point2) -> Ordering {
+    let coord = |point: Point2| Coord {
+        x: point.x,
+        y: point.y,
+    };
+    orient2d(coord(a), coord(b), coord(c))
+        .partial_cmp(&0.0)
+        .unwrap_or(Ordering::Equal)
+}
+
+/// The edges that cross the sweep line, from the lowest to the highest.
+struct Sweep<'a> {
+    vertices: &'a [Point2],
+    status: Vec<usize>,
+}
+
+impl Sweep<'_> {
+    /// Move the line over one vertex.
+    fn pass(&mut self, vertex: usize) -> Result<(), RingFault> {
+        let n = self.vertices.len();
+        let (incoming, outgoing) = ((vertex + n - 1) % n, vertex);
+        let here = self.vertices[vertex];
+        let starts = |edge: usize| along(self.ends(edge).0, here).is_eq();
+        let (incoming_starts, outgoing_starts) = (starts(incoming), starts(outgoing));
+        let at = self.status.partition_point(|edge| self.side(*edge, here).is_gt());
+        match (incoming_starts, outgoing_starts) {
+            (true, true) => self.open(at, incoming, outgoing, here),
+            (false, false) => self.close(at, incoming, outgoing),
+            (false, true) => self.replace(at, incoming, outgoing, here),
+            (true, false) => self.replace(at, outgoing, incoming, here),
+        }
+    }
+
+    /// Both edges begin at `here`.
+    fn open(&mut self, at: usize, a: usize, b: usize, here: Point2) -> Result<(), RingFault> {
+        if let Some(edge) = self.status.get(at)
+            && self.side(*edge, here).is_eq()
+        {
+            return Err(crossing(*edge, a));
+        }
+        let (lower, upper) = match turn(here, self.ends(a).1, self.ends(b).1) {
+            Ordering::Greater => (a, b),
+            Ordering::Less => (b, a),
+            Ordering::Equal => return Err(crossing(a, b)),
+        };
+        self.status.splice(at..at, [lower, upper]);
+        self.neighbours(at.wrapping_sub(1), at)?;
+        self.neighbours(at + 1, at + 2)
+    }
+
+    /// Both edges end here.
+    fn close(&mut self, at: usize, a: usize, b: usize) -> Result<(), RingFault> {
+        for slot in [at, at + 1] {
+            match self.status.get(slot) {
+                Some(edge) if *edge == a || *edge == b => {}
+                Some(edge) => return Err(crossing(*edge, a)),
+                None => return Err(crossing(a, b)),
+            }
+        }
+        self.status.drain(at..at + 2);
+        self.neighbours(at.wrapping_sub(1), at)
+    }
+
+    /// One edge ends at `here` and the next begins.
+    fn replace(&mut self, at: usize, ending: usize, starting: usize, here: Point2) -> Result<(), RingFault> {
+        match self.status.get(at) {
+            Some(edge) if *edge == ending => {}
+            Some(edge) => return Err(crossing(*edge, ending)),
+            None => return Err(crossing(ending, starting)),
+        }
+        if let Some(above) = self.status.get(at + 1)
+            && self.side(*above, here).is_eq()
+        {
+            return Err(crossing(*above, ending));
+        }
+        self.status[at] = starting;
+        self.neighbours(at.wrapping_sub(1), at)?;
+        self.neighbours(at, at + 1)
+    }
+
+    /// Two edges that have become neighbours on the line must not meet.
+    fn neighbours(&self, lower: usize, upper: usize) -> Result<(), RingFault> {
+        match (self.status.get(lower), self.status.get(upper)) {
+            (Some(a), Some(b)) if self.meet(*a, *b) => Err(crossing(*a, *b)),
+            _ => Ok(()),
+        }
+    }
+
+    /// The ends of an edge, the one that the sweep passes first before the other.
+    fn ends(&self, edge: usize) -> (Point2, Point2) {
+        let (a, b) = (
+            self.vertices[edge],
+            self.vertices[(edge + 1) % self.vertices.len()],
+        );
+        if along(a, b).is_le() { (a, b) } else { (b, a) }
+    }
+
+    /// `Greater` where the point is above the edge.
+    fn side(&self, edge: usize, point: Point2) -> Ordering {
+        let (left, right) = self.ends(edge);
+        turn(left, right, point)
+    }
+
+    /// Whether two edges have a point in common, other than the vertex between neighbours.
+    fn meet(&self, a: usize, b: usize) -> bool {
+        let n = self.vertices.len();
+        if (a + 1) % n == b || (b + 1) % n == a {
+            let (before, after) = if (a + 1) % n == b { (a, b) } else { (b, a) };
+            let (p, shared, q) = (
+                self.vertices[before],
+                self.vertices[after],
+                self.vertices[(after + 1) % n],
+            );
+            // Neighbours meet again only where the second runs back over the first.
+            return turn(p, shared, q).is_eq() && along(p, shared) == along(q, shared);
+        }
+        let ((a0, a1), (b0, b1)) = (self.ends(a), self.ends(b));
+        let (b0_side, b1_side) = (self.side(a, b0), self.side(a, b1));
+        let (a0_side, a1_side) = (self.side(b, a0), self.side(b, a1));
+        let on = |side: Ordering, point: Point2, (left, right): (Point2, Point2)| {
+            side.is_eq() && along(left, point).is_le() && along(point, right).is_le()
+        };
+        let apart = |one: Ordering, other: Ordering| one.is_ne() && one == other.reverse();
+        apart(b0_side, b1_side) && apart(a0_side, a1_side)
+            || on(b0_side, b0, (a0, a1))
+            || on(b1_side, b1, (a0, a1))
+            || on(a0_side, a0, (b0, b1))
+            || on(a1_side, a1, (b0, b1))
+    }
+}
+
+fn crossing(a: usize, b: usize) -> RingFault {
+    RingFault::Crossing(a.min(b), a.max(b))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn ring(vertices: &[(f64, f64)]) -> Vec<Point2> {
+        vertices.iter().map(|(x, y)| Point2::new(*x, *y)).collect()
+    }
+
+    #[track_caller]
+    fn check_ring(vertices: &[(f64, f64)], expected: Result<(), RingFault>) {
+        assert_eq!(check(&ring(vertices)), expected, "{vertices:?}");
+    }
+
+    #[test]
+    fn simple_rings_pass_and_others_are_named() {
+        use RingFault::{Crossing, Flat, Repeated, TooFew};
+        let square = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)];
+        check_ring(&square, Ok(()));
+        let clockwise: Vec<_> = square.into_iter().rev().collect();
+        check_ring(&clockwise, Ok(()));
+        check_ring(
+            &[(0.0, 0.0), (4.0, 0.0), (2.0, 1.0), (4.0, 4.0), (0.0, 4.0)],
+            Ok(()),
+        );
+        check_ring(&[(0.0, 0.0), (2.0, 0.0), (4.0, 0.0), (4.0, 4.0)], Ok(()));
+        check_ring(&[(0.0, 0.0), (4.0, 0.0)], Err(TooFew));
+        check_ring(&[(0.0, 0.0), (4.0, 4.0), (2.0, 2.0)], Err(Flat));
+        check_ring(&[(0.0, 0.0), (0.0, 4.0), (0.0, 2.0)], Err(Flat));
+        check_ring(
+            &[(0.0, 0.0), (4.0, 0.0), (4.0, 0.0), (0.0, 4.0)],
+            Err(Repeated(1, 2)),
+        );
+        // A bow tie.
+        check_ring(
+            &[(0.0, 0.0), (4.0, 4.0), (4.0, 0.0), (0.0, 4.0)],
+            Err(Crossing(0, 2)),
+        );
+        // A vertex on an edge that is not its own.
+        check_ring(
+            &[(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (2.0, 0.0), (0.0, 4.0)],
+            Err(Crossing(0, 3)),
+        );
+        // A spike: the second edge runs back over the first.
+        check_ring(
+            &[(0.0, 0.0), (4.0, 0.0), (2.0, 0.0), (2.0, 4.0)],
+            Err(Crossing(0, 1)),
+        );
+    }
+
+    #[test]
+    fn a_comb_of_twenty_thousand_vertices_is_quick() {
+        let teeth = 5_000;
+        let mut comb = Vec::new();
+        for tooth in 0..teeth {
+            let y = f64::from(tooth) * 2.0;
+            comb.extend([(0.0, y), (1e6, y + 0.5), (1e6, y + 1.0), (0.0, y + 1.5)]);
+        }
+        comb.extend([(-5.0, 2.0 * f64::from(teeth)), (-5.0, -1.0)]);
+        check_ring(&comb, Ok(()));
+        let middle = comb.len() / 2;
+        comb[middle].1 += 5.0;
+        assert!(check(&ring(&comb)).is_err());
+    }
+
+    /// Every pair of edges, as the plain definition has it.
+    fn simple_by_definition(vertices: &[Point2]) -> bool {
+        let all = Sweep {
+            vertices,
+            status: Vec::new(),
+        };
+        (0..vertices.len()).all(|a| (0..a).all(|b| !all.meet(a, b)))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        /// Coordinates on a small lattice, where touching, overlap and repetition are frequent.
+        #[test]
+        fn the_sweep_agrees_with_the_definition(points in prop::collection::vec((0i8..6, 0i8..6), 3..9)) {
+            let points: Vec<_> = points.into_iter().map(|(x, y)| (f64::from(x), f64::from(y))).collect();
+            let vertices = ring(&points);
+            match check(&vertices) {
+                Ok(()) => prop_assert!(simple_by_definition(&vertices)),
+                Err(RingFault::Crossing(a, b)) => {
+                    prop_assert!(!simple_by_definition(&vertices), "edges {} and {}", a, b);
+                }
+                Err(RingFault::Flat | RingFault::Repeated(..) | RingFault::TooFew) => {}
+            }
+        }
+    }
+}

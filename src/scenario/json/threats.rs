@@ -1,0 +1,158 @@
+//! `threats`: cylinders and polygons.
+
+use crate::geometry::Point2;
+use crate::scenario::limits::Limits;
+use crate::threat::{Cylinder, Polygon, Shape, Threat};
+
+use super::fault::Faults;
+use super::fields::Fields;
+use super::path::Path;
+use super::point::point2;
+use super::ranges::{COORDINATE, MARGIN, RADIUS};
+use super::ring::{self, RingFault};
+use super::tree::Node;
+use super::value::{At, figure, name};
+
+const CYLINDER: &[&str] = &["kind", "name", "center", "radius", "influence", "base", "top"];
+const POLYGON: &[&str] = &["kind", "name", "vertices", "margin", "base", "top"];
+
+/// The threats in the order of the document; those that cannot be read are `None`.
+pub(super) fn threats(at: At<'_>, limits: &Limits, faults: &mut Faults) -> Option<Vec<Option<Threat>>> {
+    let len = at.len(faults)?;
+    if len > limits.threats {
+        faults.add(at.path, "too-many", || {
+            format!(
+                "threats has {len} items, must have at most {} (limit threats)",
+                limits.threats
+            )
+        });
+        return None;
+    }
+    let n_vertices = vertex_count(at);
+    let within = n_vertices <= limits.polygon_vertices;
+    if !within {
+        faults.add(at.path, "too-many", || {
+            format!(
+                "the polygons have {n_vertices} vertices together, must have at most {} (limit polygon_vertices)",
+                limits.polygon_vertices
+            )
+        });
+    }
+    Some(at.items(faults, |at, faults| threat(at, within, faults)))
+}
+
+/// The vertices of all polygons together, before any is read.
+fn vertex_count(at: At<'_>) -> usize {
+    let Node::Array(threats) = at.node else { return 0 };
+    let count = |threat: &Node| match threat.get("vertices") {
+        Some(Node::Array(vertices)) => vertices.len(),
+        Some(Node::Numbers(vertices)) => vertices.len(),
+        _ => 0,
+    };
+    threats.iter().map(count).sum()
+}
+
+/// One threat; with `read_vertices` false there are too many to look at.
+fn threat(at: At<'_>, read_vertices: bool, faults: &mut Faults) -> Option<Threat> {
+    let (kind, fields) = at.variant(&[("cylinder", CYLINDER), ("polygon", POLYGON)], &[], faults)?;
+    let name = fields.or("name", None, faults, name);
+    let base = fields.nullable("base", COORDINATE, faults);
+    let top = fields.nullable("top", COORDINATE, faults);
+    let shape = match kind {
+        "cylinder" => cylinder(&fields, faults).map(Shape::Cylinder),
+        _ => polygon(&fields, read_vertices, faults).map(Shape::Polygon),
+    };
+    let (base, top) = (base?, top?);
+    if let (Some(base), Some(top)) = (base, top)
+        && base >= top
+    {
+        faults.add(&Path::Key(at.path, "base"), "base-above-top", || {
+            format!(
+                "base is {}, must be < top, which is {}",
+                figure(base),
+                figure(top)
+            )
+        });
+        return None;
+    }
+    Some(Threat {
+        name: name?,
+        shape: shape?,
+        base,
+        top,
+    })
+}
+
+fn cylinder(fields: &Fields<'_>, faults: &mut Faults) -> Option<Cylinder> {
+    let center = fields.required("center", faults, point2);
+    let radius = fields.number("radius", RADIUS, faults);
+    let influence = fields.or("influence", None, faults, |at, faults| {
+        at.number(RADIUS, faults).map(Some)
+    });
+    let (center, radius) = (center?, radius?);
+    let influence = influence?.unwrap_or(radius);
+    if influence < radius {
+        faults.add(
+            &Path::Key(fields.path, "influence"),
+            "influence-below-radius",
+            || {
+                format!(
+                    "influence is {}, must be >= radius, which is {}",
+                    figure(influence),
+                    figure(radius)
+                )
+            },
+        );
+        return None;
+    }
+    Some(Cylinder {
+        center,
+        radius,
+        influence,
+    })
+}
+
+fn polygon(fields: &Fields<'_>, read_vertices: bool, faults: &mut Faults) -> Option<Polygon> {
+    let margin = fields.number_or("margin", 0.0, MARGIN, faults);
+    let vertices = fields.required("vertices", faults, |at, faults| {
+        at.len(faults)?;
+        if read_vertices { vertices(at, faults) } else { None }
+    });
+    Some(Polygon::new(vertices?, margin?))
+}
+
+/// A simple ring without its closing vertex.
+fn vertices(at: At<'_>, faults: &mut Faults) -> Option<Vec<Point2>> {
+    let mut vertices: Vec<Point2> = at.items(faults, point2).into_iter().collect::<Option<_>>()?;
+    if vertices.len() > 1 && vertices.first() == vertices.last() {
+        vertices.pop();
+    }
+    let Err(fault) = ring::check(&vertices) else {
+        return Some(vertices);
+    };
+    let (code, detail) = match fault {
+        RingFault::TooFew => (
+            "degenerate-polygon",
+            format!(
+                "vertices has {} different points, must have at least 3",
+                vertices.len()
+            ),
+        ),
+        RingFault::Flat => (
+            "degenerate-polygon",
+            "vertices all lie on one line, must enclose an area".to_owned(),
+        ),
+        RingFault::Repeated(a, b) => (
+            "degenerate-polygon",
+            format!("vertices {a} and {b} are the same point, must be different"),
+        ),
+        RingFault::Crossing(a, b) => (
+            "self-crossing-polygon",
+            format!(
+                "the edges from vertices {a} and {b} cross or touch, must meet nowhere but at their ends"
+            ),
+        ),
+    };
+    faults.add(at.path, code, || detail);
+    None
+}

@@ -1,0 +1,354 @@
+//! JSON text to a tree that forgets nothing a fault may be about: object entries stay in order,
+//! duplicates included, and a syntax error knows its line, its column and its pointer.
+//!
+//! Deliberately absent: what any field means.
+
+use std::fmt;
+
+use serde::de::{Deserialize, DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde_json::Number;
+
+use super::fault::Refusal;
+use super::path::escape;
+
+/// A JSON value, 24 bytes; arrays of numbers take 8 bytes an item, so that a grid stays small.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Node {
+    Null,
+    Bool(bool),
+    /// Finite.
+    Number(Number),
+    Text(Box<str>),
+    /// An array of numbers only, or an empty one.
+    Numbers(Box<[f64]>),
+    /// Any other array.
+    Array(Box<[Node]>),
+    /// Entries in document order, duplicate keys included.
+    Object(Box<[(Box<str>, Node)]>),
+}
+
+impl Node {
+    /// The first entry of this name, when this is an object that has one.
+    pub(super) fn get(&self, key: &str) -> Option<&Node> {
+        match self {
+            Node::Object(entries) => entries
+                .iter()
+                .find(|(known, _)| **known == *key)
+                .map(|(_, node)| node),
+            _ => None,
+        }
+    }
+}
+
+/// Parse JSON text (RFC 8259, UTF-8, nothing after the value).
+///
+/// # Errors
+/// [`Refusal::Syntax`] for anything that is not JSON, nesting deeper than 127, and numbers that
+/// no 64-bit float can hold.
+pub(super) fn parse(text: &[u8]) -> Result<Node, Refusal> {
+    let mut trail = Vec::new();
+    let mut reader = serde_json::Deserializer::from_slice(text);
+    Element { trail: &mut trail }
+        .deserialize(&mut reader)
+        .and_then(|node| reader.end().map(|()| node))
+        .map_err(|error| refuse(text, &trail, &error))
+}
+
+/// One step from the root to the value being parsed.
+enum Step {
+    Key(Box<str>),
+    Index(usize),
+}
+
+/// Parses one value; steps are taken off the trail on success only, so that after an error the
+/// trail still leads to its place.
+struct Element<'a> {
+    trail: &'a mut Vec<Step>,
+}
+
+impl<'de> DeserializeSeed<'de> for Element<'_> {
+    type Value = Node;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Node, D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Element<'_> {
+    type Value = Node;
+
+    fn expecting(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str("a JSON value")
+    }
+
+    fn visit_unit<E>(self) -> Result<Node, E> {
+        Ok(Node::Null)
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Node, E> {
+        Ok(Node::Bool(value))
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Node, E> {
+        Ok(Node::Number(value.into()))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Node, E> {
+        Ok(Node::Number(value.into()))
+    }
+
+    fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<Node, E> {
+        let number = Number::from_f64(value).ok_or_else(|| E::custom("number out of range"))?;
+        Ok(Node::Number(number))
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<Node, E> {
+        Ok(Node::Text(value.into()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Node, A::Error> {
+        let mut numbers = Vec::new();
+        let mut items = Vec::new();
+        self.trail.push(Step::Index(0));
+        while let Some(item) = seq.next_element_seed(Element {
+            trail: &mut *self.trail,
+        })? {
+            match item {
+                Node::Number(number) if items.is_empty() => numbers.push(float(&number)),
+                item => {
+                    items.extend(
+                        numbers
+                            .drain(..)
+                            .map(|number| Node::Number(whole_or_float(number))),
+                    );
+                    items.push(item);
+                }
+            }
+            if let Some(Step::Index(index)) = self.trail.last_mut() {
+                *index += 1;
+            }
+        }
+        self.trail.pop();
+        if items.is_empty() {
+            Ok(Node::Numbers(numbers.into()))
+        } else {
+            Ok(Node::Array(items.into()))
+        }
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Node, A::Error> {
+        let mut entries = Vec::new();
+        while let Some(Key(key)) = map.next_key()? {
+            self.trail.push(Step::Key(key));
+            let value = map.next_value_seed(Element {
+                trail: &mut *self.trail,
+            })?;
+            if let Some(Step::Key(key)) = self.trail.pop() {
+                entries.push((key, value));
+            }
+        }
+        Ok(Node::Object(entries.into()))
+    }
+}
+
+/// A key, taken as text whatever else it may look like.
+struct Key(Box<str>);
+
+impl<'de> Deserialize<'de> for Key {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Box::<str>::deserialize(deserializer).map(Key)
+    }
+}
+
+/// The nearest 64-bit float.
+pub(super) fn float(number: &Number) -> f64 {
+    // Adding 0 turns -0 into 0, so that equal documents make bit-equal scenarios.
+    number.as_f64().expect("numbers of the tree are finite") + 0.0
+}
+
+/// A number as a caller would have written it: `3`, not `3.0`.
+#[expect(clippy::cast_possible_truncation, reason = "whole and below 2^53, so exact")]
+pub(super) fn whole_or_float(number: f64) -> Number {
+    if number.fract() == 0.0 && number.abs() < 9_007_199_254_740_992.0 {
+        Number::from(number as i64)
+    } else {
+        Number::from_f64(number).unwrap_or_else(|| Number::from(0))
+    }
+}
+
+fn refuse(text: &[u8], trail: &[Step], error: &serde_json::Error) -> Refusal {
+    let (line, column) = (error.line().max(1), error.column().max(1));
+    Refusal::Syntax {
+        line,
+        column,
+        pointer: pointer(trail),
+        detail: explain(text, line, column, error),
+    }
+}
+
+/// The trail as a JSON pointer, cut where a hostile key would make it long.
+fn pointer(trail: &[Step]) -> String {
+    const MAX_CHARS: usize = 500;
+    let mut pointer = String::new();
+    for step in trail {
+        pointer.push('/');
+        match step {
+            Step::Key(key) => pointer.push_str(&escape(&key.chars().take(MAX_CHARS).collect::<String>())),
+            Step::Index(index) => pointer.push_str(&index.to_string()),
+        }
+    }
+    match pointer.char_indices().nth(MAX_CHARS) {
+        Some((end, _)) => format!("{}...", &pointer[..end]),
+        None => pointer,
+    }
+}
+
+/// What the reader met, in words; frequent mistakes are named.
+fn explain(text: &[u8], line: usize, column: usize, error: &serde_json::Error) -> String {
+    if text.iter().all(u8::is_ascii_whitespace) {
+        return "the document is empty, must be a JSON object".to_owned();
+    }
+    if text.starts_with(b"\xEF\xBB\xBF") && (line, column) == (1, 1) {
+        return "the document starts with a byte order mark, must be plain UTF-8".to_owned();
+    }
+    let message = error.to_string();
+    let message = message
+        .rfind(" at line ")
+        .map_or(message.as_str(), |end| &message[..end]);
+    let word = word_at(text, line, column);
+    let bare = word.trim_start_matches(['-', '+']).to_ascii_lowercase();
+    if message == "number out of range" {
+        format!("{word} is out of range, must fit a 64-bit float")
+    } else if ["nan", "inf", "infinity"].contains(&bare.as_str()) {
+        format!("{word} is not JSON, numbers must be finite")
+    } else if message == "trailing characters" {
+        "something follows the document, must be one JSON value and nothing after it".to_owned()
+    } else if message == "recursion limit exceeded" {
+        "the document is nested too deeply, at most 127 levels are read".to_owned()
+    } else {
+        message.to_owned()
+    }
+}
+
+/// The number or bare word at a place, at most 40 bytes of it.
+fn word_at(text: &[u8], line: usize, column: usize) -> String {
+    let part_of_word = |byte: &u8| byte.is_ascii_alphanumeric() || b"+-._".contains(byte);
+    let row = text
+        .split(|byte| *byte == b'\n')
+        .nth(line - 1)
+        .unwrap_or_default();
+    let at = (column - 1).min(row.len());
+    let begin = row[..at]
+        .iter()
+        .rposition(|byte| !part_of_word(byte))
+        .map_or(0, |before| before + 1);
+    let word: Vec<u8> = row[begin..]
+        .iter()
+        .copied()
+        .take_while(part_of_word)
+        .take(40)
+        .collect();
+    String::from_utf8_lossy(&word).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn check(text: impl AsRef<[u8]>, expected: (usize, usize, &str, &str)) {
+        let refusal = parse(text.as_ref()).expect_err("not JSON");
+        let Refusal::Syntax {
+            line,
+            column,
+            pointer,
+            detail,
+        } = refusal
+        else {
+            panic!("a syntax error was expected, not {refusal:?}");
+        };
+        assert_eq!((line, column, pointer.as_str(), detail.as_str()), expected);
+    }
+
+    #[test]
+    fn a_syntax_error_says_where_it_is() {
+        check("", (1, 1, "", "the document is empty, must be a JSON object"));
+        check(" \n ", (2, 1, "", "the document is empty, must be a JSON object"));
+        check(
+            "{\n \"a\": [1, 1e999]}",
+            (2, 14, "/a/1", "1e999 is out of range, must fit a 64-bit float"),
+        );
+        check(
+            "{\"a\":{\"b~/\":NaN}}",
+            (1, 13, "/a/b~0~1", "NaN is not JSON, numbers must be finite"),
+        );
+        check(
+            "[1, nan]",
+            (1, 6, "/1", "nan is not JSON, numbers must be finite"),
+        );
+        check(
+            "[-Infinity]",
+            (1, 3, "/0", "-Infinity is not JSON, numbers must be finite"),
+        );
+        check(
+            "\u{feff}{}",
+            (
+                1,
+                1,
+                "",
+                "the document starts with a byte order mark, must be plain UTF-8",
+            ),
+        );
+        check(
+            "{} {}",
+            (
+                1,
+                4,
+                "",
+                "something follows the document, must be one JSON value and nothing after it",
+            ),
+        );
+        check(
+            "{\"a\":\"\\ud800\"}",
+            (1, 13, "/a", "unexpected end of hex escape"),
+        );
+        check(b"{\"a\":\"\xFF\"}", (1, 8, "/a", "invalid unicode code point"));
+        check("{\"a\":1,}", (1, 8, "", "trailing comma"));
+        check("{\"a\":01}", (1, 7, "/a", "invalid number"));
+        check(
+            format!("{}{}", "[".repeat(200), "]".repeat(200)),
+            (
+                1,
+                128,
+                &"/0".repeat(127),
+                "the document is nested too deeply, at most 127 levels are read",
+            ),
+        );
+    }
+
+    #[test]
+    fn a_long_key_does_not_make_a_long_pointer() {
+        let Err(Refusal::Syntax { pointer, .. }) =
+            parse(format!("{{\"{}\":?}}", "é".repeat(9000)).as_bytes())
+        else {
+            panic!("a syntax error was expected");
+        };
+        assert_eq!(pointer.chars().count(), 503);
+    }
+
+    #[test]
+    fn entries_keep_their_order_and_their_duplicates() {
+        let node = parse(br#"{"b":1,"a":[1,2.5],"b":[1,null]}"#).expect("JSON");
+        let Node::Object(entries) = node else {
+            panic!("an object was expected")
+        };
+        let keys: Vec<&str> = entries.iter().map(|(key, _)| &**key).collect();
+        assert_eq!(keys, ["b", "a", "b"]);
+        assert_eq!(entries[1].1, Node::Numbers([1.0, 2.5].into()));
+        assert_eq!(
+            entries[2].1,
+            Node::Array([Node::Number(1.into()), Node::Null].into())
+        );
+        assert!(size_of::<Node>() <= 24);
+    }
+}

@@ -1,0 +1,330 @@
+//! Scenario documents: what is accepted, and every fault of what is not.
+
+mod cases;
+mod fuzz;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use noctule::scenario::json::{self, AlgorithmRule, CODES, Fault, MAX_LISTED, ParameterRule, Refusal, Rules};
+use noctule::scenario::limits::Limits;
+use noctule::scenario::{Quadrature, Scenario, Seeding};
+use noctule::terrain::Terrain;
+use noctule::threat::Shape;
+
+use cases::all_cases;
+
+fn rules() -> Rules {
+    let parameters = vec![
+        ParameterRule {
+            name: "f_min",
+            min: -10.0,
+            max: 10.0,
+        },
+        ParameterRule {
+            name: "loudness",
+            min: 0.0,
+            max: 1.0,
+        },
+    ];
+    Rules {
+        limits: Limits::default(),
+        algorithms: vec![
+            AlgorithmRule {
+                name: "tms-sba",
+                parameters,
+            },
+            AlgorithmRule {
+                name: "sba",
+                parameters: Vec::new(),
+            },
+        ],
+    }
+}
+
+fn read(text: &str) -> Result<Scenario, Refusal> {
+    json::read(text.as_bytes(), &rules(), 11)
+}
+
+#[track_caller]
+fn faults(text: &str) -> Vec<Fault> {
+    match read(text) {
+        Err(Refusal::Invalid(faults)) => faults,
+        other => panic!("faults were expected, not {other:?}\n{text}"),
+    }
+}
+
+/// The least that a document must say.
+const LEAST: &str =
+    r#"{"start":{"x":0,"y":0,"z":0},"target":{"x":300,"y":400,"z":0},"altitude":{"min":0,"max":200}}"#;
+
+/// A document with everything in it; the cases below replace one part each.
+const FULL: &str = r#"{
+"name":"full","frame":"local",
+"start":{"x":100,"y":100,"z":0},"target":{"x":900,"y":800,"z":150},
+"area":{"min":{"x":0,"y":0},"max":{"x":1000,"y":1000}},
+"threats":[
+ {"kind":"cylinder","name":"radar","center":{"x":350,"y":250},"radius":60,"influence":90,"base":null,"top":500},
+ {"kind":"polygon","name":null,"vertices":[{"x":500,"y":500},{"x":600,"y":500},{"x":550,"y":600}],"margin":30}
+],
+"terrain":{"kind":"grid","origin":{"x":0,"y":0},"cell":500,"columns":3,"rows":3,"elevations":[0,0,0,0,0,0,0,0,100]},
+"altitude":{"min":10,"max":200},
+"vehicle":{"max_turn_deg":60,"max_climb_deg":45,"min_leg":8,"cruise_speed":15,"fuel_per_km":1000},
+"weights":{"fuel":0.5,"threat":1,"altitude":1},
+"planner":{"algorithm":"tms-sba","waypoints":8,"population":40,"iterations":30,"seed":7,"time_limit_ms":null,
+ "seeding":"random","polish":false,"warm_start":null,"smoothing":{"degree":3,"spacing":5},
+ "parameters":{"quadrature":"paper","loudness":0.5}}
+}"#;
+
+fn edited(from: &str, to: &str) -> String {
+    assert_eq!(
+        FULL.matches(from).count(),
+        1,
+        "{from} must occur once in the document"
+    );
+    FULL.replace(from, to)
+}
+
+#[test]
+fn every_case_makes_its_own_fault_and_no_other() {
+    for (document, expected) in all_cases() {
+        assert_eq!(faults(&document), [expected]);
+    }
+}
+
+#[test]
+fn every_code_has_a_case_and_a_row_in_the_docs() {
+    let page = include_str!("../../../docs/PROBLEMS.md");
+    let mut examples: BTreeMap<&str, Fault> = BTreeMap::new();
+    for (_, fault) in all_cases() {
+        examples.entry(fault.code).or_insert(fault);
+    }
+    let counted = faults(&format!("{{{}}}", r#""x":0,"#.repeat(150).trim_end_matches(',')));
+    let last = counted.last().expect("there are many").clone();
+    examples.insert(last.code, last);
+    for (code, meaning) in CODES {
+        let Fault { pointer, detail, .. } = &examples
+            .remove(code)
+            .unwrap_or_else(|| panic!("{code} has no case"));
+        let pointer = if pointer.is_empty() {
+            "(the document)".to_owned()
+        } else {
+            format!("`{pointer}`")
+        };
+        let row = format!("| `{code}` | {meaning} | {pointer}: {detail} |");
+        assert!(page.contains(&row), "docs/PROBLEMS.md has no row\n{row}");
+    }
+    assert!(examples.is_empty(), "not in the table of codes: {examples:?}");
+}
+
+#[test]
+fn the_least_document_is_filled_with_the_defaults() {
+    let scenario = read(LEAST).expect("it says all that is needed");
+    insta::assert_snapshot!(json::write(&scenario));
+    assert_eq!(scenario.planner.seed, 11);
+    assert_eq!(scenario.planner.seeding, Seeding::Random);
+    assert_eq!(scenario.planner.quadrature, Quadrature::Integral);
+    // |ST| / (10 (N + 1)) with |ST| = 500 and N = 10, and a box of 300 by 400 plus a quarter of 500 around.
+    assert!((scenario.vehicle.min_leg - 500.0 / 110.0).abs() < 1e-12);
+    assert!((scenario.area.min.x + 125.0).abs() < 1e-9);
+    assert!((scenario.area.max.y - 525.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_full_document_is_read_as_it_says() {
+    let scenario = read(FULL).expect("it has no fault");
+    assert_eq!(scenario.name.as_deref(), Some("full"));
+    assert_eq!(scenario.threats.len(), 2);
+    assert_eq!(scenario.threats[0].top, Some(500.0));
+    assert!(matches!(&scenario.threats[1].shape, Shape::Polygon(polygon) if polygon.vertices().len() == 3));
+    assert!(matches!(&scenario.terrain, Terrain::Grid(grid) if grid.elevations.len() == 9));
+    assert_eq!(scenario.planner.quadrature, Quadrature::Paper);
+    assert_eq!(
+        scenario.planner.parameters,
+        BTreeMap::from([("loudness".to_owned(), 0.5)])
+    );
+}
+
+#[test]
+fn what_is_nearly_a_fault_is_none() {
+    for (from, to) in [
+        // Touching a threat is not being inside; neither is being at its top.
+        (r#""x":100,"y":100,"z":0"#, r#""x":290,"y":250,"z":0"#),
+        (r#""x":100,"y":100,"z":0"#, r#""x":350,"y":250,"z":500"#),
+        (r#""x":100,"y":100,"z":0"#, r#""x":550,"y":500,"z":0"#),
+        (r#""x":100,"y":100,"z":0"#, r#""x":100,"y":100,"z":-0.1"#),
+        // The start may be below or above the band.
+        (r#""x":100,"y":100,"z":0"#, r#""x":100,"y":100,"z":5000"#),
+        (r#""x":100,"y":100,"z":0"#, r#""x":0,"y":0,"z":0"#),
+        (r#""seed":7"#, r#""seed":7.0"#),
+        (r#""seed":7"#, r#""seed":9007199254740991"#),
+        (r#""waypoints":8"#, r#""waypoints":2e2"#),
+        (r#""max_turn_deg":60"#, r#""max_turn_deg":180"#),
+        (
+            r#""fuel":0.5,"threat":1,"altitude":1"#,
+            r#""fuel":0,"threat":0,"altitude":0"#,
+        ),
+        (r#"{"x":550,"y":600}"#, r#"{"x":550,"y":600},{"x":500,"y":500}"#),
+        (
+            r#""max":{"x":1000,"y":1000}"#,
+            r#""max":{"x":1000.0000001,"y":1000}"#,
+        ),
+        (r#""influence":90,"#, r#""influence":60,"#),
+        (r#""name":"full""#, r#""name":null"#),
+    ] {
+        let scenario = read(&edited(from, to)).unwrap_or_else(|refusal| panic!("{to}: {refusal}"));
+        assert!(
+            scenario.area.max.x <= 1000.0,
+            "the area must stay within the grid"
+        );
+    }
+}
+
+#[test]
+fn a_drawn_seed_stays_below_two_to_the_53() {
+    let scenario = json::read(LEAST.as_bytes(), &rules(), u64::MAX).expect("it has no fault");
+    assert_eq!(scenario.planner.seed, (1 << 53) - 1);
+}
+
+#[test]
+fn without_an_area_everything_is_inside_and_a_grid_is_its_own_area() {
+    let area = "\"area\":{\"min\":{\"x\":0,\"y\":0},\"max\":{\"x\":1000,\"y\":1000}},\n";
+    let scenario = read(&edited(area, "")).expect("it has no fault");
+    assert!((scenario.area.max.x - 1000.0).abs() < 1e-9 && scenario.area.min.x.abs() < 1e-9);
+
+    let far = LEAST.replace(
+        r#""altitude""#,
+        r#""threats":[{"kind":"cylinder","center":{"x":-1e7,"y":0},"radius":1e7}],"altitude""#,
+    );
+    let far = far.replace(r#""x":0,"y":0,"#, r#""x":1,"y":0,"#);
+    let scenario = read(&far).expect("the largest threat still has an area round it");
+    assert!(scenario.area.min.x < -2e7);
+    assert_eq!(
+        read(&json::write(&scenario)).expect("its area is in range"),
+        scenario
+    );
+}
+
+#[test]
+fn all_faults_come_at_once_and_in_document_order() {
+    let document = r#"{
+        "threats": [
+            {"kind":"cylinder","center":{"x":0,"y":"1"},"radius":-3,"top":"high"},
+            {"kind":"polygon","vertices":[{"x":0,"y":0},{"x":9,"y":9},{"x":9,"y":0},{"x":0,"y":9}],"colour":"red"},
+            {"kind":"cylinder","name":"here","center":{"x":1,"y":1},"radius":5,"influence":4},
+            {"kind":"cylinder","name":"there","center":{"x":1,"y":1},"radius":5},
+            {"kind":"cone"}, 7
+        ],
+        "start": {"x":0,"y":0,"z":-4},
+        "planner": {"algorithm":"bat","waypoints":0.5,"seed":-1,"population":1e9,"parameters":{"f_min":3}},
+        "start": {"x":1,"y":1,"z":1},
+        "terrain": {"kind":"peaks","peaks":[{"center":{"x":0},"height":1,"spread":{"x":0,"y":5}}]},
+        "vehicle": {"max_turn_deg":0,"max_climb_deg":-45},
+        "weights": {"fuel":-1}
+    }"#;
+    let faults = faults(document);
+    insta::assert_snapshot!(Refusal::Invalid(faults).to_string());
+}
+
+#[test]
+fn ten_thousand_faults_make_a_short_answer() {
+    let threat = r#"{"kind":"cylinder","center":{"x":0,"y":0},"radius":-1},"#;
+    let threats = format!(
+        r#""threats":[{}],"altitude""#,
+        threat.repeat(10_000).trim_end_matches(',')
+    );
+    let faults = faults(&LEAST.replace(r#""altitude""#, &threats));
+    assert_eq!(faults.len(), MAX_LISTED + 1);
+    let last = faults.last().expect("there are many");
+    assert_eq!((last.code, last.pointer.as_str()), ("more-faults", ""));
+    assert_eq!(last.detail, "9900 more faults are not listed, at most 100 are");
+}
+
+#[test]
+fn hostile_keys_and_texts_are_not_echoed_in_full() {
+    let long = "\u{7}k".repeat(100_000);
+    let document = LEAST.replace(
+        r#""altitude""#,
+        &format!(
+            r#"{}:1,"frame":{},"altitude""#,
+            serde_json::json!(long),
+            serde_json::json!(long)
+        ),
+    );
+    for fault in faults(&document) {
+        assert!(fault.pointer.len() + fault.detail.len() < 1000, "{fault:?}");
+        assert!(!fault.detail.contains(char::is_control), "{fault:?}");
+    }
+}
+
+#[test]
+fn what_is_not_an_object_is_no_scenario() {
+    for text in ["null", "[]", "7", "\"scenario\"", "[1,2]"] {
+        let faults = faults(text);
+        assert_eq!(
+            (faults.len(), faults[0].code, faults[0].pointer.as_str()),
+            (1, "wrong-type", ""),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn broken_json_says_line_column_and_pointer() {
+    let Err(Refusal::Syntax {
+        line,
+        column,
+        pointer,
+        ..
+    }) = read(&edited(r#""radius":60"#, r#""radius":1e999"#))
+    else {
+        panic!("a syntax error was expected");
+    };
+    assert_eq!((line, pointer.as_str()), (6, "/threats/0/radius"));
+    assert!(column > 60);
+}
+
+#[test]
+fn a_body_of_eight_mebibytes_is_read_at_once() {
+    let nodes = 1_000_000;
+    let elevations = "123.25,".repeat(nodes - 1) + "123.25";
+    let grid = format!(
+        r#""terrain":{{"kind":"grid","origin":{{"x":0,"y":0}},"cell":30,"columns":1000,"rows":1000,"elevations":[{elevations}]}},"altitude""#
+    );
+    let document = LEAST
+        .replace(r#""altitude""#, &grid)
+        .replace(r#""z":0"#, r#""z":200"#);
+    let begin = std::time::Instant::now();
+    let scenario = read(&document).expect("it has no fault");
+    let taken = begin.elapsed();
+    assert!(matches!(&scenario.terrain, Terrain::Grid(grid) if grid.elevations.len() == nodes));
+    assert!(taken.as_secs() < 2, "{taken:?}");
+}
+
+#[test]
+fn every_document_in_scenarios_is_accepted() {
+    let mut n_documents = 0;
+    for entry in std::fs::read_dir("scenarios").expect("the directory is there") {
+        let path = entry.expect("it can be listed").path();
+        if path.extension().is_none_or(|extension| extension != "json") {
+            continue;
+        }
+        n_documents += 1;
+        let text = std::fs::read_to_string(&path).expect("it can be read");
+        let scenario =
+            read(&text).unwrap_or_else(|refusal| panic!("{} is refused:\n{refusal}", path.display()));
+        let again = read(&json::write(&scenario)).expect("what is written is accepted");
+        assert_eq!(again, scenario, "{}", path.display());
+    }
+    assert!(n_documents >= 5, "only {n_documents} documents were found");
+}
+
+#[test]
+fn the_codes_are_unlike_each_other() {
+    let codes: BTreeSet<&str> = CODES.iter().map(|(code, _)| *code).collect();
+    assert_eq!(codes.len(), CODES.len());
+    assert!(
+        codes
+            .iter()
+            .all(|code| code.chars().all(|c| c.is_ascii_lowercase() || c == '-'))
+    );
+}

@@ -33,7 +33,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let text = read(&arguments.file).with_context(|| format!("cannot read {}", arguments.file.display()))?;
     let rules = Rules {
         limits: Limits::default(),
-        algorithms: planner::algorithms(),
+        algorithms: planner::algorithm_rules(),
     };
     let scenario = match json::read(&text, &rules, draw_seed()) {
         Ok(scenario) => scenario,

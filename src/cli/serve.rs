@@ -43,7 +43,7 @@ async fn serve(config: &Serve) -> anyhow::Result<()> {
     let workers = config.workers();
     let rules = Arc::new(Rules {
         limits: Limits::default(),
-        algorithms: planner::algorithms(),
+        algorithms: planner::algorithm_rules(),
     });
     let settings = worker::Settings {
         workers: workers.get(),

@@ -1,9 +1,12 @@
 //! What the operator allows, with the defaults that `GET /limits` shows.
+//!
+//! A refusal names the limit by its field here and the value that exceeds it. What a number may be
+//! whoever runs the server (a turn of at most 180 degrees) is not here but in `json`.
 
 /// Upper limits on a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Bytes of a request body.
+    /// Bytes of a request body; checked before the body is read.
     pub body_bytes: usize,
     /// Threats of a scenario.
     pub threats: usize,
@@ -19,9 +22,10 @@ pub struct Limits {
     pub population: usize,
     /// Iterations.
     pub iterations: usize,
-    /// population * iterations * waypoints.
+    /// population * iterations * waypoints; bounds the time that one plan can take.
     pub work: u64,
-    /// Samples of the delivered path.
+    /// Samples of the delivered path: a document is refused when the straight way from start to
+    /// target already makes more at its `smoothing.spacing`.
     pub path_samples: usize,
 }
 

@@ -32,7 +32,9 @@ struct Patch {
 }
 
 impl Grid {
-    pub(super) fn extent(&self) -> Rect {
+    /// The ground that the grid covers.
+    #[must_use]
+    pub fn extent(&self) -> Rect {
         let size = nalgebra::Vector2::new((self.columns - 1) as f64, (self.rows - 1) as f64) * self.cell;
         Rect {
             min: self.origin,

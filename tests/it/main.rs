@@ -1,4 +1,4 @@
-//! The integration tests: one module per subject.
+//! The integration tests: one binary, one module a subject.
 
 mod api;
 mod events;

@@ -1,9 +1,9 @@
 //! The whole document: its sections, and what they must be to each other.
 
-use crate::geometry::{Point2, Point3, Rect};
+use crate::geometry::{Point3, Rect};
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;
-use crate::threat::{Shape, Threat};
+use crate::threat::Threat;
 
 use super::Rules;
 use super::ends;
@@ -12,7 +12,7 @@ use super::fields::Fields;
 use super::path::Path;
 use super::planner::planner;
 use super::point::{area, point3};
-use super::terrain::{self, extent};
+use super::terrain;
 use super::threats::threats;
 use super::tree::Node;
 use super::value::{At, figure, metres, name};
@@ -166,7 +166,7 @@ fn covered(area: Rect, terrain: &Terrain, faults: &mut Faults) -> Option<Rect> {
     let Terrain::Grid(grid) = terrain else {
         return Some(area);
     };
-    let ground = extent(grid);
+    let ground = grid.extent();
     if ground.excess(area.min).max(ground.excess(area.max)) > OVERHANG_M {
         faults.add(&Path::Key(&Path::Root, "area"), "area-outside-terrain", || {
             format!(
@@ -193,34 +193,17 @@ fn covered(area: Rect, terrain: &Terrain, faults: &mut Faults) -> Option<Rect> {
 /// the target and every threat with its soft zone, wider on every side by a quarter of its
 /// diagonal and at least by 10 m.
 fn default_area(start: Point3, target: Point3, threats: &[Threat], terrain: &Terrain) -> Rect {
-    if let Terrain::Grid(grid) = terrain {
-        return extent(grid);
+    if let Some(extent) = terrain.extent() {
+        return extent;
     }
-    let mut area = Rect {
-        min: start.xy(),
-        max: start.xy(),
-    };
-    let mut include = |point: Point2, reach: f64| {
-        area.min = area.min.inf(&Point2::new(point.x - reach, point.y - reach));
-        area.max = area.max.sup(&Point2::new(point.x + reach, point.y + reach));
-    };
-    include(target.xy(), 0.0);
-    for threat in threats {
-        match &threat.shape {
-            Shape::Cylinder(cylinder) => include(cylinder.center, cylinder.influence),
-            Shape::Polygon(polygon) => {
-                polygon
-                    .vertices
-                    .iter()
-                    .for_each(|vertex| include(*vertex, polygon.margin));
-            }
-        }
-    }
+    let area = threats
+        .iter()
+        .map(Threat::extent)
+        .flat_map(|extent| [extent.min, extent.max])
+        .chain([start.xy(), target.xy()]);
+    let area = Rect::around(area).expect("start and target are there");
     let padding = (area.diagonal() / 4.0).max(MIN_PADDING_M);
-    Rect {
-        min: Point2::new(area.min.x - padding, area.min.y - padding),
-        max: Point2::new(area.max.x + padding, area.max.y + padding),
-    }
+    area.grown(padding)
 }
 
 /// The straight way from start to target must not already make more samples than the server takes.

@@ -49,15 +49,15 @@ impl Range {
         above && below
     }
 
-    /// What `value` should have been: one side where the other could not be meant.
+    /// What `value` should have been. An upper end of 1e6 and more only keeps numbers sane: a
+    /// negative radius need not hear of it.
     pub(super) fn advice(&self, value: f64) -> String {
-        let only_min = value <= self.min && self.min >= 0.0 && !self.closed_max_matters();
-        if only_min { self.lower() } else { self.to_string() }
-    }
-
-    /// Upper ends of 1e6 and more are there to keep numbers sane; a negative radius needs not hear of them.
-    fn closed_max_matters(&self) -> bool {
-        self.max < 1e6
+        let sane_max = self.max >= 1e6;
+        if sane_max && self.min >= 0.0 && value <= self.min {
+            self.lower()
+        } else {
+            self.to_string()
+        }
     }
 
     fn lower(&self) -> String {

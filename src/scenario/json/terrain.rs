@@ -1,6 +1,5 @@
 //! `terrain`: flat, peaks and grid.
 
-use crate::geometry::{Point2, Rect};
 use crate::scenario::limits::Limits;
 use crate::terrain::{Flat, Grid, Peak, Peaks, Terrain};
 
@@ -31,15 +30,6 @@ pub(super) fn terrain(at: At<'_>, limits: &Limits, faults: &mut Faults) -> Optio
         }
         ("peaks", fields) => peaks(&fields, limits, faults).map(Terrain::Peaks),
         (_, fields) => grid(&fields, limits, faults).map(Terrain::Grid),
-    }
-}
-
-/// The ground that a grid covers.
-pub(super) fn extent(grid: &Grid) -> Rect {
-    let far = |origin: f64, nodes: usize| origin + grid.cell * (nodes - 1) as f64;
-    Rect {
-        min: grid.origin,
-        max: Point2::new(far(grid.origin.x, grid.columns), far(grid.origin.y, grid.rows)),
     }
 }
 
@@ -95,7 +85,7 @@ fn grid(fields: &Fields<'_>, limits: &Limits, faults: &mut Faults) -> Option<Gri
         rows: rows?,
         elevations: elevations?,
     };
-    let far = extent(&grid).max;
+    let far = grid.extent().max;
     for (axis, end) in [("x", far.x), ("y", far.y)] {
         if !COORDINATE.contains(end) {
             faults.add(&Path::Key(fields.path, "cell"), "out-of-range", || {

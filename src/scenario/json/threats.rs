@@ -118,10 +118,7 @@ fn polygon(fields: &Fields<'_>, read_vertices: bool, faults: &mut Faults) -> Opt
         at.len(faults)?;
         if read_vertices { vertices(at, faults) } else { None }
     });
-    Some(Polygon {
-        vertices: vertices?,
-        margin: margin?,
-    })
+    Some(Polygon::new(vertices?, margin?))
 }
 
 /// A simple ring without its closing vertex.

@@ -229,6 +229,7 @@ fn show(node: &Node) -> Cow<'static, str> {
     match node {
         Node::Null => "null".into(),
         Node::Bool(value) => value.to_string().into(),
+        Node::Number(number) if number.is_f64() => figure(float(number)).into(),
         Node::Number(number) => number.to_string().into(),
         Node::Text(text) => quote(text).into(),
         Node::Numbers(_) | Node::Array(_) => "an array".into(),

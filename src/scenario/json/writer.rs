@@ -236,8 +236,8 @@ impl<'a> From<&'a Threat> for WireThreat<'a> {
             },
             Shape::Polygon(polygon) => Self::Polygon {
                 name,
-                vertices: polygon.vertices.iter().copied().map(XY::from).collect(),
-                margin: Figure(polygon.margin),
+                vertices: polygon.vertices().iter().copied().map(XY::from).collect(),
+                margin: Figure(polygon.margin()),
                 base,
                 top,
             },

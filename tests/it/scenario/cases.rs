@@ -126,7 +126,7 @@ const CASES: &[Case] = &[
         r#""x":1e300"#,
         "/threats/0/center/x",
         "out-of-range",
-        "x is 1e300, must be >= -10000000 and <= 10000000",
+        "x is 1e+300, must be >= -10000000 and <= 10000000",
     ),
     (
         r#""max_climb_deg":45"#,

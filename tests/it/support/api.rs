@@ -60,7 +60,7 @@ impl Api {
                     body_bytes: 4096,
                     ..Limits::default()
                 },
-                algorithms: planner::algorithms(),
+                algorithms: planner::algorithm_rules(),
             }),
             capacity: Capacity { workers: 2, queue },
             body_timeout: Duration::from_secs(30),

@@ -55,7 +55,7 @@ fn choose_format(params: &Params, headers: &HeaderMap) -> Result<&'static Format
         let found = export::ALL.iter().find(|format| format.name == name);
         let names = || {
             let names: Vec<_> = export::ALL.iter().map(|format| format.name).collect();
-            names.join(", ")
+            format!("one of {}", names.join(", "))
         };
         return found.ok_or_else(|| params::refused("format", name, &names()));
     }

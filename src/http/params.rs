@@ -21,10 +21,10 @@ impl Params {
             .map_err(|error| invalid("query", &error.to_string()))?;
         for (position, (name, _)) in pairs.iter().enumerate() {
             if !known.contains(&name.as_str()) {
-                return Err(invalid(name, &unknown(known)));
+                return Err(invalid(name, &unknown(name, known)));
             }
             if pairs[..position].iter().any(|(earlier, _)| earlier == name) {
-                return Err(invalid(name, "given twice"));
+                return Err(invalid(name, &format!("{name} is given twice")));
             }
         }
         Ok(Self(pairs))
@@ -46,7 +46,7 @@ impl Params {
 
 /// `value` is not what `name` may be.
 pub(super) fn refused(name: &str, value: &str, allowed: &str) -> Problem {
-    invalid(name, &format!("is {value:?}, must be {allowed}"))
+    invalid(name, &format!("{name} is {value:?}, must be {allowed}"))
 }
 
 fn invalid(name: &str, detail: &str) -> Problem {
@@ -56,11 +56,11 @@ fn invalid(name: &str, detail: &str) -> Problem {
     }
 }
 
-fn unknown(known: &[&str]) -> String {
+fn unknown(name: &str, known: &[&str]) -> String {
     if known.is_empty() {
-        "is unknown; there are no parameters here".to_owned()
+        format!("{name} is unknown, there are no parameters here")
     } else {
-        format!("is unknown, must be one of {}", known.join(", "))
+        format!("{name} is unknown, must be one of {}", known.join(", "))
     }
 }
 
@@ -92,7 +92,7 @@ mod tests {
             .and_then(|params| params.parse::<u32>("limit", "a number"))
         {
             Ok(_) => None,
-            Err(Problem::InvalidParameter { name, detail }) => Some(format!("{name} {detail}")),
+            Err(Problem::InvalidParameter { detail, .. }) => Some(detail),
             Err(other) => Some(format!("{other:?}")),
         }
     }

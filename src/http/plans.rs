@@ -171,7 +171,7 @@ pub(super) async fn list(State(state): State<AppState>, uri: Uri) -> Result<Resp
 }
 
 fn read_status(name: &str) -> Result<Status, Problem> {
-    let allowed = || Status::ALL.map(Status::name).join(", ");
+    let allowed = || format!("one of {}", Status::ALL.map(Status::name).join(", "));
     Status::from_name(name).ok_or_else(|| params::refused("status", name, &allowed()))
 }
 

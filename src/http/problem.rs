@@ -177,11 +177,11 @@ impl Problem {
                 "The body is not JSON",
                 invalid_json(*line, *column, pointer, detail),
             ),
-            Self::InvalidParameter { name, detail } => (
+            Self::InvalidParameter { detail, .. } => (
                 StatusCode::BAD_REQUEST,
                 "invalid-parameter",
                 "Invalid parameter",
-                format!("{name}: {detail}"),
+                detail.clone(),
             ),
             Self::InvalidScenario(faults) => (
                 StatusCode::UNPROCESSABLE_ENTITY,

@@ -5,6 +5,7 @@ pub(crate) mod description;
 pub(crate) mod engines;
 pub(crate) mod faulty_store;
 pub(crate) mod plans;
+pub(crate) mod process;
 pub(crate) mod run;
 pub(crate) mod server;
 pub(crate) mod sse;

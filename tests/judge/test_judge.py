@@ -207,8 +207,20 @@ class Falsehood(Case):
         self.found(result, "the spline is", threats=[disc])
 
     def test_a_spline_that_leaves_the_band_between_samples(self):
+        """Samples as far apart as the whole route is long, and a limit that they keep and the curve does not."""
+        ends = {"start": {"x": 0, "y": 0, "z": 20}, "target": {"x": 300, "y": 0, "z": 20}, "threats": []}
+        planner = SCENARIO["planner"] | {"smoothing": {"spacing": 200.0}}
+        result = honest.result(SCENARIO | ends | {"planner": planner}, FREE)
+        self.assertTrue(result["feasible"])
+        top = max(place["z"] for place in result["path"]["points"])
+        lower = {"altitude": {"min": 10, "max": top + 0.005}}
+        complaints = self.complaints(result, planner=planner, **ends, **lower)
+        self.assertFalse(any("path.points: violate" in complaint for complaint in complaints))
+        self.assertTrue(any("out of its heights" in complaint for complaint in complaints), complaints)
+
+    def test_a_spline_other_than_the_samples(self):
         path = self.truth["path"]
-        control = [place | {"z": place["z"] + 200.0 * (index == 1)} for index, place in enumerate(path["control_points"])]
+        control = [place | {"z": place["z"] + 1.0 * (index == 1)} for index, place in enumerate(path["control_points"])]
         self.found(self.truth | {"path": path | {"control_points": control}}, "the spline passes it by")
 
     def test_knots(self):

@@ -28,7 +28,11 @@ pub fn init(format: LogFormat) {
 
 /// The one line of a panic; the spans round it name the request or the plan.
 fn log_panic(panic: &PanicHookInfo) {
-    let message = panic.payload_as_str().unwrap_or("no message");
+    let payload = panic.payload();
+    let text = payload.downcast_ref::<String>().map(String::as_str);
+    let message = text
+        .or_else(|| payload.downcast_ref().copied())
+        .unwrap_or("no message");
     let place = panic.location().map(ToString::to_string);
     let thread = std::thread::current().name().map(ToOwned::to_owned);
     tracing::error!(message, place, thread, "panicked");

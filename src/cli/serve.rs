@@ -139,13 +139,13 @@ struct Times {
 }
 
 impl Times {
-    /// The last fifth, at most two seconds, is for giving back, for connections, and for the store.
+    /// The last quarter, at most two seconds, is for giving back, for connections, and for the store.
     fn within(grace: Duration) -> Self {
-        let reserve = (grace / 5).min(Duration::from_secs(2));
+        let reserve = (grace / 4).min(Duration::from_secs(2));
         Self {
-            runs: grace - reserve,
-            giving_back: reserve / 2,
-            connections: reserve / 4,
+            runs: grace.saturating_sub(reserve),
+            giving_back: reserve / 4,
+            connections: reserve / 2,
         }
     }
 }

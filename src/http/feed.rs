@@ -28,8 +28,8 @@ pub(super) enum Told {
     Events(Vec<NumberedEvent>),
     /// Nothing has happened for a while.
     Silence,
-    /// The service ends; the reader may resume elsewhere.
-    Stopping,
+    /// The service ends, after these events; the reader may resume with the next process.
+    Stopping(Vec<NumberedEvent>),
 }
 
 /// One reader's place in a plan's events.
@@ -76,6 +76,8 @@ impl Feed {
     pub(super) async fn next(&mut self) -> Option<Told> {
         let mut out = Vec::new();
         while !self.over {
+            // Looked at before the store: what was told until then will still be read.
+            let stopping = *self.phase.borrow() == Phase::Stopping;
             self.changes.mark_unchanged();
             let page = match self.store.events(self.id, self.after, PAGE).await {
                 Ok(page) => page,
@@ -85,8 +87,13 @@ impl Feed {
                     break;
                 }
             };
-            let quiet = page.is_empty();
+            let (quiet, more) = (page.is_empty(), page.len() == PAGE);
             self.take(page, &mut out);
+            if stopping && (quiet || more) && !self.over {
+                // A reader who is far behind reads the rest from the next process.
+                self.over = true;
+                return Some(Told::Stopping(out));
+            }
             if !out.is_empty() {
                 return Some(Told::Events(out));
             }
@@ -94,17 +101,13 @@ impl Feed {
                 continue;
             }
             match self.wait().await {
-                Woken::Changed => {}
+                Woken::Changed | Woken::Stopping => {}
                 Woken::WindowClosed => {
                     self.throttle.flush(&mut out);
                     self.held_since = None;
                     return Some(Told::Events(out));
                 }
                 Woken::Silence => return Some(Told::Silence),
-                Woken::Stopping => {
-                    self.over = true;
-                    return Some(Told::Stopping);
-                }
                 Woken::Closed => break,
             }
         }

@@ -12,7 +12,7 @@ use super::problem::Problem;
 use super::{AppState, Phase, events, plans, prefer, retry};
 use crate::optimizer::{self, Algorithm, Parameter};
 
-/// The description of this service, OpenAPI 3.1.
+/// The description of this service.
 const OPENAPI_YAML: &str = include_str!("../../openapi.yaml");
 
 /// `GET /livez`: the process answers.

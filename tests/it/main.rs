@@ -6,6 +6,7 @@ mod crash;
 mod determinism;
 mod events;
 mod openapi;
+mod refusals;
 mod scenario;
 mod shutdown;
 mod store_conformance;

@@ -1,3 +1,7 @@
 //! The `noctule` command.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    noctule::cli::run()
+}

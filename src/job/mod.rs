@@ -3,10 +3,12 @@
 //! Deliberately absent: where records are kept, and how they travel.
 
 mod event;
+mod id;
 mod life;
 mod plan;
 pub mod state;
 
 pub use event::{Event, NumberedEvent};
+pub use id::{draw_seed, new_id};
 pub use plan::{Failure, Plan, PlanId, Submission};
 pub use state::Status;

@@ -1,6 +1,13 @@
 //! The integration tests: one binary, one module a subject.
 
+mod api;
+mod cli;
+mod crash;
+mod determinism;
+mod events;
+mod openapi;
 mod scenario;
+mod shutdown;
 mod store_conformance;
 mod store_sqlite;
 mod support;

@@ -1,0 +1,67 @@
+//! The command line: serve, plan, healthcheck.
+
+mod healthcheck;
+mod plan;
+mod serve;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Plans 3-D routes for unmanned aircraft.
+#[derive(Parser)]
+#[command(name = "noctule", version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Answer plans over HTTP
+    Serve(crate::config::Serve),
+    /// Plan one scenario here and now, without a server
+    Plan(plan::Arguments),
+    /// Ask a running service whether it is ready; for containers
+    Healthcheck(healthcheck::Arguments),
+}
+
+/// Exit codes, the same in all commands.
+mod exit {
+    /// Done; `plan` found a feasible route.
+    pub(super) const DONE: u8 = 0;
+    /// Anything without a code of its own, a wrong command line included.
+    pub(super) const FAILED: u8 = 1;
+    /// The scenario is refused.
+    pub(super) const BAD_INPUT: u8 = 2;
+    /// No feasible route was found.
+    pub(super) const INFEASIBLE: u8 = 3;
+}
+
+/// Do what the command line says.
+#[must_use]
+pub fn run() -> ExitCode {
+    let command = match Cli::try_parse() {
+        Ok(cli) => cli.command,
+        Err(usage) => {
+            // Nothing can be done about a closed terminal.
+            let _ = usage.print();
+            return if usage.use_stderr() {
+                exit::FAILED
+            } else {
+                exit::DONE
+            }
+            .into();
+        }
+    };
+    let done = match command {
+        Command::Serve(config) => serve::run(&config).map(|()| exit::DONE),
+        Command::Plan(arguments) => plan::run(&arguments),
+        Command::Healthcheck(arguments) => healthcheck::run(&arguments).map(|()| exit::DONE),
+    };
+    done.unwrap_or_else(|error| {
+        eprintln!("noctule: {error:#}");
+        exit::FAILED
+    })
+    .into()
+}

@@ -1,0 +1,190 @@
+//! `noctule plan`: the service's engine on one scenario, without the service.
+
+use std::fs;
+use std::io::{self, IsTerminal, Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use anyhow::Context;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::exit;
+use crate::export::document::{Origin, ResultDocument, Timing, scenario_sha256};
+use crate::job::draw_seed;
+use crate::planner::{self, ConvergencePoint, Incumbent, Observer, Outcome, Stop};
+use crate::scenario::Scenario;
+use crate::scenario::json::{self, Refusal, Rules};
+use crate::scenario::limits::Limits;
+
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// Scenario document; - reads standard input
+    file: PathBuf,
+    /// Where the result goes [default: standard output]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Plan, write the result, and say by the exit code how it went.
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
+    let text = read(&arguments.file).with_context(|| format!("cannot read {}", arguments.file.display()))?;
+    let rules = Rules {
+        limits: Limits::default(),
+        algorithms: planner::algorithm_rules(),
+    };
+    let scenario = match json::read(&text, &rules, draw_seed()) {
+        Ok(scenario) => scenario,
+        Err(refusal) => {
+            report(&arguments.file, &refusal);
+            return Ok(exit::BAD_INPUT);
+        }
+    };
+
+    let stop = Interrupt::watch()?;
+    let mut progress = Progress::new(scenario.planner.iterations);
+    let outcome = planner::plan(&scenario, &mut progress, &stop);
+    progress.finish(&outcome);
+
+    let document = document(&scenario, &outcome, stop.elapsed_ms());
+    write(arguments.out.as_deref(), &document).context("cannot write the result")?;
+    Ok(if outcome.feasible {
+        exit::DONE
+    } else {
+        exit::INFEASIBLE
+    })
+}
+
+fn read(file: &Path) -> io::Result<Vec<u8>> {
+    if file == Path::new("-") {
+        let mut text = Vec::new();
+        io::stdin().lock().read_to_end(&mut text)?;
+        return Ok(text);
+    }
+    fs::read(file)
+}
+
+fn write(out: Option<&Path>, document: &str) -> io::Result<()> {
+    match out {
+        Some(file) => fs::write(file, format!("{document}\n")),
+        None => writeln!(io::stdout().lock(), "{document}"),
+    }
+}
+
+fn document(scenario: &Scenario, outcome: &Outcome, run_ms: f64) -> String {
+    let origin = Origin {
+        plan_id: None,
+        algorithm: scenario.planner.algorithm.clone(),
+        seed: scenario.planner.seed,
+        scenario_sha256: scenario_sha256(&json::write(scenario)),
+        timing: Timing {
+            queued_ms: 0.0,
+            run_ms,
+        },
+    };
+    ResultDocument::new(outcome, origin).to_json()
+}
+
+/// The faults that the service would answer with, a line each.
+fn report(file: &Path, refusal: &Refusal) {
+    let file = file.display();
+    match refusal {
+        Refusal::Syntax { .. } => eprintln!("{file} is not JSON: {refusal}"),
+        Refusal::Invalid(_) => eprintln!("{file} cannot be planned:\n{refusal}"),
+    }
+}
+
+/// Ctrl-C ends the search with the best route so far; a second one ends the process.
+struct Interrupt {
+    requested: Arc<AtomicBool>,
+    begun: Instant,
+}
+
+impl Interrupt {
+    fn watch() -> anyhow::Result<Self> {
+        let requested = Arc::new(AtomicBool::new(false));
+        let flag = requested.clone();
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_io()
+            .build()?;
+        std::thread::Builder::new()
+            .name("interrupt".to_owned())
+            .spawn(move || {
+                runtime.block_on(async {
+                    if tokio::signal::ctrl_c().await.is_err() {
+                        return;
+                    }
+                    flag.store(true, Ordering::Relaxed);
+                    if tokio::signal::ctrl_c().await.is_ok() {
+                        std::process::exit(exit::FAILED.into());
+                    }
+                });
+            })?;
+        Ok(Self {
+            requested,
+            begun: Instant::now(),
+        })
+    }
+}
+
+impl Stop for Interrupt {
+    fn requested(&self) -> bool {
+        self.requested.load(Ordering::Relaxed)
+    }
+
+    fn elapsed_ms(&self) -> f64 {
+        self.begun.elapsed().as_secs_f64() * 1e3
+    }
+}
+
+/// A bar on a terminal, nothing elsewhere.
+struct Progress {
+    bar: ProgressBar,
+}
+
+impl Progress {
+    fn new(iterations: usize) -> Self {
+        if !io::stderr().is_terminal() {
+            return Self {
+                bar: ProgressBar::hidden(),
+            };
+        }
+        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} iterations, {msg}")
+            .expect("the template is well-formed");
+        let bar = ProgressBar::new(iterations as u64).with_style(style);
+        Self {
+            bar: bar.with_message("no feasible route yet"),
+        }
+    }
+
+    fn finish(&self, outcome: &Outcome) {
+        self.bar.finish_and_clear();
+        if io::stderr().is_terminal() {
+            eprintln!("{}", summary(outcome));
+        }
+    }
+}
+
+impl Observer for Progress {
+    fn iteration(&mut self, point: &ConvergencePoint) {
+        self.bar.set_position(point.iteration as u64);
+    }
+
+    fn incumbent(&mut self, incumbent: &Incumbent) {
+        if incumbent.feasible {
+            self.bar.set_message(format!("cost {:.4}", incumbent.cost));
+        }
+    }
+}
+
+fn summary(outcome: &Outcome) -> String {
+    if outcome.feasible {
+        let legs = outcome.legs.len();
+        format!("a feasible route of {legs} legs, cost {:.4}", outcome.cost.total)
+    } else {
+        let violations = outcome.violations.len();
+        format!("no feasible route; the least violating one breaks {violations} constraints")
+    }
+}

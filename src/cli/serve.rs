@@ -1,0 +1,173 @@
+//! `noctule serve`: put the parts together, and take them apart in the right order.
+
+use std::io::Write as _;
+use std::sync::Arc;
+use std::time::Duration;
+
+use anyhow::Context;
+use tokio::net::TcpListener;
+use tokio::signal::unix::{Signal, SignalKind, signal};
+use tokio::sync::watch;
+use tokio::time::Instant;
+
+use super::exit;
+use crate::config::Serve;
+use crate::http::{self, AppState, Capacity, Phase};
+use crate::job::Failure;
+use crate::scenario::json::{self, Rules};
+use crate::scenario::limits::Limits;
+use crate::store::sqlite::SqliteStore;
+use crate::store::{self, Store};
+use crate::worker::{self, Engine, Pool};
+use crate::{planner, telemetry};
+
+/// A request's body must be complete after this.
+const BODY_TIMEOUT: Duration = Duration::from_secs(30);
+
+/// Serve until a signal.
+pub(super) fn run(config: &Serve) -> anyhow::Result<()> {
+    telemetry::init(config.log_format);
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+    runtime.block_on(serve(config))?;
+    // Whatever still runs has been given back to the queue; the process does not wait for it.
+    runtime.shutdown_background();
+    Ok(())
+}
+
+async fn serve(config: &Serve) -> anyhow::Result<()> {
+    let mut signals = Signals::new()?;
+    let listener = TcpListener::bind(config.listen)
+        .await
+        .with_context(|| format!("cannot listen on {}", config.listen))?;
+    let store = open_store(config)?;
+    let workers = config.workers();
+    let rules = Arc::new(Rules {
+        limits: Limits::default(),
+        algorithms: planner::algorithm_rules(),
+    });
+    let settings = worker::Settings {
+        workers: workers.get(),
+        clock: store::wall_clock(),
+    };
+    let pool = Pool::start(store.clone(), settings, engine(rules.clone()));
+    let (phase, watched) = watch::channel(Phase::Serving);
+    let router = http::router(AppState {
+        store: store.clone(),
+        rules,
+        capacity: Capacity {
+            workers: workers.get(),
+            queue: config.queue.get() as usize,
+        },
+        body_timeout: BODY_TIMEOUT,
+        phase: watched.clone(),
+    });
+    announce(&listener)?;
+    let times = Times::within(Duration::from_secs(config.grace));
+    let server = tokio::spawn(http::server::serve(listener, router, watched, times.connections));
+
+    let name = signals.next().await;
+    let signalled = Instant::now();
+    tracing::info!(signal = name, grace_s = config.grace, "shutting down");
+    tokio::spawn(async move {
+        signals.next().await;
+        tracing::warn!("a second signal, leaving at once");
+        std::process::exit(exit::FAILED.into());
+    });
+    phase.send_replace(Phase::Draining);
+    drain(pool, &times).await;
+    phase.send_replace(Phase::Stopping);
+    server.await.context("the server broke")?;
+    store.close().await;
+    tracing::info!(duration_ms = signalled.elapsed().as_secs_f64() * 1e3, "shut down");
+    Ok(())
+}
+
+/// What the pool runs: the accepted document, read again, and planned.
+fn engine(rules: Arc<Rules>) -> Engine {
+    Arc::new(move |document, observer, stop| {
+        // The document names its seed; none is drawn.
+        let scenario = json::read(document.as_bytes(), &rules, 0).map_err(|refusal| Failure {
+            kind: "invalid-scenario".to_owned(),
+            detail: format!("this version of the service cannot read the accepted document: {refusal}"),
+        })?;
+        Ok(planner::plan(&scenario, observer, stop))
+    })
+}
+
+/// Let runs finish, then give them back; without those that do not heed their stop in time, which
+/// the next process finds as after a crash.
+async fn drain(pool: Pool, times: &Times) {
+    if tokio::time::timeout(times.runs + times.giving_back, pool.drain(times.runs))
+        .await
+        .is_err()
+    {
+        tracing::warn!("some runs did not stop in time; the next process runs them again");
+    }
+}
+
+fn open_store(config: &Serve) -> anyhow::Result<Arc<dyn Store>> {
+    let data_dir = config
+        .data_dir()
+        .context("the user has no home; name a directory with --data-dir")?;
+    let options = store::Options {
+        queue_limit: config.queue.get().into(),
+        clock: store::wall_clock(),
+    };
+    let store = SqliteStore::open(&data_dir, options)
+        .with_context(|| format!("cannot open the store in {}", data_dir.display()))?;
+    tracing::info!(data_dir = %data_dir.display(), "the store is open");
+    Ok(Arc::new(store))
+}
+
+/// One plain line for people and scripts, with the port that was taken.
+fn announce(listener: &TcpListener) -> anyhow::Result<()> {
+    let address = listener.local_addr()?;
+    let mut stdout = std::io::stdout().lock();
+    writeln!(stdout, "listening on http://{address}")?;
+    stdout.flush()?;
+    Ok(())
+}
+
+/// How the grace period is spent.
+struct Times {
+    /// Runs may finish until then.
+    runs: Duration,
+    /// Then they are stopped and given back.
+    giving_back: Duration,
+    /// Connections may finish their answers for so long, after the streams were told to end.
+    connections: Duration,
+}
+
+impl Times {
+    /// The last fifth, at most two seconds, is for giving back, for connections, and for the store.
+    fn within(grace: Duration) -> Self {
+        let reserve = (grace / 5).min(Duration::from_secs(2));
+        Self {
+            runs: grace - reserve,
+            giving_back: reserve / 2,
+            connections: reserve / 4,
+        }
+    }
+}
+
+/// The signals that ask for an end.
+struct Signals {
+    terminate: Signal,
+    interrupt: Signal,
+}
+
+impl Signals {
+    fn new() -> std::io::Result<Self> {
+        Ok(Self {
+            terminate: signal(SignalKind::terminate())?,
+            interrupt: signal(SignalKind::interrupt())?,
+        })
+    }
+
+    async fn next(&mut self) -> &'static str {
+        tokio::select! {
+            _ = self.terminate.recv() => "SIGTERM",
+            _ = self.interrupt.recv() => "SIGINT",
+        }
+    }
+}

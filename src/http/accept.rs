@@ -1,0 +1,102 @@
+//! Which of several formats the `Accept` header asks for, RFC 9110 section 12.5.1.
+
+use axum::http::{HeaderMap, header};
+
+/// The media type out of `offers` that the caller likes best, the earlier one between equals;
+/// `None` when the caller takes none of them. No `Accept` takes all.
+pub(super) fn choose(headers: &HeaderMap, offers: &[&'static str]) -> Option<&'static str> {
+    let ranges: Vec<Range> = headers
+        .get_all(header::ACCEPT)
+        .iter()
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','))
+        .filter_map(Range::read)
+        .collect();
+    if ranges.is_empty() {
+        return offers.first().copied();
+    }
+    let quality = |offer: &str| {
+        ranges
+            .iter()
+            .filter(|range| range.covers(offer))
+            .max_by_key(|range| range.precision())
+            .map_or(0.0, |range| range.quality)
+    };
+    offers
+        .iter()
+        .copied()
+        .fold(None, |best: Option<&'static str>, offer| {
+            let better = quality(offer) > best.map_or(0.0, quality);
+            if better { Some(offer) } else { best }
+        })
+}
+
+/// What the caller sent, for people.
+pub(super) fn asked(headers: &HeaderMap) -> String {
+    let values = headers.get_all(header::ACCEPT).iter();
+    values
+        .filter_map(|value| value.to_str().ok())
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+/// One entry of an `Accept` header.
+struct Range {
+    kind: String,
+    subtype: String,
+    quality: f64,
+}
+
+impl Range {
+    fn read(entry: &str) -> Option<Self> {
+        let mut parts = entry.split(';').map(str::trim);
+        let (kind, subtype) = parts.next()?.split_once('/')?;
+        let quality = parts
+            .filter_map(|parameter| parameter.split_once('='))
+            .find(|(name, _)| name.eq_ignore_ascii_case("q"))
+            .map_or(Some(1.0), |(_, value)| value.parse().ok())?;
+        Some(Self {
+            kind: kind.to_ascii_lowercase(),
+            subtype: subtype.to_ascii_lowercase(),
+            quality,
+        })
+    }
+
+    fn covers(&self, offer: &str) -> bool {
+        let (kind, subtype) = offer.split_once('/').expect("an offer is a media type");
+        (self.kind == "*" || self.kind == kind) && (self.subtype == "*" || self.subtype == subtype)
+    }
+
+    /// The more exact range decides.
+    fn precision(&self) -> usize {
+        usize::from(self.kind != "*") + usize::from(self.subtype != "*")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use axum::http::HeaderValue;
+
+    #[test]
+    fn the_most_exact_range_decides_and_order_breaks_ties() {
+        const OFFERS: [&str; 2] = ["text/event-stream", "application/x-ndjson"];
+        for (accept, expected) in [
+            ("*/*", Some("text/event-stream")),
+            ("text/event-stream", Some("text/event-stream")),
+            ("application/x-ndjson", Some("application/x-ndjson")),
+            ("application/*", Some("application/x-ndjson")),
+            (
+                "text/event-stream;q=0.5, application/x-ndjson",
+                Some("application/x-ndjson"),
+            ),
+            ("*/*;q=0.1, text/event-stream;q=0", Some("application/x-ndjson")),
+            ("text/html", None),
+        ] {
+            let mut headers = HeaderMap::new();
+            headers.insert(header::ACCEPT, HeaderValue::from_static(accept));
+            assert_eq!(choose(&headers, &OFFERS), expected, "{accept}");
+        }
+        assert_eq!(choose(&HeaderMap::new(), &OFFERS), Some("text/event-stream"));
+    }
+}

@@ -1,0 +1,69 @@
+//! A plan's documents: what was accepted, and what came out, in the format asked for.
+
+use axum::extract::State;
+use axum::http::{HeaderMap, Uri, header};
+use axum::response::{IntoResponse, Response};
+
+use super::params::{self, Id, Params};
+use super::problem::Problem;
+use super::{AppState, accept, retry};
+use crate::export::{self, Format};
+
+/// `GET /plans/{id}/scenario`.
+pub(super) async fn scenario(
+    State(state): State<AppState>,
+    Id(id): Id,
+    uri: Uri,
+) -> Result<Response, Problem> {
+    Params::read(&uri, &[])?;
+    let document = state.store.scenario(id).await?;
+    Ok(([(header::CONTENT_TYPE, "application/json")], document).into_response())
+}
+
+/// `GET /plans/{id}/result`.
+pub(super) async fn result(
+    State(state): State<AppState>,
+    Id(id): Id,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let params = Params::read(&uri, &["format"])?;
+    let plan = state.store.get(id).await?;
+    let format = choose_format(&params, &headers)?;
+    if !plan.status.is_final() {
+        let retry_after_s = retry::for_end(&plan, &state.store.stats().await?, state.capacity);
+        return Err(Problem::NotReady {
+            id,
+            status: plan.status,
+            retry_after_s,
+        });
+    }
+    let Some(stored) = state.store.result(id).await? else {
+        return Err(Problem::NoResult {
+            id,
+            status: plan.status,
+            failure: plan.error,
+        });
+    };
+    let content_type = [(header::CONTENT_TYPE, format.media_type)];
+    Ok((content_type, (format.write)(stored)).into_response())
+}
+
+/// `?format=` decides, else `Accept`.
+fn choose_format(params: &Params, headers: &HeaderMap) -> Result<&'static Format, Problem> {
+    if let Some(name) = params.text("format") {
+        let found = export::ALL.iter().find(|format| format.name == name);
+        let names = || {
+            let names: Vec<_> = export::ALL.iter().map(|format| format.name).collect();
+            format!("one of {}", names.join(", "))
+        };
+        return found.ok_or_else(|| params::refused("format", name, &names()));
+    }
+    let offers: Vec<_> = export::ALL.iter().map(|format| format.media_type).collect();
+    accept::choose(headers, &offers)
+        .and_then(|media_type| export::ALL.iter().find(|format| format.media_type == media_type))
+        .ok_or_else(|| Problem::NotAcceptable {
+            asked: accept::asked(headers),
+            available: offers,
+        })
+}

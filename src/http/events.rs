@@ -1,0 +1,106 @@
+//! `GET /plans/{id}/events`: follow a plan, or resume where a cut stream left off.
+
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
+use axum::response::{IntoResponse, Response};
+use bytes::Bytes;
+use futures_util::stream;
+use std::convert::Infallible;
+use std::sync::Arc;
+
+use super::feed::{Feed, Told};
+use super::params::{self, Id, Params};
+use super::problem::Problem;
+use super::sse::{Outgoing, Wire};
+use super::{AppState, accept};
+use crate::job::{Event, NumberedEvent};
+use crate::store::Store;
+
+const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
+const X_ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering");
+
+/// Points a second unless asked otherwise.
+const DEFAULT_RATE_HZ: f64 = 10.0;
+/// Rates that may be asked for, beside 0.
+pub(super) const RATES_HZ: std::ops::RangeInclusive<f64> = 0.01..=1000.0;
+
+/// `GET /plans/{id}/events`.
+pub(super) async fn follow(
+    State(state): State<AppState>,
+    Id(id): Id,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let params = Params::read(&uri, &["rate", "last_event_id"])?;
+    let rate_hz = read_rate(&params)?;
+    let after = read_last_event_id(&params, &headers)?;
+    let media_type = accept::choose(&headers, &Wire::MEDIA_TYPES).ok_or_else(|| Problem::NotAcceptable {
+        asked: accept::asked(&headers),
+        available: Wire::MEDIA_TYPES.to_vec(),
+    })?;
+    let plan = state.store.get(id).await?;
+    if plan.status.is_final() && state.store.events(id, after, 1).await?.is_empty() {
+        // All has been told; EventSource stops asking at a 204.
+        return Ok(StatusCode::NO_CONTENT.into_response());
+    }
+    let feed = Feed::new(state.store.clone(), state.phase.clone(), id, after, rate_hz);
+    Ok(streamed(feed, state.store, Wire::of(media_type)))
+}
+
+fn read_rate(params: &Params) -> Result<f64, Problem> {
+    const ALLOWED: &str = "0 (every iteration) or from 0.01 to 1000 a second";
+    let rate_hz = params.parse("rate", ALLOWED)?.unwrap_or(DEFAULT_RATE_HZ);
+    if rate_hz == 0.0 || RATES_HZ.contains(&rate_hz) {
+        Ok(rate_hz)
+    } else {
+        Err(params::refused("rate", &rate_hz.to_string(), ALLOWED))
+    }
+}
+
+/// The header is a reconnecting browser's and newer than the query of the page's own address.
+fn read_last_event_id(params: &Params, headers: &HeaderMap) -> Result<u64, Problem> {
+    const ALLOWED: &str = "the id of an event, a whole number";
+    let header = match headers.get(LAST_EVENT_ID) {
+        Some(value) => String::from_utf8_lossy(value.as_bytes()).into_owned(),
+        None => String::new(),
+    };
+    if header.is_empty() {
+        return Ok(params.parse("last_event_id", ALLOWED)?.unwrap_or(0));
+    }
+    header
+        .parse()
+        .map_err(|_| params::refused(LAST_EVENT_ID.as_str(), &header, ALLOWED))
+}
+
+fn streamed(feed: Feed, store: Arc<dyn Store>, wire: Wire) -> Response {
+    let prologue = stream::iter([Ok(Bytes::from_static(wire.prologue().as_bytes()))]);
+    let told = stream::unfold((feed, store), move |(mut feed, store)| async move {
+        let text = match feed.next().await? {
+            Told::Events(events) => write_events(&feed, &*store, events, wire).await,
+            Told::Silence => wire.silence().to_owned(),
+            Told::Stopping => wire.stopping().to_owned(),
+        };
+        Some((Ok::<_, Infallible>(Bytes::from(text)), (feed, store)))
+    });
+    let headers = [
+        (header::CONTENT_TYPE, HeaderValue::from_static(wire.media_type())),
+        (
+            header::CACHE_CONTROL,
+            HeaderValue::from_static("no-cache, no-transform"),
+        ),
+        (X_ACCEL_BUFFERING, HeaderValue::from_static("no")),
+    ];
+    let body = Body::from_stream(futures_util::StreamExt::chain(prologue, told));
+    (headers, body).into_response()
+}
+
+async fn write_events(feed: &Feed, store: &dyn Store, events: Vec<NumberedEvent>, wire: Wire) -> String {
+    let mut text = String::new();
+    for event in events {
+        let ends = matches!(event.event, Event::End(_));
+        let has_result = ends && matches!(store.result(feed.plan_id()).await, Ok(Some(_)));
+        wire.write(Outgoing::new(feed.plan_id(), event, has_result), &mut text);
+    }
+    text
+}

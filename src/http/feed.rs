@@ -1,0 +1,158 @@
+//! A plan's events as they come: from the store's pages first, then as the store ticks.
+//!
+//! Nothing is buffered beyond one page: a reader that does not read costs no memory, for the events
+//! stay where they are kept.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::watch;
+use tokio::time::Instant;
+
+use super::Phase;
+use super::phase::stopping;
+use super::throttle::Throttle;
+use crate::job::{Event, NumberedEvent, PlanId};
+use crate::store::{Store, StoreError};
+
+/// Events read at once.
+const PAGE: usize = 128;
+
+/// A comment is due when nothing has been said for so long.
+const SILENCE: Duration = Duration::from_secs(15);
+
+/// What a reader gets next.
+#[derive(Debug)]
+pub(super) enum Told {
+    /// One or more events; after the `end` nothing follows.
+    Events(Vec<NumberedEvent>),
+    /// Nothing has happened for a while.
+    Silence,
+    /// The service ends; the reader may resume elsewhere.
+    Stopping,
+}
+
+/// One reader's place in a plan's events.
+pub(super) struct Feed {
+    store: Arc<dyn Store>,
+    id: PlanId,
+    /// The last event read.
+    after: u64,
+    throttle: Throttle,
+    changes: watch::Receiver<u64>,
+    phase: watch::Receiver<Phase>,
+    /// Since when the throttle holds something back.
+    held_since: Option<Instant>,
+    over: bool,
+}
+
+impl Feed {
+    pub(super) fn new(
+        store: Arc<dyn Store>,
+        phase: watch::Receiver<Phase>,
+        id: PlanId,
+        after: u64,
+        rate_hz: f64,
+    ) -> Self {
+        Self {
+            // Subscribed before the first read, so that nothing is missed.
+            changes: store.changes(id),
+            store,
+            id,
+            after,
+            throttle: Throttle::new(rate_hz),
+            phase,
+            held_since: None,
+            over: false,
+        }
+    }
+
+    pub(super) fn plan_id(&self) -> PlanId {
+        self.id
+    }
+
+    /// Wait for what comes next; `None` after the end, after [`Told::Stopping`] and when the plan
+    /// has been deleted.
+    pub(super) async fn next(&mut self) -> Option<Told> {
+        let mut out = Vec::new();
+        while !self.over {
+            self.changes.mark_unchanged();
+            let page = match self.store.events(self.id, self.after, PAGE).await {
+                Ok(page) => page,
+                Err(StoreError::Gone(_) | StoreError::NotFound(_)) => break,
+                Err(error) => {
+                    tracing::warn!(plan_id = %self.id, %error, "a stream of events broke off");
+                    break;
+                }
+            };
+            let quiet = page.is_empty();
+            self.take(page, &mut out);
+            if !out.is_empty() {
+                return Some(Told::Events(out));
+            }
+            if !quiet {
+                continue;
+            }
+            match self.wait().await {
+                Woken::Changed => {}
+                Woken::WindowClosed => {
+                    self.throttle.flush(&mut out);
+                    self.held_since = None;
+                    return Some(Told::Events(out));
+                }
+                Woken::Silence => return Some(Told::Silence),
+                Woken::Stopping => {
+                    self.over = true;
+                    return Some(Told::Stopping);
+                }
+                Woken::Closed => break,
+            }
+        }
+        self.over = true;
+        None
+    }
+
+    fn take(&mut self, page: Vec<NumberedEvent>, out: &mut Vec<NumberedEvent>) {
+        for event in page {
+            self.after = event.id;
+            self.over = matches!(event.event, Event::End(_));
+            self.throttle.push(event, out);
+        }
+        self.held_since = match self.held_since {
+            Some(since) if out.is_empty() => Some(since),
+            _ => self.throttle.holds().then(Instant::now),
+        };
+    }
+
+    async fn wait(&mut self) -> Woken {
+        let window_closes = self
+            .held_since
+            .zip(self.throttle.window_ms())
+            .map(|(since, window_ms)| since + Duration::from_secs_f64(window_ms / 1000.0));
+        tokio::select! {
+            changed = self.changes.changed() => match changed {
+                Ok(()) => Woken::Changed,
+                Err(_) => Woken::Closed,
+            },
+            () = sleep_until(window_closes) => Woken::WindowClosed,
+            () = tokio::time::sleep(SILENCE) => Woken::Silence,
+            () = stopping(&mut self.phase) => Woken::Stopping,
+        }
+    }
+}
+
+/// Why a wait ended.
+enum Woken {
+    Changed,
+    WindowClosed,
+    Silence,
+    Stopping,
+    Closed,
+}
+
+async fn sleep_until(deadline: Option<Instant>) {
+    match deadline {
+        Some(deadline) => tokio::time::sleep_until(deadline).await,
+        None => std::future::pending().await,
+    }
+}

@@ -1,0 +1,125 @@
+//! The service's face: one table of routes, handlers by resource, one table of problems.
+//!
+//! Handlers extract, call one thing and convert. Deliberately absent: planning, which happens on
+//! the worker's threads, and storage, which sits behind [`Store`].
+
+mod accept;
+mod body;
+mod documents;
+mod events;
+mod feed;
+mod params;
+mod phase;
+mod plans;
+mod prefer;
+mod problem;
+mod request_id;
+mod retry;
+pub mod server;
+mod service;
+mod sse;
+mod status;
+mod throttle;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::handler::Handler;
+use axum::routing::{self, MethodRouter};
+use tokio::sync::watch;
+use tower_http::catch_panic::CatchPanicLayer;
+
+pub use phase::Phase;
+
+use crate::scenario::json::Rules;
+use crate::store::Store;
+use problem::Problem;
+
+/// What every handler can reach.
+#[derive(Clone)]
+pub struct AppState {
+    /// Where plans are kept.
+    pub store: Arc<dyn Store>,
+    /// What a scenario is held to.
+    pub rules: Arc<Rules>,
+    /// How much may be done at once.
+    pub capacity: Capacity,
+    /// A request's body must be complete after this.
+    pub body_timeout: Duration,
+    /// Where the service stands between its start and its end.
+    pub phase: watch::Receiver<Phase>,
+}
+
+/// How much the service does at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Capacity {
+    /// Plans run at the same time.
+    pub workers: usize,
+    /// Plans waiting at most.
+    pub queue: usize,
+}
+
+/// One row of the table of routes.
+pub struct Route {
+    /// Of the request.
+    pub method: &'static str,
+    /// With `{id}` for a plan's id.
+    pub path: &'static str,
+    handler: MethodRouter<AppState>,
+}
+
+/// Every route there is.
+#[must_use]
+pub fn routes() -> Vec<Route> {
+    vec![
+        post("/plans", plans::submit),
+        get("/plans", plans::list),
+        get("/plans/{id}", plans::show),
+        delete("/plans/{id}", plans::delete),
+        post("/plans/{id}/cancel", plans::cancel),
+        get("/plans/{id}/result", documents::result),
+        get("/plans/{id}/scenario", documents::scenario),
+        get("/plans/{id}/events", events::follow),
+        get("/algorithms", service::algorithms),
+        get("/limits", service::limits),
+        get("/version", service::version),
+        get("/livez", service::livez),
+        get("/readyz", service::readyz),
+        get("/openapi.yaml", service::openapi_yaml),
+    ]
+}
+
+/// The service: every route, every refusal a problem, every answer with its request's id.
+pub fn router(state: AppState) -> Router {
+    routes()
+        .into_iter()
+        .fold(Router::new(), |router, route| {
+            router.route(route.path, route.handler)
+        })
+        .method_not_allowed_fallback(async || Problem::MethodNotAllowed)
+        .fallback(async |uri: axum::http::Uri| Problem::NoSuchResource(uri.path().to_owned()))
+        .with_state(state)
+        .layer(CatchPanicLayer::custom(problem::after_panic))
+        .layer(axum::middleware::from_fn(request_id::assign))
+}
+
+fn get<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
+    row("GET", path, routing::get(handler))
+}
+
+fn post<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
+    row("POST", path, routing::post(handler))
+}
+
+fn delete<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
+    row("DELETE", path, routing::delete(handler))
+}
+
+fn row(method: &'static str, path: &'static str, handler: MethodRouter<AppState>) -> Route {
+    Route {
+        method,
+        path,
+        handler,
+    }
+}

@@ -1,0 +1,113 @@
+//! Query parameters and plan ids, read strictly: an unknown, doubled or unreadable parameter is
+//! refused, because ignoring it would give another answer than the one asked for.
+
+use std::str::FromStr;
+
+use axum::extract::{FromRequestParts, Path, Query};
+use axum::http::Uri;
+use axum::http::request::Parts;
+use uuid::Uuid;
+
+use super::problem::Problem;
+use crate::job::PlanId;
+
+/// The parameters of one request.
+pub(super) struct Params(Vec<(String, String)>);
+
+impl Params {
+    /// Of `uri`, which may have those that `known` names.
+    pub(super) fn read(uri: &Uri, known: &[&str]) -> Result<Self, Problem> {
+        let Query(pairs) = Query::<Vec<(String, String)>>::try_from_uri(uri)
+            .map_err(|error| invalid("query", &error.to_string()))?;
+        for (position, (name, _)) in pairs.iter().enumerate() {
+            if !known.contains(&name.as_str()) {
+                return Err(invalid(name, &unknown(name, known)));
+            }
+            if pairs[..position].iter().any(|(earlier, _)| earlier == name) {
+                return Err(invalid(name, &format!("{name} is given twice")));
+            }
+        }
+        Ok(Self(pairs))
+    }
+
+    /// As it was sent.
+    pub(super) fn text(&self, name: &str) -> Option<&str> {
+        let (_, value) = self.0.iter().find(|(given, _)| given == name)?;
+        Some(value)
+    }
+
+    /// Parsed; `allowed` says what would have been.
+    pub(super) fn parse<T: FromStr>(&self, name: &str, allowed: &str) -> Result<Option<T>, Problem> {
+        self.text(name)
+            .map(|value| value.parse().map_err(|_| refused(name, value, allowed)))
+            .transpose()
+    }
+}
+
+/// `value` is not what `name` may be.
+pub(super) fn refused(name: &str, value: &str, allowed: &str) -> Problem {
+    invalid(name, &format!("{name} is {value:?}, must be {allowed}"))
+}
+
+fn invalid(name: &str, detail: &str) -> Problem {
+    Problem::InvalidParameter {
+        name: name.to_owned(),
+        detail: detail.to_owned(),
+    }
+}
+
+fn unknown(name: &str, known: &[&str]) -> String {
+    if known.is_empty() {
+        format!("{name} is unknown, there are no parameters here")
+    } else {
+        format!("{name} is unknown, must be one of {}", known.join(", "))
+    }
+}
+
+/// The `{id}` of the path. What cannot be an id names no plan.
+pub(super) struct Id(pub(super) PlanId);
+
+impl<S: Send + Sync> FromRequestParts<S> for Id {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let Ok(Path(text)) = Path::<String>::from_request_parts(parts, state).await else {
+            return Err(Problem::NoSuchResource(parts.uri.path().to_owned()));
+        };
+        match Uuid::try_parse(&text) {
+            // Only the canonical spelling: each plan has one address.
+            Ok(id) if id.to_string() == text => Ok(Self(id)),
+            _ => Err(Problem::NoSuchPlan(text)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fault(query: &'static str) -> Option<String> {
+        let uri = Uri::from_static(query);
+        match Params::read(&uri, &["limit", "status"])
+            .and_then(|params| params.parse::<u32>("limit", "a number"))
+        {
+            Ok(_) => None,
+            Err(Problem::InvalidParameter { detail, .. }) => Some(detail),
+            Err(other) => Some(format!("{other:?}")),
+        }
+    }
+
+    #[test]
+    fn reads_what_it_knows_and_refuses_the_rest() {
+        for (query, expected) in [
+            ("/", None),
+            ("/?limit=3&status=running", None),
+            ("/?limit=x", Some("limit is \"x\", must be a number")),
+            ("/?limit=", Some("limit is \"\", must be a number")),
+            ("/?limt=3", Some("limt is unknown, must be one of limit, status")),
+            ("/?limit=3&limit=4", Some("limit given twice")),
+        ] {
+            assert_eq!(fault(query).as_deref(), expected, "{query}");
+        }
+    }
+}

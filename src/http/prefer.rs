@@ -1,0 +1,64 @@
+//! `Prefer: wait=N`, RFC 7240: how long the caller would rather wait than ask again.
+
+use std::time::Duration;
+
+use axum::http::{HeaderMap, HeaderName, HeaderValue};
+
+const PREFER: HeaderName = HeaderName::from_static("prefer");
+pub(super) const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
+
+/// Longest wait, seconds; a longer one is cut to this.
+pub(super) const MAX_WAIT_S: u64 = 30;
+
+/// A wait that was asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Wait(u64);
+
+impl Wait {
+    /// The first readable `wait` of the headers; a malformed preference counts as none.
+    pub(super) fn of(headers: &HeaderMap) -> Option<Self> {
+        headers
+            .get_all(PREFER)
+            .iter()
+            .filter_map(|value| value.to_str().ok())
+            .flat_map(|value| value.split(','))
+            .filter_map(|preference| preference.split(';').next()?.split_once('='))
+            .find(|(name, _)| name.trim().eq_ignore_ascii_case("wait"))
+            .and_then(|(_, value)| value.trim().trim_matches('"').parse().ok())
+            .map(|seconds: u64| Self(seconds.min(MAX_WAIT_S)))
+    }
+
+    pub(super) fn duration(self) -> Duration {
+        Duration::from_secs(self.0)
+    }
+
+    /// The value of `Preference-Applied`.
+    pub(super) fn applied(self) -> HeaderValue {
+        HeaderValue::from_str(&format!("wait={}", self.0)).expect("digits are visible ASCII")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finds_the_wait_among_preferences() {
+        for (value, expected) in [
+            ("wait=10", Some(10)),
+            ("respond-async, wait=10", Some(10)),
+            ("Wait=5; foo=bar", Some(5)),
+            ("wait=\"7\"", Some(7)),
+            ("wait=99", Some(30)),
+            ("wait=0", Some(0)),
+            ("wait=-1", None),
+            ("wait=soon", None),
+            ("wait", None),
+            ("return=minimal", None),
+        ] {
+            let mut headers = HeaderMap::new();
+            headers.insert(PREFER, HeaderValue::from_static(value));
+            assert_eq!(Wait::of(&headers), expected.map(Wait), "{value}");
+        }
+    }
+}

@@ -1,0 +1,387 @@
+//! Which status for which error: RFC 9457 problem documents.
+//!
+//! A handler returns a [`Problem`]; its response carries it as an extension, and
+//! [`super::request_id`] writes the body, because only there the request's id is known. What only
+//! the operator should read goes to the log, not into a document.
+
+use std::any::Any;
+use std::time::Duration;
+
+use axum::body::Body;
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::job::{Failure, PlanId, Status};
+use crate::scenario::json::{Fault, Refusal};
+use crate::store::StoreError;
+
+/// Everything that a request can be refused for.
+#[derive(Debug, Clone)]
+pub(super) enum Problem {
+    /// No route has this path.
+    NoSuchResource(String),
+    /// There never was such a plan, or nothing with that name can be one.
+    NoSuchPlan(String),
+    /// The plan was deleted.
+    Gone(PlanId),
+    /// The path exists, the method does not; axum adds `Allow`.
+    MethodNotAllowed,
+    /// None of the formats the caller accepts is there.
+    NotAcceptable {
+        /// What the caller named.
+        asked: String,
+        /// What there is.
+        available: Vec<&'static str>,
+    },
+    /// The body is of another kind, or of an unnamed one.
+    UnsupportedMediaType(Option<String>),
+    /// The body is too long; the limit in bytes.
+    BodyTooLarge(usize),
+    /// The body came too slowly; the limit.
+    BodyTooSlow(Duration),
+    /// The body broke off.
+    BodyIncomplete,
+    /// The body is not JSON.
+    InvalidJson {
+        /// From 1.
+        line: usize,
+        /// From 1.
+        column: usize,
+        /// As far as the reader got.
+        pointer: String,
+        /// What the reader met.
+        detail: String,
+    },
+    /// A query parameter or a header cannot be read.
+    InvalidParameter {
+        /// Its name.
+        name: String,
+        /// The value and what is allowed.
+        detail: String,
+    },
+    /// The body is JSON, but not a scenario that can be planned.
+    InvalidScenario(Vec<Fault>),
+    /// The plan has not ended yet.
+    NotReady {
+        /// Which.
+        id: PlanId,
+        /// Where it stands.
+        status: Status,
+        /// When asking again makes sense, seconds.
+        retry_after_s: u64,
+    },
+    /// The plan ended without a result.
+    NoResult {
+        /// Which.
+        id: PlanId,
+        /// How it ended.
+        status: Status,
+        /// Why, when it failed.
+        failure: Option<Failure>,
+    },
+    /// As many plans wait as may.
+    QueueFull {
+        /// How many.
+        queued: u64,
+        /// See [`super::retry`].
+        retry_after_s: u64,
+    },
+    /// The service is about to end.
+    Draining {
+        /// See [`super::retry`].
+        retry_after_s: u64,
+    },
+    /// The store cannot be read or written now.
+    StoreUnavailable,
+    /// A defect of the service.
+    Internal,
+}
+
+/// What a problem says of itself, but for the request's id.
+struct Face {
+    status: StatusCode,
+    /// Last part of `type`; stable.
+    slug: &'static str,
+    title: &'static str,
+    detail: String,
+}
+
+impl Problem {
+    /// The one table from error to status.
+    fn face(&self) -> Face {
+        let (status, slug, title, detail) = match self {
+            Self::NoSuchResource(path) => (
+                StatusCode::NOT_FOUND,
+                "not-found",
+                "No such resource",
+                format!("nothing is at {path}; GET /openapi.yaml lists what is"),
+            ),
+            Self::NoSuchPlan(id) => (
+                StatusCode::NOT_FOUND,
+                "not-found",
+                "No such resource",
+                format!("there is no plan {id}"),
+            ),
+            Self::Gone(id) => (
+                StatusCode::GONE,
+                "gone",
+                "The plan was deleted",
+                format!("plan {id} was deleted"),
+            ),
+            Self::MethodNotAllowed => (
+                StatusCode::METHOD_NOT_ALLOWED,
+                "method-not-allowed",
+                "Method not allowed",
+                "the header Allow lists the methods of this resource".to_owned(),
+            ),
+            Self::NotAcceptable { asked, available } => (
+                StatusCode::NOT_ACCEPTABLE,
+                "not-acceptable",
+                "No acceptable format",
+                format!("asked for {asked}; available: {}", available.join(", ")),
+            ),
+            Self::UnsupportedMediaType(found) => (
+                StatusCode::UNSUPPORTED_MEDIA_TYPE,
+                "unsupported-media-type",
+                "Unsupported media type",
+                unsupported_media_type(found.as_deref()),
+            ),
+            Self::BodyTooLarge(limit) => (
+                StatusCode::PAYLOAD_TOO_LARGE,
+                "body-too-large",
+                "The body is too large",
+                format!("the body is longer than {limit} bytes, the limit body_bytes of GET /limits"),
+            ),
+            Self::BodyTooSlow(limit) => (
+                StatusCode::REQUEST_TIMEOUT,
+                "request-timeout",
+                "The body came too slowly",
+                format!("the body was not complete after {} s", limit.as_secs_f64()),
+            ),
+            Self::BodyIncomplete => (
+                StatusCode::BAD_REQUEST,
+                "incomplete-body",
+                "The body broke off",
+                "the connection ended before the body did".to_owned(),
+            ),
+            Self::InvalidJson {
+                line,
+                column,
+                pointer,
+                detail,
+            } => (
+                StatusCode::BAD_REQUEST,
+                "invalid-json",
+                "The body is not JSON",
+                invalid_json(*line, *column, pointer, detail),
+            ),
+            Self::InvalidParameter { detail, .. } => (
+                StatusCode::BAD_REQUEST,
+                "invalid-parameter",
+                "Invalid parameter",
+                detail.clone(),
+            ),
+            Self::InvalidScenario(faults) => (
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "invalid-scenario",
+                "The scenario cannot be planned",
+                match faults.len() {
+                    1 => "1 fault; see errors".to_owned(),
+                    n => format!("{n} faults; see errors"),
+                },
+            ),
+            Self::NotReady { id, status, .. } => (
+                StatusCode::CONFLICT,
+                "not-ready",
+                "The plan has not ended",
+                format!(
+                    "plan {id} is {}; GET /plans/{id} with Prefer: wait=30 waits for it",
+                    status.name()
+                ),
+            ),
+            Self::NoResult { id, status, failure } => (
+                StatusCode::CONFLICT,
+                "no-result",
+                "The plan has no result",
+                match failure {
+                    Some(failure) => format!("plan {id} failed: {}", failure.detail),
+                    None => format!("plan {id} was {} before it had a route", status.name()),
+                },
+            ),
+            Self::QueueFull {
+                queued,
+                retry_after_s,
+            } => (
+                StatusCode::SERVICE_UNAVAILABLE,
+                "queue-full",
+                "The queue is full",
+                format!("{queued} plans wait, the limit; try again in {retry_after_s} s"),
+            ),
+            Self::Draining { retry_after_s } => (
+                StatusCode::SERVICE_UNAVAILABLE,
+                "draining",
+                "The service is shutting down",
+                format!("no new plans are taken; try again in {retry_after_s} s"),
+            ),
+            Self::StoreUnavailable => (
+                StatusCode::SERVICE_UNAVAILABLE,
+                "store-unavailable",
+                "The store is unavailable",
+                "plans can be neither read nor written now; the service's log says why".to_owned(),
+            ),
+            Self::Internal => (
+                StatusCode::INTERNAL_SERVER_ERROR,
+                "internal",
+                "Internal error",
+                "a defect of the service; its log has more under this request's id".to_owned(),
+            ),
+        };
+        Face {
+            status,
+            slug,
+            title,
+            detail,
+        }
+    }
+
+    fn retry_after_s(&self) -> Option<u64> {
+        match self {
+            Self::NotReady { retry_after_s, .. }
+            | Self::QueueFull { retry_after_s, .. }
+            | Self::Draining { retry_after_s } => Some(*retry_after_s),
+            Self::StoreUnavailable => Some(1),
+            _ => None,
+        }
+    }
+
+    /// The problem document; `instance` is the request's id.
+    pub(super) fn document(&self, instance: &str) -> Value {
+        let face = self.face();
+        let mut document = json!({
+            "type": format!("/problems/{}", face.slug),
+            "title": face.title,
+            "status": face.status.as_u16(),
+            "detail": face.detail,
+            "instance": instance,
+        });
+        match self {
+            Self::InvalidScenario(faults) => document["errors"] = faults.iter().map(error).collect(),
+            Self::InvalidJson {
+                line,
+                column,
+                pointer,
+                ..
+            } => {
+                document["line"] = json!(line);
+                document["column"] = json!(column);
+                document["pointer"] = json!(pointer);
+            }
+            Self::InvalidParameter { name, .. } => document["parameter"] = json!(name),
+            Self::NotAcceptable { available, .. } => document["available"] = json!(available),
+            _ => {}
+        }
+        document
+    }
+}
+
+fn error(fault: &Fault) -> Value {
+    json!({"pointer": fault.pointer, "code": fault.code, "detail": fault.detail})
+}
+
+fn invalid_json(line: usize, column: usize, pointer: &str, detail: &str) -> String {
+    match pointer {
+        "" => format!("line {line}, column {column}: {detail}"),
+        pointer => format!("line {line}, column {column}, at {pointer}: {detail}"),
+    }
+}
+
+fn unsupported_media_type(found: Option<&str>) -> String {
+    match found {
+        None => "no content-type was sent; send application/json".to_owned(),
+        Some(found) if found.starts_with("application/x-www-form-urlencoded") => format!(
+            "content-type is {found}, which curl -d sends by itself; add -H 'content-type: application/json'"
+        ),
+        Some(found) => format!("content-type is {found}; send application/json in UTF-8"),
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let mut response = self.face().status.into_response();
+        if let Some(seconds) = self.retry_after_s() {
+            response
+                .headers_mut()
+                .insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        response.extensions_mut().insert(self);
+        response
+    }
+}
+
+impl From<StoreError> for Problem {
+    fn from(error: StoreError) -> Self {
+        match error {
+            StoreError::NotFound(id) => Self::NoSuchPlan(id.to_string()),
+            StoreError::Gone(id) => Self::Gone(id),
+            StoreError::QueueFull { queued } => Self::QueueFull {
+                queued,
+                retry_after_s: 1,
+            },
+            error @ (StoreError::Unavailable(_) | StoreError::InUse(_)) => {
+                tracing::error!(%error, "the store did not answer");
+                Self::StoreUnavailable
+            }
+            error @ StoreError::LeaseLost(_) => {
+                tracing::error!(%error, "a handler met an error that only workers meet");
+                Self::Internal
+            }
+        }
+    }
+}
+
+impl From<Refusal> for Problem {
+    fn from(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::Syntax {
+                line,
+                column,
+                pointer,
+                detail,
+            } => Self::InvalidJson {
+                line,
+                column,
+                pointer,
+                detail,
+            },
+            Refusal::Invalid(faults) => Self::InvalidScenario(faults),
+        }
+    }
+}
+
+/// What stands in a status document for a failed plan: a problem without an instance.
+#[derive(Debug, Serialize)]
+pub(super) struct FailureDocument {
+    r#type: String,
+    title: &'static str,
+    status: u16,
+    detail: String,
+}
+
+impl From<Failure> for FailureDocument {
+    fn from(failure: Failure) -> Self {
+        Self {
+            r#type: format!("/problems/{}", failure.kind),
+            title: "The plan failed",
+            status: StatusCode::INTERNAL_SERVER_ERROR.as_u16(),
+            detail: failure.detail,
+        }
+    }
+}
+
+/// Answers for a handler that panicked; the panic hook has written the log.
+#[expect(clippy::needless_pass_by_value, reason = "the layer hands the panic over")]
+pub(super) fn after_panic(_: Box<dyn Any + Send>) -> axum::http::Response<Body> {
+    Problem::Internal.into_response()
+}

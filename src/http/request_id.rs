@@ -1,0 +1,108 @@
+//! A request's id: taken from the caller or drawn, in the log's span, on the answer and in its
+//! problem document.
+
+use std::time::Instant;
+
+use axum::body::Body;
+use axum::extract::Request;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
+use axum::middleware::Next;
+use axum::response::Response;
+use tracing::Instrument;
+use uuid::Uuid;
+
+use super::problem::Problem;
+
+const X_REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+
+/// Longest id taken from a caller.
+const MAX_LENGTH: usize = 128;
+
+/// The outermost layer: every answer leaves through here.
+pub(super) async fn assign(request: Request, next: Next) -> Response {
+    let id = of_caller(request.headers()).unwrap_or_else(|| Uuid::now_v7().to_string());
+    let method = request.method().clone();
+    let path = request.uri().path().to_owned();
+    let span = tracing::info_span!("request", request_id = %id);
+    async move {
+        let begun = Instant::now();
+        let mut response = next.run(request).await;
+        if let Some(problem) = response.extensions_mut().remove::<Problem>() {
+            write_problem(&mut response, &problem, &id, &method);
+        }
+        dress(response.headers_mut(), &id);
+        let duration_ms = begun.elapsed().as_secs_f64() * 1e3;
+        tracing::debug!(%method, path, status = response.status().as_u16(), duration_ms, "answered");
+        response
+    }
+    .instrument(span)
+    .await
+}
+
+/// The caller's own id, if it can stand as it is in a log line and in a URI reference.
+fn of_caller(headers: &HeaderMap) -> Option<String> {
+    let id = headers.get(X_REQUEST_ID)?.to_str().ok()?;
+    let sane = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~=;+/@,".contains(&byte);
+    (1..=MAX_LENGTH)
+        .contains(&id.len())
+        .then(|| id.bytes().all(sane).then(|| id.to_owned()))?
+}
+
+fn write_problem(response: &mut Response, problem: &Problem, id: &str, method: &Method) {
+    let body = problem.document(id).to_string();
+    let headers = response.headers_mut();
+    headers.insert(
+        header::CONTENT_TYPE,
+        HeaderValue::from_static("application/problem+json"),
+    );
+    headers.insert(header::CONTENT_LENGTH, HeaderValue::from(body.len()));
+    *response.body_mut() = if method == Method::HEAD {
+        Body::empty()
+    } else {
+        Body::from(body)
+    };
+}
+
+/// Headers of every answer.
+fn dress(headers: &mut HeaderMap, id: &str) {
+    let id = HeaderValue::from_str(id).expect("an id is visible ASCII");
+    headers.insert(X_REQUEST_ID, id);
+    headers.insert(
+        header::X_CONTENT_TYPE_OPTIONS,
+        HeaderValue::from_static("nosniff"),
+    );
+    headers
+        .entry(header::CACHE_CONTROL)
+        .or_insert(HeaderValue::from_static("no-store"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn takes_only_ids_that_are_safe_everywhere() {
+        let long = "x".repeat(129);
+        for (given, taken) in [
+            ("a", true),
+            ("Root=1-67891233-abcdef012345678912345678", true),
+            ("7f1c9f6e-0b2b-7c3d-8e4f-001122334455", true),
+            ("", false),
+            ("two words", false),
+            ("<script>", false),
+            ("caf\u{e9}", false),
+            (long.as_str(), false),
+        ] {
+            let mut headers = HeaderMap::new();
+            headers.insert(
+                X_REQUEST_ID,
+                HeaderValue::from_bytes(given.as_bytes()).expect("a header"),
+            );
+            assert_eq!(
+                of_caller(&headers).as_deref(),
+                taken.then_some(given),
+                "{given:?}"
+            );
+        }
+    }
+}

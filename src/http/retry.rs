@@ -1,0 +1,64 @@
+//! When asking again makes sense: `Retry-After`, from the queue's own figures.
+
+use super::Capacity;
+use crate::job::{Plan, Status};
+use crate::store::Stats;
+
+/// Longest advice, seconds.
+const MAX_S: f64 = 600.0;
+
+/// What a run is taken to last before the first has ended, milliseconds.
+const UNKNOWN_RUN_MS: f64 = 1000.0;
+
+/// Seconds after which a refused plan may find room: until a tenth of those waiting has been
+/// taken up,
+///
+/// `ceil((queued / 10 + 1) * mean_run_ms / workers / 1000)`, within 1 to 600.
+///
+/// A tenth rather than one place, so that not everyone refused comes back for the same place.
+pub(super) fn for_room(stats: &Stats, capacity: Capacity) -> u64 {
+    let runs = stats.queued as f64 / 10.0 + 1.0;
+    seconds(runs * mean_run_ms(stats) / capacity.workers.max(1) as f64)
+}
+
+/// Seconds until an active plan is likely to end: those before it in the queue, and its own run.
+pub(super) fn for_end(plan: &Plan, stats: &Stats, capacity: Capacity) -> u64 {
+    let waiting = plan.queue_position.unwrap_or(0) as f64 / capacity.workers.max(1) as f64;
+    let running = match plan.status {
+        Status::Running => 1.0 - plan.progress,
+        _ => 1.0,
+    };
+    seconds((waiting + running) * mean_run_ms(stats))
+}
+
+fn mean_run_ms(stats: &Stats) -> f64 {
+    stats.mean_run_ms.unwrap_or(UNKNOWN_RUN_MS)
+}
+
+fn seconds(ms: f64) -> u64 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 600")]
+    let whole = (ms / 1000.0).ceil().clamp(1.0, MAX_S) as u64;
+    whole
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grows_with_the_queue_and_shrinks_with_the_workers() {
+        let room = |queued, mean_run_ms, workers| {
+            let stats = Stats {
+                queued,
+                running: 0,
+                mean_run_ms,
+            };
+            for_room(&stats, Capacity { workers, queue: 1000 })
+        };
+        assert_eq!(room(1000, Some(2000.0), 4), 51, "101 runs of 2 s on 4 workers");
+        assert_eq!(room(1000, Some(2000.0), 8), 26);
+        assert_eq!(room(0, Some(10.0), 1), 1, "at least a second");
+        assert_eq!(room(1000, None, 1), 101, "a second a run while none is known");
+        assert_eq!(room(1_000_000, Some(1e6), 1), 600, "at most ten minutes");
+    }
+}

@@ -1,0 +1,122 @@
+//! The service about itself: alive, ready, its version, its limits, its algorithms, its description.
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::{Uri, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::params::Params;
+use super::problem::Problem;
+use super::{AppState, Phase, events, plans, prefer, retry};
+use crate::optimizer::{self, Algorithm, Parameter};
+
+/// The description of this service, OpenAPI 3.1.
+const OPENAPI_YAML: &str = include_str!("../../openapi.yaml");
+
+/// `GET /livez`: the process answers.
+pub(super) async fn livez(uri: Uri) -> Result<Response, Problem> {
+    Params::read(&uri, &[])?;
+    Ok(ok())
+}
+
+/// `GET /readyz`: it takes plans.
+pub(super) async fn readyz(State(state): State<AppState>, uri: Uri) -> Result<Response, Problem> {
+    Params::read(&uri, &[])?;
+    if *state.phase.borrow() != Phase::Serving {
+        let retry_after_s = retry::for_room(&state.store.stats().await?, state.capacity);
+        return Err(Problem::Draining { retry_after_s });
+    }
+    state.store.health().await?;
+    Ok(ok())
+}
+
+fn ok() -> Response {
+    Json(json!({"status": "ok"})).into_response()
+}
+
+/// `GET /version`.
+pub(super) async fn version(uri: Uri) -> Result<Json<Value>, Problem> {
+    Params::read(&uri, &[])?;
+    Ok(Json(json!({
+        "name": env!("CARGO_PKG_NAME"),
+        "version": env!("CARGO_PKG_VERSION"),
+        "engine_version": env!("CARGO_PKG_VERSION"),
+    })))
+}
+
+/// What the operator allows.
+#[derive(Serialize)]
+struct LimitsDocument {
+    body_bytes: usize,
+    threats: usize,
+    polygon_vertices: usize,
+    terrain_nodes: usize,
+    peaks: usize,
+    waypoints: usize,
+    population: usize,
+    iterations: usize,
+    work: u64,
+    path_samples: usize,
+    workers: usize,
+    queue: usize,
+    page: usize,
+    wait_s: u64,
+    event_rate_hz: f64,
+}
+
+/// `GET /limits`.
+pub(super) async fn limits(State(state): State<AppState>, uri: Uri) -> Result<Response, Problem> {
+    Params::read(&uri, &[])?;
+    let limits = state.rules.limits;
+    let document = LimitsDocument {
+        body_bytes: limits.body_bytes,
+        threats: limits.threats,
+        polygon_vertices: limits.polygon_vertices,
+        terrain_nodes: limits.terrain_nodes,
+        peaks: limits.peaks,
+        waypoints: limits.waypoints,
+        population: limits.population,
+        iterations: limits.iterations,
+        work: limits.work,
+        path_samples: limits.path_samples,
+        workers: state.capacity.workers,
+        queue: state.capacity.queue,
+        page: plans::MAX_PAGE,
+        wait_s: prefer::MAX_WAIT_S,
+        event_rate_hz: *events::RATES_HZ.end(),
+    };
+    Ok(Json(document).into_response())
+}
+
+/// `GET /algorithms`.
+pub(super) async fn algorithms(uri: Uri) -> Result<Json<Value>, Problem> {
+    Params::read(&uri, &[])?;
+    let algorithms: Vec<Value> = optimizer::ALL.iter().map(algorithm).collect();
+    Ok(Json(json!({"algorithms": algorithms})))
+}
+
+fn algorithm(algorithm: &Algorithm) -> Value {
+    let parameter = |parameter: &Parameter| {
+        json!({
+            "name": parameter.name,
+            "default": parameter.default,
+            "min": parameter.min,
+            "max": parameter.max,
+            "meaning": parameter.meaning,
+        })
+    };
+    json!({
+        "name": algorithm.name,
+        "title": algorithm.title,
+        "source": algorithm.source,
+        "parameters": algorithm.parameters.iter().map(parameter).collect::<Vec<_>>(),
+    })
+}
+
+/// `GET /openapi.yaml`.
+pub(super) async fn openapi_yaml(uri: Uri) -> Result<Response, Problem> {
+    Params::read(&uri, &[])?;
+    Ok(([(header::CONTENT_TYPE, "application/yaml")], OPENAPI_YAML).into_response())
+}

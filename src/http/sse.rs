@@ -1,0 +1,114 @@
+//! Events on the wire: frames of `text/event-stream`, and the same as lines of JSON.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::status::{StatusDocument, location};
+use crate::job::{Event, NumberedEvent, PlanId, Status};
+
+/// How a stream is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wire {
+    /// `text/event-stream`.
+    Sse,
+    /// `application/x-ndjson`.
+    Lines,
+}
+
+impl Wire {
+    /// The media types, the usual one first.
+    pub(super) const MEDIA_TYPES: [&str; 2] = ["text/event-stream", "application/x-ndjson"];
+
+    pub(super) fn of(media_type: &str) -> Self {
+        if media_type == Self::MEDIA_TYPES[1] {
+            Self::Lines
+        } else {
+            Self::Sse
+        }
+    }
+
+    pub(super) fn media_type(self) -> &'static str {
+        match self {
+            Self::Sse => Self::MEDIA_TYPES[0],
+            Self::Lines => Self::MEDIA_TYPES[1],
+        }
+    }
+
+    /// What a stream begins with: when to come back after a cut, milliseconds.
+    pub(super) fn prologue(self) -> &'static str {
+        match self {
+            Self::Sse => "retry: 2000\n\n",
+            Self::Lines => "",
+        }
+    }
+
+    /// Says nothing, and keeps the connection. Lines have no way to say nothing.
+    pub(super) fn silence(self) -> &'static str {
+        match self {
+            Self::Sse => ":\n\n",
+            Self::Lines => "",
+        }
+    }
+
+    /// Says that the server ends, not the plan.
+    pub(super) fn stopping(self) -> &'static str {
+        match self {
+            Self::Sse => ": the service is shutting down\n\n",
+            Self::Lines => "",
+        }
+    }
+
+    /// Add `told` to `text`.
+    pub(super) fn write(self, told: Outgoing, text: &mut String) {
+        let Outgoing { id, event, data } = told;
+        match self {
+            Self::Sse => write!(text, "id: {id}\nevent: {event}\ndata: {data}\n\n"),
+            Self::Lines => writeln!(text, r#"{{"id":{id},"event":"{event}","data":{data}}}"#),
+        }
+        .expect("writing to a string cannot fail");
+    }
+}
+
+/// An event as callers see it.
+pub(super) struct Outgoing {
+    id: u64,
+    event: &'static str,
+    data: Value,
+}
+
+impl Outgoing {
+    /// `has_result` is asked for at the end only.
+    pub(super) fn new(plan: PlanId, event: NumberedEvent, has_result: bool) -> Self {
+        let NumberedEvent { id, event } = event;
+        let (event, data) = match event {
+            Event::Status(plan) => ("status", json(StatusDocument::from(*plan))),
+            Event::Convergence(point) => ("convergence", json(point)),
+            Event::Incumbent(incumbent) => ("incumbent", json(incumbent)),
+            Event::End(status) => ("end", json(End::new(plan, status, has_result))),
+        };
+        Self { id, event, data }
+    }
+}
+
+/// The data of an `end` event.
+#[derive(Serialize)]
+struct End {
+    status: &'static str,
+    /// Where the result is, if there is one.
+    result: Option<String>,
+}
+
+impl End {
+    fn new(plan: PlanId, status: Status, has_result: bool) -> Self {
+        Self {
+            status: status.name(),
+            result: has_result.then(|| format!("{}/result", location(plan))),
+        }
+    }
+}
+
+fn json(data: impl Serialize) -> Value {
+    serde_json::to_value(data).expect("every map key is a string")
+}

@@ -1,0 +1,35 @@
+//! What the operator reads: log lines on stderr, with the ids of the request and the plan in fields.
+//!
+//! `NOCTULE_LOG` sets what is logged, in the syntax of tracing's `EnvFilter`; `info` by default.
+
+use std::panic::PanicHookInfo;
+
+use tracing_subscriber::EnvFilter;
+
+use crate::config::LogFormat;
+
+/// Start to write log lines, and let panics be among them.
+///
+/// # Panics
+/// When called twice.
+pub fn init(format: LogFormat) {
+    let filter = EnvFilter::try_from_env("NOCTULE_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
+    let lines = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr);
+    match format {
+        LogFormat::Text => lines
+            .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
+            .init(),
+        LogFormat::Json => lines.json().flatten_event(true).init(),
+    }
+    std::panic::set_hook(Box::new(log_panic));
+}
+
+/// The one line of a panic; the spans round it name the request or the plan.
+fn log_panic(panic: &PanicHookInfo) {
+    let message = panic.payload_as_str().unwrap_or("no message");
+    let place = panic.location().map(ToString::to_string);
+    let thread = std::thread::current().name().map(ToOwned::to_owned);
+    tracing::error!(message, place, thread, "panicked");
+}

@@ -1,0 +1,513 @@
+//! The service's answers, one by one; `support::api` holds each of them to `openapi.yaml`.
+
+use std::time::Duration;
+
+use axum::body::Body;
+use axum::http::{Method, StatusCode};
+use noctule::http::Phase;
+use noctule::job::Status;
+use serde_json::{Value, json};
+
+use crate::support::api::Api;
+use crate::support::{run, scenario};
+
+const UNKNOWN: &str = "/plans/01936f2c-7d1a-7c55-9a53-27b1b44c1a10";
+
+#[tokio::test]
+async fn a_plan_is_accepted_run_and_delivered() {
+    let api = Api::new();
+    let answer = api.post("/plans", &scenario()).await;
+    assert_eq!(answer.status, StatusCode::ACCEPTED);
+    let accepted = answer.json();
+    let address = answer.header("location");
+    assert_eq!(accepted["links"]["self"], address);
+    assert_eq!(accepted["status"], "queued");
+    assert_eq!(accepted["queue_position"], 1);
+    assert_eq!(accepted["seed"], 7);
+    assert_eq!(accepted["iterations"], 20);
+
+    let lease = run::complete(&*api.store, vec![run::convergence(0, 0.1)]).await;
+
+    let ended = api.get(address).await.json();
+    assert_eq!(ended["status"], "succeeded");
+    assert_eq!(ended["progress"], 1.0);
+    assert_eq!(ended["best_cost"], 580.0);
+    let result = api.get(&format!("{address}/result")).await;
+    assert_eq!(result.status, StatusCode::OK);
+    let stored = api
+        .store
+        .result(lease.plan.id)
+        .await
+        .expect("readable")
+        .expect("finished");
+    assert_eq!(result.body, stored, "the stored bytes are served");
+    let named = api.get(&format!("{address}/result?format=json")).await;
+    assert_eq!(named.body, stored);
+}
+
+#[tokio::test]
+async fn the_accepted_scenario_has_its_defaults_and_can_be_posted_again() {
+    let api = Api::new();
+    let mut document = scenario();
+    document["planner"]["seed"].take();
+    document["planner"]
+        .as_object_mut()
+        .expect("an object")
+        .remove("seed");
+    let accepted = api.post("/plans", &document).await;
+    let address = accepted.header("location");
+    let kept = api.get(&format!("{address}/scenario")).await;
+    let drawn = kept.json()["planner"]["seed"].as_u64().expect("a drawn seed");
+    assert!(drawn < 1 << 53);
+    assert_eq!(accepted.json()["seed"], drawn);
+    let again = api.post("/plans", &kept.json()).await;
+    assert_eq!(again.status, StatusCode::ACCEPTED);
+    let again = api.get(&format!("{}/scenario", again.header("location"))).await;
+    assert_eq!(again.body, kept.body);
+}
+
+#[tokio::test]
+async fn validation_alone_keeps_nothing() {
+    let api = Api::new();
+    let answer = api.post("/plans?validate_only=true", &scenario()).await;
+    assert_eq!(answer.status, StatusCode::OK);
+    assert_eq!(answer.json()["valid"], true);
+    assert_eq!(answer.json()["scenario"]["vehicle"]["max_turn_deg"], 60);
+    let mut wrong = scenario();
+    wrong["threats"][0]["radius"] = json!(-3);
+    api.post("/plans?validate_only=true", &wrong)
+        .await
+        .expect_problem(422, "invalid-scenario");
+    assert_eq!(api.get("/plans").await.json()["plans"], json!([]));
+}
+
+#[tokio::test]
+async fn a_caller_who_prefers_to_wait_gets_the_end() {
+    let api = Api::new();
+    let worker = tokio::spawn({
+        let store = api.store.clone();
+        async move { run::complete(&*store, vec![run::convergence(0, 0.1)]).await }
+    });
+    let headers = [("content-type", "application/json"), ("prefer", "wait=99")];
+    let answer = api
+        .send(Method::POST, "/plans", &headers, scenario().to_string())
+        .await;
+    assert_eq!(answer.status, StatusCode::OK);
+    assert_eq!(answer.header("preference-applied"), "wait=30");
+    assert_eq!(answer.json()["status"], "succeeded");
+    assert_eq!(answer.json()["links"]["self"], answer.header("location"));
+    worker.await.expect("the worker is done");
+
+    let headers = [("content-type", "application/json"), ("prefer", "wait=0")];
+    let answer = api
+        .send(Method::POST, "/plans", &headers, scenario().to_string())
+        .await;
+    assert_eq!(answer.status, StatusCode::ACCEPTED, "it did not end in time");
+    assert!(!answer.headers.contains_key("preference-applied"));
+}
+
+#[tokio::test]
+async fn a_status_document_is_sent_only_when_it_has_changed() {
+    let api = Api::new();
+    let address = api.submit().await;
+    let first = api.get(&address).await;
+    let tag = first.header("etag").to_owned();
+    assert_eq!(first.header("cache-control"), "no-cache");
+    let seconds: u64 = first.header("retry-after").parse().expect("seconds");
+    assert!((1..=600).contains(&seconds));
+    for known in [
+        tag.as_str(),
+        "*",
+        &format!("\"other\", {tag}"),
+        tag.trim_start_matches("W/"),
+    ] {
+        let answer = api.get_with(&address, &[("if-none-match", known)]).await;
+        assert_eq!(answer.status, StatusCode::NOT_MODIFIED, "{known}");
+        assert_eq!(answer.header("etag"), tag);
+    }
+    let answer = api.get_with(&address, &[("if-none-match", "\"other\"")]).await;
+    assert_eq!(answer.status, StatusCode::OK);
+
+    // Waiting with a known version ends at the next change, not only at the end.
+    let known = [("if-none-match", tag.as_str()), ("prefer", "wait=30")];
+    let (answer, lease) = tokio::join!(api.get_with(&address, &known), async {
+        api.store.claim().await.expect("a queued plan")
+    });
+    assert_eq!(answer.status, StatusCode::OK);
+    assert_eq!(answer.json()["status"], "running");
+    assert_eq!(answer.header("preference-applied"), "wait=30");
+
+    // Waiting without one ends at the end.
+    let wait = [("prefer", "wait=30")];
+    let (answer, ()) = tokio::join!(api.get_with(&address, &wait), async {
+        let events = vec![run::convergence(0, 0.1)];
+        api.store.append(&lease, events).await.expect("the lease holds");
+        run::finish(&*api.store, &lease, Status::Succeeded).await;
+    });
+    assert_eq!(answer.json()["status"], "succeeded");
+    assert!(!answer.headers.contains_key("retry-after"));
+}
+
+#[tokio::test]
+async fn waits_end_when_the_service_stops() {
+    let api = Api::new();
+    let address = api.submit().await;
+    let wait = [("prefer", "wait=30")];
+    let (answer, ()) = tokio::join!(api.get_with(&address, &wait), async {
+        api.phase.send_replace(Phase::Stopping);
+    });
+    assert_eq!(answer.json()["status"], "queued");
+}
+
+#[tokio::test]
+async fn plans_are_listed_newest_first_page_by_page() {
+    let api = Api::new();
+    let mut addresses = Vec::new();
+    for _ in 0..5 {
+        addresses.insert(0, api.submit().await);
+    }
+    let mut listed = Vec::new();
+    let mut next = Some("/plans?limit=2".to_owned());
+    let mut pages = 0;
+    while let Some(uri) = next {
+        let page = api.get(&uri).await;
+        let document = page.json();
+        let plans = document["plans"].as_array().expect("a list");
+        listed.extend(plans.iter().map(|plan| plan["links"]["self"].clone()));
+        next = document["links"]["next"].as_str().map(ToOwned::to_owned);
+        let link = page
+            .headers
+            .get("link")
+            .map(|link| link.to_str().expect("visible ASCII").to_owned());
+        assert_eq!(link, next.as_ref().map(|next| format!("<{next}>; rel=\"next\"")));
+        pages += 1;
+    }
+    assert_eq!(listed, addresses);
+    assert_eq!(pages, 3);
+
+    run::complete(&*api.store, Vec::new()).await;
+    let ended = api.get("/plans?status=succeeded").await.json();
+    assert_eq!(
+        ended["plans"][0]["links"]["self"],
+        *addresses.last().expect("five")
+    );
+    assert_eq!(ended["plans"].as_array().expect("a list").len(), 1);
+    let queued = api.get("/plans?status=queued&limit=3").await.json();
+    assert!(
+        queued["links"]["next"]
+            .as_str()
+            .expect("more")
+            .contains("status=queued")
+    );
+}
+
+#[tokio::test]
+async fn a_cancelled_plan_keeps_its_best_route() {
+    let api = Api::new();
+    let address = api.submit().await;
+    let lease = api.store.claim().await.expect("a queued plan");
+    let cancel = format!("{address}/cancel");
+    for _ in 0..2 {
+        let answer = api.send(Method::POST, &cancel, &[], "").await;
+        assert_eq!(answer.status, StatusCode::ACCEPTED);
+        assert_eq!(answer.json()["cancel_requested"], true);
+    }
+    assert!(*lease.cancel.borrow(), "the worker is told");
+    run::finish(&*api.store, &lease, Status::Cancelled).await;
+    let answer = api.send(Method::POST, &cancel, &[], "").await;
+    assert_eq!(answer.status, StatusCode::OK);
+    assert_eq!(answer.json()["status"], "cancelled");
+    assert_eq!(answer.json()["stop_reason"], "cancelled");
+    assert_eq!(api.get(&format!("{address}/result")).await.status, StatusCode::OK);
+}
+
+#[tokio::test]
+async fn a_deleted_plan_is_gone() {
+    let api = Api::new();
+    let address = api.submit().await;
+    for _ in 0..2 {
+        assert_eq!(api.delete(&address).await.status, StatusCode::NO_CONTENT);
+    }
+    for part in ["", "/result", "/scenario", "/events"] {
+        api.get(&format!("{address}{part}"))
+            .await
+            .expect_problem(410, "gone");
+    }
+    let cancel = api
+        .send(Method::POST, &format!("{address}/cancel"), &[], "")
+        .await;
+    cancel.expect_problem(410, "gone");
+    assert_eq!(api.get("/plans").await.json()["plans"], json!([]));
+}
+
+#[tokio::test]
+async fn results_that_are_not_there_say_why() {
+    let api = Api::new();
+    let mut problems = Vec::new();
+
+    let address = api.submit().await;
+    let result = format!("{address}/result");
+    let queued = api.get(&result).await;
+    assert!(queued.headers.contains_key("retry-after"));
+    problems.push(queued.expect_problem(409, "not-ready"));
+    let lease = api.store.claim().await.expect("a queued plan");
+    problems.push(api.get(&result).await.expect_problem(409, "not-ready"));
+    run::fail(&*api.store, &lease).await;
+    problems.push(api.get(&result).await.expect_problem(409, "no-result"));
+    let failed = api.get(&address).await.json();
+    assert_eq!(failed["error"]["type"], "/problems/planner-panic");
+    assert_eq!(failed["error"]["detail"], "the planner broke");
+
+    let address = api.submit().await;
+    let cancelled = api
+        .send(Method::POST, &format!("{address}/cancel"), &[], "")
+        .await;
+    assert_eq!(cancelled.status, StatusCode::OK, "a queued plan ends at once");
+    problems.push(
+        api.get(&format!("{address}/result"))
+            .await
+            .expect_problem(409, "no-result"),
+    );
+
+    let ids = [address, result].map(|path| path.split('/').nth(2).expect("an id").to_owned());
+    let mut text = serde_json::to_string_pretty(&problems).expect("JSON");
+    for id in ids {
+        text = text.replace(&id, "[plan]");
+    }
+    let problems: Value = serde_json::from_str(&text).expect("JSON");
+    insta::assert_json_snapshot!("results_that_are_not_there", problems, {"[].instance" => "[request]"});
+}
+
+#[tokio::test]
+async fn refusals_are_problems() {
+    let api = Api::new();
+    let plan = api.submit().await;
+    let json = ("content-type", "application/json");
+    let form = ("content-type", "application/x-www-form-urlencoded");
+    let latin = ("content-type", "application/json; charset=latin1");
+    let long = " ".repeat(4097);
+    let plan_of = |part: &str| format!("{plan}{part}");
+    let requests: Vec<(Method, String, Vec<(&str, &str)>, &str, u16)> = vec![
+        (Method::GET, "/nothing".into(), vec![], "", 404),
+        (Method::GET, "/plans/".into(), vec![], "", 404),
+        (Method::GET, UNKNOWN.into(), vec![], "", 404),
+        (Method::GET, format!("{UNKNOWN}/result"), vec![], "", 404),
+        (Method::GET, format!("{UNKNOWN}/events"), vec![], "", 404),
+        (Method::DELETE, UNKNOWN.into(), vec![], "", 404),
+        (Method::GET, "/plans/first".into(), vec![], "", 404),
+        (Method::GET, "/plans/%FF".into(), vec![], "", 404),
+        (
+            Method::GET,
+            UNKNOWN.to_uppercase().replace("PLANS", "plans"),
+            vec![],
+            "",
+            404,
+        ),
+        (Method::PUT, "/plans".into(), vec![], "", 405),
+        (Method::POST, "/livez".into(), vec![], "", 405),
+        (Method::GET, plan_of("/cancel"), vec![], "", 405),
+        (Method::GET, "/plans?limit=0".into(), vec![], "", 400),
+        (Method::GET, "/plans?limit=1001".into(), vec![], "", 400),
+        (Method::GET, "/plans?limit=many".into(), vec![], "", 400),
+        (Method::GET, "/plans?status=done".into(), vec![], "", 400),
+        (Method::GET, "/plans?cursor=xyz".into(), vec![], "", 400),
+        (Method::GET, "/plans?page=2".into(), vec![], "", 400),
+        (Method::GET, "/plans?limit=1&limit=2".into(), vec![], "", 400),
+        (Method::GET, "/livez?verbose".into(), vec![], "", 400),
+        (
+            Method::POST,
+            "/plans?validate_only=yes".into(),
+            vec![json],
+            "{}",
+            400,
+        ),
+        (Method::GET, plan_of("/events?rate=-1"), vec![], "", 400),
+        (Method::GET, plan_of("/events?rate=1001"), vec![], "", 400),
+        (Method::GET, plan_of("/events?rate=NaN"), vec![], "", 400),
+        (Method::GET, plan_of("/events?last_event_id=x"), vec![], "", 400),
+        (
+            Method::GET,
+            plan_of("/events"),
+            vec![("last-event-id", "-1")],
+            "",
+            400,
+        ),
+        (
+            Method::GET,
+            plan_of("/events"),
+            vec![("accept", "text/html")],
+            "",
+            406,
+        ),
+        (Method::GET, plan_of("/result?format=kml"), vec![], "", 400),
+        (
+            Method::GET,
+            plan_of("/result"),
+            vec![("accept", "text/html")],
+            "",
+            406,
+        ),
+        (Method::POST, "/plans".into(), vec![], "{}", 415),
+        (Method::POST, "/plans".into(), vec![form], "{}", 415),
+        (Method::POST, "/plans".into(), vec![latin], "{}", 415),
+        (Method::POST, "/plans".into(), vec![json], &long, 413),
+        (
+            Method::POST,
+            "/plans".into(),
+            vec![json, ("content-length", "5000")],
+            "{}",
+            413,
+        ),
+        (Method::POST, "/plans".into(), vec![json], "", 400),
+        (
+            Method::POST,
+            "/plans".into(),
+            vec![json],
+            "{\"start\":\n  nope}",
+            400,
+        ),
+        (Method::POST, "/plans".into(), vec![json], "[]", 422),
+        (
+            Method::POST,
+            "/plans".into(),
+            vec![json],
+            "{\"start\": 3, \"colour\": \"red\"}",
+            422,
+        ),
+    ];
+    let mut problems = Vec::new();
+    for (method, uri, headers, body, status) in requests {
+        let answer = api.send(method.clone(), &uri, &headers, body.to_owned()).await;
+        assert_eq!(answer.status, status, "{method} {uri}");
+        assert_eq!(
+            answer.header("content-type"),
+            "application/problem+json",
+            "{method} {uri}"
+        );
+        let allow = answer
+            .headers
+            .get("allow")
+            .map(|allow| allow.to_str().expect("visible ASCII"));
+        assert_eq!(allow.is_some(), status == 405, "{method} {uri}");
+        let request = format!("{method} {}", uri.replace(&plan, "/plans/[plan]"));
+        problems.push(json!({"request": request, "allow": allow, "problem": answer.json()}));
+    }
+    insta::assert_json_snapshot!("refusals", problems, {"[].problem.instance" => "[request]"});
+}
+
+#[tokio::test]
+async fn a_full_queue_refuses_and_says_when_to_come_back() {
+    let api = Api::with_queue(2);
+    for _ in 0..2 {
+        api.submit().await;
+    }
+    let answer = api.post("/plans", &scenario()).await;
+    let problem = answer.expect_problem(503, "queue-full");
+    assert_eq!(
+        answer.header("retry-after"),
+        "1",
+        "two runs of an unknown second on two workers"
+    );
+    assert_eq!(problem["detail"], "2 plans wait, the limit; try again in 1 s");
+    // Room is made by a claim.
+    let _lease = api.store.claim().await.expect("a queued plan");
+    assert_eq!(api.post("/plans", &scenario()).await.status, StatusCode::ACCEPTED);
+}
+
+#[tokio::test]
+async fn a_draining_service_answers_but_takes_no_plans() {
+    let api = Api::new();
+    let address = api.submit().await;
+    assert_eq!(api.get("/readyz").await.status, StatusCode::OK);
+    api.phase.send_replace(Phase::Draining);
+    for answer in [api.get("/readyz").await, api.post("/plans", &scenario()).await] {
+        answer.expect_problem(503, "draining");
+        assert_eq!(answer.header("retry-after"), "1");
+    }
+    assert_eq!(api.get("/livez").await.status, StatusCode::OK);
+    assert_eq!(api.get(&address).await.status, StatusCode::OK);
+    assert_eq!(
+        api.post("/plans?validate_only=true", &scenario()).await.status,
+        StatusCode::OK
+    );
+}
+
+#[tokio::test]
+async fn a_closed_store_is_unavailable_not_broken() {
+    let api = Api::new();
+    let address = api.submit().await;
+    api.store.close().await;
+    for answer in [
+        api.get("/readyz").await,
+        api.get(&address).await,
+        api.get("/plans").await,
+        api.post("/plans", &scenario()).await,
+    ] {
+        answer.expect_problem(503, "store-unavailable");
+        assert!(answer.headers.contains_key("retry-after"));
+    }
+    assert_eq!(api.get("/livez").await.status, StatusCode::OK);
+}
+
+#[tokio::test]
+async fn head_is_get_without_its_body() {
+    let api = Api::new();
+    let address = api.submit().await;
+    for path in ["/livez", "/plans", "/openapi.yaml", "/nothing", &address] {
+        let got = api.get(path).await;
+        let head = api.send(Method::HEAD, path, &[], "").await;
+        assert_eq!(head.status, got.status, "{path}");
+        assert!(head.body.is_empty(), "{path}");
+        assert_eq!(head.header("content-type"), got.header("content-type"), "{path}");
+        assert_eq!(
+            head.header("content-length"),
+            got.body.len().to_string(),
+            "{path}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn every_answer_has_its_request_id() {
+    let api = Api::new();
+    let answer = api.get_with("/nothing", &[("x-request-id", "caller-1")]).await;
+    assert_eq!(answer.header("x-request-id"), "caller-1");
+    assert_eq!(answer.json()["instance"], "caller-1");
+    let answer = api
+        .get_with("/livez", &[("x-request-id", "not a good one")])
+        .await;
+    assert_eq!(answer.header("x-request-id").len(), 36, "a drawn one instead");
+    assert_eq!(answer.header("x-content-type-options"), "nosniff");
+    assert_eq!(answer.header("cache-control"), "no-store");
+}
+
+#[tokio::test]
+async fn the_service_tells_about_itself() {
+    let api = Api::new();
+    assert_eq!(api.get("/version").await.json()["name"], "noctule");
+    let limits = api.get("/limits").await.json();
+    assert_eq!(limits["body_bytes"], 4096);
+    assert_eq!(limits["workers"], 2);
+    assert_eq!(limits["queue"], 1000);
+    let algorithms = api.get("/algorithms").await.json();
+    assert_eq!(algorithms["algorithms"][0]["name"], "tms-sba");
+}
+
+#[tokio::test]
+async fn a_body_that_never_ends_is_cut_off() {
+    let mut api = Api::new();
+    api.state.body_timeout = Duration::from_millis(10);
+    api.router = noctule::http::router(api.state.clone());
+    let stalled = futures_util::stream::pending::<Result<bytes::Bytes, std::io::Error>>();
+    let headers = [("content-type", "application/json")];
+    let answer = api
+        .send(Method::POST, "/plans", &headers, Body::from_stream(stalled))
+        .await;
+    answer.expect_problem(408, "request-timeout");
+
+    let broken = futures_util::stream::iter([Ok(bytes::Bytes::from("{")), Err(std::io::Error::other("cut"))]);
+    let answer = api
+        .send(Method::POST, "/plans", &headers, Body::from_stream(broken))
+        .await;
+    answer.expect_problem(400, "incomplete-body");
+}

@@ -1,0 +1,131 @@
+//! The command line: exit codes, faults, where results go.
+
+use std::fs;
+
+use serde_json::{Value, json};
+
+use crate::support::description::check_schema;
+use crate::support::process::{Service, run};
+use crate::support::scenario;
+
+#[test]
+fn a_feasible_plan_exits_0_with_its_result() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let path = |name: &str| directory.path().join(name).to_str().expect("UTF-8").to_owned();
+    fs::write(path("scenario.json"), scenario().to_string()).expect("written");
+
+    let from_file = run(&["plan", &path("scenario.json")], "");
+    assert_eq!(from_file.status.code(), Some(0));
+    assert!(from_file.stderr.is_empty(), "no progress bar without a terminal");
+    let result: Value = serde_json::from_slice(&from_file.stdout).expect("JSON");
+    check_schema(
+        &json!({"$ref": "#/components/schemas/ResultDocument"}),
+        &result,
+        "the result",
+    );
+    assert_eq!(result["feasible"], true);
+    assert_eq!(result["plan_id"], Value::Null);
+
+    let from_input = run(
+        &["plan", "-", "--out", &path("result.json")],
+        &scenario().to_string(),
+    );
+    assert_eq!(from_input.status.code(), Some(0));
+    assert!(from_input.stdout.is_empty());
+    let written: Value =
+        serde_json::from_slice(&fs::read(path("result.json")).expect("written")).expect("JSON");
+    assert_eq!(written["waypoints"], result["waypoints"]);
+}
+
+#[test]
+fn a_bad_scenario_exits_2_with_every_fault() {
+    let mut wrong = scenario();
+    wrong["threats"][0]["radius"] = json!(-3);
+    wrong["colour"] = json!("red");
+    let refused = run(&["plan", "-"], &wrong.to_string());
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(refused.stdout.is_empty());
+    let faults = String::from_utf8(refused.stderr).expect("UTF-8");
+    for part in [
+        "/threats/0/radius",
+        "radius is -3, must be > 0",
+        "out-of-range",
+        "/colour",
+        "unknown-field",
+    ] {
+        assert!(faults.contains(part), "{part} is not in\n{faults}");
+    }
+
+    let refused = run(&["plan", "-"], "{\n  nope");
+    assert_eq!(refused.status.code(), Some(2));
+    let fault = String::from_utf8(refused.stderr).expect("UTF-8");
+    assert!(fault.contains("line 2"), "{fault}");
+}
+
+#[test]
+fn no_feasible_route_exits_3_with_the_least_bad_one() {
+    let mut walled = scenario();
+    walled["threats"] = json!([{
+        "kind": "polygon",
+        "vertices": [{"x": 450, "y": -10}, {"x": 550, "y": -10}, {"x": 550, "y": 1010}, {"x": 450, "y": 1010}],
+    }]);
+    let infeasible = run(&["plan", "-"], &walled.to_string());
+    assert_eq!(infeasible.status.code(), Some(3));
+    let result: Value = serde_json::from_slice(&infeasible.stdout).expect("JSON");
+    check_schema(
+        &json!({"$ref": "#/components/schemas/ResultDocument"}),
+        &result,
+        "the result",
+    );
+    assert_eq!(result["feasible"], false);
+    assert_eq!(result["path"], Value::Null);
+    assert_ne!(result["checks"]["violations"], json!([]));
+}
+
+#[test]
+fn anything_else_exits_1() {
+    for arguments in [
+        &["plan", "/nowhere/scenario.json"][..],
+        &["plan", "-", "--colour"],
+        &["serve", "--listen", "nowhere"],
+        &["serve", "--workers", "0"],
+        &["healthcheck", "--url", "http://127.0.0.1:1/readyz"],
+        &["healthcheck", "--url", "ftp://127.0.0.1/"],
+        &["frobnicate"],
+        &[],
+    ] {
+        let failed = run(arguments, "");
+        assert_eq!(failed.status.code(), Some(1), "{arguments:?}");
+        assert!(!failed.stderr.is_empty(), "{arguments:?}");
+        assert!(failed.stdout.is_empty(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn help_and_version_exit_0() {
+    let help = run(&["--help"], "");
+    assert_eq!(help.status.code(), Some(0));
+    let text = String::from_utf8(help.stdout).expect("UTF-8");
+    for command in ["serve", "plan", "healthcheck"] {
+        assert!(text.contains(command), "{text}");
+    }
+    let version = run(&["--version"], "");
+    let expected = format!("noctule {}\n", env!("CARGO_PKG_VERSION"));
+    assert_eq!(String::from_utf8(version.stdout).expect("UTF-8"), expected);
+}
+
+#[tokio::test]
+async fn a_ready_service_is_healthy() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &[]);
+    assert_eq!(
+        run(&["healthcheck", "--url", &service.url("/readyz")], "")
+            .status
+            .code(),
+        Some(0)
+    );
+    let elsewhere = run(&["healthcheck", "--url", &service.url("/nothing")], "");
+    assert_eq!(elsewhere.status.code(), Some(1));
+    let reason = String::from_utf8(elsewhere.stderr).expect("UTF-8");
+    assert!(reason.contains("answers 404"), "{reason}");
+}

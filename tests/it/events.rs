@@ -1,0 +1,298 @@
+//! Event streams over a real connection: order, resumption, thinning, the end.
+
+use axum::http::StatusCode;
+use futures_util::future::join_all;
+use noctule::http::Phase;
+use noctule::job::{Event, Status};
+use reqwest::{Client, RequestBuilder};
+use serde_json::Value;
+
+use crate::support::api::Api;
+use crate::support::run;
+use crate::support::server::Server;
+use crate::support::sse::{Block, Stream, events};
+
+/// 60 iterations of 10 ms, every third of which finds a better route.
+fn a_run() -> Vec<Event> {
+    (0..60)
+        .flat_map(|iteration: usize| {
+            let elapsed_ms = iteration as f64 * 10.0;
+            let better = (iteration % 3 == 0).then(|| run::incumbent(iteration, elapsed_ms));
+            better
+                .into_iter()
+                .chain([run::convergence(iteration, elapsed_ms)])
+        })
+        .collect()
+}
+
+struct Followed {
+    api: Api,
+    server: Server,
+    address: String,
+    client: Client,
+}
+
+impl Followed {
+    async fn new() -> Self {
+        let api = Api::new();
+        Self {
+            server: Server::start(&api).await,
+            address: api.submit().await,
+            client: Client::builder().no_proxy().build().expect("a client"),
+            api,
+        }
+    }
+
+    fn events(&self, query: &str) -> RequestBuilder {
+        self.client
+            .get(self.server.url(&format!("{}/events{query}", self.address)))
+    }
+
+    async fn read(&self, query: &str) -> Vec<Block> {
+        Stream::open(self.events(query)).await.rest().await
+    }
+}
+
+#[tokio::test]
+async fn a_stream_tells_the_whole_plan_and_ends_once() {
+    let plan = Followed::new().await;
+    let mut live = Stream::open(plan.events("?rate=0")).await;
+    let Some(Block::Event { id: 1, name, data }) = live.next().await else {
+        panic!("no first event")
+    };
+    assert_eq!(
+        (name.as_str(), &data["status"]),
+        ("status", &Value::from("queued"))
+    );
+
+    let reader = tokio::spawn(live.rest());
+    run::complete(&*plan.api.store, a_run()).await;
+    let live = reader.await.expect("read");
+
+    let names: Vec<String> = events(&live).into_iter().map(|(_, name)| name).collect();
+    assert_eq!(names[0], "status", "running");
+    assert_eq!(names.iter().filter(|name| *name == "convergence").count(), 60);
+    assert_eq!(names.iter().filter(|name| *name == "incumbent").count(), 20);
+    assert_eq!(names[names.len() - 2..], ["status", "end"]);
+    assert_eq!(names.iter().filter(|name| *name == "end").count(), 1);
+    let Some(Block::Event { data: end, .. }) = live.last() else {
+        panic!("no end")
+    };
+    assert_eq!(end["status"], "succeeded");
+    assert_eq!(end["result"], format!("{}/result", plan.address));
+
+    let again = plan.read("?rate=0").await;
+    assert_eq!(again[1..], live, "the same when it is read afterwards");
+    let ids: Vec<u64> = events(&again).into_iter().map(|(id, _)| id).collect();
+    assert!(ids.is_sorted_by(|a, b| a < b), "{ids:?}");
+}
+
+#[tokio::test]
+async fn a_cut_stream_resumes_at_every_event_with_neither_loss_nor_repeat() {
+    let plan = Followed::new().await;
+    run::complete(&*plan.api.store, a_run()).await;
+    for rate in ["0", "10", "3"] {
+        let whole = plan.read(&format!("?rate={rate}")).await;
+        let ids: Vec<u64> = events(&whole).into_iter().map(|(id, _)| id).collect();
+        let resumed = join_all(ids.iter().enumerate().map(async |(position, id)| {
+            let by_header = plan.events(&format!("?rate={rate}&last_event_id=0"));
+            let by_header = by_header.header("last-event-id", id.to_string());
+            let by_query = plan.events(&format!("?rate={rate}&last_event_id={id}"));
+            let rest = &whole[position + 1..];
+            if rest.is_empty() {
+                for request in [by_header, by_query] {
+                    let answer = request.send().await.expect("an answer");
+                    assert_eq!(answer.status(), StatusCode::NO_CONTENT, "all has been told");
+                }
+            } else {
+                assert_eq!(
+                    Stream::open(by_header).await.rest().await,
+                    rest,
+                    "after {id} at {rate} Hz"
+                );
+                assert_eq!(
+                    Stream::open(by_query).await.rest().await,
+                    rest,
+                    "after {id} at {rate} Hz"
+                );
+            }
+        }));
+        assert_eq!(resumed.await.len(), ids.len());
+    }
+    let beyond = plan
+        .events("?last_event_id=1000000")
+        .send()
+        .await
+        .expect("an answer");
+    assert_eq!(beyond.status(), StatusCode::NO_CONTENT);
+}
+
+#[tokio::test]
+async fn a_live_stream_that_is_cut_resumes() {
+    let plan = Followed::new().await;
+    let store = &plan.api.store;
+    let lease = store.claim().await.expect("a queued plan");
+    let mut read = Vec::new();
+    let mut last = 0;
+    // Each connection reads one event and is dropped; what comes meanwhile is not lost.
+    for event in a_run() {
+        store.append(&lease, vec![event]).await.expect("the lease holds");
+        let request = plan.events("?rate=0").header("last-event-id", last.to_string());
+        let Some(block) = Stream::open(request).await.next().await else {
+            panic!("no event")
+        };
+        last = events(std::slice::from_ref(&block))[0].0;
+        read.push(block);
+    }
+    run::finish(&**store, &lease, Status::Succeeded).await;
+    read.extend(
+        Stream::open(plan.events("?rate=0").header("last-event-id", last.to_string()))
+            .await
+            .rest()
+            .await,
+    );
+    assert_eq!(read, plan.read("?rate=0").await);
+}
+
+#[tokio::test]
+async fn a_rate_thins_the_curve_but_keeps_the_last_route() {
+    let plan = Followed::new().await;
+    run::complete(&*plan.api.store, a_run()).await;
+    let whole = plan.read("?rate=0").await;
+    for (rate, windows) in [("10", 6), ("5", 3), ("1", 1)] {
+        let thinned = plan.read(&format!("?rate={rate}")).await;
+        let count = |name: &str| events(&thinned).iter().filter(|(_, kind)| kind == name).count();
+        assert_eq!(count("convergence"), windows, "{rate} Hz");
+        assert_eq!(count("incumbent"), windows, "{rate} Hz");
+        assert_eq!(count("status"), 3);
+        assert_eq!(count("end"), 1);
+        assert!(thinned.iter().all(|block| whole.contains(block)));
+        let last = |blocks: &[Block]| {
+            let incumbents = events(blocks).into_iter().filter(|(_, name)| name == "incumbent");
+            incumbents.last()
+        };
+        assert_eq!(last(&thinned), last(&whole));
+    }
+}
+
+#[tokio::test]
+async fn a_held_back_point_leaves_when_the_run_pauses() {
+    let plan = Followed::new().await;
+    let store = &plan.api.store;
+    let mut stream = Stream::open(plan.events("?rate=20")).await;
+    let lease = store.claim().await.expect("a queued plan");
+    let points = vec![
+        run::incumbent(1, 10.0),
+        run::convergence(1, 10.0),
+        run::convergence(2, 20.0),
+    ];
+    store.append(&lease, points).await.expect("the lease holds");
+    let mut names = Vec::new();
+    for _ in 0..4 {
+        // Without an event to close the window, time does.
+        let block = stream.next().await.expect("open");
+        names.push(events(&[block])[0].1.clone());
+    }
+    assert_eq!(names, ["status", "status", "incumbent", "convergence"]);
+}
+
+#[tokio::test]
+async fn lines_tell_the_same_as_events() {
+    let plan = Followed::new().await;
+    run::complete(&*plan.api.store, a_run()).await;
+    let request = plan.events("").header("accept", "application/x-ndjson");
+    let answer = request.send().await.expect("an answer");
+    assert_eq!(answer.headers()["content-type"], "application/x-ndjson");
+    let lines: Vec<Block> = answer
+        .text()
+        .await
+        .expect("text")
+        .lines()
+        .map(|line| {
+            let mut line: Value = serde_json::from_str(line).expect("JSON");
+            Block::Event {
+                id: line["id"].as_u64().expect("a number"),
+                name: line["event"].as_str().expect("a name").to_owned(),
+                data: line["data"].take(),
+            }
+        })
+        .collect();
+    assert_eq!(lines, plan.read("").await);
+}
+
+#[tokio::test]
+async fn plans_without_a_route_end_without_a_result() {
+    let plan = Followed::new().await;
+    let lease = plan.api.store.claim().await.expect("a queued plan");
+    run::fail(&*plan.api.store, &lease).await;
+    let Some(Block::Event { name, data, .. }) = plan.read("").await.pop() else {
+        panic!("no end")
+    };
+    assert_eq!(name, "end");
+    assert_eq!(data, serde_json::json!({"status": "failed", "result": null}));
+
+    let plan = Followed::new().await;
+    plan.api
+        .store
+        .request_cancel(lease_id(&plan.address), 0)
+        .await
+        .expect("queued");
+    let Some(Block::Event { data, .. }) = plan.read("").await.pop() else {
+        panic!("no end")
+    };
+    assert_eq!(data, serde_json::json!({"status": "cancelled", "result": null}));
+}
+
+fn lease_id(address: &str) -> noctule::job::PlanId {
+    address.trim_start_matches("/plans/").parse().expect("an id")
+}
+
+#[tokio::test]
+async fn a_stream_of_a_deleted_plan_closes() {
+    let plan = Followed::new().await;
+    let mut stream = Stream::open(plan.events("")).await;
+    stream.next().await.expect("the first status");
+    plan.api.delete(&plan.address).await;
+    assert!(
+        stream
+            .rest()
+            .await
+            .iter()
+            .all(|block| matches!(block, Block::Event { .. })),
+        "and says no more"
+    );
+}
+
+#[tokio::test]
+async fn streams_end_when_the_service_stops() {
+    let plan = Followed::new().await;
+    let mut streams = Vec::new();
+    for _ in 0..50 {
+        let mut stream = Stream::open(plan.events("")).await;
+        stream.next().await.expect("the first status");
+        streams.push(stream);
+    }
+    plan.api.phase.send_replace(Phase::Stopping);
+    for stream in streams {
+        assert_eq!(
+            stream.rest().await,
+            [Block::Comment("the service is shutting down".to_owned())]
+        );
+    }
+    plan.server.serving.await.expect("the server ends");
+}
+
+#[tokio::test]
+async fn many_readers_of_one_plan_read_the_same() {
+    let plan = Followed::new().await;
+    let streams = join_all((0..50).map(|_| Stream::open(plan.events("?rate=0")))).await;
+    let readers: Vec<_> = streams
+        .into_iter()
+        .map(|stream| tokio::spawn(stream.rest()))
+        .collect();
+    run::complete(&*plan.api.store, a_run()).await;
+    let expected = plan.read("?rate=0").await;
+    for reader in readers {
+        assert_eq!(reader.await.expect("read"), expected);
+    }
+}

@@ -1,0 +1,166 @@
+//! SIGTERM on the real binary: nothing is lost, streams end, the exit comes in time.
+
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::support::process::Service;
+use crate::support::scenario;
+use crate::support::sse::{Block, Stream, events};
+
+/// A plan that runs for so long, wherever it runs.
+fn a_run_of(ms: u64) -> Value {
+    let mut scenario = scenario();
+    scenario["planner"]["iterations"] = 100_000.into();
+    scenario["planner"]["time_limit_ms"] = ms.into();
+    scenario
+}
+
+/// Read until the plan is running.
+async fn running(service: &Service, address: &str) -> Stream {
+    let mut stream = Stream::open(service.get(&format!("{address}/events"))).await;
+    loop {
+        match stream.next().await {
+            Some(Block::Event { data, .. }) if data["status"] == "running" => return stream,
+            Some(_) => {}
+            None => panic!("the stream ended before the plan ran"),
+        }
+    }
+}
+
+/// The statuses of a plan that has ended.
+async fn life(service: &Service, address: &str) -> Vec<String> {
+    let blocks = Stream::open(service.get(&format!("{address}/events")))
+        .await
+        .rest()
+        .await;
+    assert_eq!(
+        events(&blocks).iter().filter(|(_, name)| name == "end").count(),
+        1
+    );
+    blocks
+        .into_iter()
+        .filter_map(|block| match block {
+            Block::Event { name, data, .. } if name == "status" => Some(data["status"].as_str()?.to_owned()),
+            _ => None,
+        })
+        .collect()
+}
+
+#[tokio::test]
+async fn an_idle_service_leaves_at_once() {
+    for signal in ["TERM", "INT"] {
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let service = Service::start(directory.path(), &["--grace", "30"]);
+        assert_eq!(service.bytes("/readyz").await, r#"{"status":"ok"}"#);
+        let begun = Instant::now();
+        service.signal(signal);
+        assert!(service.exit().await.success());
+        assert!(begun.elapsed() < Duration::from_secs(5), "{:?}", begun.elapsed());
+    }
+}
+
+#[tokio::test]
+async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &["--workers", "1", "--grace", "2"]);
+    let address = service.submit(&a_run_of(4000)).await;
+    let waiting = service.submit(&a_run_of(10)).await;
+    let stream = running(&service, &address).await;
+
+    let begun = Instant::now();
+    service.signal("TERM");
+    let refused = loop {
+        let ready = service.get("/readyz").send().await.expect("it still answers");
+        if ready.status() == 503 {
+            break service.post(&a_run_of(10)).await;
+        }
+    };
+    assert_eq!(refused.status(), 503);
+    assert!(refused.headers().contains_key("retry-after"));
+    let problem: Value = refused.json().await.expect("JSON");
+    assert_eq!(problem["type"], "/problems/draining");
+
+    let rest = stream.rest().await;
+    assert_eq!(
+        rest.last(),
+        Some(&Block::Comment("the service is shutting down".to_owned()))
+    );
+    assert!(
+        events(&rest).iter().all(|(_, name)| name != "end"),
+        "the plan has not ended"
+    );
+    assert!(service.exit().await.success());
+    assert!(begun.elapsed() < Duration::from_secs(3), "{:?}", begun.elapsed());
+
+    let service = Service::start(directory.path(), &["--workers", "1"]);
+    for address in [&address, &waiting] {
+        assert_eq!(service.ended(address).await["status"], "succeeded");
+    }
+    assert_eq!(
+        life(&service, &address).await,
+        ["queued", "running", "queued", "running", "succeeded"]
+    );
+    assert_eq!(life(&service, &waiting).await, ["queued", "running", "succeeded"]);
+}
+
+#[tokio::test]
+async fn a_plan_that_ends_within_the_grace_period_is_kept() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &["--workers", "1", "--grace", "30"]);
+    let address = service.submit(&a_run_of(1000)).await;
+    let stream = running(&service, &address).await;
+    service.signal("TERM");
+    let rest = stream.rest().await;
+    assert!(
+        matches!(rest.last(), Some(Block::Event { name, .. }) if name == "end"),
+        "its stream ends with it"
+    );
+    assert!(service.exit().await.success());
+
+    let service = Service::start(directory.path(), &["--workers", "1"]);
+    assert_eq!(service.ended(&address).await["status"], "succeeded");
+    assert_eq!(life(&service, &address).await, ["queued", "running", "succeeded"]);
+}
+
+#[tokio::test]
+async fn a_second_signal_does_not_wait() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &["--workers", "1", "--grace", "600"]);
+    let address = service.submit(&a_run_of(3_600_000)).await;
+    let _stream = running(&service, &address).await;
+    service.signal("TERM");
+    while service
+        .get("/readyz")
+        .send()
+        .await
+        .expect("it still answers")
+        .status()
+        != 503
+    {}
+    service.signal("TERM");
+    assert_eq!(service.exit().await.code(), Some(1));
+}
+
+#[tokio::test]
+async fn open_streams_do_not_hold_up_the_end() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &["--workers", "1", "--grace", "2"]);
+    let address = service.submit(&a_run_of(60_000)).await;
+    let mut streams = Vec::new();
+    for _ in 0..100 {
+        streams.push(running(&service, &address).await);
+    }
+    let begun = Instant::now();
+    service.signal("TERM");
+    for stream in streams {
+        let rest = stream.rest().await;
+        assert!(
+            matches!(rest.last(), Some(Block::Comment(_))),
+            "{:?}",
+            rest.last()
+        );
+    }
+    assert!(service.exit().await.success());
+    assert!(begun.elapsed() < Duration::from_secs(3), "{:?}", begun.elapsed());
+}

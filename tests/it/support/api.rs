@@ -1,0 +1,155 @@
+//! The service without a socket, over a store of its own. Each answer is held to `openapi.yaml`.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::Body;
+use axum::http::{HeaderMap, Method, Request, StatusCode};
+use bytes::Bytes;
+use http_body_util::BodyExt as _;
+use noctule::http::{self, AppState, Capacity, Phase};
+use noctule::planner;
+use noctule::scenario::json::Rules;
+use noctule::scenario::limits::Limits;
+use noctule::store::sqlite::SqliteStore;
+use noctule::store::{Options, Store, wall_clock};
+use serde_json::Value;
+use tempfile::TempDir;
+use tokio::sync::watch;
+use tower::ServiceExt as _;
+
+use super::description;
+
+/// A service whose only worker is the test.
+pub(crate) struct Api {
+    pub(crate) store: Arc<dyn Store>,
+    pub(crate) state: AppState,
+    pub(crate) router: Router,
+    pub(crate) phase: watch::Sender<Phase>,
+    _directory: TempDir,
+}
+
+/// An answer, read to its end.
+#[derive(Debug)]
+pub(crate) struct Answer {
+    pub(crate) status: StatusCode,
+    pub(crate) headers: HeaderMap,
+    pub(crate) body: Bytes,
+}
+
+impl Api {
+    /// With room for a thousand plans.
+    pub(crate) fn new() -> Self {
+        Self::with_queue(1000)
+    }
+
+    /// With room for `queue` plans.
+    pub(crate) fn with_queue(queue: usize) -> Self {
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let options = Options {
+            queue_limit: queue as u64,
+            clock: wall_clock(),
+        };
+        let store = Arc::new(SqliteStore::open(directory.path(), options).expect("a fresh store"));
+        let (phase, watched) = watch::channel(Phase::Serving);
+        let state = AppState {
+            store: store.clone(),
+            rules: Arc::new(Rules {
+                limits: Limits {
+                    body_bytes: 4096,
+                    ..Limits::default()
+                },
+                algorithms: planner::algorithm_rules(),
+            }),
+            capacity: Capacity { workers: 2, queue },
+            body_timeout: Duration::from_secs(30),
+            phase: watched,
+        };
+        Self {
+            router: http::router(state.clone()),
+            store,
+            state,
+            phase,
+            _directory: directory,
+        }
+    }
+
+    /// Send a request with headers out of `(name, value)` pairs.
+    pub(crate) async fn send(
+        &self,
+        method: Method,
+        uri: &str,
+        headers: &[(&str, &str)],
+        body: impl Into<Body>,
+    ) -> Answer {
+        let request = headers
+            .iter()
+            .fold(
+                Request::builder().method(method.clone()).uri(uri),
+                |request, (name, value)| request.header(*name, *value),
+            )
+            .body(body.into())
+            .expect("a request");
+        let path = request.uri().path().to_owned();
+        let response = self.router.clone().oneshot(request).await.expect("never fails");
+        let (head, body) = response.into_parts();
+        let body = body.collect().await.expect("a whole body").to_bytes();
+        description::check(&method, &path, head.status, &head.headers, &body);
+        Answer {
+            status: head.status,
+            headers: head.headers,
+            body,
+        }
+    }
+
+    pub(crate) async fn get(&self, uri: &str) -> Answer {
+        self.send(Method::GET, uri, &[], Body::empty()).await
+    }
+
+    pub(crate) async fn get_with(&self, uri: &str, headers: &[(&str, &str)]) -> Answer {
+        self.send(Method::GET, uri, headers, Body::empty()).await
+    }
+
+    pub(crate) async fn post(&self, uri: &str, document: &Value) -> Answer {
+        let headers = [("content-type", "application/json")];
+        self.send(Method::POST, uri, &headers, document.to_string()).await
+    }
+
+    pub(crate) async fn delete(&self, uri: &str) -> Answer {
+        self.send(Method::DELETE, uri, &[], Body::empty()).await
+    }
+
+    /// Post the small scenario; its address.
+    pub(crate) async fn submit(&self) -> String {
+        let answer = self.post("/plans", &super::scenario()).await;
+        assert_eq!(answer.status, 202, "{answer:?}");
+        answer.header("location").to_owned()
+    }
+}
+
+impl Answer {
+    pub(crate) fn json(&self) -> Value {
+        serde_json::from_slice(&self.body).expect("JSON")
+    }
+
+    pub(crate) fn header(&self, name: &str) -> &str {
+        let value = self
+            .headers
+            .get(name)
+            .unwrap_or_else(|| panic!("no {name} in {:?}", self.headers));
+        value.to_str().expect("visible ASCII")
+    }
+
+    /// Panics unless it is a problem of that kind.
+    #[track_caller]
+    pub(crate) fn expect_problem(&self, status: u16, slug: &str) -> Value {
+        assert_eq!(self.status, status, "{self:?}");
+        assert_eq!(self.header("content-type"), "application/problem+json");
+        let problem = self.json();
+        assert_eq!(problem["type"], format!("/problems/{slug}"));
+        assert_eq!(problem["status"], status);
+        assert_eq!(problem["instance"], self.header("x-request-id"));
+        problem
+    }
+}

@@ -1,0 +1,159 @@
+//! The real binary as a process of its own, always reaped.
+
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Output, Stdio};
+use std::time::Duration;
+
+use reqwest::{Client, RequestBuilder, Response};
+use serde_json::Value;
+
+/// More than anything here takes.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn noctule() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_noctule"));
+    // What the tests are run with must not change what they see.
+    for name in [
+        "LISTEN",
+        "DATA_DIR",
+        "WORKERS",
+        "QUEUE",
+        "GRACE",
+        "LOG_FORMAT",
+        "LOG",
+        "HEALTHCHECK_URL",
+    ] {
+        command.env_remove(format!("NOCTULE_{name}"));
+    }
+    command
+}
+
+/// Run the binary to its end, with `input` as its standard input.
+pub(crate) fn run(arguments: &[&str], input: &str) -> Output {
+    let mut child = noctule()
+        .args(arguments)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary starts");
+    // A process that does not read its input closes it.
+    let _ = child.stdin.take().expect("piped").write_all(input.as_bytes());
+    child.wait_with_output().expect("the binary ends")
+}
+
+/// `noctule serve`; killed when dropped.
+pub(crate) struct Service {
+    child: Child,
+    url: String,
+    client: Client,
+}
+
+impl Service {
+    /// On a free port; returns when it listens.
+    pub(crate) fn start(data_dir: &Path, arguments: &[&str]) -> Self {
+        let mut child = noctule()
+            .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
+            .arg(data_dir)
+            .args(arguments)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the binary starts");
+        let mut line = String::new();
+        let stdout = child.stdout.take().expect("piped");
+        BufReader::new(stdout).read_line(&mut line).expect("a line");
+        let url = line.trim().strip_prefix("listening on ");
+        Self {
+            url: url
+                .unwrap_or_else(|| panic!("not listening: {line:?}"))
+                .to_owned(),
+            child,
+            client: Client::builder()
+                .no_proxy()
+                .timeout(PATIENCE)
+                .build()
+                .expect("a client"),
+        }
+    }
+
+    pub(crate) fn url(&self, path: &str) -> String {
+        format!("{}{path}", self.url)
+    }
+
+    pub(crate) fn get(&self, path: &str) -> RequestBuilder {
+        self.client.get(self.url(path))
+    }
+
+    pub(crate) async fn post(&self, document: &Value) -> Response {
+        let request = self.client.post(self.url("/plans")).json(document);
+        request.send().await.expect("an answer")
+    }
+
+    /// Post a scenario; the plan's address.
+    pub(crate) async fn submit(&self, document: &Value) -> String {
+        let answer = self.post(document).await;
+        assert_eq!(answer.status(), 202);
+        answer.headers()["location"]
+            .to_str()
+            .expect("visible ASCII")
+            .to_owned()
+    }
+
+    /// The status document once the plan has ended.
+    pub(crate) async fn ended(&self, address: &str) -> Value {
+        loop {
+            let request = self.get(address).header("prefer", "wait=30");
+            let status: Value = request
+                .send()
+                .await
+                .expect("an answer")
+                .json()
+                .await
+                .expect("JSON");
+            if ["succeeded", "failed", "cancelled"].contains(&status["status"].as_str().expect("text")) {
+                return status;
+            }
+        }
+    }
+
+    /// The bytes of `path`, which must be there.
+    pub(crate) async fn bytes(&self, path: &str) -> bytes::Bytes {
+        let answer = self.get(path).send().await.expect("an answer");
+        assert_eq!(answer.status(), 200, "{path}");
+        answer.bytes().await.expect("a whole body")
+    }
+
+    /// Send `SIG{name}`.
+    pub(crate) fn signal(&self, name: &str) {
+        let pid = self.child.id().to_string();
+        let sent = Command::new("kill")
+            .args(["-s", name, &pid])
+            .status()
+            .expect("kill runs");
+        assert!(sent.success());
+    }
+
+    /// Kill the process as a power cut would.
+    pub(crate) fn kill(mut self) {
+        self.child.kill().expect("killed");
+        self.child.wait().expect("reaped");
+    }
+
+    /// Wait for the process to end by itself.
+    pub(crate) async fn exit(mut self) -> ExitStatus {
+        let ended = tokio::task::spawn_blocking(move || self.child.wait().expect("reaped"));
+        let ended = tokio::time::timeout(PATIENCE, ended).await;
+        ended.expect("the process ends").expect("no panic")
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        // Both fail when it has been reaped already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

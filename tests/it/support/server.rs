@@ -1,0 +1,35 @@
+//! A service on a real port of this machine, for what needs a connection.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use tokio::net::TcpListener;
+use tokio::task::JoinHandle;
+
+use super::api::Api;
+
+/// Serves an [`Api`] until its phase is `Stopping`.
+pub(crate) struct Server {
+    pub(crate) address: SocketAddr,
+    pub(crate) serving: JoinHandle<()>,
+}
+
+impl Server {
+    /// On a free port.
+    pub(crate) async fn start(api: &Api) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
+        let address = listener.local_addr().expect("bound");
+        let patience = Duration::from_secs(5);
+        let serving =
+            noctule::http::server::serve(listener, api.router.clone(), api.state.phase.clone(), patience);
+        Self {
+            address,
+            serving: tokio::spawn(serving),
+        }
+    }
+
+    /// The whole address of `path`.
+    pub(crate) fn url(&self, path: &str) -> String {
+        format!("http://{}{path}", self.address)
+    }
+}

@@ -237,6 +237,9 @@ impl ResultDocument {
     }
 
     /// As JSON text.
+    ///
+    /// # Panics
+    /// Never: the document has no map with other keys than strings.
     #[must_use]
     pub fn to_json(&self) -> String {
         serde_json::to_string(self).expect("every map key is a string and every number is finite")

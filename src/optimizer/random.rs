@@ -1,6 +1,6 @@
 //! Seeded random numbers, the same on every machine.
 //!
-//! xoshiro256++ seeded through SplitMix64; floats are made here, by arithmetic that IEEE 754 fixes
+//! xoshiro256++ seeded through `SplitMix64`; floats are made here, by arithmetic that IEEE 754 fixes
 //! to the bit and `libm`'s own functions, so that no platform library has a say.
 
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -187,8 +187,12 @@ impl TmsSba {
     fn stabilise(&mut self, objective: &mut dyn Objective) {
         let dimension = objective.bounds().dimension();
         let ranking = self.swarm.ranking();
-        let left_out =
-            ((ranking.len() as f64 * self.truncation / 2.0).floor() as usize).min((ranking.len() - 1) / 2);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "truncation < 1, so that fewer than half are left out at each end"
+        )]
+        let left_out = (ranking.len() as f64 * self.truncation / 2.0) as usize;
         let middle = &ranking[left_out..ranking.len() - left_out];
         let mut mean = vec![0.0; dimension];
         for &bat_idx in middle {

@@ -48,7 +48,7 @@ pub(super) fn measure(model: &Model, route: &[Point3]) -> Measures {
 pub(super) fn violations(model: &Model, route: &[Point3]) -> Vec<Violation> {
     let mut found = Vec::new();
     model.assess(route, Quadrature::Integral, model.tolerance, |breach| {
-        found.push(describe(model, &breach))
+        found.push(describe(model, &breach));
     });
     found
 }

@@ -137,7 +137,7 @@ mod tests {
             }
             for point in &route[1..11] {
                 let height = point.z - scenario.terrain.elevation(point.xy());
-                prop_assert!(height >= -1e-9 && height <= 200.0 + 1e-9);
+                prop_assert!((-1e-9..=200.0 + 1e-9).contains(&height));
             }
         }
     }

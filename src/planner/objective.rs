@@ -29,7 +29,7 @@ impl<'s> Routes<'s> {
         let mut violation = 0.0;
         let quadrature = self.model.scenario.planner.quadrature;
         let figures = self.model.assess(route, quadrature, self.tolerance, |breach| {
-            violation += breach.amount
+            violation += breach.amount;
         });
         Fitness {
             violation,

@@ -11,7 +11,7 @@ pub struct Flat {
 }
 
 impl Flat {
-    pub(super) fn height_range(&self, leg: &Segment, (t0, t1): (f64, f64)) -> HeightRange {
+    pub(super) fn height_range(self, leg: &Segment, (t0, t1): (f64, f64)) -> HeightRange {
         let (h0, h1) = (leg.at(t0).z - self.elevation, leg.at(t1).z - self.elevation);
         HeightRange {
             min: h0.min(h1),

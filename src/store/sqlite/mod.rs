@@ -12,7 +12,7 @@ mod transaction;
 mod writer;
 
 use std::fs::{DirBuilder, File, TryLockError};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -60,6 +60,15 @@ impl SqliteStore {
         let connection = open_database(&file)
             .map_err(|error| StoreError::Unavailable(format!("database {}: {error}", file.display())))?;
         sync_directory(data_dir)?;
+        Self::assemble(connection, lock, file, options)
+    }
+
+    fn assemble(
+        connection: Connection,
+        lock: File,
+        file: PathBuf,
+        options: Options,
+    ) -> Result<Self, StoreError> {
         let changes = Arc::new(Changes::default());
         let clock = Arc::clone(&options.clock);
         Ok(Self {
@@ -245,4 +254,69 @@ fn sync_directory(data_dir: &Path) -> Result<(), StoreError> {
     #[cfg(not(unix))]
     let _ = data_dir;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::wall_clock;
+
+    fn submission(bytes: usize) -> Submission {
+        Submission {
+            id: PlanId::now_v7(),
+            name: None,
+            algorithm: "tms-sba".to_owned(),
+            seed: 7,
+            iterations: 200,
+            scenario: "x".repeat(bytes),
+            created_ms: 1_000,
+        }
+    }
+
+    #[tokio::test]
+    async fn a_full_disk_refuses_what_has_no_room_and_spoils_nothing() {
+        let directory = tempfile::TempDir::new().expect("a temporary directory");
+        let lock = lock(directory.path()).expect("nobody else has it");
+        let file = directory.path().join(DATABASE);
+        let connection = open_database(&file).expect("the directory can be written");
+        connection
+            .pragma_update(None, "max_page_count", 200)
+            .expect("the file is smaller");
+        let options = Options {
+            queue_limit: 1_000,
+            clock: wall_clock(),
+        };
+        let store = SqliteStore::assemble(connection, lock, file, options).expect("the tables are there");
+
+        let mut accepted = Vec::new();
+        let refusal = loop {
+            match store.submit(submission(20_000)).await {
+                Ok(plan) => accepted.push(plan.id),
+                Err(error) => break error,
+            }
+        };
+        assert!(refusal.to_string().contains("full"), "{refusal}");
+        assert!(accepted.len() > 10);
+        let stats = store.stats().await.expect("reading goes on");
+        assert_eq!(stats.queued, accepted.len() as u64);
+
+        // Those that came with one that has no room are refused at worst, never half done.
+        let together = [20, 500_000, 30].map(|bytes| store.submit(submission(bytes)));
+        for answer in futures_util::future::join_all(together).await {
+            accepted.extend(answer.map(|plan| plan.id));
+        }
+        for id in &accepted[..5] {
+            store.delete(*id, 0).await.expect("deleting makes room");
+        }
+        let last = store
+            .submit(submission(20_000))
+            .await
+            .expect("there is room again");
+        assert_eq!(last.queue_position, Some(accepted.len() as u64 - 4));
+        for id in &accepted[5..] {
+            let lease = store.claim().await.expect("they are queued");
+            assert_eq!(lease.plan.id, *id);
+        }
+        store.close().await;
+    }
 }

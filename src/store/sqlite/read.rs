@@ -155,7 +155,7 @@ pub(super) fn list(connection: &Connection, query: ListQuery) -> Result<Vec<Plan
 /// The `seq` of each queued plan, in order.
 fn queue(connection: &Connection) -> rusqlite::Result<Vec<i64>> {
     connection
-        .prepare_cached("SELECT seq FROM plans WHERE status = 'queued' ORDER BY seq")?
+        .prepare_cached("SELECT seq FROM plans INDEXED BY plans_queue WHERE status = 'queued' ORDER BY seq")?
         .query_map([], |row| row.get(0))?
         .collect()
 }

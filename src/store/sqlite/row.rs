@@ -60,11 +60,13 @@ impl PlanRow {
         row.map(|row| row.placed(connection)).transpose()
     }
 
-    /// The row at the head of the queue.
+    /// The row at the head of the queue. Left to itself, the database would take the index by
+    /// status and sort the whole queue.
     pub(super) fn head(connection: &Connection) -> rusqlite::Result<Option<Self>> {
         let row = connection
             .prepare_cached(&format!(
-                "SELECT {COLUMNS} FROM plans WHERE status = 'queued' ORDER BY seq LIMIT 1"
+                "SELECT {COLUMNS} FROM plans INDEXED BY plans_queue WHERE status = 'queued' \
+                 ORDER BY seq LIMIT 1"
             ))?
             .query_row([], Self::read)
             .optional()?;
@@ -149,7 +151,9 @@ impl PlanRow {
 /// Place in the queue of the queued plan with that `seq`, from 1.
 fn queue_position(connection: &Connection, seq: i64) -> rusqlite::Result<u64> {
     let ahead: i64 = connection
-        .prepare_cached("SELECT count(*) FROM plans WHERE status = 'queued' AND seq < ?1")?
+        .prepare_cached(
+            "SELECT count(*) FROM plans INDEXED BY plans_queue WHERE status = 'queued' AND seq < ?1",
+        )?
         .query_row([seq], |row| row.get(0))?;
     Ok(ahead.cast_unsigned() + 1)
 }

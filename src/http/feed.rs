@@ -83,7 +83,7 @@ impl Feed {
                 Ok(page) => page,
                 Err(StoreError::Gone(_) | StoreError::NotFound(_)) => break,
                 Err(error) => {
-                    tracing::warn!(plan_id = %self.id, %error, "a stream of events broke off");
+                    tracing::warn!(plan = %self.id, %error, "a stream of events broke off");
                     break;
                 }
             };

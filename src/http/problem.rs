@@ -244,33 +244,48 @@ impl Problem {
     }
 
     /// The problem document; `instance` is the request's id.
-    pub(super) fn document(&self, instance: &str) -> Value {
+    pub(super) fn document(&self, instance: &str) -> String {
         let (status, slug, title) = self.kind();
-        let mut document = json!({
-            "type": format!("/problems/{slug}"),
-            "title": title,
-            "status": status.as_u16(),
-            "detail": self.detail(),
-            "instance": instance,
-        });
+        let document = Document {
+            r#type: format!("/problems/{slug}"),
+            title,
+            status: status.as_u16(),
+            detail: self.detail(),
+            instance,
+            more: self.more(),
+        };
+        serde_json::to_string(&document).expect("every map key is a string")
+    }
+
+    /// The members that only this kind of problem has.
+    fn more(&self) -> Value {
         match self {
-            Self::InvalidScenario(faults) => document["errors"] = faults.iter().map(error).collect(),
+            Self::InvalidScenario(faults) => json!({"errors": faults.iter().map(error).collect::<Vec<_>>()}),
             Self::InvalidJson {
                 line,
                 column,
                 pointer,
                 ..
             } => {
-                document["line"] = json!(line);
-                document["column"] = json!(column);
-                document["pointer"] = json!(pointer);
+                json!({"line": line, "column": column, "pointer": pointer})
             }
-            Self::InvalidParameter { name, .. } => document["parameter"] = json!(name),
-            Self::NotAcceptable { available, .. } => document["available"] = json!(available),
-            _ => {}
+            Self::InvalidParameter { name, .. } => json!({"parameter": name}),
+            Self::NotAcceptable { available, .. } => json!({"available": available}),
+            _ => json!({}),
         }
-        document
     }
+}
+
+/// A problem document, in the order in which people read it.
+#[derive(Serialize)]
+struct Document<'a> {
+    r#type: String,
+    title: &'static str,
+    status: u16,
+    detail: String,
+    instance: &'a str,
+    #[serde(flatten)]
+    more: Value,
 }
 
 fn error(fault: &Fault) -> Value {

@@ -18,6 +18,10 @@ use crate::store::{Store, StoreError};
 /// Events read at once.
 const PAGE: usize = 128;
 
+/// Pages read at most when the service stops: enough for what the last runs told in their last
+/// moments, their end among it, and no more, so that nobody holds up the exit.
+const LAST_PAGES: usize = 16;
+
 /// A comment is due when nothing has been said for so long.
 const SILENCE: Duration = Duration::from_secs(15);
 
@@ -43,6 +47,8 @@ pub(super) struct Feed {
     phase: watch::Receiver<Phase>,
     /// Since when the throttle holds something back.
     held_since: Option<Instant>,
+    /// Pages that may still be read once the service stops.
+    last_pages: usize,
     over: bool,
 }
 
@@ -63,6 +69,7 @@ impl Feed {
             throttle: Throttle::new(rate_hz),
             phase,
             held_since: None,
+            last_pages: LAST_PAGES,
             over: false,
         }
     }
@@ -87,12 +94,15 @@ impl Feed {
                     break;
                 }
             };
-            let (quiet, more) = (page.is_empty(), page.len() == PAGE);
+            let quiet = page.is_empty();
             self.take(page, &mut out);
-            if stopping && (quiet || more) && !self.over {
-                // A reader who is far behind reads the rest from the next process.
-                self.over = true;
-                return Some(Told::Stopping(out));
+            if stopping && !self.over {
+                if quiet || self.last_pages == 0 {
+                    // A reader who is further behind reads the rest from the next process.
+                    self.over = true;
+                    return Some(Told::Stopping(out));
+                }
+                self.last_pages -= 1;
             }
             if !out.is_empty() {
                 return Some(Told::Events(out));

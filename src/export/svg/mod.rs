@@ -123,7 +123,15 @@ impl Drawing {
         self.path.as_deref().unwrap_or(&self.waypoints)
     }
 
-    /// Indices of the legs (and with `waypoint`, of the waypoints) that break a constraint.
+    fn route_color(&self) -> &'static str {
+        if self.result.feasible {
+            palette::ROUTE
+        } else {
+            palette::BROKEN
+        }
+    }
+
+    /// Indices of what breaks a constraint: of each `leg` or of each `waypoint`.
     fn broken(&self, place: &str) -> Vec<usize> {
         let places = self.result.checks.violations.iter();
         let mut indices: Vec<usize> = places

@@ -12,19 +12,17 @@ pub(super) const ROUTE: &str = "#0a4da3";
 pub(super) const BROKEN: &str = "#d0021b";
 /// Threats, solid and soft.
 pub(super) const THREAT: &str = "#6a2c70";
-/// The allowed band of heights.
-pub(super) const BAND: &str = "#8fb8d8";
 /// The ground in the profile, and contour lines.
 pub(super) const SOIL: &str = "#8d7757";
 
 /// From the lowest to the highest ground.
 const TINTS: [[f64; 3]; 6] = [
-    [222.0, 232.0, 212.0],
-    [233.0, 237.0, 214.0],
-    [243.0, 236.0, 208.0],
-    [234.0, 217.0, 184.0],
-    [219.0, 195.0, 162.0],
-    [203.0, 175.0, 148.0],
+    [228.0, 236.0, 219.0],
+    [237.0, 240.0, 221.0],
+    [245.0, 239.0, 214.0],
+    [237.0, 222.0, 191.0],
+    [222.0, 199.0, 167.0],
+    [205.0, 178.0, 151.0],
 ];
 
 /// Tint of the ground at `share` (0 to 1) of the way from the lowest to the highest.
@@ -61,11 +59,11 @@ mod tests {
     #[test]
     fn tints_run_from_end_to_end() {
         for (share, expected) in [
-            (-1.0, "#dee8d4"),
-            (0.0, "#dee8d4"),
-            (0.1, "#e4ebd5"),
-            (1.0, "#cbaf94"),
-            (2.0, "#cbaf94"),
+            (-1.0, "#e4ecdb"),
+            (0.0, "#e4ecdb"),
+            (0.1, "#e9eedc"),
+            (1.0, "#cdb297"),
+            (2.0, "#cdb297"),
         ] {
             assert_eq!(tint(share), expected, "{share}");
         }

@@ -3,7 +3,7 @@
 use super::Drawing;
 use super::canvas::{Area, Canvas, Font, Spot, polyline, ring};
 use super::labels::Labels;
-use super::palette::{BROKEN, INK, MUTED, ROUTE, RULE, THREAT};
+use super::palette::{BROKEN, INK, MUTED, RULE, THREAT};
 use super::relief::Relief;
 use super::scale::{MapScale, Steps};
 use crate::geometry::{Point2, Point3};
@@ -33,6 +33,8 @@ pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, relief: &Relief, map:
     {
         labels.reserve_line(&spots(line, map));
     }
+    let [nw, ne, se, sw] = area_corners(drawing, map);
+    labels.reserve_line(&[nw, ne, se, sw, nw]);
     end_names(canvas, drawing, map, &mut labels);
     threat_names(canvas, &drawing.scenario.threats, map, &mut labels);
     waypoint_numbers(canvas, drawing, map, &mut labels);
@@ -52,15 +54,19 @@ fn outside(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale) {
         (frame.right(), frame.bottom()),
         (frame.left, frame.bottom()),
     ];
-    let area = &drawing.scenario.area;
-    let (west, north) = map.spot(Point2::new(area.min.x, area.max.y));
-    let (east, south) = map.spot(Point2::new(area.max.x, area.min.y));
-    let inner = ring(&[(west, north), (east, north), (east, south), (west, south)]);
+    let inner = ring(&area_corners(drawing, map));
     canvas.path(
         &format!("{}{inner}", ring(&sheet)),
         "fill=\"#fff\" fill-opacity=\"0.6\" fill-rule=\"evenodd\"",
     );
     canvas.path(&inner, AREA_EDGE);
+}
+
+fn area_corners(drawing: &Drawing, map: &MapScale) -> [Spot; 4] {
+    let area = &drawing.scenario.area;
+    let (west, north) = map.spot(Point2::new(area.min.x, area.max.y));
+    let (east, south) = map.spot(Point2::new(area.max.x, area.min.y));
+    [(west, north), (east, north), (east, south), (west, south)]
 }
 
 /// Style of the area's edge.
@@ -96,8 +102,8 @@ fn threats(canvas: &mut Canvas, threats: &[Threat], map: &MapScale) {
 }
 
 /// Styles of the parts of threats.
-pub(super) const SOFT: &str = "fill=\"#6a2c70\" fill-opacity=\"0.17\" stroke=\"#6a2c70\" \
-                               stroke-opacity=\"0.17\" stroke-linejoin=\"round\"";
+pub(super) const SOFT: &str =
+    "fill=\"#6a2c70\" stroke=\"#6a2c70\" stroke-linejoin=\"round\" opacity=\"0.18\"";
 pub(super) const SOLID: &str =
     "fill=\"#6a2c70\" fill-opacity=\"0.62\" stroke=\"#6a2c70\" stroke-width=\"1.2\"";
 pub(super) const LIMITED: &str = "fill=\"#6a2c70\" fill-opacity=\"0.36\" stroke=\"#6a2c70\" \
@@ -121,7 +127,7 @@ fn soft_zone(canvas: &mut Canvas, threat: &Threat, map: &MapScale) {
                 // A stroke of twice the margin with round joins reaches as far as the margin.
                 let width = super::canvas::num(2.0 * polygon.margin() * scale);
                 let data = outline(polygon.vertices(), map);
-                canvas.path(&data, &format!("fill=\"none\" stroke-width=\"{width}\""));
+                canvas.path(&data, &format!("stroke-width=\"{width}\""));
             }
         }
     }
@@ -153,15 +159,19 @@ fn route(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale) {
     if let Some(path) = &drawing.path {
         let data = polyline(&thinned(&spots(path, map)));
         canvas.path(&data, &format!("{CASING} stroke-width=\"6\""));
-        canvas.path(&data, &format!("{LINE} stroke=\"{ROUTE}\" stroke-width=\"3\""));
+        canvas.path(
+            &data,
+            &format!("{LINE} stroke=\"{}\" stroke-width=\"3\"", drawing.route_color()),
+        );
         let straight = polyline(&waypoints);
         canvas.path(&straight, STRAIGHT);
     } else {
         let straight = polyline(&waypoints);
+        let color = drawing.route_color();
         canvas.path(&straight, &format!("{CASING} stroke-width=\"5\""));
         canvas.path(
             &straight,
-            &format!("{LINE} stroke=\"{BROKEN}\" stroke-width=\"2\""),
+            &format!("{LINE} stroke=\"{color}\" stroke-width=\"2\""),
         );
         for leg in drawing.broken("leg") {
             if let Some(ends) = waypoints.get(leg..leg + 2) {
@@ -257,7 +267,7 @@ fn axes(canvas: &mut Canvas, map: &MapScale) {
     let foot = frame.bottom() + 36.0;
     canvas.text((frame.left + frame.width / 2.0, foot), &title, "east, m");
 
-    let bar = Steps::of(view.max.x - view.min.x, 5.0);
+    let bar = Steps::of(view.max.x - view.min.x, 10.0);
     let length = bar.step * map.pixels_per_metre();
     let (left, right) = (frame.right() - length, frame.right());
     let data = [
@@ -291,7 +301,7 @@ fn end_names(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale, labels: &mu
         labels.reserve(Area::about(map.spot(point.xy()), (16.0, 16.0)));
     }
     for (point, words) in ends {
-        let around = around(map.spot(point.xy()), font.measure(words), 11.0);
+        let around = around(map.spot(point.xy()), font.measure(words), 13.0);
         put(canvas, labels, &font, words, around);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Drawing;
 use super::canvas::{Area, Canvas, Font, Spot, num, polyline, ring};
-use super::palette::{BAND, BROKEN, INK, MUTED, ROUTE, SOIL, THREAT};
+use super::palette::{INK, MUTED, SOIL};
 use super::plan_view::{BROKEN_LEG, grid_line, start, target, thinned, waypoint};
 use super::scale::Steps;
 use crate::geometry::{Point2, Point3};
@@ -57,16 +57,13 @@ pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, frame: Area) {
     axes(canvas, &scale, drawing);
     canvas.group("clipPath", "id=\"profile\"", |canvas| canvas.rect(&frame, ""));
     canvas.group("g", "clip-path=\"url(#profile)\"", |canvas| {
-        ground(canvas, drawing, &stations, &scale);
-        canvas.group(
-            "g",
-            &format!("fill=\"{THREAT}\" fill-opacity=\"0.17\""),
-            |canvas| {
-                for threat in &drawing.scenario.threats {
-                    crossings(canvas, threat, &stations, &scale);
-                }
-            },
-        );
+        band(canvas, drawing, &stations, &scale);
+        canvas.group("g", CROSSED, |canvas| {
+            for threat in &drawing.scenario.threats {
+                crossings(canvas, threat, &stations, &scale);
+            }
+        });
+        ground(canvas, &stations, &scale);
     });
     let spots: Vec<Spot> = course
         .iter()
@@ -170,30 +167,39 @@ fn axes(canvas: &mut Canvas, scale: &Scale, drawing: &Drawing) {
     canvas.text(foot, &title, &words);
 }
 
-fn ground(canvas: &mut Canvas, drawing: &Drawing, stations: &[Station], scale: &Scale) {
+/// Style of a soft zone on the way.
+const CROSSED: &str = "fill=\"#6a2c70\" fill-opacity=\"0.18\"";
+/// Style of the allowed heights.
+pub(super) const ALLOWED: &str = "fill=\"#8fb8d8\" fill-opacity=\"0.28\"";
+/// Style of their edges.
+pub(super) const ALLOWED_EDGE: &str = "fill=\"none\" stroke=\"#8fb8d8\" stroke-dasharray=\"5 3\"";
+
+fn band(canvas: &mut Canvas, drawing: &Drawing, stations: &[Station], scale: &Scale) {
     let band = drawing.scenario.altitude;
-    let line = |above: f64| -> Vec<Spot> {
-        stations
-            .iter()
-            .map(|station| scale.spot(station.way, station.ground + above))
-            .collect()
-    };
-    let (floor, ceiling) = (line(band.min), line(band.max));
+    let [floor, ceiling] = [band.min, band.max].map(|above| over_ground(stations, above, scale));
     let allowed: Vec<Spot> = floor.iter().chain(ceiling.iter().rev()).copied().collect();
-    canvas.path(&ring(&allowed), &format!("fill=\"{BAND}\" fill-opacity=\"0.28\""));
+    canvas.path(&ring(&allowed), ALLOWED);
     for edge in [&floor, &ceiling] {
-        canvas.path(
-            &polyline(&thinned(edge)),
-            &format!("fill=\"none\" stroke=\"{BAND}\" stroke-dasharray=\"5 3\""),
-        );
+        canvas.path(&polyline(edge), ALLOWED_EDGE);
     }
-    let mut soil = line(0.0);
+}
+
+fn ground(canvas: &mut Canvas, stations: &[Station], scale: &Scale) {
+    let mut soil = over_ground(stations, 0.0, scale);
     soil.push((scale.frame.right(), scale.frame.bottom()));
     soil.push((scale.frame.left, scale.frame.bottom()));
     canvas.path(
         &ring(&soil),
         &format!("fill=\"#dccdb2\" stroke=\"{SOIL}\" stroke-width=\"1.2\""),
     );
+}
+
+/// The line that runs `above` metres over the ground.
+fn over_ground(stations: &[Station], above: f64, scale: &Scale) -> Vec<Spot> {
+    let stations = stations.iter();
+    stations
+        .map(|station| scale.spot(station.way, station.ground + above))
+        .collect()
 }
 
 /// Where the route passes through the soft zone, seen from above, from the threat's base to its top.
@@ -230,7 +236,7 @@ fn crossings(canvas: &mut Canvas, threat: &Threat, stations: &[Station], scale: 
 }
 
 fn flown(canvas: &mut Canvas, drawing: &Drawing, course: &[Spot], stations: &[Station], scale: &Scale) {
-    let color = if drawing.path.is_some() { ROUTE } else { BROKEN };
+    let color = drawing.route_color();
     let line = "fill=\"none\" stroke-linejoin=\"round\" stroke-linecap=\"round\"";
     canvas.path(
         &polyline(&thinned(course)),

@@ -14,7 +14,7 @@ const LATTICES: [usize; 5] = [141, 101, 71, 51, 31];
 /// Of all rings together.
 const MOST_POINTS: usize = 16_000;
 /// Contour lines at most.
-const MOST_LEVELS: f64 = 10.0;
+const MOST_LEVELS: f64 = 14.0;
 /// Ground that varies less than this is drawn level, metres.
 const LEVEL_M: f64 = 1e-3;
 
@@ -94,13 +94,12 @@ impl Relief {
             });
         }
         let (lit, dark) = shading(&field, metres);
-        let shades = [
-            (&dark, 0.10, "fill=\"#000\" fill-opacity=\"0.05\""),
-            (&dark, 0.22, "fill=\"#000\" fill-opacity=\"0.06\""),
-            (&dark, 0.34, "fill=\"#000\" fill-opacity=\"0.07\""),
-            (&lit, 0.08, "fill=\"#fff\" fill-opacity=\"0.18\""),
-            (&lit, 0.17, "fill=\"#fff\" fill-opacity=\"0.22\""),
-        ];
+        let dark_style = "fill=\"#000\" fill-opacity=\"0.04\"";
+        let lit_style = "fill=\"#fff\" fill-opacity=\"0.13\"";
+        let shades = [0.06, 0.12, 0.18, 0.25, 0.33]
+            .map(|level| (&dark, level, dark_style))
+            .into_iter()
+            .chain([0.06, 0.12, 0.18].map(|level| (&lit, level, lit_style)));
         for (field, level, style) in shades {
             relief.shades.push(Layer {
                 level,
@@ -128,17 +127,23 @@ impl Relief {
     }
 
     pub(super) fn draw(&self, canvas: &mut Canvas, frame: &Area) {
-        let lowest = tint(if self.contours.is_empty() { 0.3 } else { 0.0 });
+        let lowest = tint(0.0);
         canvas.rect(frame, &format!("fill=\"{lowest}\""));
         let lines = format!("stroke=\"{SOIL}\" stroke-opacity=\"0.55\" stroke-width=\"0.7\"");
         canvas.group("g", &lines, |canvas| draw(canvas, &self.contours));
         canvas.group("g", "", |canvas| draw(canvas, &self.shades));
     }
 
-    /// A height on each contour line that has room for it.
+    /// A height on each contour line, or on every other one of many, where there is room for it.
     pub(super) fn label(&self, canvas: &mut Canvas, labels: &mut Labels) {
         let font = Font::new(9.0, "#6b583c").anchor("middle").halo();
-        for contour in &self.contours {
+        let many = self.contours.len() > 8;
+        let step = self.interval.step * if many { 2.0 } else { 1.0 };
+        let labelled = |contour: &&Layer| {
+            let count = contour.level / step;
+            (count - count.round()).abs() < 1e-6
+        };
+        for contour in self.contours.iter().filter(labelled) {
             let words = self.interval.label(contour.level);
             let size = font.measure(&words);
             let longest = contour.rings.iter().max_by_key(|ring| ring.len());
@@ -185,7 +190,7 @@ fn extent(ring: &[Spot]) -> f64 {
 /// half way up. Slopes are raised or flattened to a common steepness, so that hills and ranges of
 /// mountains look alike.
 fn shading(field: &Field, metres: f64) -> (Field, Field) {
-    const STEEPNESS: f64 = 0.55;
+    const STEEPNESS: f64 = 0.5;
     const LIGHT: [f64; 3] = [-0.5, 0.5, std::f64::consts::FRAC_1_SQRT_2];
     let (columns, rows) = field.size();
     let slope = |column: usize, row: usize| {

@@ -5,6 +5,7 @@ use super::palette::{BROKEN, INK, MUTED, ROUTE, RULE, SOIL, tint};
 use super::plan_view::{
     AREA_EDGE, BROKEN_LEG, LIMITED, SOFT, SOLID, STRAIGHT, is_limited, start, target, waypoint,
 };
+use super::profile::{ALLOWED, ALLOWED_EDGE};
 use super::relief::Relief;
 use super::{Drawing, RIGHT, WIDTH, figure, metres};
 
@@ -36,11 +37,11 @@ type Mark = fn(&mut Canvas, Spot);
 /// What occurs in the drawing.
 fn legend(drawing: &Drawing) -> Vec<(&'static str, Mark)> {
     let threats = &drawing.scenario.threats;
-    let feasible = drawing.path.is_some();
-    let rows: [(bool, &'static str, Mark); 10] = [
+    let feasible = drawing.result.feasible;
+    let rows: [(bool, &'static str, Mark); 11] = [
         (true, "start", start),
         (true, "target", target),
-        (feasible, "path flown", |canvas, at| {
+        (drawing.path.is_some(), "path flown", |canvas, at| {
             across(canvas, at, &format!("stroke=\"{ROUTE}\" stroke-width=\"3\""));
         }),
         (feasible, "waypoints and legs", |canvas, at| {
@@ -71,6 +72,12 @@ fn legend(drawing: &Drawing) -> Vec<(&'static str, Mark)> {
         ),
         (!threats.is_empty(), "soft zone", |canvas, at| {
             canvas.circle(at, 7.0, SOFT);
+        }),
+        (true, "allowed heights", |canvas, at| {
+            canvas.rect(&Area::about(at, (26.0, 10.0)), ALLOWED);
+            for edge in [-5.0, 5.0] {
+                across(canvas, (at.0, at.1 + edge), ALLOWED_EDGE);
+            }
         }),
         (true, "edge of the area", |canvas, at| {
             across(canvas, at, AREA_EDGE)
@@ -142,7 +149,8 @@ fn heights(canvas: &mut Canvas, relief: &Relief, column: &Area, y: f64) -> f64 {
 
 fn figures(canvas: &mut Canvas, drawing: &Drawing, column: &Area, top: f64) {
     let result = &drawing.result;
-    let measures = result.checks.path.as_ref().unwrap_or(&result.checks.waypoints);
+    let legs = &result.checks.waypoints;
+    let measures = result.checks.path.as_ref().unwrap_or(legs);
     let gap = result.bound.gap.map(|gap| format!("{:.1} %", 100.0 * gap));
     let heights = measures
         .min_agl
@@ -160,10 +168,7 @@ fn figures(canvas: &mut Canvas, drawing: &Drawing, column: &Area, top: f64) {
         ("lower bound", Some(figure(result.bound.lower))),
         ("gap at most", gap),
         ("above ground", heights),
-        (
-            "sharpest turn",
-            Some(format!("{:.1}\u{b0}", measures.max_turn_deg)),
-        ),
+        ("sharpest turn", Some(format!("{:.1}\u{b0}", legs.max_turn_deg))),
         (
             "steepest climb",
             Some(format!("{:.1}\u{b0}", measures.max_climb_deg)),

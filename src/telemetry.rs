@@ -21,14 +21,18 @@ pub fn init(format: LogFormat) {
         LogFormat::Text => lines
             .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
             .init(),
-        LogFormat::Json => lines.json().flatten_event(true).init(),
+        LogFormat::Json => lines.json().flatten_event(true).with_span_list(false).init(),
     }
     std::panic::set_hook(Box::new(log_panic));
 }
 
 /// The one line of a panic; the spans round it name the request or the plan.
 fn log_panic(panic: &PanicHookInfo) {
-    let message = panic.payload_as_str().unwrap_or("no message");
+    let payload = panic.payload();
+    let text = payload.downcast_ref::<String>().map(String::as_str);
+    let message = text
+        .or_else(|| payload.downcast_ref().copied())
+        .unwrap_or("no message");
     let place = panic.location().map(ToString::to_string);
     let thread = std::thread::current().name().map(ToOwned::to_owned);
     tracing::error!(message, place, thread, "panicked");

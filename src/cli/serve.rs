@@ -24,6 +24,9 @@ use crate::{planner, telemetry};
 /// A request's body must be complete after this.
 const BODY_TIMEOUT: Duration = Duration::from_secs(30);
 
+/// Connections may finish their answers for so long at the end, if the grace period lasts so long.
+const LAST_ANSWERS: Duration = Duration::from_secs(5);
+
 /// Serve until a signal.
 pub(super) fn run(config: &Serve) -> anyhow::Result<()> {
     telemetry::init(config.log_format);
@@ -63,7 +66,7 @@ async fn serve(config: &Serve) -> anyhow::Result<()> {
     });
     announce(&listener)?;
     let times = Times::within(Duration::from_secs(config.grace));
-    let server = tokio::spawn(http::server::serve(listener, router, watched, times.connections));
+    let server = tokio::spawn(http::server::serve(listener, router, watched, LAST_ANSWERS));
 
     let name = signals.next().await;
     let signalled = Instant::now();
@@ -76,7 +79,9 @@ async fn serve(config: &Serve) -> anyhow::Result<()> {
     phase.send_replace(Phase::Draining);
     drain(pool, &times).await;
     phase.send_replace(Phase::Stopping);
-    server.await.context("the server broke")?;
+    if let Ok(ended) = tokio::time::timeout_at(signalled + times.answers, server).await {
+        ended.context("the server broke")?;
+    }
     store.close().await;
     tracing::info!(duration_ms = signalled.elapsed().as_secs_f64() * 1e3, "shut down");
     Ok(())
@@ -134,18 +139,18 @@ struct Times {
     runs: Duration,
     /// Then they are stopped and given back.
     giving_back: Duration,
-    /// Connections may finish their answers for so long, after the streams were told to end.
-    connections: Duration,
+    /// Connections may finish their answers until then; what remains is for the store.
+    answers: Duration,
 }
 
 impl Times {
-    /// The last fifth, at most two seconds, is for giving back, for connections, and for the store.
+    /// The last quarter, at most two seconds, is for giving back, for connections, and for the store.
     fn within(grace: Duration) -> Self {
-        let reserve = (grace / 5).min(Duration::from_secs(2));
+        let reserve = (grace / 4).min(Duration::from_secs(2));
         Self {
-            runs: grace - reserve,
-            giving_back: reserve / 2,
-            connections: reserve / 4,
+            runs: grace.saturating_sub(reserve),
+            giving_back: reserve / 4,
+            answers: grace.saturating_sub(reserve / 4),
         }
     }
 }

@@ -79,7 +79,7 @@ fn streamed(feed: Feed, store: Arc<dyn Store>, wire: Wire) -> Response {
         let text = match feed.next().await? {
             Told::Events(events) => write_events(&feed, &*store, events, wire).await,
             Told::Silence => wire.silence().to_owned(),
-            Told::Stopping => wire.stopping().to_owned(),
+            Told::Stopping(events) => write_events(&feed, &*store, events, wire).await + wire.stopping(),
         };
         Some((Ok::<_, Infallible>(Bytes::from(text)), (feed, store)))
     });

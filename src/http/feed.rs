@@ -18,6 +18,10 @@ use crate::store::{Store, StoreError};
 /// Events read at once.
 const PAGE: usize = 128;
 
+/// Pages read at most when the service stops: enough for what the last runs told in their last
+/// moments, their end among it, and no more, so that nobody holds up the exit.
+const LAST_PAGES: usize = 16;
+
 /// A comment is due when nothing has been said for so long.
 const SILENCE: Duration = Duration::from_secs(15);
 
@@ -28,8 +32,8 @@ pub(super) enum Told {
     Events(Vec<NumberedEvent>),
     /// Nothing has happened for a while.
     Silence,
-    /// The service ends; the reader may resume elsewhere.
-    Stopping,
+    /// The service ends, after these events; the reader may resume with the next process.
+    Stopping(Vec<NumberedEvent>),
 }
 
 /// One reader's place in a plan's events.
@@ -43,6 +47,8 @@ pub(super) struct Feed {
     phase: watch::Receiver<Phase>,
     /// Since when the throttle holds something back.
     held_since: Option<Instant>,
+    /// Pages that may still be read once the service stops.
+    last_pages: usize,
     over: bool,
 }
 
@@ -63,6 +69,7 @@ impl Feed {
             throttle: Throttle::new(rate_hz),
             phase,
             held_since: None,
+            last_pages: LAST_PAGES,
             over: false,
         }
     }
@@ -76,17 +83,27 @@ impl Feed {
     pub(super) async fn next(&mut self) -> Option<Told> {
         let mut out = Vec::new();
         while !self.over {
+            // Looked at before the store: what was told until then will still be read.
+            let stopping = *self.phase.borrow() == Phase::Stopping;
             self.changes.mark_unchanged();
             let page = match self.store.events(self.id, self.after, PAGE).await {
                 Ok(page) => page,
                 Err(StoreError::Gone(_) | StoreError::NotFound(_)) => break,
                 Err(error) => {
-                    tracing::warn!(plan_id = %self.id, %error, "a stream of events broke off");
+                    tracing::warn!(plan = %self.id, %error, "a stream of events broke off");
                     break;
                 }
             };
             let quiet = page.is_empty();
             self.take(page, &mut out);
+            if stopping && !self.over {
+                if quiet || self.last_pages == 0 {
+                    // A reader who is further behind reads the rest from the next process.
+                    self.over = true;
+                    return Some(Told::Stopping(out));
+                }
+                self.last_pages -= 1;
+            }
             if !out.is_empty() {
                 return Some(Told::Events(out));
             }
@@ -94,17 +111,13 @@ impl Feed {
                 continue;
             }
             match self.wait().await {
-                Woken::Changed => {}
+                Woken::Changed | Woken::Stopping => {}
                 Woken::WindowClosed => {
                     self.throttle.flush(&mut out);
                     self.held_since = None;
                     return Some(Told::Events(out));
                 }
                 Woken::Silence => return Some(Told::Silence),
-                Woken::Stopping => {
-                    self.over = true;
-                    return Some(Told::Stopping);
-                }
                 Woken::Closed => break,
             }
         }

@@ -26,6 +26,7 @@ use std::time::Duration;
 
 use axum::Router;
 use axum::handler::Handler;
+use axum::http::Uri;
 use axum::routing::{self, MethodRouter};
 use tokio::sync::watch;
 use tower_http::catch_panic::CatchPanicLayer;
@@ -92,14 +93,20 @@ pub fn routes() -> Vec<Route> {
 
 /// The service: every route, every refusal a problem, every answer with its request's id.
 pub fn router(state: AppState) -> Router {
-    routes()
+    let router = routes()
         .into_iter()
         .fold(Router::new(), |router, route| {
             router.route(route.path, route.handler)
         })
         .method_not_allowed_fallback(async || Problem::MethodNotAllowed)
-        .fallback(async |uri: axum::http::Uri| Problem::NoSuchResource(uri.path().to_owned()))
-        .with_state(state)
+        .fallback(async |uri: Uri| Problem::NoSuchResource(uri.path().to_owned()))
+        .with_state(state);
+    wrap(router)
+}
+
+/// What goes round every handler.
+fn wrap(router: Router) -> Router {
+    router
         .layer(CatchPanicLayer::custom(problem::after_panic))
         .layer(axum::middleware::from_fn(request_id::assign))
 }
@@ -121,5 +128,37 @@ fn row(method: &'static str, path: &'static str, handler: MethodRouter<AppState>
         method,
         path,
         handler,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use axum::body::{Body, to_bytes};
+    use axum::extract::Request;
+    use tower::ServiceExt as _;
+
+    use super::*;
+
+    async fn breaks() -> &'static str {
+        panic!("on purpose")
+    }
+
+    #[tokio::test]
+    async fn a_panic_is_a_problem_that_does_not_tell_why() {
+        let broken = Router::new().route("/", routing::get(breaks));
+        let request = Request::get("/")
+            .header("x-request-id", "caller-1")
+            .body(Body::empty());
+        let answer = wrap(broken)
+            .oneshot(request.expect("a request"))
+            .await
+            .expect("an answer");
+        assert_eq!(answer.status(), 500);
+        assert_eq!(answer.headers()["x-request-id"], "caller-1");
+        let body = to_bytes(answer.into_body(), 1000).await.expect("a whole body");
+        let problem: serde_json::Value = serde_json::from_slice(&body).expect("JSON");
+        assert_eq!(problem["type"], "/problems/internal");
+        assert_eq!(problem["instance"], "caller-1");
+        assert!(!problem.to_string().contains("on purpose"), "{problem}");
     }
 }

@@ -105,7 +105,7 @@ mod tests {
             ("/?limit=x", Some("limit is \"x\", must be a number")),
             ("/?limit=", Some("limit is \"\", must be a number")),
             ("/?limt=3", Some("limt is unknown, must be one of limit, status")),
-            ("/?limit=3&limit=4", Some("limit given twice")),
+            ("/?limit=3&limit=4", Some("limit is given twice")),
         ] {
             assert_eq!(fault(query).as_deref(), expected, "{query}");
         }

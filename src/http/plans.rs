@@ -59,7 +59,7 @@ pub(super) async fn submit(
         }
         Err(error) => return Err(error.into()),
     };
-    tracing::info!(plan_id = %plan.id, "accepted");
+    tracing::info!(plan = %plan.id, "accepted");
 
     let address = HeaderValue::from_str(&location(plan.id)).expect("an id is visible ASCII");
     let Some(wait) = Wait::of(&headers) else {

@@ -99,150 +99,137 @@ pub(super) enum Problem {
     Internal,
 }
 
-/// What a problem says of itself, but for the request's id.
-struct Face {
-    status: StatusCode,
-    /// Last part of `type`; stable.
-    slug: &'static str,
-    title: &'static str,
-    detail: String,
-}
+/// What a kind of problem is called: status, the last part of `type`, title.
+type Kind = (StatusCode, &'static str, &'static str);
 
 impl Problem {
-    /// The one table from error to status.
-    fn face(&self) -> Face {
-        let (status, slug, title, detail) = match self {
-            Self::NoSuchResource(path) => (
-                StatusCode::NOT_FOUND,
-                "not-found",
-                "No such resource",
-                format!("nothing is at {path}; GET /openapi.yaml lists what is"),
-            ),
-            Self::NoSuchPlan(id) => (
-                StatusCode::NOT_FOUND,
-                "not-found",
-                "No such resource",
-                format!("there is no plan {id}"),
-            ),
-            Self::Gone(id) => (
-                StatusCode::GONE,
-                "gone",
-                "The plan was deleted",
-                format!("plan {id} was deleted"),
-            ),
+    /// The one table from error to status. Slugs are stable; `docs/PROBLEMS.md` has a section for each.
+    fn kind(&self) -> Kind {
+        match self {
+            Self::InvalidJson { .. } => (StatusCode::BAD_REQUEST, "invalid-json", "The body is not JSON"),
+            Self::BodyIncomplete => (StatusCode::BAD_REQUEST, "incomplete-body", "The body broke off"),
+            Self::InvalidParameter { .. } => {
+                (StatusCode::BAD_REQUEST, "invalid-parameter", "Invalid parameter")
+            }
+            Self::NoSuchResource(_) | Self::NoSuchPlan(_) => {
+                (StatusCode::NOT_FOUND, "not-found", "No such resource")
+            }
             Self::MethodNotAllowed => (
                 StatusCode::METHOD_NOT_ALLOWED,
                 "method-not-allowed",
                 "Method not allowed",
-                "the header Allow lists the methods of this resource".to_owned(),
             ),
-            Self::NotAcceptable { asked, available } => (
+            Self::NotAcceptable { .. } => (
                 StatusCode::NOT_ACCEPTABLE,
                 "not-acceptable",
                 "No acceptable format",
-                format!("asked for {asked}; available: {}", available.join(", ")),
             ),
-            Self::UnsupportedMediaType(found) => (
-                StatusCode::UNSUPPORTED_MEDIA_TYPE,
-                "unsupported-media-type",
-                "Unsupported media type",
-                unsupported_media_type(found.as_deref()),
-            ),
-            Self::BodyTooLarge(limit) => (
-                StatusCode::PAYLOAD_TOO_LARGE,
-                "body-too-large",
-                "The body is too large",
-                format!("the body is longer than {limit} bytes, the limit body_bytes of GET /limits"),
-            ),
-            Self::BodyTooSlow(limit) => (
+            Self::BodyTooSlow(_) => (
                 StatusCode::REQUEST_TIMEOUT,
                 "request-timeout",
                 "The body came too slowly",
-                format!("the body was not complete after {} s", limit.as_secs_f64()),
             ),
-            Self::BodyIncomplete => (
-                StatusCode::BAD_REQUEST,
-                "incomplete-body",
-                "The body broke off",
-                "the connection ended before the body did".to_owned(),
+            Self::NotReady { .. } => (StatusCode::CONFLICT, "not-ready", "The plan has not ended"),
+            Self::NoResult { .. } => (StatusCode::CONFLICT, "no-result", "The plan has no result"),
+            Self::Gone(_) => (StatusCode::GONE, "gone", "The plan was deleted"),
+            Self::BodyTooLarge(_) => (
+                StatusCode::PAYLOAD_TOO_LARGE,
+                "body-too-large",
+                "The body is too large",
             ),
+            Self::UnsupportedMediaType(_) => (
+                StatusCode::UNSUPPORTED_MEDIA_TYPE,
+                "unsupported-media-type",
+                "Unsupported media type",
+            ),
+            Self::InvalidScenario(_) => (
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "invalid-scenario",
+                "The scenario cannot be planned",
+            ),
+            Self::Internal => (StatusCode::INTERNAL_SERVER_ERROR, "internal", "Internal error"),
+            Self::Draining { .. } => (
+                StatusCode::SERVICE_UNAVAILABLE,
+                "draining",
+                "The service is shutting down",
+            ),
+            Self::QueueFull { .. } => (StatusCode::SERVICE_UNAVAILABLE, "queue-full", "The queue is full"),
+            Self::StoreUnavailable => (
+                StatusCode::SERVICE_UNAVAILABLE,
+                "store-unavailable",
+                "The store is unavailable",
+            ),
+        }
+    }
+
+    /// For people: what happened this time, and what would help.
+    fn detail(&self) -> String {
+        match self {
             Self::InvalidJson {
                 line,
                 column,
                 pointer,
                 detail,
-            } => (
-                StatusCode::BAD_REQUEST,
-                "invalid-json",
-                "The body is not JSON",
-                invalid_json(*line, *column, pointer, detail),
+            } if pointer.is_empty() => {
+                format!("line {line}, column {column}: {detail}")
+            }
+            Self::InvalidJson {
+                line,
+                column,
+                pointer,
+                detail,
+            } => {
+                format!("line {line}, column {column}, at {pointer}: {detail}")
+            }
+            Self::BodyIncomplete => "the connection ended before the body did".to_owned(),
+            Self::InvalidParameter { detail, .. } => detail.clone(),
+            Self::NoSuchResource(path) => {
+                format!("nothing is at {path}; GET /openapi.yaml lists what is")
+            }
+            Self::NoSuchPlan(id) => format!("there is no plan {id}"),
+            Self::MethodNotAllowed => "the header Allow lists the methods of this resource".to_owned(),
+            Self::NotAcceptable { asked, available } => {
+                format!("asked for {asked}; available: {}", available.join(", "))
+            }
+            Self::BodyTooSlow(limit) => {
+                format!("the body was not complete after {} s", limit.as_secs_f64())
+            }
+            Self::NotReady { id, status, .. } => format!(
+                "plan {id} is {}; GET /plans/{id} with Prefer: wait=30 waits for it",
+                status.name()
             ),
-            Self::InvalidParameter { detail, .. } => (
-                StatusCode::BAD_REQUEST,
-                "invalid-parameter",
-                "Invalid parameter",
-                detail.clone(),
-            ),
-            Self::InvalidScenario(faults) => (
-                StatusCode::UNPROCESSABLE_ENTITY,
-                "invalid-scenario",
-                "The scenario cannot be planned",
-                match faults.len() {
-                    1 => "1 fault; see errors".to_owned(),
-                    n => format!("{n} faults; see errors"),
-                },
-            ),
-            Self::NotReady { id, status, .. } => (
-                StatusCode::CONFLICT,
-                "not-ready",
-                "The plan has not ended",
-                format!(
-                    "plan {id} is {}; GET /plans/{id} with Prefer: wait=30 waits for it",
-                    status.name()
-                ),
-            ),
-            Self::NoResult { id, status, failure } => (
-                StatusCode::CONFLICT,
-                "no-result",
-                "The plan has no result",
-                match failure {
-                    Some(failure) => format!("plan {id} failed: {}", failure.detail),
-                    None => format!("plan {id} was {} before it had a route", status.name()),
-                },
-            ),
+            Self::NoResult {
+                id,
+                failure: Some(failure),
+                ..
+            } => format!("plan {id} failed: {}", failure.detail),
+            Self::NoResult {
+                id,
+                status,
+                failure: None,
+            } => {
+                format!("plan {id} was {} before it had a route", status.name())
+            }
+            Self::Gone(id) => format!("plan {id} was deleted"),
+            Self::BodyTooLarge(limit) => {
+                format!("the body is longer than {limit} bytes, the limit body_bytes of GET /limits")
+            }
+            Self::UnsupportedMediaType(found) => unsupported_media_type(found.as_deref()),
+            Self::InvalidScenario(faults) if faults.len() == 1 => "1 fault; see errors".to_owned(),
+            Self::InvalidScenario(faults) => format!("{} faults; see errors", faults.len()),
+            Self::Internal => "a defect of the service; its log has more under this request's id".to_owned(),
+            Self::Draining { retry_after_s } => {
+                format!("no new plans are taken; try again in {retry_after_s} s")
+            }
             Self::QueueFull {
                 queued,
                 retry_after_s,
-            } => (
-                StatusCode::SERVICE_UNAVAILABLE,
-                "queue-full",
-                "The queue is full",
-                format!("{queued} plans wait, the limit; try again in {retry_after_s} s"),
-            ),
-            Self::Draining { retry_after_s } => (
-                StatusCode::SERVICE_UNAVAILABLE,
-                "draining",
-                "The service is shutting down",
-                format!("no new plans are taken; try again in {retry_after_s} s"),
-            ),
-            Self::StoreUnavailable => (
-                StatusCode::SERVICE_UNAVAILABLE,
-                "store-unavailable",
-                "The store is unavailable",
-                "plans can be neither read nor written now; the service's log says why".to_owned(),
-            ),
-            Self::Internal => (
-                StatusCode::INTERNAL_SERVER_ERROR,
-                "internal",
-                "Internal error",
-                "a defect of the service; its log has more under this request's id".to_owned(),
-            ),
-        };
-        Face {
-            status,
-            slug,
-            title,
-            detail,
+            } => {
+                format!("{queued} plans wait, the limit; try again in {retry_after_s} s")
+            }
+            Self::StoreUnavailable => {
+                "plans can be neither read nor written now; the service's log says why".to_owned()
+            }
         }
     }
 
@@ -257,44 +244,52 @@ impl Problem {
     }
 
     /// The problem document; `instance` is the request's id.
-    pub(super) fn document(&self, instance: &str) -> Value {
-        let face = self.face();
-        let mut document = json!({
-            "type": format!("/problems/{}", face.slug),
-            "title": face.title,
-            "status": face.status.as_u16(),
-            "detail": face.detail,
-            "instance": instance,
-        });
+    pub(super) fn document(&self, instance: &str) -> String {
+        let (status, slug, title) = self.kind();
+        let document = Document {
+            r#type: format!("/problems/{slug}"),
+            title,
+            status: status.as_u16(),
+            detail: self.detail(),
+            instance,
+            more: self.more(),
+        };
+        serde_json::to_string(&document).expect("every map key is a string")
+    }
+
+    /// The members that only this kind of problem has.
+    fn more(&self) -> Value {
         match self {
-            Self::InvalidScenario(faults) => document["errors"] = faults.iter().map(error).collect(),
+            Self::InvalidScenario(faults) => json!({"errors": faults.iter().map(error).collect::<Vec<_>>()}),
             Self::InvalidJson {
                 line,
                 column,
                 pointer,
                 ..
             } => {
-                document["line"] = json!(line);
-                document["column"] = json!(column);
-                document["pointer"] = json!(pointer);
+                json!({"line": line, "column": column, "pointer": pointer})
             }
-            Self::InvalidParameter { name, .. } => document["parameter"] = json!(name),
-            Self::NotAcceptable { available, .. } => document["available"] = json!(available),
-            _ => {}
+            Self::InvalidParameter { name, .. } => json!({"parameter": name}),
+            Self::NotAcceptable { available, .. } => json!({"available": available}),
+            _ => json!({}),
         }
-        document
     }
+}
+
+/// A problem document, in the order in which people read it.
+#[derive(Serialize)]
+struct Document<'a> {
+    r#type: String,
+    title: &'static str,
+    status: u16,
+    detail: String,
+    instance: &'a str,
+    #[serde(flatten)]
+    more: Value,
 }
 
 fn error(fault: &Fault) -> Value {
     json!({"pointer": fault.pointer, "code": fault.code, "detail": fault.detail})
-}
-
-fn invalid_json(line: usize, column: usize, pointer: &str, detail: &str) -> String {
-    match pointer {
-        "" => format!("line {line}, column {column}: {detail}"),
-        pointer => format!("line {line}, column {column}, at {pointer}: {detail}"),
-    }
 }
 
 fn unsupported_media_type(found: Option<&str>) -> String {
@@ -309,7 +304,8 @@ fn unsupported_media_type(found: Option<&str>) -> String {
 
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
-        let mut response = self.face().status.into_response();
+        let (status, ..) = self.kind();
+        let mut response = status.into_response();
         if let Some(seconds) = self.retry_after_s() {
             response
                 .headers_mut()
@@ -381,7 +377,6 @@ impl From<Failure> for FailureDocument {
 }
 
 /// Answers for a handler that panicked; the panic hook has written the log.
-#[expect(clippy::needless_pass_by_value, reason = "the layer hands the panic over")]
 pub(super) fn after_panic(_: Box<dyn Any + Send>) -> axum::http::Response<Body> {
     Problem::Internal.into_response()
 }

@@ -49,7 +49,7 @@ fn of_caller(headers: &HeaderMap) -> Option<String> {
 }
 
 fn write_problem(response: &mut Response, problem: &Problem, id: &str, method: &Method) {
-    let body = problem.document(id).to_string();
+    let body = problem.document(id);
     let headers = response.headers_mut();
     headers.insert(
         header::CONTENT_TYPE,

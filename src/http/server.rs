@@ -112,6 +112,6 @@ async fn answer(stream: TcpStream, router: Router, watcher: Watcher, place: Owne
 async fn never_began(begun: &AtomicBool) {
     tokio::time::sleep(HEAD_TIMEOUT).await;
     if begun.load(Ordering::Relaxed) {
-        std::future::pending().await
+        std::future::pending::<()>().await;
     }
 }

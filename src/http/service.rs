@@ -12,7 +12,7 @@ use super::problem::Problem;
 use super::{AppState, Phase, events, plans, prefer, retry};
 use crate::optimizer::{self, Algorithm, Parameter};
 
-/// The description of this service, OpenAPI 3.1.
+/// The description of this service.
 const OPENAPI_YAML: &str = include_str!("../../openapi.yaml");
 
 /// `GET /livez`: the process answers.
@@ -90,29 +90,57 @@ pub(super) async fn limits(State(state): State<AppState>, uri: Uri) -> Result<Re
     Ok(Json(document).into_response())
 }
 
-/// `GET /algorithms`.
-pub(super) async fn algorithms(uri: Uri) -> Result<Json<Value>, Problem> {
-    Params::read(&uri, &[])?;
-    let algorithms: Vec<Value> = optimizer::ALL.iter().map(algorithm).collect();
-    Ok(Json(json!({"algorithms": algorithms})))
+/// What may be named in `planner.algorithm`.
+#[derive(Serialize)]
+pub(super) struct AlgorithmsDocument {
+    algorithms: Vec<AlgorithmDocument>,
 }
 
-fn algorithm(algorithm: &Algorithm) -> Value {
-    let parameter = |parameter: &Parameter| {
-        json!({
-            "name": parameter.name,
-            "default": parameter.default,
-            "min": parameter.min,
-            "max": parameter.max,
-            "meaning": parameter.meaning,
-        })
-    };
-    json!({
-        "name": algorithm.name,
-        "title": algorithm.title,
-        "source": algorithm.source,
-        "parameters": algorithm.parameters.iter().map(parameter).collect::<Vec<_>>(),
-    })
+#[derive(Serialize)]
+struct AlgorithmDocument {
+    name: &'static str,
+    title: &'static str,
+    source: &'static str,
+    parameters: Vec<ParameterDocument>,
+}
+
+#[derive(Serialize)]
+struct ParameterDocument {
+    name: &'static str,
+    default: f64,
+    min: f64,
+    max: f64,
+    meaning: &'static str,
+}
+
+impl From<&Algorithm> for AlgorithmDocument {
+    fn from(algorithm: &Algorithm) -> Self {
+        Self {
+            name: algorithm.name,
+            title: algorithm.title,
+            source: algorithm.source,
+            parameters: algorithm.parameters.iter().map(Into::into).collect(),
+        }
+    }
+}
+
+impl From<&Parameter> for ParameterDocument {
+    fn from(parameter: &Parameter) -> Self {
+        Self {
+            name: parameter.name,
+            default: parameter.default,
+            min: parameter.min,
+            max: parameter.max,
+            meaning: parameter.meaning,
+        }
+    }
+}
+
+/// `GET /algorithms`.
+pub(super) async fn algorithms(uri: Uri) -> Result<Json<AlgorithmsDocument>, Problem> {
+    Params::read(&uri, &[])?;
+    let algorithms = optimizer::ALL.iter().map(AlgorithmDocument::from).collect();
+    Ok(Json(AlgorithmsDocument { algorithms }))
 }
 
 /// `GET /openapi.yaml`.

@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use serde_json::Value;
 
 use super::status::{StatusDocument, location};
 use crate::job::{Event, NumberedEvent, PlanId, Status};
@@ -75,7 +74,8 @@ impl Wire {
 pub(super) struct Outgoing {
     id: u64,
     event: &'static str,
-    data: Value,
+    /// One line of JSON.
+    data: String,
 }
 
 impl Outgoing {
@@ -109,6 +109,6 @@ impl End {
     }
 }
 
-fn json(data: impl Serialize) -> Value {
-    serde_json::to_value(data).expect("every map key is a string")
+fn json(data: impl Serialize) -> String {
+    serde_json::to_string(&data).expect("every map key is a string")
 }

@@ -30,12 +30,12 @@ const PARAMETERS: [Parameter; 10] = [
     parameter("loudness", 1.0, 0.0, 10.0, "loudness A at the start, Eq. 13-14"),
     parameter(
         "loudness_decay",
-        0.97,
+        0.99,
         0.0,
         1.0,
         "factor alpha on the loudness of a bat that improved, Eq. 14",
     ),
-    parameter("pulse_rate", 0.5, 0.0, 1.0, "pulse rate r0 in the limit, Eq. 15"),
+    parameter("pulse_rate", 0.2, 0.0, 1.0, "pulse rate r0 in the limit, Eq. 15"),
     parameter(
         "pulse_growth",
         0.1,

@@ -11,8 +11,6 @@ use serde_json::{Value, json};
 use crate::support::api::Api;
 use crate::support::{run, scenario};
 
-const UNKNOWN: &str = "/plans/01936f2c-7d1a-7c55-9a53-27b1b44c1a10";
-
 #[tokio::test]
 async fn a_plan_is_accepted_run_and_delivered() {
     let api = Api::new();
@@ -276,123 +274,6 @@ async fn results_that_are_not_there_say_why() {
     }
     let problems: Value = serde_json::from_str(&text).expect("JSON");
     insta::assert_json_snapshot!("results_that_are_not_there", problems, {"[].instance" => "[request]"});
-}
-
-#[tokio::test]
-async fn refusals_are_problems() {
-    let api = Api::new();
-    let plan = api.submit().await;
-    let json = ("content-type", "application/json");
-    let form = ("content-type", "application/x-www-form-urlencoded");
-    let latin = ("content-type", "application/json; charset=latin1");
-    let long = " ".repeat(4097);
-    let plan_of = |part: &str| format!("{plan}{part}");
-    let requests: Vec<(Method, String, Vec<(&str, &str)>, &str, u16)> = vec![
-        (Method::GET, "/nothing".into(), vec![], "", 404),
-        (Method::GET, "/plans/".into(), vec![], "", 404),
-        (Method::GET, UNKNOWN.into(), vec![], "", 404),
-        (Method::GET, format!("{UNKNOWN}/result"), vec![], "", 404),
-        (Method::GET, format!("{UNKNOWN}/events"), vec![], "", 404),
-        (Method::DELETE, UNKNOWN.into(), vec![], "", 404),
-        (Method::GET, "/plans/first".into(), vec![], "", 404),
-        (Method::GET, "/plans/%FF".into(), vec![], "", 404),
-        (
-            Method::GET,
-            UNKNOWN.to_uppercase().replace("PLANS", "plans"),
-            vec![],
-            "",
-            404,
-        ),
-        (Method::PUT, "/plans".into(), vec![], "", 405),
-        (Method::POST, "/livez".into(), vec![], "", 405),
-        (Method::GET, plan_of("/cancel"), vec![], "", 405),
-        (Method::GET, "/plans?limit=0".into(), vec![], "", 400),
-        (Method::GET, "/plans?limit=1001".into(), vec![], "", 400),
-        (Method::GET, "/plans?limit=many".into(), vec![], "", 400),
-        (Method::GET, "/plans?status=done".into(), vec![], "", 400),
-        (Method::GET, "/plans?cursor=xyz".into(), vec![], "", 400),
-        (Method::GET, "/plans?page=2".into(), vec![], "", 400),
-        (Method::GET, "/plans?limit=1&limit=2".into(), vec![], "", 400),
-        (Method::GET, "/livez?verbose".into(), vec![], "", 400),
-        (
-            Method::POST,
-            "/plans?validate_only=yes".into(),
-            vec![json],
-            "{}",
-            400,
-        ),
-        (Method::GET, plan_of("/events?rate=-1"), vec![], "", 400),
-        (Method::GET, plan_of("/events?rate=1001"), vec![], "", 400),
-        (Method::GET, plan_of("/events?rate=NaN"), vec![], "", 400),
-        (Method::GET, plan_of("/events?last_event_id=x"), vec![], "", 400),
-        (
-            Method::GET,
-            plan_of("/events"),
-            vec![("last-event-id", "-1")],
-            "",
-            400,
-        ),
-        (
-            Method::GET,
-            plan_of("/events"),
-            vec![("accept", "text/html")],
-            "",
-            406,
-        ),
-        (Method::GET, plan_of("/result?format=kml"), vec![], "", 400),
-        (
-            Method::GET,
-            plan_of("/result"),
-            vec![("accept", "text/html")],
-            "",
-            406,
-        ),
-        (Method::POST, "/plans".into(), vec![], "{}", 415),
-        (Method::POST, "/plans".into(), vec![form], "{}", 415),
-        (Method::POST, "/plans".into(), vec![latin], "{}", 415),
-        (Method::POST, "/plans".into(), vec![json], &long, 413),
-        (
-            Method::POST,
-            "/plans".into(),
-            vec![json, ("content-length", "5000")],
-            "{}",
-            413,
-        ),
-        (Method::POST, "/plans".into(), vec![json], "", 400),
-        (
-            Method::POST,
-            "/plans".into(),
-            vec![json],
-            "{\"start\":\n  nope}",
-            400,
-        ),
-        (Method::POST, "/plans".into(), vec![json], "[]", 422),
-        (
-            Method::POST,
-            "/plans".into(),
-            vec![json],
-            "{\"start\": 3, \"colour\": \"red\"}",
-            422,
-        ),
-    ];
-    let mut problems = Vec::new();
-    for (method, uri, headers, body, status) in requests {
-        let answer = api.send(method.clone(), &uri, &headers, body.to_owned()).await;
-        assert_eq!(answer.status, status, "{method} {uri}");
-        assert_eq!(
-            answer.header("content-type"),
-            "application/problem+json",
-            "{method} {uri}"
-        );
-        let allow = answer
-            .headers
-            .get("allow")
-            .map(|allow| allow.to_str().expect("visible ASCII"));
-        assert_eq!(allow.is_some(), status == 405, "{method} {uri}");
-        let request = format!("{method} {}", uri.replace(&plan, "/plans/[plan]"));
-        problems.push(json!({"request": request, "allow": allow, "problem": answer.json()}));
-    }
-    insta::assert_json_snapshot!("refusals", problems, {"[].problem.instance" => "[request]"});
 }
 
 #[tokio::test]

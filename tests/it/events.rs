@@ -17,7 +17,9 @@ fn a_run() -> Vec<Event> {
     (0..60)
         .flat_map(|iteration: usize| {
             let elapsed_ms = iteration as f64 * 10.0;
-            let better = (iteration % 3 == 0).then(|| run::incumbent(iteration, elapsed_ms));
+            let better = iteration
+                .is_multiple_of(3)
+                .then(|| run::incumbent(iteration, elapsed_ms));
             better
                 .into_iter()
                 .chain([run::convergence(iteration, elapsed_ms)])
@@ -168,8 +170,8 @@ async fn a_rate_thins_the_curve_but_keeps_the_last_route() {
         assert_eq!(count("end"), 1);
         assert!(thinned.iter().all(|block| whole.contains(block)));
         let last = |blocks: &[Block]| {
-            let incumbents = events(blocks).into_iter().filter(|(_, name)| name == "incumbent");
-            incumbents.last()
+            let mut incumbents = events(blocks).into_iter().filter(|(_, name)| name == "incumbent");
+            incumbents.next_back()
         };
         assert_eq!(last(&thinned), last(&whole));
     }

@@ -7,6 +7,7 @@ mod determinism;
 mod events;
 mod layering;
 mod openapi;
+mod refusals;
 mod scenario;
 mod shutdown;
 mod store_conformance;

@@ -88,16 +88,25 @@ fn examples_are_as_their_schemas_say() {
         .values()
         .flat_map(|item| item.as_object().expect("an object").values())
         .filter_map(|operation| operation.get("requestBody"));
+    let answers = DESCRIPTION["paths"]
+        .as_object()
+        .expect("paths")
+        .values()
+        .flat_map(|item| item.as_object().expect("an object").values())
+        .filter_map(|operation| operation["responses"].as_object())
+        .flat_map(|responses| responses.values())
+        .filter(|response| response.get("content").is_some());
     let responses = DESCRIPTION["components"]["responses"]
         .as_object()
         .expect("responses");
-    for holder in bodies.chain(responses.values()) {
+    for holder in bodies.chain(answers).chain(responses.values()) {
         for media in resolve(holder)["content"].as_object().expect("content").values() {
             let named = media.get("examples").and_then(Value::as_object);
             let named = named
                 .into_iter()
                 .flat_map(|examples| examples.values().map(|example| &example["value"]));
-            for example in named.chain(media.get("example")) {
+            let lone = media.get("example").filter(|example| !example.is_string());
+            for example in named.chain(lone) {
                 check_schema(&media["schema"], example, "an example");
                 examples += 1;
             }

@@ -8,9 +8,10 @@ use crate::support::process::Service;
 use crate::support::scenario;
 use crate::support::sse::{Block, Stream, events};
 
-/// A plan that runs for so long, wherever it runs.
+/// A plan that runs for so long, wherever it runs: its iterations alone would take minutes.
 fn a_run_of(ms: u64) -> Value {
     let mut scenario = scenario();
+    scenario["planner"]["population"] = 2000.into();
     scenario["planner"]["iterations"] = 100_000.into();
     scenario["planner"]["time_limit_ms"] = ms.into();
     scenario
@@ -112,9 +113,10 @@ async fn a_plan_that_ends_within_the_grace_period_is_kept() {
     let stream = running(&service, &address).await;
     service.signal("TERM");
     let rest = stream.rest().await;
+    let last = rest.last();
     assert!(
-        matches!(rest.last(), Some(Block::Event { name, .. }) if name == "end"),
-        "its stream ends with it"
+        matches!(last, Some(Block::Event { name, .. }) if name == "end"),
+        "{last:?}"
     );
     assert!(service.exit().await.success());
 

@@ -44,9 +44,9 @@ impl Stream {
     /// The next block; `None` when the server has closed the stream.
     pub(crate) async fn next(&mut self) -> Option<Block> {
         loop {
-            if let Some((block, rest)) = self.text.split_once("\n\n") {
-                let block = read(block);
-                self.text = rest.to_owned();
+            if let Some(end) = self.text.find("\n\n") {
+                let block = read(&self.text[..end]);
+                self.text.drain(..end + 2);
                 return Some(block);
             }
             let Some(chunk) = self.response.chunk().await.expect("an unbroken stream") else {

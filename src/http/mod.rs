@@ -8,6 +8,7 @@ mod body;
 mod documents;
 mod events;
 mod feed;
+mod off_thread;
 mod params;
 mod phase;
 mod plans;

@@ -20,7 +20,7 @@ use super::phase::stopping;
 use super::prefer::{PREFERENCE_APPLIED, Wait};
 use super::problem::Problem;
 use super::status::{StatusDocument, etag, location};
-use super::{AppState, Phase, body, retry};
+use super::{AppState, Phase, body, off_thread, retry};
 use crate::job::{self, Plan, PlanId, Status, Submission};
 use crate::scenario::json;
 use crate::store::{ListQuery, StoreError};
@@ -89,28 +89,19 @@ async fn refuse_when_draining(state: &AppState) -> Result<(), Problem> {
 /// Read a document into a submission, off the threads that answer.
 async fn accept(state: &AppState, document: Bytes) -> Result<Submission, Problem> {
     let rules = state.rules.clone();
-    let span = tracing::Span::current();
-    let read = tokio::task::spawn_blocking(move || {
-        span.in_scope(|| {
-            let scenario = json::read(&document, &rules, job::draw_seed())?;
-            Ok(Submission {
-                id: job::new_id(),
-                scenario: json::write(&scenario),
-                name: scenario.name,
-                algorithm: scenario.planner.algorithm,
-                seed: scenario.planner.seed,
-                iterations: scenario.planner.iterations as u64,
-                created_ms: now_ms(),
-            })
+    off_thread::run(move || {
+        let scenario = json::read(&document, &rules, job::draw_seed())?;
+        Ok(Submission {
+            id: job::new_id(),
+            scenario: json::write(&scenario),
+            name: scenario.name,
+            algorithm: scenario.planner.algorithm,
+            seed: scenario.planner.seed,
+            iterations: scenario.planner.iterations as u64,
+            created_ms: now_ms(),
         })
-    });
-    match read.await {
-        Ok(submission) => submission,
-        Err(broken) => match broken.try_into_panic() {
-            Ok(panic) => std::panic::resume_unwind(panic),
-            Err(_) => Err(Problem::Draining { retry_after_s: 1 }),
-        },
-    }
+    })
+    .await?
 }
 
 /// The answer to `?validate_only=true`. The accepted document is put in as the text it is.

@@ -13,4 +13,5 @@ mod shutdown;
 mod store_conformance;
 mod store_sqlite;
 mod support;
+mod svg;
 mod worker;

@@ -59,7 +59,7 @@ fn evaluate(bencher: divan::Bencher, name: &str) {
     bencher.counter(divan::counter::ItemsCount::new(1_u32)).bench(|| {
         let mut violation = 0.0;
         let figures = model.assess(&route, Quadrature::Integral, model.tolerance, |breach| {
-            violation += breach.amount
+            violation += breach.amount;
         });
         (figures, violation)
     });

@@ -212,7 +212,8 @@ mod tests {
         position
             .iter()
             .enumerate()
-            .map(|(dim, x)| (x - dim as f64 * 0.3).powi(2))
+            .map(|(dim, x)| x - dim as f64 * 0.3)
+            .map(|offset| offset * offset)
             .sum()
     }
 

@@ -101,8 +101,9 @@ fn control_points(route: &[Point3], tightness: &[Tightness], degree: usize) -> (
     for corner in 1..last {
         let at = route[corner];
         // On the legs before and after, at 1/4, 1/8, ... of each.
-        let beside =
-            |neighbour: Point3| at + (neighbour - at) * 0.5_f64.powi(tightness[corner].cast_signed() + 1);
+        let beside = |neighbour: Point3| {
+            at + (neighbour - at) * libm::scalbn(1.0, -tightness[corner].cast_signed() - 1)
+        };
         match tightness[corner] {
             0 => points.push(at),
             SHARP => points.extend(std::iter::repeat_n(at, degree)),

@@ -5,6 +5,7 @@ mod cli;
 mod crash;
 mod determinism;
 mod events;
+mod layering;
 mod openapi;
 mod refusals;
 mod scenario;

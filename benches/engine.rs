@@ -1,1 +1,93 @@
-fn main() {}
+//! Micro benchmarks of the engine: `cargo bench`.
+//!
+//! One core; read ratios between rows of one run, not times across machines.
+
+use std::collections::BTreeMap;
+use std::fs;
+
+use noctule::cost::Model;
+use noctule::geometry::Point3;
+use noctule::planner::{self, ConvergencePoint, Incumbent, Observer, Stop};
+use noctule::scenario::json::{self, Rules};
+use noctule::scenario::limits::Limits;
+use noctule::scenario::{Quadrature, Scenario};
+
+fn main() {
+    divan::main();
+}
+
+const SCENARIOS: [&str; 5] = ["paper-1", "paper-2", "paper-3", "paper-4", "jacksboro"];
+
+fn document(name: &str) -> Vec<u8> {
+    let path = format!("{}/scenarios/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    fs::read(path).expect("the scenario ships with the crate")
+}
+
+fn rules() -> Rules {
+    Rules {
+        limits: Limits::default(),
+        algorithms: planner::algorithm_rules(),
+    }
+}
+
+fn scenario(name: &str) -> Scenario {
+    json::read(&document(name), &rules(), 1).expect("a shipped scenario has no fault")
+}
+
+struct Nobody;
+
+impl Observer for Nobody {
+    fn iteration(&mut self, _: &ConvergencePoint) {}
+    fn incumbent(&mut self, _: &Incumbent) {}
+}
+
+impl Stop for Nobody {
+    fn requested(&self) -> bool {
+        false
+    }
+    fn elapsed_ms(&self) -> f64 {
+        0.0
+    }
+}
+
+/// Pricing one good route; the counter makes it evaluations a second.
+#[divan::bench(args = SCENARIOS)]
+fn evaluate(bencher: divan::Bencher, name: &str) {
+    let scenario = scenario(name);
+    let route: Vec<Point3> = planner::plan(&scenario, &mut Nobody, &Nobody).waypoints;
+    let model = Model::new(&scenario);
+    bencher.counter(divan::counter::ItemsCount::new(1_u32)).bench(|| {
+        let mut violation = 0.0;
+        let figures = model.assess(&route, Quadrature::Integral, model.tolerance, |breach| {
+            violation += breach.amount
+        });
+        (figures, violation)
+    });
+}
+
+/// A whole plan with the document's own settings (200 x 200 for the paper's scenarios), smoothing and certificate included.
+#[divan::bench(args = SCENARIOS, sample_count = 5, sample_size = 1)]
+fn plan(bencher: divan::Bencher, name: &str) {
+    let scenario = scenario(name);
+    bencher.bench(|| planner::plan(&scenario, &mut Nobody, &Nobody));
+}
+
+/// Reading and writing a scenario document.
+#[divan::bench(args = SCENARIOS)]
+fn read_scenario(bencher: divan::Bencher, name: &str) {
+    let (document, rules) = (document(name), rules());
+    bencher.bench(|| json::write(&json::read(&document, &rules, 1).expect("no fault")).len());
+}
+
+/// How the price of a route grows with the number of its waypoints.
+#[divan::bench(args = [5, 10, 20, 40, 80])]
+fn search_by_waypoints(bencher: divan::Bencher, waypoints: usize) {
+    let mut scenario = scenario("paper-2");
+    scenario.planner.waypoints = waypoints;
+    scenario.planner.population = 50;
+    scenario.planner.iterations = 20;
+    scenario.planner.parameters = BTreeMap::new();
+    bencher
+        .counter(divan::counter::ItemsCount::new(50_u32 * 21))
+        .bench(|| planner::plan(&scenario, &mut Nobody, &Nobody));
+}

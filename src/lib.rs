@@ -1,20 +1,36 @@
 //! Noctule plans 3-D routes for unmanned aircraft.
 //!
-//! The rooms, in reading order; each imports only from those above it.
+//! The rooms, in reading order; each imports only from those above it. ARCHITECTURE.md walks
+//! through them.
 
-pub mod cli;
-pub mod config;
-pub mod cost;
-pub mod export;
+// The ground rules: no room, no network, no clock.
 pub mod geometry;
-pub mod http;
-pub mod job;
-pub mod optimizer;
-pub mod planner;
-pub mod scenario;
-pub mod seeding;
-pub mod store;
-pub mod telemetry;
 pub mod terrain;
 pub mod threat;
+
+// What is asked for, and what a route costs.
+pub mod scenario;
+
+pub mod cost;
+
+// The search. `optimizer` knows no aircraft; `planner` joins it to the rest.
+pub mod optimizer;
+pub mod seeding;
+
+pub mod planner;
+
+// What people take away, and the life of a plan.
+pub mod export;
+pub mod job;
+
+// Where plans are kept, who runs them, and how the world reaches them.
+pub mod store;
 pub mod worker;
+
+pub mod http;
+
+pub mod cli;
+
+// Of no rank: plain settings, and logging.
+pub mod config;
+pub mod telemetry;

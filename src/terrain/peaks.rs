@@ -168,14 +168,23 @@ impl Bump {
     fn bend(&self, t0: f64, t1: f64) -> f64 {
         let away = self.summit - self.summit.clamp(t0, t1);
         let x = self.sharpness * away * away;
-        let factor = if x <= 1.5 {
-            1.0
-        } else {
-            (2.0 * x - 1.0) * libm::exp(-x)
-        };
+        let factor = FALL
+            .iter()
+            .rfind(|(from, _)| x >= *from)
+            .map_or(1.0, |(_, factor)| *factor);
         2.0 * self.sharpness * self.height.abs() * factor
     }
 }
+
+/// Values of (2x - 1) e^-x, rounded up: a bound for every x from there on, without an exponential.
+const FALL: [(f64, f64); 6] = [
+    (1.5, 0.4463),
+    (3.0, 0.2490),
+    (5.0, 0.0607),
+    (8.0, 0.005_04),
+    (12.0, 1.42e-4),
+    (20.0, 8.04e-8),
+];
 
 #[cfg(test)]
 mod tests {

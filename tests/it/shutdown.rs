@@ -48,16 +48,20 @@ async fn life(service: &Service, address: &str) -> Vec<String> {
         .collect()
 }
 
+/// An end that waited for a plan of a minute, for a stream, or for the whole of an idle grace period would
+/// come after it; a slow machine alone does not make one so late.
+const LONG_BEFORE: Duration = Duration::from_secs(30);
+
 #[tokio::test]
 async fn an_idle_service_leaves_at_once() {
     for signal in ["TERM", "INT"] {
         let directory = tempfile::tempdir().expect("a temporary directory");
-        let service = Service::start(directory.path(), &["--grace", "30"]);
+        let service = Service::start(directory.path(), &["--grace", "600"]);
         assert_eq!(service.bytes("/readyz").await, r#"{"status":"ok"}"#);
         let begun = Instant::now();
         service.signal(signal);
         assert!(service.exit().await.success());
-        assert!(begun.elapsed() < Duration::from_secs(5), "{:?}", begun.elapsed());
+        assert!(begun.elapsed() < LONG_BEFORE, "{:?}", begun.elapsed());
     }
 }
 
@@ -92,7 +96,7 @@ async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
         "the plan has not ended"
     );
     assert!(service.exit().await.success());
-    assert!(begun.elapsed() < Duration::from_secs(3), "{:?}", begun.elapsed());
+    assert!(begun.elapsed() < LONG_BEFORE, "{:?}", begun.elapsed());
 
     let service = Service::start(directory.path(), &["--workers", "1"]);
     for address in [&address, &waiting] {
@@ -164,5 +168,5 @@ async fn open_streams_do_not_hold_up_the_end() {
         );
     }
     assert!(service.exit().await.success());
-    assert!(begun.elapsed() < Duration::from_secs(3), "{:?}", begun.elapsed());
+    assert!(begun.elapsed() < LONG_BEFORE, "{:?}", begun.elapsed());
 }

@@ -37,6 +37,8 @@ pub(super) enum Problem {
     },
     /// The body is of another kind, or of an unnamed one.
     UnsupportedMediaType(Option<String>),
+    /// The body is compressed or otherwise coded; how.
+    UnsupportedCoding(String),
     /// The body is too long; the limit in bytes.
     BodyTooLarge(usize),
     /// The body came too slowly; the limit.
@@ -137,7 +139,7 @@ impl Problem {
                 "body-too-large",
                 "The body is too large",
             ),
-            Self::UnsupportedMediaType(_) => (
+            Self::UnsupportedMediaType(_) | Self::UnsupportedCoding(_) => (
                 StatusCode::UNSUPPORTED_MEDIA_TYPE,
                 "unsupported-media-type",
                 "Unsupported media type",
@@ -215,6 +217,7 @@ impl Problem {
                 format!("the body is longer than {limit} bytes, the limit body_bytes of GET /limits")
             }
             Self::UnsupportedMediaType(found) => unsupported_media_type(found.as_deref()),
+            Self::UnsupportedCoding(found) => format!("content-encoding is {found}; send the body as it is"),
             Self::InvalidScenario(faults) if faults.len() == 1 => "1 fault; see errors".to_owned(),
             Self::InvalidScenario(faults) => format!("{} faults; see errors", faults.len()),
             Self::Internal => "a defect of the service; its log has more under this request's id".to_owned(),
@@ -310,6 +313,11 @@ impl IntoResponse for Problem {
             response
                 .headers_mut()
                 .insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        if matches!(self, Self::UnsupportedCoding(_)) {
+            response
+                .headers_mut()
+                .insert(header::ACCEPT_ENCODING, HeaderValue::from_static("identity"));
         }
         response.extensions_mut().insert(self);
         response

@@ -58,6 +58,7 @@ const BODIES: &[(&[Header], &str, u16)] = &[
         415,
     ),
     (&[("content-type", "application/json; charset=latin1")], "{}", 415),
+    (&[JSON, ("content-encoding", "gzip")], "{}", 415),
     (&[JSON, ("content-length", "5000")], "{}", 413),
     (&[JSON], "", 400),
     (&[JSON], "{\"start\":\n  nope}", 400),

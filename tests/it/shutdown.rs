@@ -36,13 +36,18 @@ async fn life(service: &Service, address: &str) -> Vec<String> {
         .rest()
         .await;
     assert_eq!(
-        events(&blocks).iter().filter(|(_, name)| name == "end").count(),
+        events(&blocks)
+            .iter()
+            .filter(|(_, name)| name == "end")
+            .count(),
         1
     );
     blocks
         .into_iter()
         .filter_map(|block| match block {
-            Block::Event { name, data, .. } if name == "status" => Some(data["status"].as_str()?.to_owned()),
+            Block::Event { name, data, .. } if name == "status" => {
+                Some(data["status"].as_str()?.to_owned())
+            }
             _ => None,
         })
         .collect()
@@ -76,7 +81,11 @@ async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
     let begun = Instant::now();
     service.signal("TERM");
     let refused = loop {
-        let ready = service.get("/readyz").send().await.expect("it still answers");
+        let ready = service
+            .get("/readyz")
+            .send()
+            .await
+            .expect("it still answers");
         if ready.status() == 503 {
             break service.post(&a_run_of(10)).await;
         }
@@ -106,7 +115,10 @@ async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
         life(&service, &address).await,
         ["queued", "running", "queued", "running", "succeeded"]
     );
-    assert_eq!(life(&service, &waiting).await, ["queued", "running", "succeeded"]);
+    assert_eq!(
+        life(&service, &waiting).await,
+        ["queued", "running", "succeeded"]
+    );
 }
 
 #[tokio::test]
@@ -126,7 +138,10 @@ async fn a_plan_that_ends_within_the_grace_period_is_kept() {
 
     let service = Service::start(directory.path(), &["--workers", "1"]);
     assert_eq!(service.ended(&address).await["status"], "succeeded");
-    assert_eq!(life(&service, &address).await, ["queued", "running", "succeeded"]);
+    assert_eq!(
+        life(&service, &address).await,
+        ["queued", "running", "succeeded"]
+    );
 }
 
 #[tokio::test]

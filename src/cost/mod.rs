@@ -17,6 +17,7 @@ pub use heading::turns;
 
 use crate::geometry::{Point3, Segment};
 use crate::scenario::{Quadrature, Scenario};
+use threat::Nearby;
 
 /// The weighted terms of Eq. 1; `total` is their sum.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,14 +67,19 @@ impl<'s> Model<'s> {
     ) -> CostFigures {
         let (mut length, mut exposure) = (0.0, 0.0);
         let mut turns = turns(route);
+        let mut nearby = Nearby::All(0);
         for (leg_idx, ends) in route.windows(2).enumerate() {
+            if leg_idx % Nearby::RUN == 0 {
+                let run = &route[leg_idx..route.len().min(leg_idx + Nearby::RUN + 1)];
+                nearby = Nearby::to(&self.scenario.threats, run);
+            }
             let leg = Segment {
                 a: ends[0],
                 b: ends[1],
             };
             let turn = turns.next().expect("one turn a leg");
             length += leg.length();
-            exposure += self.threats(leg_idx, &leg, quadrature, tolerance, &mut report);
+            exposure += self.threats(leg_idx, &leg, &nearby, quadrature, tolerance, &mut report);
             self.heights(leg_idx, &leg, tolerance, &mut report);
             self.manoeuvres(leg_idx, &leg, turn, tolerance, &mut report);
         }
@@ -132,7 +138,10 @@ mod tests {
                 top: Some(80.0),
             }],
             terrain: Terrain::Flat(Flat { elevation: 10.0 }),
-            altitude: AltitudeBand { min: 5.0, max: 105.0 },
+            altitude: AltitudeBand {
+                min: 5.0,
+                max: 105.0,
+            },
             vehicle: Vehicle {
                 max_turn_deg: 60.0,
                 max_climb_deg: 45.0,
@@ -171,9 +180,14 @@ mod tests {
     fn breaches(scenario: &Scenario, points: &[[f64; 3]]) -> Vec<(Constraint, usize, f64)> {
         let model = Model::new(scenario);
         let mut found = Vec::new();
-        model.assess(&route(points), Quadrature::Integral, model.tolerance, |breach| {
-            found.push((breach.constraint, breach.index, breach.amount));
-        });
+        model.assess(
+            &route(points),
+            Quadrature::Integral,
+            model.tolerance,
+            |breach| {
+                found.push((breach.constraint, breach.index, breach.amount));
+            },
+        );
         found
     }
 
@@ -182,7 +196,10 @@ mod tests {
         assert_eq!(found.len(), expected.len(), "{found:?} {expected:?}");
         for (found, expected) in found.iter().zip(expected) {
             assert_eq!((found.0, found.1), (expected.0, expected.1));
-            assert!((found.2 - expected.2).abs() < 1e-9, "{found:?} {expected:?}");
+            assert!(
+                (found.2 - expected.2).abs() < 1e-9,
+                "{found:?} {expected:?}"
+            );
         }
     }
 
@@ -198,6 +215,56 @@ mod tests {
         assert!((figures.threat - 3.0 * 400.0 / 5.0).abs() < 1e-9);
         assert!((figures.altitude - 90.0).abs() < 1e-9);
         assert!((figures.total - (figures.fuel + figures.threat + figures.altitude)).abs() < 1e-12);
+    }
+
+    /// A long route past many threats costs what it costs leg by leg and threat by threat.
+    #[test]
+    fn threats_out_of_reach_are_left_out_without_a_trace() {
+        let mut scenario = scenario();
+        for idx in 0..60 {
+            let mut threat = scenario.threats[0].clone();
+            threat.shape = Shape::Cylinder(Cylinder {
+                center: Point2::new(f64::from(idx % 10) * 25.0, f64::from(idx / 10) * 17.0),
+                radius: 2.0,
+                influence: 9.0,
+            });
+            scenario.threats.push(threat);
+        }
+        let model = Model::new(&scenario);
+        let winding: Vec<Point3> = (0..300)
+            .map(|step| {
+                Point3::new(
+                    f64::from(step),
+                    3.0 * f64::from(step % 20),
+                    20.0 + f64::from(step % 7),
+                )
+            })
+            .collect();
+        for quadrature in [Quadrature::Integral, Quadrature::Paper] {
+            let mut together = Vec::new();
+            let whole = model.assess(&winding, quadrature, model.tolerance, |breach| {
+                if breach.constraint == Constraint::Threat {
+                    together.push((breach.index, breach.threat));
+                }
+            });
+            let (mut exposure, mut alone) = (0.0, Vec::new());
+            for (leg_idx, ends) in winding.windows(2).enumerate() {
+                for (threat_idx, threat) in scenario.threats.iter().enumerate() {
+                    let mut one = scenario.clone();
+                    one.threats = vec![threat.clone()];
+                    let leg_model = Model::new(&one);
+                    exposure += leg_model.figures(ends, quadrature).threat;
+                    leg_model.assess(ends, quadrature, model.tolerance, |breach| {
+                        if breach.constraint == Constraint::Threat {
+                            alone.push((leg_idx, Some(threat_idx)));
+                        }
+                    });
+                }
+            }
+            assert!((whole.threat - exposure).abs() < 1e-9 * exposure);
+            assert!(exposure > 0.0 && !alone.is_empty());
+            assert_eq!(together, alone);
+        }
     }
 
     /// Legs of 50 m that meet at the axis: T is 0, 0, 0, 7.5, 20 at the five samples of each.
@@ -218,13 +285,19 @@ mod tests {
     fn each_constraint_is_measured() {
         use Constraint::{Altitude, Area, Climb, Leg, Terrain, Threat, Turn};
         // Round the disc with room to spare.
-        check(&[[0.0, 0.0, 20.0], [50.0, 25.0, 30.0], [100.0, 0.0, 20.0]], &[]);
+        check(
+            &[[0.0, 0.0, 20.0], [50.0, 25.0, 30.0], [100.0, 0.0, 20.0]],
+            &[],
+        );
         check(
             &[[0.0, 0.0, 20.0], [50.0, 0.0, 20.0], [100.0, 0.0, 20.0]],
             &[(Threat, 0, 10.0), (Threat, 1, 10.0)],
         );
         // Above the top it may pass.
-        check(&[[0.0, 0.0, 80.0], [50.0, 0.0, 80.0], [100.0, 0.0, 80.0]], &[]);
+        check(
+            &[[0.0, 0.0, 80.0], [50.0, 0.0, 80.0], [100.0, 0.0, 80.0]],
+            &[],
+        );
         check(
             &[[0.0, 0.0, 20.0], [50.0, 25.0, 12.0], [100.0, 0.0, 20.0]],
             &[(Altitude, 0, 3.0), (Altitude, 1, 3.0)],
@@ -282,7 +355,12 @@ mod tests {
         let check = |first: [f64; 3], expected: usize| {
             let found = breaches(
                 &scenario,
-                &[[0.0, 0.0, 10.0], first, [50.0, 25.0, 20.0], [100.0, 0.0, 20.0]],
+                &[
+                    [0.0, 0.0, 10.0],
+                    first,
+                    [50.0, 25.0, 20.0],
+                    [100.0, 0.0, 20.0],
+                ],
             );
             assert_eq!(found.len(), expected, "{found:?}");
         };

@@ -1,7 +1,7 @@
 //! Eq. 4-5: exposure to threats along a leg, and keeping out of them.
 
 use super::{Breach, Constraint, Model, Tolerance};
-use crate::geometry::Segment;
+use crate::geometry::{Point3, Rect, Segment};
 use crate::scenario::Quadrature;
 use crate::threat::Threat;
 
@@ -11,18 +11,64 @@ pub(super) const SHARE: f64 = 0.2;
 /// Where Eq. 4 samples a leg. The paper lists four of the five points; all five are used.
 const SAMPLES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
+/// With so many threats or fewer, all are looked at.
+const FEW_THREATS: usize = 16;
+
+/// The threats whose soft zones a run of legs may reach. Where a route has thousands of legs or a
+/// scenario thousands of threats, most need not be looked at leg by leg.
+#[derive(Debug)]
+pub(super) enum Nearby {
+    All(usize),
+    Some(Vec<usize>),
+}
+
+impl Nearby {
+    /// So many legs are looked at together.
+    pub(super) const RUN: usize = 32;
+
+    /// Those near to the legs between `points`, in order.
+    pub(super) fn to(threats: &[Threat], points: &[Point3]) -> Self {
+        if threats.len() <= FEW_THREATS {
+            return Self::All(threats.len());
+        }
+        let Some(run) = Rect::around(points.iter().map(|point| point.xy())) else {
+            return Self::Some(Vec::new());
+        };
+        let near = threats.iter().enumerate().filter(|(_, threat)| {
+            let extent = threat.extent();
+            // Written so that a hair of rounding rather takes a threat in.
+            let hair = 1e-6 * (1.0 + extent.diagonal());
+            run.min.x <= extent.max.x + hair
+                && run.max.x >= extent.min.x - hair
+                && run.min.y <= extent.max.y + hair
+                && run.max.y >= extent.min.y - hair
+        });
+        Self::Some(near.map(|(threat_idx, _)| threat_idx).collect())
+    }
+
+    fn indices(&self) -> impl Iterator<Item = usize> + '_ {
+        let (all, some): (usize, &[usize]) = match self {
+            Self::All(count) => (*count, &[]),
+            Self::Some(indices) => (0, indices),
+        };
+        (0..all).chain(some.iter().copied())
+    }
+}
+
 impl Model<'_> {
-    /// Sum over the threats of the integral of `T(d)` along `leg`; entering a threat is reported.
+    /// Sum over the `nearby` threats of the integral of `T(d)` along `leg`; entering a threat is reported.
     pub(super) fn threats(
         &self,
         leg_idx: usize,
         leg: &Segment,
+        nearby: &Nearby,
         quadrature: Quadrature,
         tolerance: Tolerance,
         report: &mut impl FnMut(Breach),
     ) -> f64 {
         let mut exposure = 0.0;
-        for (threat_idx, threat) in self.scenario.threats.iter().enumerate() {
+        for threat_idx in nearby.indices() {
+            let threat = &self.scenario.threats[threat_idx];
             let encounter = threat.encounter(leg);
             exposure += match quadrature {
                 Quadrature::Integral => encounter.exposure,

@@ -5,6 +5,7 @@ use crate::cost::{Breach, Constraint, Model, turns};
 use crate::geometry::{Point3, Segment};
 use crate::scenario::Quadrature;
 use crate::terrain::HeightRange;
+use crate::threat::Threat;
 
 /// The legs of `route`.
 pub(super) fn legs(route: &[Point3]) -> Vec<Leg> {
@@ -19,19 +20,19 @@ pub(super) fn legs(route: &[Point3]) -> Vec<Leg> {
 /// The certificate of `route`, be it of waypoints or of a path's samples.
 pub(super) fn measure(model: &Model, route: &[Point3]) -> Measures {
     let threats = model.scenario.threats.iter().enumerate();
+    let flown = flown(route);
     let heights = segments(route)
         .filter_map(|leg| model.free_heights(&leg))
         .reduce(HeightRange::join);
-    let greatest =
-        |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |most: f64, value| most.max(value.abs()));
+    let greatest = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold(0.0, |most: f64, value| most.max(value.abs()))
+    };
     Measures {
         clearance: threats
             .map(|(threat_idx, threat)| Clearance {
                 threat: threat_idx,
                 name: threat.name.clone(),
-                distance: segments(route)
-                    .filter_map(|leg| threat.clearance(&leg))
-                    .reduce(f64::min),
+                distance: least_clearance(threat, route, &flown),
             })
             .collect(),
         min_agl: heights.map(|range| range.min),
@@ -73,7 +74,10 @@ fn describe(model: &Model, breach: &Breach) -> Violation {
             "{place} is turned into {amount} beyond {} deg",
             vehicle.max_turn_deg
         ),
-        Constraint::Climb => format!("{place} is {amount} steeper than {} deg", vehicle.max_climb_deg),
+        Constraint::Climb => format!(
+            "{place} is {amount} steeper than {} deg",
+            vehicle.max_climb_deg
+        ),
         Constraint::Leg => format!("{place} is {amount} shorter than {} m", vehicle.min_leg),
         Constraint::Area => format!("{place} lies {amount} outside the area"),
     };
@@ -85,9 +89,89 @@ fn describe(model: &Model, breach: &Breach) -> Violation {
     }
 }
 
+/// The way flown horizontally up to each point of `route`, metres.
+fn flown(route: &[Point3]) -> Vec<f64> {
+    let mut way = 0.0;
+    std::iter::once(0.0)
+        .chain(segments(route).map(|leg| {
+            way += leg.horizontal_length();
+            way
+        }))
+        .collect()
+}
+
+/// The least clearance of the legs of `route`, by branch and bound: no point is nearer to a threat
+/// than a point in its neighbourhood less the way between them.
+fn least_clearance(threat: &Threat, route: &[Point3], flown: &[f64]) -> Option<f64> {
+    let leg = |idx: usize| Segment {
+        a: route[idx],
+        b: route[idx + 1],
+    };
+    let at_its_height: Vec<usize> = (0..route.len() - 1)
+        .filter(|&idx| leg(idx).between_heights(threat.base, threat.top).is_some())
+        .collect();
+    let mut least = f64::INFINITY;
+    // Runs of those legs, with what their clearance is at least.
+    let mut open = vec![(&at_its_height[..], f64::NEG_INFINITY)];
+    while let Some((legs, bound)) = open.pop() {
+        if bound >= least {
+            continue;
+        }
+        if let [] | [_] = legs {
+            let clearances = legs.iter().filter_map(|&idx| threat.clearance(&leg(idx)));
+            least = clearances.fold(least, f64::min);
+            continue;
+        }
+        let (before, after) = legs.split_at(legs.len() / 2);
+        let middle = after[0];
+        let here = threat.distance(route[middle].xy());
+        let bounded = |legs: &'_ [usize]| {
+            let from = flown[middle] - flown[legs[0]];
+            let to = flown[legs[legs.len() - 1] + 1] - flown[middle];
+            // The way is a sum; a hair of it is left to rounding.
+            here - from.max(to) * (1.0 + 1e-9) - 1e-9
+        };
+        let mut halves = [(before, bounded(before)), (after, bounded(after))];
+        halves.sort_by(|one, other| other.1.total_cmp(&one.1));
+        open.extend(halves);
+    }
+    least.is_finite().then_some(least)
+}
+
 fn segments(route: &[Point3]) -> impl Iterator<Item = Segment> + '_ {
     route.windows(2).map(|ends| Segment {
         a: ends[0],
         b: ends[1],
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::tests::scenario;
+
+    #[test]
+    fn the_least_clearance_is_that_of_all_legs() {
+        let mut scenario = scenario();
+        scenario.threats[1].top = Some(60.0);
+        scenario.threats[2].base = Some(1e4);
+        let route: Vec<Point3> = (0..500_i32)
+            .map(|step| {
+                let (t, wave) = (f64::from(step), f64::from(step % 37));
+                Point3::new(
+                    2.0 * t,
+                    1000.0 - 1.7 * t + wave,
+                    40.0 + 3.0 * f64::from(step % 11),
+                )
+            })
+            .collect();
+        let measures = measure(&Model::new(&scenario), &route);
+        for (entry, threat) in measures.clearance.iter().zip(&scenario.threats) {
+            let expected = segments(&route)
+                .filter_map(|leg| threat.clearance(&leg))
+                .reduce(f64::min);
+            assert_eq!(entry.distance, expected);
+        }
+        assert_eq!(measures.clearance[2].distance, None);
+    }
 }

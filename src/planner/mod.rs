@@ -9,7 +9,8 @@ mod outcome;
 mod smoothing;
 
 pub use outcome::{
-    Bound, Clearance, ConvergencePoint, Incumbent, Leg, Measures, Outcome, Path, StopReason, Violation,
+    Bound, Clearance, ConvergencePoint, Incumbent, Leg, Measures, Outcome, Path, StopReason,
+    Violation,
 };
 
 pub use crate::cost::CostFigures;
@@ -31,7 +32,8 @@ pub trait Observer {
     fn incumbent(&mut self, incumbent: &Incumbent);
 }
 
-/// Tells a run when to end and what time it is; asked once an iteration.
+/// Tells a run when to end and what time it is; asked once an iteration, and now and then within
+/// one whose routes take long to price.
 pub trait Stop {
     /// Whether somebody wants the run to end with the best route so far.
     fn requested(&self) -> bool;
@@ -64,13 +66,13 @@ pub fn algorithm_rules() -> Vec<AlgorithmRule> {
 /// When the scenario names an algorithm that is not in the table; its reader refuses those.
 pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -> Outcome {
     let settings = &scenario.planner;
-    let algorithm =
-        optimizer::by_name(&settings.algorithm).expect("the reader accepts only names in the table");
+    let algorithm = optimizer::by_name(&settings.algorithm)
+        .expect("the reader accepts only names in the table");
     let model = Model::new(scenario);
 
     let mut routes = match settings.seeding {
         // Routes along the tangents of the threats will join here.
-        Seeding::Random => Routes::new(Encoding::new(scenario), model.clone()),
+        Seeding::Random => Routes::new(Encoding::new(scenario), model.clone(), stop),
     };
     let mut log = Log {
         observer,
@@ -78,6 +80,7 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
         convergence: Vec::new(),
         route: Vec::new(),
     };
+    // A stop within the first population leaves the rest of it unpriced.
     let mut search = (algorithm.start)(&search_settings(scenario, algorithm), &mut routes);
     log.record(0, search.as_ref(), &routes);
 
@@ -88,6 +91,11 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
             break;
         }
         search.iterate(&mut routes, iteration as f64 / settings.iterations as f64);
+        if routes.interrupted {
+            // Half an iteration is none: the result is that of the one before.
+            stop_reason = why_stop(scenario, stop).unwrap_or(StopReason::Cancelled);
+            break;
+        }
         log.record(iteration, search.as_ref(), &routes);
     }
 
@@ -95,13 +103,7 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
     let Log {
         convergence, route, ..
     } = log;
-    deliver(
-        &model,
-        route,
-        stop_reason,
-        convergence,
-        search.swarm().evaluations(),
-    )
+    deliver(&model, route, stop_reason, convergence)
 }
 
 fn search_settings(scenario: &Scenario, algorithm: &Algorithm) -> Settings {
@@ -132,17 +134,22 @@ struct Log<'o> {
 impl Log<'_> {
     fn record(&mut self, iteration: usize, search: &dyn Optimizer, routes: &Routes) {
         let swarm = search.swarm();
-        let (best, members) = (swarm.best_fitness(), swarm.fitness());
-        let count = members.len() as f64;
+        let best = swarm.best_fitness();
+        let members = swarm
+            .fitness()
+            .iter()
+            .filter(|fitness| fitness.cost.is_finite());
+        let count = members.clone().count() as f64;
         let elapsed_ms = self.stop.elapsed_ms();
         let point = ConvergencePoint {
             iteration,
-            evaluations: swarm.evaluations(),
+            evaluations: routes.evaluations,
             elapsed_ms,
             best_cost: best.is_feasible().then_some(best.cost),
             best_violation: best.violation,
-            mean_cost: members.iter().map(|fitness| fitness.cost).sum::<f64>() / count,
-            feasible_fraction: members.iter().filter(|fitness| fitness.is_feasible()).count() as f64 / count,
+            mean_cost: members.clone().map(|fitness| fitness.cost).sum::<f64>() / count,
+            feasible_fraction: members.filter(|fitness| fitness.is_feasible()).count() as f64
+                / count,
         };
         let mut route = Vec::new();
         routes.encoding.decode(swarm.best_position(), &mut route);
@@ -167,8 +174,8 @@ fn deliver(
     route: Vec<Point3>,
     stop_reason: StopReason,
     mut convergence: Vec<ConvergencePoint>,
-    evaluations: u64,
 ) -> Outcome {
+    let evaluations = convergence.last().map_or(0, |last| last.evaluations);
     let quadrature = model.scenario.planner.quadrature;
     let cost = model.figures(&route, quadrature);
     let violations = certificate::violations(model, &route);
@@ -184,7 +191,8 @@ fn deliver(
         feasible,
         stop_reason,
         cost,
-        cost_integral: (quadrature == Quadrature::Paper).then(|| model.figures(&route, Quadrature::Integral)),
+        cost_integral: (quadrature == Quadrature::Paper)
+            .then(|| model.figures(&route, Quadrature::Integral)),
         bound: Bound {
             lower,
             gap: (feasible && lower > 0.0).then(|| cost.total / lower - 1.0),
@@ -236,7 +244,10 @@ mod tests {
                 radar(680.0, 620.0, 60.0),
             ],
             terrain: Terrain::Flat(Flat { elevation: 0.0 }),
-            altitude: AltitudeBand { min: 0.0, max: 200.0 },
+            altitude: AltitudeBand {
+                min: 0.0,
+                max: 200.0,
+            },
             vehicle: Vehicle {
                 max_turn_deg: 60.0,
                 max_climb_deg: 45.0,
@@ -366,6 +377,33 @@ mod tests {
         let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(u32::MAX));
         assert_eq!(outcome.stop_reason, StopReason::TimeLimit);
         assert_eq!(outcome.convergence.len(), 10);
+    }
+
+    /// Routes that each take long to price: a stop does not wait for the whole population.
+    #[test]
+    fn a_stop_within_an_iteration_is_heard() {
+        let mut scenario = scenario();
+        let far = scenario.threats[0].clone();
+        scenario.threats.extend((0..20_000).map(|_| far.clone()));
+        // Every fourth route or so is a look; the first population takes 60 routes.
+        let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(5));
+        assert_eq!(outcome.stop_reason, StopReason::Cancelled);
+        assert_eq!(outcome.convergence.len(), 1);
+        assert!(
+            (1..60).contains(&outcome.evaluations),
+            "{}",
+            outcome.evaluations
+        );
+        assert!(outcome.convergence[0].mean_cost.is_finite());
+        let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(40));
+        assert_eq!(outcome.convergence.len(), 2);
+        assert_eq!(outcome.evaluations, outcome.convergence[1].evaluations);
+        assert!(
+            outcome
+                .convergence
+                .iter()
+                .all(|point| point.mean_cost.is_finite())
+        );
     }
 
     #[test]

@@ -1,9 +1,13 @@
 //! Routes as an optimizer sees them: positions in, fitness out.
 
 use super::encoding::Encoding;
+use super::{Stop, why_stop};
 use crate::cost::{Model, Tolerance};
 use crate::geometry::Point3;
 use crate::optimizer::{Bounds, Fitness, Objective};
+use crate::scenario::Scenario;
+use crate::terrain::Terrain;
+use crate::threat::Shape;
 
 /// The routes of one scenario.
 pub(super) struct Routes<'s> {
@@ -12,25 +16,42 @@ pub(super) struct Routes<'s> {
     /// Half of what feasible means, so that a delivered route is feasible for others' rounding too.
     tolerance: Tolerance,
     route: Vec<Point3>,
+    stop: &'s dyn Stop,
+    /// Evaluations between two looks at the clock.
+    stride: u64,
+    /// Routes priced so far.
+    pub(super) evaluations: u64,
+    /// Whether the run was stopped within an iteration: what was left of it is [`Fitness::WORST`].
+    pub(super) interrupted: bool,
 }
 
+/// So many steps, each some nanoseconds, may pass between two looks at the clock.
+const STEPS_UNWATCHED: usize = 1_000_000;
+
 impl<'s> Routes<'s> {
-    pub(super) fn new(encoding: Encoding<'s>, model: Model<'s>) -> Self {
+    pub(super) fn new(encoding: Encoding<'s>, model: Model<'s>, stop: &'s dyn Stop) -> Self {
         let tolerance = model.tolerance.scaled(0.5);
+        let stride = (STEPS_UNWATCHED / steps(model.scenario)).max(1) as u64;
         Self {
             encoding,
             model,
             tolerance,
             route: Vec::new(),
+            stop,
+            stride,
+            evaluations: 0,
+            interrupted: false,
         }
     }
 
     fn price(&self, route: &[Point3]) -> Fitness {
         let mut violation = 0.0;
         let quadrature = self.model.scenario.planner.quadrature;
-        let figures = self.model.assess(route, quadrature, self.tolerance, |breach| {
-            violation += breach.amount;
-        });
+        let figures = self
+            .model
+            .assess(route, quadrature, self.tolerance, |breach| {
+                violation += breach.amount;
+            });
         Fitness {
             violation,
             cost: figures.total,
@@ -47,9 +68,40 @@ impl Objective for Routes<'_> {
         let dimension = self.encoding.bounds().dimension();
         let mut route = std::mem::take(&mut self.route);
         for (position, fitness) in positions.chunks_exact(dimension).zip(fitness) {
+            // There is always one route to deliver.
+            if self.evaluations > 0
+                && self.evaluations.is_multiple_of(self.stride)
+                && !self.interrupted
+            {
+                self.interrupted = why_stop(self.model.scenario, self.stop).is_some();
+            }
+            if self.interrupted {
+                *fitness = Fitness::WORST;
+                continue;
+            }
             self.encoding.decode(position, &mut route);
             *fitness = self.price(&route);
+            self.evaluations += 1;
         }
         self.route = route;
     }
+}
+
+/// About how many steps the pricing of one route takes.
+fn steps(scenario: &Scenario) -> usize {
+    let vertices = |shape: &Shape| match shape {
+        Shape::Cylinder(_) => 1,
+        Shape::Polygon(polygon) => 10 * polygon.vertices().len(),
+    };
+    let threats: usize = scenario
+        .threats
+        .iter()
+        .map(|threat| vertices(&threat.shape))
+        .sum();
+    let ground = match &scenario.terrain {
+        Terrain::Flat(_) => 1,
+        Terrain::Peaks(peaks) => 100 * (1 + peaks.peaks.len()),
+        Terrain::Grid(grid) => grid.columns + grid.rows,
+    };
+    (scenario.planner.waypoints + 1) * (1 + threats + ground)
 }

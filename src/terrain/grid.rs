@@ -35,7 +35,8 @@ impl Grid {
     /// The ground that the grid covers.
     #[must_use]
     pub fn extent(&self) -> Rect {
-        let size = nalgebra::Vector2::new((self.columns - 1) as f64, (self.rows - 1) as f64) * self.cell;
+        let size =
+            nalgebra::Vector2::new((self.columns - 1) as f64, (self.rows - 1) as f64) * self.cell;
         Rect {
             min: self.origin,
             max: self.origin + size,
@@ -43,16 +44,41 @@ impl Grid {
     }
 
     pub(super) fn elevation(&self, point: Point2) -> f64 {
-        let (x, y) = self.in_cells(point);
+        let (x, y) = self.onto_grid(self.in_cells(point));
         let patch = self.patch(x, y);
         let (x, y) = (x - patch.column, y - patch.row);
         patch.z00 + x * patch.zx + y * (patch.zy + x * patch.zxy)
     }
 
     pub(super) fn height_range(&self, leg: &Segment, (t0, t1): (f64, f64)) -> HeightRange {
+        let (x0, y0) = self.in_cells(leg.a.xy());
+        let (x1, y1) = self.in_cells(leg.b.xy());
+        let (columns, rows) = ((self.columns - 1) as f64, (self.rows - 1) as f64);
+        // Beyond an edge its elevation goes on, so that the way over the ground bends there.
+        let mut bends = [
+            share_of_way(x0, x1, 0.0),
+            share_of_way(x0, x1, columns),
+            share_of_way(y0, y1, 0.0),
+            share_of_way(y0, y1, rows),
+            t1,
+        ];
+        bends.sort_by(f64::total_cmp);
+        let mut range = HeightRange::EMPTY;
+        let mut from = t0;
+        for to in bends.map(|bend| bend.clamp(t0, t1)) {
+            if to > from || (to >= t1 && range == HeightRange::EMPTY) {
+                range = range.join(self.height_range_straight(leg, (from, to)));
+                from = to;
+            }
+        }
+        range
+    }
+
+    /// As [`Grid::height_range`], of a part that crosses no edge of the grid.
+    fn height_range_straight(&self, leg: &Segment, (t0, t1): (f64, f64)) -> HeightRange {
         let (from, to) = (leg.at(t0), leg.at(t1));
-        let (x0, y0) = self.in_cells(from.xy());
-        let (x1, y1) = self.in_cells(to.xy());
+        let (x0, y0) = self.onto_grid(self.in_cells(from.xy()));
+        let (x1, y1) = self.onto_grid(self.in_cells(to.xy()));
         let mut range = HeightRange::EMPTY;
         let mut u = 0.0;
         // u runs from 0 to 1 over the window; each cell ends at the next grid line in either direction.
@@ -68,11 +94,16 @@ impl Grid {
         range
     }
 
-    /// `point` in cells from the first node, brought onto the grid.
+    /// `point` in cells from the first node.
     fn in_cells(&self, point: Point2) -> (f64, f64) {
         let offset = (point - self.origin) / self.cell;
+        (offset.x, offset.y)
+    }
+
+    /// The place on the grid nearest to `(x, y)`, all in cells.
+    fn onto_grid(&self, (x, y): (f64, f64)) -> (f64, f64) {
         let onto = |value: f64, nodes: usize| value.clamp(0.0, (nodes - 1) as f64);
-        (onto(offset.x, self.columns), onto(offset.y, self.rows))
+        (onto(x, self.columns), onto(y, self.rows))
     }
 
     #[expect(
@@ -95,6 +126,12 @@ impl Grid {
             zxy: z[north + 1] - z[north] - z[south + 1] + z[south],
         }
     }
+}
+
+/// The `t` at which `a + (b - a) t` is `value`; infinite when nowhere.
+fn share_of_way(a: f64, b: f64, value: f64) -> f64 {
+    let t = (value - a) / (b - a);
+    if t.is_nan() { f64::INFINITY } else { t }
 }
 
 /// The least `u` beyond `from` at which `a + (b - a) u` is a whole number; infinite when never.
@@ -121,7 +158,12 @@ fn next_line(a: f64, b: f64, from: f64) -> f64 {
 
 impl Patch {
     /// Height above this patch's ground along the way from `(x0, y0)` to `(x1, y1)` at `z0` to `z1`.
-    fn height_below(&self, (x0, y0): (f64, f64), (x1, y1): (f64, f64), (z0, z1): (f64, f64)) -> Quadratic {
+    fn height_below(
+        &self,
+        (x0, y0): (f64, f64),
+        (x1, y1): (f64, f64),
+        (z0, z1): (f64, f64),
+    ) -> Quadratic {
         let (x, y) = (x0 - self.column, y0 - self.row);
         let (dx, dy) = (x1 - x0, y1 - y0);
         Quadratic {
@@ -154,7 +196,9 @@ mod tests {
         let grid = hills();
         assert!((grid.elevation(Point2::new(-10.0, 5.0)) - grid.elevations[0]).abs() < 1e-12);
         assert!((grid.elevation(Point2::new(50.0, 45.0)) - grid.elevations[34]).abs() < 1e-12);
-        let mean = (grid.elevations[0] + grid.elevations[1] + grid.elevations[7] + grid.elevations[8]) / 4.0;
+        let mean =
+            (grid.elevations[0] + grid.elevations[1] + grid.elevations[7] + grid.elevations[8])
+                / 4.0;
         assert!((grid.elevation(Point2::new(-5.0, 10.0)) - mean).abs() < 1e-12);
     }
 
@@ -177,7 +221,8 @@ mod tests {
     proptest! {
         #[test]
         fn the_range_holds_every_sample_and_is_reached(
-            x0 in -10.0..50.0f64, y0 in 5.0..45.0f64, x1 in -10.0..50.0f64, y1 in 5.0..45.0f64,
+            // The grid reaches from (-10, 5) to (50, 45).
+            x0 in -25.0..65.0f64, y0 in -10.0..60.0f64, x1 in -25.0..65.0f64, y1 in -10.0..60.0f64,
             z0 in 0.0..40.0f64, z1 in 0.0..40.0f64, t0 in 0.0..0.5f64, t1 in 0.5..1.0f64,
         ) {
             let grid = hills();

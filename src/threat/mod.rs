@@ -62,6 +62,15 @@ impl Threat {
             }
     }
 
+    /// Horizontal distance of `point` to the boundary, metres, negative inside, whatever its height.
+    #[must_use]
+    pub fn distance(&self, point: Point2) -> f64 {
+        match &self.shape {
+            Shape::Cylinder(cylinder) => cylinder.distance(point),
+            Shape::Polygon(polygon) => polygon.distance(point),
+        }
+    }
+
     /// `T(d)` of Eq. 5 at `point`, metres.
     #[must_use]
     pub fn intensity(&self, point: Point3) -> f64 {
@@ -103,10 +112,13 @@ impl Threat {
                 clearance: Some(cylinder.clearance(leg, window)),
                 exposure: cylinder.exposure(leg, window),
             },
-            Shape::Polygon(polygon) => Encounter {
-                clearance: Some(polygon.clearance(leg, window)),
-                exposure: polygon.exposure(leg, window),
-            },
+            Shape::Polygon(polygon) => {
+                let (clearance, exposure) = polygon.encounter(leg, window);
+                Encounter {
+                    clearance: Some(clearance),
+                    exposure,
+                }
+            }
         }
     }
 
@@ -130,6 +142,10 @@ fn intensity(influence: f64, distance: f64) -> f64 {
 }
 
 /// Exposure of a leg that has no horizontal extent: `T` is the same all along.
-fn hover_exposure(leg: &Segment, (t0, t1): (f64, f64), intensity_at: impl Fn(Point2) -> f64) -> f64 {
+fn hover_exposure(
+    leg: &Segment,
+    (t0, t1): (f64, f64),
+    intensity_at: impl Fn(Point2) -> f64,
+) -> f64 {
     intensity_at(leg.at(0.5 * (t0 + t1)).xy()) * leg.length() * (t1 - t0)
 }

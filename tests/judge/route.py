@@ -167,7 +167,10 @@ def faults(points, scenario, smoothed=False):
     add("climb", measured.climb - scenario.max_climb, 0.05 if smoothed else 1e-6)
     if not smoothed:
         add("leg", scenario.min_leg - measured.leg, metres)
-        if scenario.area is not None:
+        if scenario.area is None:
+            # The box that the service takes is its own affair; a route may break it.
+            found.possible["area"] = 0.0
+        else:
             add("area", max((_outside(point, scenario.area) for point in points[1:-1]), default=0.0), metres)
     return found
 

@@ -112,6 +112,12 @@ class Truth(Case):
             self.assertIn(kind, [violation["kind"] for violation in result["checks"]["violations"]])
             self.agrees(result)
 
+    def test_of_a_route_out_of_an_area_that_the_service_chose(self):
+        # The scenario says nothing of it, so the claim cannot be told from a lie.
+        result = honest.result(SCENARIO, [(100.0, 155.0, 60.0), (200.0, 155.0, 60.0)])
+        self.assertIn("area", [violation["kind"] for violation in result["checks"]["violations"]])
+        self.assertEqual(self.complaints(result, area=None), self.complaints(result))
+
 
 class Falsehood(Case):
     def setUp(self):

@@ -257,10 +257,7 @@ async fn the_service_draws_for_who_asks() {
     let named = api.get(&format!("{result}?format=svg")).await;
     assert_eq!(named.status, 200);
     assert_eq!(named.header("content-type"), "image/svg+xml");
-    expect_words(
-        &String::from_utf8(named.body.to_vec()).expect("UTF-8"),
-        "two radars",
-    );
+    expect_words(str::from_utf8(&named.body).expect("UTF-8"), "two radars");
     for (accept, media_type) in [
         ("image/svg+xml", "image/svg+xml"),
         ("image/*", "image/svg+xml"),

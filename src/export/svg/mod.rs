@@ -144,7 +144,7 @@ impl Drawing {
     /// The area and the route with a little room, in a frame of a pleasant shape.
     fn map(&self, top: f64) -> MapScale {
         let ends = [self.scenario.area.min, self.scenario.area.max];
-        let route = self.waypoints.iter().map(|point| point.xy());
+        let route = self.waypoints.iter().map(Point3::xy);
         let shown = Rect::around(ends.into_iter().chain(route)).expect("an area has corners");
         let (width, height) = (shown.max.x - shown.min.x, shown.max.y - shown.min.y);
         let shown = shown.grown((0.02 * width.max(height)).max(0.5));
@@ -185,6 +185,6 @@ fn figure(value: f64) -> String {
 
 /// Metres for people.
 fn metres(value: f64) -> String {
-    let decimals = if value.abs() >= 100.0 { 0 } else { 1 };
+    let decimals = usize::from(value.abs() < 100.0);
     format!("{value:.decimals$} m")
 }

@@ -386,7 +386,7 @@ fn core_box(threat: &Threat, map: &MapScale) -> (Spot, (f64, f64)) {
         Shape::Polygon(polygon) => threat.extent().grown(-polygon.margin()),
     };
     let ((left, bottom), (right, top)) = (map.spot(extent.min), map.spot(extent.max));
-    let middle = ((left + right) / 2.0, (top + bottom) / 2.0);
+    let middle = (f64::midpoint(left, right), f64::midpoint(top, bottom));
     (middle, (right - left, bottom - top))
 }
 

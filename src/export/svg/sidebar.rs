@@ -80,7 +80,7 @@ fn legend(drawing: &Drawing) -> Vec<(&'static str, Mark)> {
             }
         }),
         (true, "edge of the area", |canvas, at| {
-            across(canvas, at, AREA_EDGE)
+            across(canvas, at, AREA_EDGE);
         }),
     ];
     let shown = rows.into_iter().filter(|(occurs, ..)| *occurs);

@@ -46,7 +46,8 @@ impl Arguments {
 
 /// Plan, write the result, and say by the exit code how it went.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
-    let text = read(&arguments.file).with_context(|| format!("cannot read {}", arguments.file.display()))?;
+    let text = read(&arguments.file)
+        .with_context(|| format!("cannot read {}", arguments.file.display()))?;
     let rules = Rules {
         limits: Limits::default(),
         algorithms: planner::algorithm_rules(),
@@ -206,7 +207,10 @@ impl Observer for Progress {
 fn summary(outcome: &Outcome) -> String {
     if outcome.feasible {
         let legs = outcome.legs.len();
-        format!("a feasible route of {legs} legs, cost {:.4}", outcome.cost.total)
+        format!(
+            "a feasible route of {legs} legs, cost {:.4}",
+            outcome.cost.total
+        )
     } else {
         let violations = outcome.violations.len();
         format!("no feasible route; the least violating one breaks {violations} constraints")

@@ -9,13 +9,20 @@ use super::AppState;
 use super::problem::Problem;
 
 /// The whole body.
-pub(super) async fn read_json(state: &AppState, headers: &HeaderMap, body: Body) -> Result<Bytes, Problem> {
+pub(super) async fn read_json(
+    state: &AppState,
+    headers: &HeaderMap,
+    body: Body,
+) -> Result<Bytes, Problem> {
     let (limit, timeout) = (state.rules.limits.body_bytes, state.body_timeout);
     if !is_json(headers) {
         let found = headers.get(header::CONTENT_TYPE);
-        return Err(Problem::UnsupportedMediaType(
-            found.map(|value| String::from_utf8_lossy(value.as_bytes()).into_owned()),
-        ));
+        return Err(Problem::UnsupportedMediaType(found.map(|value| {
+            String::from_utf8_lossy(value.as_bytes()).into_owned()
+        })));
+    }
+    if let Some(coding) = coding(headers) {
+        return Err(Problem::UnsupportedCoding(coding));
     }
     if announced_length(headers).is_some_and(|length| length > limit as u64) {
         return Err(Problem::BodyTooLarge(limit));
@@ -31,8 +38,24 @@ pub(super) async fn read_json(state: &AppState, headers: &HeaderMap, body: Body)
     }
 }
 
+/// How the body is coded, when it is.
+fn coding(headers: &HeaderMap) -> Option<String> {
+    let coding = headers
+        .get_all(header::CONTENT_ENCODING)
+        .iter()
+        .map(|value| String::from_utf8_lossy(value.as_bytes()).trim().to_owned());
+    coding
+        .filter(|coding| !coding.is_empty() && !coding.eq_ignore_ascii_case("identity"))
+        .reduce(|all, one| format!("{all}, {one}"))
+}
+
 fn announced_length(headers: &HeaderMap) -> Option<u64> {
-    headers.get(header::CONTENT_LENGTH)?.to_str().ok()?.parse().ok()
+    headers
+        .get(header::CONTENT_LENGTH)?
+        .to_str()
+        .ok()?
+        .parse()
+        .ok()
 }
 
 /// `application/json` or `application/*+json`, in UTF-8 or no charset named.
@@ -57,6 +80,23 @@ fn is_json(headers: &HeaderMap) -> bool {
 mod tests {
     use super::*;
     use axum::http::HeaderValue;
+
+    #[test]
+    fn tells_a_coded_body() {
+        for (values, expected) in [
+            (&["gzip"][..], Some("gzip")),
+            (&["Identity"], None),
+            (&[""], None),
+            (&[], None),
+            (&["br", "identity", "zstd"], Some("br, zstd")),
+        ] {
+            let mut headers = HeaderMap::new();
+            for value in values {
+                headers.append(header::CONTENT_ENCODING, HeaderValue::from_static(value));
+            }
+            assert_eq!(coding(&headers).as_deref(), expected, "{values:?}");
+        }
+    }
 
     #[test]
     fn tells_json_from_the_rest() {

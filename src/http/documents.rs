@@ -73,7 +73,11 @@ fn choose_format(params: &Params, headers: &HeaderMap) -> Result<&'static Format
     }
     let offers: Vec<_> = export::ALL.iter().map(|format| format.media_type).collect();
     accept::choose(headers, &offers)
-        .and_then(|media_type| export::ALL.iter().find(|format| format.media_type == media_type))
+        .and_then(|media_type| {
+            export::ALL
+                .iter()
+                .find(|format| format.media_type == media_type)
+        })
         .ok_or_else(|| Problem::NotAcceptable {
             asked: accept::asked(headers),
             available: offers,

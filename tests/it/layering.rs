@@ -91,26 +91,50 @@ fn imports_out_of_rank_are_found() {
     }
     // What is above, or within.
     check("cost/fuel.rs", "use crate::geometry::Point3;", &[]);
-    check("cost/fuel.rs", "use crate::cost::Route; use super::Route;", &[]);
-    check("cost/fuel.rs", "pub(crate) fn a() {} use crate::VERSION;", &[]);
+    check(
+        "cost/fuel.rs",
+        "use crate::cost::Route; use super::Route;",
+        &[],
+    );
+    check(
+        "cost/fuel.rs",
+        "pub(crate) fn a() {} use crate::VERSION;",
+        &[],
+    );
     // What is below, in every way to write it.
     check("cost/fuel.rs", "use crate::planner::plan;", &["planner"]);
     check("cost/fuel.rs", "use crate::planner;", &["planner"]);
-    check("cost/fuel.rs", "pub use crate :: planner :: plan ;", &["planner"]);
-    check("cost/fuel.rs", "fn a() -> crate::job::Plan { b() }", &["job"]);
+    check(
+        "cost/fuel.rs",
+        "pub use crate :: planner :: plan ;",
+        &["planner"],
+    );
+    check(
+        "cost/fuel.rs",
+        "fn a() -> crate::job::Plan { b() }",
+        &["job"],
+    );
     check(
         "cost/fuel.rs",
         "use crate::{geometry::{Point3, http}, job::{Plan, State}, cli};",
         &["job", "cli"],
     );
     check("cost/mod.rs", "use super::planner::plan;", &["planner"]);
-    check("cost/fuel.rs", "use super::super::planner::plan;", &["planner"]);
+    check(
+        "cost/fuel.rs",
+        "use super::super::planner::plan;",
+        &["planner"],
+    );
     check(
         "cost/mod.rs",
         "mod tests { use super::super::planner; }",
         &["planner"],
     );
-    check("telemetry.rs", "use super::{config, store::Store};", &["store"]);
+    check(
+        "telemetry.rs",
+        "use super::{config, store::Store};",
+        &["store"],
+    );
     // A module may bear the name of a room.
     check("scenario/json/fields.rs", "use super::planner::read;", &[]);
     check(
@@ -137,13 +161,21 @@ fn imports_out_of_rank_are_found() {
         "/// Called by [`crate::planner::plan`].\nfn a() {}",
         &[],
     );
-    check("cost/fuel.rs", "/* use /* of */ crate::job; */ fn a() {}", &[]);
+    check(
+        "cost/fuel.rs",
+        "/* use /* of */ crate::job; */ fn a() {}",
+        &[],
+    );
     check(
         "cost/fuel.rs",
         r##"const A: &str = r#"" use crate::job; "#;"##,
         &[],
     );
-    check("cost/fuel.rs", r#"const A: &str = "\" use crate::job;";"#, &[]);
+    check(
+        "cost/fuel.rs",
+        r#"const A: &str = "\" use crate::job;";"#,
+        &[],
+    );
     check(
         "cost/fuel.rs",
         "fn a<'a>(b: &'a u8) { c('\"', '\\''); } use crate::job;",
@@ -166,7 +198,11 @@ fn libraries_out_of_place_are_found() {
     check("store/mod.rs", "use axum::Router;", &["axum"]);
     check("store/sqlite/mod.rs", "use rusqlite::Connection;", &[]);
     check("http/mod.rs", "use rusqlite as sql;", &["rusqlite"]);
-    check("planner/mod.rs", "fn a() { ::tokio::spawn(b); }", &["tokio"]);
+    check(
+        "planner/mod.rs",
+        "fn a() { ::tokio::spawn(b); }",
+        &["tokio"],
+    );
     check("job/mod.rs", "#[tokio::test]\nasync fn a() {}", &["tokio"]);
     check("worker/mod.rs", "use anyhow::Context;", &["anyhow"]);
     // Words that only look like it.
@@ -328,7 +364,10 @@ fn quoted(text: &str) -> Option<usize> {
     let bytes = text.as_bytes();
     let prefix = usize::from(bytes.starts_with(b"b"));
     if bytes[prefix..].starts_with(b"r\"") || bytes[prefix..].starts_with(b"r#") {
-        let hashes = bytes[prefix + 1..].iter().take_while(|b| **b == b'#').count();
+        let hashes = bytes[prefix + 1..]
+            .iter()
+            .take_while(|b| **b == b'#')
+            .count();
         let start = prefix + 1 + hashes + 1;
         if bytes.get(start - 1) != Some(&b'"') {
             return None; // A raw identifier.
@@ -343,7 +382,9 @@ fn quoted(text: &str) -> Option<usize> {
     match bytes.get(prefix) {
         Some(b'"') => Some(closed_by(b'"', bytes, prefix + 1)),
         // A character, unless it is a lifetime: that one is not closed.
-        Some(b'\'') if bytes.get(prefix + 1) == Some(&b'\\') => Some(closed_by(b'\'', bytes, prefix + 1)),
+        Some(b'\'') if bytes.get(prefix + 1) == Some(&b'\\') => {
+            Some(closed_by(b'\'', bytes, prefix + 1))
+        }
         Some(b'\'') => {
             let character = text[prefix + 1..].chars().next()?;
             let end = prefix + 1 + character.len_utf8();
@@ -375,7 +416,10 @@ fn sources() -> Vec<(PathBuf, String)> {
     while let Some(directory) = directories.pop() {
         for entry in fs::read_dir(&directory).expect("the directory is there") {
             let path = entry.expect("it can be listed").path();
-            let below = path.strip_prefix(&root).expect("it is below src").to_owned();
+            let below = path
+                .strip_prefix(&root)
+                .expect("it is below src")
+                .to_owned();
             if path.is_dir() {
                 directories.push(path);
             } else if below.extension().is_some_and(|extension| extension == "rs")

@@ -23,7 +23,8 @@ fn accepted(document: &Value) -> String {
         limits: Limits::default(),
         algorithms: planner::algorithm_rules(),
     };
-    let scenario = json::read(document.to_string().as_bytes(), &rules, 7).expect("a valid scenario");
+    let scenario =
+        json::read(document.to_string().as_bytes(), &rules, 7).expect("a valid scenario");
     json::write(&scenario)
 }
 
@@ -67,13 +68,19 @@ fn words(drawing: &str) -> Vec<String> {
     for node in root.descendants() {
         let name = node.tag_name().name();
         assert!(
-            !matches!(name, "script" | "style" | "image" | "use" | "a" | "foreignObject"),
+            !matches!(
+                name,
+                "script" | "style" | "image" | "use" | "a" | "foreignObject"
+            ),
             "{name}"
         );
         for attribute in node.attributes() {
             let (name, value) = (attribute.name(), attribute.value());
             assert!(!name.starts_with("on") && name != "href", "{name}");
-            assert!(!value.contains("NaN") && !value.contains("inf"), "{name}={value}");
+            assert!(
+                !value.contains("NaN") && !value.contains("inf"),
+                "{name}={value}"
+            );
             assert!(
                 !value.contains("url(") || value.starts_with("url(#"),
                 "{name}={value}"
@@ -83,7 +90,10 @@ fn words(drawing: &str) -> Vec<String> {
     let texts = root
         .descendants()
         .filter(|node| node.has_tag_name(("http://www.w3.org/2000/svg", "text")));
-    texts.filter_map(|node| node.text()).map(str::to_owned).collect()
+    texts
+        .filter_map(|node| node.text())
+        .map(str::to_owned)
+        .collect()
 }
 
 #[track_caller]
@@ -174,7 +184,11 @@ fn an_infeasible_route_is_unmistakable() {
     let drawing = String::from_utf8(plan.stdout).expect("UTF-8");
     expect_words(&drawing, "NOT FEASIBLE: ");
     expect_words(&drawing, "leg in violation");
-    assert!(!words(&drawing).iter().any(|line| line.contains("path flown")));
+    assert!(
+        !words(&drawing)
+            .iter()
+            .any(|line| line.contains("path flown"))
+    );
     assert!(drawing.contains(ALARM));
 }
 
@@ -238,7 +252,8 @@ fn odd_areas_draw() {
     ] {
         let mut result = result();
         let ends = [&document["start"], &document["target"]];
-        let ends = ends.map(|end| serde_json::from_value::<Position>(end.clone()).expect("a point"));
+        let ends =
+            ends.map(|end| serde_json::from_value::<Position>(end.clone()).expect("a point"));
         result.waypoints = vec![ends[0], ends[0], ends[1]];
         result.path = None;
         expect_words(&draw(&document, &result), "two radars");
@@ -257,13 +272,22 @@ async fn the_service_draws_for_who_asks() {
     let named = api.get(&format!("{result}?format=svg")).await;
     assert_eq!(named.status, 200);
     assert_eq!(named.header("content-type"), "image/svg+xml");
-    expect_words(str::from_utf8(&named.body).expect("UTF-8"), "two radars");
+    expect_words(
+        std::str::from_utf8(&named.body).expect("UTF-8"),
+        "two radars",
+    );
     for (accept, media_type) in [
         ("image/svg+xml", "image/svg+xml"),
         ("image/*", "image/svg+xml"),
         ("application/json;q=0.5, image/svg+xml", "image/svg+xml"),
-        ("image/avif,image/svg+xml,image/*,*/*;q=0.8", "image/svg+xml"),
-        ("text/html,application/xml;q=0.9,*/*;q=0.8", "application/json"),
+        (
+            "image/avif,image/svg+xml,image/*,*/*;q=0.8",
+            "image/svg+xml",
+        ),
+        (
+            "text/html,application/xml;q=0.9,*/*;q=0.8",
+            "application/json",
+        ),
         ("*/*", "application/json"),
     ] {
         let answer = api.get_with(&result, &[("accept", accept)]).await;
@@ -275,7 +299,10 @@ async fn the_service_draws_for_who_asks() {
         );
     }
     let decided = api
-        .get_with(&format!("{result}?format=json"), &[("accept", "image/svg+xml")])
+        .get_with(
+            &format!("{result}?format=json"),
+            &[("accept", "image/svg+xml")],
+        )
         .await;
     assert_eq!(decided.header("content-type"), "application/json");
 }
@@ -283,7 +310,14 @@ async fn the_service_draws_for_who_asks() {
 #[test]
 fn the_name_of_the_file_decides_unless_a_format_is_named() {
     let directory = tempfile::tempdir().expect("a temporary directory");
-    let path = |name: &str| directory.path().join(name).to_str().expect("UTF-8").to_owned();
+    let path = |name: &str| {
+        directory
+            .path()
+            .join(name)
+            .to_str()
+            .expect("UTF-8")
+            .to_owned()
+    };
     for (name, format, drawn) in [
         ("route.svg", None, true),
         ("ROUTE.SVG", None, true),

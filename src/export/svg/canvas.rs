@@ -189,7 +189,10 @@ impl Canvas {
                  stroke-linejoin=\"round\">{words}</text>"
             ));
         }
-        self.line(&format!("<text {style} fill=\"{}\">{words}</text>", font.fill));
+        self.line(&format!(
+            "<text {style} fill=\"{}\">{words}</text>",
+            font.fill
+        ));
     }
 
     pub(super) fn rect(&mut self, area: &Area, style: &str) {
@@ -202,7 +205,10 @@ impl Canvas {
 
     pub(super) fn circle(&mut self, at: Spot, radius: f64, style: &str) {
         let [x, y, r] = [at.0, at.1, radius].map(num);
-        self.element("circle", &format!("cx=\"{x}\" cy=\"{y}\" r=\"{r}\" {style}"));
+        self.element(
+            "circle",
+            &format!("cx=\"{x}\" cy=\"{y}\" r=\"{r}\" {style}"),
+        );
     }
 
     pub(super) fn line_between(&mut self, from: Spot, to: Spot, style: &str) {
@@ -306,7 +312,7 @@ mod tests {
             (-0.04, "0"),
             (12.0, "12"),
             (0.25, "0.3"),
-            (-3.12, "-3.1"),
+            (-2.55, "-2.6"),
             (1e12, "1000000"),
         ] {
             assert_eq!(num(value), expected);
@@ -334,6 +340,9 @@ mod tests {
         let font = Font::new(10.0, "#000");
         assert_eq!(font.fit("short", 100.0), "short");
         let cut = font.fit("a name that goes on and on", 60.0);
-        assert!(cut.ends_with('\u{2026}') && font.measure(&cut).0 <= 65.0, "{cut}");
+        assert!(
+            cut.ends_with('\u{2026}') && font.measure(&cut).0 <= 65.0,
+            "{cut}"
+        );
     }
 }

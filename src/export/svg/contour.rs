@@ -84,7 +84,8 @@ impl Field {
         let (s, n) = (corner, corner + self.columns);
         let (w, e) = (vertical + corner, vertical + corner + 1);
         let joined = (sw + se + ne + nw) / 4.0 >= level;
-        let pieces: &[(usize, usize)] = match high(sw, 1) + high(se, 2) + high(ne, 4) + high(nw, 8) {
+        let pieces: &[(usize, usize)] = match high(sw, 1) + high(se, 2) + high(ne, 4) + high(nw, 8)
+        {
             1 => &[(s, w)],
             2 => &[(e, s)],
             3 => &[(e, w)],
@@ -138,7 +139,10 @@ mod tests {
     /// Twice the enclosed area, counter-clockwise positive.
     fn doubled_area(ring: &[(f64, f64)]) -> f64 {
         let next = ring.iter().cycle().skip(1);
-        ring.iter().zip(next).map(|(a, b)| a.0 * b.1 - b.0 * a.1).sum()
+        ring.iter()
+            .zip(next)
+            .map(|(a, b)| a.0 * b.1 - b.0 * a.1)
+            .sum()
     }
 
     #[test]
@@ -176,7 +180,11 @@ mod tests {
                 1.0
             }
         });
-        let mut areas: Vec<f64> = field.rings(0.5).iter().map(|ring| doubled_area(ring)).collect();
+        let mut areas: Vec<f64> = field
+            .rings(0.5)
+            .iter()
+            .map(|ring| doubled_area(ring))
+            .collect();
         areas.sort_by(f64::total_cmp);
         assert_eq!(areas.len(), 2);
         assert!(areas[0] < 0.0 && areas[1] > 0.0, "{areas:?}");

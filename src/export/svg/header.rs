@@ -14,7 +14,11 @@ pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing) {
     let title = Font::new(20.0, INK).bold();
     canvas.text((LEFT, 36.0), &title, &title.fit(drawing.name(), width));
     let facts = Font::new(13.0, MUTED);
-    canvas.text((LEFT, 58.0), &facts, &facts.fit(&facts_line(drawing), width));
+    canvas.text(
+        (LEFT, 58.0),
+        &facts,
+        &facts.fit(&facts_line(drawing), width),
+    );
     if !drawing.result.feasible {
         let banner = Area {
             left: LEFT,

@@ -27,7 +27,9 @@ impl Labels {
         for ends in line.windows(2) {
             let (dx, dy) = (ends[1].0 - ends[0].0, ends[1].1 - ends[0].1);
             // However long a line runs beyond the frame, this many boxes cover what is seen of it.
-            let steps = ((dx * dx + dy * dy).sqrt() / SIDE).ceil().clamp(1.0, 1000.0);
+            let steps = ((dx * dx + dy * dy).sqrt() / SIDE)
+                .ceil()
+                .clamp(1.0, 1000.0);
             let mut step = 0.0;
             while step <= steps {
                 let t = step / steps;

@@ -10,7 +10,8 @@ use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};
 
 /// Style of a line that is drawn under another one to set it off.
-const CASING: &str = "fill=\"none\" stroke=\"#fff\" stroke-opacity=\"0.75\" stroke-linejoin=\"round\"";
+const CASING: &str =
+    "fill=\"none\" stroke=\"#fff\" stroke-opacity=\"0.75\" stroke-linejoin=\"round\"";
 /// Style of every line of the route.
 const LINE: &str = "fill=\"none\" stroke-linejoin=\"round\" stroke-linecap=\"round\"";
 
@@ -136,7 +137,11 @@ fn soft_zone(canvas: &mut Canvas, threat: &Threat, map: &MapScale) {
 fn core(canvas: &mut Canvas, threat: &Threat, map: &MapScale) {
     let draw = |canvas: &mut Canvas| match &threat.shape {
         Shape::Cylinder(disc) => {
-            canvas.circle(map.spot(disc.center), disc.radius * map.pixels_per_metre(), "");
+            canvas.circle(
+                map.spot(disc.center),
+                disc.radius * map.pixels_per_metre(),
+                "",
+            );
         }
         Shape::Polygon(polygon) => canvas.path(&outline(polygon.vertices(), map), ""),
     };
@@ -161,7 +166,10 @@ fn route(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale) {
         canvas.path(&data, &format!("{CASING} stroke-width=\"6\""));
         canvas.path(
             &data,
-            &format!("{LINE} stroke=\"{}\" stroke-width=\"3\"", drawing.route_color()),
+            &format!(
+                "{LINE} stroke=\"{}\" stroke-width=\"3\"",
+                drawing.route_color()
+            ),
         );
         let straight = polyline(&waypoints);
         canvas.path(&straight, STRAIGHT);
@@ -263,7 +271,12 @@ fn axes(canvas: &mut Canvas, map: &MapScale) {
         canvas.text(place, &font.anchor("end"), &steps.label(y));
     }
     let title = Font::new(11.0, MUTED).anchor("middle");
-    canvas.turned_text((16.0, frame.top + frame.height / 2.0), -90.0, &title, "north, m");
+    canvas.turned_text(
+        (16.0, frame.top + frame.height / 2.0),
+        -90.0,
+        &title,
+        "north, m",
+    );
     let foot = frame.bottom() + 36.0;
     canvas.text((frame.left + frame.width / 2.0, foot), &title, "east, m");
 
@@ -286,7 +299,12 @@ fn axes(canvas: &mut Canvas, map: &MapScale) {
 }
 
 fn north(canvas: &mut Canvas, (x, y): Spot) {
-    let arrow = [(x, y - 9.0), (x + 4.5, y + 5.0), (x, y + 2.0), (x - 4.5, y + 5.0)];
+    let arrow = [
+        (x, y - 9.0),
+        (x + 4.5, y + 5.0),
+        (x, y + 2.0),
+        (x - 4.5, y + 5.0),
+    ];
     canvas.path(&ring(&arrow), &format!("fill=\"{MUTED}\""));
     canvas.text((x + 9.0, y + 4.0), &Font::new(11.0, MUTED).bold(), "N");
 }
@@ -312,7 +330,11 @@ fn waypoint_numbers(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale, labe
     let broken = drawing.broken("leg");
     let inner = drawing.waypoints.len() - 1;
     for (idx, point) in drawing.waypoints.iter().enumerate().take(inner).skip(1) {
-        let font = if broken.contains(&idx) { &alarmed } else { &calm };
+        let font = if broken.contains(&idx) {
+            &alarmed
+        } else {
+            &calm
+        };
         let words = idx.to_string();
         let around = around(map.spot(point.xy()), font.measure(&words), 5.0);
         put(canvas, labels, font, &words, around);

@@ -55,7 +55,9 @@ pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, frame: Area) {
     };
     canvas.rect(&frame, "fill=\"#fafbfc\"");
     axes(canvas, &scale, drawing);
-    canvas.group("clipPath", "id=\"profile\"", |canvas| canvas.rect(&frame, ""));
+    canvas.group("clipPath", "id=\"profile\"", |canvas| {
+        canvas.rect(&frame, "");
+    });
     canvas.group("g", "clip-path=\"url(#profile)\"", |canvas| {
         band(canvas, drawing, &stations, &scale);
         canvas.group("g", CROSSED, |canvas| {
@@ -211,7 +213,8 @@ fn crossings(canvas: &mut Canvas, threat: &Threat, stations: &[Station], scale: 
     };
     let extent = unlimited.extent();
     let reached = |station: &Station| {
-        extent.contains(station.at) && unlimited.intensity(Point3::new(station.at.x, station.at.y, 0.0)) > 0.0
+        extent.contains(station.at)
+            && unlimited.intensity(Point3::new(station.at.x, station.at.y, 0.0)) > 0.0
     };
     let (low, high) = scale.heights;
     let bottom = threat.base.unwrap_or(low).max(low);
@@ -235,7 +238,13 @@ fn crossings(canvas: &mut Canvas, threat: &Threat, stations: &[Station], scale: 
     }
 }
 
-fn flown(canvas: &mut Canvas, drawing: &Drawing, course: &[Spot], stations: &[Station], scale: &Scale) {
+fn flown(
+    canvas: &mut Canvas,
+    drawing: &Drawing,
+    course: &[Spot],
+    stations: &[Station],
+    scale: &Scale,
+) {
     let color = drawing.route_color();
     let line = "fill=\"none\" stroke-linejoin=\"round\" stroke-linecap=\"round\"";
     canvas.path(
@@ -245,7 +254,9 @@ fn flown(canvas: &mut Canvas, drawing: &Drawing, course: &[Spot], stations: &[St
     let marks: Vec<Spot> = if drawing.path.is_some() {
         let ways = abreast(&drawing.waypoints, stations);
         let points = drawing.waypoints.iter().zip(ways);
-        points.map(|(point, way)| scale.spot(way, point.z)).collect()
+        points
+            .map(|(point, way)| scale.spot(way, point.z))
+            .collect()
     } else {
         for leg in drawing.broken("leg") {
             if let Some(ends) = course.get(leg..leg + 2) {

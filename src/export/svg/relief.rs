@@ -79,8 +79,9 @@ impl Relief {
             let rings = field.rings(level).into_iter();
             rings
                 .map(|ring| {
-                    let spot =
-                        |(x, y): (f64, f64)| (map.frame.left + x * pixels, map.frame.bottom() - y * pixels);
+                    let spot = |(x, y): (f64, f64)| {
+                        (map.frame.left + x * pixels, map.frame.bottom() - y * pixels)
+                    };
                     ring.into_iter().map(spot).collect::<Vec<_>>()
                 })
                 .filter(|ring: &Vec<_>| extent(ring) > 1.5)

@@ -100,7 +100,10 @@ mod tests {
             let ticks = steps.within(min, max);
             ticks.into_iter().map(|tick| steps.label(tick)).collect()
         };
-        assert_eq!(labels(Steps::of(0.6, 3.0), -0.25, 0.35), ["-0.2", "0.0", "0.2"]);
+        assert_eq!(
+            labels(Steps::of(0.6, 3.0), -0.25, 0.35),
+            ["-0.2", "0.0", "0.2"]
+        );
         assert_eq!(labels(Steps::of(10.0, 2.0), 10.0, 20.0), ["10", "15", "20"]);
     }
 }

@@ -42,18 +42,30 @@ fn legend(drawing: &Drawing) -> Vec<(&'static str, Mark)> {
         (true, "start", start),
         (true, "target", target),
         (drawing.path.is_some(), "path flown", |canvas, at| {
-            across(canvas, at, &format!("stroke=\"{ROUTE}\" stroke-width=\"3\""));
+            across(
+                canvas,
+                at,
+                &format!("stroke=\"{ROUTE}\" stroke-width=\"3\""),
+            );
         }),
         (feasible, "waypoints and legs", |canvas, at| {
             across(canvas, at, STRAIGHT);
             waypoint(canvas, at);
         }),
         (!feasible, "least violating route", |canvas, at| {
-            across(canvas, at, &format!("stroke=\"{BROKEN}\" stroke-width=\"2\""));
+            across(
+                canvas,
+                at,
+                &format!("stroke=\"{BROKEN}\" stroke-width=\"2\""),
+            );
             waypoint(canvas, at);
         }),
         (!feasible, "leg in violation", |canvas, at| {
-            across(canvas, at, &format!("stroke=\"{BROKEN}\" stroke-width=\"2\""));
+            across(
+                canvas,
+                at,
+                &format!("stroke=\"{BROKEN}\" stroke-width=\"2\""),
+            );
             across(canvas, at, BROKEN_LEG);
         }),
         (
@@ -168,7 +180,10 @@ fn figures(canvas: &mut Canvas, drawing: &Drawing, column: &Area, top: f64) {
         ("lower bound", Some(figure(result.bound.lower))),
         ("gap at most", gap),
         ("above ground", heights),
-        ("sharpest turn", Some(format!("{:.1}\u{b0}", legs.max_turn_deg))),
+        (
+            "sharpest turn",
+            Some(format!("{:.1}\u{b0}", legs.max_turn_deg)),
+        ),
         (
             "steepest climb",
             Some(format!("{:.1}\u{b0}", measures.max_climb_deg)),
@@ -181,7 +196,11 @@ fn figures(canvas: &mut Canvas, drawing: &Drawing, column: &Area, top: f64) {
         let Some(value) = value else { continue };
         if words == "cost" {
             let rule = y - FIGURE_LINE + 5.0;
-            canvas.line_between((column.left, rule), (right, rule), &format!("stroke=\"{RULE}\""));
+            canvas.line_between(
+                (column.left, rule),
+                (right, rule),
+                &format!("stroke=\"{RULE}\""),
+            );
         }
         canvas.text((column.left, y), &Font::new(12.0, MUTED), words);
         let font = Font::new(12.0, INK).anchor("end");

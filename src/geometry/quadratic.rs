@@ -75,7 +75,7 @@ mod tests {
             for (root, wanted) in roots.into_iter().zip(expected) {
                 match (root, wanted) {
                     (Some(root), Some(wanted)) => {
-                        assert!((root - wanted).abs() < 1e-12, "{root} {wanted}")
+                        assert!((root - wanted).abs() < 1e-12, "{root} {wanted}");
                     }
                     (None, None) => {}
                     other => panic!("{other:?}"),

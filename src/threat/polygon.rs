@@ -552,7 +552,7 @@ mod tests {
         let vertices = (0..20_000).map(|corner| {
             let angle = std::f64::consts::TAU * f64::from(corner) / 20_000.0;
             let away = if corner % 2 == 0 { 1000.0 } else { 900.0 };
-            Point2::new(away * angle.cos(), away * angle.sin())
+            Point2::new(away * libm::cos(angle), away * libm::sin(angle))
         });
         let flower = Polygon::new(vertices.collect(), 200.0);
         for (a, b) in [

@@ -56,7 +56,7 @@ pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, frame: Area) {
     canvas.rect(&frame, "fill=\"#fafbfc\"");
     axes(canvas, &scale, drawing);
     canvas.group("clipPath", "id=\"profile\"", |canvas| {
-        canvas.rect(&frame, "")
+        canvas.rect(&frame, "");
     });
     canvas.group("g", "clip-path=\"url(#profile)\"", |canvas| {
         band(canvas, drawing, &stations, &scale);

@@ -197,7 +197,7 @@ fn pointer(trail: &[Step]) -> String {
         pointer.push('/');
         match step {
             Step::Key(key) => {
-                pointer.push_str(&escape(&key.chars().take(MAX_CHARS).collect::<String>()))
+                pointer.push_str(&escape(&key.chars().take(MAX_CHARS).collect::<String>()));
             }
             Step::Index(index) => pointer.push_str(&index.to_string()),
         }

@@ -115,7 +115,7 @@ fn check_headers(response: &Value, headers: &HeaderMap, place: &str) {
 fn check_body(media_type: &str, schema: &Value, body: &[u8], place: &str) {
     match media_type {
         "application/json" | "application/problem+json" => {
-            check_schema(schema, &parse(body, place), place)
+            check_schema(schema, &parse(body, place), place);
         }
         "application/x-ndjson" => {
             for line in body

@@ -31,7 +31,7 @@ impl Nearby {
         if threats.len() <= FEW_THREATS {
             return Self::All(threats.len());
         }
-        let Some(run) = Rect::around(points.iter().map(|point| point.xy())) else {
+        let Some(run) = Rect::around(points.iter().map(Point3::xy)) else {
             return Self::Some(Vec::new());
         };
         let near = threats.iter().enumerate().filter(|(_, threat)| {

@@ -56,13 +56,15 @@ fn evaluate(bencher: divan::Bencher, name: &str) {
     let scenario = scenario(name);
     let route: Vec<Point3> = planner::plan(&scenario, &mut Nobody, &Nobody).waypoints;
     let model = Model::new(&scenario);
-    bencher.counter(divan::counter::ItemsCount::new(1_u32)).bench(|| {
-        let mut violation = 0.0;
-        let figures = model.assess(&route, Quadrature::Integral, model.tolerance, |breach| {
-            violation += breach.amount
+    bencher
+        .counter(divan::counter::ItemsCount::new(1_u32))
+        .bench(|| {
+            let mut violation = 0.0;
+            let figures = model.assess(&route, Quadrature::Integral, model.tolerance, |breach| {
+                violation += breach.amount;
+            });
+            (figures, violation)
         });
-        (figures, violation)
-    });
 }
 
 /// A whole plan with the document's own settings (200 x 200 for the paper's scenarios), smoothing and certificate included.

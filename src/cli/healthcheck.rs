@@ -34,7 +34,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         authority.port_u16().unwrap_or(80),
     );
     let path = url.path_and_query().map_or("/", |path| path.as_str());
-    let head = ask(address, authority.as_str(), path).with_context(|| format!("no answer from {url}"))?;
+    let head =
+        ask(address, authority.as_str(), path).with_context(|| format!("no answer from {url}"))?;
     match head.split(' ').nth(1) {
         Some("200") => Ok(()),
         Some(status) => bail!("{url} answers {status}"),

@@ -9,10 +9,12 @@ use std::time::Instant;
 
 use anyhow::Context;
 use clap::Args;
+use clap::builder::PossibleValuesParser;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::exit;
 use crate::export::document::{Origin, ResultDocument, Timing, scenario_sha256};
+use crate::export::{self, Format, ResultInput};
 use crate::job::draw_seed;
 use crate::planner::{self, ConvergencePoint, Incumbent, Observer, Outcome, Stop};
 use crate::scenario::Scenario;
@@ -26,11 +28,26 @@ pub(super) struct Arguments {
     /// Where the result goes [default: standard output]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// What the result is written as [default: by the extension of --out, else json]
+    #[arg(long, value_parser = PossibleValuesParser::new(export::ALL.iter().map(|format| format.name)))]
+    format: Option<String>,
+}
+
+impl Arguments {
+    fn format(&self) -> &'static Format {
+        let extension = || self.out.as_deref()?.extension()?.to_str();
+        let name = self.format.as_deref().or_else(extension);
+        let named = export::ALL
+            .iter()
+            .find(|format| name.is_some_and(|name| format.name.eq_ignore_ascii_case(name)));
+        named.unwrap_or(&export::ALL[0])
+    }
 }
 
 /// Plan, write the result, and say by the exit code how it went.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
-    let text = read(&arguments.file).with_context(|| format!("cannot read {}", arguments.file.display()))?;
+    let text = read(&arguments.file)
+        .with_context(|| format!("cannot read {}", arguments.file.display()))?;
     let rules = Rules {
         limits: Limits::default(),
         algorithms: planner::algorithm_rules(),
@@ -48,7 +65,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let outcome = planner::plan(&scenario, &mut progress, &stop);
     progress.finish(&outcome);
 
-    let document = document(&scenario, &outcome, stop.elapsed_ms());
+    let document = document(&scenario, &outcome, stop.elapsed_ms(), arguments.format());
     write(arguments.out.as_deref(), &document).context("cannot write the result")?;
     Ok(if outcome.feasible {
         exit::DONE
@@ -73,18 +90,26 @@ fn write(out: Option<&Path>, document: &str) -> io::Result<()> {
     }
 }
 
-fn document(scenario: &Scenario, outcome: &Outcome, run_ms: f64) -> String {
+fn document(scenario: &Scenario, outcome: &Outcome, run_ms: f64, format: &Format) -> String {
+    let accepted = json::write(scenario);
     let origin = Origin {
         plan_id: None,
         algorithm: scenario.planner.algorithm.clone(),
         seed: scenario.planner.seed,
-        scenario_sha256: scenario_sha256(&json::write(scenario)),
+        scenario_sha256: scenario_sha256(&accepted),
         timing: Timing {
             queued_ms: 0.0,
             run_ms,
         },
     };
-    ResultDocument::new(outcome, origin).to_json()
+    let result = ResultDocument::new(outcome, origin).to_json();
+    match format.write {
+        None => result,
+        Some(write) => write(&ResultInput {
+            result: &result,
+            scenario: &accepted,
+        }),
+    }
 }
 
 /// The faults that the service would answer with, a line each.
@@ -182,7 +207,10 @@ impl Observer for Progress {
 fn summary(outcome: &Outcome) -> String {
     if outcome.feasible {
         let legs = outcome.legs.len();
-        format!("a feasible route of {legs} legs, cost {:.4}", outcome.cost.total)
+        format!(
+            "a feasible route of {legs} legs, cost {:.4}",
+            outcome.cost.total
+        )
     } else {
         let violations = outcome.violations.len();
         format!("no feasible route; the least violating one breaks {violations} constraints")

@@ -30,7 +30,9 @@ const LAST_ANSWERS: Duration = Duration::from_secs(5);
 /// Serve until a signal.
 pub(super) fn run(config: &Serve) -> anyhow::Result<()> {
     telemetry::init(config.log_format);
-    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()?;
     runtime.block_on(serve(config))?;
     // Whatever still runs has been given back to the queue; the process does not wait for it.
     runtime.shutdown_background();
@@ -83,7 +85,10 @@ async fn serve(config: &Serve) -> anyhow::Result<()> {
         ended.context("the server broke")?;
     }
     store.close().await;
-    tracing::info!(duration_ms = signalled.elapsed().as_secs_f64() * 1e3, "shut down");
+    tracing::info!(
+        duration_ms = signalled.elapsed().as_secs_f64() * 1e3,
+        "shut down"
+    );
     Ok(())
 }
 
@@ -93,7 +98,9 @@ fn engine(rules: Arc<Rules>) -> Engine {
         // The document names its seed; none is drawn.
         let scenario = json::read(document.as_bytes(), &rules, 0).map_err(|refusal| Failure {
             kind: "invalid-scenario".to_owned(),
-            detail: format!("this version of the service cannot read the accepted document: {refusal}"),
+            detail: format!(
+                "this version of the service cannot read the accepted document: {refusal}"
+            ),
         })?;
         Ok(planner::plan(&scenario, observer, stop))
     })

@@ -116,7 +116,10 @@ impl Model<'_> {
         let mut range = None;
         self.sections(leg, |section| {
             if !section.terminal {
-                let part = self.scenario.terrain.height_range(leg, (section.t0, section.t1));
+                let part = self
+                    .scenario
+                    .terrain
+                    .height_range(leg, (section.t0, section.t1));
                 range = Some(range.unwrap_or(HeightRange::EMPTY).join(part));
             }
         });
@@ -134,10 +137,10 @@ impl Model<'_> {
         let (mut underground, mut off_band) = (0.0_f64, 0.0_f64);
         self.sections(leg, |section| {
             let window = (section.t0, section.t1);
-            let (below, above) = self
-                .scenario
-                .terrain
-                .excess(leg, window, section.floor, section.ceiling);
+            let (below, above) =
+                self.scenario
+                    .terrain
+                    .excess(leg, window, section.floor, section.ceiling);
             off_band = off_band.max(above);
             if section.terminal {
                 underground = underground.max(below);

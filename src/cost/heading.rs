@@ -68,7 +68,10 @@ mod tests {
         let check = |route: &[[f64; 3]], expected: &[f64]| {
             let route: Vec<Point3> = route.iter().map(|&p| Point3::from(p)).collect();
             for (turn, degrees) in turns(&route).zip(expected) {
-                assert!((turn.to_degrees() - degrees).abs() < 1e-9, "{turn} {degrees}");
+                assert!(
+                    (turn.to_degrees() - degrees).abs() < 1e-9,
+                    "{turn} {degrees}"
+                );
             }
             assert_eq!(turns(&route).count(), expected.len());
         };

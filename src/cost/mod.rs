@@ -138,7 +138,10 @@ mod tests {
                 top: Some(80.0),
             }],
             terrain: Terrain::Flat(Flat { elevation: 10.0 }),
-            altitude: AltitudeBand { min: 5.0, max: 105.0 },
+            altitude: AltitudeBand {
+                min: 5.0,
+                max: 105.0,
+            },
             vehicle: Vehicle {
                 max_turn_deg: 60.0,
                 max_climb_deg: 45.0,
@@ -177,9 +180,14 @@ mod tests {
     fn breaches(scenario: &Scenario, points: &[[f64; 3]]) -> Vec<(Constraint, usize, f64)> {
         let model = Model::new(scenario);
         let mut found = Vec::new();
-        model.assess(&route(points), Quadrature::Integral, model.tolerance, |breach| {
-            found.push((breach.constraint, breach.index, breach.amount));
-        });
+        model.assess(
+            &route(points),
+            Quadrature::Integral,
+            model.tolerance,
+            |breach| {
+                found.push((breach.constraint, breach.index, breach.amount));
+            },
+        );
         found
     }
 
@@ -188,7 +196,10 @@ mod tests {
         assert_eq!(found.len(), expected.len(), "{found:?} {expected:?}");
         for (found, expected) in found.iter().zip(expected) {
             assert_eq!((found.0, found.1), (expected.0, expected.1));
-            assert!((found.2 - expected.2).abs() < 1e-9, "{found:?} {expected:?}");
+            assert!(
+                (found.2 - expected.2).abs() < 1e-9,
+                "{found:?} {expected:?}"
+            );
         }
     }
 
@@ -274,13 +285,19 @@ mod tests {
     fn each_constraint_is_measured() {
         use Constraint::{Altitude, Area, Climb, Leg, Terrain, Threat, Turn};
         // Round the disc with room to spare.
-        check(&[[0.0, 0.0, 20.0], [50.0, 25.0, 30.0], [100.0, 0.0, 20.0]], &[]);
+        check(
+            &[[0.0, 0.0, 20.0], [50.0, 25.0, 30.0], [100.0, 0.0, 20.0]],
+            &[],
+        );
         check(
             &[[0.0, 0.0, 20.0], [50.0, 0.0, 20.0], [100.0, 0.0, 20.0]],
             &[(Threat, 0, 10.0), (Threat, 1, 10.0)],
         );
         // Above the top it may pass.
-        check(&[[0.0, 0.0, 80.0], [50.0, 0.0, 80.0], [100.0, 0.0, 80.0]], &[]);
+        check(
+            &[[0.0, 0.0, 80.0], [50.0, 0.0, 80.0], [100.0, 0.0, 80.0]],
+            &[],
+        );
         check(
             &[[0.0, 0.0, 20.0], [50.0, 25.0, 12.0], [100.0, 0.0, 20.0]],
             &[(Altitude, 0, 3.0), (Altitude, 1, 3.0)],
@@ -338,7 +355,12 @@ mod tests {
         let check = |first: [f64; 3], expected: usize| {
             let found = breaches(
                 &scenario,
-                &[[0.0, 0.0, 10.0], first, [50.0, 25.0, 20.0], [100.0, 0.0, 20.0]],
+                &[
+                    [0.0, 0.0, 10.0],
+                    first,
+                    [50.0, 25.0, 20.0],
+                    [100.0, 0.0, 20.0],
+                ],
             );
             assert_eq!(found.len(), expected, "{found:?}");
         };

@@ -144,7 +144,10 @@ pub struct Violation {
 
 /// A point of the curve of the search; also the data of a `convergence` event.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[expect(missing_docs, reason = "named and documented in planner::ConvergencePoint")]
+#[expect(
+    missing_docs,
+    reason = "named and documented in planner::ConvergencePoint"
+)]
 pub struct Convergence {
     pub iteration: usize,
     pub evaluations: u64,

@@ -24,7 +24,10 @@ impl BSpline {
     /// With fewer than two control points.
     #[must_use]
     pub fn clamped_uniform(control_points: Vec<Point3>, degree: usize) -> Self {
-        assert!(control_points.len() >= 2, "a curve needs two control points");
+        assert!(
+            control_points.len() >= 2,
+            "a curve needs two control points"
+        );
         let degree = degree.min(control_points.len() - 1);
         let spans = control_points.len() - degree;
         let knots = (0..=degree)
@@ -107,7 +110,8 @@ mod tests {
         }
         let term = |num: f64, den: f64| if den == 0.0 { 0.0 } else { num / den };
         term(u - knots[i], knots[i + p] - knots[i]) * basis(knots, i, p - 1, u)
-            + term(knots[i + p + 1] - u, knots[i + p + 1] - knots[i + 1]) * basis(knots, i + 1, p - 1, u)
+            + term(knots[i + p + 1] - u, knots[i + p + 1] - knots[i + 1])
+                * basis(knots, i + 1, p - 1, u)
     }
 
     #[test]
@@ -155,7 +159,10 @@ mod tests {
         for (first, u0, u1) in spline.spans() {
             for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
                 let point = spline.at(first, u0 + (u1 - u0) * share);
-                assert!(point.y.abs() < 1e-12 || (point.x - 10.0).abs() < 1e-12, "{point}");
+                assert!(
+                    point.y.abs() < 1e-12 || (point.x - 10.0).abs() < 1e-12,
+                    "{point}"
+                );
             }
         }
     }
@@ -172,7 +179,8 @@ mod tests {
         for (first, u0, u1) in spline.spans() {
             let step = (u1 - u0) * 1e-3;
             let middle = 0.5 * (u0 + u1);
-            let second = (spline.at(first, middle + step).coords - spline.at(first, middle).coords * 2.0
+            let second = (spline.at(first, middle + step).coords
+                - spline.at(first, middle).coords * 2.0
                 + spline.at(first, middle - step).coords)
                 / (step * step);
             assert!(second.norm() <= spline.curvature_bound(first) * (1.0 + 1e-6));

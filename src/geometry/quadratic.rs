@@ -74,7 +74,9 @@ mod tests {
             let roots = Quadratic { a, b, c }.roots();
             for (root, wanted) in roots.into_iter().zip(expected) {
                 match (root, wanted) {
-                    (Some(root), Some(wanted)) => assert!((root - wanted).abs() < 1e-12, "{root} {wanted}"),
+                    (Some(root), Some(wanted)) => {
+                        assert!((root - wanted).abs() < 1e-12, "{root} {wanted}")
+                    }
                     (None, None) => {}
                     other => panic!("{other:?}"),
                 }

@@ -37,7 +37,8 @@ impl Segment {
     /// Direction seen from above, radians counter-clockwise from east; `None` when it has none.
     #[must_use]
     pub fn heading(&self) -> Option<f64> {
-        (self.horizontal_length() >= LEVEL).then(|| libm::atan2(self.b.y - self.a.y, self.b.x - self.a.x))
+        (self.horizontal_length() >= LEVEL)
+            .then(|| libm::atan2(self.b.y - self.a.y, self.b.x - self.a.x))
     }
 
     /// Climb angle, radians, up positive.
@@ -140,6 +141,9 @@ mod tests {
         assert_eq!(leg.within(Point2::new(5.0, 3.0), 2.5), None);
         assert_eq!(leg.within(Point2::new(-2.0, 0.0), 1.0), None);
         let vertical = segment([1.0, 0.0, 0.0], [1.0, 0.0, 9.0]);
-        assert_eq!(vertical.within(Point2::new(0.0, 0.0), 1.0), Some((0.0, 1.0)));
+        assert_eq!(
+            vertical.within(Point2::new(0.0, 0.0), 1.0),
+            Some((0.0, 1.0))
+        );
     }
 }

@@ -90,13 +90,19 @@ mod tests {
                 "text/event-stream;q=0.5, application/x-ndjson",
                 Some("application/x-ndjson"),
             ),
-            ("*/*;q=0.1, text/event-stream;q=0", Some("application/x-ndjson")),
+            (
+                "*/*;q=0.1, text/event-stream;q=0",
+                Some("application/x-ndjson"),
+            ),
             ("text/html", None),
         ] {
             let mut headers = HeaderMap::new();
             headers.insert(header::ACCEPT, HeaderValue::from_static(accept));
             assert_eq!(choose(&headers, &OFFERS), expected, "{accept}");
         }
-        assert_eq!(choose(&HeaderMap::new(), &OFFERS), Some("text/event-stream"));
+        assert_eq!(
+            choose(&HeaderMap::new(), &OFFERS),
+            Some("text/event-stream")
+        );
     }
 }

@@ -9,13 +9,17 @@ use super::AppState;
 use super::problem::Problem;
 
 /// The whole body.
-pub(super) async fn read_json(state: &AppState, headers: &HeaderMap, body: Body) -> Result<Bytes, Problem> {
+pub(super) async fn read_json(
+    state: &AppState,
+    headers: &HeaderMap,
+    body: Body,
+) -> Result<Bytes, Problem> {
     let (limit, timeout) = (state.rules.limits.body_bytes, state.body_timeout);
     if !is_json(headers) {
         let found = headers.get(header::CONTENT_TYPE);
-        return Err(Problem::UnsupportedMediaType(
-            found.map(|value| String::from_utf8_lossy(value.as_bytes()).into_owned()),
-        ));
+        return Err(Problem::UnsupportedMediaType(found.map(|value| {
+            String::from_utf8_lossy(value.as_bytes()).into_owned()
+        })));
     }
     if let Some(coding) = coding(headers) {
         return Err(Problem::UnsupportedCoding(coding));
@@ -46,7 +50,12 @@ fn coding(headers: &HeaderMap) -> Option<String> {
 }
 
 fn announced_length(headers: &HeaderMap) -> Option<u64> {
-    headers.get(header::CONTENT_LENGTH)?.to_str().ok()?.parse().ok()
+    headers
+        .get(header::CONTENT_LENGTH)?
+        .to_str()
+        .ok()?
+        .parse()
+        .ok()
 }
 
 /// `application/json` or `application/*+json`, in UTF-8 or no charset named.

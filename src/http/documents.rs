@@ -6,8 +6,8 @@ use axum::response::{IntoResponse, Response};
 
 use super::params::{self, Id, Params};
 use super::problem::Problem;
-use super::{AppState, accept, retry};
-use crate::export::{self, Format};
+use super::{AppState, accept, off_thread, retry};
+use crate::export::{self, Format, ResultInput};
 
 /// `GET /plans/{id}/scenario`.
 pub(super) async fn scenario(
@@ -45,8 +45,20 @@ pub(super) async fn result(
             failure: plan.error,
         });
     };
-    let content_type = [(header::CONTENT_TYPE, format.media_type)];
-    Ok((content_type, (format.write)(stored)).into_response())
+    let document = match format.write {
+        None => stored,
+        Some(write) => {
+            let scenario = state.store.scenario(id).await?;
+            off_thread::run(move || {
+                write(&ResultInput {
+                    result: &stored,
+                    scenario: &scenario,
+                })
+            })
+            .await?
+        }
+    };
+    Ok(([(header::CONTENT_TYPE, format.media_type)], document).into_response())
 }
 
 /// `?format=` decides, else `Accept`.
@@ -61,7 +73,11 @@ fn choose_format(params: &Params, headers: &HeaderMap) -> Result<&'static Format
     }
     let offers: Vec<_> = export::ALL.iter().map(|format| format.media_type).collect();
     accept::choose(headers, &offers)
-        .and_then(|media_type| export::ALL.iter().find(|format| format.media_type == media_type))
+        .and_then(|media_type| {
+            export::ALL
+                .iter()
+                .find(|format| format.media_type == media_type)
+        })
         .ok_or_else(|| Problem::NotAcceptable {
             asked: accept::asked(headers),
             available: offers,

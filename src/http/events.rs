@@ -35,10 +35,11 @@ pub(super) async fn follow(
     let params = Params::read(&uri, &["rate", "last_event_id"])?;
     let rate_hz = read_rate(&params)?;
     let after = read_last_event_id(&params, &headers)?;
-    let media_type = accept::choose(&headers, &Wire::MEDIA_TYPES).ok_or_else(|| Problem::NotAcceptable {
-        asked: accept::asked(&headers),
-        available: Wire::MEDIA_TYPES.to_vec(),
-    })?;
+    let media_type =
+        accept::choose(&headers, &Wire::MEDIA_TYPES).ok_or_else(|| Problem::NotAcceptable {
+            asked: accept::asked(&headers),
+            available: Wire::MEDIA_TYPES.to_vec(),
+        })?;
     let plan = state.store.get(id).await?;
     if plan.status.is_final() && state.store.events(id, after, 1).await?.is_empty() {
         // All has been told; EventSource stops asking at a 204.
@@ -79,12 +80,17 @@ fn streamed(feed: Feed, store: Arc<dyn Store>, wire: Wire) -> Response {
         let text = match feed.next().await? {
             Told::Events(events) => write_events(&feed, &*store, events, wire).await,
             Told::Silence => wire.silence().to_owned(),
-            Told::Stopping(events) => write_events(&feed, &*store, events, wire).await + wire.stopping(),
+            Told::Stopping(events) => {
+                write_events(&feed, &*store, events, wire).await + wire.stopping()
+            }
         };
         Some((Ok::<_, Infallible>(Bytes::from(text)), (feed, store)))
     });
     let headers = [
-        (header::CONTENT_TYPE, HeaderValue::from_static(wire.media_type())),
+        (
+            header::CONTENT_TYPE,
+            HeaderValue::from_static(wire.media_type()),
+        ),
         (
             header::CACHE_CONTROL,
             HeaderValue::from_static("no-cache, no-transform"),
@@ -95,7 +101,12 @@ fn streamed(feed: Feed, store: Arc<dyn Store>, wire: Wire) -> Response {
     (headers, body).into_response()
 }
 
-async fn write_events(feed: &Feed, store: &dyn Store, events: Vec<NumberedEvent>, wire: Wire) -> String {
+async fn write_events(
+    feed: &Feed,
+    store: &dyn Store,
+    events: Vec<NumberedEvent>,
+    wire: Wire,
+) -> String {
     let mut text = String::new();
     for event in events {
         let ends = matches!(event.event, Event::End(_));

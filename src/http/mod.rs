@@ -8,6 +8,7 @@ mod body;
 mod documents;
 mod events;
 mod feed;
+mod off_thread;
 mod params;
 mod phase;
 mod plans;
@@ -155,7 +156,9 @@ mod tests {
             .expect("an answer");
         assert_eq!(answer.status(), 500);
         assert_eq!(answer.headers()["x-request-id"], "caller-1");
-        let body = to_bytes(answer.into_body(), 1000).await.expect("a whole body");
+        let body = to_bytes(answer.into_body(), 1000)
+            .await
+            .expect("a whole body");
         let problem: serde_json::Value = serde_json::from_slice(&body).expect("JSON");
         assert_eq!(problem["type"], "/problems/internal");
         assert_eq!(problem["instance"], "caller-1");

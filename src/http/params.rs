@@ -37,7 +37,11 @@ impl Params {
     }
 
     /// Parsed; `allowed` says what would have been.
-    pub(super) fn parse<T: FromStr>(&self, name: &str, allowed: &str) -> Result<Option<T>, Problem> {
+    pub(super) fn parse<T: FromStr>(
+        &self,
+        name: &str,
+        allowed: &str,
+    ) -> Result<Option<T>, Problem> {
         self.text(name)
             .map(|value| value.parse().map_err(|_| refused(name, value, allowed)))
             .transpose()
@@ -104,7 +108,10 @@ mod tests {
             ("/?limit=3&status=running", None),
             ("/?limit=x", Some("limit is \"x\", must be a number")),
             ("/?limit=", Some("limit is \"\", must be a number")),
-            ("/?limt=3", Some("limt is unknown, must be one of limit, status")),
+            (
+                "/?limt=3",
+                Some("limt is unknown, must be one of limit, status"),
+            ),
             ("/?limit=3&limit=4", Some("limit is given twice")),
         ] {
             assert_eq!(fault(query).as_deref(), expected, "{query}");

@@ -20,7 +20,7 @@ use super::phase::stopping;
 use super::prefer::{PREFERENCE_APPLIED, Wait};
 use super::problem::Problem;
 use super::status::{StatusDocument, etag, location};
-use super::{AppState, Phase, body, retry};
+use super::{AppState, Phase, body, off_thread, retry};
 use crate::job::{self, Plan, PlanId, Status, Submission};
 use crate::scenario::json;
 use crate::store::{ListQuery, StoreError};
@@ -38,7 +38,9 @@ pub(super) async fn submit(
     body: Body,
 ) -> Result<Response, Problem> {
     let params = Params::read(&uri, &["validate_only"])?;
-    let validate_only = params.parse("validate_only", "true or false")?.unwrap_or(false);
+    let validate_only = params
+        .parse("validate_only", "true or false")?
+        .unwrap_or(false);
     if !validate_only {
         refuse_when_draining(&state).await?;
     }
@@ -65,17 +67,28 @@ pub(super) async fn submit(
     let Some(wait) = Wait::of(&headers) else {
         return Ok(accepted(plan, address));
     };
-    let plan = wait_for(&state, plan.id, wait.duration(), |plan| plan.status.is_final()).await?;
+    let plan = wait_for(&state, plan.id, wait.duration(), |plan| {
+        plan.status.is_final()
+    })
+    .await?;
     if !plan.status.is_final() {
         return Ok(accepted(plan, address));
     }
-    let ended = [(header::LOCATION, address), (PREFERENCE_APPLIED, wait.applied())];
+    let ended = [
+        (header::LOCATION, address),
+        (PREFERENCE_APPLIED, wait.applied()),
+    ];
     Ok((ended, Json(StatusDocument::from(plan))).into_response())
 }
 
 fn accepted(plan: Plan, address: HeaderValue) -> Response {
     let document = Json(StatusDocument::from(plan));
-    (StatusCode::ACCEPTED, [(header::LOCATION, address)], document).into_response()
+    (
+        StatusCode::ACCEPTED,
+        [(header::LOCATION, address)],
+        document,
+    )
+        .into_response()
 }
 
 async fn refuse_when_draining(state: &AppState) -> Result<(), Problem> {
@@ -89,28 +102,19 @@ async fn refuse_when_draining(state: &AppState) -> Result<(), Problem> {
 /// Read a document into a submission, off the threads that answer.
 async fn accept(state: &AppState, document: Bytes) -> Result<Submission, Problem> {
     let rules = state.rules.clone();
-    let span = tracing::Span::current();
-    let read = tokio::task::spawn_blocking(move || {
-        span.in_scope(|| {
-            let scenario = json::read(&document, &rules, job::draw_seed())?;
-            Ok(Submission {
-                id: job::new_id(),
-                scenario: json::write(&scenario),
-                name: scenario.name,
-                algorithm: scenario.planner.algorithm,
-                seed: scenario.planner.seed,
-                iterations: scenario.planner.iterations as u64,
-                created_ms: now_ms(),
-            })
+    off_thread::run(move || {
+        let scenario = json::read(&document, &rules, job::draw_seed())?;
+        Ok(Submission {
+            id: job::new_id(),
+            scenario: json::write(&scenario),
+            name: scenario.name,
+            algorithm: scenario.planner.algorithm,
+            seed: scenario.planner.seed,
+            iterations: scenario.planner.iterations as u64,
+            created_ms: now_ms(),
         })
-    });
-    match read.await {
-        Ok(submission) => submission,
-        Err(broken) => match broken.try_into_panic() {
-            Ok(panic) => std::panic::resume_unwind(panic),
-            Err(_) => Err(Problem::Draining { retry_after_s: 1 }),
-        },
-    }
+    })
+    .await?
 }
 
 /// The answer to `?validate_only=true`. The accepted document is put in as the text it is.
@@ -139,7 +143,11 @@ pub(super) async fn list(State(state): State<AppState>, uri: Uri) -> Result<Resp
         .parse("limit", "a number from 1 to 1000")?
         .unwrap_or(DEFAULT_PAGE);
     if !(1..=MAX_PAGE).contains(&limit) {
-        return Err(params::refused("limit", &limit.to_string(), "from 1 to 1000"));
+        return Err(params::refused(
+            "limit",
+            &limit.to_string(),
+            "from 1 to 1000",
+        ));
     }
     let before = params.text("cursor").map(read_cursor).transpose()?;
 
@@ -163,8 +171,8 @@ pub(super) async fn list(State(state): State<AppState>, uri: Uri) -> Result<Resp
     })
     .into_response();
     if let Some(next) = next {
-        let link =
-            HeaderValue::from_str(&format!("<{next}>; rel=\"next\"")).expect("a link is visible ASCII");
+        let link = HeaderValue::from_str(&format!("<{next}>; rel=\"next\""))
+            .expect("a link is visible ASCII");
         response.headers_mut().insert(header::LINK, link);
     }
     Ok(response)
@@ -177,7 +185,10 @@ fn read_status(name: &str) -> Result<Status, Problem> {
 
 /// A cursor is the last id of the page before it; callers are not to know.
 fn read_cursor(text: &str) -> Result<PlanId, Problem> {
-    let bytes = BASE64.decode(text).ok().and_then(|bytes| bytes.try_into().ok());
+    let bytes = BASE64
+        .decode(text)
+        .ok()
+        .and_then(|bytes| bytes.try_into().ok());
     bytes
         .map(Uuid::from_bytes)
         .ok_or_else(|| params::refused("cursor", text, "one out of a next link"))
@@ -252,12 +263,18 @@ impl KnownTags {
     fn contain(&self, tag: &HeaderValue) -> bool {
         let opaque = |tag: &str| tag.strip_prefix("W/").unwrap_or(tag).to_owned();
         let tag = opaque(tag.to_str().unwrap_or_default());
-        self.0.iter().any(|known| known == "*" || opaque(known) == tag)
+        self.0
+            .iter()
+            .any(|known| known == "*" || opaque(known) == tag)
     }
 }
 
 /// `POST /plans/{id}/cancel`.
-pub(super) async fn cancel(State(state): State<AppState>, Id(id): Id, uri: Uri) -> Result<Response, Problem> {
+pub(super) async fn cancel(
+    State(state): State<AppState>,
+    Id(id): Id,
+    uri: Uri,
+) -> Result<Response, Problem> {
     Params::read(&uri, &[])?;
     let plan = state.store.request_cancel(id, now_ms()).await?;
     let status = if plan.status.is_final() {

@@ -108,11 +108,21 @@ impl Problem {
     /// The one table from error to status. Slugs are stable; `docs/PROBLEMS.md` has a section for each.
     fn kind(&self) -> Kind {
         match self {
-            Self::InvalidJson { .. } => (StatusCode::BAD_REQUEST, "invalid-json", "The body is not JSON"),
-            Self::BodyIncomplete => (StatusCode::BAD_REQUEST, "incomplete-body", "The body broke off"),
-            Self::InvalidParameter { .. } => {
-                (StatusCode::BAD_REQUEST, "invalid-parameter", "Invalid parameter")
-            }
+            Self::InvalidJson { .. } => (
+                StatusCode::BAD_REQUEST,
+                "invalid-json",
+                "The body is not JSON",
+            ),
+            Self::BodyIncomplete => (
+                StatusCode::BAD_REQUEST,
+                "incomplete-body",
+                "The body broke off",
+            ),
+            Self::InvalidParameter { .. } => (
+                StatusCode::BAD_REQUEST,
+                "invalid-parameter",
+                "Invalid parameter",
+            ),
             Self::NoSuchResource(_) | Self::NoSuchPlan(_) => {
                 (StatusCode::NOT_FOUND, "not-found", "No such resource")
             }
@@ -149,13 +159,21 @@ impl Problem {
                 "invalid-scenario",
                 "The scenario cannot be planned",
             ),
-            Self::Internal => (StatusCode::INTERNAL_SERVER_ERROR, "internal", "Internal error"),
+            Self::Internal => (
+                StatusCode::INTERNAL_SERVER_ERROR,
+                "internal",
+                "Internal error",
+            ),
             Self::Draining { .. } => (
                 StatusCode::SERVICE_UNAVAILABLE,
                 "draining",
                 "The service is shutting down",
             ),
-            Self::QueueFull { .. } => (StatusCode::SERVICE_UNAVAILABLE, "queue-full", "The queue is full"),
+            Self::QueueFull { .. } => (
+                StatusCode::SERVICE_UNAVAILABLE,
+                "queue-full",
+                "The queue is full",
+            ),
             Self::StoreUnavailable => (
                 StatusCode::SERVICE_UNAVAILABLE,
                 "store-unavailable",
@@ -189,7 +207,9 @@ impl Problem {
                 format!("nothing is at {path}; GET /openapi.yaml lists what is")
             }
             Self::NoSuchPlan(id) => format!("there is no plan {id}"),
-            Self::MethodNotAllowed => "the header Allow lists the methods of this resource".to_owned(),
+            Self::MethodNotAllowed => {
+                "the header Allow lists the methods of this resource".to_owned()
+            }
             Self::NotAcceptable { asked, available } => {
                 format!("asked for {asked}; available: {}", available.join(", "))
             }
@@ -214,13 +234,19 @@ impl Problem {
             }
             Self::Gone(id) => format!("plan {id} was deleted"),
             Self::BodyTooLarge(limit) => {
-                format!("the body is longer than {limit} bytes, the limit body_bytes of GET /limits")
+                format!(
+                    "the body is longer than {limit} bytes, the limit body_bytes of GET /limits"
+                )
             }
             Self::UnsupportedMediaType(found) => unsupported_media_type(found.as_deref()),
-            Self::UnsupportedCoding(found) => format!("content-encoding is {found}; send the body as it is"),
+            Self::UnsupportedCoding(found) => {
+                format!("content-encoding is {found}; send the body as it is")
+            }
             Self::InvalidScenario(faults) if faults.len() == 1 => "1 fault; see errors".to_owned(),
             Self::InvalidScenario(faults) => format!("{} faults; see errors", faults.len()),
-            Self::Internal => "a defect of the service; its log has more under this request's id".to_owned(),
+            Self::Internal => {
+                "a defect of the service; its log has more under this request's id".to_owned()
+            }
             Self::Draining { retry_after_s } => {
                 format!("no new plans are taken; try again in {retry_after_s} s")
             }
@@ -263,7 +289,9 @@ impl Problem {
     /// The members that only this kind of problem has.
     fn more(&self) -> Value {
         match self {
-            Self::InvalidScenario(faults) => json!({"errors": faults.iter().map(error).collect::<Vec<_>>()}),
+            Self::InvalidScenario(faults) => {
+                json!({"errors": faults.iter().map(error).collect::<Vec<_>>()})
+            }
             Self::InvalidJson {
                 line,
                 column,
@@ -315,9 +343,10 @@ impl IntoResponse for Problem {
                 .insert(header::RETRY_AFTER, HeaderValue::from(seconds));
         }
         if matches!(self, Self::UnsupportedCoding(_)) {
-            response
-                .headers_mut()
-                .insert(header::ACCEPT_ENCODING, HeaderValue::from_static("identity"));
+            response.headers_mut().insert(
+                header::ACCEPT_ENCODING,
+                HeaderValue::from_static("identity"),
+            );
         }
         response.extensions_mut().insert(self);
         response

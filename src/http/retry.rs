@@ -36,7 +36,11 @@ fn mean_run_ms(stats: &Stats) -> f64 {
 }
 
 fn seconds(ms: f64) -> u64 {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 600")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "1 to 600"
+    )]
     let whole = (ms / 1000.0).ceil().clamp(1.0, MAX_S) as u64;
     whole
 }
@@ -53,12 +57,26 @@ mod tests {
                 running: 0,
                 mean_run_ms,
             };
-            for_room(&stats, Capacity { workers, queue: 1000 })
+            for_room(
+                &stats,
+                Capacity {
+                    workers,
+                    queue: 1000,
+                },
+            )
         };
-        assert_eq!(room(1000, Some(2000.0), 4), 51, "101 runs of 2 s on 4 workers");
+        assert_eq!(
+            room(1000, Some(2000.0), 4),
+            51,
+            "101 runs of 2 s on 4 workers"
+        );
         assert_eq!(room(1000, Some(2000.0), 8), 26);
         assert_eq!(room(0, Some(10.0), 1), 1, "at least a second");
-        assert_eq!(room(1000, None, 1), 101, "a second a run while none is known");
+        assert_eq!(
+            room(1000, None, 1),
+            101,
+            "a second a run while none is known"
+        );
         assert_eq!(room(1_000_000, Some(1e6), 1), 600, "at most ten minutes");
     }
 }

@@ -96,7 +96,8 @@ async fn answer(stream: TcpStream, router: Router, watcher: Watcher, place: Owne
         .timer(TokioTimer::new())
         .keep_alive_interval(HEAD_TIMEOUT)
         .max_concurrent_streams(256);
-    let connection = builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
+    let connection =
+        builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
     let connection = watcher.watch(connection.into_owned());
     tokio::select! {
         ended = connection => if let Err(error) = ended {

@@ -91,7 +91,8 @@ pub(super) fn location(id: PlanId) -> String {
 /// place in the queue moves without a change of the record.
 pub(super) fn etag(plan: &Plan) -> HeaderValue {
     let position = plan.queue_position.unwrap_or(0);
-    HeaderValue::from_str(&format!("W/\"{}-{position}\"", plan.revision)).expect("digits are visible ASCII")
+    HeaderValue::from_str(&format!("W/\"{}-{position}\"", plan.revision))
+        .expect("digits are visible ASCII")
 }
 
 /// UTC with milliseconds.

@@ -196,7 +196,8 @@ mod tests {
             &self.bounds
         }
         fn evaluate(&mut self, positions: &[f64], fitness: &mut [Fitness]) {
-            for (position, fitness) in positions.chunks_exact(self.bounds.dimension()).zip(fitness) {
+            for (position, fitness) in positions.chunks_exact(self.bounds.dimension()).zip(fitness)
+            {
                 let mut clamped = position.to_vec();
                 self.bounds.clamp(&mut clamped);
                 self.outside += usize::from(clamped != position);
@@ -212,7 +213,8 @@ mod tests {
         position
             .iter()
             .enumerate()
-            .map(|(dim, x)| (x - dim as f64 * 0.3).powi(2))
+            .map(|(dim, x)| x - dim as f64 * 0.3)
+            .map(|offset| offset * offset)
             .sum()
     }
 
@@ -224,7 +226,12 @@ mod tests {
         }
     }
 
-    fn run(algorithm: &Algorithm, objective: &mut Standard, seed: u64, iterations: usize) -> Vec<f64> {
+    fn run(
+        algorithm: &Algorithm,
+        objective: &mut Standard,
+        seed: u64,
+        iterations: usize,
+    ) -> Vec<f64> {
         let mut search = (algorithm.start)(&settings(algorithm, seed), objective);
         let mut curve = vec![search.swarm().best_fitness().cost];
         for iteration in 1..=iterations {
@@ -244,7 +251,12 @@ mod tests {
                 "{}",
                 algorithm.name
             );
-            assert!(curve[400] < 1e-3, "{} ends at {}", algorithm.name, curve[400]);
+            assert!(
+                curve[400] < 1e-3,
+                "{} ends at {}",
+                algorithm.name,
+                curve[400]
+            );
             assert_eq!(objective.outside, 0, "{} leaves the box", algorithm.name);
         }
     }
@@ -281,7 +293,8 @@ mod tests {
     #[test]
     fn extreme_parameters_and_populations_do_no_harm() {
         for algorithm in ALL {
-            let ends: [fn(&Parameter) -> f64; 2] = [|parameter| parameter.min, |parameter| parameter.max];
+            let ends: [fn(&Parameter) -> f64; 2] =
+                [|parameter| parameter.min, |parameter| parameter.max];
             for end in ends {
                 for population in [2, 3, 40] {
                     let mut objective = Standard::new(3, 4.0, sphere);

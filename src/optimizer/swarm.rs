@@ -85,7 +85,12 @@ impl Swarm {
     }
 
     /// Price `positions`, count them and remember the best.
-    pub fn price(&mut self, objective: &mut dyn Objective, positions: &[f64], fitness: &mut [Fitness]) {
+    pub fn price(
+        &mut self,
+        objective: &mut dyn Objective,
+        positions: &[f64],
+        fitness: &mut [Fitness],
+    ) {
         objective.evaluate(positions, fitness);
         self.evaluations += fitness.len() as u64;
         for (position, fitness) in positions.chunks_exact(self.dimension).zip(fitness.iter()) {

@@ -14,7 +14,13 @@ pub(super) const ALGORITHM: Algorithm = Algorithm {
     start: |settings, objective| Box::new(TmsSba::start(settings, objective)),
 };
 
-const fn parameter(name: &'static str, default: f64, min: f64, max: f64, meaning: &'static str) -> Parameter {
+const fn parameter(
+    name: &'static str,
+    default: f64,
+    min: f64,
+    max: f64,
+    meaning: &'static str,
+) -> Parameter {
     Parameter {
         name,
         default,
@@ -27,7 +33,13 @@ const fn parameter(name: &'static str, default: f64, min: f64, max: f64, meaning
 const PARAMETERS: [Parameter; 10] = [
     parameter("f_min", 0.0, 0.0, 10.0, "least frequency, Eq. 10"),
     parameter("f_max", 1.0, 0.0, 10.0, "greatest frequency, Eq. 10"),
-    parameter("loudness", 1.0, 0.0, 10.0, "loudness A at the start, Eq. 13-14"),
+    parameter(
+        "loudness",
+        1.0,
+        0.0,
+        10.0,
+        "loudness A at the start, Eq. 13-14",
+    ),
     parameter(
         "loudness_decay",
         0.99,
@@ -35,7 +47,13 @@ const PARAMETERS: [Parameter; 10] = [
         1.0,
         "factor alpha on the loudness of a bat that improved, Eq. 14",
     ),
-    parameter("pulse_rate", 0.2, 0.0, 1.0, "pulse rate r0 in the limit, Eq. 15"),
+    parameter(
+        "pulse_rate",
+        0.2,
+        0.0,
+        1.0,
+        "pulse rate r0 in the limit, Eq. 15",
+    ),
     parameter(
         "pulse_growth",
         0.1,
@@ -172,7 +190,8 @@ impl TmsSba {
 
     /// Eq. 14-15: a bat that improves goes there, grows quieter and calls more often.
     fn accept(&mut self, dimension: usize) {
-        let pulse_rate = self.pulse_rate * (1.0 - libm::exp(-self.pulse_growth * self.iteration as f64));
+        let pulse_rate =
+            self.pulse_rate * (1.0 - libm::exp(-self.pulse_growth * self.iteration as f64));
         for (bat_idx, position) in self.candidates.chunks_exact(dimension).enumerate() {
             if self.outcome[bat_idx].beats(&self.swarm.fitness()[bat_idx]) {
                 self.swarm.replace(bat_idx, position, self.outcome[bat_idx]);
@@ -202,8 +221,9 @@ impl TmsSba {
         }
         let worst = ranking[ranking.len() - 1];
         let bounds = objective.bounds();
-        let stagnant = (0..dimension)
-            .all(|dim| (self.swarm.position(worst)[dim] - mean[dim]).abs() <= STAGNATION * bounds.range(dim));
+        let stagnant = (0..dimension).all(|dim| {
+            (self.swarm.position(worst)[dim] - mean[dim]).abs() <= STAGNATION * bounds.range(dim)
+        });
         if stagnant {
             self.reinitialise(objective, &mean, &ranking);
         } else {
@@ -233,8 +253,10 @@ impl TmsSba {
             bounds.clamp(candidate);
         }
         let best = ranking[0];
-        self.candidates[best * dimension..(best + 1) * dimension].copy_from_slice(self.swarm.position(best));
-        self.swarm.price(objective, &self.candidates, &mut self.outcome);
+        self.candidates[best * dimension..(best + 1) * dimension]
+            .copy_from_slice(self.swarm.position(best));
+        self.swarm
+            .price(objective, &self.candidates, &mut self.outcome);
         self.velocities.fill(0.0);
         for (bat_idx, position) in self.candidates.chunks_exact(dimension).enumerate() {
             self.swarm.replace(bat_idx, position, self.outcome[bat_idx]);
@@ -246,7 +268,8 @@ impl Optimizer for TmsSba {
     fn iterate(&mut self, objective: &mut dyn Objective, progress: f64) {
         self.iteration += 1;
         self.move_bats(objective, progress);
-        self.swarm.price(objective, &self.candidates, &mut self.outcome);
+        self.swarm
+            .price(objective, &self.candidates, &mut self.outcome);
         self.accept(objective.bounds().dimension());
         self.stabilise(objective);
     }

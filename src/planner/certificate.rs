@@ -24,8 +24,9 @@ pub(super) fn measure(model: &Model, route: &[Point3]) -> Measures {
     let heights = segments(route)
         .filter_map(|leg| model.free_heights(&leg))
         .reduce(HeightRange::join);
-    let greatest =
-        |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |most: f64, value| most.max(value.abs()));
+    let greatest = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold(0.0, |most: f64, value| most.max(value.abs()))
+    };
     Measures {
         clearance: threats
             .map(|(threat_idx, threat)| Clearance {
@@ -73,7 +74,10 @@ fn describe(model: &Model, breach: &Breach) -> Violation {
             "{place} is turned into {amount} beyond {} deg",
             vehicle.max_turn_deg
         ),
-        Constraint::Climb => format!("{place} is {amount} steeper than {} deg", vehicle.max_climb_deg),
+        Constraint::Climb => format!(
+            "{place} is {amount} steeper than {} deg",
+            vehicle.max_climb_deg
+        ),
         Constraint::Leg => format!("{place} is {amount} shorter than {} m", vehicle.min_leg),
         Constraint::Area => format!("{place} lies {amount} outside the area"),
     };

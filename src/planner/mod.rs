@@ -9,7 +9,8 @@ mod outcome;
 mod smoothing;
 
 pub use outcome::{
-    Bound, Clearance, ConvergencePoint, Incumbent, Leg, Measures, Outcome, Path, StopReason, Violation,
+    Bound, Clearance, ConvergencePoint, Incumbent, Leg, Measures, Outcome, Path, StopReason,
+    Violation,
 };
 
 pub use crate::cost::CostFigures;
@@ -65,8 +66,8 @@ pub fn algorithm_rules() -> Vec<AlgorithmRule> {
 /// When the scenario names an algorithm that is not in the table; its reader refuses those.
 pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -> Outcome {
     let settings = &scenario.planner;
-    let algorithm =
-        optimizer::by_name(&settings.algorithm).expect("the reader accepts only names in the table");
+    let algorithm = optimizer::by_name(&settings.algorithm)
+        .expect("the reader accepts only names in the table");
     let model = Model::new(scenario);
 
     let mut routes = match settings.seeding {
@@ -134,7 +135,10 @@ impl Log<'_> {
     fn record(&mut self, iteration: usize, search: &dyn Optimizer, routes: &Routes) {
         let swarm = search.swarm();
         let best = swarm.best_fitness();
-        let members = swarm.fitness().iter().filter(|fitness| fitness.cost.is_finite());
+        let members = swarm
+            .fitness()
+            .iter()
+            .filter(|fitness| fitness.cost.is_finite());
         let count = members.clone().count() as f64;
         let elapsed_ms = self.stop.elapsed_ms();
         let point = ConvergencePoint {
@@ -144,7 +148,8 @@ impl Log<'_> {
             best_cost: best.is_feasible().then_some(best.cost),
             best_violation: best.violation,
             mean_cost: members.clone().map(|fitness| fitness.cost).sum::<f64>() / count,
-            feasible_fraction: members.filter(|fitness| fitness.is_feasible()).count() as f64 / count,
+            feasible_fraction: members.filter(|fitness| fitness.is_feasible()).count() as f64
+                / count,
         };
         let mut route = Vec::new();
         routes.encoding.decode(swarm.best_position(), &mut route);
@@ -186,7 +191,8 @@ fn deliver(
         feasible,
         stop_reason,
         cost,
-        cost_integral: (quadrature == Quadrature::Paper).then(|| model.figures(&route, Quadrature::Integral)),
+        cost_integral: (quadrature == Quadrature::Paper)
+            .then(|| model.figures(&route, Quadrature::Integral)),
         bound: Bound {
             lower,
             gap: (feasible && lower > 0.0).then(|| cost.total / lower - 1.0),
@@ -238,7 +244,10 @@ mod tests {
                 radar(680.0, 620.0, 60.0),
             ],
             terrain: Terrain::Flat(Flat { elevation: 0.0 }),
-            altitude: AltitudeBand { min: 0.0, max: 200.0 },
+            altitude: AltitudeBand {
+                min: 0.0,
+                max: 200.0,
+            },
             vehicle: Vehicle {
                 max_turn_deg: 60.0,
                 max_climb_deg: 45.0,
@@ -380,7 +389,11 @@ mod tests {
         let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(5));
         assert_eq!(outcome.stop_reason, StopReason::Cancelled);
         assert_eq!(outcome.convergence.len(), 1);
-        assert!((1..60).contains(&outcome.evaluations), "{}", outcome.evaluations);
+        assert!(
+            (1..60).contains(&outcome.evaluations),
+            "{}",
+            outcome.evaluations
+        );
         assert!(outcome.convergence[0].mean_cost.is_finite());
         let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(40));
         assert_eq!(outcome.convergence.len(), 2);

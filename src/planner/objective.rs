@@ -47,9 +47,11 @@ impl<'s> Routes<'s> {
     fn price(&self, route: &[Point3]) -> Fitness {
         let mut violation = 0.0;
         let quadrature = self.model.scenario.planner.quadrature;
-        let figures = self.model.assess(route, quadrature, self.tolerance, |breach| {
-            violation += breach.amount;
-        });
+        let figures = self
+            .model
+            .assess(route, quadrature, self.tolerance, |breach| {
+                violation += breach.amount;
+            });
         Fitness {
             violation,
             cost: figures.total,
@@ -67,7 +69,10 @@ impl Objective for Routes<'_> {
         let mut route = std::mem::take(&mut self.route);
         for (position, fitness) in positions.chunks_exact(dimension).zip(fitness) {
             // There is always one route to deliver.
-            if self.evaluations > 0 && self.evaluations.is_multiple_of(self.stride) && !self.interrupted {
+            if self.evaluations > 0
+                && self.evaluations.is_multiple_of(self.stride)
+                && !self.interrupted
+            {
                 self.interrupted = why_stop(self.model.scenario, self.stop).is_some();
             }
             if self.interrupted {

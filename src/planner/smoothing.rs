@@ -49,7 +49,10 @@ struct Sample {
 /// The smoothed path of `route`; `None` when even its polyline breaks a constraint.
 pub(super) fn smooth(model: &Model, route: &[Point3]) -> Option<Path> {
     let smoothing = model.scenario.planner.smoothing;
-    let length: f64 = route.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum();
+    let length: f64 = route
+        .windows(2)
+        .map(|ends| (ends[1] - ends[0]).norm())
+        .sum();
     let spacing = smoothing.spacing.max(length / MOST_SAMPLES);
     let mut tightness: Vec<Tightness> = vec![0; route.len()];
     loop {
@@ -73,7 +76,10 @@ pub(super) fn smooth(model: &Model, route: &[Point3]) -> Option<Path> {
 
 fn deliver(model: &Model, spline: BSpline, samples: &[Sample]) -> Path {
     let points: Vec<Point3> = samples.iter().map(|sample| sample.point).collect();
-    let length = points.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum();
+    let length = points
+        .windows(2)
+        .map(|ends| (ends[1] - ends[0]).norm())
+        .sum();
     Path {
         points,
         length,
@@ -94,15 +100,20 @@ fn tighten(tightness: &mut [Tightness], corners: impl IntoIterator<Item = usize>
 }
 
 /// The control points, and the waypoint that each belongs to.
-fn control_points(route: &[Point3], tightness: &[Tightness], degree: usize) -> (Vec<Point3>, Vec<usize>) {
+fn control_points(
+    route: &[Point3],
+    tightness: &[Tightness],
+    degree: usize,
+) -> (Vec<Point3>, Vec<usize>) {
     let last = route.len() - 1;
     let mut points = vec![route[0]];
     let mut corners = vec![0];
     for corner in 1..last {
         let at = route[corner];
         // On the legs before and after, at 1/4, 1/8, ... of each.
-        let beside =
-            |neighbour: Point3| at + (neighbour - at) * 0.5_f64.powi(tightness[corner].cast_signed() + 1);
+        let beside = |neighbour: Point3| {
+            at + (neighbour - at) * libm::scalbn(1.0, -tightness[corner].cast_signed() - 1)
+        };
         match tightness[corner] {
             0 => points.push(at),
             SHARP => points.extend(std::iter::repeat_n(at, degree)),
@@ -180,7 +191,9 @@ fn cutting_pieces(model: &Model, spline: &BSpline, samples: &[Sample]) -> Vec<us
     let points: Vec<Point3> = samples.iter().map(|sample| sample.point).collect();
     model.assess(&points, Quadrature::Integral, model.tolerance, |breach| {
         let counts = match breach.constraint {
-            Constraint::Threat | Constraint::Altitude | Constraint::Terrain | Constraint::Turn => true,
+            Constraint::Threat | Constraint::Altitude | Constraint::Terrain | Constraint::Turn => {
+                true
+            }
             Constraint::Climb => breach.amount > CHORD_CLIMB_SLACK,
             Constraint::Leg | Constraint::Area => false,
         };
@@ -284,9 +297,14 @@ mod tests {
             );
             assert_eq!(path.degree, degree);
             let mut broken = 0;
-            model.assess(&path.points, Quadrature::Integral, model.tolerance, |breach| {
-                broken += usize::from(breach.constraint == Constraint::Threat);
-            });
+            model.assess(
+                &path.points,
+                Quadrature::Integral,
+                model.tolerance,
+                |breach| {
+                    broken += usize::from(breach.constraint == Constraint::Threat);
+                },
+            );
             assert_eq!(broken, 0, "degree {degree}");
         }
     }
@@ -294,7 +312,11 @@ mod tests {
     #[test]
     fn a_route_through_a_threat_has_no_path() {
         let scenario = scenario();
-        let route = points(&[[200.0, 100.0, 0.0], [500.0, 480.0, 100.0], [800.0, 800.0, 150.0]]);
+        let route = points(&[
+            [200.0, 100.0, 0.0],
+            [500.0, 480.0, 100.0],
+            [800.0, 800.0, 150.0],
+        ]);
         assert_eq!(smooth(&Model::new(&scenario), &route), None);
     }
 }

@@ -93,7 +93,12 @@ pub trait Store: Send + Sync + 'static {
     ///
     /// # Errors
     /// As [`Store::get`].
-    async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<Vec<NumberedEvent>, StoreError>;
+    async fn events(
+        &self,
+        id: PlanId,
+        after: u64,
+        limit: usize,
+    ) -> Result<Vec<NumberedEvent>, StoreError>;
 
     /// Ticks after each change of the plan or its events has become readable, and once more when it is deleted.
     /// Subscribe before reading, and no change is missed.

@@ -35,7 +35,8 @@ impl Grid {
     /// The ground that the grid covers.
     #[must_use]
     pub fn extent(&self) -> Rect {
-        let size = nalgebra::Vector2::new((self.columns - 1) as f64, (self.rows - 1) as f64) * self.cell;
+        let size =
+            nalgebra::Vector2::new((self.columns - 1) as f64, (self.rows - 1) as f64) * self.cell;
         Rect {
             min: self.origin,
             max: self.origin + size,
@@ -157,7 +158,12 @@ fn next_line(a: f64, b: f64, from: f64) -> f64 {
 
 impl Patch {
     /// Height above this patch's ground along the way from `(x0, y0)` to `(x1, y1)` at `z0` to `z1`.
-    fn height_below(&self, (x0, y0): (f64, f64), (x1, y1): (f64, f64), (z0, z1): (f64, f64)) -> Quadratic {
+    fn height_below(
+        &self,
+        (x0, y0): (f64, f64),
+        (x1, y1): (f64, f64),
+        (z0, z1): (f64, f64),
+    ) -> Quadratic {
         let (x, y) = (x0 - self.column, y0 - self.row);
         let (dx, dy) = (x1 - x0, y1 - y0);
         Quadratic {
@@ -190,7 +196,9 @@ mod tests {
         let grid = hills();
         assert!((grid.elevation(Point2::new(-10.0, 5.0)) - grid.elevations[0]).abs() < 1e-12);
         assert!((grid.elevation(Point2::new(50.0, 45.0)) - grid.elevations[34]).abs() < 1e-12);
-        let mean = (grid.elevations[0] + grid.elevations[1] + grid.elevations[7] + grid.elevations[8]) / 4.0;
+        let mean =
+            (grid.elevations[0] + grid.elevations[1] + grid.elevations[7] + grid.elevations[8])
+                / 4.0;
         assert!((grid.elevation(Point2::new(-5.0, 10.0)) - mean).abs() < 1e-12);
     }
 

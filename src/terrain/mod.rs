@@ -76,7 +76,13 @@ impl Terrain {
     /// above ground), metres, each >= 0. The same as by [`Terrain::height_range`], but cheap where
     /// the leg keeps well within them.
     #[must_use]
-    pub fn excess(&self, leg: &Segment, window: (f64, f64), floor: f64, ceiling: f64) -> (f64, f64) {
+    pub fn excess(
+        &self,
+        leg: &Segment,
+        window: (f64, f64),
+        floor: f64,
+        ceiling: f64,
+    ) -> (f64, f64) {
         let range = match self {
             Self::Peaks(peaks) => peaks.height_range_beyond(
                 leg,

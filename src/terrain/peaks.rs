@@ -73,7 +73,13 @@ impl Peaks {
     }
 
     /// Branch and bound for the extremes beyond `band`.
-    fn search(&self, leg: &Segment, (t0, t1): (f64, f64), band: HeightRange, accuracy: f64) -> HeightRange {
+    fn search(
+        &self,
+        leg: &Segment,
+        (t0, t1): (f64, f64),
+        band: HeightRange,
+        accuracy: f64,
+    ) -> HeightRange {
         let profile = self.profile(leg);
         let (h0, h1) = (profile.at(t0), profile.at(t1));
         let mut range = HeightRange {
@@ -108,7 +114,11 @@ impl Peaks {
             let (u, v) = (way.x / peak.spread.x, way.y / peak.spread.y);
             let (p, q) = (from.x / peak.spread.x, from.y / peak.spread.y);
             let sharpness = if flat { 0.0 } else { u * u + v * v };
-            let summit = if flat { 0.0 } else { -(p * u + q * v) / sharpness };
+            let summit = if flat {
+                0.0
+            } else {
+                -(p * u + q * v) / sharpness
+            };
             let offset = p * p + q * q - sharpness * summit * summit;
             let off_leg = summit - summit.clamp(0.0, 1.0);
             (offset + sharpness * off_leg * off_leg < NEGLIGIBLE).then(|| Bump {

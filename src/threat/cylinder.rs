@@ -113,13 +113,15 @@ mod tests {
     /// Through the axis: T falls linearly from 0 to 10 and back, area 10 * 10.
     #[test]
     fn a_leg_through_the_axis() {
-        let exposure = disc(50.0, 0.0, 2.0, 10.0).exposure(&leg([0.0; 3], [100.0, 0.0, 0.0]), (0.0, 1.0));
+        let exposure =
+            disc(50.0, 0.0, 2.0, 10.0).exposure(&leg([0.0; 3], [100.0, 0.0, 0.0]), (0.0, 1.0));
         assert!((exposure - 100.0).abs() < 1e-9, "{exposure}");
     }
 
     #[test]
     fn a_vertical_leg_hovers() {
-        let exposure = disc(3.0, 0.0, 1.0, 10.0).exposure(&leg([0.0; 3], [0.0, 0.0, 20.0]), (0.25, 0.75));
+        let exposure =
+            disc(3.0, 0.0, 1.0, 10.0).exposure(&leg([0.0; 3], [0.0, 0.0, 20.0]), (0.25, 0.75));
         assert!((exposure - 70.0).abs() < 1e-12, "{exposure}");
     }
 
@@ -127,7 +129,10 @@ mod tests {
     fn clearance_is_signed() {
         let check = |a, b, expected: f64| {
             let clearance = disc(0.0, 0.0, 5.0, 8.0).clearance(&leg(a, b), (0.0, 1.0));
-            assert!((clearance - expected).abs() < 1e-12, "{clearance} {expected}");
+            assert!(
+                (clearance - expected).abs() < 1e-12,
+                "{clearance} {expected}"
+            );
         };
         check([-10.0, 7.0, 0.0], [10.0, 7.0, 0.0], 2.0);
         check([-10.0, 1.0, 0.0], [10.0, 1.0, 0.0], -4.0);

@@ -142,6 +142,10 @@ fn intensity(influence: f64, distance: f64) -> f64 {
 }
 
 /// Exposure of a leg that has no horizontal extent: `T` is the same all along.
-fn hover_exposure(leg: &Segment, (t0, t1): (f64, f64), intensity_at: impl Fn(Point2) -> f64) -> f64 {
+fn hover_exposure(
+    leg: &Segment,
+    (t0, t1): (f64, f64),
+    intensity_at: impl Fn(Point2) -> f64,
+) -> f64 {
     intensity_at(leg.at(0.5 * (t0 + t1)).xy()) * leg.length() * (t1 - t0)
 }

@@ -92,7 +92,8 @@ impl Polygon {
     /// Whether `point` is strictly inside, by the even-odd rule.
     pub(super) fn contains(&self, point: Point2) -> bool {
         let crossings = self.edges().filter(|(a, b)| {
-            (a.y > point.y) != (b.y > point.y) && point.x < a.x + (b.x - a.x) * (point.y - a.y) / (b.y - a.y)
+            (a.y > point.y) != (b.y > point.y)
+                && point.x < a.x + (b.x - a.x) * (point.y - a.y) / (b.y - a.y)
         });
         crossings.count() % 2 == 1 && self.ring_distance(point) > 0.0
     }
@@ -138,7 +139,11 @@ impl Polygon {
     /// Distance to the ring, metres, negative inside.
     pub(super) fn distance(&self, point: Point2) -> f64 {
         let distance = self.ring_distance(point);
-        if self.contains(point) { -distance } else { distance }
+        if self.contains(point) {
+            -distance
+        } else {
+            distance
+        }
     }
 
     /// Least distance of the part `window` of `leg` to the ring, metres; where the leg enters, the
@@ -163,7 +168,10 @@ impl Polygon {
         } else if leg.horizontal_length() < LEVEL {
             hover_exposure(leg, window, |point| self.intensity(point))
         } else {
-            pieces.iter().map(|piece| self.piece_exposure(leg, piece)).sum()
+            pieces
+                .iter()
+                .map(|piece| self.piece_exposure(leg, piece))
+                .sum()
         };
         (clearance, exposure)
     }
@@ -215,7 +223,12 @@ impl Polygon {
     /// where the leg crosses the ring.
     fn pieces(&self, leg: &Segment, window: (f64, f64)) -> Vec<Piece> {
         let mut pieces = Vec::new();
-        cut(&self.features(leg), window, leg.horizontal_length(), &mut pieces);
+        cut(
+            &self.features(leg),
+            window,
+            leg.horizontal_length(),
+            &mut pieces,
+        );
         let hair = 1e-6 * (1.0 + leg.horizontal_length());
         let (mut inside, mut at_ring) = (false, true);
         for piece in &mut pieces {
@@ -340,7 +353,11 @@ fn cut(features: &[Feature], (t0, t1): (f64, f64), length: f64, pieces: &mut Vec
         let may_reign = |feature: &&Feature| {
             feature.valid.0 <= t1 && feature.valid.1 >= t0 && feature.squared.at(middle) <= reach
         };
-        kept = features.iter().filter(may_reign).copied().collect::<Vec<_>>();
+        kept = features
+            .iter()
+            .filter(may_reign)
+            .copied()
+            .collect::<Vec<_>>();
         &kept[..]
     } else {
         features
@@ -413,7 +430,11 @@ fn reign(features: &[Feature], nearest: &Feature, middle: f64, window: (f64, f64
         }
     }
     (
-        if begins_here { middle } else { from.min(middle) },
+        if begins_here {
+            middle
+        } else {
+            from.min(middle)
+        },
         if ends_here { middle } else { to.max(middle) },
     )
 }
@@ -425,7 +446,10 @@ mod tests {
     use proptest::prelude::*;
 
     fn square(margin: f64) -> Polygon {
-        ring(&[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]], margin)
+        ring(
+            &[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]],
+            margin,
+        )
     }
 
     fn ring(vertices: &[[f64; 2]], margin: f64) -> Polygon {
@@ -443,7 +467,10 @@ mod tests {
     fn clearance_is_exact_and_signed() {
         let check = |a, b, expected: f64| {
             let clearance = square(0.0).clearance(&leg(a, b), (0.0, 1.0));
-            assert!((clearance - expected).abs() < 1e-9, "{clearance} {expected}");
+            assert!(
+                (clearance - expected).abs() < 1e-9,
+                "{clearance} {expected}"
+            );
         };
         check([-5.0, 13.0, 0.0], [15.0, 13.0, 0.0], 3.0);
         check([-5.0, 5.0, 0.0], [15.0, 5.0, 0.0], -5.0);
@@ -509,7 +536,10 @@ mod tests {
             let (sin, cos) = (0.5 * away, away);
             let clearance = strip.clearance(&leg([0.0, -sin, 0.0], [1e5, -cos, 0.0]), (0.0, 1.0));
             let expected = if away < 0.0 { away } else { sin };
-            assert!((clearance - expected).abs() < 1e-9, "{clearance} {expected}");
+            assert!(
+                (clearance - expected).abs() < 1e-9,
+                "{clearance} {expected}"
+            );
         }
         let corner = ring(&[[5e4, 0.0], [6e4, 1e4], [4e4, 1e4]], 0.0);
         let clearance = corner.clearance(&leg([0.0, -1e-4, 0.0], [1e5, -1e-4, 0.0]), (0.0, 1.0));
@@ -538,7 +568,10 @@ mod tests {
                 sum += flower.intensity(point) * leg.length() / f64::from(steps);
                 signed = signed.min(flower.distance(point));
             }
-            assert!((exposure - sum).abs() < 0.01 * (1.0 + sum), "{exposure} {sum}");
+            assert!(
+                (exposure - sum).abs() < 0.01 * (1.0 + sum),
+                "{exposure} {sum}"
+            );
             assert!((clearance - signed).abs() < 10.0, "{clearance} {signed}");
         }
     }

@@ -18,7 +18,8 @@ use crate::planner::{Observer, Outcome, Stop};
 use crate::store::{Clock, Store};
 
 /// Plans an accepted scenario document, calling back as it goes. A panic of it fails its plan only.
-pub type Engine = Arc<dyn Fn(&str, &mut dyn Observer, &dyn Stop) -> Result<Outcome, Failure> + Send + Sync>;
+pub type Engine =
+    Arc<dyn Fn(&str, &mut dyn Observer, &dyn Stop) -> Result<Outcome, Failure> + Send + Sync>;
 
 /// What a pool is started with.
 #[derive(Clone)]

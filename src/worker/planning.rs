@@ -58,13 +58,15 @@ pub(super) fn start(
 ) -> std::io::Result<oneshot::Receiver<Ending>> {
     let (ended, ending) = oneshot::channel();
     let (plan, scenario) = (lease.plan.clone(), Arc::clone(&lease.scenario));
-    std::thread::Builder::new().name(thread_name).spawn(move || {
-        let end = catch_unwind(AssertUnwindSafe(|| {
-            plan_to_its_end(&engine, &plan, &scenario, events, stop)
-        }));
-        // Nobody listens when the pool was dropped.
-        let _ = ended.send(end.unwrap_or_else(|payload| panicked(&plan, &*payload)));
-    })?;
+    std::thread::Builder::new()
+        .name(thread_name)
+        .spawn(move || {
+            let end = catch_unwind(AssertUnwindSafe(|| {
+                plan_to_its_end(&engine, &plan, &scenario, events, stop)
+            }));
+            // Nobody listens when the pool was dropped.
+            let _ = ended.send(end.unwrap_or_else(|payload| panicked(&plan, &*payload)));
+        })?;
     Ok(ending)
 }
 
@@ -102,13 +104,18 @@ fn ending(outcome: &Outcome, plan: &Plan, scenario: &str, run_ms: f64) -> Ending
     Ending::Result {
         status: match outcome.stop_reason {
             StopReason::Cancelled => Status::Cancelled,
-            StopReason::Iterations | StopReason::Converged | StopReason::TimeLimit => Status::Succeeded,
+            StopReason::Iterations | StopReason::Converged | StopReason::TimeLimit => {
+                Status::Succeeded
+            }
         },
         stop_reason: outcome.stop_reason.name().to_owned(),
         feasible: outcome.feasible,
         best_cost: outcome.feasible.then_some(outcome.cost.total),
         evaluations: outcome.evaluations,
-        iteration: outcome.convergence.last().map_or(0, |last| last.iteration as u64),
+        iteration: outcome
+            .convergence
+            .last()
+            .map_or(0, |last| last.iteration as u64),
         document: ResultDocument::new(outcome, origin).to_json(),
     }
 }

@@ -133,7 +133,11 @@ impl Slot {
 }
 
 /// Hand the wish to stop on to the planning thread.
-async fn stop_when_asked(lease: &Lease, phase: watch::Receiver<Phase>, stop: &StopFlag) -> Infallible {
+async fn stop_when_asked(
+    lease: &Lease,
+    phase: watch::Receiver<Phase>,
+    stop: &StopFlag,
+) -> Infallible {
     let mut cancel = lease.cancel.clone();
     tokio::select! {
         // A cancelled plan keeps its best route, even at the end of the service.

@@ -55,12 +55,16 @@ async fn the_accepted_scenario_has_its_defaults_and_can_be_posted_again() {
     let accepted = api.post("/plans", &document).await;
     let address = accepted.header("location");
     let kept = api.get(&format!("{address}/scenario")).await;
-    let drawn = kept.json()["planner"]["seed"].as_u64().expect("a drawn seed");
+    let drawn = kept.json()["planner"]["seed"]
+        .as_u64()
+        .expect("a drawn seed");
     assert!(drawn < 1 << 53);
     assert_eq!(accepted.json()["seed"], drawn);
     let again = api.post("/plans", &kept.json()).await;
     assert_eq!(again.status, StatusCode::ACCEPTED);
-    let again = api.get(&format!("{}/scenario", again.header("location"))).await;
+    let again = api
+        .get(&format!("{}/scenario", again.header("location")))
+        .await;
     assert_eq!(again.body, kept.body);
 }
 
@@ -100,7 +104,11 @@ async fn a_caller_who_prefers_to_wait_gets_the_end() {
     let answer = api
         .send(Method::POST, "/plans", &headers, scenario().to_string())
         .await;
-    assert_eq!(answer.status, StatusCode::ACCEPTED, "it did not end in time");
+    assert_eq!(
+        answer.status,
+        StatusCode::ACCEPTED,
+        "it did not end in time"
+    );
     assert!(!answer.headers.contains_key("preference-applied"));
 }
 
@@ -123,7 +131,9 @@ async fn a_status_document_is_sent_only_when_it_has_changed() {
         assert_eq!(answer.status, StatusCode::NOT_MODIFIED, "{known}");
         assert_eq!(answer.header("etag"), tag);
     }
-    let answer = api.get_with(&address, &[("if-none-match", "\"other\"")]).await;
+    let answer = api
+        .get_with(&address, &[("if-none-match", "\"other\"")])
+        .await;
     assert_eq!(answer.status, StatusCode::OK);
 
     // Waiting with a known version ends at the next change, not only at the end.
@@ -139,7 +149,10 @@ async fn a_status_document_is_sent_only_when_it_has_changed() {
     let wait = [("prefer", "wait=30")];
     let (answer, ()) = tokio::join!(api.get_with(&address, &wait), async {
         let events = vec![run::convergence(0, 0.1)];
-        api.store.append(&lease, events).await.expect("the lease holds");
+        api.store
+            .append(&lease, events)
+            .await
+            .expect("the lease holds");
         run::finish(&*api.store, &lease, Status::Succeeded).await;
     });
     assert_eq!(answer.json()["status"], "succeeded");
@@ -177,7 +190,10 @@ async fn plans_are_listed_newest_first_page_by_page() {
             .headers
             .get("link")
             .map(|link| link.to_str().expect("visible ASCII").to_owned());
-        assert_eq!(link, next.as_ref().map(|next| format!("<{next}>; rel=\"next\"")));
+        assert_eq!(
+            link,
+            next.as_ref().map(|next| format!("<{next}>; rel=\"next\""))
+        );
         pages += 1;
     }
     assert_eq!(listed, addresses);
@@ -216,7 +232,10 @@ async fn a_cancelled_plan_keeps_its_best_route() {
     assert_eq!(answer.status, StatusCode::OK);
     assert_eq!(answer.json()["status"], "cancelled");
     assert_eq!(answer.json()["stop_reason"], "cancelled");
-    assert_eq!(api.get(&format!("{address}/result")).await.status, StatusCode::OK);
+    assert_eq!(
+        api.get(&format!("{address}/result")).await.status,
+        StatusCode::OK
+    );
 }
 
 #[tokio::test]
@@ -260,7 +279,11 @@ async fn results_that_are_not_there_say_why() {
     let cancelled = api
         .send(Method::POST, &format!("{address}/cancel"), &[], "")
         .await;
-    assert_eq!(cancelled.status, StatusCode::OK, "a queued plan ends at once");
+    assert_eq!(
+        cancelled.status,
+        StatusCode::OK,
+        "a queued plan ends at once"
+    );
     problems.push(
         api.get(&format!("{address}/result"))
             .await
@@ -289,10 +312,16 @@ async fn a_full_queue_refuses_and_says_when_to_come_back() {
         "1",
         "two runs of an unknown second on two workers"
     );
-    assert_eq!(problem["detail"], "2 plans wait, the limit; try again in 1 s");
+    assert_eq!(
+        problem["detail"],
+        "2 plans wait, the limit; try again in 1 s"
+    );
     // Room is made by a claim.
     let _lease = api.store.claim().await.expect("a queued plan");
-    assert_eq!(api.post("/plans", &scenario()).await.status, StatusCode::ACCEPTED);
+    assert_eq!(
+        api.post("/plans", &scenario()).await.status,
+        StatusCode::ACCEPTED
+    );
 }
 
 #[tokio::test]
@@ -301,14 +330,19 @@ async fn a_draining_service_answers_but_takes_no_plans() {
     let address = api.submit().await;
     assert_eq!(api.get("/readyz").await.status, StatusCode::OK);
     api.phase.send_replace(Phase::Draining);
-    for answer in [api.get("/readyz").await, api.post("/plans", &scenario()).await] {
+    for answer in [
+        api.get("/readyz").await,
+        api.post("/plans", &scenario()).await,
+    ] {
         answer.expect_problem(503, "draining");
         assert_eq!(answer.header("retry-after"), "1");
     }
     assert_eq!(api.get("/livez").await.status, StatusCode::OK);
     assert_eq!(api.get(&address).await.status, StatusCode::OK);
     assert_eq!(
-        api.post("/plans?validate_only=true", &scenario()).await.status,
+        api.post("/plans?validate_only=true", &scenario())
+            .await
+            .status,
         StatusCode::OK
     );
 }
@@ -339,7 +373,11 @@ async fn head_is_get_without_its_body() {
         let head = api.send(Method::HEAD, path, &[], "").await;
         assert_eq!(head.status, got.status, "{path}");
         assert!(head.body.is_empty(), "{path}");
-        assert_eq!(head.header("content-type"), got.header("content-type"), "{path}");
+        assert_eq!(
+            head.header("content-type"),
+            got.header("content-type"),
+            "{path}"
+        );
         assert_eq!(
             head.header("content-length"),
             got.body.len().to_string(),
@@ -351,13 +389,19 @@ async fn head_is_get_without_its_body() {
 #[tokio::test]
 async fn every_answer_has_its_request_id() {
     let api = Api::new();
-    let answer = api.get_with("/nothing", &[("x-request-id", "caller-1")]).await;
+    let answer = api
+        .get_with("/nothing", &[("x-request-id", "caller-1")])
+        .await;
     assert_eq!(answer.header("x-request-id"), "caller-1");
     assert_eq!(answer.json()["instance"], "caller-1");
     let answer = api
         .get_with("/livez", &[("x-request-id", "not a good one")])
         .await;
-    assert_eq!(answer.header("x-request-id").len(), 36, "a drawn one instead");
+    assert_eq!(
+        answer.header("x-request-id").len(),
+        36,
+        "a drawn one instead"
+    );
     assert_eq!(answer.header("x-content-type-options"), "nosniff");
     assert_eq!(answer.header("cache-control"), "no-store");
 }
@@ -386,7 +430,10 @@ async fn a_body_that_never_ends_is_cut_off() {
         .await;
     answer.expect_problem(408, "request-timeout");
 
-    let broken = futures_util::stream::iter([Ok(bytes::Bytes::from("{")), Err(std::io::Error::other("cut"))]);
+    let broken = futures_util::stream::iter([
+        Ok(bytes::Bytes::from("{")),
+        Err(std::io::Error::other("cut")),
+    ]);
     let answer = api
         .send(Method::POST, "/plans", &headers, Body::from_stream(broken))
         .await;

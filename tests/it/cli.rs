@@ -11,12 +11,22 @@ use crate::support::scenario;
 #[test]
 fn a_feasible_plan_exits_0_with_its_result() {
     let directory = tempfile::tempdir().expect("a temporary directory");
-    let path = |name: &str| directory.path().join(name).to_str().expect("UTF-8").to_owned();
+    let path = |name: &str| {
+        directory
+            .path()
+            .join(name)
+            .to_str()
+            .expect("UTF-8")
+            .to_owned()
+    };
     fs::write(path("scenario.json"), scenario().to_string()).expect("written");
 
     let from_file = run(&["plan", &path("scenario.json")], "");
     assert_eq!(from_file.status.code(), Some(0));
-    assert!(from_file.stderr.is_empty(), "no progress bar without a terminal");
+    assert!(
+        from_file.stderr.is_empty(),
+        "no progress bar without a terminal"
+    );
     let result: Value = serde_json::from_slice(&from_file.stdout).expect("JSON");
     check_schema(
         &json!({"$ref": "#/components/schemas/ResultDocument"}),

@@ -35,12 +35,20 @@ async fn no_accepted_plan_is_lost_or_done_twice() {
             finished.insert(address, answer.bytes().await.expect("a whole body"));
         }
     }
-    assert!((1..50).contains(&finished.len()), "{} were done", finished.len());
+    assert!(
+        (1..50).contains(&finished.len()),
+        "{} were done",
+        finished.len()
+    );
     service.kill();
 
     let service = Service::start(directory.path(), &["--workers", "2"]);
     for address in &addresses {
-        assert_eq!(service.ended(address).await["status"], "succeeded", "{address}");
+        assert_eq!(
+            service.ended(address).await["status"],
+            "succeeded",
+            "{address}"
+        );
         let told = events(
             &Stream::open(service.get(&format!("{address}/events?rate=0")))
                 .await
@@ -76,8 +84,10 @@ async fn a_second_process_is_kept_out() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &[]);
     let data_dir = directory.path().to_str().expect("UTF-8");
-    let second =
-        crate::support::process::run(&["serve", "--listen", "127.0.0.1:0", "--data-dir", data_dir], "");
+    let second = crate::support::process::run(
+        &["serve", "--listen", "127.0.0.1:0", "--data-dir", data_dir],
+        "",
+    );
     assert_eq!(second.status.code(), Some(1));
     let reason = String::from_utf8(second.stderr).expect("UTF-8");
     assert!(reason.contains("in use by another process"), "{reason}");

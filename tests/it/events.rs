@@ -73,7 +73,10 @@ async fn a_stream_tells_the_whole_plan_and_ends_once() {
 
     let names: Vec<String> = events(&live).into_iter().map(|(_, name)| name).collect();
     assert_eq!(names[0], "status", "running");
-    assert_eq!(names.iter().filter(|name| *name == "convergence").count(), 60);
+    assert_eq!(
+        names.iter().filter(|name| *name == "convergence").count(),
+        60
+    );
     assert_eq!(names.iter().filter(|name| *name == "incumbent").count(), 20);
     assert_eq!(names[names.len() - 2..], ["status", "end"]);
     assert_eq!(names.iter().filter(|name| *name == "end").count(), 1);
@@ -138,8 +141,13 @@ async fn a_live_stream_that_is_cut_resumes() {
     let mut last = 0;
     // Each connection reads one event and is dropped; what comes meanwhile is not lost.
     for event in a_run() {
-        store.append(&lease, vec![event]).await.expect("the lease holds");
-        let request = plan.events("?rate=0").header("last-event-id", last.to_string());
+        store
+            .append(&lease, vec![event])
+            .await
+            .expect("the lease holds");
+        let request = plan
+            .events("?rate=0")
+            .header("last-event-id", last.to_string());
         let Some(block) = Stream::open(request).await.next().await else {
             panic!("no event")
         };
@@ -148,10 +156,13 @@ async fn a_live_stream_that_is_cut_resumes() {
     }
     run::finish(&**store, &lease, Status::Succeeded).await;
     read.extend(
-        Stream::open(plan.events("?rate=0").header("last-event-id", last.to_string()))
-            .await
-            .rest()
-            .await,
+        Stream::open(
+            plan.events("?rate=0")
+                .header("last-event-id", last.to_string()),
+        )
+        .await
+        .rest()
+        .await,
     );
     assert_eq!(read, plan.read("?rate=0").await);
 }
@@ -163,14 +174,21 @@ async fn a_rate_thins_the_curve_but_keeps_the_last_route() {
     let whole = plan.read("?rate=0").await;
     for (rate, windows) in [("10", 6), ("5", 3), ("1", 1)] {
         let thinned = plan.read(&format!("?rate={rate}")).await;
-        let count = |name: &str| events(&thinned).iter().filter(|(_, kind)| kind == name).count();
+        let count = |name: &str| {
+            events(&thinned)
+                .iter()
+                .filter(|(_, kind)| kind == name)
+                .count()
+        };
         assert_eq!(count("convergence"), windows, "{rate} Hz");
         assert_eq!(count("incumbent"), windows, "{rate} Hz");
         assert_eq!(count("status"), 3);
         assert_eq!(count("end"), 1);
         assert!(thinned.iter().all(|block| whole.contains(block)));
         let last = |blocks: &[Block]| {
-            let mut incumbents = events(blocks).into_iter().filter(|(_, name)| name == "incumbent");
+            let mut incumbents = events(blocks)
+                .into_iter()
+                .filter(|(_, name)| name == "incumbent");
             incumbents.next_back()
         };
         assert_eq!(last(&thinned), last(&whole));
@@ -231,7 +249,10 @@ async fn plans_without_a_route_end_without_a_result() {
         panic!("no end")
     };
     assert_eq!(name, "end");
-    assert_eq!(data, serde_json::json!({"status": "failed", "result": null}));
+    assert_eq!(
+        data,
+        serde_json::json!({"status": "failed", "result": null})
+    );
 
     let plan = Followed::new().await;
     plan.api
@@ -242,11 +263,17 @@ async fn plans_without_a_route_end_without_a_result() {
     let Some(Block::Event { data, .. }) = plan.read("").await.pop() else {
         panic!("no end")
     };
-    assert_eq!(data, serde_json::json!({"status": "cancelled", "result": null}));
+    assert_eq!(
+        data,
+        serde_json::json!({"status": "cancelled", "result": null})
+    );
 }
 
 fn lease_id(address: &str) -> noctule::job::PlanId {
-    address.trim_start_matches("/plans/").parse().expect("an id")
+    address
+        .trim_start_matches("/plans/")
+        .parse()
+        .expect("an id")
 }
 
 #[tokio::test]

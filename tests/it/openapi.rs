@@ -72,7 +72,9 @@ fn references(node: &Value, found: &mut BTreeSet<String>) {
             if let Some(Value::String(reference)) = members.get("$ref") {
                 found.insert(reference.clone());
             }
-            members.values().for_each(|member| references(member, found));
+            members
+                .values()
+                .for_each(|member| references(member, found));
         }
         Value::Array(items) => items.iter().for_each(|item| references(item, found)),
         _ => {}
@@ -100,7 +102,11 @@ fn examples_are_as_their_schemas_say() {
         .as_object()
         .expect("responses");
     for holder in bodies.chain(answers).chain(responses.values()) {
-        for media in resolve(holder)["content"].as_object().expect("content").values() {
+        for media in resolve(holder)["content"]
+            .as_object()
+            .expect("content")
+            .values()
+        {
             let named = media.get("examples").and_then(Value::as_object);
             let named = named
                 .into_iter()
@@ -118,7 +124,8 @@ fn examples_are_as_their_schemas_say() {
 #[tokio::test]
 async fn example_scenarios_are_accepted() {
     let api = Api::new();
-    let body = &DESCRIPTION["paths"]["/plans"]["post"]["requestBody"]["content"]["application/json"];
+    let body =
+        &DESCRIPTION["paths"]["/plans"]["post"]["requestBody"]["content"]["application/json"];
     for example in body["examples"].as_object().expect("examples").values() {
         assert_eq!(api.post("/plans", &example["value"]).await.status, 202);
     }
@@ -127,7 +134,8 @@ async fn example_scenarios_are_accepted() {
 #[test]
 fn problem_types_are_documented() {
     let page = include_str!("../../docs/PROBLEMS.md");
-    let types = DESCRIPTION["components"]["schemas"]["Problem"]["properties"]["type"]["enum"].as_array();
+    let types =
+        DESCRIPTION["components"]["schemas"]["Problem"]["properties"]["type"]["enum"].as_array();
     for slug in types.expect("a list").iter().filter_map(Value::as_str) {
         let heading = format!("## {}\n", slug.trim_start_matches("/problems/"));
         assert!(

@@ -16,10 +16,22 @@ const WITHOUT_BODY: &[(&str, u16)] = &[
     ("GET /plans/", 404),
     ("GET /plans/01936f2c-7d1a-7c55-9a53-27b1b44c1a10", 404),
     ("GET /plans/01936F2C-7D1A-7C55-9A53-27B1B44C1A10", 404),
-    ("GET /plans/01936f2c-7d1a-7c55-9a53-27b1b44c1a10/result", 404),
-    ("GET /plans/01936f2c-7d1a-7c55-9a53-27b1b44c1a10/scenario", 404),
-    ("GET /plans/01936f2c-7d1a-7c55-9a53-27b1b44c1a10/events", 404),
-    ("POST /plans/01936f2c-7d1a-7c55-9a53-27b1b44c1a10/cancel", 404),
+    (
+        "GET /plans/01936f2c-7d1a-7c55-9a53-27b1b44c1a10/result",
+        404,
+    ),
+    (
+        "GET /plans/01936f2c-7d1a-7c55-9a53-27b1b44c1a10/scenario",
+        404,
+    ),
+    (
+        "GET /plans/01936f2c-7d1a-7c55-9a53-27b1b44c1a10/events",
+        404,
+    ),
+    (
+        "POST /plans/01936f2c-7d1a-7c55-9a53-27b1b44c1a10/cancel",
+        404,
+    ),
     ("DELETE /plans/01936f2c-7d1a-7c55-9a53-27b1b44c1a10", 404),
     ("GET /plans/first", 404),
     ("GET /plans/%FF", 404),
@@ -57,7 +69,11 @@ const BODIES: &[(&[Header], &str, u16)] = &[
         "{}",
         415,
     ),
-    (&[("content-type", "application/json; charset=latin1")], "{}", 415),
+    (
+        &[("content-type", "application/json; charset=latin1")],
+        "{}",
+        415,
+    ),
     (&[JSON, ("content-encoding", "gzip")], "{}", 415),
     (&[JSON, ("content-length", "5000")], "{}", 413),
     (&[JSON], "", 400),
@@ -114,13 +130,16 @@ fn record(request: &str, answer: &Answer, status: u16) -> Value {
 #[tokio::test]
 async fn a_body_beyond_the_limit_is_refused_whether_announced_or_not() {
     let api = Api::new();
-    let chunks =
-        futures_util::stream::repeat_with(|| Ok::<_, std::io::Error>(bytes::Bytes::from(vec![b' '; 1000])));
+    let chunks = futures_util::stream::repeat_with(|| {
+        Ok::<_, std::io::Error>(bytes::Bytes::from(vec![b' '; 1000]))
+    });
     let endless = axum::body::Body::from_stream(chunks);
     for body in [endless, " ".repeat(4097).into()] {
         let answer = api.send(Method::POST, "/plans", &[JSON], body).await;
         answer.expect_problem(413, "body-too-large");
     }
-    let answer = api.send(Method::POST, "/plans", &[JSON], " ".repeat(4096)).await;
+    let answer = api
+        .send(Method::POST, "/plans", &[JSON], " ".repeat(4096))
+        .await;
     answer.expect_problem(400, "invalid-json");
 }

@@ -36,28 +36,37 @@ async fn life(service: &Service, address: &str) -> Vec<String> {
         .rest()
         .await;
     assert_eq!(
-        events(&blocks).iter().filter(|(_, name)| name == "end").count(),
+        events(&blocks)
+            .iter()
+            .filter(|(_, name)| name == "end")
+            .count(),
         1
     );
     blocks
         .into_iter()
         .filter_map(|block| match block {
-            Block::Event { name, data, .. } if name == "status" => Some(data["status"].as_str()?.to_owned()),
+            Block::Event { name, data, .. } if name == "status" => {
+                Some(data["status"].as_str()?.to_owned())
+            }
             _ => None,
         })
         .collect()
 }
 
+/// An end that waited for a plan of a minute, for a stream, or for the whole of an idle grace period would
+/// come after it; a slow machine alone does not make one so late.
+const LONG_BEFORE: Duration = Duration::from_secs(30);
+
 #[tokio::test]
 async fn an_idle_service_leaves_at_once() {
     for signal in ["TERM", "INT"] {
         let directory = tempfile::tempdir().expect("a temporary directory");
-        let service = Service::start(directory.path(), &["--grace", "30"]);
+        let service = Service::start(directory.path(), &["--grace", "600"]);
         assert_eq!(service.bytes("/readyz").await, r#"{"status":"ok"}"#);
         let begun = Instant::now();
         service.signal(signal);
         assert!(service.exit().await.success());
-        assert!(begun.elapsed() < Duration::from_secs(5), "{:?}", begun.elapsed());
+        assert!(begun.elapsed() < LONG_BEFORE, "{:?}", begun.elapsed());
     }
 }
 
@@ -72,7 +81,11 @@ async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
     let begun = Instant::now();
     service.signal("TERM");
     let refused = loop {
-        let ready = service.get("/readyz").send().await.expect("it still answers");
+        let ready = service
+            .get("/readyz")
+            .send()
+            .await
+            .expect("it still answers");
         if ready.status() == 503 {
             break service.post(&a_run_of(10)).await;
         }
@@ -92,7 +105,7 @@ async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
         "the plan has not ended"
     );
     assert!(service.exit().await.success());
-    assert!(begun.elapsed() < Duration::from_secs(3), "{:?}", begun.elapsed());
+    assert!(begun.elapsed() < LONG_BEFORE, "{:?}", begun.elapsed());
 
     let service = Service::start(directory.path(), &["--workers", "1"]);
     for address in [&address, &waiting] {
@@ -102,7 +115,10 @@ async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
         life(&service, &address).await,
         ["queued", "running", "queued", "running", "succeeded"]
     );
-    assert_eq!(life(&service, &waiting).await, ["queued", "running", "succeeded"]);
+    assert_eq!(
+        life(&service, &waiting).await,
+        ["queued", "running", "succeeded"]
+    );
 }
 
 #[tokio::test]
@@ -122,7 +138,10 @@ async fn a_plan_that_ends_within_the_grace_period_is_kept() {
 
     let service = Service::start(directory.path(), &["--workers", "1"]);
     assert_eq!(service.ended(&address).await["status"], "succeeded");
-    assert_eq!(life(&service, &address).await, ["queued", "running", "succeeded"]);
+    assert_eq!(
+        life(&service, &address).await,
+        ["queued", "running", "succeeded"]
+    );
 }
 
 #[tokio::test]
@@ -164,5 +183,5 @@ async fn open_streams_do_not_hold_up_the_end() {
         );
     }
     assert!(service.exit().await.success());
-    assert!(begun.elapsed() < Duration::from_secs(3), "{:?}", begun.elapsed());
+    assert!(begun.elapsed() < LONG_BEFORE, "{:?}", begun.elapsed());
 }

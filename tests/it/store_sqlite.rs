@@ -157,7 +157,10 @@ async fn one_failed_write_does_not_spoil_the_others() {
         assert_eq!(answer.is_err(), nth % 10 == 0, "{nth}: {answer:?}");
     }
     assert_eq!(store.stats().await.unwrap().queued, 91);
-    let positions = answers.into_iter().flatten().map(|plan| plan.queue_position);
+    let positions = answers
+        .into_iter()
+        .flatten()
+        .map(|plan| plan.queue_position);
     assert!(positions.eq((2..=91).map(Some)));
 }
 

@@ -52,7 +52,10 @@ async fn a_plan_is_run_and_its_result_and_events_are_kept_in_order() {
         let document = result(&**store, id).await;
         let plan = store.get(id).await.unwrap();
         assert_eq!(document.plan_id, Some(id));
-        assert_eq!((document.seed, &document.algorithm), (plan.seed, &plan.algorithm));
+        assert_eq!(
+            (document.seed, &document.algorithm),
+            (plan.seed, &plan.algorithm)
+        );
         assert_eq!(document.scenario_sha256.len(), 64);
         assert!((document.timing.queued_ms - 9_000.0).abs() < 1e-9);
         assert_eq!(plan.best_cost, Some(document.cost.total));
@@ -105,7 +108,10 @@ async fn events_can_be_read_while_their_run_goes_on() {
         );
         let id = submit(&**store, "{}").await;
         let plan = until(&**store, id, |plan| plan.iteration == 4).await;
-        assert_eq!((plan.status, plan.best_cost), (Status::Running, Some(480.0)));
+        assert_eq!(
+            (plan.status, plan.best_cost),
+            (Status::Running, Some(480.0))
+        );
         go_on.send(()).unwrap();
         assert_eq!(ended(&**store, id).await, Status::Succeeded);
         pool.drain(AGES).await;
@@ -127,7 +133,11 @@ async fn a_panic_fails_its_plan_and_no_other() {
                         kind: "terrain-missing".to_owned(),
                         detail: "no such terrain".to_owned(),
                     }),
-                    _ => Ok(outcome(StopReason::Iterations, 470.0, vec![point(0, 470.0)])),
+                    _ => Ok(outcome(
+                        StopReason::Iterations,
+                        470.0,
+                        vec![point(0, 470.0)],
+                    )),
                 }
             }),
         );
@@ -168,7 +178,10 @@ async fn a_cancelled_run_keeps_its_best_route() {
         assert_eq!(ended(&**store, id).await, Status::Cancelled);
         let plan = store.get(id).await.unwrap();
         let document = result(&**store, id).await;
-        assert_eq!((&*document.stop_reason, document.feasible), ("cancelled", true));
+        assert_eq!(
+            (&*document.stop_reason, document.feasible),
+            ("cancelled", true)
+        );
         assert_eq!(plan.best_cost, Some(document.cost.total));
         assert_eq!(plan.stop_reason.as_deref(), Some("cancelled"));
         let told = history(&**store, id).await;
@@ -212,7 +225,11 @@ async fn no_more_plans_run_at_a_time_than_there_are_workers() {
                 record.fetch_max(now, Ordering::SeqCst);
                 told_to.lock().unwrap().recv().unwrap();
                 running.fetch_sub(1, Ordering::SeqCst);
-                Ok(outcome(StopReason::Iterations, 470.0, vec![point(0, 470.0)]))
+                Ok(outcome(
+                    StopReason::Iterations,
+                    470.0,
+                    vec![point(0, 470.0)],
+                ))
             }),
         );
         let mut ids = Vec::new();
@@ -261,7 +278,10 @@ async fn draining_gives_back_what_does_not_end_and_a_rerun_ends_as_if_alone() {
         let alone = submit(&**store, "{\"seed\":0}").await;
         assert_eq!(ended(&**store, alone).await, Status::Succeeded);
         assert_eq!(ended(&**store, ids[0]).await, Status::Succeeded);
-        let results = [result(&**store, ids[0]).await, result(&**store, alone).await];
+        let results = [
+            result(&**store, ids[0]).await,
+            result(&**store, alone).await,
+        ];
         assert_eq!(without_times(&results[0]), without_times(&results[1]));
         second.drain(AGES).await;
     })
@@ -280,7 +300,11 @@ async fn draining_lets_a_run_end_and_begins_no_other() {
                 observer.iteration(&point(1, 480.0));
                 told_to.lock().unwrap().recv().unwrap();
                 assert!(!stop.requested());
-                Ok(outcome(StopReason::Iterations, 470.0, vec![point(0, 470.0)]))
+                Ok(outcome(
+                    StopReason::Iterations,
+                    470.0,
+                    vec![point(0, 470.0)],
+                ))
             }),
         );
         let running = submit(&**store, "{}").await;

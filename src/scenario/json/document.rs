@@ -39,7 +39,12 @@ const OVERHANG_M: f64 = 1e-6;
 const MIN_PADDING_M: f64 = 10.0;
 
 /// Read the document; `None` has left at least one fault.
-pub(super) fn document(node: &Node, rules: &Rules, drawn_seed: u64, faults: &mut Faults) -> Option<Scenario> {
+pub(super) fn document(
+    node: &Node,
+    rules: &Rules,
+    drawn_seed: u64,
+    faults: &mut Faults,
+) -> Option<Scenario> {
     let fields = At {
         node,
         path: &Path::Root,
@@ -49,7 +54,12 @@ pub(super) fn document(node: &Node, rules: &Rules, drawn_seed: u64, faults: &mut
     let local = is_local(&fields, faults);
     let altitude = fields.required("altitude", faults, vehicle::altitude);
     let draft = fields.or("vehicle", vehicle::DEFAULT, faults, vehicle::vehicle);
-    let weights = fields.or("weights", vehicle::default_weights(), faults, vehicle::weights);
+    let weights = fields.or(
+        "weights",
+        vehicle::default_weights(),
+        faults,
+        vehicle::weights,
+    );
     let planner = section(&fields, "planner", &Node::Object(Box::default()), |at| {
         planner(at, rules, drawn_seed, faults)
     });
@@ -121,7 +131,9 @@ struct Place {
 fn place(fields: &Fields<'_>, rules: &Rules, faults: &mut Faults) -> Option<Place> {
     let start = fields.required("start", faults, point3);
     let target = fields.required("target", faults, point3);
-    let given_area = fields.or("area", None, faults, |at, faults| area(at, faults).map(Some));
+    let given_area = fields.or("area", None, faults, |at, faults| {
+        area(at, faults).map(Some)
+    });
     let threats = fields.or("threats", Vec::new(), faults, |at, faults| {
         threats(at, &rules.limits, faults)
     });

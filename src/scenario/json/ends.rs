@@ -43,7 +43,14 @@ pub(super) fn check_apart(start: Point3, target: Point3, faults: &mut Faults) {
 pub(super) fn check_ground(name: &str, end: Point3, terrain: &Terrain, faults: &mut Faults) {
     let path = Path::Key(&Path::Root, name);
     if let Some(extent) = terrain.extent().filter(|extent| !extent.contains(end.xy())) {
-        return outside(&path, "outside-terrain", "the terrain grid", end, extent, faults);
+        return outside(
+            &path,
+            "outside-terrain",
+            "the terrain grid",
+            end,
+            extent,
+            faults,
+        );
     }
     let ground = terrain.elevation(end.xy());
     if ground - end.z > SUNK_M {
@@ -68,11 +75,19 @@ pub(super) fn check_area(name: &str, end: Point3, area: Rect, faults: &mut Fault
 }
 
 /// The start or the target must lie in no threat; touching one is clear.
-pub(super) fn check_threats(name: &str, end: Point3, threats: &[Option<Threat>], faults: &mut Faults) {
-    let mut around = threats.iter().enumerate().filter_map(|(threat_idx, threat)| {
-        let threat = threat.as_ref()?;
-        threat.contains(end).then_some((threat_idx, threat))
-    });
+pub(super) fn check_threats(
+    name: &str,
+    end: Point3,
+    threats: &[Option<Threat>],
+    faults: &mut Faults,
+) {
+    let mut around = threats
+        .iter()
+        .enumerate()
+        .filter_map(|(threat_idx, threat)| {
+            let threat = threat.as_ref()?;
+            threat.contains(end).then_some((threat_idx, threat))
+        });
     let Some((threat_idx, threat)) = around.next() else {
         return;
     };
@@ -107,7 +122,14 @@ pub(super) fn check_threats(name: &str, end: Point3, threats: &[Option<Threat>],
     });
 }
 
-fn outside(path: &Path<'_>, code: &'static str, what: &str, end: Point3, rect: Rect, faults: &mut Faults) {
+fn outside(
+    path: &Path<'_>,
+    code: &'static str,
+    what: &str,
+    end: Point3,
+    rect: Rect,
+    faults: &mut Faults,
+) {
     faults.add(path, code, || {
         format!(
             "{} is at ({}, {}), must lie in {what}, from ({}, {}) to ({}, {})",

@@ -19,7 +19,10 @@ pub const CODES: &[(&str, &str)] = &[
         "wrong-type",
         "the value has another JSON type than the field takes",
     ),
-    ("out-of-range", "the number lies outside what the field takes"),
+    (
+        "out-of-range",
+        "the number lies outside what the field takes",
+    ),
     (
         "not-an-integer",
         "the number has a fraction where a whole number is needed",
@@ -34,9 +37,18 @@ pub const CODES: &[(&str, &str)] = &[
         "too-much-work",
         "population * iterations * waypoints exceeds the limit of this server",
     ),
-    ("unknown-value", "the text is none of the values the field takes"),
-    ("not-available", "a known value that this release does not offer"),
-    ("not-applicable", "the field has no meaning beside the others"),
+    (
+        "unknown-value",
+        "the text is none of the values the field takes",
+    ),
+    (
+        "not-available",
+        "a known value that this release does not offer",
+    ),
+    (
+        "not-applicable",
+        "the field has no meaning beside the others",
+    ),
     ("unknown-algorithm", "no algorithm has this name"),
     ("unknown-parameter", "the algorithm has no such parameter"),
     (
@@ -48,9 +60,15 @@ pub const CODES: &[(&str, &str)] = &[
         "degenerate-polygon",
         "the vertices enclose no area or repeat a point",
     ),
-    ("self-crossing-polygon", "two edges of the polygon cross or touch"),
+    (
+        "self-crossing-polygon",
+        "two edges of the polygon cross or touch",
+    ),
     ("empty-area", "the area has no width or no height"),
-    ("area-outside-terrain", "the terrain grid does not cover the area"),
+    (
+        "area-outside-terrain",
+        "the terrain grid does not cover the area",
+    ),
     ("empty-altitude-band", "the altitude band is empty"),
     (
         "below-ground",
@@ -58,7 +76,10 @@ pub const CODES: &[(&str, &str)] = &[
     ),
     ("start-in-threat", "the start lies inside a threat"),
     ("target-in-threat", "the target lies inside a threat"),
-    ("outside-area", "the start or the target lies outside the area"),
+    (
+        "outside-area",
+        "the start or the target lies outside the area",
+    ),
     (
         "outside-terrain",
         "the start or the target lies outside the terrain grid",

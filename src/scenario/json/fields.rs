@@ -8,7 +8,11 @@ use super::value::{At, quote};
 
 impl<'a> At<'a> {
     /// The fields of an object; unknown ones and repeated ones leave faults.
-    pub(super) fn fields(self, allowed: &'static [&'static str], faults: &mut Faults) -> Option<Fields<'a>> {
+    pub(super) fn fields(
+        self,
+        allowed: &'static [&'static str],
+        faults: &mut Faults,
+    ) -> Option<Fields<'a>> {
         let Node::Object(entries) = self.node else {
             return self.wrong_type("an object", faults);
         };
@@ -16,7 +20,14 @@ impl<'a> At<'a> {
         for (key, node) in entries {
             let path = Path::Key(self.path, key);
             match allowed.iter().position(|name| *name == &**key) {
-                None => unknown_key(self.path, key, "unknown-field", "field here", allowed, faults),
+                None => unknown_key(
+                    self.path,
+                    key,
+                    "unknown-field",
+                    "field here",
+                    allowed,
+                    faults,
+                ),
                 Some(slot) if found[slot].is_some() => {
                     faults.add(&path, "duplicate-key", || {
                         format!("{key} is given twice, must be given once")
@@ -129,7 +140,12 @@ impl<'a> Fields<'a> {
         clippy::option_option,
         reason = "the outer one tells whether it could be read"
     )]
-    pub(super) fn nullable(&self, name: &str, range: Range, faults: &mut Faults) -> Option<Option<f64>> {
+    pub(super) fn nullable(
+        &self,
+        name: &str,
+        range: Range,
+        faults: &mut Faults,
+    ) -> Option<Option<f64>> {
         self.or(name, None, faults, |at, faults| match at.node {
             Node::Null => Some(None),
             _ => at.number(range, faults).map(Some),
@@ -148,7 +164,11 @@ pub(super) fn unknown_key(
 ) {
     let own = Path::Key(parent, key);
     // A pointer to a key of a megabyte helps nobody; then the object is pointed at.
-    let path = if key.len() <= MAX_NAME_CHARS { &own } else { parent };
+    let path = if key.len() <= MAX_NAME_CHARS {
+        &own
+    } else {
+        parent
+    };
     faults.add(path, code, || {
         let hint = nearest(key, allowed)
             .map(|name| format!(", did you mean {name}?"))

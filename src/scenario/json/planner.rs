@@ -51,11 +51,17 @@ pub(super) fn planner(
         Some(first) => fields.or("algorithm", first, faults, |at, faults| {
             algorithm(at, rules, faults)
         }),
-        None => fields.required("algorithm", faults, |at, faults| algorithm(at, rules, faults)),
+        None => fields.required("algorithm", faults, |at, faults| {
+            algorithm(at, rules, faults)
+        }),
     };
     let size = |name: &'static str, limit: usize| {
         move |at: At<'_>, faults: &mut Faults| {
-            let min = if name == "population" { MIN_POPULATION } else { 1 };
+            let min = if name == "population" {
+                MIN_POPULATION
+            } else {
+                1
+            };
             at.count(min, (name, limit), faults)
         }
     };
@@ -98,8 +104,15 @@ pub(super) fn planner(
         faults,
         |at, faults| parameters(at, algorithm, faults),
     );
-    if let (Some(waypoints), Some(population), Some(iterations)) = (waypoints, population, iterations) {
-        check_work(at.path, [population, iterations, waypoints], limits.work, faults);
+    if let (Some(waypoints), Some(population), Some(iterations)) =
+        (waypoints, population, iterations)
+    {
+        check_work(
+            at.path,
+            [population, iterations, waypoints],
+            limits.work,
+            faults,
+        );
     }
     cold?;
     let (quadrature, parameters) = parameters?;
@@ -207,12 +220,12 @@ fn parameters(
         }
         let at = At { node, path: &path };
         if slot == 0 {
-            quadrature = at
-                .choice(&["integral", "paper"], &[], faults)
-                .map(|choice| match choice {
-                    "paper" => Quadrature::Paper,
-                    _ => Quadrature::Integral,
-                });
+            quadrature =
+                at.choice(&["integral", "paper"], &[], faults)
+                    .map(|choice| match choice {
+                        "paper" => Quadrature::Paper,
+                        _ => Quadrature::Integral,
+                    });
             continue;
         }
         let constant = rule.parameters[slot - 1];

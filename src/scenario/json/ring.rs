@@ -36,10 +36,16 @@ pub(super) fn check(vertices: &[Point2]) -> Result<(), RingFault> {
         .windows(2)
         .find(|pair| along(vertices[pair[0]], vertices[pair[1]]).is_eq())
     {
-        return Err(RingFault::Repeated(pair[0].min(pair[1]), pair[0].max(pair[1])));
+        return Err(RingFault::Repeated(
+            pair[0].min(pair[1]),
+            pair[0].max(pair[1]),
+        ));
     }
     let (first, last) = (vertices[order[0]], vertices[order[order.len() - 1]]);
-    if vertices.iter().all(|vertex| turn(first, last, *vertex).is_eq()) {
+    if vertices
+        .iter()
+        .all(|vertex| turn(first, last, *vertex).is_eq())
+    {
         return Err(RingFault::Flat);
     }
     let mut sweep = Sweep {
@@ -81,7 +87,9 @@ impl Sweep<'_> {
         let here = self.vertices[vertex];
         let starts = |edge: usize| along(self.ends(edge).0, here).is_eq();
         let (incoming_starts, outgoing_starts) = (starts(incoming), starts(outgoing));
-        let at = self.status.partition_point(|edge| self.side(*edge, here).is_gt());
+        let at = self
+            .status
+            .partition_point(|edge| self.side(*edge, here).is_gt());
         match (incoming_starts, outgoing_starts) {
             (true, true) => self.open(at, incoming, outgoing, here),
             (false, false) => self.close(at, incoming, outgoing),
@@ -121,7 +129,13 @@ impl Sweep<'_> {
     }
 
     /// One edge ends at `here` and the next begins.
-    fn replace(&mut self, at: usize, ending: usize, starting: usize, here: Point2) -> Result<(), RingFault> {
+    fn replace(
+        &mut self,
+        at: usize,
+        ending: usize,
+        starting: usize,
+        here: Point2,
+    ) -> Result<(), RingFault> {
         match self.status.get(at) {
             Some(edge) if *edge == ending => {}
             Some(edge) => return Err(crossing(*edge, ending)),

@@ -46,7 +46,9 @@ fn peaks(fields: &Fields<'_>, limits: &Limits, faults: &mut Faults) -> Option<Pe
             });
             return None;
         }
-        at.items(faults, peak).into_iter().collect::<Option<Vec<_>>>()
+        at.items(faults, peak)
+            .into_iter()
+            .collect::<Option<Vec<_>>>()
     });
     Some(Peaks {
         base: base?,
@@ -70,8 +72,12 @@ fn grid(fields: &Fields<'_>, limits: &Limits, faults: &mut Faults) -> Option<Gri
     let nodes = ("terrain_nodes", limits.terrain_nodes);
     let origin = fields.required("origin", faults, point2);
     let cell = fields.number("cell", CELL, faults);
-    let columns = fields.required("columns", faults, |at, faults| at.count(MIN_NODES, nodes, faults));
-    let rows = fields.required("rows", faults, |at, faults| at.count(MIN_NODES, nodes, faults));
+    let columns = fields.required("columns", faults, |at, faults| {
+        at.count(MIN_NODES, nodes, faults)
+    });
+    let rows = fields.required("rows", faults, |at, faults| {
+        at.count(MIN_NODES, nodes, faults)
+    });
     let expected = columns
         .zip(rows)
         .map(|(columns, rows)| columns.saturating_mul(rows));
@@ -101,7 +107,12 @@ fn grid(fields: &Fields<'_>, limits: &Limits, faults: &mut Faults) -> Option<Gri
 }
 
 /// Elevations, as many as the grid has nodes and no more than the server takes.
-fn elevations(at: At<'_>, expected: Option<usize>, limits: &Limits, faults: &mut Faults) -> Option<Vec<f64>> {
+fn elevations(
+    at: At<'_>,
+    expected: Option<usize>,
+    limits: &Limits,
+    faults: &mut Faults,
+) -> Option<Vec<f64>> {
     let len = at.len(faults)?;
     let nodes = expected.unwrap_or(len).max(len);
     if nodes > limits.terrain_nodes {

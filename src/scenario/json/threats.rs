@@ -13,11 +13,23 @@ use super::ring::{self, RingFault};
 use super::tree::Node;
 use super::value::{At, figure, name};
 
-const CYLINDER: &[&str] = &["kind", "name", "center", "radius", "influence", "base", "top"];
+const CYLINDER: &[&str] = &[
+    "kind",
+    "name",
+    "center",
+    "radius",
+    "influence",
+    "base",
+    "top",
+];
 const POLYGON: &[&str] = &["kind", "name", "vertices", "margin", "base", "top"];
 
 /// The threats in the order of the document; those that cannot be read are `None`.
-pub(super) fn threats(at: At<'_>, limits: &Limits, faults: &mut Faults) -> Option<Vec<Option<Threat>>> {
+pub(super) fn threats(
+    at: At<'_>,
+    limits: &Limits,
+    faults: &mut Faults,
+) -> Option<Vec<Option<Threat>>> {
     let len = at.len(faults)?;
     if len > limits.threats {
         faults.add(at.path, "too-many", || {
@@ -43,7 +55,9 @@ pub(super) fn threats(at: At<'_>, limits: &Limits, faults: &mut Faults) -> Optio
 
 /// The vertices of all polygons together, before any is read.
 fn vertex_count(at: At<'_>) -> usize {
-    let Node::Array(threats) = at.node else { return 0 };
+    let Node::Array(threats) = at.node else {
+        return 0;
+    };
     let count = |threat: &Node| match threat.get("vertices") {
         Some(Node::Array(vertices)) => vertices.len(),
         Some(Node::Numbers(vertices)) => vertices.len(),
@@ -54,7 +68,8 @@ fn vertex_count(at: At<'_>) -> usize {
 
 /// One threat; with `read_vertices` false there are too many to look at.
 fn threat(at: At<'_>, read_vertices: bool, faults: &mut Faults) -> Option<Threat> {
-    let (kind, fields) = at.variant(&[("cylinder", CYLINDER), ("polygon", POLYGON)], &[], faults)?;
+    let (kind, fields) =
+        at.variant(&[("cylinder", CYLINDER), ("polygon", POLYGON)], &[], faults)?;
     let name = fields.or("name", None, faults, name);
     let base = fields.nullable("base", COORDINATE, faults);
     let top = fields.nullable("top", COORDINATE, faults);
@@ -116,14 +131,21 @@ fn polygon(fields: &Fields<'_>, read_vertices: bool, faults: &mut Faults) -> Opt
     let margin = fields.number_or("margin", 0.0, MARGIN, faults);
     let vertices = fields.required("vertices", faults, |at, faults| {
         at.len(faults)?;
-        if read_vertices { vertices(at, faults) } else { None }
+        if read_vertices {
+            vertices(at, faults)
+        } else {
+            None
+        }
     });
     Some(Polygon::new(vertices?, margin?))
 }
 
 /// A simple ring without its closing vertex.
 fn vertices(at: At<'_>, faults: &mut Faults) -> Option<Vec<Point2>> {
-    let mut vertices: Vec<Point2> = at.items(faults, point2).into_iter().collect::<Option<_>>()?;
+    let mut vertices: Vec<Point2> = at
+        .items(faults, point2)
+        .into_iter()
+        .collect::<Option<_>>()?;
     if vertices.len() > 1 && vertices.first() == vertices.last() {
         vertices.pop();
     }

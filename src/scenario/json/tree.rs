@@ -167,7 +167,10 @@ pub(super) fn float(number: &Number) -> f64 {
 }
 
 /// A number as a caller would have written it: `3`, not `3.0`.
-#[expect(clippy::cast_possible_truncation, reason = "whole and below 2^53, so exact")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "whole and below 2^53, so exact"
+)]
 pub(super) fn whole_or_float(number: f64) -> Number {
     if number.fract() == 0.0 && number.abs() < 9_007_199_254_740_992.0 {
         Number::from(number as i64)
@@ -193,7 +196,9 @@ fn pointer(trail: &[Step]) -> String {
     for step in trail {
         pointer.push('/');
         match step {
-            Step::Key(key) => pointer.push_str(&escape(&key.chars().take(MAX_CHARS).collect::<String>())),
+            Step::Key(key) => {
+                pointer.push_str(&escape(&key.chars().take(MAX_CHARS).collect::<String>()))
+            }
             Step::Index(index) => pointer.push_str(&index.to_string()),
         }
     }
@@ -272,11 +277,22 @@ mod tests {
 
     #[test]
     fn a_syntax_error_says_where_it_is() {
-        check("", (1, 1, "", "the document is empty, must be a JSON object"));
-        check(" \n ", (2, 1, "", "the document is empty, must be a JSON object"));
+        check(
+            "",
+            (1, 1, "", "the document is empty, must be a JSON object"),
+        );
+        check(
+            " \n ",
+            (2, 1, "", "the document is empty, must be a JSON object"),
+        );
         check(
             "{\n \"a\": [1, 1e999]}",
-            (2, 15, "/a/1", "1e999 is out of range, must fit a 64-bit float"),
+            (
+                2,
+                15,
+                "/a/1",
+                "1e999 is out of range, must fit a 64-bit float",
+            ),
         );
         check(
             "{\"a\":{\"b~/\":NaN}}",
@@ -312,7 +328,10 @@ mod tests {
             "{\"a\":\"\\ud800\"}",
             (1, 13, "/a", "unexpected end of hex escape"),
         );
-        check(b"{\"a\":\"\xFF\"}", (1, 7, "/a", "invalid unicode code point"));
+        check(
+            b"{\"a\":\"\xFF\"}",
+            (1, 7, "/a", "invalid unicode code point"),
+        );
         check("{\"a\":1,}", (1, 8, "", "trailing comma"));
         check("{\"a\":01}", (1, 7, "/a", "invalid number"));
         check(

@@ -52,11 +52,20 @@ impl<'a> At<'a> {
         clippy::cast_sign_loss,
         reason = "whole and within range"
     )]
-    pub(super) fn count(self, min: usize, limit: (&str, usize), faults: &mut Faults) -> Option<usize> {
+    pub(super) fn count(
+        self,
+        min: usize,
+        limit: (&str, usize),
+        faults: &mut Faults,
+    ) -> Option<usize> {
         let value = self.integer(faults)?;
         if value < min as f64 {
             faults.add(self.path, "out-of-range", || {
-                format!("{} is {}, must be >= {min}", self.path.label(), show(self.node))
+                format!(
+                    "{} is {}, must be >= {min}",
+                    self.path.label(),
+                    show(self.node)
+                )
             });
             return None;
         }
@@ -170,7 +179,9 @@ impl<'a> At<'a> {
                 .map(|(index, node)| item(index, node))
                 .collect(),
             Node::Numbers(numbers) => {
-                let nodes = numbers.iter().map(|number| Node::Number(whole_or_float(*number)));
+                let nodes = numbers
+                    .iter()
+                    .map(|number| Node::Number(whole_or_float(*number)));
                 nodes
                     .enumerate()
                     .map(|(index, node)| item(index, &node))
@@ -195,7 +206,11 @@ impl<'a> At<'a> {
 
     pub(super) fn wrong_type<T>(self, wanted: &str, faults: &mut Faults) -> Option<T> {
         faults.add(self.path, "wrong-type", || {
-            format!("{} is {}, must be {wanted}", self.path.label(), show(self.node))
+            format!(
+                "{} is {}, must be {wanted}",
+                self.path.label(),
+                show(self.node)
+            )
         });
         None
     }

@@ -43,7 +43,9 @@ impl VehicleDraft {
         Vehicle {
             max_turn_deg: self.max_turn_deg,
             max_climb_deg: self.max_climb_deg,
-            min_leg: self.min_leg.unwrap_or(distance / (10.0 * (waypoints + 1) as f64)),
+            min_leg: self
+                .min_leg
+                .unwrap_or(distance / (10.0 * (waypoints + 1) as f64)),
             cruise_speed: self.cruise_speed,
             fuel_per_km: self.fuel_per_km,
         }

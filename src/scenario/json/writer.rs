@@ -13,7 +13,8 @@ use super::tree::whole_or_float;
 
 /// The accepted document as compact JSON; reading it gives an equal scenario.
 pub(super) fn write(scenario: &Scenario) -> String {
-    serde_json::to_string(&Document::from(scenario)).expect("wire structs have text keys and finite numbers")
+    serde_json::to_string(&Document::from(scenario))
+        .expect("wire structs have text keys and finite numbers")
 }
 
 /// A number, written `3` rather than `3.0`.

@@ -57,8 +57,9 @@ impl SqliteStore {
         create_directory(data_dir)?;
         let lock = lock(data_dir)?;
         let file = data_dir.join(DATABASE);
-        let connection = open_database(&file)
-            .map_err(|error| StoreError::Unavailable(format!("database {}: {error}", file.display())))?;
+        let connection = open_database(&file).map_err(|error| {
+            StoreError::Unavailable(format!("database {}: {error}", file.display()))
+        })?;
         sync_directory(data_dir)?;
         Self::assemble(connection, lock, file, options)
     }
@@ -159,7 +160,12 @@ impl Store for SqliteStore {
             .await
     }
 
-    async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<Vec<NumberedEvent>, StoreError> {
+    async fn events(
+        &self,
+        id: PlanId,
+        after: u64,
+        limit: usize,
+    ) -> Result<Vec<NumberedEvent>, StoreError> {
         let now_ms = (self.clock)();
         self.readers
             .read(move |connection| read::events(connection, id, after, limit, now_ms))
@@ -215,7 +221,8 @@ fn create_directory(data_dir: &Path) -> Result<(), StoreError> {
 
 fn lock(data_dir: &Path) -> Result<File, StoreError> {
     let path = data_dir.join(LOCK);
-    let unusable = |error| StoreError::Unavailable(format!("lock file {}: {error}", path.display()));
+    let unusable =
+        |error| StoreError::Unavailable(format!("lock file {}: {error}", path.display()));
     let file = File::options()
         .create(true)
         .truncate(false)
@@ -286,7 +293,8 @@ mod tests {
             queue_limit: 1_000,
             clock: wall_clock(),
         };
-        let store = SqliteStore::assemble(connection, lock, file, options).expect("the tables are there");
+        let store =
+            SqliteStore::assemble(connection, lock, file, options).expect("the tables are there");
 
         let mut accepted = Vec::new();
         let refusal = loop {

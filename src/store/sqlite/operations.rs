@@ -11,7 +11,10 @@ use super::transaction::{Effect, Transaction};
 use crate::job::{Event, Plan, PlanId, Status, Submission};
 use crate::store::{Ending, Lease, StoreError, TOMBSTONE_MS};
 
-pub(super) fn submit(tx: &mut Transaction<'_>, submission: &Submission) -> Result<Plan, StoreError> {
+pub(super) fn submit(
+    tx: &mut Transaction<'_>,
+    submission: &Submission,
+) -> Result<Plan, StoreError> {
     if tx.queued >= tx.queue_limit {
         return Err(StoreError::QueueFull { queued: tx.queued });
     }
@@ -94,7 +97,11 @@ pub(super) fn finish(
     Ok(row.plan)
 }
 
-pub(super) fn release(tx: &mut Transaction<'_>, id: PlanId, attempt: u64) -> Result<(), StoreError> {
+pub(super) fn release(
+    tx: &mut Transaction<'_>,
+    id: PlanId,
+    attempt: u64,
+) -> Result<(), StoreError> {
     let row = leased(tx, id, attempt)?;
     give_back(tx, row)?;
     tx.effects.push(Effect::Unleased(id));
@@ -118,7 +125,11 @@ pub(super) fn recover(tx: &mut Transaction<'_>) -> Result<(), StoreError> {
     Ok(())
 }
 
-pub(super) fn request_cancel(tx: &mut Transaction<'_>, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
+pub(super) fn request_cancel(
+    tx: &mut Transaction<'_>,
+    id: PlanId,
+    now_ms: i64,
+) -> Result<Plan, StoreError> {
     let Some(mut row) = PlanRow::load(tx.connection, id)? else {
         return Err(missing(tx.connection, id, (tx.clock)())?);
     };

@@ -40,7 +40,12 @@ impl Readers {
         T: Send + 'static,
         W: FnOnce(&Connection) -> Result<T, StoreError> + Send + 'static,
     {
-        let permit = self.permits.clone().acquire_owned().await.map_err(|_| closed())?;
+        let permit = self
+            .permits
+            .clone()
+            .acquire_owned()
+            .await
+            .map_err(|_| closed())?;
         let readers = Arc::clone(self);
         let task = tokio::task::spawn_blocking(move || {
             let mut connection = readers.take()?;
@@ -87,13 +92,21 @@ pub(super) fn get(connection: &Connection, id: PlanId, now_ms: i64) -> Result<Pl
     }
 }
 
-pub(super) fn scenario(connection: &Connection, id: PlanId, now_ms: i64) -> Result<String, StoreError> {
+pub(super) fn scenario(
+    connection: &Connection,
+    id: PlanId,
+    now_ms: i64,
+) -> Result<String, StoreError> {
     let sql = "SELECT document FROM plans LEFT JOIN scenarios ON plan_seq = seq WHERE id = ?1";
     let document = document(connection, sql, id, now_ms)?;
     document.ok_or_else(|| StoreError::Unavailable(format!("plan {id} has lost its scenario")))
 }
 
-pub(super) fn result(connection: &Connection, id: PlanId, now_ms: i64) -> Result<Option<String>, StoreError> {
+pub(super) fn result(
+    connection: &Connection,
+    id: PlanId,
+    now_ms: i64,
+) -> Result<Option<String>, StoreError> {
     let sql = "SELECT document FROM plans LEFT JOIN results ON plan_seq = seq WHERE id = ?1";
     document(connection, sql, id, now_ms)
 }
@@ -155,7 +168,9 @@ pub(super) fn list(connection: &Connection, query: ListQuery) -> Result<Vec<Plan
 /// The `seq` of each queued plan, in order.
 fn queue(connection: &Connection) -> rusqlite::Result<Vec<i64>> {
     connection
-        .prepare_cached("SELECT seq FROM plans INDEXED BY plans_queue WHERE status = 'queued' ORDER BY seq")?
+        .prepare_cached(
+            "SELECT seq FROM plans INDEXED BY plans_queue WHERE status = 'queued' ORDER BY seq",
+        )?
         .query_map([], |row| row.get(0))?
         .collect()
 }
@@ -218,13 +233,19 @@ pub(super) fn stats(connection: &Connection) -> Result<Stats, StoreError> {
 }
 
 /// Why there is no such plan.
-pub(super) fn missing(connection: &Connection, id: PlanId, now_ms: i64) -> Result<StoreError, StoreError> {
+pub(super) fn missing(
+    connection: &Connection,
+    id: PlanId,
+    now_ms: i64,
+) -> Result<StoreError, StoreError> {
     let deleted_ms: Option<i64> = connection
         .prepare_cached("SELECT deleted_ms FROM tombstones WHERE id = ?1")?
         .query_row([id.to_string()], |row| row.get(0))
         .optional()?;
     Ok(match deleted_ms {
-        Some(deleted_ms) if now_ms.saturating_sub(deleted_ms) < TOMBSTONE_MS => StoreError::Gone(id),
+        Some(deleted_ms) if now_ms.saturating_sub(deleted_ms) < TOMBSTONE_MS => {
+            StoreError::Gone(id)
+        }
         _ => StoreError::NotFound(id),
     })
 }

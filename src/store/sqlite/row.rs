@@ -176,6 +176,10 @@ fn text<T>(row: &Row<'_>, column: &str, parse: impl Fn(&str) -> Option<T>) -> ru
     let value: String = row.get(column)?;
     parse(&value).ok_or_else(|| {
         let index = row.as_ref().column_index(column).unwrap_or_default();
-        rusqlite::Error::InvalidColumnType(index, format!("{column} {value:?}"), rusqlite::types::Type::Text)
+        rusqlite::Error::InvalidColumnType(
+            index,
+            format!("{column} {value:?}"),
+            rusqlite::types::Type::Text,
+        )
     })
 }

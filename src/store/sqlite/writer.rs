@@ -69,7 +69,9 @@ impl Writer {
                     closing.send(()).ok();
                 }
             })
-            .map_err(|error| StoreError::Unavailable(format!("no thread for the writer: {error}")))?;
+            .map_err(|error| {
+                StoreError::Unavailable(format!("no thread for the writer: {error}"))
+            })?;
         Ok(Self {
             messages,
             thread: Mutex::new(Some(thread)),
@@ -122,7 +124,11 @@ impl Drop for Writer {
     fn drop(&mut self) {
         let (reply, _) = oneshot::channel();
         self.send(Message::Close(reply)).ok();
-        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let thread = self
+            .thread
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
         if let Some(thread) = thread {
             // Its panic, if any, has been reported by the panic hook.
             thread.join().ok();
@@ -144,7 +150,9 @@ impl Delivery {
 
 impl Drop for Delivery {
     fn drop(&mut self) {
-        let Some(lease) = self.lease.take() else { return };
+        let Some(lease) = self.lease.take() else {
+            return;
+        };
         let (id, attempt) = (lease.plan.id, lease.attempt);
         let give_back: Operation = Box::new(move |tx| {
             let done = tx.map_or_else(
@@ -182,9 +190,11 @@ impl Desk {
     fn recover(&mut self) -> Result<(), StoreError> {
         self.queued = self
             .connection
-            .query_row("SELECT count(*) FROM plans WHERE status = 'queued'", [], |row| {
-                row.get::<_, i64>(0)
-            })?
+            .query_row(
+                "SELECT count(*) FROM plans WHERE status = 'queued'",
+                [],
+                |row| row.get::<_, i64>(0),
+            )?
             .cast_unsigned();
         let now_ms = (self.options.clock)();
         self.commit(|tx, _| {
@@ -274,7 +284,9 @@ impl Desk {
         &mut self,
         work: impl FnOnce(&mut Transaction<'_>, &mut VecDeque<Claimer>) -> T,
     ) -> Result<T, StoreError> {
-        self.connection.prepare_cached("BEGIN IMMEDIATE")?.execute([])?;
+        self.connection
+            .prepare_cached("BEGIN IMMEDIATE")?
+            .execute([])?;
         let mut tx = Transaction {
             connection: &self.connection,
             clock: &self.options.clock,

@@ -423,7 +423,10 @@ pub(crate) fn all_cases() -> Vec<(String, Fault)> {
         .iter()
         .map(|(from, to, pointer, code, detail)| (edited(from, to), fault(pointer, code, detail)))
         .collect();
-    let long_name = edited(r#""name":"full""#, &format!(r#""name":"{}""#, "n".repeat(201)));
+    let long_name = edited(
+        r#""name":"full""#,
+        &format!(r#""name":"{}""#, "n".repeat(201)),
+    );
     cases.push((
         long_name,
         fault(
@@ -441,8 +444,7 @@ pub(crate) fn all_cases() -> Vec<(String, Fault)> {
     cases.push((crowded, fault("/threats", "too-many", detail)));
     let vertices = r#"{"x":500,"y":500},"#.repeat(20_000);
     let detailed = edited(r#""vertices":["#, &format!(r#""vertices":[{vertices}"#));
-    let detail =
-        "the polygons have 20003 vertices together, must have at most 20000 (limit polygon_vertices)";
+    let detail = "the polygons have 20003 vertices together, must have at most 20000 (limit polygon_vertices)";
     cases.push((detailed, fault("/threats", "too-many", detail)));
     cases
 }

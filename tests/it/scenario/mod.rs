@@ -6,7 +6,9 @@ mod fuzz;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
-use noctule::scenario::json::{self, AlgorithmRule, CODES, Fault, MAX_LISTED, ParameterRule, Refusal, Rules};
+use noctule::scenario::json::{
+    self, AlgorithmRule, CODES, Fault, MAX_LISTED, ParameterRule, Refusal, Rules,
+};
 use noctule::scenario::limits::Limits;
 use noctule::scenario::{Quadrature, Scenario, Seeding};
 use noctule::terrain::Terrain;
@@ -55,8 +57,7 @@ fn faults(text: &str) -> Vec<Fault> {
 }
 
 /// The least that a document must say.
-const LEAST: &str =
-    r#"{"start":{"x":0,"y":0,"z":0},"target":{"x":300,"y":400,"z":0},"altitude":{"min":0,"max":200}}"#;
+const LEAST: &str = r#"{"start":{"x":0,"y":0,"z":0},"target":{"x":300,"y":400,"z":0},"altitude":{"min":0,"max":200}}"#;
 
 /// A document with everything in it; the cases below replace one part each.
 const FULL: &str = r#"{
@@ -99,11 +100,16 @@ fn every_code_has_a_case_and_a_row_in_the_docs() {
     for (_, fault) in all_cases() {
         examples.entry(fault.code).or_insert(fault);
     }
-    let counted = faults(&format!("{{{}}}", r#""x":0,"#.repeat(150).trim_end_matches(',')));
+    let counted = faults(&format!(
+        "{{{}}}",
+        r#""x":0,"#.repeat(150).trim_end_matches(',')
+    ));
     let last = counted.last().expect("there are many").clone();
     examples.insert(last.code, last);
     for (code, meaning) in CODES {
-        let Fault { pointer, detail, .. } = &examples
+        let Fault {
+            pointer, detail, ..
+        } = &examples
             .remove(code)
             .unwrap_or_else(|| panic!("{code} has no case"));
         let pointer = if pointer.is_empty() {
@@ -114,7 +120,10 @@ fn every_code_has_a_case_and_a_row_in_the_docs() {
         let row = format!("| `{code}` | {meaning} | {pointer}: {detail} |");
         assert!(page.contains(&row), "docs/PROBLEMS.md has no row\n{row}");
     }
-    assert!(examples.is_empty(), "not in the table of codes: {examples:?}");
+    assert!(
+        examples.is_empty(),
+        "not in the table of codes: {examples:?}"
+    );
 }
 
 #[test]
@@ -136,7 +145,9 @@ fn a_full_document_is_read_as_it_says() {
     assert_eq!(scenario.name.as_deref(), Some("full"));
     assert_eq!(scenario.threats.len(), 2);
     assert_eq!(scenario.threats[0].top, Some(500.0));
-    assert!(matches!(&scenario.threats[1].shape, Shape::Polygon(polygon) if polygon.vertices().len() == 3));
+    assert!(
+        matches!(&scenario.threats[1].shape, Shape::Polygon(polygon) if polygon.vertices().len() == 3)
+    );
     assert!(matches!(&scenario.terrain, Terrain::Grid(grid) if grid.elevations.len() == 9));
     assert_eq!(scenario.planner.quadrature, Quadrature::Paper);
     assert_eq!(
@@ -164,7 +175,10 @@ fn what_is_nearly_a_fault_is_none() {
             r#""fuel":0.5,"threat":1,"altitude":1"#,
             r#""fuel":0,"threat":0,"altitude":0"#,
         ),
-        (r#"{"x":550,"y":600}"#, r#"{"x":550,"y":600},{"x":500,"y":500}"#),
+        (
+            r#"{"x":550,"y":600}"#,
+            r#"{"x":550,"y":600},{"x":500,"y":500}"#,
+        ),
         (
             r#""max":{"x":1000,"y":1000}"#,
             r#""max":{"x":1000.0000001,"y":1000}"#,
@@ -237,7 +251,10 @@ fn ten_thousand_faults_make_a_short_answer() {
     assert_eq!(faults.len(), MAX_LISTED + 1);
     let last = faults.last().expect("there are many");
     assert_eq!((last.code, last.pointer.as_str()), ("more-faults", ""));
-    assert_eq!(last.detail, "9900 more faults are not listed, at most 100 are");
+    assert_eq!(
+        last.detail,
+        "9900 more faults are not listed, at most 100 are"
+    );
 }
 
 #[test]
@@ -310,8 +327,16 @@ fn a_hostile_body_of_eight_mebibytes_is_refused_at_once() {
             "0,",
             "0]}]}",
         ),
-        ("{\"planner\":{\"parameters\":{", "\"f_min\":9,", "\"f_min\":9}}}"),
-        ("{\"terrain\":{\"kind\":\"peaks\",\"peaks\":[", "{},", "{}]}}"),
+        (
+            "{\"planner\":{\"parameters\":{",
+            "\"f_min\":9,",
+            "\"f_min\":9}}}",
+        ),
+        (
+            "{\"terrain\":{\"kind\":\"peaks\",\"peaks\":[",
+            "{},",
+            "{}]}}",
+        ),
         (
             "{\"terrain\":{\"kind\":\"grid\",\"rows\":2,\"columns\":2,\"elevations\":[",
             "1e9,\"\",",
@@ -344,8 +369,8 @@ fn every_document_in_scenarios_is_accepted() {
         }
         n_documents += 1;
         let text = std::fs::read_to_string(&path).expect("it can be read");
-        let scenario =
-            read(&text).unwrap_or_else(|refusal| panic!("{} is refused:\n{refusal}", path.display()));
+        let scenario = read(&text)
+            .unwrap_or_else(|refusal| panic!("{} is refused:\n{refusal}", path.display()));
         let again = read(&json::write(&scenario)).expect("what is written is accepted");
         assert_eq!(again, scenario, "{}", path.display());
     }

@@ -59,7 +59,10 @@ async fn a_run_moves_the_record() {
         );
         assert_eq!(
             told[6..],
-            [Event::Status(Box::new(ended)), Event::End(Status::Succeeded)]
+            [
+                Event::Status(Box::new(ended)),
+                Event::End(Status::Succeeded)
+            ]
         );
     })
     .await;
@@ -91,7 +94,10 @@ async fn a_result_is_kept_byte_for_byte() {
     on_every_backend(10, async |store| {
         let id = store.submit(submission()).await.unwrap().id;
         let lease = store.claim().await.unwrap();
-        store.finish(&lease, ending(Status::Succeeded), 0).await.unwrap();
+        store
+            .finish(&lease, ending(Status::Succeeded), 0)
+            .await
+            .unwrap();
         let Ending::Result { document, .. } = ending(Status::Succeeded) else {
             unreachable!("that is what it makes")
         };
@@ -120,14 +126,23 @@ async fn a_lease_that_is_over_changes_nothing() {
                 kind(store.append(stale, vec![point(5, None)]).await),
                 Err("lease lost")
             );
-            assert_eq!(kind(store.finish(stale, failure(), 0).await), Err("lease lost"));
+            assert_eq!(
+                kind(store.finish(stale, failure(), 0).await),
+                Err("lease lost")
+            );
             assert_eq!(kind(store.release(stale).await), Err("lease lost"));
         }
-        store.finish(&ended, ending(Status::Succeeded), 0).await.unwrap();
+        store
+            .finish(&ended, ending(Status::Succeeded), 0)
+            .await
+            .unwrap();
         let plan = store.get(id).await.unwrap();
         let told = history(&**store, id).await;
         assert_eq!(kind(store.append(&ended, vec![]).await), Err("lease lost"));
-        assert_eq!(kind(store.finish(&ended, failure(), 0).await), Err("lease lost"));
+        assert_eq!(
+            kind(store.finish(&ended, failure(), 0).await),
+            Err("lease lost")
+        );
         assert_eq!(kind(store.release(&ended).await), Err("lease lost"));
         assert_eq!(store.get(id).await.unwrap(), plan);
         assert_eq!(history(&**store, id).await, told);
@@ -141,7 +156,10 @@ async fn a_queued_plan_is_cancelled_at_once_without_a_result() {
         let id = store.submit(submission()).await.unwrap().id;
         let next = store.submit(submission()).await.unwrap().id;
         let plan = store.request_cancel(id, 11_000).await.unwrap();
-        assert_eq!((plan.status, plan.finished_ms), (Status::Cancelled, Some(11_000)));
+        assert_eq!(
+            (plan.status, plan.finished_ms),
+            (Status::Cancelled, Some(11_000))
+        );
         assert_eq!((plan.queue_position, &plan.stop_reason), (None, &None));
         assert_eq!(store.result(id).await.unwrap(), None);
         let told = history(&**store, id).await;
@@ -163,7 +181,10 @@ async fn a_running_plan_is_told_to_stop_and_ends_with_its_result() {
         let mut lease = store.claim().await.unwrap();
         assert!(!*lease.cancel.borrow());
         let plan = store.request_cancel(id, 11_000).await.unwrap();
-        assert_eq!((plan.status, plan.cancel_requested), (Status::Running, true));
+        assert_eq!(
+            (plan.status, plan.cancel_requested),
+            (Status::Running, true)
+        );
         assert_eq!(store.request_cancel(id, 11_500).await.unwrap(), plan);
         assert!(*lease.cancel.wait_for(|cancelled| *cancelled).await.unwrap());
         store
@@ -171,7 +192,10 @@ async fn a_running_plan_is_told_to_stop_and_ends_with_its_result() {
             .await
             .unwrap();
         let plan = store.request_cancel(id, 13_000).await.unwrap();
-        assert_eq!((plan.status, plan.finished_ms), (Status::Cancelled, Some(12_000)));
+        assert_eq!(
+            (plan.status, plan.finished_ms),
+            (Status::Cancelled, Some(12_000))
+        );
         assert!(store.result(id).await.unwrap().is_some());
         let told = history(&**store, id).await;
         assert_eq!(
@@ -201,7 +225,10 @@ async fn a_cancelled_run_that_comes_back_is_not_run_again() {
         store.reopen().await;
         for id in [released, recovered] {
             let plan = store.get(id).await.unwrap();
-            assert_eq!((plan.status, plan.finished_ms), (Status::Cancelled, Some(10_000)));
+            assert_eq!(
+                (plan.status, plan.finished_ms),
+                (Status::Cancelled, Some(10_000))
+            );
             assert_eq!(
                 history(&**store, id).await.last(),
                 Some(&Event::End(Status::Cancelled))
@@ -249,7 +276,10 @@ async fn a_plan_ends_once_however_its_endings_race() {
 
             let status = store.get(id).await.unwrap().status;
             let told = history(&**store, id).await;
-            let ends = told.iter().filter(|event| matches!(event, Event::End(_))).count();
+            let ends = told
+                .iter()
+                .filter(|event| matches!(event, Event::End(_)))
+                .count();
             assert_eq!(ends, 1, "{told:?}");
             assert_eq!(told.last(), Some(&Event::End(status)));
             let path = statuses(&told);

@@ -88,12 +88,14 @@ impl Model {
             Step::Claim => self.claim(store).await,
             Step::Append(which) | Step::Finish(which, _) | Step::Release(which) => {
                 if !self.leases.is_empty() {
-                    self.apply_to_lease(store, step, which % self.leases.len()).await;
+                    self.apply_to_lease(store, step, which % self.leases.len())
+                        .await;
                 }
             }
             Step::Cancel(which) | Step::Delete(which) => {
                 if !self.plans.is_empty() {
-                    self.apply_to_plan(store, step, which % self.plans.len()).await;
+                    self.apply_to_plan(store, step, which % self.plans.len())
+                        .await;
                 }
             }
             Step::Reopen => {

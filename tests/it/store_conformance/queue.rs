@@ -22,7 +22,10 @@ async fn an_accepted_plan_reads_back_as_it_was_handed_in() {
         let accepted = store.submit(first.clone()).await.unwrap();
         let read = store.get(first.id).await.unwrap();
         assert_eq!(read, accepted);
-        assert_eq!((read.status, read.queue_position), (Status::Queued, Some(2)));
+        assert_eq!(
+            (read.status, read.queue_position),
+            (Status::Queued, Some(2))
+        );
         assert_eq!((read.name, read.seed), (first.name, first.seed));
         assert_eq!((read.iterations, read.created_ms), (10, 1_000));
         assert_eq!(store.scenario(first.id).await.unwrap(), first.scenario);
@@ -101,7 +104,10 @@ async fn a_claim_waits_for_a_plan() {
             submitted.push(store.submit(submission()).await.unwrap().id);
         }
         let claimed = join_all(claims).await;
-        let mut claimed: Vec<_> = claimed.into_iter().map(|lease| lease.unwrap().plan.id).collect();
+        let mut claimed: Vec<_> = claimed
+            .into_iter()
+            .map(|lease| lease.unwrap().plan.id)
+            .collect();
         claimed.sort_unstable();
         assert_eq!(claimed, submitted);
     })
@@ -160,12 +166,21 @@ async fn a_released_plan_is_next_and_begins_anew() {
         ];
         let first = store.claim().await.unwrap();
         let second = store.claim().await.unwrap();
-        store.append(&first, vec![point(3, Some(480.0))]).await.unwrap();
+        store
+            .append(&first, vec![point(3, Some(480.0))])
+            .await
+            .unwrap();
         store.release(&second).await.unwrap();
         store.release(&first).await.unwrap();
         let plan = store.get(ids[0]).await.unwrap();
-        assert_eq!((plan.status, plan.queue_position), (Status::Queued, Some(1)));
-        assert_eq!((plan.iteration, plan.evaluations, plan.best_cost), (0, 0, None));
+        assert_eq!(
+            (plan.status, plan.queue_position),
+            (Status::Queued, Some(1))
+        );
+        assert_eq!(
+            (plan.iteration, plan.evaluations, plan.best_cost),
+            (0, 0, None)
+        );
         assert_eq!((plan.feasible, plan.started_ms), (None, None));
         assert_eq!(
             history(&**store, ids[0]).await.last(),

@@ -36,7 +36,10 @@ async fn a_deleted_plan_is_gone_for_a_day_and_then_unknown() {
         let mut lease = store.claim().await.unwrap();
         assert_eq!(lease.plan.id, running);
         let last = store.claim().await.unwrap();
-        store.finish(&last, ending(Status::Succeeded), 0).await.unwrap();
+        store
+            .finish(&last, ending(Status::Succeeded), 0)
+            .await
+            .unwrap();
 
         let mut changes = store.changes(running);
         store.delete(running, store.now_ms()).await.unwrap();
@@ -47,7 +50,10 @@ async fn a_deleted_plan_is_gone_for_a_day_and_then_unknown() {
             kind(store.append(&lease, vec![point(0, None)]).await),
             Err("lease lost")
         );
-        assert_eq!(kind(store.finish(&lease, failure(), 0).await), Err("lease lost"));
+        assert_eq!(
+            kind(store.finish(&lease, failure(), 0).await),
+            Err("lease lost")
+        );
         assert_eq!(kind(store.release(&lease).await), Err("lease lost"));
 
         store.pass_ms(TOMBSTONE_MS - 1);
@@ -64,7 +70,10 @@ async fn a_deleted_plan_is_gone_for_a_day_and_then_unknown() {
         for id in [queued, running, ended] {
             assert_eq!(kind(store.get(id).await), Err("not found"));
             assert_eq!(kind(store.request_cancel(id, 0).await), Err("not found"));
-            assert_eq!(kind(store.delete(id, store.now_ms()).await), Err("not found"));
+            assert_eq!(
+                kind(store.delete(id, store.now_ms()).await),
+                Err("not found")
+            );
         }
         assert_eq!(store.list(ALL).await.unwrap(), []);
         let stats = store.stats().await.unwrap();
@@ -86,7 +95,10 @@ async fn events_are_read_without_loss_or_repeat_from_any_place() {
             });
             store.append(&lease, batch.collect()).await.unwrap();
         }
-        store.finish(&lease, ending(Status::Succeeded), 0).await.unwrap();
+        store
+            .finish(&lease, ending(Status::Succeeded), 0)
+            .await
+            .unwrap();
 
         let all = store.events(id, 0, usize::MAX).await.unwrap();
         assert_eq!(all.len(), 2 + 313 + 2);
@@ -100,7 +112,11 @@ async fn events_are_read_without_loss_or_repeat_from_any_place() {
             assert_eq!(read_by(&**store, id, limit).await, all, "limit {limit}");
         }
         for after in [0, 1, 2, 3, 4, 11, 12, 200, 316, 317, 318, u64::MAX] {
-            let rest: Vec<_> = all.iter().filter(|event| event.id > after).cloned().collect();
+            let rest: Vec<_> = all
+                .iter()
+                .filter(|event| event.id > after)
+                .cloned()
+                .collect();
             assert_eq!(
                 store.events(id, after, usize::MAX).await.unwrap(),
                 rest,
@@ -131,7 +147,10 @@ async fn event_ids_grow_over_releases_and_restarts() {
         let id = store.submit(submission()).await.unwrap().id;
         for round in 0..4 {
             let lease = store.claim().await.unwrap();
-            store.append(&lease, vec![point(round, None)]).await.unwrap();
+            store
+                .append(&lease, vec![point(round, None)])
+                .await
+                .unwrap();
             if round % 2 == 0 {
                 store.release(&lease).await.unwrap();
             } else {
@@ -186,9 +205,15 @@ async fn whoever_subscribes_and_then_reads_misses_nothing() {
                 })
             });
             for iteration in 0..10 {
-                shared.append(&lease, vec![point(iteration, None)]).await.unwrap();
+                shared
+                    .append(&lease, vec![point(iteration, None)])
+                    .await
+                    .unwrap();
             }
-            shared.finish(&lease, ending(Status::Succeeded), 0).await.unwrap();
+            shared
+                .finish(&lease, ending(Status::Succeeded), 0)
+                .await
+                .unwrap();
             let all = shared.events(id, 0, usize::MAX).await.unwrap();
             for follower in followers {
                 assert_eq!(follower.await.unwrap(), all);
@@ -206,13 +231,19 @@ async fn plans_are_listed_newest_first_by_status_and_page() {
             ids.push(store.submit(submission()).await.unwrap().id);
         }
         let lease = store.claim().await.unwrap();
-        store.finish(&lease, ending(Status::Succeeded), 0).await.unwrap();
+        store
+            .finish(&lease, ending(Status::Succeeded), 0)
+            .await
+            .unwrap();
         let _running = store.claim().await.unwrap();
         store.request_cancel(ids[24], 0).await.unwrap();
 
         let newest_first: Vec<_> = ids.iter().rev().copied().collect();
         let all = store.list(ALL).await.unwrap();
-        assert_eq!(all.iter().map(|plan| plan.id).collect::<Vec<_>>(), newest_first);
+        assert_eq!(
+            all.iter().map(|plan| plan.id).collect::<Vec<_>>(),
+            newest_first
+        );
         for plan in &all {
             assert_eq!(*plan, store.get(plan.id).await.unwrap());
         }
@@ -246,7 +277,10 @@ async fn plans_are_listed_newest_first_by_status_and_page() {
         assert_eq!(of_status(Status::Running, None).await, [ids[1]]);
         assert_eq!(of_status(Status::Cancelled, None).await, [ids[24]]);
         assert!(of_status(Status::Failed, None).await.is_empty());
-        assert_eq!(of_status(Status::Queued, Some(ids[4])).await, [ids[3], ids[2]]);
+        assert_eq!(
+            of_status(Status::Queued, Some(ids[4])).await,
+            [ids[3], ids[2]]
+        );
 
         // A page's mark still holds when its plan has been deleted.
         store.delete(ids[20], 0).await.unwrap();
@@ -280,9 +314,15 @@ async fn the_mean_run_time_is_that_of_the_last_runs_with_a_result() {
         store.submit(submission()).await.unwrap();
         let lease = store.claim().await.unwrap();
         store.pass_ms(1_000_000);
-        store.finish(&lease, failure(), store.now_ms()).await.unwrap();
+        store
+            .finish(&lease, failure(), store.now_ms())
+            .await
+            .unwrap();
         let unseen = store.submit(submission()).await.unwrap();
-        store.request_cancel(unseen.id, store.now_ms()).await.unwrap();
+        store
+            .request_cancel(unseen.id, store.now_ms())
+            .await
+            .unwrap();
         let mean_run_ms = store.stats().await.unwrap().mean_run_ms;
         assert!(
             mean_run_ms.is_some_and(|mean| (mean - 300.0).abs() < 1e-9),
@@ -300,10 +340,16 @@ async fn a_new_process_queues_what_was_running_and_keeps_the_order() {
             ids.push(store.submit(submission()).await.unwrap().id);
         }
         let lease = store.claim().await.unwrap();
-        store.finish(&lease, ending(Status::Succeeded), 0).await.unwrap();
+        store
+            .finish(&lease, ending(Status::Succeeded), 0)
+            .await
+            .unwrap();
         let _first = store.claim().await.unwrap();
         let third = store.claim().await.unwrap();
-        store.append(&third, vec![point(5, Some(1.0))]).await.unwrap();
+        store
+            .append(&third, vec![point(5, Some(1.0))])
+            .await
+            .unwrap();
         store.reopen().await;
         let stats = store.stats().await.unwrap();
         assert_eq!((stats.queued, stats.running), (8, 0));

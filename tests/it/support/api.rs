@@ -92,7 +92,12 @@ impl Api {
             .body(body.into())
             .expect("a request");
         let path = request.uri().path().to_owned();
-        let response = self.router.clone().oneshot(request).await.expect("never fails");
+        let response = self
+            .router
+            .clone()
+            .oneshot(request)
+            .await
+            .expect("never fails");
         let (head, body) = response.into_parts();
         let body = body.collect().await.expect("a whole body").to_bytes();
         description::check(&method, &path, head.status, &head.headers, &body);
@@ -113,7 +118,8 @@ impl Api {
 
     pub(crate) async fn post(&self, uri: &str, document: &Value) -> Answer {
         let headers = [("content-type", "application/json")];
-        self.send(Method::POST, uri, &headers, document.to_string()).await
+        self.send(Method::POST, uri, &headers, document.to_string())
+            .await
     }
 
     pub(crate) async fn delete(&self, uri: &str) -> Answer {

@@ -45,7 +45,13 @@ pub(crate) fn template(path: &str) -> Option<&'static str> {
 }
 
 /// Panics unless the description knows such an answer.
-pub(crate) fn check(method: &Method, path: &str, status: StatusCode, headers: &HeaderMap, body: &[u8]) {
+pub(crate) fn check(
+    method: &Method,
+    path: &str,
+    status: StatusCode,
+    headers: &HeaderMap,
+    body: &[u8],
+) {
     let place = format!("{method} {path} -> {status}");
     assert!(
         headers.contains_key("x-request-id"),
@@ -74,7 +80,8 @@ pub(crate) fn check(method: &Method, path: &str, status: StatusCode, headers: &H
         Some(content) => {
             let media_type = headers["content-type"].to_str().expect("visible ASCII");
             let described = content.get(media_type);
-            let described = described.unwrap_or_else(|| panic!("{place}: {media_type} is not described"));
+            let described =
+                described.unwrap_or_else(|| panic!("{place}: {media_type} is not described"));
             check_body(media_type, &described["schema"], body, &place);
         }
     }
@@ -94,7 +101,10 @@ fn check_headers(response: &Value, headers: &HeaderMap, place: &str) {
     let described = response["headers"]
         .as_object()
         .expect("every response has headers");
-    for name in headers.keys().filter(|name| !COMMON.contains(&name.as_str())) {
+    for name in headers
+        .keys()
+        .filter(|name| !COMMON.contains(&name.as_str()))
+    {
         let known = described
             .keys()
             .any(|known| known.eq_ignore_ascii_case(name.as_str()));
@@ -104,9 +114,14 @@ fn check_headers(response: &Value, headers: &HeaderMap, place: &str) {
 
 fn check_body(media_type: &str, schema: &Value, body: &[u8], place: &str) {
     match media_type {
-        "application/json" | "application/problem+json" => check_schema(schema, &parse(body, place), place),
+        "application/json" | "application/problem+json" => {
+            check_schema(schema, &parse(body, place), place)
+        }
         "application/x-ndjson" => {
-            for line in body.split(|byte| *byte == b'\n').filter(|line| !line.is_empty()) {
+            for line in body
+                .split(|byte| *byte == b'\n')
+                .filter(|line| !line.is_empty())
+            {
                 check_schema(schema, &parse(line, place), place);
             }
         }
@@ -129,8 +144,11 @@ pub(crate) fn check_schema(schema: &Value, instance: &Value, place: &str) {
 
 /// Compiled once for each schema.
 fn validator(schema: &Value) -> Arc<Validator> {
-    static COMPILED: LazyLock<Mutex<HashMap<String, Arc<Validator>>>> = LazyLock::new(Mutex::default);
-    let mut compiled = COMPILED.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    static COMPILED: LazyLock<Mutex<HashMap<String, Arc<Validator>>>> =
+        LazyLock::new(Mutex::default);
+    let mut compiled = COMPILED
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
     let compile = || {
         let whole = json!({
             "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -144,5 +162,8 @@ fn validator(schema: &Value) -> Arc<Validator> {
                 .expect("the description's schemas are well-formed"),
         )
     };
-    compiled.entry(schema.to_string()).or_insert_with(compile).clone()
+    compiled
+        .entry(schema.to_string())
+        .or_insert_with(compile)
+        .clone()
 }

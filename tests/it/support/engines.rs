@@ -5,13 +5,17 @@ use std::sync::Arc;
 use noctule::geometry::Point3;
 use noctule::job::Failure;
 use noctule::planner::{
-    Bound, ConvergencePoint, CostFigures, Incumbent, Leg, Measures, Observer, Outcome, Stop, StopReason,
+    Bound, ConvergencePoint, CostFigures, Incumbent, Leg, Measures, Observer, Outcome, Stop,
+    StopReason,
 };
 use noctule::worker::Engine;
 
 /// Wraps a function as an engine.
 pub(crate) fn engine(
-    plan: impl Fn(&str, &mut dyn Observer, &dyn Stop) -> Result<Outcome, Failure> + Send + Sync + 'static,
+    plan: impl Fn(&str, &mut dyn Observer, &dyn Stop) -> Result<Outcome, Failure>
+    + Send
+    + Sync
+    + 'static,
 ) -> Engine {
     Arc::new(plan)
 }
@@ -27,7 +31,12 @@ pub(crate) fn endless() -> Engine {
     engine(|scenario, observer, stop| Ok(search(scenario, usize::MAX, observer, stop)))
 }
 
-fn search(scenario: &str, iterations: usize, observer: &mut dyn Observer, stop: &dyn Stop) -> Outcome {
+fn search(
+    scenario: &str,
+    iterations: usize,
+    observer: &mut dyn Observer,
+    stop: &dyn Stop,
+) -> Outcome {
     let start = scenario
         .bytes()
         .fold(1_u32, |sum, byte| sum.wrapping_mul(31) + u32::from(byte));
@@ -73,7 +82,11 @@ pub(crate) fn incumbent(iteration: usize, cost: f64) -> Incumbent {
     }
 }
 
-pub(crate) fn outcome(stop_reason: StopReason, cost: f64, convergence: Vec<ConvergencePoint>) -> Outcome {
+pub(crate) fn outcome(
+    stop_reason: StopReason,
+    cost: f64,
+    convergence: Vec<ConvergencePoint>,
+) -> Outcome {
     Outcome {
         feasible: true,
         stop_reason,

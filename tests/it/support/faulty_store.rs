@@ -80,7 +80,12 @@ impl Store for FaultyStore {
         self.sound.list(query).await
     }
 
-    async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<Vec<NumberedEvent>, StoreError> {
+    async fn events(
+        &self,
+        id: PlanId,
+        after: u64,
+        limit: usize,
+    ) -> Result<Vec<NumberedEvent>, StoreError> {
         self.sound.events(id, after, limit).await
     }
 

@@ -52,7 +52,10 @@ pub(crate) fn failure() -> Ending {
 
 /// All events of a plan.
 pub(crate) async fn history(store: &dyn Store, id: PlanId) -> Vec<Event> {
-    let events = store.events(id, 0, usize::MAX).await.expect("the plan is there");
+    let events = store
+        .events(id, 0, usize::MAX)
+        .await
+        .expect("the plan is there");
     events.into_iter().map(|numbered| numbered.event).collect()
 }
 

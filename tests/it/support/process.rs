@@ -39,7 +39,11 @@ pub(crate) fn run(arguments: &[&str], input: &str) -> Output {
         .spawn()
         .expect("the binary starts");
     // A process that does not read its input closes it.
-    let _ = child.stdin.take().expect("piped").write_all(input.as_bytes());
+    let _ = child
+        .stdin
+        .take()
+        .expect("piped")
+        .write_all(input.as_bytes());
     child.wait_with_output().expect("the binary ends")
 }
 
@@ -113,7 +117,9 @@ impl Service {
                 .json()
                 .await
                 .expect("JSON");
-            if ["succeeded", "failed", "cancelled"].contains(&status["status"].as_str().expect("text")) {
+            if ["succeeded", "failed", "cancelled"]
+                .contains(&status["status"].as_str().expect("text"))
+            {
                 return status;
             }
         }

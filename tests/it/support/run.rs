@@ -1,8 +1,8 @@
 //! Playing the worker: runs whose every step the test decides.
 
 use noctule::export::document::{
-    Bound, Checks, Clearance, Convergence, Cost, Incumbent, Leg, MeasuresDocument, Position, ResultDocument,
-    Timing,
+    Bound, Checks, Clearance, Convergence, Cost, Incumbent, Leg, MeasuresDocument, Position,
+    ResultDocument, Timing,
 };
 use noctule::job::{Event, Failure, PlanId, Status};
 use noctule::store::{Ending, Lease, Store};
@@ -133,7 +133,11 @@ fn curve(iteration: usize, elapsed_ms: f64) -> Convergence {
 }
 
 fn route() -> Vec<Position> {
-    [(200.0, 100.0, 0.0), (500.0, 300.0, 80.0), (800.0, 800.0, 150.0)]
-        .map(|(x, y, z)| Position { x, y, z })
-        .to_vec()
+    [
+        (200.0, 100.0, 0.0),
+        (500.0, 300.0, 80.0),
+        (800.0, 800.0, 150.0),
+    ]
+    .map(|(x, y, z)| Position { x, y, z })
+    .to_vec()
 }

@@ -20,8 +20,12 @@ impl Server {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
         let address = listener.local_addr().expect("bound");
         let patience = Duration::from_secs(5);
-        let serving =
-            noctule::http::server::serve(listener, api.router.clone(), api.state.phase.clone(), patience);
+        let serving = noctule::http::server::serve(
+            listener,
+            api.router.clone(),
+            api.state.phase.clone(),
+            patience,
+        );
         Self {
             address,
             serving: tokio::spawn(serving),

@@ -53,7 +53,8 @@ impl Stream {
                 assert_eq!(self.text, "", "the last block is whole");
                 return None;
             };
-            self.text.push_str(std::str::from_utf8(&chunk).expect("UTF-8"));
+            self.text
+                .push_str(std::str::from_utf8(&chunk).expect("UTF-8"));
         }
     }
 
@@ -78,12 +79,20 @@ fn read(block: &str) -> Block {
     let [id, name, data] = lines[..] else {
         panic!("not an event: {block:?}")
     };
-    let id = id.strip_prefix("id: ").expect("an id").parse().expect("a number");
+    let id = id
+        .strip_prefix("id: ")
+        .expect("an id")
+        .parse()
+        .expect("a number");
     let name = name.strip_prefix("event: ").expect("a name").to_owned();
     let data = data.strip_prefix("data: ").expect("data");
     let data = serde_json::from_str(data).expect("JSON");
     let line = json!({"id": id, "event": name, "data": data});
-    check_schema(&json!({"$ref": "#/components/schemas/EventLine"}), &line, block);
+    check_schema(
+        &json!({"$ref": "#/components/schemas/EventLine"}),
+        &line,
+        block,
+    );
     Block::Event { id, name, data }
 }
 

@@ -1,0 +1,43 @@
+# The service in an image that holds the program, the C library and nothing else: no shell, no package
+# manager, no root. Run it with a read-only root file system; all it writes goes to /data:
+#
+#     docker build -t noctule .
+#     docker run --read-only -p 8080:8080 -v noctule:/data noctule
+
+FROM rust:1-slim-bookworm AS builder
+WORKDIR /build
+
+# The libraries alone, so that this layer is built again only when they change.
+COPY Cargo.toml Cargo.lock ./
+RUN mkdir src benches \
+    && touch src/lib.rs \
+    && echo 'fn main() {}' >src/main.rs \
+    && cp src/main.rs benches/engine.rs \
+    && cargo build --release --locked \
+    && rm -r src
+
+COPY src src
+COPY openapi.yaml ./
+# Cargo goes by times of change; those of the copied files may lie before the build above.
+RUN touch src/lib.rs src/main.rs \
+    && cargo build --release --locked \
+    && mkdir /data
+
+# The C library of the same Debian release as the builder's.
+FROM gcr.io/distroless/cc-debian12:nonroot
+LABEL org.opencontainers.image.title="noctule" \
+      org.opencontainers.image.description="Plans routes for unmanned aircraft over HTTP" \
+      org.opencontainers.image.licenses="MIT OR Apache-2.0"
+COPY --from=builder /build/target/release/noctule /usr/local/bin/noctule
+COPY LICENSE-MIT LICENSE-APACHE /usr/share/doc/noctule/
+COPY --from=builder --chown=65532:65532 /data /data
+VOLUME /data
+# SQLite's own temporary files, where the root file system is read-only.
+ENV SQLITE_TMPDIR=/data
+# A number, so that an orchestrator can see that it is not root's.
+USER 65532:65532
+EXPOSE 8080
+STOPSIGNAL SIGTERM
+HEALTHCHECK --interval=10s --timeout=5s --start-period=10s CMD ["noctule", "healthcheck"]
+ENTRYPOINT ["noctule"]
+CMD ["serve", "--listen", "0.0.0.0:8080", "--data-dir", "/data"]

@@ -1,0 +1,190 @@
+//! A drawing of a plan: the route seen from above, its profile below, on one sheet of SVG 1.1.
+//!
+//! The same documents give the same bytes. Deliberately absent: scripts, styles and anything that
+//! would have to be fetched, so that the file can be opened, printed and mailed as it is.
+
+mod canvas;
+mod contour;
+mod header;
+mod labels;
+mod palette;
+mod plan_view;
+mod profile;
+mod relief;
+mod scale;
+mod sidebar;
+
+use canvas::{Area, Canvas};
+use relief::Relief;
+use scale::MapScale;
+
+use super::ResultInput;
+use super::document::{Position, ResultDocument};
+use crate::geometry::{Point3, Rect};
+use crate::planner;
+use crate::scenario::Scenario;
+use crate::scenario::json::{self, Rules};
+use crate::scenario::limits::Limits;
+
+/// Of the sheet, pixels.
+const WIDTH: f64 = 900.0;
+/// Left of the frames: labels of the axes.
+const LEFT: f64 = 70.0;
+/// Right of everything.
+const RIGHT: f64 = 18.0;
+/// Of the plan's frame.
+const PLAN_WIDTH: f64 = 620.0;
+/// Below the plan's frame: labels, scale bar.
+const PLAN_FOOT: f64 = 62.0;
+/// Of the profile's frame.
+const PROFILE_HEIGHT: f64 = 170.0;
+/// Below the profile's frame.
+const PROFILE_FOOT: f64 = 44.0;
+/// Height of the plan's frame over its width; a longer or flatter area is shown with what lies
+/// beside it.
+const ASPECT: (f64, f64) = (0.66, 1.05);
+
+/// What is drawn.
+struct Drawing {
+    scenario: Scenario,
+    result: ResultDocument,
+    waypoints: Vec<Point3>,
+    /// What is flown; none when infeasible.
+    path: Option<Vec<Point3>>,
+}
+
+/// Draw a stored plan.
+///
+/// # Panics
+/// When the documents are none that this program stored.
+pub(super) fn write(input: &ResultInput) -> String {
+    let drawing = Drawing::read(input);
+    let map = drawing.map(header::height(&drawing));
+    let profile_frame = Area {
+        left: LEFT,
+        top: map.frame.bottom() + PLAN_FOOT,
+        width: WIDTH - LEFT - RIGHT,
+        height: PROFILE_HEIGHT,
+    };
+    let mut canvas = Canvas::new(WIDTH, profile_frame.bottom() + PROFILE_FOOT);
+    let everything = Area {
+        left: 0.0,
+        top: 0.0,
+        width: WIDTH,
+        height: profile_frame.bottom() + PROFILE_FOOT,
+    };
+    canvas.title(drawing.name());
+    canvas.rect(&everything, "fill=\"#fff\"");
+    header::draw(&mut canvas, &drawing);
+    let relief = Relief::of(&drawing.scenario.terrain, &map);
+    plan_view::draw(&mut canvas, &drawing, &relief, &map);
+    sidebar::draw(&mut canvas, &drawing, &relief, &map.frame);
+    profile::draw(&mut canvas, &drawing, profile_frame);
+    canvas.finish()
+}
+
+impl Drawing {
+    fn read(input: &ResultInput) -> Self {
+        // Limits are for those who hand in; what was accepted once stays readable when an
+        // operator lowers them.
+        let rules = Rules {
+            limits: Limits {
+                body_bytes: usize::MAX,
+                threats: usize::MAX,
+                polygon_vertices: usize::MAX,
+                terrain_nodes: usize::MAX,
+                peaks: usize::MAX,
+                waypoints: usize::MAX,
+                population: usize::MAX,
+                iterations: usize::MAX,
+                work: u64::MAX,
+                path_samples: usize::MAX,
+            },
+            algorithms: planner::algorithm_rules(),
+        };
+        let scenario = json::read(input.scenario.as_bytes(), &rules, 0)
+            .expect("an accepted document is written so that it can be read again");
+        let result: ResultDocument =
+            serde_json::from_str(input.result).expect("a stored result is a result document");
+        Self {
+            scenario,
+            waypoints: points(&result.waypoints),
+            path: result.path.as_ref().map(|path| points(&path.points)),
+            result,
+        }
+    }
+
+    fn name(&self) -> &str {
+        self.scenario.name.as_deref().unwrap_or("unnamed scenario")
+    }
+
+    /// What the vehicle does, as far as is known: the path, else the waypoints.
+    fn course(&self) -> &[Point3] {
+        self.path.as_deref().unwrap_or(&self.waypoints)
+    }
+
+    fn route_color(&self) -> &'static str {
+        if self.result.feasible {
+            palette::ROUTE
+        } else {
+            palette::BROKEN
+        }
+    }
+
+    /// Indices of what breaks a constraint: of each `leg` or of each `waypoint`.
+    fn broken(&self, place: &str) -> Vec<usize> {
+        let places = self.result.checks.violations.iter();
+        let mut indices: Vec<usize> = places
+            .filter_map(|violation| violation.place.strip_prefix(place)?.trim().parse().ok())
+            .collect();
+        indices.dedup();
+        indices
+    }
+
+    /// The area and the route with a little room, in a frame of a pleasant shape.
+    fn map(&self, top: f64) -> MapScale {
+        let ends = [self.scenario.area.min, self.scenario.area.max];
+        let route = self.waypoints.iter().map(Point3::xy);
+        let shown = Rect::around(ends.into_iter().chain(route)).expect("an area has corners");
+        let (width, height) = (shown.max.x - shown.min.x, shown.max.y - shown.min.y);
+        let shown = shown.grown((0.02 * width.max(height)).max(0.5));
+        let (width, height) = (shown.max.x - shown.min.x, shown.max.y - shown.min.y);
+        let aspect = (height / width).clamp(ASPECT.0, ASPECT.1);
+        let (wider, taller) = ((height / aspect).max(width), (width * aspect).max(height));
+        let margin = nalgebra::Vector2::new(wider - width, taller - height) / 2.0;
+        MapScale {
+            view: Rect {
+                min: shown.min - margin,
+                max: shown.max + margin,
+            },
+            frame: Area {
+                left: LEFT,
+                top,
+                width: PLAN_WIDTH,
+                height: PLAN_WIDTH * taller / wider,
+            },
+        }
+    }
+}
+
+fn points(positions: &[Position]) -> Vec<Point3> {
+    let point = |position: &Position| Point3::new(position.x, position.y, position.z);
+    positions.iter().map(point).collect()
+}
+
+/// A number for people: three or four figures of it.
+fn figure(value: f64) -> String {
+    let decimals = match value.abs() {
+        size if size >= 1000.0 => 0,
+        size if size >= 100.0 => 1,
+        size if size >= 1.0 => 2,
+        _ => 3,
+    };
+    format!("{value:.decimals$}")
+}
+
+/// Metres for people.
+fn metres(value: f64) -> String {
+    let decimals = usize::from(value.abs() < 100.0);
+    format!("{value:.decimals$} m")
+}

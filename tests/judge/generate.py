@@ -168,7 +168,8 @@ class _Scene:
 
     def peak(self, relief):
         rng = self.rng
-        spread = [max(1.0, self.size * rng.choice([0.0, 0.02, 0.1, 0.5])) for _ in range(2)]
+        # Narrower ones take the judge, who steps along every leg, minutes.
+        spread = [max(1.0, self.size * rng.choice([0.005, 0.02, 0.1, 0.5])) for _ in range(2)]
         return {
             "center": _plane(*self.somewhere()),
             "height": relief * rng.uniform(0.1, 1.0),

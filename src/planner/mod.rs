@@ -3,7 +3,7 @@
 //! Plain functions: no async, no store, no clock of their own.
 
 mod certificate;
-mod encoding;
+mod coding;
 mod objective;
 mod outcome;
 mod smoothing;
@@ -21,7 +21,7 @@ use crate::optimizer::{self, Algorithm, Optimizer, Settings};
 use crate::scenario::json::{AlgorithmRule, ParameterRule};
 use crate::scenario::{Quadrature, Scenario, Seeding};
 use crate::seeding;
-use encoding::Encoding;
+use coding::Coding;
 use objective::Routes;
 
 /// Follows a run. Called on the planning thread; must return quickly.
@@ -72,7 +72,7 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
 
     let mut routes = match settings.seeding {
         // Routes along the tangents of the threats will join here.
-        Seeding::Random => Routes::new(Encoding::new(scenario), model.clone(), stop),
+        Seeding::Random => Routes::new(Coding::of(scenario), model.clone(), stop),
     };
     let mut log = Log {
         observer,

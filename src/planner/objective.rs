@@ -1,6 +1,6 @@
 //! Routes as an optimizer sees them: positions in, fitness out.
 
-use super::encoding::Encoding;
+use super::coding::Coding;
 use super::{Stop, why_stop};
 use crate::cost::{Model, Tolerance};
 use crate::geometry::Point3;
@@ -11,7 +11,7 @@ use crate::threat::Shape;
 
 /// The routes of one scenario.
 pub(super) struct Routes<'s> {
-    pub(super) encoding: Encoding<'s>,
+    pub(super) encoding: Coding<'s>,
     pub(super) model: Model<'s>,
     /// Half of what feasible means, so that a delivered route is feasible for others' rounding too.
     tolerance: Tolerance,
@@ -29,7 +29,7 @@ pub(super) struct Routes<'s> {
 const STEPS_UNWATCHED: usize = 1_000_000;
 
 impl<'s> Routes<'s> {
-    pub(super) fn new(encoding: Encoding<'s>, model: Model<'s>, stop: &'s dyn Stop) -> Self {
+    pub(super) fn new(encoding: Coding<'s>, model: Model<'s>, stop: &'s dyn Stop) -> Self {
         let tolerance = model.tolerance.scaled(0.5);
         let stride = (STEPS_UNWATCHED / steps(model.scenario)).max(1) as u64;
         Self {

@@ -103,7 +103,7 @@ pub struct PlannerSettings {
 /// Where the first bats come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seeding {
-    /// Uniformly within the bounds of the encoding, as in the paper.
+    /// Uniformly within the bounds of the coding, as in the paper.
     Random,
 }
 

@@ -14,7 +14,7 @@ use crate::scenario::Scenario;
 
 /// The coding of routes of one scenario.
 #[derive(Debug, Clone)]
-pub(super) struct Encoding<'s> {
+pub(in crate::planner) struct Spherical<'s> {
     scenario: &'s Scenario,
     /// Heading from start to target, radians.
     course: f64,
@@ -28,12 +28,12 @@ pub(super) struct Encoding<'s> {
 }
 
 /// Numbers of one spherical vector.
-pub(super) const PER_LEG: usize = 3;
+const PER_LEG: usize = 3;
 
-impl<'s> Encoding<'s> {
+impl<'s> Spherical<'s> {
     /// The coding of routes of `scenario`.
     #[must_use]
-    pub(super) fn new(scenario: &'s Scenario) -> Self {
+    pub(in crate::planner) fn new(scenario: &'s Scenario) -> Self {
         let legs = scenario.planner.waypoints + 1;
         let way = scenario.target - scenario.start;
         let distance = (way.x * way.x + way.y * way.y).sqrt();
@@ -59,12 +59,12 @@ impl<'s> Encoding<'s> {
 
     /// Where positions may lie.
     #[must_use]
-    pub(super) fn bounds(&self) -> &Bounds {
+    pub(in crate::planner) fn bounds(&self) -> &Bounds {
         &self.bounds
     }
 
     /// Write the route of `position` into `route`: start, free waypoints, target.
-    pub(super) fn decode(&self, position: &[f64], route: &mut Vec<Point3>) {
+    pub(in crate::planner) fn decode(&self, position: &[f64], route: &mut Vec<Point3>) {
         let (start, target) = (self.scenario.start, self.scenario.target);
         route.clear();
         route.push(start);
@@ -118,15 +118,15 @@ mod tests {
         #[test]
         fn every_position_is_a_route_within_turn_and_band(shares in prop::collection::vec(0.0..1.0f64, 33)) {
             let scenario = scenario();
-            let encoding = Encoding::new(&scenario);
-            let bounds = encoding.bounds().clone();
+            let coding = Spherical::new(&scenario);
+            let bounds = coding.bounds().clone();
             let position: Vec<f64> = shares
                 .iter()
                 .enumerate()
                 .map(|(dim, share)| bounds.lower[dim] + share * bounds.range(dim))
                 .collect();
             let mut route = Vec::new();
-            encoding.decode(&position, &mut route);
+            coding.decode(&position, &mut route);
             prop_assert_eq!(route.len(), 12);
             prop_assert_eq!(route[0], scenario.start);
             prop_assert_eq!(route[11], scenario.target);

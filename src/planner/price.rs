@@ -1,0 +1,21 @@
+//! What a route is worth to the search.
+
+use crate::cost::Model;
+use crate::geometry::Point3;
+use crate::optimizer::Fitness;
+
+/// The fitness of `route`, which may be a part of one: its ends are not free waypoints.
+///
+/// Violations count from half of the tolerance on, so that a delivered route is feasible for
+/// others' rounding too.
+pub fn price(model: &Model, route: &[Point3]) -> Fitness {
+    let mut violation = 0.0;
+    let quadrature = model.scenario.planner.quadrature;
+    let figures = model.assess(route, quadrature, model.tolerance.scaled(0.5), |breach| {
+        violation += breach.amount;
+    });
+    Fitness {
+        violation,
+        cost: figures.total,
+    }
+}

@@ -3,7 +3,9 @@
 //! The spherical coding is the objective's affair; here a bat is a point in a box. All bats of an
 //! iteration move by the same best position and are priced together.
 
-use super::{Algorithm, Fitness, Objective, Optimizer, Parameter, Random, Settings, Swarm};
+use super::{
+    Algorithm, Fitness, Objective, Optimizer, Parameter, Random, Settings, Swarm, parameter,
+};
 
 /// The row of the table.
 pub(super) const ALGORITHM: Algorithm = Algorithm {
@@ -14,23 +16,8 @@ pub(super) const ALGORITHM: Algorithm = Algorithm {
     start: |settings, objective| Box::new(TmsSba::start(settings, objective)),
 };
 
-const fn parameter(
-    name: &'static str,
-    default: f64,
-    min: f64,
-    max: f64,
-    meaning: &'static str,
-) -> Parameter {
-    Parameter {
-        name,
-        default,
-        min,
-        max,
-        meaning,
-    }
-}
-
-const PARAMETERS: [Parameter; 10] = [
+/// The constants; those of the truncated mean come last.
+pub(super) const PARAMETERS: [Parameter; 10] = [
     parameter("f_min", 0.0, 0.0, 10.0, "least frequency, Eq. 10"),
     parameter("f_max", 1.0, 0.0, 10.0, "greatest frequency, Eq. 10"),
     parameter(
@@ -107,7 +94,8 @@ fn share_of(count: usize, share: f64) -> usize {
     (count as f64 * share) as usize
 }
 
-struct TmsSba {
+/// A running search.
+pub(super) struct TmsSba {
     swarm: Swarm,
     random: Random,
     iteration: usize,
@@ -128,7 +116,8 @@ struct TmsSba {
 }
 
 impl TmsSba {
-    fn start(settings: &Settings, objective: &mut dyn Objective) -> Self {
+    /// Draw and price the first bats.
+    pub(super) fn start(settings: &Settings, objective: &mut dyn Objective) -> Self {
         let [
             f_min,
             f_max,
@@ -166,6 +155,15 @@ impl TmsSba {
             outcome: vec![Fitness::WORST; swarm.len()],
             swarm,
         }
+    }
+
+    /// Eq. 10-15: one iteration of the bats, before their stabilisation.
+    pub(super) fn fly(&mut self, objective: &mut dyn Objective, progress: f64) {
+        self.iteration += 1;
+        self.move_bats(objective, progress);
+        self.swarm
+            .price(objective, &self.candidates, &mut self.outcome);
+        self.accept(objective.bounds().dimension());
     }
 
     /// Eq. 10-13: every bat flies towards the best, or walks about it.
@@ -284,11 +282,7 @@ impl TmsSba {
 
 impl Optimizer for TmsSba {
     fn iterate(&mut self, objective: &mut dyn Objective, progress: f64) {
-        self.iteration += 1;
-        self.move_bats(objective, progress);
-        self.swarm
-            .price(objective, &self.candidates, &mut self.outcome);
-        self.accept(objective.bounds().dimension());
+        self.fly(objective, progress);
         self.stabilise(objective);
     }
 

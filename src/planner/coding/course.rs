@@ -24,7 +24,7 @@ use crate::scenario::Scenario;
 pub(in crate::planner) struct Course<'s> {
     scenario: &'s Scenario,
     /// Heading from start to target, radians.
-    course: f64,
+    towards_target: f64,
     /// Height of the start above ground.
     start_height: f64,
     bounds: Bounds,
@@ -44,7 +44,7 @@ impl<'s> Course<'s> {
         let amplitude = 2.0 * way.norm() / legs as f64;
         Self {
             scenario,
-            course: libm::atan2(way.y, way.x),
+            towards_target: libm::atan2(way.y, way.x),
             start_height: scenario.start.z - scenario.terrain.elevation(scenario.start.xy()),
             bounds: Bounds {
                 lower: [0.0, -SECTOR, -SECTOR].repeat(legs),
@@ -71,7 +71,7 @@ impl<'s> Course<'s> {
                 unreachable!("chunks are of PER_LEG numbers")
             };
             let level = amplitude * libm::cos(elevation);
-            let heading = self.course + azimuth;
+            let heading = self.towards_target + azimuth;
             x = (x + level * libm::cos(heading)).clamp(area.min.x, area.max.x);
             y = (y + level * libm::sin(heading)).clamp(area.min.y, area.max.y);
             height = (height + amplitude * libm::sin(elevation)).clamp(band.min, band.max);

@@ -109,18 +109,15 @@ impl Pricer<'_> {
         };
         let mut met_before = one.lt(zero);
         for zone in &self.heights.zones {
-            let (ox, oy) = (leg.a.x - zone.center.x, leg.a.y - zone.center.y);
-            let foot = -(ox * leg.dx + oy * leg.dy) * leg.inverse_square;
-            let squared_distance = |t: Lane<S>| {
-                let (x, y) = (ox + leg.dx * t, oy + leg.dy * t);
-                x * x + y * y
-            };
+            let sight = leg.seen_from(zone.center);
             let reach = leg.splat(zone.radius * zone.radius);
-            let met = squared_distance(foot.clamp(zero, one)).le(reach);
+            let met = sight.least_squared_distance(zero, one).le(reach);
             if !met.any() {
                 continue;
             }
-            let half = ((reach - squared_distance(foot)).max(zero) * leg.inverse_square).sqrt();
+            let foot = sight.foot;
+            let past = (reach - sight.squared_distance(foot)).max(zero);
+            let half = (past * leg.inverse_square).sqrt();
             inside.enter = met.select((foot - half).clamp(zero, one), inside.enter);
             inside.leave = met.select((foot + half).clamp(zero, one), inside.leave);
             inside.unclear = inside.unclear | (met & (met_before | !leg.moves));

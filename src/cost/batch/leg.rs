@@ -4,7 +4,7 @@ use pulp::Simd;
 
 use super::PointRow;
 use crate::geometry::lane::{Lane, Mask};
-use crate::geometry::{LEVEL, Segment};
+use crate::geometry::{LEVEL, Point2, Segment};
 
 /// A point of each lane.
 #[derive(Clone, Copy)]
@@ -80,9 +80,49 @@ impl<'a, S: Simd> Leg<'a, S> {
         }
     }
 
+    /// How the leg lies to `center`.
+    #[inline(always)]
+    pub(super) fn seen_from(&self, center: Point2) -> Sight<S> {
+        let (x, y) = (self.a.x - center.x, self.a.y - center.y);
+        Sight {
+            x,
+            y,
+            dx: self.dx,
+            dy: self.dy,
+            foot: -(x * self.dx + y * self.dy) * self.inverse_square,
+        }
+    }
+
     /// `value` in every lane.
     #[inline(always)]
     pub(super) fn splat(&self, value: f64) -> Lane<S> {
         Lane::splat(self.simd, value)
+    }
+}
+
+/// A leg as seen from a point of the plane.
+#[derive(Clone, Copy)]
+pub(super) struct Sight<S: Simd> {
+    /// Where it begins.
+    pub(super) x: Lane<S>,
+    pub(super) y: Lane<S>,
+    dx: Lane<S>,
+    dy: Lane<S>,
+    /// The `t` at which its line comes nearest; 0 for one that only climbs.
+    pub(super) foot: Lane<S>,
+}
+
+impl<S: Simd> Sight<S> {
+    /// Squared horizontal distance at `t`.
+    #[inline(always)]
+    pub(super) fn squared_distance(&self, t: Lane<S>) -> Lane<S> {
+        let (x, y) = (self.x + self.dx * t, self.y + self.dy * t);
+        x * x + y * y
+    }
+
+    /// The least squared distance over `[t0, t1]`.
+    #[inline(always)]
+    pub(super) fn least_squared_distance(&self, t0: Lane<S>, t1: Lane<S>) -> Lane<S> {
+        self.squared_distance(self.foot.clamp(t0, t1))
     }
 }

@@ -6,7 +6,7 @@ use super::leg::{Leg, Point};
 use super::threats::Candidates;
 use super::{PointRow, Pricer};
 use crate::cost::threat::SHARE;
-use crate::cost::{Constraint, fuel};
+use crate::cost::fuel;
 use crate::geometry::lane::Lane;
 use crate::scenario::Scenario;
 
@@ -144,9 +144,6 @@ impl Pricer<'_> {
     fn area<S: Simd>(&self, point: Point<S>) -> Lane<S> {
         let area = &self.model.scenario.area;
         let zero = point.x.with(0.0);
-        let beyond = |value: Lane<S>, min: f64, max: f64| {
-            (value.with(min) - value).max(value - max).max(zero)
-        };
         let dx = beyond(point.x, area.min.x, area.max.x);
         let dy = beyond(point.y, area.min.y, area.max.y);
         if !zero.lt(dx + dy).any() {
@@ -155,6 +152,13 @@ impl Pricer<'_> {
         let amount = (dx * dx + dy * dy).sqrt();
         zero.with(self.tolerance.length_m).lt(amount).keep(amount)
     }
+}
+
+/// How far `value` lies outside `[min, max]`.
+#[inline(always)]
+fn beyond<S: Simd>(value: Lane<S>, min: f64, max: f64) -> Lane<S> {
+    let outside = (value.with(min) - value).max(value - max);
+    outside.max(value.with(0.0))
 }
 
 /// Of a radian.

@@ -4,7 +4,7 @@ use pulp::Simd;
 
 use super::Pricer;
 use super::index::Index;
-use super::leg::Leg;
+use super::leg::{Leg, Sight};
 use crate::cost::threat::{SAMPLES, sampled_exposure};
 use crate::geometry::lane::{Lane, Mask};
 use crate::geometry::{LEVEL, Rect};
@@ -122,52 +122,27 @@ impl Pricer<'_> {
     ) {
         let outline = &disc.outline;
         let (zero, one) = (leg.splat(0.0), leg.splat(1.0));
-        let (ox, oy) = (
-            leg.a.x - outline.center.x,
-            leg.a.y - outline.center.y,
-        );
-        // Where the axis projects onto the leg's line.
-        let foot = -(ox * leg.dx + oy * leg.dy) * leg.inverse_square;
-        let squared_distance = |t: Lane<S>| {
-            let (x, y) = (ox + leg.dx * t, oy + leg.dy * t);
-            x * x + y * y
-        };
+        let sight = leg.seen_from(outline.center);
         let reach = leg.splat(outline.influence * outline.influence);
-        let near = squared_distance(foot.clamp(zero, one)).le(reach);
+        let near = sight.least_squared_distance(zero, one).le(reach);
         if !near.any() {
             return;
         }
         let window = disc.window(leg);
         let near = near & window.some;
-        let nearest = squared_distance(foot.clamp(window.t0, window.t1)).sqrt();
+        let nearest = sight.least_squared_distance(window.t0, window.t1).sqrt();
         let depth = leg.splat(outline.radius) - nearest;
         let entered = near & leg.splat(self.tolerance.length_m).lt(depth);
         *violation = *violation + entered.keep(depth);
-        *exposure = *exposure
-            + near.keep(match self.quadrature {
-                Quadrature::Integral => {
-                    let crossed = disc.exposure(leg, &window, ox, oy, foot);
-                    if (!leg.moves).any() {
-                        let middle = squared_distance((window.t0 + window.t1) * 0.5).sqrt();
-                        let intensity = (leg.splat(outline.influence) - middle).max(zero);
-                        leg.moves
-                            .select(crossed, intensity * leg.length * (window.t1 - window.t0))
-                    } else {
-                        crossed
-                    }
-                }
-                Quadrature::Paper => {
-                    let mut sum = zero;
-                    for t in SAMPLES {
-                        let z = leg.a.z + leg.dz * t;
-                        let reached = leg.splat(disc.base).le(z) & z.lt(leg.splat(disc.top));
-                        let distance = squared_distance(leg.splat(t)).sqrt();
-                        let intensity = (leg.splat(outline.influence) - distance).max(zero);
-                        sum = sum + reached.keep(intensity);
-                    }
-                    sum * (1.0 / SAMPLES.len() as f64) * leg.length
-                }
-            });
+        let crossed = match self.quadrature {
+            Quadrature::Integral if (!leg.moves).any() => leg.moves.select(
+                disc.exposure(leg, &window, &sight),
+                disc.hover_exposure(leg, &window, &sight),
+            ),
+            Quadrature::Integral => disc.exposure(leg, &window, &sight),
+            Quadrature::Paper => disc.sampled_exposure(leg, &sight),
+        };
+        *exposure = *exposure + near.keep(crossed);
     }
 
     /// A ring is rarely near; then it is left to the scalar code.
@@ -235,29 +210,56 @@ impl Disc {
     /// logarithm: with `d0`, `d1` the distances of the ends of a chord of length `c` from the axis,
     /// the integral of `1 / d` along it is `ln((d0 + d1 + c) / (d0 + d1 - c))`.
     #[inline(always)]
-    fn exposure<S: Simd>(
-        &self,
-        leg: &Leg<S>,
-        window: &Window<S>,
-        ox: Lane<S>,
-        oy: Lane<S>,
-        foot: Lane<S>,
-    ) -> Lane<S> {
+    fn exposure<S: Simd>(&self, leg: &Leg<S>, window: &Window<S>, sight: &Sight<S>) -> Lane<S> {
         let zero = leg.splat(0.0);
         let influence = self.outline.influence;
-        let across = (ox * leg.dy - oy * leg.dx) / leg.level;
+        let across = (sight.x * leg.dy - sight.y * leg.dx) / leg.level;
         let across_square = across * across;
         let half_square = leg.splat(influence * influence) - across_square;
         let half_chord = half_square.max(zero).sqrt();
-        let s0 = ((window.t0 - foot) * leg.level).max(-half_chord);
-        let s1 = ((window.t1 - foot) * leg.level).min(half_chord);
+        let s0 = ((window.t0 - sight.foot) * leg.level).max(-half_chord);
+        let s1 = ((window.t1 - sight.foot) * leg.level).min(half_chord);
         let chord = s1 - s0;
         let d0 = (across_square + s0 * s0).sqrt();
         let d1 = (across_square + s1 * s1).sqrt();
         let (over, under) = (d0 + d1 + chord, d0 + d1 - chord);
         let logarithm = over.ln_over(under.max(over * (1.0 / LARGEST_QUOTIENT)));
-        let logarithm = leg.splat(LEVEL).le(across.abs()).keep(across_square * logarithm);
+        let logarithm = leg
+            .splat(LEVEL)
+            .le(across.abs())
+            .keep(across_square * logarithm);
         let integral = chord * influence - (s1 * d1 - s0 * d0 + logarithm) * 0.5;
         (zero.lt(half_square) & s0.lt(s1)).keep(integral * (leg.length / leg.level))
+    }
+
+    /// As `exposure`, of legs that only climb.
+    #[inline(always)]
+    fn hover_exposure<S: Simd>(
+        &self,
+        leg: &Leg<S>,
+        window: &Window<S>,
+        sight: &Sight<S>,
+    ) -> Lane<S> {
+        let middle = (window.t0 + window.t1) * 0.5;
+        self.intensity(sight, middle) * leg.length * (window.t1 - window.t0)
+    }
+
+    /// As `cost::threat::sampled_exposure`.
+    #[inline(always)]
+    fn sampled_exposure<S: Simd>(&self, leg: &Leg<S>, sight: &Sight<S>) -> Lane<S> {
+        let mut sum = leg.splat(0.0);
+        for t in SAMPLES {
+            let z = leg.a.z + leg.dz * t;
+            let reached = leg.splat(self.base).le(z) & z.lt(leg.splat(self.top));
+            sum = sum + reached.keep(self.intensity(sight, leg.splat(t)));
+        }
+        sum * (1.0 / SAMPLES.len() as f64) * leg.length
+    }
+
+    /// `T(d)` of Eq. 5 at `t`, whatever the height.
+    #[inline(always)]
+    fn intensity<S: Simd>(&self, sight: &Sight<S>, t: Lane<S>) -> Lane<S> {
+        let distance = sight.squared_distance(t).sqrt();
+        (t.with(self.outline.influence) - distance).max(t.with(0.0))
     }
 }

@@ -101,9 +101,7 @@ impl<S: Simd> Lane<S> {
     #[inline(always)]
     pub(crate) fn sin_cos(self) -> (Self, Self) {
         let quarters = self.rounded_product(FRAC_2_PI);
-        let x = HALF_PI
-            .iter()
-            .fold(self, |x, &part| x - quarters * part);
+        let x = self - quarters * HALF_PI[0] - quarters * HALF_PI[1] - quarters * HALF_PI[2];
         let square = x * x;
         let (sin, cos) = (x * square.polynomial(&SIN), square.polynomial(&COS));
         // -2 to 2: how far round, modulo 4.
@@ -137,9 +135,7 @@ impl<S: Simd> Lane<S> {
     #[inline(always)]
     pub(crate) fn exp(self) -> Self {
         let doublings = self.rounded_product(LOG2_E);
-        let x = LN_2_PARTS
-            .iter()
-            .fold(self, |x, &part| x - doublings * part);
+        let x = self - doublings * LN_2_PARTS[0] - doublings * LN_2_PARTS[1];
         // The whole number stands in the last bits of its sum with the rounder.
         let scale = (doublings + ROUNDER).map(|_, sum| {
             f64::from_bits((sum.to_bits() << 52).wrapping_add(ONE))
@@ -171,14 +167,14 @@ impl<S: Simd> Lane<S> {
     /// The polynomial of `self` with `coefficients`, constant first: even and odd powers apart, so
     /// that the processor works on both at once.
     #[inline(always)]
-    fn polynomial(self, coefficients: &[f64]) -> Self {
+    fn polynomial<const N: usize>(self, coefficients: &[f64; N]) -> Self {
         let square = self * self;
-        let chain = |from: usize| {
-            let mut own = coefficients[from..].iter().step_by(2).rev();
-            let last = self.with(own.next().copied().unwrap_or(0.0));
-            own.fold(last, |sum, &coefficient| sum * square + coefficient)
-        };
-        chain(0) + self * chain(1)
+        let (mut sums, mut idx) = ([self.with(0.0); 2], N);
+        while idx > 0 {
+            idx -= 1;
+            sums[idx % 2] = sums[idx % 2] * square + coefficients[idx];
+        }
+        sums[0] + self * sums[1]
     }
 }
 

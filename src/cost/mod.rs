@@ -6,6 +6,7 @@
 
 mod altitude;
 mod band;
+pub mod batch;
 mod constraint;
 mod fuel;
 mod heading;

@@ -9,7 +9,7 @@ mod moves;
 mod objective;
 mod outcome;
 pub mod polish;
-pub mod price;
+mod price;
 mod search;
 mod smoothing;
 pub mod starts;

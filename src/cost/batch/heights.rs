@@ -129,12 +129,7 @@ impl Pricer<'_> {
     /// Where a leg keeps its heights above level ground: they are greatest and least where parts of
     /// it end.
     #[inline(always)]
-    fn clear_of_flat<S: Simd>(
-        &self,
-        leg: &Leg<S>,
-        inside: &Inside<S>,
-        elevation: f64,
-    ) -> Mask<S> {
+    fn clear_of_flat<S: Simd>(&self, leg: &Leg<S>, inside: &Inside<S>, elevation: f64) -> Mask<S> {
         let (zero, one) = (leg.splat(0.0), leg.splat(1.0));
         let (h0, h1) = (leg.a.z - elevation, leg.b.z - elevation);
         let (low, high) = (h0.min(h1), h0.max(h1));
@@ -149,8 +144,6 @@ impl Pricer<'_> {
         let none = leg.splat(f64::INFINITY);
         let outside = zero.lt(inside.enter).select(first, none);
         let outside = outside.min(inside.leave.lt(one).select(last, none));
-        below_ceiling
-            & leg.splat(heights.ground).le(low)
-            & leg.splat(heights.floor).le(outside)
+        below_ceiling & leg.splat(heights.ground).le(low) & leg.splat(heights.floor).le(outside)
     }
 }

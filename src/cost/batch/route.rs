@@ -5,8 +5,8 @@ use pulp::Simd;
 use super::leg::{Leg, Point};
 use super::threats::Candidates;
 use super::{PointRow, Pricer};
-use crate::cost::threat::SHARE;
 use crate::cost::fuel;
+use crate::cost::threat::SHARE;
 use crate::geometry::lane::Lane;
 use crate::scenario::Scenario;
 
@@ -94,7 +94,12 @@ impl Pricer<'_> {
     ) -> (Lane<S>, Lane<S>) {
         let leg = Leg::new(simd, part, [a, b]);
         let (mut exposure, mut violation) = (leg.splat(0.0), leg.splat(0.0));
-        self.threats(&leg, &mut Candidates::default(), &mut exposure, &mut violation);
+        self.threats(
+            &leg,
+            &mut Candidates::default(),
+            &mut exposure,
+            &mut violation,
+        );
         violation = violation + self.heights(&leg) + self.leg_limits(&leg);
         (violation, self.flown(leg.length, exposure))
     }

@@ -91,7 +91,7 @@ impl<'s> Course<'s> {
             let way = point.xy() - at;
             let climb = point.z - self.scenario.terrain.elevation(point.xy()) - height;
             let level = way.norm();
-            let azimuth = wrap_angle(libm::atan2(way.y, way.x) - self.course);
+            let azimuth = wrap_angle(libm::atan2(way.y, way.x) - self.towards_target);
             vector[0] = (level * level + climb * climb)
                 .sqrt()
                 .min(self.bounds.upper[0]);
@@ -99,7 +99,7 @@ impl<'s> Course<'s> {
             vector[2] = azimuth.clamp(-SECTOR, SECTOR);
             let (area, band) = (&self.scenario.area, self.scenario.altitude);
             let level = vector[0] * libm::cos(vector[1]);
-            let heading = self.course + vector[2];
+            let heading = self.towards_target + vector[2];
             at.x = (at.x + level * libm::cos(heading)).clamp(area.min.x, area.max.x);
             at.y = (at.y + level * libm::sin(heading)).clamp(area.min.y, area.max.y);
             height = (height + vector[0] * libm::sin(vector[1])).clamp(band.min, band.max);

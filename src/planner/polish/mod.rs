@@ -41,9 +41,8 @@ impl<'m, 's> Polish<'m, 's> {
         let (mut step, mut kind, mut failed) = (from * way, 0, 0);
         while step > to * way && why_stop(scenario, self.stop).is_none() {
             let mut trial = route.clone();
-            let steps = vec![step; route.len()];
             let mut better = false;
-            if self.lattice.sweep(&mut trial, &steps, kind).is_some() {
+            if self.lattice.sweep(&mut trial, step, kind) {
                 let exact = price(self.model, &trial);
                 if exact.beats(&best) {
                     better = exact.violation < best.violation

@@ -8,11 +8,11 @@ mod log;
 mod moves;
 mod objective;
 mod outcome;
-pub mod polish;
+mod polish;
 mod price;
 mod search;
 mod smoothing;
-pub mod starts;
+mod starts;
 
 pub use outcome::{
     Bound, Clearance, ConvergencePoint, Incumbent, Leg, Measures, Outcome, Path, StopReason,
@@ -22,6 +22,7 @@ pub use outcome::{
 pub use crate::cost::CostFigures;
 
 use crate::cost::Model;
+use crate::geometry::Point3;
 use crate::optimizer::{self, Algorithm};
 use crate::scenario::json::{AlgorithmRule, ParameterRule};
 use crate::scenario::{Quadrature, Scenario};
@@ -70,14 +71,24 @@ pub fn algorithm_rules() -> Vec<AlgorithmRule> {
 /// When the scenario names an algorithm that is not in the table; its reader refuses those.
 pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -> Outcome {
     let model = Model::new(scenario);
-    let starts = starts::routes(&model);
     let mut log = Log::new(&model, observer, stop);
-    let stop_reason = if starts.is_empty() {
-        search::plain(&model, &mut log)
-    } else {
-        search::guided(&model, starts, &mut log)
+    let stop_reason = match starts::routes(&model, stop) {
+        None => search::plain(&model, &mut log),
+        Some(starts) => search::guided(&model, starts, &mut log),
     };
     deliver(&model, log, stop_reason)
+}
+
+/// Routes are the same when no waypoint is farther from its like than this share of the way.
+const SAME: f64 = 0.02;
+
+fn same(scenario: &Scenario, one: &[Point3], other: &[Point3]) -> bool {
+    let reach = SAME * (scenario.target - scenario.start).norm();
+    one.len() == other.len()
+        && one
+            .iter()
+            .zip(other)
+            .all(|(one, other)| (one - other).norm() <= reach)
 }
 
 fn why_stop(scenario: &Scenario, stop: &dyn Stop) -> Option<StopReason> {
@@ -129,7 +140,7 @@ fn deliver(model: &Model, log: Log, stop_reason: StopReason) -> Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Point2, Point3, Rect};
+    use crate::geometry::{Point2, Rect};
     use crate::scenario::{AltitudeBand, PlannerSettings, Seeding, Smoothing, Vehicle, Weights};
     use crate::terrain::{Flat, Terrain};
     use crate::threat::{Cylinder, Shape, Threat};

@@ -4,7 +4,8 @@ use super::coding::Coding;
 use super::log::Log;
 use super::objective::Routes;
 use super::polish::Polish;
-use super::{StopReason, starts, why_stop};
+use super::starts::Starts;
+use super::{StopReason, same, starts, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::{self, Algorithm, Fitness, Optimizer, Settings};
@@ -14,9 +15,6 @@ const COARSE_SHARE: f64 = 0.4;
 
 /// Routes that go on from one stage of a guided search to the next.
 const ELITES: usize = 4;
-
-/// Routes are the same when no waypoint is farther from its like than this share of the way.
-const SAME: f64 = 0.02;
 
 /// The algorithm alone, from random routes: the paper's.
 pub(super) fn plain(model: &Model, log: &mut Log) -> StopReason {
@@ -34,15 +32,16 @@ pub(super) fn plain(model: &Model, log: &mut Log) -> StopReason {
 }
 
 /// From `starts`, best first: bats about coarse routes, then about whole ones, then polish.
-pub(super) fn guided(model: &Model, starts: Vec<Vec<Point3>>, log: &mut Log) -> StopReason {
+pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason {
     let settings = &model.scenario.planner;
-    let coarse = starts[0].len() - 2;
+    let coarse = starts.routes[0].len() - 2;
+    log.evaluations += starts.evaluations;
     let turning = if coarse < settings.waypoints {
         (settings.iterations as f64 * COARSE_SHARE).floor() as usize
     } else {
         0
     };
-    let mut elites = starts;
+    let mut elites = starts.routes;
     let mut reason = StopReason::Iterations;
     let mut first = 0;
     if turning > 0 {
@@ -167,7 +166,6 @@ fn search_settings(model: &Model, algorithm: &Algorithm) -> Settings {
 
 /// The best few routes of the swarm that are not all but the same.
 fn distinct(model: &Model, routes: &Routes, search: &dyn Optimizer) -> Vec<Vec<Point3>> {
-    let way = (model.scenario.target - model.scenario.start).norm();
     let swarm = search.swarm();
     let ranking = swarm.ranking();
     let mut chosen: Vec<Vec<Point3>> = Vec::new();
@@ -175,13 +173,10 @@ fn distinct(model: &Model, routes: &Routes, search: &dyn Optimizer) -> Vec<Vec<P
     for position in std::iter::once(swarm.best_position()).chain(members) {
         let mut route = Vec::new();
         routes.coding.decode(position, &mut route);
-        let same = |other: &Vec<Point3>| {
-            route
-                .iter()
-                .zip(other)
-                .all(|(one, other)| (one - other).norm() <= SAME * way)
-        };
-        if !chosen.iter().any(same) {
+        if !chosen
+            .iter()
+            .any(|other| same(model.scenario, &route, other))
+        {
             chosen.push(route);
         }
         if chosen.len() == ELITES {

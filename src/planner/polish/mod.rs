@@ -13,14 +13,14 @@ use lattice::Lattice;
 const GAIN: f64 = 1e-7;
 
 /// Polishes routes of one scenario.
-pub struct Polish<'m, 's> {
+pub(super) struct Polish<'m, 's> {
     lattice: Lattice<'m, 's>,
     model: &'m Model<'s>,
     stop: &'m dyn Stop,
 }
 
 impl<'m, 's> Polish<'m, 's> {
-    pub fn new(model: &'m Model<'s>, stop: &'m dyn Stop) -> Self {
+    pub(super) fn new(model: &'m Model<'s>, stop: &'m dyn Stop) -> Self {
         Self {
             lattice: Lattice::new(model),
             model,
@@ -29,12 +29,12 @@ impl<'m, 's> Polish<'m, 's> {
     }
 
     /// What was priced, in routes of so many free waypoints.
-    pub fn evaluations(&self, waypoints: usize) -> u64 {
+    pub(super) fn evaluations(&self, waypoints: usize) -> u64 {
         self.lattice.legs_priced.div_ceil(waypoints as u64 + 1)
     }
 
     /// Improve `route` by steps that shrink from the share `from` of the way to the share `to`.
-    pub fn descend(&mut self, route: &mut Vec<Point3>, from: f64, to: f64) -> Fitness {
+    pub(super) fn descend(&mut self, route: &mut Vec<Point3>, from: f64, to: f64) -> Fitness {
         let scenario = self.model.scenario;
         let way = (scenario.target - scenario.start).norm();
         let mut best = price(self.model, route);

@@ -10,7 +10,11 @@ use crate::planner::price::price;
 const NOTHING: f64 = 1e-9;
 
 /// `route` with exactly `waypoints` free waypoints.
-pub fn with_waypoints(model: &Model, mut route: Vec<Point3>, waypoints: usize) -> Vec<Point3> {
+pub(in crate::planner) fn with_waypoints(
+    model: &Model,
+    mut route: Vec<Point3>,
+    waypoints: usize,
+) -> Vec<Point3> {
     while route.len() > waypoints + 2 {
         leave_out(model, &mut route);
     }

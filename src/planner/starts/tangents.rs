@@ -1,19 +1,20 @@
 //! From a taut string to waypoints: every arc becomes the corners of a polygon drawn round it.
 
-use crate::geometry::Point2;
+use crate::geometry::{LEVEL, Point2};
 use crate::scenario::Scenario;
+use crate::seeding::{Piece, TautString};
 
 /// An arc of a taut string.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Arc {
+struct Arc {
     /// Of the circle, metres.
-    pub center: Point2,
+    center: Point2,
     /// Of the circle; 0 at the corner of a polygon.
-    pub radius: f64,
+    radius: f64,
     /// Of the string where it meets the circle, radians counter-clockwise from east.
-    pub heading: f64,
+    heading: f64,
     /// How far it goes round, radians, left positive.
-    pub angle: f64,
+    angle: f64,
 }
 
 /// Arcs of less than this, radians, bend nothing.
@@ -24,12 +25,8 @@ const STRAIGHT: f64 = 1e-9;
 ///
 /// With `k` corners an arc of angle `a` and radius `r` is flown in `2 k r tan(a / 2k)`, so that the
 /// gain of one corner more falls with each: taking the greatest gain first is optimal.
-pub(super) fn corners(scenario: &Scenario, arcs: &[Arc], waypoints: usize) -> Vec<Point2> {
-    let arcs: Vec<Arc> = arcs
-        .iter()
-        .copied()
-        .filter(|arc| arc.angle.abs() > STRAIGHT)
-        .collect();
+pub(super) fn corners(scenario: &Scenario, string: &TautString, waypoints: usize) -> Vec<Point2> {
+    let arcs = arcs(string);
     let max_turn = scenario.vehicle.max_turn_deg.to_radians() * (1.0 - 1e-6);
     let mut counts: Vec<usize> = arcs
         .iter()
@@ -61,6 +58,39 @@ pub(super) fn corners(scenario: &Scenario, arcs: &[Arc], waypoints: usize) -> Ve
         .zip(counts)
         .flat_map(|(arc, count)| around(arc, count, scenario.vehicle.min_leg))
         .collect()
+}
+
+/// The bends of `string`, with its heading where each begins.
+fn arcs(string: &TautString) -> Vec<Arc> {
+    let mut heading = 0.0;
+    let mut arcs = Vec::new();
+    for piece in &string.pieces {
+        match *piece {
+            Piece::Straight { from, to } => {
+                let way = to - from;
+                if way.norm() > LEVEL {
+                    heading = libm::atan2(way.y, way.x);
+                }
+            }
+            Piece::Arc {
+                center,
+                radius,
+                turn,
+                ..
+            } => {
+                if turn.abs() > STRAIGHT {
+                    arcs.push(Arc {
+                        center,
+                        radius,
+                        heading,
+                        angle: turn,
+                    });
+                }
+                heading += turn;
+            }
+        }
+    }
+    arcs
 }
 
 #[expect(

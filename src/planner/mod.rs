@@ -4,6 +4,7 @@
 
 mod certificate;
 mod coding;
+mod guide;
 mod log;
 mod moves;
 mod objective;

@@ -36,7 +36,9 @@ pub(super) struct Leg<'a, S: Simd> {
     pub(super) dz: Lane<S>,
     /// Horizontal length, metres.
     pub(super) level: Lane<S>,
-    /// 1 over its square; 0 for a leg that stands still or only climbs.
+    /// 1 over it; 0 for a leg that stands still or only climbs.
+    pub(super) inverse: Lane<S>,
+    /// The square of that.
     pub(super) inverse_square: Lane<S>,
     /// 3-D length, metres.
     pub(super) length: Lane<S>,
@@ -55,6 +57,7 @@ impl<'a, S: Simd> Leg<'a, S> {
         let square = dx * dx + dy * dy;
         let level = square.sqrt();
         let moves = dx.with(LEVEL).le(level);
+        let inverse = moves.keep(dx.with(1.0) / level);
         Self {
             simd,
             a,
@@ -63,7 +66,8 @@ impl<'a, S: Simd> Leg<'a, S> {
             dy,
             dz,
             level,
-            inverse_square: moves.keep(dx.with(1.0) / square),
+            inverse,
+            inverse_square: inverse * inverse,
             length: (square + dz * dz).sqrt(),
             moves,
             rows,

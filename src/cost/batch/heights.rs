@@ -109,6 +109,9 @@ impl Pricer<'_> {
         };
         let mut met_before = one.lt(zero);
         for zone in &self.heights.zones {
+            if !leg.may_reach(zone.center, zone.radius) {
+                continue;
+            }
             let sight = leg.seen_from(zone.center);
             let reach = leg.splat(zone.radius * zone.radius);
             let met = sight.least_squared_distance(zero, one).le(reach);

@@ -121,6 +121,9 @@ impl Pricer<'_> {
         violation: &mut Lane<S>,
     ) {
         let outline = &disc.outline;
+        if !leg.may_reach(outline.center, outline.influence) {
+            return;
+        }
         let (zero, one) = (leg.splat(0.0), leg.splat(1.0));
         let sight = leg.seen_from(outline.center);
         let reach = leg.splat(outline.influence * outline.influence);

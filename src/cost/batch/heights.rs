@@ -5,6 +5,7 @@ use pulp::Simd;
 
 use super::Pricer;
 use super::leg::Leg;
+use super::peaks::Massif;
 use crate::cost::{Model, Tolerance};
 use crate::geometry::Point2;
 use crate::geometry::lane::{Lane, Mask};
@@ -12,6 +13,11 @@ use crate::terrain::Terrain;
 
 /// What a proof may overlook: less than what counts as a breach.
 const OVERLOOKED: f64 = 0.5;
+
+/// At how many steps along a leg the height over peaks is looked at, at first, and where that
+/// proves nothing.
+const FEW_STEPS: usize = 4;
+const MANY_STEPS: usize = 16;
 
 /// The heights that routes must keep, made ready for proofs.
 #[derive(Debug, Clone)]
@@ -23,6 +29,15 @@ pub(super) struct Heights {
     ground: f64,
     /// Highest anywhere, likewise.
     ceiling: f64,
+    surface: Surface,
+}
+
+/// What lies below.
+#[derive(Debug, Clone)]
+enum Surface {
+    Flat(f64),
+    Peaks(Massif),
+    Grid,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -32,10 +47,10 @@ struct Zone {
 }
 
 /// The part of each leg in a terminal zone: `[enter, leave]`, 1 to 1 where there is none.
-struct Inside<S: Simd> {
+pub(super) struct Inside<S: Simd> {
     enter: Lane<S>,
     leave: Lane<S>,
-    /// Where a leg meets two zones, or climbs in one; not proven here.
+    /// Where a leg meets two zones, or only climbs in one; not proven here.
     unclear: Mask<S>,
 }
 
@@ -55,7 +70,32 @@ impl Heights {
             floor: band.min - slack,
             ground: floors.fold(f64::NEG_INFINITY, f64::max) - slack,
             ceiling: band.max + slack,
+            surface: match &model.scenario.terrain {
+                Terrain::Flat(flat) => Surface::Flat(flat.elevation),
+                Terrain::Peaks(peaks) => Surface::Peaks(Massif::of(peaks)),
+                Terrain::Grid(_) => Surface::Grid,
+            },
         }
+    }
+}
+
+impl Heights {
+    /// Where heights from `low` to `high` are allowed over the part `[t0, t1]` of a leg.
+    #[inline(always)]
+    pub(super) fn within<S: Simd>(
+        &self,
+        low: Lane<S>,
+        high: Lane<S>,
+        inside: &Inside<S>,
+        [t0, t1]: [f64; 2],
+    ) -> Mask<S> {
+        let below_ceiling = high.le(high.with(self.ceiling));
+        if self.zones.is_empty() {
+            return below_ceiling & low.with(self.floor).le(low);
+        }
+        let outside = low.with(t0).lt(inside.enter) | inside.leave.lt(low.with(t1));
+        let floor = outside.select(low.with(self.floor), low.with(self.ground));
+        below_ceiling & floor.le(low)
     }
 }
 
@@ -63,13 +103,20 @@ impl Pricer<'_> {
     /// Beyond the band or below the ground.
     #[inline(always)]
     pub(super) fn heights<S: Simd>(&self, leg: &Leg<S>) -> Lane<S> {
-        let clear = match &self.model.scenario.terrain {
-            Terrain::Flat(flat) => {
-                let inside = self.inside(leg);
-                self.clear_of_flat(leg, &inside, flat.elevation) & !inside.unclear
+        let inside = self.inside(leg);
+        let clear = match &self.heights.surface {
+            Surface::Flat(elevation) => self.clear_of_flat(leg, &inside, *elevation),
+            Surface::Peaks(massif) => {
+                let clear = massif.clear::<S, FEW_STEPS>(leg, &inside, &self.heights);
+                if (!(clear | inside.unclear)).any() {
+                    clear | massif.clear::<S, MANY_STEPS>(leg, &inside, &self.heights)
+                } else {
+                    clear
+                }
             }
-            Terrain::Peaks(_) | Terrain::Grid(_) => leg.splat(1.0).lt(leg.splat(0.0)),
+            Surface::Grid => leg.splat(1.0).lt(leg.splat(0.0)),
         };
+        let clear = clear & !inside.unclear;
         if !(!clear).any() {
             return leg.splat(0.0);
         }
@@ -88,12 +135,13 @@ impl Pricer<'_> {
     pub(super) fn off_middle<S: Simd>(&self, leg: &Leg<S>) -> Lane<S> {
         let band = self.model.scenario.altitude;
         let middle = 0.5 * (band.max + band.min);
-        let ground = match &self.model.scenario.terrain {
-            Terrain::Flat(flat) => leg.splat(flat.elevation),
-            terrain => leg
-                .b
-                .z
-                .map(|lane, _| terrain.elevation(leg.segment(lane).b.xy())),
+        let ground = match &self.heights.surface {
+            Surface::Flat(elevation) => leg.splat(*elevation),
+            Surface::Peaks(massif) => massif.elevation(leg.b),
+            Surface::Grid => leg.b.z.map(|lane, _| {
+                let below = leg.segment(lane).b.xy();
+                self.model.scenario.terrain.elevation(below)
+            }),
         };
         (leg.b.z - ground - middle).abs()
     }

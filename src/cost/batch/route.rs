@@ -3,6 +3,7 @@
 use pulp::Simd;
 
 use super::leg::{Leg, Point};
+use super::peaks::Panorama;
 use super::threats::Candidates;
 use super::{PointRow, Pricer};
 use crate::cost::threat::SHARE;
@@ -68,17 +69,20 @@ impl Pricer<'_> {
             level: zero,
         };
         let mut candidates = Candidates::default();
+        let mut panorama = Panorama::new(simd);
+        self.look(Point::load(simd, &points[0], part), &mut panorama);
         for (leg_idx, rows) in points.windows(2).enumerate() {
             let leg = Leg::new(simd, part, [&rows[0], &rows[1]]);
             length = length + leg.length;
+            self.look(leg.b, &mut panorama);
             self.threats(&leg, &mut candidates, &mut exposure, &mut violation);
-            violation = violation + self.heights(&leg);
+            violation = violation + self.heights(&leg, &panorama);
             let (near, sharp) = self.turn(&leg, &mut heading);
             let mut suspect = near | self.may_break_limits(&leg);
             let free = leg_idx + 2 < points.len();
             if free {
                 suspect = suspect | self.outside(leg.b);
-                off_middle = off_middle + self.off_middle(&leg);
+                off_middle = off_middle + self.off_middle(&leg, &panorama);
             }
             if suspect.any() {
                 violation = violation + self.leg_limits(&leg) + self.turn_limit(near, sharp);
@@ -102,8 +106,11 @@ impl Pricer<'_> {
     ) -> (Lane<S>, Lane<S>) {
         let leg = Leg::new(simd, part, [a, b]);
         let (mut exposure, mut violation) = (leg.splat(0.0), leg.splat(0.0));
+        let mut panorama = Panorama::new(simd);
+        self.look(leg.a, &mut panorama);
+        self.look(leg.b, &mut panorama);
         self.threats(&leg, &mut Candidates::default(), &mut exposure, &mut violation);
-        violation = violation + self.heights(&leg);
+        violation = violation + self.heights(&leg, &panorama);
         if self.may_break_limits(&leg).any() {
             violation = violation + self.leg_limits(&leg);
         }

@@ -18,6 +18,9 @@ pub type Point2 = nalgebra::Point2<f64>;
 /// A point in space, metres.
 pub type Point3 = nalgebra::Point3<f64>;
 
+/// A horizontal way, metres.
+pub type Vector2 = nalgebra::Vector2<f64>;
+
 /// `angle` brought into (-pi, pi].
 #[must_use]
 pub fn wrap_angle(angle: f64) -> f64 {

@@ -1,8 +1,15 @@
 //! Population searches over a box of real numbers. They know an [`Objective`], not an aircraft.
 //!
-//! Adding an algorithm is one file beside `tms_sba.rs` and one row of [`ALL`].
+//! Adding an algorithm is one file beside `tms_sba.rs` and one row of [`ALL`]; the planner says by the
+//! algorithm's name what its positions mean.
 
+mod abc;
+mod ba;
+mod particles;
+mod pso;
 mod random;
+mod sba;
+mod spso;
 mod swarm;
 mod tms_sba;
 
@@ -70,6 +77,13 @@ impl Bounds {
         self.upper[dim] - self.lower[dim]
     }
 
+    /// Write a position uniform within the box.
+    pub fn draw(&self, random: &mut Random, position: &mut [f64]) {
+        for (value, (lower, upper)) in position.iter_mut().zip(self.lower.iter().zip(&self.upper)) {
+            *value = random.between(*lower, *upper);
+        }
+    }
+
     /// Bring `position` into the box.
     pub fn clamp(&self, position: &mut [f64]) {
         for (value, (lower, upper)) in position.iter_mut().zip(self.lower.iter().zip(&self.upper)) {
@@ -85,10 +99,17 @@ pub trait Objective {
 
     /// Write a start position, by default uniform within the bounds.
     fn draw(&mut self, random: &mut Random, position: &mut [f64]) {
-        let bounds = self.bounds();
-        for (dim, value) in position.iter_mut().enumerate() {
-            *value = random.between(bounds.lower[dim], bounds.upper[dim]);
-        }
+        self.bounds().draw(random, position);
+    }
+
+    /// Whether it knows neighbours of a position, see [`Objective::walk`].
+    fn walks(&self) -> bool {
+        false
+    }
+
+    /// Write a neighbour of `base` into `candidate`; `size`, 0 to 1, tells how far it may be.
+    fn walk(&mut self, _random: &mut Random, base: &[f64], _size: f64, candidate: &mut [f64]) {
+        candidate.copy_from_slice(base);
     }
 
     /// Price `fitness.len()` positions, laid end to end.
@@ -117,6 +138,23 @@ pub struct Parameter {
     pub max: f64,
     /// For people.
     pub meaning: &'static str,
+}
+
+/// A row of an algorithm's constants.
+const fn parameter(
+    name: &'static str,
+    default: f64,
+    min: f64,
+    max: f64,
+    meaning: &'static str,
+) -> Parameter {
+    Parameter {
+        name,
+        default,
+        min,
+        max,
+        meaning,
+    }
 }
 
 /// An algorithm by name.
@@ -157,7 +195,14 @@ impl Algorithm {
 }
 
 /// Every algorithm; the first is the default.
-pub const ALL: &[Algorithm] = &[tms_sba::ALGORITHM];
+pub const ALL: &[Algorithm] = &[
+    tms_sba::ALGORITHM,
+    sba::ALGORITHM,
+    spso::ALGORITHM,
+    ba::ALGORITHM,
+    pso::ALGORITHM,
+    abc::ALGORITHM,
+];
 
 /// The algorithm of that name.
 #[must_use]
@@ -165,162 +210,5 @@ pub fn by_name(name: &str) -> Option<&'static Algorithm> {
     ALL.iter().find(|algorithm| algorithm.name == name)
 }
 
-/// What every row of the table must do.
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A standard function, shifted so that its minimum is nowhere special.
-    struct Standard {
-        bounds: Bounds,
-        of: fn(&[f64]) -> f64,
-        outside: usize,
-    }
-
-    impl Standard {
-        fn new(dimension: usize, reach: f64, of: fn(&[f64]) -> f64) -> Self {
-            let bounds = Bounds {
-                lower: vec![-reach; dimension],
-                upper: vec![reach; dimension],
-            };
-            Self {
-                bounds,
-                of,
-                outside: 0,
-            }
-        }
-    }
-
-    impl Objective for Standard {
-        fn bounds(&self) -> &Bounds {
-            &self.bounds
-        }
-        fn evaluate(&mut self, positions: &[f64], fitness: &mut [Fitness]) {
-            for (position, fitness) in positions.chunks_exact(self.bounds.dimension()).zip(fitness)
-            {
-                let mut clamped = position.to_vec();
-                self.bounds.clamp(&mut clamped);
-                self.outside += usize::from(clamped != position);
-                *fitness = Fitness {
-                    violation: 0.0,
-                    cost: (self.of)(position),
-                };
-            }
-        }
-    }
-
-    fn sphere(position: &[f64]) -> f64 {
-        position
-            .iter()
-            .enumerate()
-            .map(|(dim, x)| x - dim as f64 * 0.3)
-            .map(|offset| offset * offset)
-            .sum()
-    }
-
-    fn settings(algorithm: &Algorithm, seed: u64) -> Settings {
-        Settings {
-            population: 30,
-            seed,
-            parameters: algorithm.parameters_with(|_| None),
-        }
-    }
-
-    fn run(
-        algorithm: &Algorithm,
-        objective: &mut Standard,
-        seed: u64,
-        iterations: usize,
-    ) -> Vec<f64> {
-        let mut search = (algorithm.start)(&settings(algorithm, seed), objective);
-        let mut curve = vec![search.swarm().best_fitness().cost];
-        for iteration in 1..=iterations {
-            search.iterate(objective, iteration as f64 / iterations as f64);
-            curve.push(search.swarm().best_fitness().cost);
-        }
-        curve
-    }
-
-    #[test]
-    fn the_best_never_worsens_and_sphere_is_solved_within_the_box() {
-        for algorithm in ALL {
-            let mut objective = Standard::new(8, 10.0, sphere);
-            let curve = run(algorithm, &mut objective, 3, 400);
-            assert!(
-                curve.windows(2).all(|pair| pair[1] <= pair[0]),
-                "{}",
-                algorithm.name
-            );
-            assert!(
-                curve[400] < 1e-3,
-                "{} ends at {}",
-                algorithm.name,
-                curve[400]
-            );
-            assert_eq!(objective.outside, 0, "{} leaves the box", algorithm.name);
-        }
-    }
-
-    #[test]
-    fn the_same_seed_gives_the_same_curve() {
-        for algorithm in ALL {
-            let curve = |seed| run(algorithm, &mut Standard::new(5, 4.0, sphere), seed, 50);
-            assert_eq!(curve(11), curve(11), "{}", algorithm.name);
-            assert_ne!(curve(11), curve(12), "{}", algorithm.name);
-        }
-    }
-
-    #[test]
-    fn names_are_unique_and_defaults_lie_in_their_ranges() {
-        for algorithm in ALL {
-            assert_eq!(
-                by_name(algorithm.name).map(|found| found.title),
-                Some(algorithm.title)
-            );
-            for parameter in algorithm.parameters {
-                let range = parameter.min..=parameter.max;
-                assert!(
-                    range.contains(&parameter.default),
-                    "{} {}",
-                    algorithm.name,
-                    parameter.name
-                );
-            }
-        }
-        assert_eq!(by_name("simplex").map(|found| found.name), None);
-    }
-
-    #[test]
-    fn extreme_parameters_and_populations_do_no_harm() {
-        for algorithm in ALL {
-            let ends: [fn(&Parameter) -> f64; 2] =
-                [|parameter| parameter.min, |parameter| parameter.max];
-            for end in ends {
-                for population in [2, 3, 40] {
-                    let mut objective = Standard::new(3, 4.0, sphere);
-                    let parameters = algorithm.parameters.iter().map(end).collect();
-                    let settings = Settings {
-                        population,
-                        seed: 5,
-                        parameters,
-                    };
-                    let mut search = (algorithm.start)(&settings, &mut objective);
-                    for step in 1..=30 {
-                        search.iterate(&mut objective, f64::from(step) / 30.0);
-                    }
-                    assert!(search.swarm().best_fitness().cost.is_finite());
-                    assert_eq!(objective.outside, 0);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn less_violation_goes_before_less_cost() {
-        let fitness = |violation, cost| Fitness { violation, cost };
-        assert!(fitness(0.0, 9.0).beats(&fitness(1.0, 1.0)));
-        assert!(fitness(1.0, 1.0).beats(&fitness(1.0, 2.0)));
-        assert!(!fitness(0.0, 1.0).beats(&fitness(0.0, 1.0)));
-        assert!(fitness(5.0, 5.0).beats(&Fitness::WORST));
-    }
-}
+mod tests;

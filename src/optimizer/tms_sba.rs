@@ -3,7 +3,9 @@
 //! The spherical coding is the objective's affair; here a bat is a point in a box. All bats of an
 //! iteration move by the same best position and are priced together.
 
-use super::{Algorithm, Fitness, Objective, Optimizer, Parameter, Random, Settings, Swarm};
+use super::{
+    Algorithm, Fitness, Objective, Optimizer, Parameter, Random, Settings, Swarm, parameter,
+};
 
 /// The row of the table.
 pub(super) const ALGORITHM: Algorithm = Algorithm {
@@ -14,23 +16,8 @@ pub(super) const ALGORITHM: Algorithm = Algorithm {
     start: |settings, objective| Box::new(TmsSba::start(settings, objective)),
 };
 
-const fn parameter(
-    name: &'static str,
-    default: f64,
-    min: f64,
-    max: f64,
-    meaning: &'static str,
-) -> Parameter {
-    Parameter {
-        name,
-        default,
-        min,
-        max,
-        meaning,
-    }
-}
-
-const PARAMETERS: [Parameter; 10] = [
+/// The constants; those of the truncated mean come last.
+pub(super) const PARAMETERS: [Parameter; 10] = [
     parameter("f_min", 0.0, 0.0, 10.0, "least frequency, Eq. 10"),
     parameter("f_max", 1.0, 0.0, 10.0, "greatest frequency, Eq. 10"),
     parameter(
@@ -95,7 +82,20 @@ const PARAMETERS: [Parameter; 10] = [
 /// means that the swarm has stagnated; the paper compares floats for equality.
 const STAGNATION: f64 = 1e-3;
 
-struct TmsSba {
+/// Share of the swarm that a walk may start from, at first.
+const ELITE: f64 = 0.2;
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a share below 1 of a count"
+)]
+fn share_of(count: usize, share: f64) -> usize {
+    (count as f64 * share) as usize
+}
+
+/// A running search.
+pub(super) struct TmsSba {
     swarm: Swarm,
     random: Random,
     iteration: usize,
@@ -116,7 +116,8 @@ struct TmsSba {
 }
 
 impl TmsSba {
-    fn start(settings: &Settings, objective: &mut dyn Objective) -> Self {
+    /// Draw and price the first bats.
+    pub(super) fn start(settings: &Settings, objective: &mut dyn Objective) -> Self {
         let [
             f_min,
             f_max,
@@ -156,15 +157,30 @@ impl TmsSba {
         }
     }
 
+    /// Eq. 10-15: one iteration of the bats, before their stabilisation.
+    pub(super) fn fly(&mut self, objective: &mut dyn Objective, progress: f64) {
+        self.iteration += 1;
+        self.move_bats(objective, progress);
+        self.swarm
+            .price(objective, &self.candidates, &mut self.outcome);
+        self.accept(objective.bounds().dimension());
+    }
+
     /// Eq. 10-13: every bat flies towards the best, or walks about it.
-    fn move_bats(&mut self, objective: &dyn Objective, progress: f64) {
-        let bounds = objective.bounds();
-        let dimension = bounds.dimension();
+    fn move_bats(&mut self, objective: &mut dyn Objective, progress: f64) {
+        let dimension = objective.bounds().dimension();
         let mean_loudness = self.loudness.iter().sum::<f64>() / self.loudness.len() as f64;
         // The walk shrinks over the run to a thousandth of its first size.
         let size = self.walk * libm::pow(1e-3, progress) * mean_loudness;
         let share = self.walk_numbers / dimension as f64;
         let best = self.swarm.best_position();
+        // A walk of the objective's own starts from any of the best few, ever fewer.
+        let elite = if objective.walks() {
+            self.swarm.ranking()
+        } else {
+            Vec::new()
+        };
+        let n_elite = share_of(elite.len(), ELITE * (1.0 - progress)).max(1);
         for bat_idx in 0..self.swarm.len() {
             let here = self.swarm.position(bat_idx);
             let candidate = &mut self.candidates[bat_idx * dimension..(bat_idx + 1) * dimension];
@@ -174,17 +190,21 @@ impl TmsSba {
                 velocity[dim] += (best[dim] - here[dim]) * frequency; // Eq. 11, 20
                 candidate[dim] = here[dim] + velocity[dim]; // Eq. 12, 21
             }
-            if self.random.unit() >= self.pulse_rates[bat_idx] {
-                // Eq. 13, in a few dimensions: a step in all of them at once hardly ever improves.
+            let walks = self.random.unit() >= self.pulse_rates[bat_idx]; // Eq. 13
+            if walks && !elite.is_empty() {
+                let base = self.swarm.position(elite[self.random.below(n_elite)]);
+                objective.walk(&mut self.random, base, size, candidate);
+            } else if walks {
+                // In a few dimensions: a step in all of them at once hardly ever improves.
                 let chosen = self.random.below(dimension);
                 candidate.copy_from_slice(best);
                 for (dim, value) in candidate.iter_mut().enumerate() {
                     if dim == chosen || self.random.unit() < share {
-                        *value += self.random.normal() * size * bounds.range(dim);
+                        *value += self.random.normal() * size * objective.bounds().range(dim);
                     }
                 }
             }
-            bounds.clamp(candidate);
+            objective.bounds().clamp(candidate);
         }
     }
 
@@ -206,12 +226,8 @@ impl TmsSba {
     fn stabilise(&mut self, objective: &mut dyn Objective) {
         let dimension = objective.bounds().dimension();
         let ranking = self.swarm.ranking();
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "truncation < 1, so that fewer than half are left out at each end"
-        )]
-        let left_out = (ranking.len() as f64 * self.truncation / 2.0) as usize;
+        // As truncation < 1, fewer than half are left out at each end.
+        let left_out = share_of(ranking.len(), self.truncation / 2.0);
         let middle = &ranking[left_out..ranking.len() - left_out];
         let mut mean = vec![0.0; dimension];
         for &bat_idx in middle {
@@ -266,11 +282,7 @@ impl TmsSba {
 
 impl Optimizer for TmsSba {
     fn iterate(&mut self, objective: &mut dyn Objective, progress: f64) {
-        self.iteration += 1;
-        self.move_bats(objective, progress);
-        self.swarm
-            .price(objective, &self.candidates, &mut self.outcome);
-        self.accept(objective.bounds().dimension());
+        self.fly(objective, progress);
         self.stabilise(objective);
     }
 

@@ -94,7 +94,10 @@ impl Heights {
         }
         // Lines are lowest where parts of them end; without a zone, a leg is outside from 0 to 1.
         let (start, end) = (low.with(t0), low.with(t1));
-        let (enter, leave) = (inside.enter.clamp(start, end), inside.leave.clamp(start, end));
+        let (enter, leave) = (
+            inside.enter.clamp(start, end),
+            inside.leave.clamp(start, end),
+        );
         let slope = (to - from) * (1.0 / (t1 - t0));
         let first = from.min(from + slope * (enter - start));
         let last = to.min(from + slope * (leave - start));
@@ -124,9 +127,7 @@ impl Pricer<'_> {
                 let none = [leg.splat(0.0); 2];
                 self.heights.within(ends, none, &inside, [0.0, 1.0])
             }
-            Surface::Peaks(massif) => {
-                massif.clear(leg, panorama, &inside, &self.heights)
-            }
+            Surface::Peaks(massif) => massif.clear(leg, panorama, &inside, &self.heights),
             Surface::Grid => leg.splat(1.0).lt(leg.splat(0.0)),
         };
         let clear = clear & !inside.unclear;

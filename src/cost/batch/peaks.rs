@@ -328,9 +328,15 @@ impl Mountain {
         let (down, up) = (quarter * summit, quarter * upward);
         // A mountain bends the height above ground the other way round, a pit as itself.
         if self.height > 0.0 {
-            Slack { dip: down, rise: up }
+            Slack {
+                dip: down,
+                rise: up,
+            }
         } else {
-            Slack { dip: up, rise: down }
+            Slack {
+                dip: up,
+                rise: down,
+            }
         }
     }
 

@@ -6,8 +6,8 @@ use super::leg::{Leg, Point};
 use super::peaks::Panorama;
 use super::threats::Candidates;
 use super::{PointRow, Pricer};
-use crate::cost::threat::SHARE;
 use crate::cost::fuel;
+use crate::cost::threat::SHARE;
 use crate::geometry::lane::{Lane, Mask};
 use crate::scenario::Scenario;
 
@@ -109,7 +109,12 @@ impl Pricer<'_> {
         let mut panorama = Panorama::new(simd);
         self.look(leg.a, &mut panorama);
         self.look(leg.b, &mut panorama);
-        self.threats(&leg, &mut Candidates::default(), &mut exposure, &mut violation);
+        self.threats(
+            &leg,
+            &mut Candidates::default(),
+            &mut exposure,
+            &mut violation,
+        );
         violation = violation + self.heights(&leg, &panorama);
         if self.may_break_limits(&leg).any() {
             violation = violation + self.leg_limits(&leg);

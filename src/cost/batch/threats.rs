@@ -174,7 +174,14 @@ impl Pricer<'_> {
             let segment = leg.segment(lane);
             let encounter = threat.encounter(&segment);
             let depth = encounter.clearance.map_or(0.0, |clearance| -clearance);
-            depths = depths.set(lane, if depth > self.tolerance.length_m { depth } else { 0.0 });
+            depths = depths.set(
+                lane,
+                if depth > self.tolerance.length_m {
+                    depth
+                } else {
+                    0.0
+                },
+            );
             match self.quadrature {
                 Quadrature::Integral => encounter.exposure,
                 Quadrature::Paper => sampled_exposure(threat, &segment),

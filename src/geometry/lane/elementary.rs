@@ -140,9 +140,8 @@ impl<S: Simd> Lane<S> {
         let doublings = self.rounded_product(LOG2_E);
         let x = self - doublings * LN_2_PARTS[0] - doublings * LN_2_PARTS[1];
         // The whole number stands in the last bits of its sum with the rounder.
-        let scale = (doublings + ROUNDER).map(|_, sum| {
-            f64::from_bits((sum.to_bits() << 52).wrapping_add(ONE))
-        });
+        let scale = (doublings + ROUNDER)
+            .map(|_, sum| f64::from_bits((sum.to_bits() << 52).wrapping_add(ONE)));
         x.polynomial(&EXP) * scale
     }
 
@@ -155,7 +154,8 @@ impl<S: Simd> Lane<S> {
             let powers = (over.to_bits() & EXPONENT) + ONE - (under.to_bits() & EXPONENT);
             f64::from_bits(powers)
         });
-        let exponent = power.map(|_, value| f64::from_bits((value.to_bits() >> 52) | COUNTER.to_bits()))
+        let exponent = power
+            .map(|_, value| f64::from_bits((value.to_bits() >> 52) | COUNTER.to_bits()))
             - (COUNTER + 1023.0);
         let reduced = divisor * power;
         let f = (self - reduced) / (self + reduced);

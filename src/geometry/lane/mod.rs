@@ -149,9 +149,7 @@ impl<S: Simd> Mask<S> {
     pub(crate) fn select(self, yes: Lane<S>, no: Lane<S>) -> Lane<S> {
         Lane {
             simd: self.simd,
-            values: self
-                .simd
-                .select_f64s(self.values, yes.values, no.values),
+            values: self.simd.select_f64s(self.values, yes.values, no.values),
         }
     }
 

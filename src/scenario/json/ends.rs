@@ -17,7 +17,7 @@ const SAME_M: f64 = 1e-6;
 /// Start and target closer than this, seen from above, give the route no direction, metres.
 const ABOVE_M: f64 = 1e-3;
 
-/// Start and target must be apart, and apart seen from above: the encoding of a route turns about
+/// Start and target must be apart, and apart seen from above: the coding of a route turns about
 /// the line between them.
 pub(super) fn check_apart(start: Point3, target: Point3, faults: &mut Faults) {
     let path = Path::Key(&Path::Root, "target");

@@ -1,0 +1,93 @@
+//! A route as its waypoints: three numbers each, as most planners before the spherical vector have it.
+//!
+//! A position holds N waypoints: x and y within the area, and the height above ground within the
+//! band. Nothing is assumed of how one waypoint lies to the next.
+
+use crate::geometry::{Point2, Point3};
+use crate::optimizer::Bounds;
+use crate::scenario::Scenario;
+
+/// The coding of routes of one scenario.
+#[derive(Debug, Clone)]
+pub(in crate::planner) struct Cartesian<'s> {
+    scenario: &'s Scenario,
+    bounds: Bounds,
+}
+
+/// Numbers of one waypoint.
+const PER_WAYPOINT: usize = 3;
+
+impl<'s> Cartesian<'s> {
+    /// The coding of routes of `scenario` with so many free waypoints.
+    #[must_use]
+    pub(in crate::planner) fn new(scenario: &'s Scenario, waypoints: usize) -> Self {
+        let (area, band) = (&scenario.area, scenario.altitude);
+        Self {
+            scenario,
+            bounds: Bounds {
+                lower: [area.min.x, area.min.y, band.min].repeat(waypoints),
+                upper: [area.max.x, area.max.y, band.max].repeat(waypoints),
+            },
+        }
+    }
+
+    /// Where positions may lie.
+    #[must_use]
+    pub(in crate::planner) fn bounds(&self) -> &Bounds {
+        &self.bounds
+    }
+
+    /// Write the route of `position` into `route`: start, free waypoints, target.
+    pub(in crate::planner) fn decode(&self, position: &[f64], route: &mut Vec<Point3>) {
+        route.clear();
+        route.push(self.scenario.start);
+        for waypoint in position.chunks_exact(PER_WAYPOINT) {
+            let &[x, y, height] = waypoint else {
+                unreachable!("chunks are of PER_WAYPOINT numbers")
+            };
+            let ground = self.scenario.terrain.elevation(Point2::new(x, y));
+            route.push(Point3::new(x, y, ground + height));
+        }
+        route.push(self.scenario.target);
+    }
+
+    /// Write the position of `route` into `position`; what the bounds do not hold is cut off.
+    pub(in crate::planner) fn encode(&self, route: &[Point3], position: &mut [f64]) {
+        for (waypoint, point) in position.chunks_exact_mut(PER_WAYPOINT).zip(&route[1..]) {
+            let ground = self.scenario.terrain.elevation(point.xy());
+            waypoint.copy_from_slice(&[point.x, point.y, point.z - ground]);
+        }
+        self.bounds.clamp(position);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::tests::scenario;
+    use crate::terrain::{Flat, Terrain};
+
+    #[test]
+    fn a_position_is_its_waypoints_over_the_ground() {
+        let mut scenario = scenario();
+        scenario.terrain = Terrain::Flat(Flat { elevation: 40.0 });
+        let coding = Cartesian::new(&scenario, 2);
+        assert_eq!(coding.bounds().lower, [0.0; 6]);
+        assert_eq!(
+            coding.bounds().upper,
+            [1000.0, 1000.0, 200.0, 1000.0, 1000.0, 200.0]
+        );
+        let mut route = Vec::new();
+        coding.decode(&[10.0, 20.0, 30.0, 400.0, 500.0, 60.0], &mut route);
+        let expected = [
+            scenario.start,
+            Point3::new(10.0, 20.0, 70.0),
+            Point3::new(400.0, 500.0, 100.0),
+            scenario.target,
+        ];
+        assert_eq!(route, expected);
+        let mut position = [0.0; 6];
+        coding.encode(&route, &mut position);
+        assert_eq!(position, [10.0, 20.0, 30.0, 400.0, 500.0, 60.0]);
+    }
+}

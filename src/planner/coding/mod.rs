@@ -1,0 +1,142 @@
+//! Routes as points in a box: what the numbers of a position mean.
+//!
+//! A coding says where positions may lie and draws the route of one. Which algorithm searches in
+//! which coding is the table [`CODINGS`]; the optimizers know of none.
+
+mod cartesian;
+mod course;
+mod spherical;
+
+pub(super) use cartesian::Cartesian;
+pub(super) use course::Course;
+pub(super) use spherical::Spherical;
+
+use crate::geometry::Point3;
+use crate::optimizer::{Bounds, Random};
+use crate::scenario::Scenario;
+
+/// The coding of routes of one scenario.
+#[derive(Debug, Clone)]
+pub(super) enum Coding<'s> {
+    /// Vectors relative to the course flown, closed onto the target; Eq. 16-22.
+    Spherical(Spherical<'s>),
+    /// The waypoints themselves.
+    Cartesian(Cartesian<'s>),
+    /// Vectors about the heading from start to target.
+    Course(Course<'s>),
+}
+
+/// Of a scenario, so many free waypoints, and whether every route must have a code.
+type Make = for<'s> fn(&'s Scenario, usize, bool) -> Coding<'s>;
+
+const SPHERICAL: Make =
+    |scenario, waypoints, wide| Coding::Spherical(Spherical::new(scenario, waypoints, wide));
+const CARTESIAN: Make =
+    |scenario, waypoints, _| Coding::Cartesian(Cartesian::new(scenario, waypoints));
+const COURSE: Make = |scenario, waypoints, _| Coding::Course(Course::new(scenario, waypoints));
+
+/// The coding that each algorithm searches in, by the algorithm's name.
+const CODINGS: [(&str, Make); 6] = [
+    ("tms-sba", SPHERICAL),
+    ("sba", SPHERICAL),
+    ("spso", COURSE),
+    ("ba", CARTESIAN),
+    ("pso", CARTESIAN),
+    ("abc", CARTESIAN),
+];
+
+impl<'s> Coding<'s> {
+    /// The coding that the algorithm of `scenario` searches in, of routes with so many free
+    /// waypoints; `wide` has room for every route, as far as the coding can.
+    ///
+    /// # Panics
+    /// When that algorithm has no row in the table of codings.
+    pub(super) fn of(scenario: &'s Scenario, waypoints: usize, wide: bool) -> Self {
+        let named = |row: &&(&str, Make)| row.0 == scenario.planner.algorithm;
+        let (_, make) = CODINGS
+            .iter()
+            .find(named)
+            .expect("a test holds the table to have a row for every algorithm");
+        make(scenario, waypoints, wide)
+    }
+
+    /// Where positions may lie.
+    pub(super) fn bounds(&self) -> &Bounds {
+        match self {
+            Self::Spherical(coding) => coding.bounds(),
+            Self::Cartesian(coding) => coding.bounds(),
+            Self::Course(coding) => coding.bounds(),
+        }
+    }
+
+    /// Write a position of a random route into `position`.
+    pub(super) fn draw(&self, random: &mut Random, position: &mut [f64]) {
+        match self {
+            Self::Spherical(coding) => coding.draw(random, position),
+            Self::Cartesian(_) | Self::Course(_) => self.bounds().draw(random, position),
+        }
+    }
+
+    /// Write the route of `position` into `route`: start, free waypoints, target.
+    pub(super) fn decode(&self, position: &[f64], route: &mut Vec<Point3>) {
+        match self {
+            Self::Spherical(coding) => coding.decode(position, route),
+            Self::Cartesian(coding) => coding.decode(position, route),
+            Self::Course(coding) => coding.decode(position, route),
+        }
+    }
+
+    /// Write the position whose route is `route`, or is near to it, into `position`.
+    pub(super) fn encode(&self, route: &[Point3], position: &mut [f64]) {
+        match self {
+            Self::Spherical(coding) => coding.encode(route, position),
+            Self::Cartesian(coding) => coding.encode(route, position),
+            Self::Course(coding) => coding.encode(route, position),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optimizer;
+    use crate::planner::tests::scenario;
+    use proptest::prelude::*;
+
+    #[test]
+    fn every_algorithm_has_one_coding() {
+        for algorithm in optimizer::ALL {
+            let rows = CODINGS.iter().filter(|row| row.0 == algorithm.name);
+            assert_eq!(rows.count(), 1, "{}", algorithm.name);
+        }
+    }
+
+    proptest! {
+        /// Whatever the coding and the position: the ends are exact, the waypoints as many as asked
+        /// for, their heights within the band.
+        #[test]
+        fn every_position_is_a_route_within_the_band(
+            shares in prop::collection::vec(0.0..=1.0f64, 3 * 13),
+            waypoints in 1..=12_usize,
+        ) {
+            let mut scenario = scenario();
+            scenario.planner.waypoints = waypoints;
+            for (name, make) in CODINGS {
+                let coding = make(&scenario, waypoints, false);
+                let bounds = coding.bounds();
+                let position: Vec<f64> = (0..bounds.dimension())
+                    .map(|dim| bounds.lower[dim] + shares[dim] * bounds.range(dim))
+                    .collect();
+                let mut route = vec![scenario.target; 3];
+                coding.decode(&position, &mut route);
+                prop_assert_eq!(route.len(), waypoints + 2, "{}", name);
+                prop_assert_eq!(route[0], scenario.start);
+                prop_assert_eq!(route[waypoints + 1], scenario.target);
+                for point in &route[1..=waypoints] {
+                    let height = point.z - scenario.terrain.elevation(point.xy());
+                    prop_assert!((-1e-9..=200.0 + 1e-9).contains(&height), "{}", name);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! The search algorithms that a request may name: listed everywhere, and planning as they should.
+
+use noctule::planner::{self, ConvergencePoint, Incumbent, Observer, Outcome, Stop};
+use noctule::scenario::json::{self, Rules};
+use noctule::scenario::limits::Limits;
+use serde_json::Value;
+
+use crate::support::api::Api;
+use crate::support::description::DESCRIPTION;
+
+struct Nobody;
+
+impl Observer for Nobody {
+    fn iteration(&mut self, _: &ConvergencePoint) {}
+    fn incumbent(&mut self, _: &Incumbent) {}
+}
+
+impl Stop for Nobody {
+    fn requested(&self) -> bool {
+        false
+    }
+    fn elapsed_ms(&self) -> f64 {
+        0.0
+    }
+}
+
+fn names() -> Vec<&'static str> {
+    let rules = planner::algorithm_rules();
+    rules.iter().map(|rule| rule.name).collect()
+}
+
+/// Plan the shipped `paper-1`, plainly: from a random start, without polishing.
+fn plan(algorithm: &str, seed: u64, [waypoints, population, iterations]: [u64; 3]) -> Outcome {
+    let text = include_str!("../../scenarios/paper-1.json");
+    let mut document: Value = serde_json::from_str(text).expect("JSON");
+    let planner = &mut document["planner"];
+    planner["algorithm"] = algorithm.into();
+    planner["seed"] = seed.into();
+    planner["waypoints"] = waypoints.into();
+    planner["population"] = population.into();
+    planner["iterations"] = iterations.into();
+    planner["seeding"] = "random".into();
+    planner["polish"] = false.into();
+    let rules = Rules {
+        limits: Limits::default(),
+        algorithms: planner::algorithm_rules(),
+    };
+    let scenario = json::read(document.to_string().as_bytes(), &rules, 1).expect("no fault");
+    planner::plan(&scenario, &mut Nobody, &Nobody)
+}
+
+#[test]
+fn every_algorithm_plans_alike_with_the_same_seed() {
+    for name in names() {
+        let size = [10, 30, 60];
+        let outcome = plan(name, 7, size);
+        assert_eq!(outcome, plan(name, 7, size), "{name}");
+        assert_ne!(
+            outcome.waypoints,
+            plan(name, 8, size).waypoints,
+            "{name} with another seed"
+        );
+        assert_eq!(outcome.waypoints.len(), 12, "{name}");
+        let mut before = f64::INFINITY;
+        for point in &outcome.convergence {
+            assert!(point.best_violation <= before, "{name}");
+            before = point.best_violation;
+        }
+    }
+}
+
+/// The spherical codings find a route from every seed; the Cartesian ones come nearer to one.
+#[test]
+fn spherical_vectors_are_feasible() {
+    for name in ["tms-sba", "sba", "spso"] {
+        for seed in 1..=3 {
+            let outcome = plan(name, seed, [10, 60, 100]);
+            assert!(outcome.feasible, "{name}: {:?}", outcome.violations);
+            assert!(
+                outcome.cost.total < 650.0,
+                "{name} costs {}",
+                outcome.cost.total
+            );
+        }
+    }
+    for name in ["ba", "pso", "abc"] {
+        let outcome = plan(name, 1, [10, 60, 100]);
+        let (first, last) = (outcome.convergence[0], outcome.convergence[100]);
+        assert!(
+            last.best_violation < 0.2 * first.best_violation,
+            "{name} ends at {}",
+            last.best_violation
+        );
+    }
+}
+
+#[test]
+fn the_smallest_population_and_a_single_waypoint_will_do() {
+    for name in names() {
+        for population in [2, 3] {
+            assert_eq!(plan(name, 3, [1, population, 20]).waypoints.len(), 3);
+            assert_eq!(plan(name, 3, [10, population, 20]).waypoints.len(), 12);
+        }
+        // Between the radars there is room for one corner.
+        let outcome = plan(name, 3, [1, 40, 100]);
+        assert!(outcome.feasible, "{name}: {:?}", outcome.violations);
+    }
+}
+
+#[tokio::test]
+async fn every_algorithm_is_listed_with_its_source() {
+    let listed = Api::new().get("/algorithms").await.json();
+    let listed = listed["algorithms"].as_array().expect("a list");
+    let listed_names: Vec<&str> = listed
+        .iter()
+        .map(|algorithm| algorithm["name"].as_str().expect("a name"))
+        .collect();
+    assert_eq!(listed_names, names());
+    for algorithm in listed {
+        let source = algorithm["source"].as_str().expect("a source");
+        let year = source.rsplit(", ").next().expect("the year comes last");
+        assert!(year.parse::<u32>().is_ok(), "{source}");
+        assert_ne!(algorithm["parameters"], serde_json::json!([]));
+    }
+
+    let described = &DESCRIPTION["components"]["schemas"]["Planner"]["properties"]["algorithm"];
+    assert_eq!(described["enum"], serde_json::json!(names()));
+    assert_eq!(described["default"], names()[0]);
+    let page = include_str!("../../docs/EQUATIONS.md");
+    for name in &names()[1..] {
+        let heading = format!("### `{name}`\n");
+        assert!(
+            page.contains(&heading),
+            "docs/EQUATIONS.md has no {heading}"
+        );
+    }
+}

@@ -17,7 +17,7 @@ pub use crate::cost::CostFigures;
 
 use crate::cost::Model;
 use crate::geometry::Point3;
-use crate::optimizer::{self, Algorithm, Optimizer, Settings};
+use crate::optimizer::{self, Algorithm, Objective, Optimizer, Settings};
 use crate::scenario::json::{AlgorithmRule, ParameterRule};
 use crate::scenario::{Quadrature, Scenario, Seeding};
 use crate::seeding;
@@ -104,6 +104,17 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
         convergence, route, ..
     } = log;
     deliver(&model, route, stop_reason, convergence)
+}
+
+/// The routes of `scenario` as its algorithm sees them: positions in a box, each with its price.
+///
+/// For measuring the pricing itself, and for searches of one's own. Once `stop` asks for it, what is
+/// left of a batch is [`Fitness::WORST`](optimizer::Fitness::WORST).
+///
+/// # Panics
+/// When the scenario names an algorithm that is not in the table; its reader refuses those.
+pub fn objective<'s>(scenario: &'s Scenario, stop: &'s dyn Stop) -> impl Objective + 's {
+    Routes::new(Coding::of(scenario), Model::new(scenario), stop)
 }
 
 fn search_settings(scenario: &Scenario, algorithm: &Algorithm) -> Settings {

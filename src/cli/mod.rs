@@ -1,5 +1,6 @@
-//! The command line: serve, plan, healthcheck.
+//! The command line: serve, plan, bench, healthcheck.
 
+mod bench;
 mod healthcheck;
 mod plan;
 mod serve;
@@ -22,6 +23,9 @@ enum Command {
     Serve(crate::config::Serve),
     /// Plan one scenario here and now, without a server
     Plan(plan::Arguments),
+    /// Measure the algorithms: against each other, against the best known routes, against the clock
+    #[command(subcommand)]
+    Bench(bench::Command),
     /// Ask a running service whether it is ready; for containers
     Healthcheck(healthcheck::Arguments),
 }
@@ -32,7 +36,7 @@ mod exit {
     pub(super) const DONE: u8 = 0;
     /// Anything without a code of its own, a wrong command line included.
     pub(super) const FAILED: u8 = 1;
-    /// The scenario is refused.
+    /// A scenario is refused.
     pub(super) const BAD_INPUT: u8 = 2;
     /// No feasible route was found.
     pub(super) const INFEASIBLE: u8 = 3;
@@ -57,6 +61,7 @@ pub fn run() -> ExitCode {
     let done = match command {
         Command::Serve(config) => serve::run(&config).map(|()| exit::DONE),
         Command::Plan(arguments) => plan::run(&arguments),
+        Command::Bench(command) => bench::run(&command),
         Command::Healthcheck(arguments) => healthcheck::run(&arguments).map(|()| exit::DONE),
     };
     done.unwrap_or_else(|error| {

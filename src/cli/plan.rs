@@ -124,7 +124,7 @@ fn document(scenario: &Scenario, outcome: &Outcome, run_ms: f64, format: &Format
 }
 
 /// The faults that the service would answer with, a line each.
-fn report(file: &Path, refusal: &Refusal) {
+pub(super) fn report(file: &Path, refusal: &Refusal) {
     let file = file.display();
     match refusal {
         Refusal::Syntax { .. } => eprintln!("{file} is not JSON: {refusal}"),

@@ -24,11 +24,12 @@ pub use crate::cost::CostFigures;
 
 use crate::cost::Model;
 use crate::geometry::Point3;
-use crate::optimizer::{self, Algorithm};
+use crate::optimizer::{self, Algorithm, Objective};
 use crate::scenario::json::{AlgorithmRule, ParameterRule};
 use crate::scenario::{Quadrature, Scenario};
 use crate::seeding;
 use log::Log;
+use objective::Routes;
 
 /// Follows a run. Called on the planning thread; must return quickly.
 pub trait Observer {
@@ -78,6 +79,17 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
         Some(starts) => search::guided(&model, starts, &mut log),
     };
     deliver(&model, log, stop_reason)
+}
+
+/// The routes of `scenario` as its algorithm sees them: positions in a box, each with its price.
+///
+/// For measuring the pricing itself, and for searches of one's own. Once `stop` asks for it, what is
+/// left of a batch is [`Fitness::WORST`](optimizer::Fitness::WORST).
+///
+/// # Panics
+/// When the scenario names an algorithm that is not in the table; its reader refuses those.
+pub fn objective<'s>(scenario: &'s Scenario, stop: &'s dyn Stop) -> impl Objective + 's {
+    Routes::plain(&Model::new(scenario), stop)
 }
 
 /// Routes are the same when no waypoint is farther from its like than this share of the way.

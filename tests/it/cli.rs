@@ -116,7 +116,7 @@ fn help_and_version_exit_0() {
     let help = run(&["--help"], "");
     assert_eq!(help.status.code(), Some(0));
     let text = String::from_utf8(help.stdout).expect("UTF-8");
-    for command in ["serve", "plan", "healthcheck"] {
+    for command in ["serve", "plan", "bench", "healthcheck"] {
         assert!(text.contains(command), "{text}");
     }
     let version = run(&["--version"], "");

@@ -2,6 +2,7 @@
 
 mod algorithms;
 mod api;
+mod bench;
 mod cli;
 mod crash;
 mod determinism;

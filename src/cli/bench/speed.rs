@@ -1,0 +1,296 @@
+//! `noctule bench speed`: routes priced in a second on one core.
+
+use std::f64::consts::TAU;
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::Common;
+use super::case::{self, Case};
+use super::clock::Stopwatch;
+use super::progress;
+use super::report::Report;
+use super::summary::median;
+use super::table::{Cell, Table};
+use super::trial::{self, Nobody};
+use crate::optimizer::{self, Fitness, Objective, Random, Settings};
+use crate::planner;
+use crate::scenario::Scenario;
+
+#[derive(Args)]
+pub(in crate::cli) struct Arguments {
+    #[command(flatten)]
+    pub(super) common: Common,
+    /// Processor time of each measurement, milliseconds
+    #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..=60_000))]
+    time_ms: u32,
+}
+
+/// Where the growth with waypoints, threats and population is measured.
+const GROUND: &str = "paper-2";
+
+const WAYPOINTS: [usize; 7] = [3, 5, 10, 20, 40, 80, 160];
+const POPULATIONS: [usize; 6] = [2, 8, 40, 200, 1000, 5000];
+const FAR_THREATS: [u32; 4] = [0, 10, 100, 1000];
+
+/// The size of a population where it is not what is varied.
+const POPULATION: usize = 200;
+/// Iterations that gather the positions which are then priced.
+const GATHERING: u32 = 50;
+/// A measurement is cut into so many; the fastest counts, for the others were disturbed.
+const SLICES: u32 = 5;
+/// Plans of each scenario, of which the median counts.
+const PLANS: u64 = 5;
+
+/// What is priced, in one row.
+struct Row {
+    label: Cell,
+    scenario: Scenario,
+    /// Positions in a batch.
+    batch: usize,
+}
+
+/// Measure all tables.
+pub(super) fn measure(arguments: &Arguments, cases: &[Case]) -> anyhow::Result<Report> {
+    let ground = case::cases(&[GROUND.into()])?;
+    let ground = &ground[0];
+    let planner =
+        |waypoints: usize| json!({"waypoints": waypoints, "population": POPULATION, "seed": 1});
+    let row = |label: Cell, scenario: anyhow::Result<Scenario>, batch: usize| {
+        scenario.map(|scenario| Row {
+            label,
+            scenario,
+            batch,
+        })
+    };
+    let by_scenario: Vec<Row> = cases
+        .iter()
+        .map(|case| row(Cell::text(&case.name), case.with(&planner(10)), POPULATION))
+        .collect::<Result<_, _>>()?;
+    let by_waypoints: Vec<Row> = WAYPOINTS
+        .iter()
+        .map(|&size| row(Cell::count(size), ground.with(&planner(size)), POPULATION))
+        .collect::<Result<_, _>>()?;
+    let by_threats: Vec<Row> = FAR_THREATS
+        .iter()
+        .map(|&count| {
+            let threats = (0..count).map(|idx| far_threat(idx, count)).collect();
+            let scenario = ground.with_threats(&planner(10), threats);
+            row(Cell::Number(f64::from(count), 0), scenario, POPULATION)
+        })
+        .collect::<Result<_, _>>()?;
+    let by_population: Vec<Row> = POPULATIONS
+        .iter()
+        .map(|&size| row(Cell::count(size), ground.with(&planner(10)), size))
+        .collect::<Result<_, _>>()?;
+
+    let tables: [(&'static str, &str, &str, &'static str, Vec<Row>); 4] = [
+        (
+            "scenarios",
+            "Scenarios",
+            "N = 10, population 200.",
+            "scenario",
+            by_scenario,
+        ),
+        (
+            "waypoints",
+            "Growth with waypoints",
+            "paper-2, population 200.",
+            "N",
+            by_waypoints,
+        ),
+        (
+            "threats",
+            "Growth with far threats",
+            "paper-2, N = 10, population 200, and so many threats more whose soft zones no sensible route comes near.",
+            "far threats",
+            by_threats,
+        ),
+        (
+            "population",
+            "Growth with the population",
+            "paper-2, N = 10; a population is priced in one batch.",
+            "population",
+            by_population,
+        ),
+    ];
+    let steps = tables.iter().map(|(.., rows)| rows.len()).sum::<usize>() + cases.len();
+    let bar = progress::bar(steps);
+    let mut done = Vec::new();
+    for (name, title, note, column, rows) in tables {
+        let mut measured = Vec::new();
+        for row in rows {
+            bar.set_message(title.to_owned());
+            let rates = rates(&row.scenario, row.batch, arguments.time_ms);
+            measured.push((row.label, rates));
+            bar.inc(1);
+        }
+        done.push(rate_table(name, title, note, column, measured));
+    }
+    bar.set_message("Plans");
+    done.push(plan_table(cases, || bar.inc(1))?);
+    bar.finish_and_clear();
+    Ok(Report {
+        title: "Speed".to_owned(),
+        intro: format!(
+            "One core, processor time; each figure the best of {SLICES} slices of {} ms. An evaluation decodes a position of tms-sba and \
+             prices the route with every constraint. Scattered positions are drawn at random from the bounds; gathered ones are a \
+             population of {POPULATION} after {GATHERING} iterations, which is what a search prices most of the time.",
+            arguments.time_ms / SLICES
+        ),
+        tables: done,
+        raw: Vec::new(),
+        drawings: Vec::new(),
+    })
+}
+
+/// Evaluations a second.
+struct Rates {
+    scattered: f64,
+    gathered: f64,
+}
+
+fn rates(scenario: &Scenario, batch: usize, time_ms: u32) -> Rates {
+    let mut objective = planner::objective(scenario, &Nobody);
+    let dimension = objective.bounds().dimension();
+    let mut positions = vec![0.0; batch * dimension];
+    let mut random = Random::new(scenario.planner.seed);
+    for position in positions.chunks_exact_mut(dimension) {
+        objective.draw(&mut random, position);
+    }
+    let scattered = rate(&mut objective, &positions, batch, time_ms);
+
+    let algorithm = optimizer::by_name(&scenario.planner.algorithm)
+        .expect("the reader accepts only names in the table");
+    let settings = Settings {
+        population: POPULATION,
+        seed: scenario.planner.seed,
+        parameters: algorithm.parameters_with(|_| None),
+    };
+    let mut search = (algorithm.start)(&settings, &mut objective);
+    for step in 1..=GATHERING {
+        search.iterate(&mut objective, f64::from(step) / f64::from(GATHERING));
+    }
+    let members = (0..search.swarm().len()).cycle().take(batch);
+    let positions: Vec<f64> = members
+        .flat_map(|idx| search.swarm().position(idx).to_vec())
+        .collect();
+    Rates {
+        scattered,
+        gathered: rate(&mut objective, &positions, batch, time_ms),
+    }
+}
+
+fn rate(objective: &mut impl Objective, positions: &[f64], batch: usize, time_ms: u32) -> f64 {
+    let mut fitness = vec![Fitness::WORST; batch];
+    let slice_s = f64::from(time_ms) * 1e-3 / f64::from(SLICES);
+    let mut best = 0.0;
+    for _ in 0..SLICES {
+        let watch = Stopwatch::start();
+        let mut priced = 0.0;
+        let seconds = loop {
+            objective.evaluate(positions, &mut fitness);
+            std::hint::black_box(&fitness);
+            priced += batch as f64;
+            let seconds = watch.seconds();
+            if seconds >= slice_s {
+                break seconds;
+            }
+        };
+        best = f64::max(best, priced / seconds);
+    }
+    best
+}
+
+/// Number `idx` of `count`, on a spiral round the area, from half a kilometre off its edge outwards.
+fn far_threat(idx: u32, count: u32) -> Value {
+    let share = f64::from(idx) / f64::from(count);
+    // Neighbours stand 137.5 degrees apart, so that no direction is left out.
+    let angle = TAU * 0.381_966 * f64::from(idx);
+    let distance = 1200.0 + 8800.0 * share.sqrt();
+    json!({
+        "kind": "cylinder",
+        "center": {"x": 500.0 + distance * libm::cos(angle), "y": 500.0 + distance * libm::sin(angle)},
+        "radius": 30,
+        "influence": 60,
+    })
+}
+
+fn rate_table(
+    name: &'static str,
+    title: &str,
+    note: &str,
+    column: &'static str,
+    measured: Vec<(Cell, Rates)>,
+) -> Table {
+    let first = measured.first().map_or(1.0, |(_, rates)| rates.gathered);
+    let row = |(label, rates): (Cell, Rates)| {
+        vec![
+            label,
+            Cell::Number(rates.scattered, 0),
+            Cell::Number(rates.gathered, 0),
+            Cell::Number(1e6 / rates.gathered, 3),
+            Cell::Number(first / rates.gathered, 2),
+        ]
+    };
+    Table {
+        name,
+        title: title.to_owned(),
+        note: note.to_owned(),
+        columns: vec![
+            column,
+            "evaluations/s, scattered",
+            "evaluations/s, gathered",
+            "us each",
+            "times the first row",
+        ],
+        rows: measured.into_iter().map(row).collect(),
+    }
+}
+
+/// Whole plans with the planner's default settings.
+fn plan_table(cases: &[Case], step: impl Fn()) -> anyhow::Result<Table> {
+    let mut rows = Vec::new();
+    for case in cases {
+        let mut times = Vec::new();
+        let mut evaluations = 0.0;
+        for seed in 1..=PLANS {
+            let trial = trial::run(&case.with(&json!({"seed": seed}))?);
+            times.push(trial.cpu_ms);
+            evaluations += trial.evaluations as f64;
+        }
+        let seconds = times.iter().sum::<f64>() * 1e-3;
+        rows.push(vec![
+            Cell::text(&case.name),
+            Cell::number(median(times), 1),
+            Cell::Number(evaluations / PLANS as f64, 0),
+            Cell::Number(evaluations / seconds, 0),
+        ]);
+        step();
+    }
+    Ok(Table {
+        name: "plans",
+        title: "Whole plans".to_owned(),
+        note: format!(
+            "The planner's default settings, N = 10, seeds 1 to {PLANS}; search, smoothing and certificate."
+        ),
+        columns: vec!["scenario", "CPU ms, median", "evaluations", "evaluations/s"],
+        rows,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn far_threats_keep_away_from_the_area() {
+        for idx in 0..1000 {
+            let threat = far_threat(idx, 1000);
+            let offset = |axis: &str| threat["center"][axis].as_f64().expect("a number") - 500.0;
+            let distance = (offset("x") * offset("x") + offset("y") * offset("y")).sqrt();
+            // A corner of the area is 707.1 from its middle.
+            assert!(distance > 1199.9, "{threat}");
+        }
+    }
+}

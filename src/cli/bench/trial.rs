@@ -1,0 +1,81 @@
+//! One run of the planner, and what is kept of it.
+
+use std::cmp::Ordering;
+
+use super::clock::Stopwatch;
+use crate::optimizer::Fitness;
+use crate::planner::{self, ConvergencePoint, Incumbent, Observer, Stop};
+use crate::scenario::Scenario;
+
+/// What is kept of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Trial {
+    pub(super) seed: u64,
+    pub(super) feasible: bool,
+    /// Total violation and cost, for ranking.
+    pub(super) fitness: Fitness,
+    /// The proven gap; none without a feasible route.
+    pub(super) gap: Option<f64>,
+    pub(super) evaluations: u64,
+    /// Processor time, milliseconds; smoothing and certificate included.
+    pub(super) cpu_ms: f64,
+    /// Cost of the best feasible route after each iteration, the first evaluation included.
+    pub(super) curve: Vec<Option<f64>>,
+}
+
+impl Trial {
+    /// Its cost; none without a feasible route.
+    pub(super) fn cost(&self) -> Option<f64> {
+        self.feasible.then_some(self.fitness.cost)
+    }
+
+    /// Deb's rule; better is less.
+    pub(super) fn rank(&self, other: &Self) -> Ordering {
+        self.fitness.rank(&other.fitness)
+    }
+}
+
+/// Plan `scenario`.
+pub(super) fn run(scenario: &Scenario) -> Trial {
+    let watch = Stopwatch::start();
+    let outcome = planner::plan(scenario, &mut Nobody, &Nobody);
+    let cpu_ms = watch.seconds() * 1e3;
+    let violation = outcome
+        .violations
+        .iter()
+        .map(|violation| violation.amount)
+        .sum();
+    Trial {
+        seed: scenario.planner.seed,
+        feasible: outcome.feasible,
+        fitness: Fitness {
+            violation,
+            cost: outcome.cost.total,
+        },
+        gap: outcome.bound.gap,
+        evaluations: outcome.evaluations,
+        cpu_ms,
+        curve: outcome
+            .convergence
+            .iter()
+            .map(|point| point.best_cost)
+            .collect(),
+    }
+}
+
+/// Nobody looks on, and nobody stops the run.
+pub(super) struct Nobody;
+
+impl Observer for Nobody {
+    fn iteration(&mut self, _: &ConvergencePoint) {}
+    fn incumbent(&mut self, _: &Incumbent) {}
+}
+
+impl Stop for Nobody {
+    fn requested(&self) -> bool {
+        false
+    }
+    fn elapsed_ms(&self) -> f64 {
+        0.0
+    }
+}

@@ -1,0 +1,287 @@
+//! `noctule bench`: what it writes, and that everything but times is the same each time.
+
+use std::fs;
+use std::path::Path;
+
+use crate::support::process::run;
+use crate::support::scenario;
+
+/// The rows of a CSV file, by its columns.
+fn rows(file: &Path) -> (Vec<String>, Vec<Vec<String>>) {
+    let text = fs::read_to_string(file).expect("written");
+    let mut lines = text.lines().map(fields);
+    let columns = lines.next().expect("a line of columns");
+    let rows: Vec<Vec<String>> = lines.collect();
+    for row in &rows {
+        assert_eq!(row.len(), columns.len(), "{row:?} in {}", file.display());
+    }
+    (columns, rows)
+}
+
+/// The fields of a line, as RFC 4180 has them.
+fn fields(line: &str) -> Vec<String> {
+    let mut fields = vec![String::new()];
+    let mut quoted = false;
+    for character in line.chars() {
+        let last = fields.last_mut().expect("there is one");
+        match character {
+            '"' => quoted = !quoted,
+            ',' if !quoted => fields.push(String::new()),
+            other => last.push(other),
+        }
+    }
+    assert!(!quoted, "{line}");
+    fields
+}
+
+/// One column, by its name.
+fn column(file: &Path, name: &str) -> Vec<String> {
+    let (columns, rows) = rows(file);
+    let idx = columns.iter().position(|column| column == name);
+    let idx = idx.unwrap_or_else(|| panic!("no column {name} in {columns:?}"));
+    rows.into_iter()
+        .map(|mut row| row.swap_remove(idx))
+        .collect()
+}
+
+/// All but times.
+fn essence(file: &Path) -> Vec<Vec<String>> {
+    let (columns, rows) = rows(file);
+    rows.into_iter()
+        .map(|row| {
+            let kept = row
+                .into_iter()
+                .zip(&columns)
+                .filter(|(_, column)| !column.contains("CPU"));
+            kept.map(|(field, _)| field).collect()
+        })
+        .collect()
+}
+
+fn numbers(column: &[String]) -> Vec<f64> {
+    column
+        .iter()
+        .map(|field| field.parse().unwrap_or_else(|_| panic!("{field:?}")))
+        .collect()
+}
+
+#[test]
+fn the_paper_is_repeated() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let own = directory.path().join("two-radars.json");
+    fs::write(&own, scenario().to_string()).expect("written");
+    let measure = |out: &Path| {
+        let arguments = [
+            "bench",
+            "paper",
+            "--seeds",
+            "3",
+            "--population",
+            "8",
+            "--iterations",
+            "8",
+            "--waypoints",
+            "4",
+            "--out",
+            out.to_str().expect("UTF-8"),
+            "--scenario",
+            "paper-1",
+            own.to_str().expect("UTF-8"),
+        ];
+        let done = run(&arguments, "");
+        assert_eq!(done.status.code(), Some(0), "{done:?}");
+        assert!(done.stdout.is_empty() && done.stderr.is_empty(), "{done:?}");
+    };
+    let (first, second) = (directory.path().join("1"), directory.path().join("2"));
+    measure(&first);
+    measure(&second);
+
+    let page = fs::read_to_string(first.join("paper.md")).expect("written");
+    let tables = [
+        "algorithms",
+        "iterations",
+        "population",
+        "waypoints",
+        "ablation",
+    ];
+    for (table, sizes) in tables.into_iter().zip([1, 4, 4, 4, 1]) {
+        let file = format!("paper-{table}.csv");
+        let algorithms = column(&first.join(&file), "algorithm");
+        // Six algorithms, or the reference with its five variants, in two scenarios.
+        assert_eq!(algorithms.len(), 2 * 6 * sizes, "{file}");
+        assert_eq!(essence(&first.join(&file)), essence(&second.join(&file)));
+        let wins = column(&first.join(&file), "wins");
+        for (algorithm, wins) in algorithms.iter().zip(&wins) {
+            assert_eq!(
+                algorithm == "tms-sba",
+                wins.is_empty(),
+                "{algorithm} {wins}"
+            );
+        }
+        for p in column(&first.join(&file), "p")
+            .iter()
+            .filter(|p| !p.is_empty())
+        {
+            let p: f64 = p.parse().expect("a number");
+            assert!((0.0..=1.0).contains(&p), "{p}");
+        }
+    }
+    assert_eq!(page.matches("\n## ").count(), 5);
+    assert_eq!(
+        essence(&first.join("paper-runs.csv")),
+        essence(&second.join("paper-runs.csv"))
+    );
+
+    // The figures of a table are those of the runs.
+    let runs = first.join("paper-runs.csv");
+    let (_, all) = rows(&runs);
+    let costs: Vec<f64> = all
+        .iter()
+        .filter(|row| row[..5] == ["paper-1", "spso", "4", "8", "8"] && row[6] == "true")
+        .map(|row| row[7].parse().expect("a cost"))
+        .collect();
+    let means = column(&first.join("paper-algorithms.csv"), "mean");
+    let position = column(&first.join("paper-algorithms.csv"), "algorithm")
+        .iter()
+        .position(|algorithm| algorithm == "spso");
+    let mean = &means[position.expect("a row")];
+    if costs.is_empty() {
+        assert_eq!(mean, "");
+    } else {
+        let expected = costs.iter().sum::<f64>() / costs.len() as f64;
+        assert!((mean.parse::<f64>().expect("a mean") - expected).abs() < 1e-9);
+    }
+
+    for name in ["paper-1", "two-radars"] {
+        let file = format!("paper-{name}.svg");
+        assert!(page.contains(&format!("]({file})")), "{page}");
+        let svg = fs::read_to_string(first.join(file)).expect("written");
+        let tree = roxmltree::Document::parse(&svg).expect("well-formed");
+        let curves = tree
+            .descendants()
+            .filter(|node| node.has_tag_name("polyline"));
+        assert_eq!(curves.count(), 6);
+    }
+}
+
+#[test]
+fn quality_is_measured_against_the_best_known() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let arguments = [
+        "bench",
+        "quality",
+        "--seeds",
+        "2",
+        "--population",
+        "40",
+        "--iterations",
+        "30",
+        "--waypoints",
+        "3,10",
+        "--scenario",
+        "paper-1",
+    ];
+    let out = directory.path().to_str().expect("UTF-8");
+    let done = run(&[&arguments[..], &["--out", out]].concat(), "");
+    assert_eq!(done.status.code(), Some(0), "{done:?}");
+    let file = directory.path().join("quality-gaps.csv");
+    assert_eq!(column(&file, "N"), ["3", "10"]);
+    assert_eq!(column(&file, "*"), ["*", ""]);
+    assert_eq!(column(&file, "reference")[1], "489.4413");
+    let best = numbers(&column(&file, "best"));
+    let gaps = numbers(&column(&file, "worst gap %"));
+    assert!(best[1] > 489.0 && gaps[1] >= (best[1] / 489.4413 - 1.0) * 100.0 - 1e-9);
+    for (mean, worst) in numbers(&column(&file, "mean gap %")).iter().zip(&gaps) {
+        assert!((0.0..=*worst).contains(mean), "{mean} {worst}");
+    }
+    assert!(
+        numbers(&column(&file, "proven gap %, mean"))
+            .iter()
+            .all(|gap| *gap > 0.0)
+    );
+    assert_eq!(
+        column(&directory.path().join("quality-runs.csv"), "seed").len(),
+        4
+    );
+
+    let printed = run(&arguments, "");
+    assert_eq!(printed.status.code(), Some(0), "{printed:?}");
+    let page = String::from_utf8(printed.stdout).expect("UTF-8");
+    assert!(
+        page.starts_with("# Quality with default settings\n"),
+        "{page}"
+    );
+    assert!(
+        page.contains("a population of 40") && page.contains("| paper-1 | 10 |"),
+        "{page}"
+    );
+}
+
+#[test]
+fn speed_has_its_tables() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let out = directory.path().to_str().expect("UTF-8");
+    let done = run(
+        &[
+            "bench",
+            "speed",
+            "--time-ms",
+            "5",
+            "--scenario",
+            "paper-1",
+            "--out",
+            out,
+        ],
+        "",
+    );
+    assert_eq!(done.status.code(), Some(0), "{done:?}");
+    for (table, key, expected) in [
+        ("scenarios", "scenario", &["paper-1"][..]),
+        ("waypoints", "N", &["3", "5", "10", "20", "40", "80", "160"]),
+        ("threats", "far threats", &["0", "10", "100", "1000"]),
+        (
+            "population",
+            "population",
+            &["2", "8", "40", "200", "1000", "5000"],
+        ),
+    ] {
+        let file = directory.path().join(format!("speed-{table}.csv"));
+        assert_eq!(column(&file, key), expected);
+        for rate in numbers(&column(&file, "evaluations/s, gathered")) {
+            assert!(rate > 100.0, "{rate} in {table}");
+        }
+    }
+    let plans = directory.path().join("speed-plans.csv");
+    assert!(numbers(&column(&plans, "CPU ms, median"))[0] > 0.0);
+}
+
+#[test]
+fn faults_of_a_scenario_are_told() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let file = directory.path().join("wrong.json");
+    let mut wrong = scenario();
+    wrong["threats"][0]["radius"] = serde_json::json!(-3);
+    fs::write(&file, wrong.to_string()).expect("written");
+    let file = file.to_str().expect("UTF-8");
+    let refused = run(&["bench", "quality", "--scenario", file], "");
+    assert_eq!(refused.status.code(), Some(2));
+    let faults = String::from_utf8(refused.stderr).expect("UTF-8");
+    assert!(faults.contains("/threats/0/radius"), "{faults}");
+
+    for arguments in [
+        &["bench"][..],
+        &["bench", "paper", "--seeds", "0"],
+        &["bench", "paper", "--scenario", "/nowhere/scenario.json"],
+        &["bench", "speed", "--time-ms", "never"],
+    ] {
+        let failed = run(arguments, "");
+        assert_eq!(failed.status.code(), Some(1), "{arguments:?}");
+        assert!(!failed.stderr.is_empty() && failed.stdout.is_empty());
+    }
+    // A size that no planner takes is a fault of the document it makes.
+    let refused = run(
+        &["bench", "quality", "--seeds", "1", "--waypoints", "0"],
+        "",
+    );
+    assert_eq!(refused.status.code(), Some(2));
+}

@@ -19,11 +19,14 @@ pub(super) struct Log<'o> {
     told: Option<Vec<Point3>>,
     /// Routes priced so far.
     pub(super) evaluations: u64,
+    /// Proven: no route costs less.
+    pub(super) lower: f64,
 }
 
 impl<'o> Log<'o> {
     pub(super) fn new(
         model: &'o Model<'o>,
+        lower: f64,
         observer: &'o mut dyn Observer,
         stop: &'o dyn Stop,
     ) -> Self {
@@ -36,7 +39,14 @@ impl<'o> Log<'o> {
             best: Fitness::WORST,
             told: None,
             evaluations: 0,
+            lower,
         }
+    }
+
+    /// Whether the best so far is proven to be as near to the optimum as was asked for.
+    pub(super) fn has_converged(&self) -> bool {
+        let gap = self.model.scenario.planner.gap;
+        gap > 0.0 && self.best.is_feasible() && self.best.cost <= self.lower * (1.0 + gap)
     }
 
     /// Keep `route` if it is the best so far; whether it is.

@@ -73,7 +73,8 @@ pub fn algorithm_rules() -> Vec<AlgorithmRule> {
 /// When the scenario names an algorithm that is not in the table; its reader refuses those.
 pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -> Outcome {
     let model = Model::new(scenario);
-    let mut log = Log::new(&model, observer, stop);
+    let lower = seeding::lower_bound(scenario);
+    let mut log = Log::new(&model, lower, observer, stop);
     let stop_reason = match starts::routes(&model, stop) {
         None => search::plain(&model, &mut log),
         Some(starts) => search::guided(&model, starts, &mut log),
@@ -114,7 +115,7 @@ fn why_stop(scenario: &Scenario, stop: &dyn Stop) -> Option<StopReason> {
 
 /// Price, smooth and certify the best route.
 fn deliver(model: &Model, log: Log, stop_reason: StopReason) -> Outcome {
-    let (mut convergence, route) = (log.convergence, log.route);
+    let (mut convergence, route, lower) = (log.convergence, log.route, log.lower);
     let evaluations = convergence.last().map_or(0, |last| last.evaluations);
     let quadrature = model.scenario.planner.quadrature;
     let cost = model.figures(&route, quadrature);
@@ -126,7 +127,6 @@ fn deliver(model: &Model, log: Log, stop_reason: StopReason) -> Outcome {
         last.best_violation = 0.0;
     }
     let path = feasible.then(|| smoothing::smooth(model, &route)).flatten();
-    let lower = seeding::lower_bound(model.scenario);
     Outcome {
         feasible,
         stop_reason,

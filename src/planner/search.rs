@@ -13,7 +13,16 @@ use crate::optimizer::{self, Algorithm, Fitness, Optimizer, Settings};
 const COARSE_SHARE: f64 = 0.4;
 
 /// Routes that go on from one stage of a guided search to the next.
-const ELITES: usize = 4;
+const ELITES: usize = 3;
+
+/// A route that goes on costs at most this share more than the best.
+const PROMISING: f64 = 0.03;
+
+/// Greatest and least step of the polish between the stages, as shares of the way.
+const COARSE_STEPS: (f64, f64) = (0.02, 1e-3);
+
+/// Of the polish at the end.
+const LAST_STEPS: (f64, f64) = (0.01, 5e-5);
 
 /// The algorithm alone, from random routes: the paper's.
 pub(super) fn plain(model: &Model, log: &mut Log) -> StopReason {
@@ -21,68 +30,84 @@ pub(super) fn plain(model: &Model, log: &mut Log) -> StopReason {
     let scenario = model.scenario;
     let iterations = 0..=scenario.planner.iterations;
     let (_, reason) = run(model, &mut routes, iterations, log);
-    polish(model, vec![log.route.clone()], log);
+    finish(model, reason, log);
     reason
 }
 
 /// From `starts`, best first: bats about coarse routes, then about whole ones, then polish.
 pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason {
     let settings = &model.scenario.planner;
-    let coarse = starts.routes[0].len() - 2;
     log.evaluations += starts.evaluations;
+    let coarse = starts.routes[0].len() - 2;
     let turning = if coarse < settings.waypoints {
-        (settings.iterations as f64 * COARSE_SHARE).floor() as usize
+        share_of(settings.iterations, COARSE_SHARE)
     } else {
         0
     };
+    let whole = |routes: Vec<Vec<Point3>>, log: &mut Log| -> Vec<Vec<Point3>> {
+        let whole = |route| starts::with_waypoints(model, route, settings.waypoints);
+        let routes: Vec<_> = routes.into_iter().map(whole).collect();
+        for route in &routes {
+            log.offer_unpriced(route);
+        }
+        routes
+    };
     let mut elites = starts.routes;
     let mut reason = StopReason::Iterations;
-    let mut first = 0;
     if turning > 0 {
         let mut routes = Routes::guided(model, log.stop, elites);
         let (search, why) = run(model, &mut routes, 0..=turning, log);
         elites = distinct(model, &routes, search.as_ref());
         reason = why;
-        first = turning + 1;
-    }
-    if settings.polish {
-        for route in &mut elites {
-            let mut polish = Polish::new(model, log.stop);
-            polish.descend(route, 0.03, 1e-3);
-            log.evaluations += polish.evaluations(coarse);
+        if reason == StopReason::Iterations {
+            for route in &mut elites {
+                polish(model, route, COARSE_STEPS, log);
+            }
         }
     }
-    let mut elites: Vec<Vec<Point3>> = elites
-        .into_iter()
-        .map(|route| starts::with_waypoints(model, route, settings.waypoints))
-        .collect();
-    for route in &elites {
-        log.offer_unpriced(route);
-    }
+    let elites = whole(elites, log);
     if reason == StopReason::Iterations {
         let mut routes = Routes::guided(model, log.stop, elites);
-        let (search, why) = run(model, &mut routes, first..=settings.iterations, log);
-        elites = distinct(model, &routes, search.as_ref());
-        reason = why;
+        let first = if turning > 0 { turning + 1 } else { 0 };
+        (_, reason) = run(model, &mut routes, first..=settings.iterations, log);
     }
-    elites.truncate(2);
-    elites.push(log.route.clone());
-    polish(model, elites, log);
+    finish(model, reason, log);
     reason
 }
 
-/// The best of `routes` made better, as the last point of the curve.
-fn polish(model: &Model, routes: Vec<Vec<Point3>>, log: &mut Log) {
-    if !model.scenario.planner.polish {
-        return;
+/// Polish the best route, as the last point of the curve, unless it is good enough already.
+fn finish(model: &Model, reason: StopReason, log: &mut Log) {
+    if model.scenario.planner.polish && reason != StopReason::Converged {
+        let mut route = log.route.clone();
+        if let Some(fitness) = polish(model, &mut route, LAST_STEPS, log) {
+            log.offer(&route, fitness);
+        }
+        log.last_point();
     }
-    for mut route in routes {
+}
+
+/// Improve `route` by steps between two shares of the way, if the scenario asks for polish.
+fn polish(
+    model: &Model,
+    route: &mut Vec<Point3>,
+    (from, to): (f64, f64),
+    log: &mut Log,
+) -> Option<Fitness> {
+    model.scenario.planner.polish.then(|| {
         let mut polish = Polish::new(model, log.stop);
-        let fitness = polish.descend(&mut route, 0.005, 5e-5);
-        log.evaluations += polish.evaluations(model.scenario.planner.waypoints);
-        log.offer(&route, fitness);
-    }
-    log.last_point();
+        let fitness = polish.descend(route, from, to);
+        log.evaluations += polish.evaluations(route.len() - 2);
+        fitness
+    })
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a share below 1 of a count"
+)]
+fn share_of(count: usize, share: f64) -> usize {
+    (count as f64 * share) as usize
 }
 
 /// Start the algorithm and do `iterations`; where the range begins with 0, the first evaluation is
@@ -123,6 +148,9 @@ fn run(
     }
     let count = last + 1 - first.max(1);
     for iteration in first.max(1)..=last {
+        if log.has_converged() {
+            return (search, StopReason::Converged);
+        }
         if let Some(reason) = why_stop(model.scenario, log.stop) {
             return (search, reason);
         }
@@ -151,9 +179,16 @@ fn search_settings(model: &Model, algorithm: &Algorithm) -> Settings {
 /// The best few routes of the swarm that are not all but the same.
 fn distinct(model: &Model, routes: &Routes, search: &dyn Optimizer) -> Vec<Vec<Point3>> {
     let swarm = search.swarm();
+    let best = swarm.best_fitness();
+    let promising = |fitness: &Fitness| {
+        fitness.violation <= best.violation && fitness.cost <= best.cost * (1.0 + PROMISING)
+    };
     let ranking = swarm.ranking();
+    let members = ranking
+        .iter()
+        .filter(|&&idx| promising(&swarm.fitness()[idx]))
+        .map(|&idx| swarm.position(idx));
     let mut chosen: Vec<Vec<Point3>> = Vec::new();
-    let members = ranking.iter().map(|&idx| swarm.position(idx));
     for position in std::iter::once(swarm.best_position()).chain(members) {
         let mut route = Vec::new();
         routes.coding.decode(position, &mut route);

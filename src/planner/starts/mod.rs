@@ -30,6 +30,9 @@ const COARSE: usize = 4;
 /// A start this much dearer than the best, as a share, is not worth refining.
 const HOPELESS: f64 = 0.25;
 
+/// Greatest and least step by which a start is pulled into place, as shares of the way.
+const ROUGH_STEPS: (f64, f64) = (0.03, 0.01);
+
 /// Where a search starts.
 pub(super) struct Starts {
     /// Best first, all with as many waypoints.
@@ -95,7 +98,7 @@ fn refine(
         if fitness.violation <= best.violation && fitness.cost > best.cost * (1.0 + HOPELESS) {
             continue;
         }
-        *fitness = polish.descend(route, 0.03, 0.005);
+        *fitness = polish.descend(route, ROUGH_STEPS.0, ROUGH_STEPS.1);
         if fitness.beats(&best) {
             best = *fitness;
         }

@@ -13,10 +13,10 @@ use crate::optimizer::{self, Algorithm, Fitness, Optimizer, Settings};
 const COARSE_SHARE: f64 = 0.4;
 
 /// Routes that go on from one stage of a guided search to the next.
-const ELITES: usize = 3;
+const ELITES: usize = 4;
 
 /// A route that goes on costs at most this share more than the best.
-const PROMISING: f64 = 0.03;
+const PROMISING: f64 = 0.05;
 
 /// Greatest and least step of the polish between the stages, as shares of the way.
 const COARSE_STEPS: (f64, f64) = (0.02, 1e-3);

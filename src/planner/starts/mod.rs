@@ -22,7 +22,7 @@ use crate::threat::Threat;
 const STRINGS: usize = 5;
 
 /// Routes to start from at most.
-const STARTS: usize = 8;
+const STARTS: usize = 12;
 
 /// Free waypoints of a coarse route, unless its bends ask for more.
 const COARSE: usize = 4;
@@ -31,7 +31,7 @@ const COARSE: usize = 4;
 const HOPELESS: f64 = 0.25;
 
 /// Greatest and least step by which a start is pulled into place, as shares of the way.
-const ROUGH_STEPS: (f64, f64) = (0.03, 0.01);
+const ROUGH_STEPS: (f64, f64) = (0.03, 0.005);
 
 /// Where a search starts.
 pub(super) struct Starts {

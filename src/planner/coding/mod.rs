@@ -5,12 +5,14 @@
 
 mod cartesian;
 mod course;
+mod lanes;
 mod spherical;
 
 pub(super) use cartesian::Cartesian;
 pub(super) use course::Course;
 pub(super) use spherical::Spherical;
 
+use crate::cost::batch::{LANES, PointRow, Pricer};
 use crate::geometry::Point3;
 use crate::optimizer::{Bounds, Random};
 use crate::scenario::Scenario;
@@ -86,6 +88,31 @@ impl<'s> Coding<'s> {
         }
     }
 
+    /// As `decode`, of as many positions as there are lanes; within rounding the same.
+    pub(super) fn decode_lanes(
+        &self,
+        positions: [&[f64]; LANES],
+        pricer: &Pricer,
+        points: &mut Vec<PointRow>,
+    ) {
+        if let Self::Spherical(coding) = self {
+            coding.decode_lanes(positions, points);
+            let last = points.len() - 1;
+            return pricer.raise(&mut points[1..last]);
+        }
+        let mut route = Vec::new();
+        for (lane, position) in positions.into_iter().enumerate() {
+            self.decode(position, &mut route);
+            if lane == 0 {
+                points.clear();
+                points.extend(route.iter().copied().map(PointRow::splat));
+            }
+            for (row, point) in points.iter_mut().zip(&route) {
+                row.set(lane, *point);
+            }
+        }
+    }
+
     /// Write the position whose route is `route`, or is near to it, into `position`.
     pub(super) fn encode(&self, route: &[Point3], position: &mut [f64]) {
         match self {
@@ -99,6 +126,7 @@ impl<'s> Coding<'s> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cost::Model;
     use crate::optimizer;
     use crate::planner::tests::scenario;
     use proptest::prelude::*;
@@ -132,6 +160,20 @@ mod tests {
                 prop_assert_eq!(route.len(), waypoints + 2, "{}", name);
                 prop_assert_eq!(route[0], scenario.start);
                 prop_assert_eq!(route[waypoints + 1], scenario.target);
+                let pricer = Pricer::new(
+                    &Model::new(&scenario),
+                    scenario.planner.quadrature,
+                    Model::new(&scenario).tolerance,
+                );
+                let mut points = Vec::new();
+                coding.decode_lanes([&position; LANES], &pricer, &mut points);
+                prop_assert_eq!(points.len(), route.len());
+                for (row, point) in points.iter().zip(&route) {
+                    for lane in 0..LANES {
+                        let off = (row.get(lane) - point).norm();
+                        prop_assert!(off <= 1e-8, "{}: {}", name, off);
+                    }
+                }
                 for point in &route[1..=waypoints] {
                     let height = point.z - scenario.terrain.elevation(point.xy());
                     prop_assert!((-1e-9..=200.0 + 1e-9).contains(&height), "{}", name);

@@ -5,6 +5,8 @@
 //! nearby) it leaves to the scalar code, lane by lane. A lane's bits depend on its own route alone,
 //! not on its neighbours nor on the width of the processor.
 
+#[cfg(test)]
+mod equality;
 mod heights;
 mod index;
 mod leg;

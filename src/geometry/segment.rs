@@ -67,10 +67,16 @@ impl Segment {
         if distance.a < LEVEL * LEVEL {
             return (distance.c <= 0.0).then_some((0.0, 1.0));
         }
-        let [Some(t0), Some(t1)] = distance.roots() else {
-            return None;
+        let (t0, t1) = match distance.roots() {
+            [Some(t0), Some(t1)] => (t0.max(0.0), t1.min(1.0)),
+            // Of a leg that hardly moves, the square is lost beside the distance.
+            [Some(t), None] if distance.b > 0.0 => (0.0, t.min(1.0)),
+            [Some(t), None] => (t.max(0.0), 1.0),
+            _ => {
+                return (distance.a <= 1e-14 * distance.c.abs() && distance.c <= 0.0)
+                    .then_some((0.0, 1.0));
+            }
         };
-        let (t0, t1) = (t0.max(0.0), t1.min(1.0));
         (t0 <= t1).then_some((t0, t1))
     }
 
@@ -140,6 +146,21 @@ mod tests {
         assert_eq!(leg.within(Point2::new(5.0, 0.0), 2.5), Some((0.25, 0.75)));
         assert_eq!(leg.within(Point2::new(5.0, 3.0), 2.5), None);
         assert_eq!(leg.within(Point2::new(-2.0, 0.0), 1.0), None);
+        // Seven digits less than its distance from the middle, a leg is as good as vertical.
+        for far in [-1e-7, 1e-7] {
+            let hardly = segment([100.0, 0.0, 0.0], [100.0 + far, 0.0, 9.0]);
+            assert_eq!(
+                hardly.within(Point2::new(0.0, 0.0), 200.0),
+                Some((0.0, 1.0))
+            );
+            assert_eq!(hardly.within(Point2::new(0.0, 0.0), 50.0), None);
+            let across = segment([100.0, 0.0, 0.0], [100.0, far, 9.0]);
+            assert_eq!(
+                across.within(Point2::new(0.0, 0.0), 200.0),
+                Some((0.0, 1.0))
+            );
+            assert_eq!(across.within(Point2::new(0.0, 0.0), 50.0), None);
+        }
         let vertical = segment([1.0, 0.0, 0.0], [1.0, 0.0, 9.0]);
         assert_eq!(
             vertical.within(Point2::new(0.0, 0.0), 1.0),

@@ -2,9 +2,10 @@
 
 use super::coding::{Cartesian, Coding};
 use super::guide::Guide;
-use super::price::PRICED_FROM;
+use super::price::{PRICED_FROM, price};
 use super::{Stop, why_stop};
-use crate::cost::{Model, Tolerance};
+use crate::cost::Model;
+use crate::cost::batch::{LANES, PointRow, Pricer};
 use crate::geometry::Point3;
 use crate::optimizer::{Bounds, Fitness, Objective, Random};
 use crate::scenario::Scenario;
@@ -17,9 +18,9 @@ pub(super) struct Routes<'s> {
     /// Of a guided search.
     guide: Option<Guide<'s>>,
     pub(super) model: Model<'s>,
-    /// Half of what feasible means, so that a delivered route is feasible for others' rounding too.
-    tolerance: Tolerance,
+    pricer: Pricer<'s>,
     route: Vec<Point3>,
+    points: Vec<PointRow>,
     stop: &'s dyn Stop,
     /// Evaluations between two looks at the clock.
     stride: u64,
@@ -55,13 +56,16 @@ impl<'s> Routes<'s> {
         model: &Model<'s>,
         stop: &'s dyn Stop,
     ) -> Self {
+        let tolerance = model.tolerance.scaled(PRICED_FROM);
+        let quadrature = model.scenario.planner.quadrature;
         let stride = (STEPS_UNWATCHED / steps(model.scenario)).max(1) as u64;
         Self {
             coding,
             guide,
-            tolerance: model.tolerance.scaled(PRICED_FROM),
+            pricer: Pricer::new(model, quadrature, tolerance),
             model: model.clone(),
             route: Vec::new(),
+            points: Vec::new(),
             stop,
             stride,
             evaluations: 0,
@@ -69,18 +73,50 @@ impl<'s> Routes<'s> {
         }
     }
 
-    fn price(&self, route: &[Point3]) -> Fitness {
-        let mut violation = 0.0;
-        let quadrature = self.model.scenario.planner.quadrature;
-        let figures = self
-            .model
-            .assess(route, quadrature, self.tolerance, |breach| {
-                violation += breach.amount;
-            });
-        Fitness {
-            violation,
-            cost: figures.total,
+    /// Whether the next `count` routes may be priced; looks at the clock now and then.
+    fn may_go_on(&mut self, count: usize) -> bool {
+        let since = self.evaluations % self.stride;
+        // There is always one route to deliver.
+        let due = self.evaluations > 0 && (since == 0 || since + count as u64 > self.stride);
+        if due && !self.interrupted {
+            self.interrupted = why_stop(self.model.scenario, self.stop).is_some();
         }
+        !self.interrupted
+    }
+
+    /// Price the routes of up to [`LANES`] positions side by side. It depends on each position alone.
+    fn price_lanes(&self, positions: &[f64], points: &mut Vec<PointRow>, fitness: &mut [Fitness]) {
+        let dimension = self.coding.bounds().dimension();
+        // Spare lanes repeat the last position.
+        let own = |lane: usize| {
+            let from = lane.min(fitness.len() - 1) * dimension;
+            &positions[from..from + dimension]
+        };
+        let lanes = std::array::from_fn(own);
+        self.coding.decode_lanes(lanes, &self.pricer, points);
+        let price = self.pricer.routes(points);
+        for (lane, fitness) in fitness.iter_mut().enumerate() {
+            *fitness = Fitness {
+                violation: price.violation[lane],
+                cost: price.cost[lane],
+            };
+        }
+    }
+
+    /// As `price_lanes`, where a single route takes long: between two of them a run may end.
+    fn one_by_one(&mut self, positions: &[f64], fitness: &mut [Fitness]) {
+        let dimension = self.coding.bounds().dimension();
+        let mut route = std::mem::take(&mut self.route);
+        for (position, fitness) in positions.chunks_exact(dimension).zip(fitness) {
+            if self.may_go_on(1) {
+                self.coding.decode(position, &mut route);
+                *fitness = price(&self.model, &route);
+                self.evaluations += 1;
+            } else {
+                *fitness = Fitness::WORST;
+            }
+        }
+        self.route = route;
     }
 }
 
@@ -108,24 +144,21 @@ impl Objective for Routes<'_> {
 
     fn evaluate(&mut self, positions: &[f64], fitness: &mut [Fitness]) {
         let dimension = self.coding.bounds().dimension();
-        let mut route = std::mem::take(&mut self.route);
-        for (position, fitness) in positions.chunks_exact(dimension).zip(fitness) {
-            // There is always one route to deliver.
-            if self.evaluations > 0
-                && self.evaluations.is_multiple_of(self.stride)
-                && !self.interrupted
-            {
-                self.interrupted = why_stop(self.model.scenario, self.stop).is_some();
-            }
-            if self.interrupted {
-                *fitness = Fitness::WORST;
+        let blocks = positions.chunks(LANES * dimension);
+        let mut points = std::mem::take(&mut self.points);
+        for (positions, fitness) in blocks.zip(fitness.chunks_mut(LANES)) {
+            if self.stride < LANES as u64 {
+                self.one_by_one(positions, fitness);
                 continue;
             }
-            self.coding.decode(position, &mut route);
-            *fitness = self.price(&route);
-            self.evaluations += 1;
+            if self.may_go_on(fitness.len()) {
+                self.price_lanes(positions, &mut points, fitness);
+                self.evaluations += fitness.len() as u64;
+            } else {
+                fitness.fill(Fitness::WORST);
+            }
         }
-        self.route = route;
+        self.points = points;
     }
 }
 

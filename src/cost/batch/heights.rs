@@ -3,9 +3,9 @@
 
 use pulp::Simd;
 
-use super::Pricer;
 use super::leg::{Leg, Point};
 use super::peaks::{Massif, Panorama};
+use super::{PointRow, Pricer};
 use crate::cost::{Model, Tolerance};
 use crate::geometry::Point2;
 use crate::geometry::lane::{Lane, Mask};
@@ -142,6 +142,20 @@ impl Pricer<'_> {
                 });
             violation
         })
+    }
+
+    /// The elevation of the ground below each point of a part of `row`.
+    #[inline(always)]
+    pub(super) fn elevation<S: Simd>(&self, simd: S, part: usize, row: &PointRow) -> Lane<S> {
+        let point = Point::load(simd, row, part);
+        match &self.heights.surface {
+            Surface::Flat(elevation) => point.x.with(*elevation),
+            Surface::Peaks(massif) => massif.elevation(point),
+            Surface::Grid => point.x.map(|lane, _| {
+                let below = row.get(part * S::F64_LANES + lane).xy();
+                self.model.scenario.terrain.elevation(below)
+            }),
+        }
     }
 
     /// How far the end of each leg lies from the middle of the band, Eq. 6.

@@ -5,6 +5,8 @@
 //! nearby) it leaves to the scalar code, lane by lane. A lane's bits depend on its own route alone,
 //! not on its neighbours nor on the width of the processor.
 
+#[cfg(test)]
+mod equality;
 mod heights;
 mod index;
 mod leg;
@@ -21,6 +23,7 @@ use crate::geometry::Point3;
 use crate::geometry::lane::parts;
 use crate::scenario::Quadrature;
 use heights::Heights;
+use leg::Point;
 use route::Limits;
 use threats::Threats;
 
@@ -138,6 +141,34 @@ impl<'s> Pricer<'s> {
             b,
             prices,
         });
+    }
+
+    /// Raise points whose heights are above ground by the ground's elevation.
+    pub fn raise(&self, points: &mut [PointRow]) {
+        self.arch.dispatch(Raise {
+            pricer: self,
+            points,
+        });
+    }
+}
+
+struct Raise<'a, 's> {
+    pricer: &'a Pricer<'s>,
+    points: &'a mut [PointRow],
+}
+
+impl WithSimd for Raise<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        for point in self.points {
+            for part in 0..parts::<S>() {
+                let own = Point::load(simd, point, part);
+                let ground = self.pricer.elevation(simd, part, point);
+                (own.z + ground).store(&mut point.z, part);
+            }
+        }
     }
 }
 

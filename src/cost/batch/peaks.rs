@@ -113,6 +113,16 @@ impl Massif {
         }
     }
 
+    /// The elevation of the ground at `point`; the same as by `look`.
+    #[inline(always)]
+    pub(super) fn elevation<S: Simd>(&self, point: Point<S>) -> Lane<S> {
+        let mut ground = point.x.with(self.base);
+        for peak in &self.peaks {
+            ground = ground + peak.view(point).lift;
+        }
+        ground
+    }
+
     /// Look round from `point`, the end of a leg; the end before becomes its beginning.
     #[inline(always)]
     pub(super) fn look<S: Simd>(&self, point: Point<S>, panorama: &mut Panorama<S>) {
@@ -120,21 +130,9 @@ impl Massif {
         panorama.to.clear();
         let mut ground = point.x.with(self.base);
         for peak in &self.peaks {
-            let p = (point.x - peak.center.x) * peak.narrowness.x;
-            let q = (point.y - peak.center.y) * peak.narrowness.y;
-            let exponent = p * p + q * q;
-            let near = exponent.lt(exponent.with(NEGLIGIBLE));
-            let mut lift = exponent.with(0.0);
-            if near.any() {
-                lift = near.keep((-near.keep(exponent)).exp() * peak.height);
-                ground = ground + lift;
-            }
-            panorama.to.push(View {
-                p,
-                q,
-                exponent,
-                lift,
-            });
+            let view = peak.view(point);
+            ground = ground + view.lift;
+            panorama.to.push(view);
         }
         panorama.ground = [panorama.ground[1], ground];
     }
@@ -315,6 +313,25 @@ impl Massif {
 }
 
 impl Mountain {
+    #[inline(always)]
+    fn view<S: Simd>(&self, point: Point<S>) -> View<S> {
+        let p = (point.x - self.center.x) * self.narrowness.x;
+        let q = (point.y - self.center.y) * self.narrowness.y;
+        let exponent = p * p + q * q;
+        let near = exponent.lt(exponent.with(NEGLIGIBLE));
+        let lift = if near.any() {
+            near.keep((-near.keep(exponent)).exp() * self.height)
+        } else {
+            exponent.with(0.0)
+        };
+        View {
+            p,
+            q,
+            exponent,
+            lift,
+        }
+    }
+
     /// How far a leg lies from its chords for the sake of this peak, in steps whose squared length
     /// in spreads is `bend`, at most [`WIDEST_STEP`]: `highest` is the greatest of the samples'
     /// lifts, `farthest` no less than the greatest exponent.

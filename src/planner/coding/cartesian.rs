@@ -3,6 +3,7 @@
 //! A position holds N waypoints: x and y within the area, and the height above ground within the
 //! band. Nothing is assumed of how one waypoint lies to the next.
 
+use crate::cost::batch::{LANES, PointRow};
 use crate::geometry::{Point2, Point3};
 use crate::optimizer::Bounds;
 use crate::scenario::Scenario;
@@ -49,6 +50,25 @@ impl<'s> Cartesian<'s> {
             route.push(Point3::new(x, y, ground + height));
         }
         route.push(self.scenario.target);
+    }
+
+    /// As `decode`, of as many positions as there are lanes, but with free waypoints' heights above
+    /// ground.
+    pub(in crate::planner) fn decode_lanes(
+        &self,
+        positions: [&[f64]; LANES],
+        points: &mut Vec<PointRow>,
+    ) {
+        let waypoints = positions[0].len() / PER_WAYPOINT;
+        points.clear();
+        points.resize(waypoints + 2, PointRow::splat(self.scenario.start));
+        points[waypoints + 1] = PointRow::splat(self.scenario.target);
+        for (lane, position) in positions.into_iter().enumerate() {
+            let waypoints = position.chunks_exact(PER_WAYPOINT);
+            for (row, waypoint) in points[1..].iter_mut().zip(waypoints) {
+                row.set(lane, Point3::new(waypoint[0], waypoint[1], waypoint[2]));
+            }
+        }
     }
 
     /// Write the position of `route` into `position`; what the bounds do not hold is cut off.

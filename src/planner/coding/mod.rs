@@ -5,12 +5,14 @@
 
 mod cartesian;
 mod course;
+mod lanes;
 mod spherical;
 
 pub(super) use cartesian::Cartesian;
 pub(super) use course::Course;
 pub(super) use spherical::Spherical;
 
+use crate::cost::batch::{LANES, PointRow, Pricer};
 use crate::geometry::Point3;
 use crate::optimizer::Bounds;
 use crate::scenario::Scenario;
@@ -77,11 +79,41 @@ impl<'s> Coding<'s> {
             Self::Course(coding) => coding.decode(position, route),
         }
     }
+
+    /// As `decode`, of as many positions as there are lanes; within rounding the same.
+    pub(super) fn decode_lanes(
+        &self,
+        positions: [&[f64]; LANES],
+        pricer: &Pricer,
+        points: &mut Vec<PointRow>,
+    ) {
+        match self {
+            Self::Spherical(coding) => coding.decode_lanes(positions, points),
+            Self::Cartesian(coding) => coding.decode_lanes(positions, points),
+            Self::Course(coding) => {
+                let mut route = Vec::new();
+                points.resize(
+                    positions[0].len() / 3 + 2,
+                    PointRow::splat(Point3::origin()),
+                );
+                for (lane, position) in positions.into_iter().enumerate() {
+                    coding.decode(position, &mut route);
+                    for (row, point) in points.iter_mut().zip(&route) {
+                        row.set(lane, *point);
+                    }
+                }
+                return;
+            }
+        }
+        let last = points.len() - 1;
+        pricer.raise(&mut points[1..last]);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cost::Model;
     use crate::optimizer;
     use crate::planner::tests::scenario;
     use proptest::prelude::*;
@@ -115,6 +147,20 @@ mod tests {
                 prop_assert_eq!(route.len(), waypoints + 2, "{}", name);
                 prop_assert_eq!(route[0], scenario.start);
                 prop_assert_eq!(route[waypoints + 1], scenario.target);
+                let pricer = Pricer::new(
+                    &Model::new(&scenario),
+                    scenario.planner.quadrature,
+                    Model::new(&scenario).tolerance,
+                );
+                let mut points = Vec::new();
+                coding.decode_lanes([&position; LANES], &pricer, &mut points);
+                prop_assert_eq!(points.len(), route.len());
+                for (row, point) in points.iter().zip(&route) {
+                    for lane in 0..LANES {
+                        let off = (row.get(lane) - point).norm();
+                        prop_assert!(off <= 1e-8, "{}: {}", name, off);
+                    }
+                }
                 for point in &route[1..=waypoints] {
                     let height = point.z - scenario.terrain.elevation(point.xy());
                     prop_assert!((-1e-9..=200.0 + 1e-9).contains(&height), "{}", name);

@@ -8,6 +8,10 @@
 //! leads back to the middle of the band, where F3 is least, as steeply as the vehicle may. Measured
 //! from the level, one leg's climb would move all waypoints after it.
 
+use pulp::Arch;
+
+use super::lanes::Chains;
+use crate::cost::batch::{LANES, PointRow};
 use crate::geometry::{LEVEL, Point2, Point3};
 use crate::optimizer::Bounds;
 use crate::scenario::Scenario;
@@ -15,15 +19,17 @@ use crate::scenario::Scenario;
 /// The coding of routes of one scenario.
 #[derive(Debug, Clone)]
 pub(in crate::planner) struct Spherical<'s> {
-    scenario: &'s Scenario,
+    pub(super) scenario: &'s Scenario,
     /// Heading from start to target, radians.
     course: f64,
+    /// Its cosine and sine.
+    pub(super) toward: [f64; 2],
     /// Horizontal distance from start to target, metres.
-    distance: f64,
+    pub(super) distance: f64,
     /// Height of the start above ground.
-    start_height: f64,
+    pub(super) start_height: f64,
     /// Tangent of the steepest climb.
-    steepest: f64,
+    pub(super) steepest: f64,
     bounds: Bounds,
 }
 
@@ -44,9 +50,11 @@ impl<'s> Spherical<'s> {
         let level = std::f64::consts::FRAC_PI_2;
         let lower = [0.0, -max_turn, level - max_climb];
         let upper = [amplitude, max_turn, level + max_climb];
+        let course = libm::atan2(way.y, way.x);
         Self {
             scenario,
-            course: libm::atan2(way.y, way.x),
+            course,
+            toward: [libm::cos(course), libm::sin(course)],
             distance,
             start_height: scenario.start.z - scenario.terrain.elevation(scenario.start.xy()),
             steepest: libm::tan(max_climb),
@@ -102,6 +110,24 @@ impl<'s> Spherical<'s> {
             *point = Point3::new(x, y, ground + point.z);
         }
         route[last] = target;
+    }
+
+    /// As `decode`, of as many positions as there are lanes, but with free waypoints' heights above
+    /// ground; within rounding the same.
+    pub(in crate::planner) fn decode_lanes(
+        &self,
+        positions: [&[f64]; LANES],
+        points: &mut Vec<PointRow>,
+    ) {
+        let legs = positions[0].len() / PER_LEG;
+        points.clear();
+        points.resize(legs + 1, PointRow::splat(self.scenario.start));
+        Arch::new().dispatch(Chains {
+            coding: self,
+            positions,
+            points,
+        });
+        points[legs] = PointRow::splat(self.scenario.target);
     }
 }
 

@@ -1,0 +1,244 @@
+//! That lanes come to what the scalar code comes to, whatever the scenario and the routes, and to
+//! the same bits whatever the processor and the neighbours.
+
+use proptest::prelude::*;
+use pulp::Arch;
+
+use super::{LANES, PointRow, Price, Pricer};
+use crate::cost::{Constraint, Model};
+use crate::geometry::{Point2, Point3, Rect};
+use crate::scenario::json::{self, AlgorithmRule, Rules};
+use crate::scenario::limits::Limits;
+use crate::scenario::{Quadrature, Scenario};
+use crate::terrain::{Flat, Grid, Peak, Peaks, Terrain};
+use crate::threat::{Cylinder, Polygon, Shape, Threat};
+
+/// A choice after the other out of a case of proptest.
+struct Choices(std::vec::IntoIter<f64>);
+
+impl Choices {
+    fn share(&mut self) -> f64 {
+        self.0.next().expect("there are enough choices")
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + self.share() * (high - low)
+    }
+
+    fn one_in(&mut self, count: f64) -> bool {
+        self.share() * count < 1.0
+    }
+
+    fn place(&mut self) -> Point2 {
+        Point2::new(self.between(-50.0, 1050.0), self.between(-50.0, 1050.0))
+    }
+
+    fn terrain(&mut self) -> Terrain {
+        let kind = self.share();
+        if kind < 0.3 {
+            return Terrain::Flat(Flat {
+                elevation: self.between(-10.0, 10.0),
+            });
+        }
+        if kind < 0.7 {
+            let peaks = (0..6).map(|_| Peak {
+                center: self.place(),
+                height: self.between(-60.0, 250.0),
+                spread: Point2::new(self.between(20.0, 150.0), self.between(20.0, 150.0)),
+            });
+            return Terrain::Peaks(Peaks {
+                peaks: peaks.collect(),
+                base: 5.0,
+            });
+        }
+        let elevations = (0..144).map(|_| self.between(0.0, 80.0));
+        Terrain::Grid(Grid {
+            elevations: elevations.collect(),
+            origin: Point2::new(0.0, 0.0),
+            cell: 1000.0 / 11.0,
+            columns: 12,
+            rows: 12,
+        })
+    }
+
+    fn threat(&mut self, small: bool) -> Threat {
+        let center = self.place();
+        let size = if small { 0.2 } else { 1.0 };
+        let shape = if self.one_in(4.0) {
+            let corner = |angle: f64, away: f64| {
+                center + nalgebra::Vector2::new(libm::cos(angle), libm::sin(angle)) * away
+            };
+            let corners =
+                (0..5).map(|i| corner(1.2 * f64::from(i), size * self.between(20.0, 90.0)));
+            Shape::Polygon(Polygon::new(
+                corners.collect(),
+                size * self.between(0.0, 40.0),
+            ))
+        } else {
+            let radius = size * self.between(5.0, 80.0);
+            Shape::Cylinder(Cylinder {
+                center,
+                radius,
+                influence: radius + size * self.between(0.0, 50.0),
+            })
+        };
+        let limit =
+            |choices: &mut Self, low, high| choices.one_in(3.0).then(|| choices.between(low, high));
+        Threat {
+            name: None,
+            shape,
+            base: limit(self, 0.0, 80.0),
+            top: limit(self, 90.0, 200.0),
+        }
+    }
+
+    /// From the reader, for what does not matter here, and then at random.
+    fn scenario(&mut self) -> Scenario {
+        let rules = Rules {
+            limits: Limits::default(),
+            algorithms: vec![AlgorithmRule {
+                name: "any",
+                parameters: Vec::new(),
+            }],
+        };
+        let document =
+            br#"{"frame":"local","start":{"x":0,"y":0,"z":0},"target":{"x":9,"y":0,"z":0},
+            "altitude":{"min":0,"max":9},"area":{"min":{"x":0,"y":0},"max":{"x":1000,"y":1000}},"planner":{"algorithm":"any"}}"#;
+        let mut scenario = json::read(document, &rules, 1).expect("the document has no fault");
+        scenario.terrain = self.terrain();
+        let many = self.one_in(3.0);
+        let threats = (0..if many { 40 } else { 7 }).map(|_| self.threat(many));
+        scenario.threats = threats.collect();
+        scenario.altitude.min = if self.one_in(3.0) {
+            0.0
+        } else {
+            self.between(0.0, 60.0)
+        };
+        scenario.altitude.max = scenario.altitude.min + self.between(40.0, 250.0);
+        scenario.vehicle.max_turn_deg = if self.one_in(6.0) {
+            180.0
+        } else {
+            self.between(5.0, 120.0)
+        };
+        scenario.vehicle.max_climb_deg = self.between(5.0, 70.0);
+        scenario.vehicle.min_leg = self.between(0.0, 30.0);
+        scenario.area = Rect {
+            min: Point2::new(0.0, 0.0),
+            max: Point2::new(1000.0, 1000.0),
+        };
+        if self.one_in(2.0) {
+            scenario.planner.quadrature = Quadrature::Paper;
+        }
+        let end = |choices: &mut Self, scenario: &Scenario| {
+            let place = Point2::new(choices.between(0.0, 1000.0), choices.between(0.0, 1000.0));
+            let height = if choices.one_in(2.0) {
+                0.0
+            } else {
+                choices.between(0.0, 300.0)
+            };
+            place
+                .coords
+                .push(scenario.terrain.elevation(place) + height)
+                .into()
+        };
+        scenario.start = end(self, &scenario);
+        scenario.target = end(self, &scenario);
+        scenario
+    }
+
+    /// From start to target, mostly as one would fly.
+    fn route(&mut self, scenario: &Scenario) -> Vec<Point3> {
+        let spread =
+            [1.0, 30.0, 300.0][usize::from(self.one_in(2.0)) + usize::from(self.one_in(2.0))];
+        let mut route = vec![scenario.start];
+        for idx in 1..=6 {
+            let way = scenario.target - scenario.start;
+            let before = route[idx - 1];
+            let place = scenario.start + way * (idx as f64 / 7.0);
+            let shift = [self.between(-spread, spread), self.between(-spread, spread)];
+            let mut point = Point3::new(place.x + shift[0], place.y + shift[1], 0.0);
+            let band = scenario.altitude;
+            point.z = scenario.terrain.elevation(point.xy()) + self.between(band.min, band.max);
+            if self.one_in(12.0) {
+                // Straight up, a tiny step, or nearly none at all. Of steps between, both lose digits: the
+                // way past an axis is then a small difference of large numbers.
+                point = before;
+                point.z += [20.0, 0.0][usize::from(self.one_in(2.0))];
+                point.x += [0.01, 1e-10][usize::from(self.one_in(3.0))];
+            }
+            if self.one_in(20.0) {
+                point.z += self.between(-200.0, 200.0);
+            }
+            route.push(point);
+        }
+        route.push(scenario.target);
+        route
+    }
+}
+
+fn rows(routes: &[Vec<Point3>]) -> Vec<PointRow> {
+    let row = |idx: usize| {
+        let mut row = PointRow::splat(routes[0][idx]);
+        for (lane, route) in routes.iter().enumerate() {
+            row.set(lane, route[idx]);
+        }
+        row
+    };
+    (0..routes[0].len()).map(row).collect()
+}
+
+fn bits(price: &Price) -> [[u64; LANES]; 2] {
+    [
+        price.violation.map(f64::to_bits),
+        price.cost.map(f64::to_bits),
+    ]
+}
+
+fn close(value: f64, expected: f64) -> bool {
+    (value - expected).abs() <= 1e-9 * expected.max(1.0)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(512))]
+
+    #[test]
+    fn lanes_come_to_what_the_scalar_code_comes_to(
+        choices in prop::collection::vec(0.0..1.0f64, 1500),
+    ) {
+        let mut choices = Choices(choices.into_iter());
+        let scenario = choices.scenario();
+        let model = Model::new(&scenario);
+        let quadrature = scenario.planner.quadrature;
+        let tolerance = model.tolerance.scaled(0.5);
+        let pricer = Pricer::new(&model, quadrature, tolerance);
+        let scalar = Pricer { arch: Arch::Scalar, ..pricer.clone() };
+        let routes: Vec<_> = (0..LANES).map(|_| choices.route(&scenario)).collect();
+        let points = rows(&routes);
+        let together = pricer.routes(&points);
+        prop_assert_eq!(bits(&together), bits(&scalar.routes(&points)));
+        for (lane, route) in routes.iter().enumerate() {
+            let mut violation = 0.0;
+            let mut by_leg = vec![(0.0, 0.0); route.len() - 1];
+            let figures = model.assess(route, quadrature, tolerance, |breach| {
+                violation += breach.amount;
+                if !matches!(breach.constraint, Constraint::Turn | Constraint::Area) {
+                    by_leg[breach.index].0 += breach.amount;
+                }
+            });
+            prop_assert!(close(together.violation[lane], violation), "{} {violation}", together.violation[lane]);
+            prop_assert!(close(together.cost[lane], figures.total), "{} {figures:?}", together.cost[lane]);
+            // Its neighbours have no part in it.
+            let alone = pricer.routes(&rows(&vec![route.clone(); LANES]));
+            prop_assert_eq!(bits(&alone).map(|row| row[0]), bits(&together).map(|row| row[lane]));
+            for (leg_idx, ends) in route.windows(2).enumerate() {
+                by_leg[leg_idx].1 = model.figures(ends, quadrature).total;
+            }
+            let mut prices = vec![Price::ZERO; by_leg.len()];
+            pricer.legs(&points[..route.len() - 1], &points[1..], &mut prices);
+            for (price, (violation, cost)) in prices.iter().zip(by_leg) {
+                prop_assert!(close(price.violation[lane], violation), "{} {violation}", price.violation[lane]);
+                prop_assert!(close(price.cost[lane], cost), "{} {cost}", price.cost[lane]);
+            }
+        }
+    }
+}

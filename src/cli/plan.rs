@@ -17,9 +17,9 @@ use crate::export::document::{Origin, ResultDocument, Timing, scenario_sha256};
 use crate::export::{self, Format, ResultInput};
 use crate::job::draw_seed;
 use crate::planner::{self, ConvergencePoint, Incumbent, Observer, Outcome, Stop};
-use crate::scenario::Scenario;
-use crate::scenario::json::{self, Refusal, Rules};
+use crate::scenario::json::{self, Fault, Refusal, Rules};
 use crate::scenario::limits::Limits;
+use crate::scenario::{Scenario, WarmStart};
 
 #[derive(Args)]
 pub(super) struct Arguments {
@@ -52,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         limits: Limits::default(),
         algorithms: planner::algorithm_rules(),
     };
-    let scenario = match json::read(&text, &rules, draw_seed()) {
+    let scenario = match json::read(&text, &rules, draw_seed()).and_then(without_a_store) {
         Ok(scenario) => scenario,
         Err(refusal) => {
             report(&arguments.file, &refusal);
@@ -72,6 +72,17 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     } else {
         exit::INFEASIBLE
     })
+}
+
+/// No plans are kept here that a route could be taken from.
+fn without_a_store(scenario: Scenario) -> Result<Scenario, Refusal> {
+    match &scenario.planner.warm_start {
+        Some(WarmStart::Plan(id)) => {
+            let why = "only the service keeps plans: give waypoints in its place";
+            Err(Refusal::Invalid(vec![Fault::unknown_plan(id, why)]))
+        }
+        _ => Ok(scenario),
+    }
 }
 
 fn read(file: &Path) -> io::Result<Vec<u8>> {

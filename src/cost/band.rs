@@ -13,12 +13,12 @@ pub(super) struct TerminalZones {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct TerminalZone {
-    center: Point2,
+pub(super) struct TerminalZone {
+    pub(super) center: Point2,
     /// Horizontal, metres; 0 where the band needs no ramp.
-    radius: f64,
+    pub(super) radius: f64,
     /// Lowest height above ground in the zone.
-    floor: f64,
+    pub(super) floor: f64,
     /// Highest height above ground in the zone.
     ceiling: f64,
 }
@@ -54,6 +54,10 @@ impl TerminalZones {
         Self {
             zones: [zone(scenario.start), zone(scenario.target)],
         }
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = &TerminalZone> {
+        self.zones.iter()
     }
 
     /// Cut `leg` where it enters or leaves a zone, and pass each part on.

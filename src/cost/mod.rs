@@ -6,6 +6,7 @@
 
 mod altitude;
 mod band;
+pub mod batch;
 mod constraint;
 mod fuel;
 mod heading;
@@ -102,6 +103,44 @@ impl<'s> Model<'s> {
         }
     }
 
+    /// Price one leg by itself: its violation beyond `tolerance`, its fuel and its exposure. What
+    /// depends on more than its two ends, turns and waypoints, is not in it.
+    #[must_use]
+    pub fn leg(
+        &self,
+        a: Point3,
+        b: Point3,
+        quadrature: Quadrature,
+        tolerance: Tolerance,
+    ) -> (f64, f64) {
+        let leg = Segment { a, b };
+        let nearby = Nearby::to(&self.scenario.threats, &[a, b]);
+        let mut violation = 0.0;
+        let mut report = |breach: Breach| violation += breach.amount;
+        let exposure = self.threats(0, &leg, &nearby, quadrature, tolerance, &mut report);
+        self.heights(0, &leg, tolerance, &mut report);
+        self.manoeuvres(0, &leg, 0.0, tolerance, &mut report);
+        let weights = &self.scenario.weights;
+        let fuel = weights.fuel * fuel::fuel(&self.scenario.vehicle, leg.length());
+        (violation, fuel + weights.threat * exposure * threat::SHARE)
+    }
+
+    /// Price one free waypoint by itself: how far it lies outside the area, beyond `tolerance`, and
+    /// its altitude cost.
+    #[must_use]
+    pub fn waypoint(&self, point: Point3, tolerance: Tolerance) -> (f64, f64) {
+        let outside = self.scenario.area.excess(point.xy());
+        let violation = if outside > tolerance.length_m {
+            outside
+        } else {
+            0.0
+        };
+        (
+            violation,
+            self.scenario.weights.altitude * self.altitude(&[point]),
+        )
+    }
+
     /// The figures alone.
     #[must_use]
     pub fn figures(&self, route: &[Point3], quadrature: Quadrature) -> CostFigures {
@@ -163,11 +202,14 @@ mod tests {
                 time_limit_ms: None,
                 seeding: Seeding::Random,
                 polish: false,
+                warm_start: None,
                 smoothing: Smoothing {
                     degree: 3,
                     spacing: 5.0,
                 },
                 quadrature: Quadrature::Integral,
+                gap: 0.0,
+                threads: 1,
                 parameters: std::collections::BTreeMap::new(),
             },
         }

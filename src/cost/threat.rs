@@ -9,7 +9,7 @@ use crate::threat::Threat;
 pub(super) const SHARE: f64 = 0.2;
 
 /// Where Eq. 4 samples a leg. The paper lists four of the five points; all five are used.
-const SAMPLES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+pub(super) const SAMPLES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
 /// With so many threats or fewer, all are looked at.
 const FEW_THREATS: usize = 16;
@@ -87,7 +87,7 @@ impl Model<'_> {
 }
 
 /// The integral of Eq. 4 as printed: the mean of five samples times the leg's length.
-fn sampled_exposure(threat: &Threat, leg: &Segment) -> f64 {
+pub(super) fn sampled_exposure(threat: &Threat, leg: &Segment) -> f64 {
     let sum: f64 = SAMPLES.iter().map(|&t| threat.intensity(leg.at(t))).sum();
     sum / SAMPLES.len() as f64 * leg.length()
 }

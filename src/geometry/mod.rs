@@ -3,6 +3,7 @@
 //! Deliberately absent: anything that knows what a threat, a terrain or a vehicle is.
 
 pub mod bspline;
+pub mod lane;
 mod quadratic;
 mod rect;
 mod segment;
@@ -16,6 +17,9 @@ pub type Point2 = nalgebra::Point2<f64>;
 
 /// A point in space, metres.
 pub type Point3 = nalgebra::Point3<f64>;
+
+/// A horizontal way, metres.
+pub type Vector2 = nalgebra::Vector2<f64>;
 
 /// `angle` brought into (-pi, pi].
 #[must_use]

@@ -42,6 +42,15 @@ impl Rect {
         self.excess(point) <= 0.0
     }
 
+    /// The point inside nearest to `point`.
+    #[must_use]
+    pub fn nearest(&self, point: Point2) -> Point2 {
+        Point2::new(
+            point.x.clamp(self.min.x, self.max.x),
+            point.y.clamp(self.min.y, self.max.y),
+        )
+    }
+
     /// How far `point` lies outside, metres; 0 inside.
     #[must_use]
     pub fn excess(&self, point: Point2) -> f64 {

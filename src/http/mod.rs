@@ -21,6 +21,7 @@ mod service;
 mod sse;
 mod status;
 mod throttle;
+mod warm_start;
 
 use std::sync::Arc;
 use std::time::Duration;

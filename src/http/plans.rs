@@ -20,7 +20,7 @@ use super::phase::stopping;
 use super::prefer::{PREFERENCE_APPLIED, Wait};
 use super::problem::Problem;
 use super::status::{StatusDocument, etag, location};
-use super::{AppState, Phase, body, off_thread, retry};
+use super::{AppState, Phase, body, off_thread, retry, warm_start};
 use crate::job::{self, Plan, PlanId, Status, Submission};
 use crate::scenario::json;
 use crate::store::{ListQuery, StoreError};
@@ -102,19 +102,19 @@ async fn refuse_when_draining(state: &AppState) -> Result<(), Problem> {
 /// Read a document into a submission, off the threads that answer.
 async fn accept(state: &AppState, document: Bytes) -> Result<Submission, Problem> {
     let rules = state.rules.clone();
-    off_thread::run(move || {
-        let scenario = json::read(&document, &rules, job::draw_seed())?;
-        Ok(Submission {
-            id: job::new_id(),
-            scenario: json::write(&scenario),
-            name: scenario.name,
-            algorithm: scenario.planner.algorithm,
-            seed: scenario.planner.seed,
-            iterations: scenario.planner.iterations as u64,
-            created_ms: now_ms(),
-        })
-    })
-    .await?
+    let mut scenario =
+        off_thread::run(move || json::read(&document, &rules, job::draw_seed())).await??;
+    warm_start::resolve(state, &mut scenario).await?;
+    let submission = move || Submission {
+        id: job::new_id(),
+        scenario: json::write(&scenario),
+        name: scenario.name,
+        algorithm: scenario.planner.algorithm,
+        seed: scenario.planner.seed,
+        iterations: scenario.planner.iterations as u64,
+        created_ms: now_ms(),
+    };
+    off_thread::run(submission).await
 }
 
 /// The answer to `?validate_only=true`. The accepted document is put in as the text it is.

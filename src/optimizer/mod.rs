@@ -77,6 +77,13 @@ impl Bounds {
         self.upper[dim] - self.lower[dim]
     }
 
+    /// Write a position uniform within the box.
+    pub fn draw(&self, random: &mut Random, position: &mut [f64]) {
+        for (value, (lower, upper)) in position.iter_mut().zip(self.lower.iter().zip(&self.upper)) {
+            *value = random.between(*lower, *upper);
+        }
+    }
+
     /// Bring `position` into the box.
     pub fn clamp(&self, position: &mut [f64]) {
         for (value, (lower, upper)) in position.iter_mut().zip(self.lower.iter().zip(&self.upper)) {
@@ -92,10 +99,17 @@ pub trait Objective {
 
     /// Write a start position, by default uniform within the bounds.
     fn draw(&mut self, random: &mut Random, position: &mut [f64]) {
-        let bounds = self.bounds();
-        for (dim, value) in position.iter_mut().enumerate() {
-            *value = random.between(bounds.lower[dim], bounds.upper[dim]);
-        }
+        self.bounds().draw(random, position);
+    }
+
+    /// Whether it knows neighbours of a position, see [`Objective::walk`].
+    fn walks(&self) -> bool {
+        false
+    }
+
+    /// Write a neighbour of `base` into `candidate`; `size`, 0 to 1, tells how far it may be.
+    fn walk(&mut self, _random: &mut Random, base: &[f64], _size: f64, candidate: &mut [f64]) {
+        candidate.copy_from_slice(base);
     }
 
     /// Price `fitness.len()` positions, laid end to end.

@@ -82,6 +82,18 @@ pub(super) const PARAMETERS: [Parameter; 10] = [
 /// means that the swarm has stagnated; the paper compares floats for equality.
 const STAGNATION: f64 = 1e-3;
 
+/// Share of the swarm that a walk may start from, at first.
+const ELITE: f64 = 0.2;
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a share below 1 of a count"
+)]
+fn share_of(count: usize, share: f64) -> usize {
+    (count as f64 * share) as usize
+}
+
 /// A running search.
 pub(super) struct TmsSba {
     swarm: Swarm,
@@ -155,14 +167,20 @@ impl TmsSba {
     }
 
     /// Eq. 10-13: every bat flies towards the best, or walks about it.
-    fn move_bats(&mut self, objective: &dyn Objective, progress: f64) {
-        let bounds = objective.bounds();
-        let dimension = bounds.dimension();
+    fn move_bats(&mut self, objective: &mut dyn Objective, progress: f64) {
+        let dimension = objective.bounds().dimension();
         let mean_loudness = self.loudness.iter().sum::<f64>() / self.loudness.len() as f64;
         // The walk shrinks over the run to a thousandth of its first size.
         let size = self.walk * libm::pow(1e-3, progress) * mean_loudness;
         let share = self.walk_numbers / dimension as f64;
         let best = self.swarm.best_position();
+        // A walk of the objective's own starts from any of the best few, ever fewer.
+        let elite = if objective.walks() {
+            self.swarm.ranking()
+        } else {
+            Vec::new()
+        };
+        let n_elite = share_of(elite.len(), ELITE * (1.0 - progress)).max(1);
         for bat_idx in 0..self.swarm.len() {
             let here = self.swarm.position(bat_idx);
             let candidate = &mut self.candidates[bat_idx * dimension..(bat_idx + 1) * dimension];
@@ -172,17 +190,21 @@ impl TmsSba {
                 velocity[dim] += (best[dim] - here[dim]) * frequency; // Eq. 11, 20
                 candidate[dim] = here[dim] + velocity[dim]; // Eq. 12, 21
             }
-            if self.random.unit() >= self.pulse_rates[bat_idx] {
-                // Eq. 13, in a few dimensions: a step in all of them at once hardly ever improves.
+            let walks = self.random.unit() >= self.pulse_rates[bat_idx]; // Eq. 13
+            if walks && !elite.is_empty() {
+                let base = self.swarm.position(elite[self.random.below(n_elite)]);
+                objective.walk(&mut self.random, base, size, candidate);
+            } else if walks {
+                // In a few dimensions: a step in all of them at once hardly ever improves.
                 let chosen = self.random.below(dimension);
                 candidate.copy_from_slice(best);
                 for (dim, value) in candidate.iter_mut().enumerate() {
                     if dim == chosen || self.random.unit() < share {
-                        *value += self.random.normal() * size * bounds.range(dim);
+                        *value += self.random.normal() * size * objective.bounds().range(dim);
                     }
                 }
             }
-            bounds.clamp(candidate);
+            objective.bounds().clamp(candidate);
         }
     }
 
@@ -204,12 +226,8 @@ impl TmsSba {
     fn stabilise(&mut self, objective: &mut dyn Objective) {
         let dimension = objective.bounds().dimension();
         let ranking = self.swarm.ranking();
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "truncation < 1, so that fewer than half are left out at each end"
-        )]
-        let left_out = (ranking.len() as f64 * self.truncation / 2.0) as usize;
+        // As truncation < 1, fewer than half are left out at each end.
+        let left_out = share_of(ranking.len(), self.truncation / 2.0);
         let middle = &ranking[left_out..ranking.len() - left_out];
         let mut mean = vec![0.0; dimension];
         for &bat_idx in middle {

@@ -4,9 +4,15 @@
 
 mod certificate;
 mod coding;
+mod log;
+mod moves;
 mod objective;
 mod outcome;
+mod polish;
+mod price;
+mod search;
 mod smoothing;
+mod starts;
 
 pub use outcome::{
     Bound, Clearance, ConvergencePoint, Incumbent, Leg, Measures, Outcome, Path, StopReason,
@@ -17,11 +23,12 @@ pub use crate::cost::CostFigures;
 
 use crate::cost::Model;
 use crate::geometry::Point3;
-use crate::optimizer::{self, Algorithm, Objective, Optimizer, Settings};
+use crate::optimizer::{self, Algorithm, Objective};
 use crate::scenario::json::{AlgorithmRule, ParameterRule};
-use crate::scenario::{Quadrature, Scenario, Seeding};
+use crate::scenario::{Quadrature, Scenario};
 use crate::seeding;
 use coding::Coding;
+use log::Log;
 use objective::Routes;
 
 /// Follows a run. Called on the planning thread; must return quickly.
@@ -65,45 +72,13 @@ pub fn algorithm_rules() -> Vec<AlgorithmRule> {
 /// # Panics
 /// When the scenario names an algorithm that is not in the table; its reader refuses those.
 pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -> Outcome {
-    let settings = &scenario.planner;
-    let algorithm = optimizer::by_name(&settings.algorithm)
-        .expect("the reader accepts only names in the table");
     let model = Model::new(scenario);
-
-    let mut routes = match settings.seeding {
-        // Routes along the tangents of the threats will join here.
-        Seeding::Random => Routes::new(Coding::of(scenario), model.clone(), stop),
+    let mut log = Log::new(&model, observer, stop);
+    let stop_reason = match starts::routes(&model, stop) {
+        None => search::plain(&model, &mut log),
+        Some(starts) => search::guided(&model, starts, &mut log),
     };
-    let mut log = Log {
-        observer,
-        stop,
-        convergence: Vec::new(),
-        route: Vec::new(),
-    };
-    // A stop within the first population leaves the rest of it unpriced.
-    let mut search = (algorithm.start)(&search_settings(scenario, algorithm), &mut routes);
-    log.record(0, search.as_ref(), &routes);
-
-    let mut stop_reason = StopReason::Iterations;
-    for iteration in 1..=settings.iterations {
-        if let Some(reason) = why_stop(scenario, stop) {
-            stop_reason = reason;
-            break;
-        }
-        search.iterate(&mut routes, iteration as f64 / settings.iterations as f64);
-        if routes.interrupted {
-            // Half an iteration is none: the result is that of the one before.
-            stop_reason = why_stop(scenario, stop).unwrap_or(StopReason::Cancelled);
-            break;
-        }
-        log.record(iteration, search.as_ref(), &routes);
-    }
-
-    // Polishing the best route will stand here, as the last point of the curve.
-    let Log {
-        convergence, route, ..
-    } = log;
-    deliver(&model, route, stop_reason, convergence)
+    deliver(&model, log, stop_reason)
 }
 
 /// The routes of `scenario` as its algorithm sees them: positions in a box, each with its price.
@@ -114,16 +89,20 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
 /// # Panics
 /// When the scenario names an algorithm that is not in the table; its reader refuses those.
 pub fn objective<'s>(scenario: &'s Scenario, stop: &'s dyn Stop) -> impl Objective + 's {
-    Routes::new(Coding::of(scenario), Model::new(scenario), stop)
+    let coding = Coding::of(scenario, scenario.planner.waypoints, false);
+    Routes::new(coding, Model::new(scenario), stop)
 }
 
-fn search_settings(scenario: &Scenario, algorithm: &Algorithm) -> Settings {
-    let chosen = &scenario.planner.parameters;
-    Settings {
-        population: scenario.planner.population,
-        seed: scenario.planner.seed,
-        parameters: algorithm.parameters_with(|name| chosen.get(name).copied()),
-    }
+/// Routes are the same when no waypoint is farther from its like than this share of the way.
+const SAME: f64 = 0.02;
+
+fn same(scenario: &Scenario, one: &[Point3], other: &[Point3]) -> bool {
+    let reach = SAME * (scenario.target - scenario.start).norm();
+    one.len() == other.len()
+        && one
+            .iter()
+            .zip(other)
+            .all(|(one, other)| (one - other).norm() <= reach)
 }
 
 fn why_stop(scenario: &Scenario, stop: &dyn Stop) -> Option<StopReason> {
@@ -134,58 +113,9 @@ fn why_stop(scenario: &Scenario, stop: &dyn Stop) -> Option<StopReason> {
     (stop.elapsed_ms() >= limit as f64).then_some(StopReason::TimeLimit)
 }
 
-/// The curve of a run and its best route so far.
-struct Log<'o> {
-    observer: &'o mut dyn Observer,
-    stop: &'o dyn Stop,
-    convergence: Vec<ConvergencePoint>,
-    route: Vec<Point3>,
-}
-
-impl Log<'_> {
-    fn record(&mut self, iteration: usize, search: &dyn Optimizer, routes: &Routes) {
-        let swarm = search.swarm();
-        let best = swarm.best_fitness();
-        let members = swarm
-            .fitness()
-            .iter()
-            .filter(|fitness| fitness.cost.is_finite());
-        let count = members.clone().count() as f64;
-        let elapsed_ms = self.stop.elapsed_ms();
-        let point = ConvergencePoint {
-            iteration,
-            evaluations: routes.evaluations,
-            elapsed_ms,
-            best_cost: best.is_feasible().then_some(best.cost),
-            best_violation: best.violation,
-            mean_cost: members.clone().map(|fitness| fitness.cost).sum::<f64>() / count,
-            feasible_fraction: members.filter(|fitness| fitness.is_feasible()).count() as f64
-                / count,
-        };
-        let mut route = Vec::new();
-        routes.encoding.decode(swarm.best_position(), &mut route);
-        if route != self.route {
-            self.observer.incumbent(&Incumbent {
-                iteration,
-                elapsed_ms,
-                cost: best.cost,
-                feasible: best.is_feasible(),
-                waypoints: route.clone(),
-            });
-            self.route = route;
-        }
-        self.observer.iteration(&point);
-        self.convergence.push(point);
-    }
-}
-
 /// Price, smooth and certify the best route.
-fn deliver(
-    model: &Model,
-    route: Vec<Point3>,
-    stop_reason: StopReason,
-    mut convergence: Vec<ConvergencePoint>,
-) -> Outcome {
+fn deliver(model: &Model, log: Log, stop_reason: StopReason) -> Outcome {
+    let (mut convergence, route) = (log.convergence, log.route);
     let evaluations = convergence.last().map_or(0, |last| last.evaluations);
     let quadrature = model.scenario.planner.quadrature;
     let cost = model.figures(&route, quadrature);
@@ -225,7 +155,7 @@ fn deliver(
 mod tests {
     use super::*;
     use crate::geometry::{Point2, Rect};
-    use crate::scenario::{AltitudeBand, PlannerSettings, Smoothing, Vehicle, Weights};
+    use crate::scenario::{AltitudeBand, PlannerSettings, Seeding, Smoothing, Vehicle, Weights};
     use crate::terrain::{Flat, Terrain};
     use crate::threat::{Cylinder, Shape, Threat};
 
@@ -280,11 +210,14 @@ mod tests {
                 time_limit_ms: None,
                 seeding: Seeding::Random,
                 polish: false,
+                warm_start: None,
                 smoothing: Smoothing {
                     degree: 3,
                     spacing: 5.0,
                 },
                 quadrature: Quadrature::Integral,
+                gap: 0.0,
+                threads: 1,
                 parameters: std::collections::BTreeMap::new(),
             },
         }

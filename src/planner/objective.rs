@@ -1,17 +1,22 @@
 //! Routes as an optimizer sees them: positions in, fitness out.
 
 use super::coding::Coding;
+use super::moves::move_a_part;
 use super::{Stop, why_stop};
 use crate::cost::{Model, Tolerance};
 use crate::geometry::Point3;
-use crate::optimizer::{Bounds, Fitness, Objective};
+use crate::optimizer::{Bounds, Fitness, Objective, Random};
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;
 use crate::threat::Shape;
 
 /// The routes of one scenario.
 pub(super) struct Routes<'s> {
-    pub(super) encoding: Coding<'s>,
+    pub(super) coding: Coding<'s>,
+    /// Routes that the first members are, and the others are near to; empty in a plain search.
+    seeds: Vec<Vec<Point3>>,
+    /// Members drawn so far.
+    drawn: usize,
     pub(super) model: Model<'s>,
     /// Half of what feasible means, so that a delivered route is feasible for others' rounding too.
     tolerance: Tolerance,
@@ -29,11 +34,13 @@ pub(super) struct Routes<'s> {
 const STEPS_UNWATCHED: usize = 1_000_000;
 
 impl<'s> Routes<'s> {
-    pub(super) fn new(encoding: Coding<'s>, model: Model<'s>, stop: &'s dyn Stop) -> Self {
+    pub(super) fn new(coding: Coding<'s>, model: Model<'s>, stop: &'s dyn Stop) -> Self {
         let tolerance = model.tolerance.scaled(0.5);
         let stride = (STEPS_UNWATCHED / steps(model.scenario)).max(1) as u64;
         Self {
-            encoding,
+            coding,
+            seeds: Vec::new(),
+            drawn: 0,
             model,
             tolerance,
             route: Vec::new(),
@@ -41,6 +48,19 @@ impl<'s> Routes<'s> {
             stride,
             evaluations: 0,
             interrupted: false,
+        }
+    }
+
+    /// Those that start from `seeds` and whose local walk is a move of the route.
+    pub(super) fn guided(
+        coding: Coding<'s>,
+        model: Model<'s>,
+        stop: &'s dyn Stop,
+        seeds: Vec<Vec<Point3>>,
+    ) -> Self {
+        Self {
+            seeds,
+            ..Self::new(coding, model, stop)
         }
     }
 
@@ -61,11 +81,40 @@ impl<'s> Routes<'s> {
 
 impl Objective for Routes<'_> {
     fn bounds(&self) -> &Bounds {
-        self.encoding.bounds()
+        self.coding.bounds()
+    }
+
+    /// The seeds, then neighbours of each in turn; of every four, one comes from anywhere.
+    fn draw(&mut self, random: &mut Random, position: &mut [f64]) {
+        let idx = self.drawn;
+        self.drawn += 1;
+        let count = self.seeds.len();
+        if idx >= count && (count == 0 || idx % 4 == 3) {
+            return self.coding.draw(random, position);
+        }
+        let mut route = self.seeds[idx % count].clone();
+        if idx >= count {
+            for _ in 0..3 {
+                move_a_part(self.model.scenario, &mut route, random, 0.3);
+            }
+        }
+        self.coding.encode(&route, position);
+    }
+
+    fn walks(&self) -> bool {
+        !self.seeds.is_empty()
+    }
+
+    fn walk(&mut self, random: &mut Random, base: &[f64], size: f64, candidate: &mut [f64]) {
+        let mut route = std::mem::take(&mut self.route);
+        self.coding.decode(base, &mut route);
+        move_a_part(self.model.scenario, &mut route, random, size);
+        self.coding.encode(&route, candidate);
+        self.route = route;
     }
 
     fn evaluate(&mut self, positions: &[f64], fitness: &mut [Fitness]) {
-        let dimension = self.encoding.bounds().dimension();
+        let dimension = self.coding.bounds().dimension();
         let mut route = std::mem::take(&mut self.route);
         for (position, fitness) in positions.chunks_exact(dimension).zip(fitness) {
             // There is always one route to deliver.
@@ -79,7 +128,7 @@ impl Objective for Routes<'_> {
                 *fitness = Fitness::WORST;
                 continue;
             }
-            self.encoding.decode(position, &mut route);
+            self.coding.decode(position, &mut route);
             *fitness = self.price(&route);
             self.evaluations += 1;
         }

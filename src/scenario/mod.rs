@@ -92,10 +92,17 @@ pub struct PlannerSettings {
     pub seeding: Seeding,
     /// Whether the best route is polished at the end.
     pub polish: bool,
+    /// A known route to start from.
+    pub warm_start: Option<WarmStart>,
     /// How the route is smoothed, Eq. 26-27.
     pub smoothing: Smoothing,
     /// How the threat integral of Eq. 4 is taken.
     pub quadrature: Quadrature,
+    /// The search ends once its cost is proven to be no farther above the optimum than this share
+    /// of it; 0 lets it go on.
+    pub gap: f64,
+    /// Threads that may price routes; the result does not depend on it.
+    pub threads: usize,
     /// The algorithm's own constants that the caller set, by name.
     pub parameters: BTreeMap<String, f64>,
 }
@@ -103,8 +110,20 @@ pub struct PlannerSettings {
 /// Where the first bats come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seeding {
+    /// Routes along the common tangents of the threats, the best few ways round them.
+    Tangent,
     /// Uniformly within the bounds of the coding, as in the paper.
     Random,
+}
+
+/// A known route to start from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum WarmStart {
+    /// That of a stored plan. Who keeps the plans puts its waypoints here instead before anything
+    /// is planned.
+    Plan(String),
+    /// In order; start and target may be among them.
+    Waypoints(Vec<Point3>),
 }
 
 /// The B-spline of Eq. 26-27.

@@ -1,5 +1,46 @@
-//! What the geometry of a scenario tells before any search.
+//! What the geometry of a scenario tells before any search: the taut strings round its obstacles,
+//! and a cost that no route can undercut.
+//!
+//! Deliberately absent: routes of waypoints, and everything that a vehicle can or cannot fly.
 
+mod arc;
 mod bound;
+mod obstacles;
+mod steep;
+mod taut;
 
 pub use bound::lower_bound;
+pub use obstacles::{Obstacles, Outline, OutlineShape};
+pub use steep::steep_ground;
+pub use taut::{Piece, TautString, TautStrings, taut_strings};
+
+#[cfg(test)]
+mod tests {
+    use crate::scenario::Scenario;
+    use crate::scenario::json::{self, AlgorithmRule, Rules};
+    use crate::scenario::limits::Limits;
+
+    pub(super) fn read(document: &str) -> Scenario {
+        let rules = Rules {
+            limits: Limits::default(),
+            algorithms: vec![AlgorithmRule {
+                name: "tms-sba",
+                parameters: Vec::new(),
+            }],
+        };
+        json::read(document.as_bytes(), &rules, 1).unwrap_or_else(|fault| panic!("{fault:?}"))
+    }
+
+    /// From (200, 100, 0) to (800, 800, 150) in a square of a kilometre, with `members` besides.
+    pub(super) fn scenario(members: &str) -> Scenario {
+        read(&format!(
+            r#"{{ "frame": "local",
+                "start": {{ "x": 200, "y": 100, "z": 0 }}, "target": {{ "x": 800, "y": 800, "z": 150 }},
+                "area": {{ "min": {{ "x": 0, "y": 0 }}, "max": {{ "x": 1000, "y": 1000 }} }},
+                "altitude": {{ "min": 0, "max": 200 }},
+                "vehicle": {{ "max_turn_deg": 60, "max_climb_deg": 45, "fuel_per_km": 1000 }},
+                "weights": {{ "fuel": 0.5, "threat": 1, "altitude": 1 }},
+                "planner": {{ "algorithm": "tms-sba" }}, {members} }}"#
+        ))
+    }
+}

@@ -18,11 +18,10 @@ pub(in crate::planner) struct Cartesian<'s> {
 const PER_WAYPOINT: usize = 3;
 
 impl<'s> Cartesian<'s> {
-    /// The coding of routes of `scenario`.
+    /// The coding of routes of `scenario` with so many free waypoints.
     #[must_use]
-    pub(in crate::planner) fn new(scenario: &'s Scenario) -> Self {
+    pub(in crate::planner) fn new(scenario: &'s Scenario, waypoints: usize) -> Self {
         let (area, band) = (&scenario.area, scenario.altitude);
-        let waypoints = scenario.planner.waypoints;
         Self {
             scenario,
             bounds: Bounds {
@@ -51,6 +50,15 @@ impl<'s> Cartesian<'s> {
         }
         route.push(self.scenario.target);
     }
+
+    /// Write the position of `route` into `position`; what the bounds do not hold is cut off.
+    pub(in crate::planner) fn encode(&self, route: &[Point3], position: &mut [f64]) {
+        for (waypoint, point) in position.chunks_exact_mut(PER_WAYPOINT).zip(&route[1..]) {
+            let ground = self.scenario.terrain.elevation(point.xy());
+            waypoint.copy_from_slice(&[point.x, point.y, point.z - ground]);
+        }
+        self.bounds.clamp(position);
+    }
 }
 
 #[cfg(test)]
@@ -62,9 +70,8 @@ mod tests {
     #[test]
     fn a_position_is_its_waypoints_over_the_ground() {
         let mut scenario = scenario();
-        scenario.planner.waypoints = 2;
         scenario.terrain = Terrain::Flat(Flat { elevation: 40.0 });
-        let coding = Cartesian::new(&scenario);
+        let coding = Cartesian::new(&scenario, 2);
         assert_eq!(coding.bounds().lower, [0.0; 6]);
         assert_eq!(
             coding.bounds().upper,
@@ -79,5 +86,8 @@ mod tests {
             scenario.target,
         ];
         assert_eq!(route, expected);
+        let mut position = [0.0; 6];
+        coding.encode(&route, &mut position);
+        assert_eq!(position, [10.0, 20.0, 30.0, 400.0, 500.0, 60.0]);
     }
 }

@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use super::path::Path;
 use super::tree::Node;
+use super::value::quote;
 
 /// Most faults listed in one refusal; a last fault counts the rest.
 pub const MAX_LISTED: usize = 100;
@@ -89,6 +90,10 @@ pub const CODES: &[(&str, &str)] = &[
         "target-above-start",
         "the target is straight above or below the start",
     ),
+    (
+        "unknown-plan",
+        "the plan to start from is not there, or has no route yet",
+    ),
     ("more-faults", "only the first faults are listed"),
 ];
 
@@ -102,6 +107,18 @@ pub struct Fault {
     pub code: &'static str,
     /// The offending value and what is allowed, a lowercase fragment.
     pub detail: String,
+}
+
+impl Fault {
+    /// Of `/planner/warm_start/plan_id`; who keeps the plans finds out `why`.
+    #[must_use]
+    pub fn unknown_plan(id: &str, why: &str) -> Self {
+        Self {
+            pointer: "/planner/warm_start/plan_id".to_owned(),
+            code: "unknown-plan",
+            detail: format!("plan_id is {}, {why}", quote(id)),
+        }
+    }
 }
 
 /// Why a document is refused.

@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use crate::scenario::{PlannerSettings, Quadrature, Seeding, Smoothing};
+use crate::geometry::Point3;
+use crate::scenario::{PlannerSettings, Quadrature, Seeding, Smoothing, WarmStart};
 
 use super::fault::Faults;
 use super::fields::{nearest, unknown_key};
 use super::path::Path;
-use super::ranges::{DEGREE, MIN_POPULATION, Range, SEED, SPACING, TIME_LIMIT_MS};
+use super::point::point3;
+use super::ranges::{DEGREE, GAP, MIN_POPULATION, Range, SEED, SPACING, THREADS, TIME_LIMIT_MS};
 use super::tree::Node;
 use super::value::{At, quote};
 use super::{AlgorithmRule, Rules};
@@ -21,8 +23,8 @@ const DEFAULT_SMOOTHING: Smoothing = Smoothing {
     spacing: 5.0,
 };
 
-/// The quadrature stands among the algorithm's constants, but belongs to the cost.
-const QUADRATURE: &str = "quadrature";
+/// These stand among the algorithm's constants, but are every algorithm's.
+const COMMON: [&str; 3] = ["quadrature", "gap", "threads"];
 
 const FIELDS: &[&str] = &[
     "algorithm",
@@ -91,19 +93,21 @@ pub(super) fn planner(
         Node::Null => Some(None),
         _ => at.whole(TIME_LIMIT_MS, faults).map(Some),
     });
-    let seeding = fields.or("seeding", Seeding::Random, faults, |at, faults| {
-        at.choice(&["random"], &["tangent"], faults)
-            .map(|_| Seeding::Random)
+    let seeding = fields.or("seeding", Seeding::Tangent, faults, |at, faults| {
+        at.choice(&["tangent", "random"], &[], faults)
+            .map(|choice| match choice {
+                "random" => Seeding::Random,
+                _ => Seeding::Tangent,
+            })
     });
-    let polish = fields.or("polish", false, faults, polish);
-    let cold = fields.or("warm_start", (), faults, warm_start);
+    let polish = fields.or("polish", true, faults, |at, faults| at.boolean(faults));
+    let warm_start = fields.or("warm_start", None, faults, |at, faults| {
+        warm_start(at, limits.waypoints, faults)
+    });
     let smoothing = fields.or("smoothing", DEFAULT_SMOOTHING, faults, smoothing);
-    let parameters = fields.or(
-        "parameters",
-        (Quadrature::Integral, BTreeMap::new()),
-        faults,
-        |at, faults| parameters(at, algorithm, faults),
-    );
+    let parameters = fields.or("parameters", Parameters::default(), faults, |at, faults| {
+        parameters(at, algorithm, faults)
+    });
     if let (Some(waypoints), Some(population), Some(iterations)) =
         (waypoints, population, iterations)
     {
@@ -114,8 +118,7 @@ pub(super) fn planner(
             faults,
         );
     }
-    cold?;
-    let (quadrature, parameters) = parameters?;
+    let parameters = parameters?;
     Some(PlannerSettings {
         algorithm: algorithm?.name.to_owned(),
         waypoints: waypoints?,
@@ -125,9 +128,12 @@ pub(super) fn planner(
         time_limit_ms: time_limit_ms?,
         seeding: seeding?,
         polish: polish?,
+        warm_start: warm_start?,
         smoothing: smoothing?,
-        quadrature,
-        parameters,
+        quadrature: parameters.quadrature,
+        gap: parameters.gap,
+        threads: parameters.threads,
+        parameters: parameters.constants,
     })
 }
 
@@ -150,29 +156,57 @@ fn algorithm<'r>(at: At<'_>, rules: &'r Rules, faults: &mut Faults) -> Option<&'
     found
 }
 
-fn polish(at: At<'_>, faults: &mut Faults) -> Option<bool> {
-    let polish = at.boolean(faults)?;
-    if polish {
-        faults.add(
-            at.path,
-            "not-available",
-            || "polish is true, which is not available yet, must be false",
-        );
-        return None;
+/// `{"plan_id"}` or `{"waypoints"}`, one of the two.
+#[expect(
+    clippy::option_option,
+    reason = "the outer one tells whether it could be read"
+)]
+fn warm_start(at: At<'_>, limit: usize, faults: &mut Faults) -> Option<Option<WarmStart>> {
+    if *at.node == Node::Null {
+        return Some(None);
     }
-    Some(polish)
+    let fields = at.fields(&["plan_id", "waypoints"], faults)?;
+    let plan = fields.or("plan_id", None, faults, |at, faults| {
+        at.text(faults).map(|id| Some(id.to_owned()))
+    });
+    let waypoints = fields.or("waypoints", None, faults, |at, faults| {
+        waypoints(at, limit, faults).map(Some)
+    });
+    match (plan?, waypoints?) {
+        (Some(id), None) => Some(Some(WarmStart::Plan(id))),
+        (None, Some(waypoints)) => Some(Some(WarmStart::Waypoints(waypoints))),
+        (None, None) => {
+            faults.add(
+                &Path::Key(at.path, "plan_id"),
+                "missing-field",
+                || "plan_id is missing, and so is waypoints: one of them must be given",
+            );
+            None
+        }
+        (Some(_), Some(_)) => {
+            faults.add(
+                &Path::Key(at.path, "waypoints"),
+                "not-applicable",
+                || "waypoints is given, must be left out where plan_id is given",
+            );
+            None
+        }
+    }
 }
 
-fn warm_start(at: At<'_>, faults: &mut Faults) -> Option<()> {
-    if *at.node == Node::Null {
-        return Some(());
+/// Points of a route; start and target may be among them.
+fn waypoints(at: At<'_>, limit: usize, faults: &mut Faults) -> Option<Vec<Point3>> {
+    let count = at.len(faults)?;
+    if count > limit + 2 {
+        faults.add(at.path, "too-many", || {
+            format!(
+                "waypoints has {count} items, must have at most {} (limit waypoints, and both ends)",
+                limit + 2
+            )
+        });
+        return None;
     }
-    faults.add(
-        at.path,
-        "not-available",
-        || "warm_start is given, which is not available yet, must be null",
-    );
-    None
+    at.items(faults, point3).into_iter().collect()
 }
 
 fn smoothing(at: At<'_>, faults: &mut Faults) -> Option<Smoothing> {
@@ -188,27 +222,43 @@ fn smoothing(at: At<'_>, faults: &mut Faults) -> Option<Smoothing> {
     })
 }
 
-/// The quadrature, and the constants that `rule` allows; with the algorithm unknown, none is checked.
-fn parameters(
-    at: At<'_>,
-    rule: Option<&AlgorithmRule>,
-    faults: &mut Faults,
-) -> Option<(Quadrature, BTreeMap<String, f64>)> {
+/// What `parameters` may hold.
+struct Parameters {
+    quadrature: Quadrature,
+    gap: f64,
+    threads: usize,
+    constants: BTreeMap<String, f64>,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            quadrature: Quadrature::Integral,
+            gap: 0.0,
+            threads: 1,
+            constants: BTreeMap::new(),
+        }
+    }
+}
+
+/// What every algorithm has, and the constants that `rule` allows; with the algorithm unknown, none
+/// is checked.
+fn parameters(at: At<'_>, rule: Option<&AlgorithmRule>, faults: &mut Faults) -> Option<Parameters> {
     let Node::Object(entries) = at.node else {
         at.fields(&[], faults);
         return None;
     };
     let rule = rule?;
-    let mut allowed = vec![QUADRATURE];
+    let mut allowed = COMMON.to_vec();
     allowed.extend(rule.parameters.iter().map(|parameter| parameter.name));
     let mut seen = vec![false; allowed.len()];
-    let mut quadrature = Some(Quadrature::Integral);
-    let mut parameters = Some(BTreeMap::new());
+    let mut sound = true;
+    let mut parameters = Parameters::default();
     for (key, node) in entries {
         let Some(slot) = allowed.iter().position(|name| *name == &**key) else {
             let role = format!("parameter of {}", rule.name);
             unknown_key(at.path, key, "unknown-parameter", &role, &allowed, faults);
-            parameters = None;
+            sound = false;
             continue;
         };
         let path = Path::Key(at.path, key);
@@ -219,28 +269,33 @@ fn parameters(
             continue;
         }
         let at = At { node, path: &path };
-        if slot == 0 {
-            quadrature =
-                at.choice(&["integral", "paper"], &[], faults)
-                    .map(|choice| match choice {
-                        "paper" => Quadrature::Paper,
-                        _ => Quadrature::Integral,
-                    });
-            continue;
-        }
-        let constant = rule.parameters[slot - 1];
-        match (
-            at.number(Range::closed(constant.min, constant.max), faults),
-            &mut parameters,
-        ) {
-            (Some(value), Some(parameters)) => {
-                parameters.insert(key.to_string(), value);
+        sound &= match COMMON.get(slot) {
+            Some(&"quadrature") => at
+                .choice(&["integral", "paper"], &[], faults)
+                .map(|choice| {
+                    if choice == "paper" {
+                        parameters.quadrature = Quadrature::Paper;
+                    }
+                })
+                .is_some(),
+            Some(&"gap") => at
+                .number(GAP, faults)
+                .map(|gap| parameters.gap = gap)
+                .is_some(),
+            Some(_) => at
+                .whole(THREADS, faults)
+                .and_then(|threads| usize::try_from(threads).ok())
+                .map(|threads| parameters.threads = threads)
+                .is_some(),
+            None => {
+                let constant = rule.parameters[slot - COMMON.len()];
+                at.number(Range::closed(constant.min, constant.max), faults)
+                    .map(|value| parameters.constants.insert(key.to_string(), value))
+                    .is_some()
             }
-            (None, _) => parameters = None,
-            (_, None) => {}
-        }
+        };
     }
-    Some((quadrature?, parameters?))
+    sound.then_some(parameters)
 }
 
 /// population * iterations * waypoints against the operator's limit.

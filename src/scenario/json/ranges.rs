@@ -116,6 +116,10 @@ pub(super) const DEGREE: Range = Range::closed(1.0, 5.0);
 pub(super) const TIME_LIMIT_MS: Range = Range::closed(1.0, 3_600_000.0);
 /// `seed`, a whole number below 2^53, so that every JSON reader keeps it.
 pub(super) const SEED: Range = Range::closed(0.0, 9_007_199_254_740_991.0);
+/// `parameters.gap`, a share of the proven bound; 0 never ends the search.
+pub(super) const GAP: Range = Range::closed(0.0, 10.0);
+/// `parameters.threads`, a whole number.
+pub(super) const THREADS: Range = Range::closed(1.0, 256.0);
 
 /// Fewest nodes of a grid either way.
 pub(super) const MIN_NODES: usize = 2;
@@ -152,6 +156,8 @@ mod tests {
             ("`smoothing.degree`", DEGREE),
             ("`time_limit_ms`", TIME_LIMIT_MS),
             ("`seed`", SEED),
+            ("`parameters.gap`", GAP),
+            ("`parameters.threads`", THREADS),
         ] {
             let row = format!("| {field} | {range} |");
             assert!(page.contains(&row), "docs/PROBLEMS.md has no row {row}");

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Serialize, Serializer};
 
 use crate::geometry::{Point2, Point3, Rect};
-use crate::scenario::{Quadrature, Scenario, Seeding};
+use crate::scenario::{Quadrature, Scenario, Seeding, WarmStart};
 use crate::terrain::{Peak, Terrain};
 use crate::threat::{Shape, Threat};
 
@@ -141,9 +141,16 @@ struct WirePlanner<'a> {
     time_limit_ms: Option<u64>,
     seeding: &'static str,
     polish: bool,
-    warm_start: (),
+    warm_start: Option<WireWarmStart<'a>>,
     smoothing: WireSmoothing,
     parameters: WireParameters<'a>,
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "snake_case")]
+enum WireWarmStart<'a> {
+    PlanId(&'a str),
+    Waypoints(Vec<XYZ>),
 }
 
 #[derive(Serialize)]
@@ -155,6 +162,8 @@ struct WireSmoothing {
 #[derive(Serialize)]
 struct WireParameters<'a> {
     quadrature: &'static str,
+    gap: Figure,
+    threads: usize,
     #[serde(flatten)]
     constants: BTreeMap<&'a str, Figure>,
 }
@@ -277,6 +286,17 @@ impl From<&Peak> for WirePeak {
     }
 }
 
+impl<'a> From<&'a WarmStart> for WireWarmStart<'a> {
+    fn from(start: &'a WarmStart) -> Self {
+        match start {
+            WarmStart::Plan(id) => Self::PlanId(id),
+            WarmStart::Waypoints(points) => {
+                Self::Waypoints(points.iter().copied().map(XYZ::from).collect())
+            }
+        }
+    }
+}
+
 impl<'a> From<&'a crate::scenario::PlannerSettings> for WirePlanner<'a> {
     fn from(planner: &'a crate::scenario::PlannerSettings) -> Self {
         let constants = planner
@@ -291,10 +311,11 @@ impl<'a> From<&'a crate::scenario::PlannerSettings> for WirePlanner<'a> {
             seed: planner.seed,
             time_limit_ms: planner.time_limit_ms,
             seeding: match planner.seeding {
+                Seeding::Tangent => "tangent",
                 Seeding::Random => "random",
             },
             polish: planner.polish,
-            warm_start: (),
+            warm_start: planner.warm_start.as_ref().map(WireWarmStart::from),
             smoothing: WireSmoothing {
                 degree: planner.smoothing.degree,
                 spacing: Figure(planner.smoothing.spacing),
@@ -304,6 +325,8 @@ impl<'a> From<&'a crate::scenario::PlannerSettings> for WirePlanner<'a> {
                     Quadrature::Integral => "integral",
                     Quadrature::Paper => "paper",
                 },
+                gap: Figure(planner.gap),
+                threads: planner.threads,
                 constants: constants.collect(),
             },
         }

@@ -106,6 +106,8 @@ fn every_code_has_a_case_and_a_row_in_the_docs() {
     ));
     let last = counted.last().expect("there are many").clone();
     examples.insert(last.code, last);
+    let unknown = Fault::unknown_plan("x", "no plan has this id");
+    examples.insert(unknown.code, unknown);
     for (code, meaning) in CODES {
         let Fault {
             pointer, detail, ..
@@ -131,7 +133,7 @@ fn the_least_document_is_filled_with_the_defaults() {
     let scenario = read(LEAST).expect("it says all that is needed");
     insta::assert_snapshot!(json::write(&scenario));
     assert_eq!(scenario.planner.seed, 11);
-    assert_eq!(scenario.planner.seeding, Seeding::Random);
+    assert_eq!(scenario.planner.seeding, Seeding::Tangent);
     assert_eq!(scenario.planner.quadrature, Quadrature::Integral);
     // |ST| / (10 (N + 1)) with |ST| = 500 and N = 10, and a box of 300 by 400 plus a quarter of 500 around.
     assert!((scenario.vehicle.min_leg - 500.0 / 110.0).abs() < 1e-12);

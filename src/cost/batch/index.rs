@@ -1,0 +1,124 @@
+//! Which threats a leg may meet, among many.
+
+use crate::geometry::{Point2, Rect, Segment};
+
+/// Cells over the threats, each with the threats whose boxes it touches.
+#[derive(Debug, Clone)]
+pub(super) struct Index {
+    extent: Rect,
+    /// Cells a metre, east and north.
+    per_metre: Point2,
+    columns: usize,
+    rows: usize,
+    /// Where the threats of each cell begin in `threats`; one more than cells.
+    starts: Vec<u32>,
+    threats: Vec<u32>,
+    boxes: Vec<Rect>,
+}
+
+/// From the cell of one corner to that of the other, both included.
+struct Cells {
+    columns: std::ops::RangeInclusive<usize>,
+    rows: std::ops::RangeInclusive<usize>,
+}
+
+impl Index {
+    /// Of the boxes round threats and their soft zones, one or more.
+    pub(super) fn of(boxes: impl Iterator<Item = Rect>) -> Self {
+        // A hair of rounding rather takes a threat in.
+        let boxes: Vec<Rect> = boxes
+            .map(|extent| extent.grown(1e-6 * (1.0 + extent.diagonal())))
+            .collect();
+        let corners = boxes.iter().flat_map(|extent| [extent.min, extent.max]);
+        let extent = Rect::around(corners).expect("there are threats");
+        let side = side(boxes.len());
+        let size = extent.max - extent.min;
+        let mut index = Self {
+            extent,
+            per_metre: Point2::new(side as f64 / size.x, side as f64 / size.y),
+            columns: side,
+            rows: side,
+            starts: vec![0; side * side + 1],
+            threats: Vec::new(),
+            boxes,
+        };
+        // Count, then fill.
+        for extent in &index.boxes {
+            for cell in index.cells(extent).iter(side) {
+                index.starts[cell + 1] += 1;
+            }
+        }
+        for cell in 0..side * side {
+            index.starts[cell + 1] += index.starts[cell];
+        }
+        let mut next = index.starts.clone();
+        index.threats = vec![0; next[side * side] as usize];
+        for (threat_idx, extent) in (0_u32..).zip(&index.boxes) {
+            for cell in index.cells(extent).iter(side) {
+                index.threats[next[cell] as usize] = threat_idx;
+                next[cell] += 1;
+            }
+        }
+        index
+    }
+
+    /// The threats whose boxes meet that of any of `legs`, in order.
+    pub(super) fn find(&self, legs: impl Iterator<Item = Segment>, found: &mut Vec<u32>) {
+        found.clear();
+        for leg in legs {
+            let own = Rect {
+                min: Point2::new(leg.a.x.min(leg.b.x), leg.a.y.min(leg.b.y)),
+                max: Point2::new(leg.a.x.max(leg.b.x), leg.a.y.max(leg.b.y)),
+            };
+            if !meet(&own, &self.extent) {
+                continue;
+            }
+            for cell in self.cells(&own).iter(self.columns) {
+                let range = self.starts[cell] as usize..self.starts[cell + 1] as usize;
+                let near = self.threats[range].iter();
+                found.extend(near.filter(|threat| meet(&own, &self.boxes[**threat as usize])));
+            }
+        }
+        found.sort_unstable();
+        found.dedup();
+    }
+
+    fn cells(&self, of: &Rect) -> Cells {
+        let column = |x: f64| onto((x - self.extent.min.x) * self.per_metre.x, self.columns);
+        let row = |y: f64| onto((y - self.extent.min.y) * self.per_metre.y, self.rows);
+        Cells {
+            columns: column(of.min.x)..=column(of.max.x),
+            rows: row(of.min.y)..=row(of.max.y),
+        }
+    }
+}
+
+impl Cells {
+    fn iter(self, width: usize) -> impl Iterator<Item = usize> {
+        let Self { columns, rows } = self;
+        rows.flat_map(move |row| columns.clone().map(move |column| row * width + column))
+    }
+}
+
+/// Cells in either direction for `count` threats: about four of them to a threat, not too many.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "the root of a count is positive and small"
+)]
+fn side(count: usize) -> usize {
+    ((2.0 * (count as f64).sqrt()) as usize).clamp(1, 256)
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to the cells first; what is not a number becomes 0"
+)]
+fn onto(cells: f64, count: usize) -> usize {
+    cells.clamp(0.0, (count - 1) as f64) as usize
+}
+
+fn meet(a: &Rect, b: &Rect) -> bool {
+    a.min.x <= b.max.x && a.max.x >= b.min.x && a.min.y <= b.max.y && a.max.y >= b.min.y
+}

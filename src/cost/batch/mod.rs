@@ -1,0 +1,182 @@
+//! Many routes priced at once, in lanes.
+//!
+//! [`Pricer`] asks of [`LANES`] routes side by side what [`Model::assess`] asks of one, and comes to
+//! the same within rounding: what it cannot settle in lanes (a leg that breaks the band, a polygon
+//! nearby) it leaves to the scalar code, lane by lane. A lane's bits depend on its own route alone,
+//! not on its neighbours nor on the width of the processor.
+
+mod heights;
+mod index;
+mod leg;
+mod route;
+mod threats;
+
+pub use crate::geometry::lane::{LANES, Row};
+
+use pulp::{Arch, Simd, WithSimd};
+
+use super::{Model, Tolerance};
+use crate::geometry::Point3;
+use crate::geometry::lane::parts;
+use crate::scenario::Quadrature;
+use heights::Heights;
+use route::Limits;
+use threats::Threats;
+
+/// [`LANES`] points side by side, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointRow {
+    /// East.
+    pub x: Row,
+    /// North.
+    pub y: Row,
+    /// Up.
+    pub z: Row,
+}
+
+impl PointRow {
+    /// `point` in every lane.
+    #[must_use]
+    pub fn splat(point: Point3) -> Self {
+        Self {
+            x: [point.x; LANES],
+            y: [point.y; LANES],
+            z: [point.z; LANES],
+        }
+    }
+
+    /// The point of lane `lane`.
+    ///
+    /// # Panics
+    /// Where there is no such lane.
+    #[must_use]
+    pub fn get(&self, lane: usize) -> Point3 {
+        Point3::new(self.x[lane], self.y[lane], self.z[lane])
+    }
+
+    /// Write `point` into lane `lane`.
+    ///
+    /// # Panics
+    /// Where there is no such lane.
+    pub fn set(&mut self, lane: usize, point: Point3) {
+        (self.x[lane], self.y[lane], self.z[lane]) = (point.x, point.y, point.z);
+    }
+}
+
+/// What [`LANES`] routes or legs cost.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Price {
+    /// Sum of all breaches beyond the tolerance, in metres and degrees.
+    pub violation: Row,
+    /// The weighted cost, Eq. 1.
+    pub cost: Row,
+}
+
+impl Price {
+    /// Of nothing.
+    pub const ZERO: Self = Self {
+        violation: [0.0; LANES],
+        cost: [0.0; LANES],
+    };
+}
+
+/// A model made ready for pricing many routes.
+#[derive(Debug, Clone)]
+pub struct Pricer<'s> {
+    model: Model<'s>,
+    tolerance: Tolerance,
+    quadrature: Quadrature,
+    limits: Limits,
+    threats: Threats,
+    heights: Heights,
+    arch: Arch,
+}
+
+impl<'s> Pricer<'s> {
+    /// Prices routes as `model` does by `quadrature`, counting breaches beyond `tolerance`.
+    #[must_use]
+    pub fn new(model: &Model<'s>, quadrature: Quadrature, tolerance: Tolerance) -> Self {
+        Self {
+            limits: Limits::of(model.scenario),
+            threats: Threats::of(model.scenario),
+            heights: Heights::of(model, tolerance),
+            model: model.clone(),
+            tolerance,
+            quadrature,
+            arch: Arch::new(),
+        }
+    }
+
+    /// Price [`LANES`] routes of as many points: start, free waypoints, target.
+    ///
+    /// # Panics
+    /// With fewer than two points.
+    #[must_use]
+    pub fn routes(&self, points: &[PointRow]) -> Price {
+        assert!(points.len() >= 2, "a route has a start and a target");
+        let mut price = Price::ZERO;
+        self.arch.dispatch(Routes {
+            pricer: self,
+            points,
+            price: &mut price,
+        });
+        price
+    }
+
+    /// Price `prices.len()` rows of single legs, from `a` to `b`: fuel and exposure, and the
+    /// breaches of threats, band, ground, climb and shortness. Turns, the area and F3 belong to
+    /// routes and waypoints, and are left out.
+    ///
+    /// # Panics
+    /// When the slices differ in length.
+    pub fn legs(&self, a: &[PointRow], b: &[PointRow], prices: &mut [Price]) {
+        assert!(a.len() == prices.len() && b.len() == prices.len());
+        self.arch.dispatch(Legs {
+            pricer: self,
+            a,
+            b,
+            prices,
+        });
+    }
+}
+
+struct Routes<'a, 's> {
+    pricer: &'a Pricer<'s>,
+    points: &'a [PointRow],
+    price: &'a mut Price,
+}
+
+impl WithSimd for Routes<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        for part in 0..parts::<S>() {
+            let (violation, cost) = self.pricer.route(simd, part, self.points);
+            violation.store(&mut self.price.violation, part);
+            cost.store(&mut self.price.cost, part);
+        }
+    }
+}
+
+struct Legs<'a, 's> {
+    pricer: &'a Pricer<'s>,
+    a: &'a [PointRow],
+    b: &'a [PointRow],
+    prices: &'a mut [Price],
+}
+
+impl WithSimd for Legs<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        for ((a, b), price) in self.a.iter().zip(self.b).zip(self.prices) {
+            for part in 0..parts::<S>() {
+                let (violation, cost) = self.pricer.single_leg(simd, part, a, b);
+                violation.store(&mut price.violation, part);
+                cost.store(&mut price.cost, part);
+            }
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! Eq. 4-5 in lanes: discs in closed form, rings by the scalar code where a lane is near.
+
+use pulp::Simd;
+
+use super::Pricer;
+use super::index::Index;
+use super::leg::{Leg, Sight};
+use crate::cost::threat::{SAMPLES, sampled_exposure};
+use crate::geometry::lane::{Lane, Mask};
+use crate::geometry::{LEVEL, Rect};
+use crate::scenario::{Quadrature, Scenario};
+use crate::threat::{Cylinder, Shape, Threat};
+
+/// With so many threats or fewer, all are looked at.
+const FEW_THREATS: usize = 24;
+
+/// Twice the line integral of 1 / d is a logarithm of a quotient that grows without end as the
+/// distance falls; beyond this the distance squared, its factor, is lost in rounding.
+const LARGEST_QUOTIENT: f64 = 1e18;
+
+/// The threats of a scenario, made ready for lanes.
+#[derive(Debug, Clone)]
+pub(super) struct Threats {
+    all: Vec<Outline>,
+    /// Where there are many.
+    index: Option<Index>,
+}
+
+#[derive(Debug, Clone)]
+enum Outline {
+    Disc(Disc),
+    Ring(Rect),
+}
+
+/// A disc between two heights, infinite where it has no limit.
+#[derive(Debug, Clone, Copy)]
+struct Disc {
+    outline: Cylinder,
+    base: f64,
+    top: f64,
+    limited: bool,
+}
+
+/// The threats that a walk along some legs may meet; kept from leg to leg to save its memory.
+#[derive(Debug, Default)]
+pub(super) struct Candidates(Vec<u32>);
+
+/// The part of each leg between the heights of a threat.
+struct Window<S: Simd> {
+    t0: Lane<S>,
+    t1: Lane<S>,
+    /// Where there is one.
+    some: Mask<S>,
+}
+
+impl Threats {
+    pub(super) fn of(scenario: &Scenario) -> Self {
+        let outline = |threat: &Threat| match &threat.shape {
+            Shape::Cylinder(cylinder) => Outline::Disc(Disc {
+                outline: *cylinder,
+                base: threat.base.unwrap_or(f64::NEG_INFINITY),
+                top: threat.top.unwrap_or(f64::INFINITY),
+                limited: threat.base.is_some() || threat.top.is_some(),
+            }),
+            Shape::Polygon(_) => Outline::Ring(threat.extent()),
+        };
+        let many = scenario.threats.len() > FEW_THREATS;
+        Self {
+            all: scenario.threats.iter().map(outline).collect(),
+            index: many.then(|| Index::of(scenario.threats.iter().map(Threat::extent))),
+        }
+    }
+}
+
+impl Pricer<'_> {
+    /// Add the exposure of each leg and how deep it enters threats.
+    #[inline(always)]
+    pub(super) fn threats<S: Simd>(
+        &self,
+        leg: &Leg<S>,
+        candidates: &mut Candidates,
+        exposure: &mut Lane<S>,
+        violation: &mut Lane<S>,
+    ) {
+        let Some(index) = &self.threats.index else {
+            for threat_idx in 0..self.threats.all.len() {
+                self.threat(threat_idx, leg, exposure, violation);
+            }
+            return;
+        };
+        // In the order of the request, so that sums are the same whoever the neighbours are.
+        index.find(
+            (0..S::F64_LANES).map(|lane| leg.segment(lane)),
+            &mut candidates.0,
+        );
+        for &threat_idx in &candidates.0 {
+            self.threat(threat_idx as usize, leg, exposure, violation);
+        }
+    }
+
+    #[inline(always)]
+    fn threat<S: Simd>(
+        &self,
+        threat_idx: usize,
+        leg: &Leg<S>,
+        exposure: &mut Lane<S>,
+        violation: &mut Lane<S>,
+    ) {
+        match &self.threats.all[threat_idx] {
+            Outline::Disc(disc) => self.disc(disc, leg, exposure, violation),
+            Outline::Ring(extent) => self.ring(threat_idx, extent, leg, exposure, violation),
+        }
+    }
+
+    #[inline(always)]
+    fn disc<S: Simd>(
+        &self,
+        disc: &Disc,
+        leg: &Leg<S>,
+        exposure: &mut Lane<S>,
+        violation: &mut Lane<S>,
+    ) {
+        let outline = &disc.outline;
+        let (zero, one) = (leg.splat(0.0), leg.splat(1.0));
+        let sight = leg.seen_from(outline.center);
+        let reach = leg.splat(outline.influence * outline.influence);
+        let near = sight.least_squared_distance(zero, one).le(reach);
+        if !near.any() {
+            return;
+        }
+        let window = disc.window(leg);
+        let near = near & window.some;
+        let nearest = sight.least_squared_distance(window.t0, window.t1).sqrt();
+        let depth = leg.splat(outline.radius) - nearest;
+        let entered = near & leg.splat(self.tolerance.length_m).lt(depth);
+        *violation = *violation + entered.keep(depth);
+        let crossed = match self.quadrature {
+            Quadrature::Integral if (!leg.moves).any() => leg.moves.select(
+                disc.exposure(leg, &window, &sight),
+                disc.hover_exposure(leg, &window, &sight),
+            ),
+            Quadrature::Integral => disc.exposure(leg, &window, &sight),
+            Quadrature::Paper => disc.sampled_exposure(leg, &sight),
+        };
+        *exposure = *exposure + near.keep(crossed);
+    }
+
+    /// A ring is rarely near; then it is left to the scalar code.
+    #[inline(always)]
+    fn ring<S: Simd>(
+        &self,
+        threat_idx: usize,
+        extent: &Rect,
+        leg: &Leg<S>,
+        exposure: &mut Lane<S>,
+        violation: &mut Lane<S>,
+    ) {
+        let overlap = leg.a.x.min(leg.b.x).le(leg.splat(extent.max.x))
+            & leg.splat(extent.min.x).le(leg.a.x.max(leg.b.x))
+            & leg.a.y.min(leg.b.y).le(leg.splat(extent.max.y))
+            & leg.splat(extent.min.y).le(leg.a.y.max(leg.b.y));
+        if !overlap.any() {
+            return;
+        }
+        let threat = &self.model.scenario.threats[threat_idx];
+        let mut depths = leg.splat(0.0);
+        let met = overlap.map(|lane| {
+            let segment = leg.segment(lane);
+            let encounter = threat.encounter(&segment);
+            let depth = encounter.clearance.map_or(0.0, |clearance| -clearance);
+            depths = depths.set(
+                lane,
+                if depth > self.tolerance.length_m {
+                    depth
+                } else {
+                    0.0
+                },
+            );
+            match self.quadrature {
+                Quadrature::Integral => encounter.exposure,
+                Quadrature::Paper => sampled_exposure(threat, &segment),
+            }
+        });
+        *exposure = *exposure + met;
+        *violation = *violation + depths;
+    }
+}
+
+impl Disc {
+    /// As `Segment::between_heights`.
+    #[inline(always)]
+    fn window<S: Simd>(&self, leg: &Leg<S>) -> Window<S> {
+        let (zero, one) = (leg.splat(0.0), leg.splat(1.0));
+        if !self.limited {
+            return Window {
+                t0: zero,
+                t1: one,
+                some: zero.le(one),
+            };
+        }
+        let (low, high) = (leg.a.z.min(leg.b.z), leg.a.z.max(leg.b.z));
+        let (base, top) = (leg.splat(self.base), leg.splat(self.top));
+        let some = low.lt(top) & base.le(high);
+        let at_base = (base - leg.a.z) / leg.dz;
+        let at_top = (top - leg.a.z) / leg.dz;
+        let (climbs, sinks) = (zero.lt(leg.dz), leg.dz.lt(zero));
+        let enter = climbs.select(at_base, sinks.select(at_top, zero)).max(zero);
+        let leave = climbs.select(at_top, sinks.select(at_base, one)).min(one);
+        Window {
+            t0: enter.min(one),
+            t1: leave.max(zero),
+            some: some & enter.le(leave),
+        }
+    }
+
+    /// As `Cylinder::exposure`, of legs that move. The difference of the two asinh is one
+    /// logarithm: with `d0`, `d1` the distances of the ends of a chord of length `c` from the axis,
+    /// the integral of `1 / d` along it is `ln((d0 + d1 + c) / (d0 + d1 - c))`.
+    #[inline(always)]
+    fn exposure<S: Simd>(&self, leg: &Leg<S>, window: &Window<S>, sight: &Sight<S>) -> Lane<S> {
+        let zero = leg.splat(0.0);
+        let influence = self.outline.influence;
+        let across = (sight.x * leg.dy - sight.y * leg.dx) / leg.level;
+        let across_square = across * across;
+        let half_square = leg.splat(influence * influence) - across_square;
+        let half_chord = half_square.max(zero).sqrt();
+        let s0 = ((window.t0 - sight.foot) * leg.level).max(-half_chord);
+        let s1 = ((window.t1 - sight.foot) * leg.level).min(half_chord);
+        let chord = s1 - s0;
+        let d0 = (across_square + s0 * s0).sqrt();
+        let d1 = (across_square + s1 * s1).sqrt();
+        let (over, under) = (d0 + d1 + chord, d0 + d1 - chord);
+        let logarithm = over.ln_over(under.max(over * (1.0 / LARGEST_QUOTIENT)));
+        let logarithm = leg
+            .splat(LEVEL)
+            .le(across.abs())
+            .keep(across_square * logarithm);
+        let integral = chord * influence - (s1 * d1 - s0 * d0 + logarithm) * 0.5;
+        (zero.lt(half_square) & s0.lt(s1)).keep(integral * (leg.length / leg.level))
+    }
+
+    /// As `exposure`, of legs that only climb.
+    #[inline(always)]
+    fn hover_exposure<S: Simd>(
+        &self,
+        leg: &Leg<S>,
+        window: &Window<S>,
+        sight: &Sight<S>,
+    ) -> Lane<S> {
+        let middle = (window.t0 + window.t1) * 0.5;
+        self.intensity(sight, middle) * leg.length * (window.t1 - window.t0)
+    }
+
+    /// As `cost::threat::sampled_exposure`.
+    #[inline(always)]
+    fn sampled_exposure<S: Simd>(&self, leg: &Leg<S>, sight: &Sight<S>) -> Lane<S> {
+        let mut sum = leg.splat(0.0);
+        for t in SAMPLES {
+            let z = leg.a.z + leg.dz * t;
+            let reached = leg.splat(self.base).le(z) & z.lt(leg.splat(self.top));
+            sum = sum + reached.keep(self.intensity(sight, leg.splat(t)));
+        }
+        sum * (1.0 / SAMPLES.len() as f64) * leg.length
+    }
+
+    /// `T(d)` of Eq. 5 at `t`, whatever the height.
+    #[inline(always)]
+    fn intensity<S: Simd>(&self, sight: &Sight<S>, t: Lane<S>) -> Lane<S> {
+        let distance = sight.squared_distance(t).sqrt();
+        (t.with(self.outline.influence) - distance).max(t.with(0.0))
+    }
+}

@@ -1,0 +1,245 @@
+//! Numbers side by side: the same arithmetic on as many as the processor takes at once.
+//!
+//! Every operation is one that IEEE 754 defines to the last bit (`+ - * /`, square root, comparison,
+//! selection), so that a lane holds the same bits whatever the width. Deliberately absent: fused
+//! multiplication, approximate reciprocals, anything that mixes lanes.
+
+mod elementary;
+
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+use pulp::Simd;
+
+/// Numbers in a [`Row`]; every width of the processor divides it.
+pub const LANES: usize = 8;
+
+/// The same figure of [`LANES`] things, in memory.
+pub type Row = [f64; LANES];
+
+/// So many numbers as `S` takes at once: a part of a [`Row`], in registers.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lane<S: Simd> {
+    simd: S,
+    values: S::f64s,
+}
+
+/// A condition on each number of a [`Lane`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Mask<S: Simd> {
+    simd: S,
+    values: S::m64s,
+}
+
+/// How many parts `S` takes a [`Row`] in.
+#[inline(always)]
+pub(crate) fn parts<S: Simd>() -> usize {
+    LANES / S::F64_LANES
+}
+
+impl<S: Simd> Lane<S> {
+    /// `value` in every lane.
+    #[inline(always)]
+    pub(crate) fn splat(simd: S, value: f64) -> Self {
+        Self {
+            simd,
+            values: simd.splat_f64s(value),
+        }
+    }
+
+    /// Part `part` of `row`.
+    #[inline(always)]
+    pub(crate) fn load(simd: S, row: &Row, part: usize) -> Self {
+        Self {
+            simd,
+            values: S::as_simd_f64s(row).0[part],
+        }
+    }
+
+    /// Write it to part `part` of `row`.
+    #[inline(always)]
+    pub(crate) fn store(self, row: &mut Row, part: usize) {
+        S::as_mut_simd_f64s(row).0[part] = self.values;
+    }
+
+    /// `value` in as many lanes as this has.
+    #[inline(always)]
+    pub(crate) fn with(self, value: f64) -> Self {
+        Self::splat(self.simd, value)
+    }
+
+    /// One number at a time, where there is no better way.
+    #[inline(always)]
+    pub(crate) fn map(self, mut each: impl FnMut(usize, f64) -> f64) -> Self {
+        let mut row = [0.0; LANES];
+        self.store(&mut row, 0);
+        for (lane, value) in row[..S::F64_LANES].iter_mut().enumerate() {
+            *value = each(lane, *value);
+        }
+        Self::load(self.simd, &row, 0)
+    }
+
+    /// With `value` in one lane.
+    #[inline(always)]
+    pub(crate) fn set(self, lane: usize, value: f64) -> Self {
+        self.map(|own, old| if own == lane { value } else { old })
+    }
+
+    #[inline(always)]
+    pub(crate) fn sqrt(self) -> Self {
+        Self {
+            values: self.simd.sqrt_f64s(self.values),
+            ..self
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn abs(self) -> Self {
+        Self {
+            values: self.simd.abs_f64s(self.values),
+            ..self
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn lt(self, other: Self) -> Mask<S> {
+        Mask {
+            simd: self.simd,
+            values: self.simd.less_than_f64s(self.values, other.values),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn le(self, other: Self) -> Mask<S> {
+        Mask {
+            simd: self.simd,
+            values: self.simd.less_than_or_equal_f64s(self.values, other.values),
+        }
+    }
+
+    /// The lesser; `other` where either is not a number.
+    #[inline(always)]
+    pub(crate) fn min(self, other: Self) -> Self {
+        self.lt(other).select(self, other)
+    }
+
+    /// The greater; `other` where either is not a number.
+    #[inline(always)]
+    pub(crate) fn max(self, other: Self) -> Self {
+        other.lt(self).select(self, other)
+    }
+
+    /// Brought into `[low, high]`; `low` where it is not a number.
+    #[inline(always)]
+    pub(crate) fn clamp(self, low: Self, high: Self) -> Self {
+        self.max(low).min(high)
+    }
+}
+
+impl<S: Simd> Mask<S> {
+    /// `yes` where it holds, elsewhere `no`.
+    #[inline(always)]
+    pub(crate) fn select(self, yes: Lane<S>, no: Lane<S>) -> Lane<S> {
+        Lane {
+            simd: self.simd,
+            values: self.simd.select_f64s(self.values, yes.values, no.values),
+        }
+    }
+
+    /// `yes` where it holds, elsewhere 0.
+    #[inline(always)]
+    pub(crate) fn keep(self, yes: Lane<S>) -> Lane<S> {
+        self.select(yes, yes.with(0.0))
+    }
+
+    /// Whether it holds in any lane.
+    #[inline(always)]
+    pub(crate) fn any(self) -> bool {
+        self.simd.first_true_m64s(self.values) < S::F64_LANES
+    }
+
+    /// `each` of the lanes in which it holds, elsewhere 0.
+    #[inline(always)]
+    pub(crate) fn map(self, mut each: impl FnMut(usize) -> f64) -> Lane<S> {
+        let one = Lane::splat(self.simd, 1.0);
+        self.keep(one)
+            .map(|lane, holds| if holds > 0.0 { each(lane) } else { 0.0 })
+    }
+}
+
+impl<S: Simd> BitAnd for Mask<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        Self {
+            values: self.simd.and_m64s(self.values, other.values),
+            ..self
+        }
+    }
+}
+
+impl<S: Simd> BitOr for Mask<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitor(self, other: Self) -> Self {
+        Self {
+            values: self.simd.or_m64s(self.values, other.values),
+            ..self
+        }
+    }
+}
+
+impl<S: Simd> Not for Mask<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self {
+            values: self.simd.not_m64s(self.values),
+            ..self
+        }
+    }
+}
+
+impl<S: Simd> Neg for Lane<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self {
+            values: self.simd.neg_f64s(self.values),
+            ..self
+        }
+    }
+}
+
+macro_rules! operator {
+    ($operator:ident, $method:ident, $simd_method:ident) => {
+        impl<S: Simd> $operator for Lane<S> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self {
+                    values: self.simd.$simd_method(self.values, other.values),
+                    ..self
+                }
+            }
+        }
+
+        impl<S: Simd> $operator<f64> for Lane<S> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: f64) -> Self {
+                self.$method(self.with(other))
+            }
+        }
+    };
+}
+
+operator!(Add, add, add_f64s);
+operator!(Sub, sub, sub_f64s);
+operator!(Mul, mul, mul_f64s);
+operator!(Div, div, div_f64s);

@@ -1,0 +1,54 @@
+//! `planner.warm_start.plan_id`: a stored plan's waypoints in place of its id, so that what is
+//! planned depends on the accepted document alone.
+
+use serde::Deserialize;
+
+use super::AppState;
+use super::problem::Problem;
+use crate::geometry::Point3;
+use crate::job::PlanId;
+use crate::scenario::json::Fault;
+use crate::scenario::{Scenario, WarmStart};
+use crate::store::StoreError;
+
+/// The part of a result document that counts here.
+#[derive(Deserialize)]
+struct Route {
+    waypoints: Vec<Waypoint>,
+}
+
+#[derive(Deserialize)]
+struct Waypoint {
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+/// Put the waypoints of the plan that `scenario` starts from into it.
+///
+/// # Errors
+/// An invalid scenario when that plan is not there or has no route yet.
+pub(super) async fn resolve(state: &AppState, scenario: &mut Scenario) -> Result<(), Problem> {
+    let Some(WarmStart::Plan(id)) = &scenario.planner.warm_start else {
+        return Ok(());
+    };
+    let unknown = |why| Problem::InvalidScenario(vec![Fault::unknown_plan(id, why)]);
+    let plan: PlanId = id
+        .parse()
+        .map_err(|_| unknown("must be the id of a plan, a UUID"))?;
+    let result = match state.store.result(plan).await {
+        Ok(result) => result.ok_or_else(|| unknown("that plan has no route yet"))?,
+        Err(StoreError::NotFound(_) | StoreError::Gone(_)) => {
+            return Err(unknown("no plan has this id"));
+        }
+        Err(error) => return Err(error.into()),
+    };
+    let route: Route = serde_json::from_str(&result).map_err(|error| {
+        tracing::error!(%plan, %error, "a stored result cannot be read");
+        Problem::Internal
+    })?;
+    let points = route.waypoints.iter();
+    let points = points.map(|point| Point3::new(point.x, point.y, point.z));
+    scenario.planner.warm_start = Some(WarmStart::Waypoints(points.collect()));
+    Ok(())
+}

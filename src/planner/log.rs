@@ -1,0 +1,104 @@
+//! The curve of a run and its best route so far.
+
+use super::price::price;
+use super::{ConvergencePoint, Incumbent, Observer, Stop};
+use crate::cost::Model;
+use crate::geometry::Point3;
+use crate::optimizer::{Fitness, Swarm};
+
+/// What a run tells, and what it will deliver.
+pub(super) struct Log<'o> {
+    model: &'o Model<'o>,
+    observer: &'o mut dyn Observer,
+    pub(super) stop: &'o dyn Stop,
+    pub(super) convergence: Vec<ConvergencePoint>,
+    /// Start, free waypoints, target.
+    pub(super) route: Vec<Point3>,
+    pub(super) best: Fitness,
+    /// The last route that the observer was told.
+    told: Option<Vec<Point3>>,
+    /// Routes priced so far.
+    pub(super) evaluations: u64,
+}
+
+impl<'o> Log<'o> {
+    pub(super) fn new(
+        model: &'o Model<'o>,
+        observer: &'o mut dyn Observer,
+        stop: &'o dyn Stop,
+    ) -> Self {
+        Self {
+            model,
+            observer,
+            stop,
+            convergence: Vec::new(),
+            route: Vec::new(),
+            best: Fitness::WORST,
+            told: None,
+            evaluations: 0,
+        }
+    }
+
+    /// Keep `route` if it is the best so far; whether it is.
+    pub(super) fn offer(&mut self, route: &[Point3], fitness: Fitness) -> bool {
+        let better = self.route.is_empty() || fitness.beats(&self.best);
+        if better {
+            self.route = route.to_vec();
+            self.best = fitness;
+        }
+        better
+    }
+
+    /// As [`Log::offer`], of a route that is not priced yet.
+    pub(super) fn offer_unpriced(&mut self, route: &[Point3]) -> bool {
+        self.evaluations += 1;
+        self.offer(route, price(self.model, route))
+    }
+
+    /// A point of the curve: the best so far, and how `swarm` fares.
+    pub(super) fn point(&mut self, iteration: usize, swarm: &Swarm) {
+        let members = swarm
+            .fitness()
+            .iter()
+            .filter(|fitness| fitness.cost.is_finite());
+        let count = members.clone().count() as f64;
+        let mean_cost = members.clone().map(|fitness| fitness.cost).sum::<f64>() / count;
+        let feasible = members.filter(|fitness| fitness.is_feasible()).count() as f64;
+        self.record(iteration, mean_cost, feasible / count);
+    }
+
+    /// One point more of the last iteration: what came after it.
+    pub(super) fn last_point(&mut self) {
+        let Some(&last) = self.convergence.last() else {
+            return;
+        };
+        self.record(last.iteration, last.mean_cost, last.feasible_fraction);
+    }
+
+    fn record(&mut self, iteration: usize, mean_cost: f64, feasible_fraction: f64) {
+        let elapsed_ms = self.stop.elapsed_ms();
+        let best = self.best;
+        let last = self.told.as_ref();
+        if last != Some(&self.route) {
+            self.observer.incumbent(&Incumbent {
+                iteration,
+                elapsed_ms,
+                cost: best.cost,
+                feasible: best.is_feasible(),
+                waypoints: self.route.clone(),
+            });
+            self.told = Some(self.route.clone());
+        }
+        let point = ConvergencePoint {
+            iteration,
+            evaluations: self.evaluations,
+            elapsed_ms,
+            best_cost: best.is_feasible().then_some(best.cost),
+            best_violation: best.violation,
+            mean_cost,
+            feasible_fraction,
+        };
+        self.observer.iteration(&point);
+        self.convergence.push(point);
+    }
+}

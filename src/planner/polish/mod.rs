@@ -1,0 +1,63 @@
+//! Makes a good route better, to the last metre: descent on a lattice that shrinks.
+
+mod lattice;
+
+use super::price::price;
+use super::{Stop, why_stop};
+use crate::cost::Model;
+use crate::geometry::Point3;
+use crate::optimizer::Fitness;
+use lattice::Lattice;
+
+/// A gain below this share of the cost is none.
+const GAIN: f64 = 1e-7;
+
+/// Polishes routes of one scenario.
+pub(super) struct Polish<'m, 's> {
+    lattice: Lattice<'m, 's>,
+    model: &'m Model<'s>,
+    stop: &'m dyn Stop,
+}
+
+impl<'m, 's> Polish<'m, 's> {
+    pub(super) fn new(model: &'m Model<'s>, stop: &'m dyn Stop) -> Self {
+        Self {
+            lattice: Lattice::new(model),
+            model,
+            stop,
+        }
+    }
+
+    /// What was priced, in routes of so many free waypoints.
+    pub(super) fn evaluations(&self, waypoints: usize) -> u64 {
+        self.lattice.legs_priced.div_ceil(waypoints as u64 + 1)
+    }
+
+    /// Improve `route` by steps that shrink from the share `from` of the way to the share `to`.
+    pub(super) fn descend(&mut self, route: &mut Vec<Point3>, from: f64, to: f64) -> Fitness {
+        let scenario = self.model.scenario;
+        let way = (scenario.target - scenario.start).norm();
+        let mut best = price(self.model, route);
+        let (mut step, mut kind, mut failed) = (from * way, 0, 0);
+        while step > to * way && why_stop(scenario, self.stop).is_none() {
+            let mut trial = route.clone();
+            let mut better = false;
+            if self.lattice.sweep(&mut trial, step, kind) {
+                let exact = price(self.model, &trial);
+                if exact.beats(&best) {
+                    better = exact.violation < best.violation
+                        || best.cost - exact.cost > GAIN * best.cost;
+                    best = exact;
+                    *route = trial;
+                }
+            }
+            kind += 1;
+            failed = if better { 0 } else { failed + 1 };
+            if failed >= 2 {
+                step *= 0.5;
+                failed = 0;
+            }
+        }
+        best
+    }
+}

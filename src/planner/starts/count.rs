@@ -1,0 +1,154 @@
+//! Routes of as many waypoints as asked for: spare ones are spread along the legs, surplus ones
+//! left out.
+
+use crate::cost::Model;
+use crate::geometry::{LEVEL, Point3};
+use crate::optimizer::Fitness;
+use crate::planner::price::price;
+
+/// Costs nearer than this are the same.
+const NOTHING: f64 = 1e-9;
+
+/// `route` with exactly `waypoints` free waypoints.
+pub(in crate::planner) fn with_waypoints(
+    model: &Model,
+    mut route: Vec<Point3>,
+    waypoints: usize,
+) -> Vec<Point3> {
+    while route.len() > waypoints + 2 {
+        leave_out(model, &mut route);
+    }
+    let mut splits: Vec<Split> = route
+        .windows(2)
+        .map(|ends| Split::of(model, ends[0], ends[1]))
+        .collect();
+    while route.len() < waypoints + 2 {
+        let best = (0..splits.len())
+            .min_by(|&a, &b| splits[a].rank(&splits[b]).then(a.cmp(&b)))
+            .expect("a route has a leg");
+        route.insert(best + 1, splits[best].at);
+        let (before, at, after) = (route[best], route[best + 1], route[best + 2]);
+        splits.splice(
+            best..=best,
+            [Split::of(model, before, at), Split::of(model, at, after)],
+        );
+    }
+    route
+}
+
+/// Where a leg is best split.
+struct Split {
+    at: Point3,
+    /// What it adds.
+    added: Fitness,
+    /// Of the leg.
+    length: f64,
+}
+
+impl Split {
+    fn of(model: &Model, a: Point3, b: Point3) -> Self {
+        let tolerance = model.tolerance.scaled(0.5);
+        let length = (b - a).norm();
+        let least = (model.scenario.vehicle.min_leg / length * (1.0 + 1e-6)).min(0.5);
+        let at = |share: f64| {
+            let at = a + (b - a) * share;
+            let own = model.waypoint(at, tolerance);
+            let short = |share: f64| (model.scenario.vehicle.min_leg - share * length).max(0.0);
+            let violation = own.0 + short(share) + short(1.0 - share);
+            Self {
+                at,
+                added: Fitness {
+                    violation,
+                    cost: own.1,
+                },
+                length,
+            }
+        };
+        // The middle, unless an end is nearer to the middle of the band.
+        [0.5, least, 1.0 - least]
+            .map(at)
+            .into_iter()
+            .reduce(|best, next| {
+                if next.added.cost < best.added.cost - NOTHING {
+                    next
+                } else {
+                    best
+                }
+            })
+            .expect("three places")
+    }
+
+    fn rank(&self, other: &Self) -> std::cmp::Ordering {
+        let cost = |split: &Self| (split.added.cost / NOTHING).round();
+        self.added
+            .violation
+            .total_cmp(&other.added.violation)
+            .then(cost(self).total_cmp(&cost(other)))
+            .then(other.length.total_cmp(&self.length))
+    }
+}
+
+/// Leave out the waypoint that is missed least, or put one in place of two.
+fn leave_out(model: &Model, route: &mut Vec<Point3>) {
+    let count = route.len();
+    let mut best: Option<(Fitness, usize, Option<Point3>)> = None;
+    let mut consider = |price: Fitness, idx: usize, instead: Option<Point3>| {
+        if best.as_ref().is_none_or(|(least, ..)| price.beats(least)) {
+            best = Some((price, idx, instead));
+        }
+    };
+    for idx in 1..count - 1 {
+        let before = idx.saturating_sub(2);
+        let after = (idx + 3).min(count);
+        let without: Vec<Point3> = (before..after)
+            .filter(|&other| other != idx)
+            .map(|other| route[other])
+            .collect();
+        consider(change(model, &route[before..after], &without), idx, None);
+        if idx + 2 < count
+            && let Some(corner) =
+                crossing(route[idx - 1], route[idx], route[idx + 1], route[idx + 2])
+        {
+            let after = (idx + 4).min(count);
+            let with: Vec<Point3> = (before..after)
+                .filter(|&other| other != idx + 1)
+                .map(|other| if other == idx { corner } else { route[other] })
+                .collect();
+            consider(
+                change(model, &route[before..after], &with),
+                idx,
+                Some(corner),
+            );
+        }
+    }
+    let (_, idx, instead) = best.expect("there is a waypoint to leave out");
+    route.remove(idx);
+    if let Some(corner) = instead {
+        route[idx] = corner;
+    }
+}
+
+/// What it changes to fly `new` in place of `old`.
+fn change(model: &Model, old: &[Point3], new: &[Point3]) -> Fitness {
+    let (old, new) = (price(model, old), price(model, new));
+    Fitness {
+        violation: new.violation - old.violation,
+        cost: new.cost - old.cost,
+    }
+}
+
+/// Where the leg from `a` to `b`, flown on, meets that from `c` to `d`, flown back.
+fn crossing(a: Point3, b: Point3, c: Point3, d: Point3) -> Option<Point3> {
+    let (ahead, back, gap) = (b.xy() - a.xy(), c.xy() - d.xy(), c.xy() - b.xy());
+    let area = ahead.perp(&back);
+    if area.abs() < LEVEL * (ahead.norm() + back.norm()) {
+        return None;
+    }
+    // b + ahead s = c + back t
+    let (s, t) = (gap.perp(&back) / area, gap.perp(&ahead) / area);
+    if s < 0.0 || t < 0.0 || s * ahead.norm() > 10.0 * gap.norm() {
+        return None;
+    }
+    let at = b.xy() + ahead * s;
+    Some(Point3::new(at.x, at.y, 0.5 * (b.z + c.z)))
+}

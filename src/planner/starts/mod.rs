@@ -1,0 +1,177 @@
+//! Routes to start from: along taut strings round the threats, and along a route that is known.
+
+mod count;
+mod known;
+mod over;
+mod tangents;
+
+pub(super) use count::with_waypoints;
+
+use super::polish::Polish;
+use super::price::price;
+use super::{Stop, same};
+use crate::cost::Model;
+use crate::geometry::{Point2, Point3};
+use crate::optimizer::Fitness;
+use crate::scenario::{Scenario, Seeding, WarmStart};
+use crate::seeding::{Obstacles, Outline, TautString, steep_ground, taut_strings};
+use crate::terrain::Terrain;
+use crate::threat::Threat;
+
+/// Strings taken from each scene of obstacles.
+const STRINGS: usize = 5;
+
+/// Routes to start from at most.
+const STARTS: usize = 8;
+
+/// Free waypoints of a coarse route, unless its bends ask for more.
+const COARSE: usize = 4;
+
+/// A start this much dearer than the best, as a share, is not worth refining.
+const HOPELESS: f64 = 0.25;
+
+/// Where a search starts.
+pub(super) struct Starts {
+    /// Best first, all with as many waypoints.
+    pub(super) routes: Vec<Vec<Point3>>,
+    /// Routes priced on the way.
+    pub(super) evaluations: u64,
+}
+
+/// Where the search of `model` starts; `None` for the algorithm alone.
+pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
+    let settings = &model.scenario.planner;
+    let mut shapes = match settings.seeding {
+        Seeding::Random => Vec::new(),
+        Seeding::Tangent => along_strings(model),
+    };
+    if let Some(WarmStart::Waypoints(points)) = &settings.warm_start {
+        shapes.insert(0, known::route(model, points));
+    }
+    if shapes.is_empty() {
+        return None;
+    }
+    // A known route keeps its bends; a string needs but as many waypoints as it has.
+    let coarse = match settings.warm_start {
+        Some(_) => settings.waypoints,
+        None => least_bends(model, &shapes)
+            .max(COARSE)
+            .min(settings.waypoints),
+    };
+    let mut starts = Starts {
+        routes: Vec::new(),
+        evaluations: 0,
+    };
+    let mut priced: Vec<(Fitness, Vec<Point3>)> = Vec::new();
+    for shape in shapes {
+        let route = with_waypoints(model, shape, coarse);
+        if !priced
+            .iter()
+            .any(|(_, other)| same(model.scenario, &route, other))
+        {
+            starts.evaluations += 1;
+            priced.push((price(model, &route), route));
+        }
+    }
+    priced.sort_by(|one, other| one.0.rank(&other.0));
+    priced.truncate(STARTS);
+    if settings.polish {
+        refine(model, &mut priced, stop, &mut starts.evaluations);
+    }
+    starts.routes = priced.into_iter().map(|(_, route)| route).collect();
+    Some(starts)
+}
+
+/// Pull the routes that may still win roughly into place.
+fn refine(
+    model: &Model,
+    priced: &mut [(Fitness, Vec<Point3>)],
+    stop: &dyn Stop,
+    evaluations: &mut u64,
+) {
+    let mut polish = Polish::new(model, stop);
+    let mut best = Fitness::WORST;
+    for (fitness, route) in priced.iter_mut() {
+        if fitness.violation <= best.violation && fitness.cost > best.cost * (1.0 + HOPELESS) {
+            continue;
+        }
+        *fitness = polish.descend(route, 0.03, 0.005);
+        if fitness.beats(&best) {
+            best = *fitness;
+        }
+    }
+    *evaluations += polish.evaluations(priced.first().map_or(0, |(_, route)| route.len() - 2));
+    priced.sort_by(|one, other| one.0.rank(&other.0));
+}
+
+/// Bends of the route that costs least as it is.
+fn least_bends(model: &Model, shapes: &[Vec<Point3>]) -> usize {
+    shapes
+        .iter()
+        .min_by(|one, other| price(model, one).rank(&price(model, other)))
+        .map_or(0, |route| route.len() - 2)
+}
+
+/// Routes with as few waypoints as each needs, along the taut strings of several scenes: round the
+/// soft zones, round the threats alone, over those that can be overflown, round steep ground.
+fn along_strings(model: &Model) -> Vec<Vec<Point3>> {
+    let scenario = model.scenario;
+    let everything = |_: usize, _: &Threat| true;
+    let in_the_way = |_: usize, threat: &Threat| !over::passable(scenario, threat);
+    let mut shapes = Vec::new();
+    let mut follow = |obstacles: &Obstacles| {
+        for string in taut_strings(obstacles, STRINGS).strings {
+            shapes.push(along(model, &string));
+        }
+    };
+    follow(&Obstacles::soft(scenario, everything));
+    follow(&Obstacles::hard(scenario, everything));
+    if scenario
+        .threats
+        .iter()
+        .any(|threat| over::passable(scenario, threat))
+    {
+        follow(&Obstacles::soft(scenario, in_the_way));
+        follow(&Obstacles::hard(scenario, in_the_way));
+    }
+    if !matches!(scenario.terrain, Terrain::Flat(_)) {
+        let steep = steep_ground(scenario);
+        if !steep.is_empty() {
+            let outlines = scenario.threats.iter().map(Outline::soft).chain(steep);
+            let ends = [scenario.start.xy(), scenario.target.xy()];
+            follow(&Obstacles::new(
+                outlines.map(Some),
+                ends,
+                Some(scenario.area),
+            ));
+        }
+    }
+    // Straight ahead, for when crossing soft zones is worth it.
+    shapes.push(vec![scenario.start, scenario.target]);
+    shapes
+}
+
+/// The route along `string`, in the middle of the band where it can be reached.
+fn along(model: &Model, string: &TautString) -> Vec<Point3> {
+    let scenario = model.scenario;
+    let corners = tangents::corners(scenario, string, scenario.planner.waypoints.min(COARSE));
+    let mut route = vec![scenario.start];
+    route.extend(corners.iter().map(|&corner| lifted(scenario, corner)));
+    route.push(scenario.target);
+    over::lift(model, &mut route);
+    route
+}
+
+/// `point` in the middle of the band, or as near to it as the vehicle can climb from the start and
+/// to the target.
+fn lifted(scenario: &Scenario, point: Point2) -> Point3 {
+    let band = scenario.altitude;
+    let point = scenario.area.nearest(point);
+    let steepest = libm::tan(scenario.vehicle.max_climb_deg.to_radians()) * (1.0 - 1e-9);
+    let mut z = scenario.terrain.elevation(point) + 0.5 * (band.min + band.max);
+    for end in [scenario.start, scenario.target] {
+        let reach = (point - end.xy()).norm() * steepest;
+        z = z.clamp(end.z - reach, end.z + reach);
+    }
+    Point3::new(point.x, point.y, z)
+}

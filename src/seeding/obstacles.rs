@@ -1,0 +1,465 @@
+//! What a string seen from above must go round: discs, and rings widened by a radius.
+//!
+//! A ring is one capsule for each edge. Its inside cannot be reached without crossing an edge, so
+//! that only a ring that is not widened at all needs a look at its inside.
+
+use nalgebra::Vector2;
+use rstar::primitives::{GeomWithData, Rectangle};
+use rstar::{AABB, RTree};
+
+use super::arc::{Arc, crossing, point_segment, segment_segment};
+use crate::geometry::{Point2, Rect};
+use crate::scenario::Scenario;
+use crate::threat::{Shape, Threat};
+
+/// What is looked through one by one; beyond it a tree is built.
+const FEW_BODIES: usize = 24;
+
+/// Touching is not entering: bodies count as smaller by this share of the scene's extent.
+const TOUCH: f64 = 1e-9;
+
+/// Something to go round.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outline {
+    /// Its shape seen from above.
+    pub shape: OutlineShape,
+    /// Metres by which the shape is widened: the radius of a disc.
+    pub radius: f64,
+    /// Never made smaller than this where an end of the way lies within; an end within the core
+    /// itself means that the obstacle is none at that height, and it is left out.
+    pub core: f64,
+}
+
+/// The shape of an [`Outline`] before it is widened.
+#[derive(Debug, Clone, PartialEq)]
+pub enum OutlineShape {
+    /// A disc round this point.
+    Disc(Point2),
+    /// A simple ring, inside included.
+    Ring(Vec<Point2>),
+}
+
+impl Outline {
+    /// The hard part of `threat`.
+    #[must_use]
+    pub fn hard(threat: &Threat) -> Self {
+        match &threat.shape {
+            Shape::Cylinder(cylinder) => Self {
+                shape: OutlineShape::Disc(cylinder.center),
+                radius: cylinder.radius,
+                core: cylinder.radius,
+            },
+            Shape::Polygon(polygon) => Self {
+                shape: OutlineShape::Ring(polygon.vertices().to_vec()),
+                radius: 0.0,
+                core: 0.0,
+            },
+        }
+    }
+
+    /// `threat` with its whole soft zone.
+    #[must_use]
+    pub fn soft(threat: &Threat) -> Self {
+        let radius = match &threat.shape {
+            Shape::Cylinder(cylinder) => cylinder.influence,
+            Shape::Polygon(polygon) => polygon.margin(),
+        };
+        Self {
+            radius,
+            ..Self::hard(threat)
+        }
+    }
+
+    /// Distance of `point` to the shape before it is widened, metres; 0 within a ring.
+    #[must_use]
+    pub fn distance(&self, point: Point2) -> f64 {
+        match &self.shape {
+            OutlineShape::Disc(center) => (point - center).norm(),
+            OutlineShape::Ring(ring) => {
+                if ring_contains(ring, point) {
+                    0.0
+                } else {
+                    ring_distance(ring, point)
+                }
+            }
+        }
+    }
+}
+
+/// A scene of obstacles between two ends.
+#[derive(Debug, Clone)]
+pub struct Obstacles {
+    pub(super) ends: [Point2; 2],
+    pub(super) bodies: Vec<Body>,
+    pub(super) corners: Vec<Corner>,
+    /// By index of the outline, where its corners are; those of outlines left out are empty.
+    pub(super) corners_of: Vec<std::ops::Range<usize>>,
+    rings: Vec<Ring>,
+    tree: Option<RTree<Entry>>,
+    pub(super) area: Option<Rect>,
+    /// Metres by which a body may be touched.
+    pub(super) touch: f64,
+}
+
+type Entry = GeomWithData<Rectangle<[f64; 2]>, usize>;
+
+/// A capsule: all points within `radius` of the segment from `a` to `b`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Body {
+    pub(super) a: Point2,
+    pub(super) b: Point2,
+    pub(super) radius: f64,
+    /// Index of the outline.
+    pub(super) outline: usize,
+}
+
+/// A circle round which a string may bend.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Corner {
+    pub(super) center: Point2,
+    pub(super) radius: f64,
+    /// The bodies that it belongs to; twice the same for a disc.
+    pub(super) bodies: [usize; 2],
+    /// Unit vectors along the edges that meet at the corner of a ring.
+    pub(super) edges: Option<[Vector2<f64>; 2]>,
+    /// Index of the outline.
+    pub(super) outline: usize,
+}
+
+/// A ring that is not widened, so that a string could slip in through a corner.
+#[derive(Debug, Clone)]
+struct Ring {
+    vertices: Vec<Point2>,
+    extent: Rect,
+    outline: usize,
+}
+
+impl Obstacles {
+    /// The hard parts of the threats of `scenario` that `counts` picks, by index, between its start
+    /// and its target. A string may bend only inside the area.
+    #[must_use]
+    pub fn hard(scenario: &Scenario, counts: impl Fn(usize, &Threat) -> bool) -> Self {
+        Self::of(scenario, counts, Outline::hard)
+    }
+
+    /// As [`Obstacles::hard`], the threats widened by their soft zones, but not over an end of the
+    /// way.
+    #[must_use]
+    pub fn soft(scenario: &Scenario, counts: impl Fn(usize, &Threat) -> bool) -> Self {
+        Self::of(scenario, counts, Outline::soft)
+    }
+
+    /// As [`Obstacles::hard`], each threat by an outline of the caller's making.
+    #[must_use]
+    pub fn of(
+        scenario: &Scenario,
+        counts: impl Fn(usize, &Threat) -> bool,
+        outline: impl Fn(&Threat) -> Outline,
+    ) -> Self {
+        let outlines = scenario
+            .threats
+            .iter()
+            .enumerate()
+            .map(|(idx, threat)| counts(idx, threat).then(|| outline(threat)));
+        Self::new(
+            outlines,
+            [scenario.start.xy(), scenario.target.xy()],
+            Some(scenario.area),
+        )
+    }
+
+    /// `outlines` (`None` leaves one out but keeps the numbers of the others) between two ends. An
+    /// outline that reaches over an end is made smaller, down to its core. Strings bend inside
+    /// `area` alone, if there is one.
+    #[must_use]
+    pub fn new(
+        outlines: impl IntoIterator<Item = Option<Outline>>,
+        ends: [Point2; 2],
+        area: Option<Rect>,
+    ) -> Self {
+        let outlines: Vec<Option<Outline>> = outlines.into_iter().collect();
+        let extent = outlines.iter().flatten().flat_map(|outline| {
+            let points: &[Point2] = match &outline.shape {
+                OutlineShape::Disc(center) => std::slice::from_ref(center),
+                OutlineShape::Ring(ring) => ring,
+            };
+            points.iter().copied()
+        });
+        let extent = Rect::around(extent.chain(ends)).expect("there are two ends");
+        let mut scene = Self {
+            ends,
+            bodies: Vec::new(),
+            corners: Vec::new(),
+            corners_of: Vec::new(),
+            rings: Vec::new(),
+            tree: None,
+            area,
+            touch: TOUCH * extent.diagonal().max(1.0),
+        };
+        for (idx, outline) in outlines.into_iter().enumerate() {
+            let first = scene.corners.len();
+            if let Some(outline) = outline {
+                scene.add(idx, outline);
+            }
+            scene.corners_of.push(first..scene.corners.len());
+        }
+        if scene.bodies.len() > FEW_BODIES {
+            let entries = scene.bodies.iter().enumerate().map(|(idx, body)| {
+                let (low, high) = body.corners();
+                GeomWithData::new(Rectangle::from_corners(low, high), idx)
+            });
+            scene.tree = Some(RTree::bulk_load(entries.collect()));
+        }
+        scene
+    }
+
+    fn add(&mut self, idx: usize, outline: Outline) {
+        let distances = self.ends.map(|end| outline.distance(end));
+        let nearest = distances[0].min(distances[1]);
+        if nearest < outline.core - self.touch {
+            return;
+        }
+        if let OutlineShape::Ring(ring) = &outline.shape
+            && self
+                .ends
+                .iter()
+                .any(|end| ring_contains(ring, *end) && ring_distance(ring, *end) > self.touch)
+        {
+            return;
+        }
+        let radius = outline.radius.min(nearest);
+        match outline.shape {
+            OutlineShape::Disc(center) => self.add_disc(idx, center, radius),
+            OutlineShape::Ring(ring) => self.add_ring(idx, ring, radius),
+        }
+    }
+
+    fn add_disc(&mut self, outline: usize, center: Point2, radius: f64) {
+        if radius <= self.touch {
+            return;
+        }
+        let body = self.bodies.len();
+        self.bodies.push(Body {
+            a: center,
+            b: center,
+            radius,
+            outline,
+        });
+        self.corners.push(Corner {
+            center,
+            radius,
+            bodies: [body; 2],
+            edges: None,
+            outline,
+        });
+    }
+
+    fn add_ring(&mut self, outline: usize, mut ring: Vec<Point2>, radius: f64) {
+        ring.dedup();
+        if ring.len() > 1 && ring.first() == ring.last() {
+            ring.pop();
+        }
+        let count = ring.len();
+        let first_body = self.bodies.len();
+        let twice_area: f64 = (0..count)
+            .map(|i| ring[i].coords.perp(&ring[(i + 1) % count].coords))
+            .sum();
+        for i in 0..count {
+            let (a, b) = (ring[i], ring[(i + 1) % count]);
+            self.bodies.push(Body {
+                a,
+                b,
+                radius,
+                outline,
+            });
+            let before = ring[(i + count - 1) % count];
+            let edges = [(before - a).normalize(), (b - a).normalize()];
+            // A string never bends round a corner that points inwards.
+            if count == 2 || edges[1].perp(&edges[0]) * twice_area > 0.0 {
+                self.corners.push(Corner {
+                    center: a,
+                    radius,
+                    bodies: [first_body + (i + count - 1) % count, first_body + i],
+                    edges: Some(edges),
+                    outline,
+                });
+            }
+        }
+        if radius <= self.touch {
+            let extent = Rect::around(ring.iter().copied()).expect("a ring has vertices");
+            self.rings.push(Ring {
+                vertices: ring,
+                extent,
+                outline,
+            });
+        }
+    }
+
+    /// A body that the straight way from `a` to `b` enters, the bodies `own` apart; the index of
+    /// its outline.
+    pub(super) fn blocks_segment(&self, a: Point2, b: Point2, own: &[usize]) -> Option<usize> {
+        let low = [a.x.min(b.x), a.y.min(b.y)];
+        let high = [a.x.max(b.x), a.y.max(b.y)];
+        self.first_of(low, high, own, |body| {
+            if body.radius > self.touch {
+                let distance = if body.a == body.b {
+                    point_segment(body.a, a, b)
+                } else {
+                    segment_segment((a, b), (body.a, body.b))
+                };
+                distance < body.radius - self.touch
+            } else {
+                self.crosses((a, b), (body.a, body.b))
+            }
+        })
+        .or_else(|| self.slips_into_ring(a, b))
+    }
+
+    /// A body that `arc` enters, its own bodies apart; the index of its outline.
+    pub(super) fn blocks_arc(&self, arc: &Arc, own: &[usize]) -> Option<usize> {
+        if arc.length() <= 0.0 {
+            return None;
+        }
+        let (center, radius) = (arc.on.center, arc.on.radius);
+        let low = [center.x - radius, center.y - radius];
+        let high = [center.x + radius, center.y + radius];
+        self.first_of(low, high, own, |body| {
+            let distance = if body.a == body.b {
+                arc.distance_to(body.a)
+            } else {
+                arc.distance_to_segment(body.a, body.b)
+            };
+            // An edge without width is not crossed either: the ring's inside is beyond it.
+            distance < body.radius - self.touch
+                || (body.radius <= self.touch && distance <= 0.0 && !touches(arc, body, self.touch))
+        })
+    }
+
+    /// Whether `arc` leaves the area.
+    pub(super) fn leaves_area(&self, arc: &Arc) -> bool {
+        let Some(area) = self.area else {
+            return false;
+        };
+        let outside = |point| area.excess(point) > self.touch;
+        let bulges = [Vector2::x(), -Vector2::x(), Vector2::y(), -Vector2::y()];
+        outside(arc.start())
+            || outside(arc.end())
+            || bulges.into_iter().any(|way| {
+                outside(arc.on.center + way * arc.on.radius) && arc.turn > 0.0 && arc.passes(way)
+            })
+    }
+
+    /// The outline of the first body near to the box that `blocks`.
+    fn first_of(
+        &self,
+        low: [f64; 2],
+        high: [f64; 2],
+        own: &[usize],
+        blocks: impl Fn(&Body) -> bool,
+    ) -> Option<usize> {
+        let body = |idx: usize| {
+            let body = &self.bodies[idx];
+            (!own.contains(&idx) && blocks(body)).then_some(body.outline)
+        };
+        match &self.tree {
+            None => (0..self.bodies.len()).find_map(body),
+            Some(tree) => tree
+                .locate_in_envelope_intersecting(AABB::from_corners(low, high))
+                .find_map(|entry| body(entry.data)),
+        }
+    }
+
+    /// Whether two segments cross by more than a touch.
+    fn crosses(&self, one: (Point2, Point2), other: (Point2, Point2)) -> bool {
+        let off = |(a, b): (Point2, Point2), point: Point2| {
+            let way = b - a;
+            way.perp(&(point - a)).abs() / way.norm().max(f64::MIN_POSITIVE)
+        };
+        crossing(one, other).is_some()
+            && off(other, one.0) > self.touch
+            && off(other, one.1) > self.touch
+            && off(one, other.0) > self.touch
+            && off(one, other.1) > self.touch
+    }
+
+    /// Whether the way from `a` to `b` touches corners of a ring without width and lies inside it
+    /// between them.
+    fn slips_into_ring(&self, a: Point2, b: Point2) -> Option<usize> {
+        let way = b - a;
+        let length = way.norm();
+        if length <= 2.0 * self.touch {
+            return None;
+        }
+        let near = Rect::around([a, b]).expect("two points").grown(self.touch);
+        let slips = |ring: &&Ring| {
+            let apart = ring.extent.min.x > near.max.x
+                || ring.extent.max.x < near.min.x
+                || ring.extent.min.y > near.max.y
+                || ring.extent.max.y < near.min.y;
+            if apart {
+                return false;
+            }
+            let along = way / length;
+            let mut touches: Vec<f64> = ring
+                .vertices
+                .iter()
+                .filter(|vertex| along.perp(&(*vertex - a)).abs() <= 2.0 * self.touch)
+                .map(|vertex| along.dot(&(vertex - a)).clamp(0.0, length))
+                .chain([0.0, length])
+                .collect();
+            touches.sort_by(f64::total_cmp);
+            touches.windows(2).any(|pair| {
+                let middle = a + along * (0.5 * (pair[0] + pair[1]));
+                pair[1] - pair[0] > 4.0 * self.touch
+                    && ring_contains(&ring.vertices, middle)
+                    && ring_distance(&ring.vertices, middle) > 2.0 * self.touch
+            })
+        };
+        self.rings.iter().find(slips).map(|ring| ring.outline)
+    }
+}
+
+impl Body {
+    fn corners(&self) -> ([f64; 2], [f64; 2]) {
+        let radius = self.radius;
+        (
+            [
+                self.a.x.min(self.b.x) - radius,
+                self.a.y.min(self.b.y) - radius,
+            ],
+            [
+                self.a.x.max(self.b.x) + radius,
+                self.a.y.max(self.b.y) + radius,
+            ],
+        )
+    }
+}
+
+/// Whether `arc` meets `body` only at one of the body's ends or of its own.
+fn touches(arc: &Arc, body: &Body, touch: f64) -> bool {
+    [body.a, body.b]
+        .into_iter()
+        .any(|end| arc.distance_to(end) <= touch)
+        || [arc.start(), arc.end()]
+            .into_iter()
+            .any(|end| point_segment(end, body.a, body.b) <= touch)
+}
+
+/// Whether `point` lies inside `ring`, by the even-odd rule.
+pub(super) fn ring_contains(ring: &[Point2], point: Point2) -> bool {
+    let count = ring.len();
+    let crossed = (0..count).filter(|&i| {
+        let (a, b) = (ring[i], ring[(i + 1) % count]);
+        (a.y > point.y) != (b.y > point.y)
+            && point.x < a.x + (b.x - a.x) * (point.y - a.y) / (b.y - a.y)
+    });
+    crossed.count() % 2 == 1
+}
+
+/// Distance of `point` to the edges of `ring`.
+pub(super) fn ring_distance(ring: &[Point2], point: Point2) -> f64 {
+    let count = ring.len();
+    (0..count)
+        .map(|i| point_segment(point, ring[i], ring[(i + 1) % count]))
+        .fold(f64::INFINITY, f64::min)
+}

@@ -4,6 +4,7 @@
 
 mod certificate;
 mod coding;
+mod guide;
 mod log;
 mod moves;
 mod objective;
@@ -27,7 +28,6 @@ use crate::optimizer::{self, Algorithm, Objective};
 use crate::scenario::json::{AlgorithmRule, ParameterRule};
 use crate::scenario::{Quadrature, Scenario};
 use crate::seeding;
-use coding::Coding;
 use log::Log;
 use objective::Routes;
 
@@ -89,8 +89,7 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
 /// # Panics
 /// When the scenario names an algorithm that is not in the table; its reader refuses those.
 pub fn objective<'s>(scenario: &'s Scenario, stop: &'s dyn Stop) -> impl Objective + 's {
-    let coding = Coding::of(scenario, scenario.planner.waypoints, false);
-    Routes::new(coding, Model::new(scenario), stop)
+    Routes::plain(&Model::new(scenario), stop)
 }
 
 /// Routes are the same when no waypoint is farther from its like than this share of the way.

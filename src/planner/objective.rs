@@ -1,7 +1,8 @@
 //! Routes as an optimizer sees them: positions in, fitness out.
 
-use super::coding::Coding;
-use super::moves::move_a_part;
+use super::coding::{Cartesian, Coding};
+use super::guide::Guide;
+use super::price::PRICED_FROM;
 use super::{Stop, why_stop};
 use crate::cost::{Model, Tolerance};
 use crate::geometry::Point3;
@@ -13,10 +14,8 @@ use crate::threat::Shape;
 /// The routes of one scenario.
 pub(super) struct Routes<'s> {
     pub(super) coding: Coding<'s>,
-    /// Routes that the first members are, and the others are near to; empty in a plain search.
-    seeds: Vec<Vec<Point3>>,
-    /// Members drawn so far.
-    drawn: usize,
+    /// Of a guided search.
+    guide: Option<Guide<'s>>,
     pub(super) model: Model<'s>,
     /// Half of what feasible means, so that a delivered route is feasible for others' rounding too.
     tolerance: Tolerance,
@@ -34,33 +33,39 @@ pub(super) struct Routes<'s> {
 const STEPS_UNWATCHED: usize = 1_000_000;
 
 impl<'s> Routes<'s> {
-    pub(super) fn new(coding: Coding<'s>, model: Model<'s>, stop: &'s dyn Stop) -> Self {
-        let tolerance = model.tolerance.scaled(0.5);
+    /// Of a plain search in the coding of its algorithm.
+    pub(super) fn plain(model: &Model<'s>, stop: &'s dyn Stop) -> Self {
+        let scenario = model.scenario;
+        let coding = Coding::of(scenario, scenario.planner.waypoints);
+        Self::new(coding, None, model, stop)
+    }
+
+    /// Of a search in space that starts from `seeds`, all with as many waypoints, and whose local
+    /// walk is a move of the route.
+    pub(super) fn guided(model: &Model<'s>, stop: &'s dyn Stop, seeds: Vec<Vec<Point3>>) -> Self {
+        let waypoints = seeds[0].len() - 2;
+        let coding = Coding::Cartesian(Cartesian::new(model.scenario, waypoints));
+        let guide = Guide::new(model.scenario, waypoints, seeds);
+        Self::new(coding, Some(guide), model, stop)
+    }
+
+    fn new(
+        coding: Coding<'s>,
+        guide: Option<Guide<'s>>,
+        model: &Model<'s>,
+        stop: &'s dyn Stop,
+    ) -> Self {
         let stride = (STEPS_UNWATCHED / steps(model.scenario)).max(1) as u64;
         Self {
             coding,
-            seeds: Vec::new(),
-            drawn: 0,
-            model,
-            tolerance,
+            guide,
+            tolerance: model.tolerance.scaled(PRICED_FROM),
+            model: model.clone(),
             route: Vec::new(),
             stop,
             stride,
             evaluations: 0,
             interrupted: false,
-        }
-    }
-
-    /// Those that start from `seeds` and whose local walk is a move of the route.
-    pub(super) fn guided(
-        coding: Coding<'s>,
-        model: Model<'s>,
-        stop: &'s dyn Stop,
-        seeds: Vec<Vec<Point3>>,
-    ) -> Self {
-        Self {
-            seeds,
-            ..Self::new(coding, model, stop)
         }
     }
 
@@ -84,33 +89,21 @@ impl Objective for Routes<'_> {
         self.coding.bounds()
     }
 
-    /// The seeds, then neighbours of each in turn; of every four, one comes from anywhere.
     fn draw(&mut self, random: &mut Random, position: &mut [f64]) {
-        let idx = self.drawn;
-        self.drawn += 1;
-        let count = self.seeds.len();
-        if idx >= count && (count == 0 || idx % 4 == 3) {
-            return self.coding.draw(random, position);
+        match &mut self.guide {
+            Some(guide) => guide.draw(random, position),
+            None => self.coding.bounds().draw(random, position),
         }
-        let mut route = self.seeds[idx % count].clone();
-        if idx >= count {
-            for _ in 0..3 {
-                move_a_part(self.model.scenario, &mut route, random, 0.3);
-            }
-        }
-        self.coding.encode(&route, position);
     }
 
     fn walks(&self) -> bool {
-        !self.seeds.is_empty()
+        self.guide.is_some()
     }
 
     fn walk(&mut self, random: &mut Random, base: &[f64], size: f64, candidate: &mut [f64]) {
-        let mut route = std::mem::take(&mut self.route);
-        self.coding.decode(base, &mut route);
-        move_a_part(self.model.scenario, &mut route, random, size);
-        self.coding.encode(&route, candidate);
-        self.route = route;
+        if let Some(guide) = &mut self.guide {
+            guide.walk(random, base, size, candidate);
+        }
     }
 
     fn evaluate(&mut self, positions: &[f64], fitness: &mut [Fitness]) {

@@ -1,6 +1,5 @@
 //! How a run searches: the algorithm alone, or guided by routes to start from.
 
-use super::coding::Coding;
 use super::log::Log;
 use super::objective::Routes;
 use super::polish::Polish;
@@ -18,13 +17,8 @@ const ELITES: usize = 4;
 
 /// The algorithm alone, from random routes: the paper's.
 pub(super) fn plain(model: &Model, log: &mut Log) -> StopReason {
+    let mut routes = Routes::plain(model, log.stop);
     let scenario = model.scenario;
-    let waypoints = scenario.planner.waypoints;
-    let mut routes = Routes::new(
-        Coding::of(scenario, waypoints, false),
-        model.clone(),
-        log.stop,
-    );
     let iterations = 0..=scenario.planner.iterations;
     let (_, reason) = run(model, &mut routes, iterations, log);
     polish(model, vec![log.route.clone()], log);
@@ -45,12 +39,7 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
     let mut reason = StopReason::Iterations;
     let mut first = 0;
     if turning > 0 {
-        let mut routes = Routes::guided(
-            Coding::of(model.scenario, coarse, true),
-            model.clone(),
-            log.stop,
-            elites,
-        );
+        let mut routes = Routes::guided(model, log.stop, elites);
         let (search, why) = run(model, &mut routes, 0..=turning, log);
         elites = distinct(model, &routes, search.as_ref());
         reason = why;
@@ -71,12 +60,7 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         log.offer_unpriced(route);
     }
     if reason == StopReason::Iterations {
-        let mut routes = Routes::guided(
-            Coding::of(model.scenario, settings.waypoints, true),
-            model.clone(),
-            log.stop,
-            elites,
-        );
+        let mut routes = Routes::guided(model, log.stop, elites);
         let (search, why) = run(model, &mut routes, first..=settings.iterations, log);
         elites = distinct(model, &routes, search.as_ref());
         reason = why;
@@ -94,7 +78,7 @@ fn polish(model: &Model, routes: Vec<Vec<Point3>>, log: &mut Log) {
     }
     for mut route in routes {
         let mut polish = Polish::new(model, log.stop);
-        let fitness = polish.descend(&mut route, 0.01, 1e-5);
+        let fitness = polish.descend(&mut route, 0.005, 5e-5);
         log.evaluations += polish.evaluations(model.scenario.planner.waypoints);
         log.offer(&route, fitness);
     }

@@ -96,6 +96,10 @@ pub struct Obstacles {
     pub(super) corners_of: Vec<std::ops::Range<usize>>,
     rings: Vec<Ring>,
     tree: Option<RTree<Entry>>,
+    /// Metres of a straight way that are looked up in the tree at once.
+    stride: f64,
+    /// No straight or round part of a string and what remains behind it is longer, metres.
+    pub(super) longest_way: f64,
     pub(super) area: Option<Rect>,
     /// Metres by which a body may be touched.
     pub(super) touch: f64,
@@ -185,7 +189,10 @@ impl Obstacles {
             };
             points.iter().copied()
         });
-        let extent = Rect::around(extent.chain(ends)).expect("there are two ends");
+        let extent = Rect::around(extent.chain(ends)).unwrap_or(Rect {
+            min: ends[0],
+            max: ends[0],
+        });
         let mut scene = Self {
             ends,
             bodies: Vec::new(),
@@ -193,6 +200,8 @@ impl Obstacles {
             corners_of: Vec::new(),
             rings: Vec::new(),
             tree: None,
+            stride: f64::INFINITY,
+            longest_way: 2.0 * extent.diagonal(),
             area,
             touch: TOUCH * extent.diagonal().max(1.0),
         };
@@ -203,12 +212,16 @@ impl Obstacles {
             }
             scene.corners_of.push(first..scene.corners.len());
         }
+        let radii = scene.corners.iter().map(|corner| corner.radius);
+        scene.longest_way += 20.0 * radii.fold(0.0, f64::max);
         if scene.bodies.len() > FEW_BODIES {
             let entries = scene.bodies.iter().enumerate().map(|(idx, body)| {
                 let (low, high) = body.corners();
                 GeomWithData::new(Rectangle::from_corners(low, high), idx)
             });
             scene.tree = Some(RTree::bulk_load(entries.collect()));
+            // About as far as one sees among so many.
+            scene.stride = 2.0 * extent.diagonal() / (scene.bodies.len() as f64).sqrt();
         }
         scene
     }
@@ -298,9 +311,7 @@ impl Obstacles {
     /// A body that the straight way from `a` to `b` enters, the bodies `own` apart; the index of
     /// its outline.
     pub(super) fn blocks_segment(&self, a: Point2, b: Point2, own: &[usize]) -> Option<usize> {
-        let low = [a.x.min(b.x), a.y.min(b.y)];
-        let high = [a.x.max(b.x), a.y.max(b.y)];
-        self.first_of(low, high, own, |body| {
+        let blocks = |body: &Body| {
             if body.radius > self.touch {
                 let distance = if body.a == body.b {
                     point_segment(body.a, a, b)
@@ -311,8 +322,20 @@ impl Obstacles {
             } else {
                 self.crosses((a, b), (body.a, body.b))
             }
-        })
-        .or_else(|| self.slips_into_ring(a, b))
+        };
+        let way = b - a;
+        let parts = (way.norm() / self.stride).ceil().max(1.0);
+        let mut part = 0.0;
+        while part < parts {
+            let (from, to) = (a + way * (part / parts), a + way * ((part + 1.0) / parts));
+            let low = [from.x.min(to.x), from.y.min(to.y)];
+            let high = [from.x.max(to.x), from.y.max(to.y)];
+            if let Some(outline) = self.first_of(low, high, own, blocks) {
+                return Some(outline);
+            }
+            part += 1.0;
+        }
+        self.slips_into_ring(a, b)
     }
 
     /// A body that `arc` enters, its own bodies apart; the index of its outline.

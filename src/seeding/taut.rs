@@ -63,7 +63,10 @@ pub struct TautStrings {
 const FEW_CORNERS: usize = 64;
 
 /// Ways looked at before the search gives up.
-const MOST_WAYS: usize = 4_000_000;
+const MOST_WAYS: usize = 2_000_000;
+
+/// So many corners are passed over in the time that one way takes.
+const LOOKS_PER_WAY: usize = 16;
 
 /// Strings nearer than this share of their length everywhere are one.
 const SAME: f64 = 1e-7;
@@ -74,12 +77,22 @@ pub fn taut_strings(obstacles: &Obstacles, k: usize) -> TautStrings {
     Search::new(obstacles, k).run()
 }
 
+/// Strings that are longer by more than this share of the way are looked at only when no shorter
+/// one is left; the share doubles with each look.
+const FIRST_REACH: f64 = 0.002;
+
 /// An arrival at a corner: the string so far.
 struct Step {
     place: Place,
     /// From which step, along which arc of its circle, then straight.
     before: Option<(usize, Arc, Tangent)>,
     length: f64,
+    /// Where it is, for a first guess at what lies ahead.
+    at: Point2,
+    /// Ways on are known as far as strings up to this length are concerned.
+    reach: f64,
+    /// By how much the reach grows next.
+    growth: f64,
 }
 
 /// A corner and the sense in which it is rounded, or an end.
@@ -91,7 +104,7 @@ enum Place {
 }
 
 /// A way on from a step that has not been checked yet, ordered by the length of the shortest string
-/// that it could become, then by age.
+/// that it could become, then by age. Back to the start stands for all ways beyond the step's reach.
 struct Way {
     least: f64,
     age: usize,
@@ -139,11 +152,7 @@ impl<'o> Search<'o> {
         let mut search = Self {
             obstacles,
             k,
-            steps: vec![Step {
-                place: Place::Start,
-                before: None,
-                length: 0.0,
-            }],
+            steps: Vec::new(),
             open: BinaryHeap::new(),
             ways: 0,
             active: Vec::new(),
@@ -156,10 +165,7 @@ impl<'o> Search<'o> {
             search.active = (0..obstacles.corners.len()).collect();
             search.is_active.fill(true);
         }
-        search.push(0, Place::Target);
-        for at in 0..search.active.len() {
-            search.push_corner(0, search.active[at]);
-        }
+        search.add_step(Place::Start, None, 0.0, obstacles.ends[0]);
         search
     }
 
@@ -170,7 +176,11 @@ impl<'o> Search<'o> {
                 beyond = way.least;
                 break;
             }
-            self.follow(&way);
+            if way.to == Place::Start {
+                self.widen(way.step);
+            } else {
+                self.follow(&way);
+            }
         }
         self.strings
             .sort_by(|one, other| one.length.total_cmp(&other.length));
@@ -235,8 +245,55 @@ impl<'o> Search<'o> {
         (!turns_back).then_some((arc, straight))
     }
 
-    fn push(&mut self, step: usize, to: Place) {
-        self.ways += 1;
+    fn add_step(
+        &mut self,
+        place: Place,
+        before: Option<(usize, Arc, Tangent)>,
+        length: f64,
+        at: Point2,
+    ) {
+        let [start, target] = self.obstacles.ends;
+        let growth = FIRST_REACH * (target - start).norm();
+        self.steps.push(Step {
+            place,
+            before,
+            length,
+            at,
+            reach: f64::NEG_INFINITY,
+            growth,
+        });
+        self.widen(self.steps.len() - 1);
+    }
+
+    /// Look further from `step`: at the ways on that strings longer than before may take.
+    fn widen(&mut self, step: usize) {
+        let known = self.steps[step].reach;
+        let here = &self.steps[step];
+        let direct = here.length + (self.obstacles.ends[1] - here.at).norm();
+        let reach = known.max(direct) + here.growth;
+        self.steps[step].growth *= 2.0;
+        self.steps[step].reach = reach;
+        self.push(step, Place::Target, known);
+        for at in 0..self.active.len() {
+            self.push_corner(step, self.active[at], known);
+        }
+        self.ways += self.active.len() / LOOKS_PER_WAY;
+        // Beyond the longest way there is nothing more to widen to.
+        if reach - self.steps[step].length <= self.obstacles.longest_way {
+            self.ways += 1;
+            self.open.push(Reverse(Way {
+                least: reach,
+                age: self.ways,
+                step,
+                to: Place::Start,
+            }));
+        }
+    }
+
+    /// Note the way from `step` to `to` if it may become a string longer than `known` and no longer
+    /// than the step's reach.
+    fn push(&mut self, step: usize, to: Place, known: f64) {
+        let reach = self.steps[step].reach;
         let Some((arc, straight)) = self.leave(&self.steps[step], to) else {
             return;
         };
@@ -245,20 +302,33 @@ impl<'o> Search<'o> {
             Place::Target => 0.0,
             _ => (self.obstacles.ends[1] - straight.to).norm(),
         };
-        self.open.push(Reverse(Way {
-            least: length + remaining,
-            age: self.ways,
-            step,
-            to,
-        }));
+        let least = length + remaining;
+        if least > known && least <= reach {
+            self.ways += 1;
+            self.open.push(Reverse(Way {
+                least,
+                age: self.ways,
+                step,
+                to,
+            }));
+        }
     }
 
-    fn push_corner(&mut self, step: usize, corner: usize) {
-        if matches!(self.steps[step].place, Place::Corner(at, _) if at == corner) {
+    fn push_corner(&mut self, step: usize, corner: usize, known: f64) {
+        let here = &self.steps[step];
+        if matches!(here.place, Place::Corner(at, _) if at == corner) {
+            return;
+        }
+        // However the corner is reached from here, the string is at least so long.
+        let Corner { center, radius, .. } = self.obstacles.corners[corner];
+        let least = here.length + (center - here.at).norm() - radius
+            + (self.obstacles.ends[1] - center).norm()
+            - radius;
+        if least > here.reach {
             return;
         }
         for left in [true, false] {
-            self.push(step, Place::Corner(corner, left));
+            self.push(step, Place::Corner(corner, left), known);
         }
     }
 
@@ -289,17 +359,12 @@ impl<'o> Search<'o> {
         if self.is_dominated(way.to, &straight, length) {
             return;
         }
-        let step = self.steps.len();
-        self.steps.push(Step {
-            place: way.to,
-            before: Some((way.step, arc, straight)),
-            length,
-        });
-        self.arrivals.entry(way.to).or_default().push(step);
-        self.push(step, Place::Target);
-        for at in 0..self.active.len() {
-            self.push_corner(step, self.active[at]);
-        }
+        self.arrivals
+            .entry(way.to)
+            .or_default()
+            .push(self.steps.len());
+        let before = Some((way.step, arc, straight));
+        self.add_step(way.to, before, length, straight.to);
     }
 
     fn in_the_way_of(&mut self, from: Place, arc: &Arc, to: Place, way: &Tangent) -> Option<usize> {
@@ -325,7 +390,7 @@ impl<'o> Search<'o> {
         for corner in self.obstacles.corners_of[outline].clone() {
             self.active.push(corner);
             for step in 0..self.steps.len() {
-                self.push_corner(step, corner);
+                self.push_corner(step, corner, f64::NEG_INFINITY);
             }
         }
     }

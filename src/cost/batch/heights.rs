@@ -4,7 +4,8 @@
 use pulp::Simd;
 
 use super::Pricer;
-use super::leg::Leg;
+use super::leg::{Leg, Point};
+use super::peaks::{Massif, Panorama};
 use crate::cost::{Model, Tolerance};
 use crate::geometry::Point2;
 use crate::geometry::lane::{Lane, Mask};
@@ -23,6 +24,15 @@ pub(super) struct Heights {
     ground: f64,
     /// Highest anywhere, likewise.
     ceiling: f64,
+    surface: Surface,
+}
+
+/// What lies below.
+#[derive(Debug, Clone)]
+enum Surface {
+    Flat(f64),
+    Peaks(Massif),
+    Grid,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -32,10 +42,12 @@ struct Zone {
 }
 
 /// The part of each leg in a terminal zone: `[enter, leave]`, 1 to 1 where there is none.
-struct Inside<S: Simd> {
+pub(super) struct Inside<S: Simd> {
     enter: Lane<S>,
     leave: Lane<S>,
-    /// Where a leg meets two zones, or climbs in one; not proven here.
+    /// Whether any does.
+    any: bool,
+    /// Where a leg meets two zones, or only climbs in one; not proven here.
     unclear: Mask<S>,
 }
 
@@ -55,21 +67,70 @@ impl Heights {
             floor: band.min - slack,
             ground: floors.fold(f64::NEG_INFINITY, f64::max) - slack,
             ceiling: band.max + slack,
+            surface: match &model.scenario.terrain {
+                Terrain::Flat(flat) => Surface::Flat(flat.elevation),
+                Terrain::Peaks(peaks) => Surface::Peaks(Massif::of(peaks)),
+                Terrain::Grid(_) => Surface::Grid,
+            },
         }
     }
 }
 
-impl Pricer<'_> {
-    /// Beyond the band or below the ground.
+impl Heights {
+    /// Where a leg keeps its heights over its part `[t0, t1]`, being `from` and `to` at the ends of
+    /// it and between them at most `dip` below and `rise` above the line that joins these.
     #[inline(always)]
-    pub(super) fn heights<S: Simd>(&self, leg: &Leg<S>) -> Lane<S> {
-        let clear = match &self.model.scenario.terrain {
-            Terrain::Flat(flat) => {
-                let inside = self.inside(leg);
-                self.clear_of_flat(leg, &inside, flat.elevation) & !inside.unclear
+    pub(super) fn within<S: Simd>(
+        &self,
+        [from, to]: [Lane<S>; 2],
+        [dip, rise]: [Lane<S>; 2],
+        inside: &Inside<S>,
+        [t0, t1]: [f64; 2],
+    ) -> Mask<S> {
+        let (low, high) = (from.min(to) - dip, from.max(to) + rise);
+        let below_ceiling = high.le(high.with(self.ceiling));
+        if !inside.any {
+            return below_ceiling & low.with(self.floor).le(low);
+        }
+        // Lines are lowest where parts of them end; without a zone, a leg is outside from 0 to 1.
+        let (start, end) = (low.with(t0), low.with(t1));
+        let (enter, leave) = (
+            inside.enter.clamp(start, end),
+            inside.leave.clamp(start, end),
+        );
+        let slope = (to - from) * (1.0 / (t1 - t0));
+        let first = from.min(from + slope * (enter - start));
+        let last = to.min(from + slope * (leave - start));
+        let none = low.with(f64::INFINITY);
+        let outside = start.lt(enter).select(first, none);
+        let outside = outside.min(leave.lt(end).select(last, none)) - dip;
+        below_ceiling & low.with(self.ground).le(low) & low.with(self.floor).le(outside)
+    }
+}
+
+impl Pricer<'_> {
+    /// Look round from `point`, an end of a leg.
+    #[inline(always)]
+    pub(super) fn look<S: Simd>(&self, point: Point<S>, panorama: &mut Panorama<S>) {
+        if let Surface::Peaks(massif) = &self.heights.surface {
+            massif.look(point, panorama);
+        }
+    }
+
+    /// Beyond the band or below the ground; `panorama` is that of the leg's ends.
+    #[inline(always)]
+    pub(super) fn heights<S: Simd>(&self, leg: &Leg<S>, panorama: &Panorama<S>) -> Lane<S> {
+        let inside = self.inside(leg);
+        let clear = match &self.heights.surface {
+            Surface::Flat(elevation) => {
+                let ends = [leg.a.z - *elevation, leg.b.z - *elevation];
+                let none = [leg.splat(0.0); 2];
+                self.heights.within(ends, none, &inside, [0.0, 1.0])
             }
-            Terrain::Peaks(_) | Terrain::Grid(_) => leg.splat(1.0).lt(leg.splat(0.0)),
+            Surface::Peaks(massif) => massif.clear(leg, panorama, &inside, &self.heights),
+            Surface::Grid => leg.splat(1.0).lt(leg.splat(0.0)),
         };
+        let clear = clear & !inside.unclear;
         if !(!clear).any() {
             return leg.splat(0.0);
         }
@@ -85,15 +146,16 @@ impl Pricer<'_> {
 
     /// How far the end of each leg lies from the middle of the band, Eq. 6.
     #[inline(always)]
-    pub(super) fn off_middle<S: Simd>(&self, leg: &Leg<S>) -> Lane<S> {
+    pub(super) fn off_middle<S: Simd>(&self, leg: &Leg<S>, panorama: &Panorama<S>) -> Lane<S> {
         let band = self.model.scenario.altitude;
         let middle = 0.5 * (band.max + band.min);
-        let ground = match &self.model.scenario.terrain {
-            Terrain::Flat(flat) => leg.splat(flat.elevation),
-            terrain => leg
-                .b
-                .z
-                .map(|lane, _| terrain.elevation(leg.segment(lane).b.xy())),
+        let ground = match &self.heights.surface {
+            Surface::Flat(elevation) => leg.splat(*elevation),
+            Surface::Peaks(_) => panorama.ground(),
+            Surface::Grid => leg.b.z.map(|lane, _| {
+                let below = leg.segment(lane).b.xy();
+                self.model.scenario.terrain.elevation(below)
+            }),
         };
         (leg.b.z - ground - middle).abs()
     }
@@ -105,16 +167,21 @@ impl Pricer<'_> {
         let mut inside = Inside {
             enter: one,
             leave: one,
+            any: false,
             unclear: one.lt(zero),
         };
         let mut met_before = one.lt(zero);
         for zone in &self.heights.zones {
+            if !leg.may_reach(zone.center, zone.radius) {
+                continue;
+            }
             let sight = leg.seen_from(zone.center);
             let reach = leg.splat(zone.radius * zone.radius);
             let met = sight.least_squared_distance(zero, one).le(reach);
             if !met.any() {
                 continue;
             }
+            inside.any = true;
             let foot = sight.foot;
             let past = (reach - sight.squared_distance(foot)).max(zero);
             let half = (past * leg.inverse_square).sqrt();
@@ -124,26 +191,5 @@ impl Pricer<'_> {
             met_before = met_before | met;
         }
         inside
-    }
-
-    /// Where a leg keeps its heights above level ground: they are greatest and least where parts of
-    /// it end.
-    #[inline(always)]
-    fn clear_of_flat<S: Simd>(&self, leg: &Leg<S>, inside: &Inside<S>, elevation: f64) -> Mask<S> {
-        let (zero, one) = (leg.splat(0.0), leg.splat(1.0));
-        let (h0, h1) = (leg.a.z - elevation, leg.b.z - elevation);
-        let (low, high) = (h0.min(h1), h0.max(h1));
-        let heights = &self.heights;
-        let below_ceiling = high.le(leg.splat(heights.ceiling));
-        if self.heights.zones.is_empty() {
-            return below_ceiling & leg.splat(heights.floor).le(low);
-        }
-        // Without a zone to enter, a leg is outside from 0 to 1.
-        let first = h0.min(h0 + leg.dz * inside.enter);
-        let last = h1.min(h0 + leg.dz * inside.leave);
-        let none = leg.splat(f64::INFINITY);
-        let outside = zero.lt(inside.enter).select(first, none);
-        let outside = outside.min(inside.leave.lt(one).select(last, none));
-        below_ceiling & leg.splat(heights.ground).le(low) & leg.splat(heights.floor).le(outside)
     }
 }

@@ -36,10 +36,14 @@ pub(super) struct Leg<'a, S: Simd> {
     pub(super) dz: Lane<S>,
     /// Horizontal length, metres.
     pub(super) level: Lane<S>,
-    /// 1 over its square; 0 for a leg that stands still or only climbs.
+    /// 1 over it; 0 for a leg that stands still or only climbs.
+    pub(super) inverse: Lane<S>,
+    /// The square of that.
     pub(super) inverse_square: Lane<S>,
     /// 3-D length, metres.
     pub(super) length: Lane<S>,
+    /// Of its middle.
+    pub(super) middle: [Lane<S>; 2],
     /// Where it moves horizontally, so that it has a heading.
     pub(super) moves: Mask<S>,
     rows: [&'a PointRow; 2],
@@ -55,6 +59,7 @@ impl<'a, S: Simd> Leg<'a, S> {
         let square = dx * dx + dy * dy;
         let level = square.sqrt();
         let moves = dx.with(LEVEL).le(level);
+        let inverse = moves.keep(dx.with(1.0) / level);
         Self {
             simd,
             a,
@@ -63,8 +68,10 @@ impl<'a, S: Simd> Leg<'a, S> {
             dy,
             dz,
             level,
-            inverse_square: moves.keep(dx.with(1.0) / square),
+            inverse,
+            inverse_square: inverse * inverse,
             length: (square + dz * dz).sqrt(),
+            middle: [(a.x + b.x) * 0.5, (a.y + b.y) * 0.5],
             moves,
             rows,
             part,
@@ -78,6 +85,16 @@ impl<'a, S: Simd> Leg<'a, S> {
             a: self.rows[0].get(lane),
             b: self.rows[1].get(lane),
         }
+    }
+
+    /// Whether any lane's leg may come within `radius` of `center`: within half its length of that
+    /// at its middle.
+    #[inline(always)]
+    pub(super) fn may_reach(&self, center: Point2, radius: f64) -> bool {
+        let (x, y) = (self.middle[0] - center.x, self.middle[1] - center.y);
+        // A hair more than half, for rounding.
+        let reach = self.level * (0.5 + 1e-9) + radius * (1.0 + 1e-9);
+        (x * x + y * y).le(reach * reach).any()
     }
 
     /// How the leg lies to `center`.

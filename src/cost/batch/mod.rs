@@ -8,6 +8,7 @@
 mod heights;
 mod index;
 mod leg;
+mod peaks;
 mod route;
 mod threats;
 

@@ -3,11 +3,12 @@
 use pulp::Simd;
 
 use super::leg::{Leg, Point};
+use super::peaks::Panorama;
 use super::threats::Candidates;
 use super::{PointRow, Pricer};
 use crate::cost::fuel;
 use crate::cost::threat::SHARE;
-use crate::geometry::lane::Lane;
+use crate::geometry::lane::{Lane, Mask};
 use crate::scenario::Scenario;
 
 /// Angles are compared by their tangents and cosines; from this share of the limit up they are
@@ -68,15 +69,26 @@ impl Pricer<'_> {
             level: zero,
         };
         let mut candidates = Candidates::default();
+        let mut panorama = Panorama::new(simd);
+        self.look(Point::load(simd, &points[0], part), &mut panorama);
         for (leg_idx, rows) in points.windows(2).enumerate() {
             let leg = Leg::new(simd, part, [&rows[0], &rows[1]]);
             length = length + leg.length;
+            self.look(leg.b, &mut panorama);
             self.threats(&leg, &mut candidates, &mut exposure, &mut violation);
-            violation = violation + self.heights(&leg) + self.leg_limits(&leg);
-            violation = violation + self.turn(&leg, &mut heading);
-            if leg_idx + 2 < points.len() {
-                violation = violation + self.area(leg.b);
-                off_middle = off_middle + self.off_middle(&leg);
+            violation = violation + self.heights(&leg, &panorama);
+            let (near, sharp) = self.turn(&leg, &mut heading);
+            let mut suspect = near | self.may_break_limits(&leg);
+            let free = leg_idx + 2 < points.len();
+            if free {
+                suspect = suspect | self.outside(leg.b);
+                off_middle = off_middle + self.off_middle(&leg, &panorama);
+            }
+            if suspect.any() {
+                violation = violation + self.leg_limits(&leg) + self.turn_limit(near, sharp);
+                if free {
+                    violation = violation + self.area(leg.b);
+                }
             }
         }
         let altitude = off_middle * self.model.scenario.weights.altitude;
@@ -94,13 +106,19 @@ impl Pricer<'_> {
     ) -> (Lane<S>, Lane<S>) {
         let leg = Leg::new(simd, part, [a, b]);
         let (mut exposure, mut violation) = (leg.splat(0.0), leg.splat(0.0));
+        let mut panorama = Panorama::new(simd);
+        self.look(leg.a, &mut panorama);
+        self.look(leg.b, &mut panorama);
         self.threats(
             &leg,
             &mut Candidates::default(),
             &mut exposure,
             &mut violation,
         );
-        violation = violation + self.heights(&leg) + self.leg_limits(&leg);
+        violation = violation + self.heights(&leg, &panorama);
+        if self.may_break_limits(&leg).any() {
+            violation = violation + self.leg_limits(&leg);
+        }
         (violation, self.flown(leg.length, exposure))
     }
 
@@ -112,50 +130,64 @@ impl Pricer<'_> {
         length * metre + exposure * (scenario.weights.threat * SHARE)
     }
 
+    /// Where a leg may be too short or too steep.
+    #[inline(always)]
+    fn may_break_limits<S: Simd>(&self, leg: &Leg<S>) -> Mask<S> {
+        leg.length.lt(leg.splat(self.limits.min_leg))
+            | (leg.level * self.limits.climb_slope).lt(leg.dz.abs())
+    }
+
     /// Beyond the limits of climbing and of shortness.
     #[inline(always)]
     fn leg_limits<S: Simd>(&self, leg: &Leg<S>) -> Lane<S> {
         let limits = &self.limits;
         let short = leg.splat(limits.min_leg) - leg.length;
-        let mut violation = leg.splat(self.tolerance.length_m).lt(short).keep(short);
-        let rise = leg.dz.abs();
-        if (leg.level * limits.climb_slope).lt(rise).any() {
-            let steep = rise.atan2(leg.level) * DEGREES - limits.climb_deg;
-            violation = violation + leg.splat(self.tolerance.angle_deg).lt(steep).keep(steep);
-        }
-        violation
+        let steep = leg.dz.abs().atan2(leg.level) * DEGREES - limits.climb_deg;
+        leg.splat(self.tolerance.length_m).lt(short).keep(short)
+            + leg.splat(self.tolerance.angle_deg).lt(steep).keep(steep)
     }
 
-    /// Beyond the limit of turning; a leg that only climbs keeps the heading before it.
+    /// Where the route may turn too sharply into a leg, and the cosine and sine of how sharply, both
+    /// times the same. A leg that only climbs keeps the heading before it.
     #[inline(always)]
-    fn turn<S: Simd>(&self, leg: &Leg<S>, heading: &mut Heading<S>) -> Lane<S> {
+    fn turn<S: Simd>(&self, leg: &Leg<S>, heading: &mut Heading<S>) -> (Mask<S>, [Lane<S>; 2]) {
         let before = *heading;
         heading.dx = leg.moves.select(leg.dx, before.dx);
         heading.dy = leg.moves.select(leg.dy, before.dy);
         heading.level = leg.moves.select(leg.level, before.level);
         let along = before.dx * leg.dx + before.dy * leg.dy;
-        let both = before.level * leg.level;
-        if !(along.lt(both * self.limits.turn_cosine) & leg.moves).any() {
-            return leg.splat(0.0);
-        }
         let across = before.dx * leg.dy - before.dy * leg.dx;
-        let sharp = across.abs().atan2(along) * DEGREES - self.limits.turn_deg;
-        // Where the route has not moved yet, both products are 0, and the angle is.
-        (leg.splat(self.tolerance.angle_deg).lt(sharp) & leg.moves).keep(sharp)
+        let both = before.level * leg.level;
+        // Where the route has not moved yet, all three are 0.
+        let near = along.lt(both * self.limits.turn_cosine) & leg.moves;
+        (near, [along, across])
     }
 
-    /// How far a waypoint lies outside the area.
+    /// Beyond the limit of turning.
+    #[inline(always)]
+    fn turn_limit<S: Simd>(&self, near: Mask<S>, [along, across]: [Lane<S>; 2]) -> Lane<S> {
+        let sharp = across.abs().atan2(along) * DEGREES - self.limits.turn_deg;
+        (near & along.with(self.tolerance.angle_deg).lt(sharp)).keep(sharp)
+    }
+
+    /// Where a waypoint lies outside the area.
+    #[inline(always)]
+    fn outside<S: Simd>(&self, point: Point<S>) -> Mask<S> {
+        let area = &self.model.scenario.area;
+        point.x.lt(point.x.with(area.min.x))
+            | point.x.with(area.max.x).lt(point.x)
+            | point.y.lt(point.y.with(area.min.y))
+            | point.y.with(area.max.y).lt(point.y)
+    }
+
+    /// How far.
     #[inline(always)]
     fn area<S: Simd>(&self, point: Point<S>) -> Lane<S> {
         let area = &self.model.scenario.area;
-        let zero = point.x.with(0.0);
         let dx = beyond(point.x, area.min.x, area.max.x);
         let dy = beyond(point.y, area.min.y, area.max.y);
-        if !zero.lt(dx + dy).any() {
-            return zero;
-        }
         let amount = (dx * dx + dy * dy).sqrt();
-        zero.with(self.tolerance.length_m).lt(amount).keep(amount)
+        (amount.with(self.tolerance.length_m).lt(amount)).keep(amount)
     }
 }
 

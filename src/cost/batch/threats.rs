@@ -121,6 +121,9 @@ impl Pricer<'_> {
         violation: &mut Lane<S>,
     ) {
         let outline = &disc.outline;
+        if !leg.may_reach(outline.center, outline.influence) {
+            return;
+        }
         let (zero, one) = (leg.splat(0.0), leg.splat(1.0));
         let sight = leg.seen_from(outline.center);
         let reach = leg.splat(outline.influence * outline.influence);
@@ -130,10 +133,13 @@ impl Pricer<'_> {
         }
         let window = disc.window(leg);
         let near = near & window.some;
-        let nearest = sight.least_squared_distance(window.t0, window.t1).sqrt();
-        let depth = leg.splat(outline.radius) - nearest;
-        let entered = near & leg.splat(self.tolerance.length_m).lt(depth);
-        *violation = *violation + entered.keep(depth);
+        let nearest = sight.least_squared_distance(window.t0, window.t1);
+        let entered = near & nearest.lt(leg.splat(outline.radius * outline.radius));
+        if entered.any() {
+            let depth = leg.splat(outline.radius) - nearest.sqrt();
+            let entered = entered & leg.splat(self.tolerance.length_m).lt(depth);
+            *violation = *violation + entered.keep(depth);
+        }
         let crossed = match self.quadrature {
             Quadrature::Integral if (!leg.moves).any() => leg.moves.select(
                 disc.exposure(leg, &window, &sight),
@@ -220,7 +226,7 @@ impl Disc {
     fn exposure<S: Simd>(&self, leg: &Leg<S>, window: &Window<S>, sight: &Sight<S>) -> Lane<S> {
         let zero = leg.splat(0.0);
         let influence = self.outline.influence;
-        let across = (sight.x * leg.dy - sight.y * leg.dx) / leg.level;
+        let across = (sight.x * leg.dy - sight.y * leg.dx) * leg.inverse;
         let across_square = across * across;
         let half_square = leg.splat(influence * influence) - across_square;
         let half_chord = half_square.max(zero).sqrt();
@@ -236,7 +242,7 @@ impl Disc {
             .le(across.abs())
             .keep(across_square * logarithm);
         let integral = chord * influence - (s1 * d1 - s0 * d0 + logarithm) * 0.5;
-        (zero.lt(half_square) & s0.lt(s1)).keep(integral * (leg.length / leg.level))
+        (zero.lt(half_square) & s0.lt(s1)).keep(integral * (leg.length * leg.inverse))
     }
 
     /// As `exposure`, of legs that only climb.

@@ -78,6 +78,14 @@ impl<S: Simd> Lane<S> {
         Self::load(self.simd, &row, 0)
     }
 
+    /// As `map`, of both.
+    #[inline(always)]
+    pub(crate) fn zip(self, other: Self, mut each: impl FnMut(f64, f64) -> f64) -> Self {
+        let mut others = [0.0; LANES];
+        other.store(&mut others, 0);
+        self.map(|lane, value| each(value, others[lane]))
+    }
+
     /// With `value` in one lane.
     #[inline(always)]
     pub(crate) fn set(self, lane: usize, value: f64) -> Self {

@@ -15,7 +15,7 @@
 //! outside of it. Here the sector lies about the heading that the text gives. Heights are above ground
 //! there too.
 
-use crate::geometry::{Point2, Point3, wrap_angle};
+use crate::geometry::{Point2, Point3};
 use crate::optimizer::Bounds;
 use crate::scenario::Scenario;
 
@@ -80,31 +80,6 @@ impl<'s> Course<'s> {
         }
         route.push(self.scenario.target);
     }
-
-    /// Write the position of `route` into `position`; a leg that points out of the sector or is too
-    /// long for it is brought to its edge, and those after it aim at the waypoints again.
-    pub(in crate::planner) fn encode(&self, route: &[Point3], position: &mut [f64]) {
-        let mut at = self.scenario.start.xy();
-        let mut height = self.start_height;
-        for (leg_idx, vector) in position.chunks_exact_mut(PER_LEG).enumerate() {
-            let point = route[leg_idx + 1];
-            let way = point.xy() - at;
-            let climb = point.z - self.scenario.terrain.elevation(point.xy()) - height;
-            let level = way.norm();
-            let azimuth = wrap_angle(libm::atan2(way.y, way.x) - self.towards_target);
-            vector[0] = (level * level + climb * climb)
-                .sqrt()
-                .min(self.bounds.upper[0]);
-            vector[1] = libm::atan2(climb, level).clamp(-SECTOR, SECTOR);
-            vector[2] = azimuth.clamp(-SECTOR, SECTOR);
-            let (area, band) = (&self.scenario.area, self.scenario.altitude);
-            let level = vector[0] * libm::cos(vector[1]);
-            let heading = self.towards_target + vector[2];
-            at.x = (at.x + level * libm::cos(heading)).clamp(area.min.x, area.max.x);
-            at.y = (at.y + level * libm::sin(heading)).clamp(area.min.y, area.max.y);
-            height = (height + vector[0] * libm::sin(vector[1])).clamp(band.min, band.max);
-        }
-    }
 }
 
 #[cfg(test)]
@@ -131,15 +106,6 @@ mod tests {
             let expected = Point3::new(100.0 + 200.0 * idx as f64, 500.0, 50.0);
             assert!((point - expected).norm() < 1e-9, "{point}");
         }
-        let mut position = [1.0; 9];
-        coding.encode(&route, &mut position);
-        let again = decode(&coding, &position);
-        assert!(
-            route
-                .iter()
-                .zip(&again)
-                .all(|(one, other)| (one - other).norm() < 1e-9)
-        );
         // Left of the course is north, and up is up.
         let route = decode(&coding, &[100.0, 0.3, SECTOR].repeat(3));
         let level = 100.0 * libm::cos(0.3) * libm::cos(SECTOR);

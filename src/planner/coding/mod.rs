@@ -12,7 +12,7 @@ pub(super) use course::Course;
 pub(super) use spherical::Spherical;
 
 use crate::geometry::Point3;
-use crate::optimizer::{Bounds, Random};
+use crate::optimizer::Bounds;
 use crate::scenario::Scenario;
 
 /// The coding of routes of one scenario.
@@ -26,14 +26,14 @@ pub(super) enum Coding<'s> {
     Course(Course<'s>),
 }
 
-/// Of a scenario, so many free waypoints, and whether every route must have a code.
-type Make = for<'s> fn(&'s Scenario, usize, bool) -> Coding<'s>;
+/// Of a scenario and so many free waypoints.
+type Make = for<'s> fn(&'s Scenario, usize) -> Coding<'s>;
 
 const SPHERICAL: Make =
-    |scenario, waypoints, wide| Coding::Spherical(Spherical::new(scenario, waypoints, wide));
+    |scenario, waypoints| Coding::Spherical(Spherical::new(scenario, waypoints));
 const CARTESIAN: Make =
-    |scenario, waypoints, _| Coding::Cartesian(Cartesian::new(scenario, waypoints));
-const COURSE: Make = |scenario, waypoints, _| Coding::Course(Course::new(scenario, waypoints));
+    |scenario, waypoints| Coding::Cartesian(Cartesian::new(scenario, waypoints));
+const COURSE: Make = |scenario, waypoints| Coding::Course(Course::new(scenario, waypoints));
 
 /// The coding that each algorithm searches in, by the algorithm's name.
 const CODINGS: [(&str, Make); 6] = [
@@ -47,17 +47,17 @@ const CODINGS: [(&str, Make); 6] = [
 
 impl<'s> Coding<'s> {
     /// The coding that the algorithm of `scenario` searches in, of routes with so many free
-    /// waypoints; `wide` has room for every route, as far as the coding can.
+    /// waypoints.
     ///
     /// # Panics
     /// When that algorithm has no row in the table of codings.
-    pub(super) fn of(scenario: &'s Scenario, waypoints: usize, wide: bool) -> Self {
+    pub(super) fn of(scenario: &'s Scenario, waypoints: usize) -> Self {
         let named = |row: &&(&str, Make)| row.0 == scenario.planner.algorithm;
         let (_, make) = CODINGS
             .iter()
             .find(named)
             .expect("a test holds the table to have a row for every algorithm");
-        make(scenario, waypoints, wide)
+        make(scenario, waypoints)
     }
 
     /// Where positions may lie.
@@ -69,29 +69,12 @@ impl<'s> Coding<'s> {
         }
     }
 
-    /// Write a position of a random route into `position`.
-    pub(super) fn draw(&self, random: &mut Random, position: &mut [f64]) {
-        match self {
-            Self::Spherical(coding) => coding.draw(random, position),
-            Self::Cartesian(_) | Self::Course(_) => self.bounds().draw(random, position),
-        }
-    }
-
     /// Write the route of `position` into `route`: start, free waypoints, target.
     pub(super) fn decode(&self, position: &[f64], route: &mut Vec<Point3>) {
         match self {
             Self::Spherical(coding) => coding.decode(position, route),
             Self::Cartesian(coding) => coding.decode(position, route),
             Self::Course(coding) => coding.decode(position, route),
-        }
-    }
-
-    /// Write the position whose route is `route`, or is near to it, into `position`.
-    pub(super) fn encode(&self, route: &[Point3], position: &mut [f64]) {
-        match self {
-            Self::Spherical(coding) => coding.encode(route, position),
-            Self::Cartesian(coding) => coding.encode(route, position),
-            Self::Course(coding) => coding.encode(route, position),
         }
     }
 }
@@ -122,7 +105,7 @@ mod tests {
             let mut scenario = scenario();
             scenario.planner.waypoints = waypoints;
             for (name, make) in CODINGS {
-                let coding = make(&scenario, waypoints, false);
+                let coding = make(&scenario, waypoints);
                 let bounds = coding.bounds();
                 let position: Vec<f64> = (0..bounds.dimension())
                     .map(|dim| bounds.lower[dim] + shares[dim] * bounds.range(dim))

@@ -8,8 +8,8 @@
 //! leads back to the middle of the band, where F3 is least, as steeply as the vehicle may. Measured
 //! from the level, one leg's climb would move all waypoints after it.
 
-use crate::geometry::{LEVEL, Point2, Point3, wrap_angle};
-use crate::optimizer::{Bounds, Random};
+use crate::geometry::{LEVEL, Point2, Point3};
+use crate::optimizer::Bounds;
 use crate::scenario::Scenario;
 
 /// The coding of routes of one scenario.
@@ -24,8 +24,6 @@ pub(in crate::planner) struct Spherical<'s> {
     start_height: f64,
     /// Tangent of the steepest climb.
     steepest: f64,
-    /// Twice the length of a leg of the straight route, metres.
-    amplitude: f64,
     bounds: Bounds,
 }
 
@@ -33,39 +31,25 @@ pub(in crate::planner) struct Spherical<'s> {
 const PER_LEG: usize = 3;
 
 impl<'s> Spherical<'s> {
-    /// The coding of routes of `scenario` with so many free waypoints. Legs are at most twice as
-    /// long as those of the straight route; with `wide`, as long as the area allows, so that every
-    /// route can be coded.
+    /// The coding of routes of `scenario` with so many free waypoints.
     #[must_use]
-    pub(in crate::planner) fn new(scenario: &'s Scenario, waypoints: usize, wide: bool) -> Self {
+    pub(in crate::planner) fn new(scenario: &'s Scenario, waypoints: usize) -> Self {
         let legs = waypoints + 1;
         let way = scenario.target - scenario.start;
         let distance = (way.x * way.x + way.y * way.y).sqrt();
-        let tight = 2.0 * way.norm() / legs as f64;
-        let amplitude = if wide {
-            tight.max(scenario.area.diagonal())
-        } else {
-            tight
-        };
+        // Twice the length of a leg of the straight route.
+        let amplitude = 2.0 * way.norm() / legs as f64;
         let max_turn = scenario.vehicle.max_turn_deg.to_radians();
         let max_climb = scenario.vehicle.max_climb_deg.to_radians();
         let level = std::f64::consts::FRAC_PI_2;
-        let steepest = libm::tan(max_climb);
-        // From the steepest glide one way to the steepest climb the other is twice the limit.
-        let polar = if wide {
-            libm::atan(2.0 * steepest)
-        } else {
-            max_climb
-        };
-        let lower = [0.0, -max_turn, level - polar];
-        let upper = [amplitude, max_turn, level + polar];
+        let lower = [0.0, -max_turn, level - max_climb];
+        let upper = [amplitude, max_turn, level + max_climb];
         Self {
             scenario,
             course: libm::atan2(way.y, way.x),
             distance,
             start_height: scenario.start.z - scenario.terrain.elevation(scenario.start.xy()),
-            steepest,
-            amplitude: tight,
+            steepest: libm::tan(max_climb),
             bounds: Bounds {
                 lower: lower.repeat(legs),
                 upper: upper.repeat(legs),
@@ -77,19 +61,6 @@ impl<'s> Spherical<'s> {
     #[must_use]
     pub(in crate::planner) fn bounds(&self) -> &Bounds {
         &self.bounds
-    }
-
-    /// Write a position drawn uniformly, its legs at most twice as long as those of the straight route.
-    pub(in crate::planner) fn draw(&self, random: &mut Random, position: &mut [f64]) {
-        let (lower, upper) = (&self.bounds.lower, &self.bounds.upper);
-        for (dim, value) in position.iter_mut().enumerate() {
-            let upper = if dim % PER_LEG == 0 {
-                self.amplitude
-            } else {
-                upper[dim]
-            };
-            *value = random.between(lower[dim], upper);
-        }
     }
 
     /// Write the route of `position` into `route`: start, free waypoints, target.
@@ -132,39 +103,12 @@ impl<'s> Spherical<'s> {
         }
         route[last] = target;
     }
-
-    /// Write the position of `route` into `position`; what the bounds do not hold is cut off.
-    pub(in crate::planner) fn encode(&self, route: &[Point3], position: &mut [f64]) {
-        let band = self.scenario.altitude;
-        let middle = 0.5 * (band.min + band.max);
-        let (mut height, mut heading) = (self.start_height, None);
-        for (vector, ends) in position.chunks_exact_mut(PER_LEG).zip(route.windows(2)) {
-            let way = ends[1].xy() - ends[0].xy();
-            let level = way.norm();
-            let steepest = level * self.steepest;
-            let glide = (middle - height).clamp(-steepest, steepest);
-            let next = ends[1].z - self.scenario.terrain.elevation(ends[1].xy());
-            let climb = next - height - glide;
-            let course = if level < LEVEL {
-                heading.unwrap_or(0.0)
-            } else {
-                libm::atan2(way.y, way.x)
-            };
-            vector[0] = (level * level + climb * climb).sqrt();
-            vector[1] = heading.map_or(0.0, |before| wrap_angle(course - before));
-            vector[2] = libm::atan2(level, climb);
-            heading = Some(course);
-            height = next.clamp(band.min, band.max);
-        }
-        self.bounds.clamp(position);
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::cost::turns;
-    use crate::geometry::Segment;
     use crate::planner::tests::scenario;
     use proptest::prelude::*;
 
@@ -174,7 +118,7 @@ mod tests {
         #[test]
         fn every_position_is_a_route_within_turn_and_band(shares in prop::collection::vec(0.0..1.0f64, 33)) {
             let scenario = scenario();
-            let coding = Spherical::new(&scenario, 10, false);
+            let coding = Spherical::new(&scenario, 10);
             let bounds = coding.bounds().clone();
             let position: Vec<f64> = shares
                 .iter()
@@ -190,17 +134,6 @@ mod tests {
             let short = route.windows(2).any(|ends| (ends[1] - ends[0]).norm() < 1e-3);
             for turn in turns(&route) {
                 prop_assert!(short || turn.abs().to_degrees() <= scenario.vehicle.max_turn_deg + 1e-6);
-            }
-            let steep = route.windows(2).any(|ends| {
-                let leg = Segment { a: ends[0], b: ends[1] };
-                leg.climb().abs().to_degrees() > scenario.vehicle.max_climb_deg
-            });
-            let wide = Spherical::new(&scenario, 10, true);
-            let (mut coded, mut again) = (position, Vec::new());
-            wide.encode(&route, &mut coded);
-            wide.decode(&coded, &mut again);
-            for (one, other) in route.iter().zip(&again) {
-                prop_assert!(short || steep || (one - other).norm() < 1e-5, "{one} {other}");
             }
             for point in &route[1..11] {
                 let height = point.z - scenario.terrain.elevation(point.xy());

@@ -189,30 +189,49 @@ impl<'m, 's> Lattice<'m, 's> {
             self.reached[0][b].price = self.legs[0][b].price;
         }
         for leg_idx in 1..last {
+            let before = &self.legs[leg_idx - 1];
             for b in 0..Self::count(leg_idx, last) {
+                let mut arrivals = [(NOWHERE, Vector2::zeros()); CHOICES];
+                let arrivals = &mut arrivals[..Self::count(leg_idx - 1, last)];
+                for (from, arrival) in arrivals.iter_mut().enumerate() {
+                    let pair = from * CHOICES + b;
+                    let price = self.reached[leg_idx - 1][pair].price;
+                    *arrival = (Reached { price, from }, before[pair].way);
+                }
+                // With the best first, most departures need but one look.
+                arrivals.sort_unstable_by(|one, other| {
+                    let rank = one.0.price.rank(&other.0.price);
+                    rank.then(one.0.from.cmp(&other.0.from))
+                });
                 for c in 0..Self::count(leg_idx + 1, last) {
                     let next = self.legs[leg_idx][b * CHOICES + c];
-                    let mut best = NOWHERE;
-                    for a in 0..Self::count(leg_idx - 1, last) {
-                        let before = self.reached[leg_idx - 1][a * CHOICES + b].price;
-                        if !before.beats(&best.price) {
-                            continue;
-                        }
-                        let way = self.legs[leg_idx - 1][a * CHOICES + b].way;
-                        let price = Fitness {
-                            violation: before.violation + self.excess_turn(way, next.way),
-                            cost: before.cost,
-                        };
-                        if price.beats(&best.price) {
-                            best = Reached { price, from: a };
-                        }
-                    }
+                    let mut best = self.best_arrival(arrivals, next.way);
                     best.price.violation += next.price.violation;
                     best.price.cost += next.price.cost;
                     self.reached[leg_idx][b * CHOICES + c] = best;
                 }
             }
         }
+    }
+
+    /// The arrival, best first, that is still the best with the turn onto `way`.
+    fn best_arrival(&self, arrivals: &[(Reached, Vector2)], way: Vector2) -> Reached {
+        let mut best = NOWHERE;
+        for &(arrival, before) in arrivals {
+            if arrival.price.violation > best.price.violation {
+                break;
+            }
+            let excess = self.excess_turn(before, way);
+            let mut turned = arrival;
+            turned.price.violation += excess;
+            if turned.price.beats(&best.price) {
+                best = turned;
+            }
+            if excess == 0.0 {
+                break;
+            }
+        }
+        best
     }
 
     /// From the target back along the best way.

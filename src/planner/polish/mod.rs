@@ -10,7 +10,7 @@ use crate::optimizer::Fitness;
 use lattice::Lattice;
 
 /// A gain below this share of the cost is none.
-const GAIN: f64 = 1e-7;
+const GAIN: f64 = 1e-6;
 
 /// Polishes routes of one scenario.
 pub(super) struct Polish<'m, 's> {

@@ -1,0 +1,75 @@
+//! What a guided search knows that a plain one does not: routes to start from, and moves of a route.
+
+use super::coding::{Cartesian, Spherical};
+use super::moves::move_a_part;
+use crate::geometry::Point3;
+use crate::optimizer::Random;
+use crate::scenario::Scenario;
+
+/// Of so many members, one comes from anywhere; the others are near to a seed.
+const STRANGERS: usize = 4;
+
+/// Moves by which a member differs from its seed.
+const MOVES: usize = 3;
+
+/// How far such a move may go, as a share of the way.
+const REACH: f64 = 0.3;
+
+/// Draws the first members of a swarm in space and walks about routes.
+pub(super) struct Guide<'s> {
+    scenario: &'s Scenario,
+    space: Cartesian<'s>,
+    /// Strangers are drawn in the spherical coding, whose random routes are flyable.
+    spherical: Spherical<'s>,
+    seeds: Vec<Vec<Point3>>,
+    /// Members drawn so far.
+    drawn: usize,
+    route: Vec<Point3>,
+    vectors: Vec<f64>,
+}
+
+impl<'s> Guide<'s> {
+    /// From `seeds`, each of `waypoints` free waypoints.
+    pub(super) fn new(scenario: &'s Scenario, waypoints: usize, seeds: Vec<Vec<Point3>>) -> Self {
+        let spherical = Spherical::new(scenario, waypoints);
+        Self {
+            scenario,
+            space: Cartesian::new(scenario, waypoints),
+            vectors: vec![0.0; spherical.bounds().dimension()],
+            spherical,
+            seeds,
+            drawn: 0,
+            route: Vec::new(),
+        }
+    }
+
+    /// Write the next first member into `position`: the seeds, then neighbours of each in turn, and
+    /// strangers among them.
+    pub(super) fn draw(&mut self, random: &mut Random, position: &mut [f64]) {
+        let (idx, count) = (self.drawn, self.seeds.len());
+        self.drawn += 1;
+        if idx >= count && idx % STRANGERS == STRANGERS - 1 {
+            self.spherical.bounds().draw(random, &mut self.vectors);
+            self.spherical.decode(&self.vectors, &mut self.route);
+        } else {
+            self.route.clone_from(&self.seeds[idx % count]);
+            for _ in 0..if idx < count { 0 } else { MOVES } {
+                move_a_part(self.scenario, &mut self.route, random, REACH);
+            }
+        }
+        self.space.encode(&self.route, position);
+    }
+
+    /// Write a neighbour of `base` into `candidate`.
+    pub(super) fn walk(
+        &mut self,
+        random: &mut Random,
+        base: &[f64],
+        size: f64,
+        candidate: &mut [f64],
+    ) {
+        self.space.decode(base, &mut self.route);
+        move_a_part(self.scenario, &mut self.route, random, size);
+        self.space.encode(&self.route, candidate);
+    }
+}

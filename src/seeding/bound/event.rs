@@ -1,0 +1,213 @@
+//! What a route would have to do to beat the string round the widened walls, and what that costs
+//! at least: slip between two walls, cut a corner, fly over or under.
+
+use super::super::arc::{crossing, nearest_points, point_segment};
+use super::super::obstacles::{OutlineShape, ring_contains};
+use super::Prices;
+use super::wall::Wall;
+use crate::geometry::Point2;
+
+/// Pairs of cores looked at before the search for gaps gives up.
+const MOST_PAIRS: usize = 300_000;
+
+/// A way to beat the string.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Event {
+    pub(super) kind: Kind,
+    /// No route does it for less.
+    pub(super) cost: f64,
+    /// What it costs beyond the string round walls that are not widened.
+    pub(super) extra: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Kind {
+    /// Pass between two walls whose cores are `apart` metres from each other; twice the same wall
+    /// where a ring nearly closes.
+    Slip { walls: [usize; 2], apart: f64 },
+    /// Come nearer to a wall than its `dip`.
+    Dip { wall: usize },
+    /// Fly over or under a wall.
+    Pass { wall: usize },
+}
+
+/// A convex core: a disc's centre, or an edge of a ring.
+#[derive(Debug, Clone, Copy)]
+struct Core {
+    a: Point2,
+    b: Point2,
+    wall: usize,
+    edge: usize,
+}
+
+/// All events, cheapest first; `None` when there are too many to tell.
+pub(super) fn events(walls: &[Wall], prices: &Prices) -> Option<Vec<Event>> {
+    let mut events = gaps(walls, prices)?;
+    for (idx, wall) in walls.iter().enumerate() {
+        if let Some(toll) = wall.toll {
+            let vertical = toll.vertical.max(prices.rise());
+            events.push(Event {
+                kind: Kind::Pass { wall: idx },
+                cost: prices.climbing(prices.direct(), vertical) + toll.altitude,
+                extra: toll.altitude,
+            });
+        }
+        if wall.dip > wall.core && wall.wide > wall.safe {
+            events.push(dip(idx, wall, prices));
+        }
+    }
+    events.sort_by(|one, other| one.cost.total_cmp(&other.cost));
+    Some(events)
+}
+
+/// Coming as near to a wall as `dip`, and away again: on either side the soft zone is crossed at
+/// least as fast as the distance to the corner grows.
+fn dip(idx: usize, wall: &Wall, prices: &Prices) -> Event {
+    let (mut cost, mut extra) = (f64::INFINITY, f64::INFINITY);
+    for center in wall.centers() {
+        let ways = prices
+            .ends
+            .map(|end| ((end.xy() - center).norm() - wall.dip).max(0.0));
+        let depth = (wall.influence - wall.dip).max(0.0);
+        let more = prices.exposure * (ramp(depth, 1.0, ways[0]) + ramp(depth, 1.0, ways[1]));
+        let length = (ways[0] + ways[1]).max(prices.direct());
+        cost = cost.min(prices.climbing(length, prices.rise()) + more);
+        extra = extra.min(more);
+    }
+    Event {
+        kind: Kind::Dip { wall: idx },
+        cost,
+        extra,
+    }
+}
+
+/// Integral of `(depth - slope u)_+` for u from 0 to `way`.
+fn ramp(depth: f64, slope: f64, way: f64) -> f64 {
+    if depth <= 0.0 {
+        return 0.0;
+    }
+    let way = way.min(depth / slope);
+    way * (depth - 0.5 * slope * way)
+}
+
+/// The gaps between walls that overlap when widened.
+fn gaps(walls: &[Wall], prices: &Prices) -> Option<Vec<Event>> {
+    let mut cores = cores(walls);
+    let low = |core: &Core| core.a.x.min(core.b.x) - walls[core.wall].wide;
+    let high = |core: &Core| core.a.x.max(core.b.x) + walls[core.wall].wide;
+    cores.sort_by(|one, other| low(one).total_cmp(&low(other)));
+    let (mut events, mut pairs) = (Vec::new(), 0);
+    for (at, one) in cores.iter().enumerate() {
+        let near = cores[at + 1..]
+            .iter()
+            .take_while(|other| low(other) <= high(one));
+        for other in near {
+            pairs += 1;
+            if pairs > MOST_PAIRS {
+                return None;
+            }
+            events.extend(gap(one, other, walls, prices));
+        }
+    }
+    Some(events)
+}
+
+fn cores(walls: &[Wall]) -> Vec<Core> {
+    let mut cores = Vec::new();
+    for (wall_idx, wall) in walls.iter().enumerate() {
+        match &wall.shape {
+            OutlineShape::Disc(center) => cores.push(Core {
+                a: *center,
+                b: *center,
+                wall: wall_idx,
+                edge: 0,
+            }),
+            OutlineShape::Ring(ring) => {
+                cores.extend((0..ring.len()).map(|edge| Core {
+                    a: ring[edge],
+                    b: ring[(edge + 1) % ring.len()],
+                    wall: wall_idx,
+                    edge,
+                }));
+            }
+        }
+    }
+    cores
+}
+
+/// The gap between two cores, if their widened walls overlap and something can pass there.
+fn gap(one: &Core, other: &Core, walls: &[Wall], prices: &Prices) -> Option<Event> {
+    let (wall, next) = (&walls[one.wall], &walls[other.wall]);
+    let (p, q) = nearest_points((one.a, one.b), (other.a, other.b));
+    let apart = (q - p).norm();
+    if apart >= wall.wide + next.wide || apart <= wall.core + next.core {
+        return None;
+    }
+    let same = one.wall == other.wall;
+    if same && is_closed(wall, one, other, p, q) {
+        return None;
+    }
+    let ways = prices.ends.map(|end| point_segment(end.xy(), p, q));
+    let exposure: f64 = ways
+        .iter()
+        .map(|way| {
+            if same {
+                ramp(wall.influence - 0.5 * apart, 1.0, *way)
+            } else {
+                let depth = wall.influence + next.influence - apart;
+                let discs = one.a == one.b && other.a == other.b;
+                if discs {
+                    between_discs(wall, next, apart, *way)
+                } else {
+                    ramp(depth, 2.0, *way)
+                }
+            }
+        })
+        .sum();
+    let length = (ways[0] + ways[1]).max(prices.direct());
+    let extra = prices.exposure * exposure;
+    Some(Event {
+        kind: Kind::Slip {
+            walls: [one.wall, other.wall],
+            apart,
+        },
+        cost: prices.climbing(length, prices.rise()) + extra,
+        extra,
+    })
+}
+
+/// Least exposure to two discs on a way that begins between their centres and goes `way` metres or
+/// further from there: the integral of `(I + I' - D sqrt(1 + u^2 / q))_+`.
+fn between_discs(one: &Wall, other: &Wall, apart: f64, way: f64) -> f64 {
+    let depth = one.influence + other.influence;
+    let least = (one.core * (apart - one.core)).min(other.core * (apart - other.core));
+    if depth <= apart || least <= 0.0 {
+        return ramp(depth - apart, 2.0, way);
+    }
+    let ratio = depth / apart;
+    let way = way.min((least * (ratio * ratio - 1.0)).sqrt());
+    // With k = sqrt(q): integral of sqrt(1 + u^2 / k^2) = (u sqrt(1 + u^2/k^2) + k asinh(u / k)) / 2.
+    let k = least.sqrt();
+    let root = (1.0 + way * way / least).sqrt();
+    let integral = 0.5 * (way * root + k * libm::asinh(way / k));
+    let lower = (depth * way - apart * integral) - 1e-12 * depth * way;
+    lower.max(ramp(depth - apart, 2.0, way))
+}
+
+/// Whether nothing passes between two edges of one ring: they meet, a third edge joins them where
+/// they are nearest, or the inside lies between.
+fn is_closed(wall: &Wall, one: &Core, other: &Core, p: Point2, q: Point2) -> bool {
+    let OutlineShape::Ring(ring) = &wall.shape else {
+        return true;
+    };
+    let count = ring.len();
+    if (one.edge + 1) % count == other.edge || (other.edge + 1) % count == one.edge {
+        return true;
+    }
+    let edges = || (0..count).map(|i| (ring[i], ring[(i + 1) % count]));
+    if edges().any(|(a, b)| (a == p && b == q) || (a == q && b == p)) {
+        return true;
+    }
+    let middle = p + (q - p) * 0.5;
+    edges().all(|edge| crossing(edge, (p, q)).is_none()) && ring_contains(ring, middle)
+}

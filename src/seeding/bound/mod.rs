@@ -1,0 +1,287 @@
+//! A cost that no route can undercut, with its proof in docs/BOUND.md.
+//!
+//! Seen from above, a soft zone costs so much that going through it is never cheaper than going
+//! round it: its threat can be widened and counts as hard. The string round the widened threats,
+//! priced by its fuel, is then a lower bound for all routes that pass none of the few places where
+//! that argument has a gap, and those places are priced one by one.
+
+mod ends;
+mod event;
+mod wall;
+
+use super::obstacles::Obstacles;
+use super::taut::taut_strings;
+use crate::cost::Tolerance;
+use crate::geometry::Point3;
+use crate::scenario::{Quadrature, Scenario};
+use event::{Event, Kind};
+use wall::Wall;
+
+/// Covers the rounding of the sums behind a bound, so that it holds in floating point too.
+const ROUNDING: f64 = 1e-9;
+
+/// Bisections on the number of events that a cheaper route may make use of.
+const MOST_LEVELS: usize = 24;
+
+/// What a metre costs, and where it is flown.
+#[derive(Debug, Clone, Copy)]
+struct Prices {
+    /// Of a metre, `w`.
+    fuel: f64,
+    /// Of a metre in a soft zone, for each metre of its depth, `s`.
+    exposure: f64,
+    /// Metres by which a feasible route may miss a limit.
+    tolerance: f64,
+    ends: [Point3; 2],
+}
+
+impl Prices {
+    fn of(scenario: &Scenario) -> Self {
+        let exposure = match scenario.planner.quadrature {
+            Quadrature::Integral => scenario.weights.threat * THREAT_SHARE,
+            // Sampled, a soft zone can be crossed for nothing.
+            Quadrature::Paper => 0.0,
+        };
+        Self {
+            fuel: scenario.weights.fuel * scenario.vehicle.fuel_per_km / 1000.0,
+            exposure,
+            tolerance: Tolerance::of(scenario).length_m,
+            ends: [scenario.start, scenario.target],
+        }
+    }
+
+    /// Distance of the ends seen from above, metres.
+    fn direct(&self) -> f64 {
+        (self.ends[1].xy() - self.ends[0].xy()).norm()
+    }
+
+    /// Difference in height of the ends, metres.
+    fn rise(&self) -> f64 {
+        (self.ends[1].z - self.ends[0].z).abs()
+    }
+
+    /// Least cost of fuel for a way of `length` metres seen from above that goes up and down by
+    /// `vertical`.
+    fn climbing(&self, length: f64, vertical: f64) -> f64 {
+        self.fuel * (length * length + vertical * vertical).sqrt()
+    }
+}
+
+/// The factor 1/5 of Eq. 4.
+const THREAT_SHARE: f64 = 0.2;
+
+/// A proven lower bound on the total cost of any feasible route from start to target, Eq. 1; 0
+/// where fuel costs nothing. The argument is in docs/BOUND.md.
+#[must_use]
+pub fn lower_bound(scenario: &Scenario) -> f64 {
+    let prices = Prices::of(scenario);
+    let straight = prices.climbing(prices.direct(), prices.rise());
+    if prices.fuel <= 0.0 {
+        return 0.0;
+    }
+    let bound = round_walls(scenario, &prices).max(straight);
+    let bound = if bound.is_finite() { bound } else { straight };
+    bound * (1.0 - ROUNDING)
+}
+
+/// The largest cost that can be proven: a route cheaper than it could use only the events that
+/// cost less, and without the others no route is cheaper.
+fn round_walls(scenario: &Scenario, prices: &Prices) -> f64 {
+    let walls = wall::walls(scenario, prices);
+    let Some(events) = event::events(&walls, prices) else {
+        return plain(&walls, prices);
+    };
+    let field = Field {
+        scenario,
+        prices,
+        walls: &walls,
+    };
+    // The first level at which the next event costs as much as can be proven without it; beyond
+    // it, less can be proven.
+    let (mut low, mut high) = (0, events.len());
+    let (mut proven, mut level) = (0.0_f64, 0);
+    for _ in 0..MOST_LEVELS {
+        let bound = field.bound(&events[..level]);
+        let next = events.get(level).map_or(f64::INFINITY, |event| event.cost);
+        proven = proven.max(bound.min(next));
+        if next >= bound {
+            high = level;
+            if low >= high {
+                break;
+            }
+        } else {
+            low = level + 1;
+            // No event dearer than what was proven without it need be looked at.
+            let affordable = events.partition_point(|event| event.cost < bound);
+            high = high.min(affordable).max(low);
+        }
+        level = usize::midpoint(low, high);
+    }
+    proven
+}
+
+/// Without widening anything: where there are too many gaps to look at.
+fn plain(walls: &[Wall], prices: &Prices) -> f64 {
+    let radii: Vec<Option<f64>> = walls
+        .iter()
+        .map(|wall| wall.toll.is_none().then_some(wall.core))
+        .collect();
+    string(walls, &radii, prices, prices.rise())
+}
+
+/// Cost of the string round `walls` widened to `radii` (`None` leaves one out), going up and down
+/// by `vertical`; infinite where there is none.
+fn string(walls: &[Wall], radii: &[Option<f64>], prices: &Prices, vertical: f64) -> f64 {
+    prices.climbing(length(walls, radii, prices), vertical)
+}
+
+/// Length of the string, metres, less what routes may cut off corners.
+fn length(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> f64 {
+    let outlines = walls.iter().zip(radii);
+    let scene = Obstacles::new(
+        outlines.map(|(wall, radius)| radius.map(|radius| wall.outline(radius))),
+        prices.ends.map(|end| end.xy()),
+        None,
+    );
+    shortest(&scene) - slack(walls, radii, prices)
+}
+
+fn slack(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> f64 {
+    let kept = walls
+        .iter()
+        .zip(radii)
+        .filter(|(_, radius)| radius.is_some());
+    let length: f64 = kept.map(|(wall, _)| wall.slack(prices.tolerance)).sum();
+    // A way round a corner instead of across it may lie in every soft zone.
+    let dearest: f64 = walls.iter().map(|wall| wall.influence).sum();
+    length * (1.0 + prices.exposure * dearest / prices.fuel)
+}
+
+/// Length that no string in `scene` undercuts.
+fn shortest(scene: &Obstacles) -> f64 {
+    let found = taut_strings(scene, 1);
+    let first = found.strings.first().map(|string| string.length);
+    first.unwrap_or(f64::INFINITY).min(found.beyond)
+}
+
+/// A scenario as a bound sees it.
+struct Field<'a> {
+    scenario: &'a Scenario,
+    prices: &'a Prices,
+    walls: &'a [Wall],
+}
+
+impl Field<'_> {
+    /// What no route undercuts that makes use of `allowed` events at most.
+    fn bound(&self, allowed: &[Event]) -> f64 {
+        let radii = self.radii(allowed);
+        let tame = ends::bound(self.scenario, self.prices, self.walls, &radii);
+        if allowed.is_empty() || tame.is_infinite() {
+            return tame;
+        }
+        // Either no event happens, or one does: then its price comes on top, but what it is made
+        // of must not be used twice.
+        let none = self.radii(&[]);
+        let without = ends::bound(self.scenario, self.prices, self.walls, &none);
+        let bare = self.bare(allowed);
+        let extra = allowed
+            .iter()
+            .map(|event| event.extra)
+            .fold(f64::INFINITY, f64::min);
+        let with = string(self.walls, &bare, self.prices, self.prices.rise()) + extra;
+        tame.max(without.min(with))
+    }
+
+    /// How far each wall may be widened so that it counts as hard whatever `allowed` events happen.
+    fn radii(&self, allowed: &[Event]) -> Vec<Option<f64>> {
+        let mut radii: Vec<Option<f64>> = self.walls.iter().map(|wall| Some(wall.wide)).collect();
+        for event in allowed {
+            match event.kind {
+                Kind::Pass { wall } => radii[wall] = None,
+                Kind::Dip { wall } => {
+                    radii[wall] = radii[wall].map(|radius| radius.min(self.walls[wall].safe));
+                }
+                Kind::Slip { .. } => {}
+            }
+        }
+        for event in allowed {
+            if let Kind::Slip { walls, apart } = event.kind
+                && let [Some(one), Some(other)] = walls.map(|wall| radii[wall])
+                && one + other > apart
+            {
+                // Both shrink alike, but not below their cores.
+                let [core, next] = walls.map(|wall| self.walls[wall].core);
+                let shrunk = (one - 0.5 * (one + other - apart))
+                    .max(core)
+                    .min(apart - next);
+                radii[walls[0]] = Some(shrunk);
+                radii[walls[1]] = Some(other.min(apart - shrunk).min(if walls[0] == walls[1] {
+                    shrunk
+                } else {
+                    other
+                }));
+            }
+        }
+        radii
+    }
+
+    /// The walls with nothing of their soft zones used that `allowed` events touch.
+    fn bare(&self, allowed: &[Event]) -> Vec<Option<f64>> {
+        let mut radii = self.radii(&[]);
+        for event in allowed {
+            match event.kind {
+                Kind::Pass { wall } => radii[wall] = None,
+                Kind::Dip { wall } => radii[wall] = radii[wall].map(|_| self.walls[wall].core),
+                Kind::Slip { walls, .. } => {
+                    for wall in walls {
+                        radii[wall] = radii[wall].map(|_| self.walls[wall].core);
+                    }
+                }
+            }
+        }
+        radii
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{read, scenario};
+    use super::*;
+
+    /// Best routes known, from long searches: upper bounds of the optimum.
+    #[test]
+    fn within_two_percent_of_the_best_routes_known() {
+        let check = |document: &str, best: f64, gap: f64| {
+            let bound = lower_bound(&read(document));
+            assert!(bound <= best, "{bound} {best}");
+            assert!(best / bound - 1.0 <= gap, "{bound} {best}");
+        };
+        check(
+            include_str!("../../../scenarios/paper-1.json"),
+            489.4413,
+            0.02,
+        );
+        check(
+            include_str!("../../../scenarios/paper-2.json"),
+            505.1495,
+            0.02,
+        );
+        check(
+            include_str!("../../../scenarios/paper-3.json"),
+            519.4687,
+            0.02,
+        );
+        check(
+            include_str!("../../../scenarios/paper-4.json"),
+            525.6264,
+            0.20,
+        );
+    }
+
+    #[test]
+    fn never_below_the_straight_line() {
+        let scenario = scenario(r#""threats": []"#);
+        let straight = 0.5 * (scenario.target - scenario.start).norm();
+        assert!(lower_bound(&scenario) >= straight * (1.0 - 1e-8));
+    }
+}

@@ -13,9 +13,11 @@ use super::report::Report;
 use super::summary::median;
 use super::table::{Cell, Table};
 use super::trial::{self, Nobody};
+use crate::cost::Model;
+use crate::cost::batch::{LANES, PointRow, Pricer};
 use crate::optimizer::{self, Fitness, Objective, Random, Settings};
 use crate::planner;
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, Seeding};
 
 #[derive(Args)]
 pub(in crate::cli) struct Arguments {
@@ -135,7 +137,8 @@ pub(super) fn measure(arguments: &Arguments, cases: &[Case]) -> anyhow::Result<R
         intro: format!(
             "One core, processor time; each figure the best of {SLICES} slices of {} ms. An evaluation decodes a position of tms-sba and \
              prices the route with every constraint. Scattered positions are drawn at random from the bounds; gathered ones are a \
-             population of {POPULATION} after {GATHERING} iterations, which is what a search prices most of the time.",
+             population of {POPULATION} after {GATHERING} iterations, which is what a search prices most of the time. Priced are the \
+             routes of {LANES} short plain searches side by side, without decoding; the last two columns are of that.",
             arguments.time_ms / SLICES
         ),
         tables: done,
@@ -148,6 +151,8 @@ pub(super) fn measure(arguments: &Arguments, cases: &[Case]) -> anyhow::Result<R
 struct Rates {
     scattered: f64,
     gathered: f64,
+    /// Routes priced side by side, without decoding.
+    priced: f64,
 }
 
 fn rates(scenario: &Scenario, batch: usize, time_ms: u32) -> Rates {
@@ -178,20 +183,54 @@ fn rates(scenario: &Scenario, batch: usize, time_ms: u32) -> Rates {
     Rates {
         scattered,
         gathered: rate(&mut objective, &positions, batch, time_ms),
+        priced: priced(scenario, batch, time_ms),
     }
+}
+
+/// Pricing alone: the routes of one short search a lane, as many times as make a batch.
+fn priced(scenario: &Scenario, batch: usize, time_ms: u32) -> f64 {
+    let model = Model::new(scenario);
+    let quadrature = scenario.planner.quadrature;
+    let pricer = Pricer::new(&model, quadrature, model.tolerance);
+    let mut rows = vec![PointRow::splat(scenario.start); scenario.planner.waypoints + 2];
+    for (lane, seed) in (0..LANES).zip(1..) {
+        let mut short = scenario.clone();
+        short.planner.seed = seed;
+        short.planner.population = 20;
+        short.planner.iterations = 20;
+        short.planner.seeding = Seeding::Random;
+        short.planner.polish = false;
+        let route = planner::plan(&short, &mut Nobody, &Nobody).waypoints;
+        for (row, point) in rows.iter_mut().zip(route) {
+            row.set(lane, point);
+        }
+    }
+    let rounds = batch.div_ceil(LANES);
+    best_rate(rounds * LANES, time_ms, || {
+        for _ in 0..rounds {
+            std::hint::black_box(pricer.routes(std::hint::black_box(&rows)));
+        }
+    })
 }
 
 fn rate(objective: &mut impl Objective, positions: &[f64], batch: usize, time_ms: u32) -> f64 {
     let mut fitness = vec![Fitness::WORST; batch];
+    best_rate(batch, time_ms, || {
+        objective.evaluate(positions, &mut fitness);
+        std::hint::black_box(&fitness);
+    })
+}
+
+/// How many a second `price` does, which does `count` at a time.
+fn best_rate(count: usize, time_ms: u32, mut price: impl FnMut()) -> f64 {
     let slice_s = f64::from(time_ms) * 1e-3 / f64::from(SLICES);
     let mut best = 0.0;
     for _ in 0..SLICES {
         let watch = Stopwatch::start();
         let mut priced = 0.0;
         let seconds = loop {
-            objective.evaluate(positions, &mut fitness);
-            std::hint::black_box(&fitness);
-            priced += batch as f64;
+            price();
+            priced += count as f64;
             let seconds = watch.seconds();
             if seconds >= slice_s {
                 break seconds;
@@ -223,14 +262,15 @@ fn rate_table(
     column: &'static str,
     measured: Vec<(Cell, Rates)>,
 ) -> Table {
-    let first = measured.first().map_or(1.0, |(_, rates)| rates.gathered);
+    let first = measured.first().map_or(1.0, |(_, rates)| rates.priced);
     let row = |(label, rates): (Cell, Rates)| {
         vec![
             label,
             Cell::Number(rates.scattered, 0),
             Cell::Number(rates.gathered, 0),
-            Cell::Number(1e6 / rates.gathered, 3),
-            Cell::Number(first / rates.gathered, 2),
+            Cell::Number(rates.priced, 0),
+            Cell::Number(1e6 / rates.priced, 3),
+            Cell::Number(first / rates.priced, 2),
         ]
     };
     Table {
@@ -241,6 +281,7 @@ fn rate_table(
             column,
             "evaluations/s, scattered",
             "evaluations/s, gathered",
+            "priced/s",
             "us each",
             "times the first row",
         ],

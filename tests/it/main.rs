@@ -1,6 +1,7 @@
 //! The integration tests: one binary, one module a subject.
 
 mod api;
+mod bound;
 mod cli;
 mod crash;
 mod determinism;

@@ -294,7 +294,7 @@ fn ways(model: &Model<'_>) -> Vec<Vec<Point3>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases / 8, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn no_route_is_cheaper_than_the_bound(drawn in drawn()) {

@@ -6,11 +6,13 @@ use std::collections::BTreeMap;
 use std::fs;
 
 use noctule::cost::Model;
-use noctule::geometry::Point3;
+use noctule::geometry::{Point2, Point3};
 use noctule::planner::{self, ConvergencePoint, Incumbent, Observer, Stop};
 use noctule::scenario::json::{self, Rules};
 use noctule::scenario::limits::Limits;
 use noctule::scenario::{Quadrature, Scenario};
+use noctule::seeding::{self, Obstacles};
+use noctule::threat::{Cylinder, Shape, Threat};
 
 fn main() {
     divan::main();
@@ -92,4 +94,53 @@ fn search_by_waypoints(bencher: divan::Bencher, waypoints: usize) {
     bencher
         .counter(divan::counter::ItemsCount::new(50_u32 * 21))
         .bench(|| planner::plan(&scenario, &mut Nobody, &Nobody));
+}
+
+/// Discs spread evenly over the square of the paper's scenarios; the more, the smaller.
+fn discs(count: u32) -> Scenario {
+    let mut scenario = scenario("paper-1");
+    let radius = 300.0 / f64::from(count).sqrt();
+    // The golden ratio's powers and those of its cousin fill a square without clusters.
+    let disc = |idx: u32| Cylinder {
+        center: Point2::new(
+            1000.0 * (0.754_877_666 * f64::from(idx + 1)).fract(),
+            1000.0 * (0.569_840_291 * f64::from(idx + 1)).fract(),
+        ),
+        radius,
+        influence: 1.3 * radius,
+    };
+    let ends = [scenario.start.xy(), scenario.target.xy()];
+    scenario.threats = (0..)
+        .map(disc)
+        .filter(|disc| ends.iter().all(|end| (end - disc.center).norm() > radius))
+        .take(count as usize)
+        .map(|disc| Threat {
+            name: None,
+            shape: Shape::Cylinder(disc),
+            base: None,
+            top: None,
+        })
+        .collect();
+    scenario
+}
+
+/// The shortest ways of passing so many discs.
+#[divan::bench(args = [10, 100, 1000], consts = [1, 6])]
+fn taut_strings<const K: usize>(bencher: divan::Bencher, discs_count: u32) {
+    let scenario = discs(discs_count);
+    bencher.bench(|| seeding::taut_strings(&Obstacles::hard(&scenario, |_, _| true), K));
+}
+
+/// The proven lower bound, on the paper's scenarios.
+#[divan::bench(args = SCENARIOS)]
+fn bound(bencher: divan::Bencher, name: &str) {
+    let scenario = scenario(name);
+    bencher.bench(|| seeding::lower_bound(&scenario));
+}
+
+/// The proven lower bound among so many discs.
+#[divan::bench(args = [10, 100, 1000])]
+fn bound_by_discs(bencher: divan::Bencher, discs_count: u32) {
+    let scenario = discs(discs_count);
+    bencher.bench(|| seeding::lower_bound(&scenario));
 }

@@ -57,6 +57,8 @@ pub struct TautStrings {
     pub strings: Vec<TautString>,
     /// No string that is not listed is shorter, metres; infinite when there is none.
     pub beyond: f64,
+    /// What the search took: ways looked at.
+    pub ways: usize,
 }
 
 /// With so many corners or fewer, all take part from the beginning when several strings are wanted.
@@ -74,7 +76,16 @@ const SAME: f64 = 1e-7;
 /// The `k` shortest taut strings between the ends of `obstacles`.
 #[must_use]
 pub fn taut_strings(obstacles: &Obstacles, k: usize) -> TautStrings {
-    Search::new(obstacles, k).run()
+    taut_strings_within(obstacles, k, MOST_WAYS)
+}
+
+/// As [`taut_strings`], with so many ways looked at at most.
+pub(super) fn taut_strings_within(
+    obstacles: &Obstacles,
+    k: usize,
+    most_ways: usize,
+) -> TautStrings {
+    Search::new(obstacles, k, most_ways).run()
 }
 
 /// Strings that are longer by more than this share of the way are looked at only when no shorter
@@ -137,6 +148,7 @@ struct Search<'o> {
     steps: Vec<Step>,
     open: BinaryHeap<Reverse<Way>>,
     ways: usize,
+    most_ways: usize,
     /// Corners that take part, and by outline whether its corners do.
     active: Vec<usize>,
     is_active: Vec<bool>,
@@ -148,13 +160,14 @@ struct Search<'o> {
 }
 
 impl<'o> Search<'o> {
-    fn new(obstacles: &'o Obstacles, k: usize) -> Self {
+    fn new(obstacles: &'o Obstacles, k: usize, most_ways: usize) -> Self {
         let mut search = Self {
             obstacles,
             k,
             steps: Vec::new(),
             open: BinaryHeap::new(),
             ways: 0,
+            most_ways,
             active: Vec::new(),
             is_active: vec![false; obstacles.corners_of.len()],
             blocked: HashMap::new(),
@@ -172,7 +185,7 @@ impl<'o> Search<'o> {
     fn run(mut self) -> TautStrings {
         let mut beyond = f64::INFINITY;
         while let Some(Reverse(way)) = self.open.pop() {
-            if self.strings.len() >= self.k || self.ways > MOST_WAYS {
+            if self.strings.len() >= self.k || self.ways > self.most_ways {
                 beyond = way.least;
                 break;
             }
@@ -187,6 +200,7 @@ impl<'o> Search<'o> {
         TautStrings {
             strings: self.strings,
             beyond,
+            ways: self.ways,
         }
     }
 
@@ -334,6 +348,7 @@ impl<'o> Search<'o> {
 
     /// Check a way; where it is free, go on from its end.
     fn follow(&mut self, way: &Way) {
+        self.ways += 1;
         let from = &self.steps[way.step];
         let Some((arc, straight)) = self.leave(from, way.to) else {
             return;
@@ -387,6 +402,7 @@ impl<'o> Search<'o> {
             return;
         }
         self.is_active[outline] = true;
+        self.ways += self.steps.len() * self.obstacles.corners_of[outline].len() / LOOKS_PER_WAY;
         for corner in self.obstacles.corners_of[outline].clone() {
             self.active.push(corner);
             for step in 0..self.steps.len() {

@@ -3,6 +3,7 @@
 mod algorithms;
 mod api;
 mod bench;
+mod bound;
 mod cli;
 mod crash;
 mod determinism;

@@ -13,10 +13,13 @@ use crate::terrain::Terrain;
 use crate::threat::{Cylinder, Shape, Threat};
 
 /// With more corners than this, only the difference in height of the ends is made use of.
-const MOST_CORNERS: usize = 120;
+const MOST_CORNERS: usize = 80;
+
+/// What proving legs may take: one for each sector, more for each string.
+const EFFORT: usize = 10_000;
 
 /// Sectors are not cut finer than this share of the way.
-const FINEST: f64 = 0.002;
+const FINEST: f64 = 0.003;
 
 /// Nor is a string pulled for sectors wider than this share of it.
 const COARSEST: f64 = 0.04;
@@ -27,6 +30,11 @@ const CUTS: usize = 9;
 /// Bisections of the length of a leg.
 const BISECTIONS: usize = 6;
 
+/// Whether there are so many corners that legs are not looked at.
+pub(super) fn are_too_many(walls: &[Wall]) -> bool {
+    walls.iter().map(|wall| wall.centers().len()).sum::<usize>() > MOST_CORNERS
+}
+
 /// What no route undercuts that goes round `walls` widened to `radii`.
 pub(super) fn bound(
     scenario: &Scenario,
@@ -34,15 +42,15 @@ pub(super) fn bound(
     walls: &[Wall],
     radii: &[Option<f64>],
 ) -> f64 {
-    let string = length(walls, radii, prices);
+    let (string, _) = length(walls, radii, prices);
     let level = prices.climbing(string, prices.rise());
-    let corners: usize = walls.iter().map(|wall| wall.centers().len()).sum();
     let Terrain::Flat(ground) = scenario.terrain else {
         return level;
     };
-    if !string.is_finite() || scenario.weights.altitude <= 0.0 || corners > MOST_CORNERS {
+    if !string.is_finite() || scenario.weights.altitude <= 0.0 || are_too_many(walls) {
         return level;
     }
+    let corners: usize = walls.iter().map(|wall| wall.centers().len()).sum();
     let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max) + ground.elevation;
     // A single waypoint ends both legs.
     let share = if scenario.planner.waypoints > 1 {
@@ -60,6 +68,9 @@ pub(super) fn bound(
         radii,
         slack: slack(walls, radii, prices),
         known: Vec::new(),
+        failed: None,
+        effort: EFFORT / 2,
+        price: 4 + corners + corners * corners / 10,
     });
     level.max(with_legs(legs, prices.fuel * string))
 }
@@ -111,6 +122,12 @@ struct Leg<'a> {
     slack: f64,
     /// Lengths and costs, and whether every route with so long a leg costs so much.
     known: Vec<(f64, f64, bool)>,
+    /// Heading and half width of the sector that was not dear enough last.
+    failed: Option<(f64, f64)>,
+    /// What is left of it; without any, nothing more is proven.
+    effort: usize,
+    /// What pulling one string takes of it.
+    price: usize,
 }
 
 impl Leg<'_> {
@@ -156,15 +173,25 @@ impl Leg<'_> {
             }
         }
         let eighth = std::f64::consts::FRAC_PI_8;
-        let dear = (0..8).all(|sector| {
-            self.sector_is_dear(length, cost, 2.0 * eighth * f64::from(sector), eighth)
+        // What was too cheap before may be so again.
+        let again = self.failed.is_some_and(|(heading, half)| {
+            half * length <= 2.0 * FINEST * (self.to - self.from).norm()
+                && !self.sector_is_dear(length, cost, heading, half)
         });
+        let dear = !again
+            && (0..8).all(|sector| {
+                self.sector_is_dear(length, cost, 2.0 * eighth * f64::from(sector), eighth)
+            });
         self.known.push((length, cost, dear));
         dear
     }
 
     /// As `is_dear`, of the legs whose heading is within `half` radians of `heading`.
-    fn sector_is_dear(&self, length: f64, cost: f64, heading: f64, half: f64) -> bool {
+    fn sector_is_dear(&mut self, length: f64, cost: f64, heading: f64, half: f64) -> bool {
+        if self.effort < self.price {
+            return false;
+        }
+        self.effort -= 1;
         let w = self.prices.fuel;
         let way = Vector2::new(libm::cos(heading), libm::sin(heading)) * length;
         let at = self.from + way;
@@ -180,13 +207,24 @@ impl Leg<'_> {
             return true;
         }
         let direct = (self.to - self.from).norm();
-        if spread <= COARSEST * direct && self.remaining(at, spread) >= needed {
-            return true;
+        if spread <= COARSEST * direct {
+            self.effort -= self.price.min(self.effort);
+            if self.remaining(at, spread) >= needed {
+                return true;
+            }
         }
-        spread > FINEST * direct
-            && [-0.5, 0.5]
-                .into_iter()
-                .all(|side| self.sector_is_dear(length, cost, heading + side * half, 0.5 * half))
+        if spread <= FINEST * direct {
+            self.failed = Some((heading, half));
+            return false;
+        }
+        // The half that leads closer to the other end first: it decides more often.
+        let mut sides = [-0.5, 0.5];
+        if way.perp(&(self.to - self.from)) > 0.0 {
+            sides.reverse();
+        }
+        sides
+            .into_iter()
+            .all(|side| self.sector_is_dear(length, cost, heading + side * half, 0.5 * half))
     }
 
     /// The walls that count, and by how much they are widened.
@@ -245,6 +283,6 @@ impl Leg<'_> {
             outline.radius = outline.radius.min(distance);
             (distance > 0.0).then_some(outline)
         });
-        shortest(&Obstacles::new(outlines, [at, self.to], None)) - self.slack
+        shortest(&Obstacles::new(outlines, [at, self.to], None)).0 - self.slack
     }
 }

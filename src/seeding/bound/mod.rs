@@ -9,8 +9,10 @@ mod ends;
 mod event;
 mod wall;
 
+use std::cell::Cell;
+
 use super::obstacles::Obstacles;
-use super::taut::taut_strings;
+use super::taut::taut_strings_within;
 use crate::cost::Tolerance;
 use crate::geometry::Point3;
 use crate::scenario::{Quadrature, Scenario};
@@ -19,6 +21,13 @@ use wall::Wall;
 
 /// Covers the rounding of the sums behind a bound, so that it holds in floating point too.
 const ROUNDING: f64 = 1e-9;
+
+/// Ways looked at for one string: beyond a few hundred walls, the search ends with what it has
+/// proven so far.
+const MOST_WAYS: usize = 60_000;
+
+/// Ways looked at in all before the number of events is no longer bisected.
+const MOST_WAYS_IN_ALL: usize = 120_000;
 
 /// Bisections on the number of events that a cheaper route may make use of.
 const MOST_LEVELS: usize = 24;
@@ -95,15 +104,18 @@ fn round_walls(scenario: &Scenario, prices: &Prices) -> f64 {
         scenario,
         prices,
         walls: &walls,
+        ways: Cell::new(0),
     };
     // The first level at which the next event costs as much as can be proven without it; beyond
     // it, less can be proven.
     let (mut low, mut high) = (0, events.len());
-    let (mut proven, mut level) = (0.0_f64, 0);
+    let (mut proven, mut level, mut best) = (0.0_f64, 0, 0);
     for _ in 0..MOST_LEVELS {
-        let bound = field.bound(&events[..level]);
-        let next = events.get(level).map_or(f64::INFINITY, |event| event.cost);
-        proven = proven.max(bound.min(next));
+        let bound = field.level(&events[..level]);
+        let next = cost_of(&events, level);
+        if bound.min(next) > proven {
+            (proven, best) = (bound.min(next), level);
+        }
         if next >= bound {
             high = level;
             if low >= high {
@@ -115,9 +127,34 @@ fn round_walls(scenario: &Scenario, prices: &Prices) -> f64 {
             let affordable = events.partition_point(|event| event.cost < bound);
             high = high.min(affordable).max(low);
         }
-        level = usize::midpoint(low, high);
+        // At the highest level first: there, all that is proven is the bound itself.
+        level = if level == 0 {
+            high
+        } else if field.ways.get() > MOST_WAYS_IN_ALL {
+            break;
+        } else {
+            usize::midpoint(low, high)
+        };
+    }
+    if ends::are_too_many(&walls) {
+        return proven;
+    }
+    // The legs of start and target make it dearer still, at times dearer than the next event.
+    for _ in 0..2 {
+        let steep = field.steep(&events[..best]);
+        proven = proven.max(steep.min(cost_of(&events, best)));
+        let affordable = events.partition_point(|event| event.cost < steep);
+        if affordable <= best {
+            break;
+        }
+        best = affordable;
     }
     proven
+}
+
+/// Cost of the first event that is not allowed at `level`.
+fn cost_of(events: &[Event], level: usize) -> f64 {
+    events.get(level).map_or(f64::INFINITY, |event| event.cost)
 }
 
 /// Without widening anything: where there are too many gaps to look at.
@@ -126,24 +163,20 @@ fn plain(walls: &[Wall], prices: &Prices) -> f64 {
         .iter()
         .map(|wall| wall.toll.is_none().then_some(wall.core))
         .collect();
-    string(walls, &radii, prices, prices.rise())
+    prices.climbing(length(walls, &radii, prices).0, prices.rise())
 }
 
-/// Cost of the string round `walls` widened to `radii` (`None` leaves one out), going up and down
-/// by `vertical`; infinite where there is none.
-fn string(walls: &[Wall], radii: &[Option<f64>], prices: &Prices, vertical: f64) -> f64 {
-    prices.climbing(length(walls, radii, prices), vertical)
-}
-
-/// Length of the string, metres, less what routes may cut off corners.
-fn length(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> f64 {
+/// Length of the string round `walls` widened to `radii` (`None` leaves one out), metres, less what
+/// routes may cut off corners; infinite where there is none. With it, the ways looked at.
+fn length(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> (f64, usize) {
     let outlines = walls.iter().zip(radii);
     let scene = Obstacles::new(
         outlines.map(|(wall, radius)| radius.map(|radius| wall.outline(radius))),
         prices.ends.map(|end| end.xy()),
         None,
     );
-    shortest(&scene) - slack(walls, radii, prices)
+    let (shortest, ways) = shortest(&scene);
+    (shortest - slack(walls, radii, prices), ways)
 }
 
 fn slack(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> f64 {
@@ -157,11 +190,11 @@ fn slack(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> f64 {
     length * (1.0 + prices.exposure * dearest / prices.fuel)
 }
 
-/// Length that no string in `scene` undercuts.
-fn shortest(scene: &Obstacles) -> f64 {
-    let found = taut_strings(scene, 1);
+/// Length that no string in `scene` undercuts, and the ways looked at.
+fn shortest(scene: &Obstacles) -> (f64, usize) {
+    let found = taut_strings_within(scene, 1, MOST_WAYS);
     let first = found.strings.first().map(|string| string.length);
-    first.unwrap_or(f64::INFINITY).min(found.beyond)
+    (first.unwrap_or(f64::INFINITY).min(found.beyond), found.ways)
 }
 
 /// A scenario as a bound sees it.
@@ -169,27 +202,38 @@ struct Field<'a> {
     scenario: &'a Scenario,
     prices: &'a Prices,
     walls: &'a [Wall],
+    /// Looked at so far.
+    ways: Cell<usize>,
 }
 
 impl Field<'_> {
     /// What no route undercuts that makes use of `allowed` events at most.
-    fn bound(&self, allowed: &[Event]) -> f64 {
-        let radii = self.radii(allowed);
-        let tame = ends::bound(self.scenario, self.prices, self.walls, &radii);
+    fn level(&self, allowed: &[Event]) -> f64 {
+        let cost = |radii: &[Option<f64>]| {
+            let (length, ways) = length(self.walls, radii, self.prices);
+            self.ways.set(self.ways.get() + ways);
+            self.prices.climbing(length, self.prices.rise())
+        };
+        let tame = cost(&self.radii(allowed));
         if allowed.is_empty() || tame.is_infinite() {
             return tame;
         }
         // Either no event happens, or one does: then its price comes on top, but what it is made
         // of must not be used twice.
-        let none = self.radii(&[]);
-        let without = ends::bound(self.scenario, self.prices, self.walls, &none);
-        let bare = self.bare(allowed);
         let extra = allowed
             .iter()
             .map(|event| event.extra)
             .fold(f64::INFINITY, f64::min);
-        let with = string(self.walls, &bare, self.prices, self.prices.rise()) + extra;
-        tame.max(without.min(with))
+        if extra <= 0.0 || self.ways.get() > MOST_WAYS_IN_ALL {
+            return tame;
+        }
+        let with = cost(&self.bare(allowed)) + extra;
+        tame.max(with.min(cost(&self.radii(&[]))))
+    }
+
+    /// As `level`, by the legs that begin at the start and end at the target.
+    fn steep(&self, allowed: &[Event]) -> f64 {
+        ends::bound(self.scenario, self.prices, self.walls, &self.radii(allowed))
     }
 
     /// How far each wall may be widened so that it counts as hard whatever `allowed` events happen.

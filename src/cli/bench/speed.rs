@@ -37,8 +37,11 @@ const FAR_THREATS: [u32; 4] = [0, 10, 100, 1000];
 
 /// The size of a population where it is not what is varied.
 const POPULATION: usize = 200;
-/// Iterations that gather the positions which are then priced.
+/// Members and iterations of the search that gathers the positions which are then priced.
+const GATHERED: usize = 40;
 const GATHERING: u32 = 50;
+/// How far from a route its neighbours are, as a share of the way.
+const NEIGHBOURHOOD: f64 = 0.01;
 /// A measurement is cut into so many; the fastest counts, for the others were disturbed.
 const SLICES: u32 = 5;
 /// Plans of each scenario, of which the median counts.
@@ -137,8 +140,8 @@ pub(super) fn measure(arguments: &Arguments, cases: &[Case]) -> anyhow::Result<R
         intro: format!(
             "One core, processor time; each figure the best of {SLICES} slices of {} ms. An evaluation decodes a position of tms-sba and \
              prices the route with every constraint. Scattered positions are drawn at random from the bounds; gathered ones are a \
-             population of {POPULATION} after {GATHERING} iterations, which is what a search prices most of the time. Priced are the \
-             routes of {LANES} short plain searches side by side, without decoding; the last two columns are of that.",
+             population of {GATHERED} after {GATHERING} iterations, which is what a search prices most of the time. Priced are \
+             {LANES} neighbouring routes side by side, without decoding; the last two columns are of that.",
             arguments.time_ms / SLICES
         ),
         tables: done,
@@ -168,7 +171,7 @@ fn rates(scenario: &Scenario, batch: usize, time_ms: u32) -> Rates {
     let algorithm = optimizer::by_name(&scenario.planner.algorithm)
         .expect("the reader accepts only names in the table");
     let settings = Settings {
-        population: POPULATION,
+        population: GATHERED,
         seed: scenario.planner.seed,
         parameters: algorithm.parameters_with(|_| None),
     };
@@ -187,24 +190,28 @@ fn rates(scenario: &Scenario, batch: usize, time_ms: u32) -> Rates {
     }
 }
 
-/// Pricing alone: the routes of one short search a lane, as many times as make a batch.
+/// Pricing alone: the route of a short search and neighbours of it, one a lane, as many times as make
+/// a batch.
 fn priced(scenario: &Scenario, batch: usize, time_ms: u32) -> f64 {
-    let model = Model::new(scenario);
-    let quadrature = scenario.planner.quadrature;
-    let pricer = Pricer::new(&model, quadrature, model.tolerance);
-    let mut rows = vec![PointRow::splat(scenario.start); scenario.planner.waypoints + 2];
-    for (lane, seed) in (0..LANES).zip(1..) {
-        let mut short = scenario.clone();
-        short.planner.seed = seed;
-        short.planner.population = 20;
-        short.planner.iterations = 20;
-        short.planner.seeding = Seeding::Random;
-        short.planner.polish = false;
-        let route = planner::plan(&short, &mut Nobody, &Nobody).waypoints;
-        for (row, point) in rows.iter_mut().zip(route) {
-            row.set(lane, point);
+    let mut short = scenario.clone();
+    short.planner.population = GATHERED;
+    short.planner.iterations = 10;
+    short.planner.seeding = Seeding::Random;
+    short.planner.polish = false;
+    let route = planner::plan(&short, &mut Nobody, &Nobody).waypoints;
+    let mut rows: Vec<PointRow> = route.iter().copied().map(PointRow::splat).collect();
+    let mut random = Random::new(scenario.planner.seed);
+    let reach = NEIGHBOURHOOD * (scenario.target - scenario.start).norm();
+    for (row, point) in rows.iter_mut().zip(&route).skip(1).take(route.len() - 2) {
+        for lane in 1..LANES {
+            let mut beside = *point;
+            beside.x += random.between(-reach, reach);
+            beside.y += random.between(-reach, reach);
+            row.set(lane, beside);
         }
     }
+    let model = Model::new(scenario);
+    let pricer = Pricer::new(&model, scenario.planner.quadrature, model.tolerance);
     let rounds = batch.div_ceil(LANES);
     best_rate(rounds * LANES, time_ms, || {
         for _ in 0..rounds {

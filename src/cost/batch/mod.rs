@@ -11,6 +11,7 @@ mod heights;
 mod index;
 mod leg;
 mod peaks;
+mod pyramid;
 mod route;
 mod threats;
 

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::fs;
 
 use noctule::cost::Model;
+use noctule::cost::batch::{LANES, PointRow, Pricer};
 use noctule::geometry::{Point2, Point3};
 use noctule::planner::{self, ConvergencePoint, Incumbent, Observer, Stop};
 use noctule::scenario::json::{self, Rules};
@@ -67,6 +68,72 @@ fn evaluate(bencher: divan::Bencher, name: &str) {
             });
             (figures, violation)
         });
+}
+
+/// A good route and seven near it, side by side.
+fn swarm(scenario: &Scenario) -> Vec<PointRow> {
+    let route = planner::plan(scenario, &mut Nobody, &Nobody).waypoints;
+    let mut rows: Vec<PointRow> = route.iter().copied().map(PointRow::splat).collect();
+    let (last, step) = (
+        rows.len() - 1,
+        0.001 * (scenario.target - scenario.start).norm(),
+    );
+    for (idx, row) in rows[1..last].iter_mut().enumerate() {
+        for lane in 0..LANES {
+            let mut point = row.get(lane);
+            let height = point.z - scenario.terrain.elevation(point.xy());
+            point.x += step * ((lane * 3 + idx * 5) % 7) as f64;
+            point.y += step * ((lane * 5 + idx * 2) % 7) as f64;
+            point.z = scenario.terrain.elevation(point.xy()) + height;
+            row.set(lane, point);
+        }
+    }
+    rows
+}
+
+fn bench_lanes(bencher: divan::Bencher, scenario: &Scenario, rows: &[PointRow]) {
+    let model = Model::new(scenario);
+    let pricer = Pricer::new(&model, scenario.planner.quadrature, model.tolerance);
+    bencher
+        .counter(divan::counter::ItemsCount::new(LANES))
+        .bench(|| pricer.routes(divan::black_box(rows)));
+}
+
+/// As `evaluate`, of eight routes side by side.
+#[divan::bench(args = SCENARIOS)]
+fn evaluate_lanes(bencher: divan::Bencher, name: &str) {
+    let scenario = scenario(name);
+    bench_lanes(bencher, &scenario, &swarm(&scenario));
+}
+
+/// As `evaluate_lanes`, beside so many small threats far from the route.
+#[divan::bench(args = [10, 100, 1000])]
+fn evaluate_lanes_by_threats(bencher: divan::Bencher, threats: usize) {
+    let mut scenario = scenario("paper-2");
+    let rows = swarm(&scenario);
+    for idx in scenario.threats.len()..threats {
+        let mut far = scenario.threats[0].clone();
+        // Along the diagonal on which the route does not lie, in both its halves.
+        let along = (idx * 37 % 1000) as f64 / 1000.0;
+        let across = 400.0 + 90.0 * ((idx * 61 % 100) as f64 / 100.0);
+        let side = if idx % 2 == 0 { across } else { -across };
+        far.shape = Shape::Cylinder(Cylinder {
+            center: Point2::new(1000.0 * along + side, 1000.0 * along - side),
+            radius: 3.0,
+            influence: 8.0,
+        });
+        scenario.threats.push(far);
+    }
+    bench_lanes(bencher, &scenario, &rows);
+}
+
+/// As `evaluate_lanes`, with so many waypoints.
+#[divan::bench(args = [5, 10, 20, 40, 80])]
+fn evaluate_lanes_by_waypoints(bencher: divan::Bencher, waypoints: usize) {
+    let mut scenario = scenario("paper-2");
+    scenario.planner.waypoints = waypoints;
+    scenario.planner.iterations = 20;
+    bench_lanes(bencher, &scenario, &swarm(&scenario));
 }
 
 /// A whole plan with the document's own settings (200 x 200 for the paper's scenarios), smoothing and certificate included.

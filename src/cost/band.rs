@@ -130,12 +130,14 @@ impl Model<'_> {
         range
     }
 
-    /// Report a leg that leaves the band or meets the ground.
+    /// Report a leg that leaves the band or meets the ground, by how much to within the share
+    /// `rough` of it.
     pub(super) fn heights(
         &self,
         leg_idx: usize,
         leg: &Segment,
         tolerance: Tolerance,
+        rough: f64,
         report: &mut impl FnMut(Breach),
     ) {
         let (mut underground, mut off_band) = (0.0_f64, 0.0_f64);
@@ -144,7 +146,7 @@ impl Model<'_> {
             let (below, above) =
                 self.scenario
                     .terrain
-                    .excess(leg, window, section.floor, section.ceiling);
+                    .excess(leg, window, section.floor, section.ceiling, rough);
             off_band = off_band.max(above);
             if section.terminal {
                 underground = underground.max(below);

@@ -49,8 +49,14 @@ impl<'o> Log<'o> {
         gap > 0.0 && self.best.is_feasible() && self.best.cost <= self.lower * (1.0 + gap)
     }
 
-    /// Keep `route` if it is the best so far; whether it is.
+    /// Keep `route`, whose fitness was found in lanes, if it is the best so far; whether it is.
     pub(super) fn offer(&mut self, route: &[Point3], fitness: Fitness) -> bool {
+        // What is told and delivered is the scalar figure, to the last digit.
+        (self.route.is_empty() || fitness.beats(&self.best))
+            && self.keep_better(route, price(self.model, route))
+    }
+
+    fn keep_better(&mut self, route: &[Point3], fitness: Fitness) -> bool {
         let better = self.route.is_empty() || fitness.beats(&self.best);
         if better {
             self.route = route.to_vec();
@@ -62,7 +68,7 @@ impl<'o> Log<'o> {
     /// As [`Log::offer`], of a route that is not priced yet.
     pub(super) fn offer_unpriced(&mut self, route: &[Point3]) -> bool {
         self.evaluations += 1;
-        self.offer(route, price(self.model, route))
+        self.keep_better(route, price(self.model, route))
     }
 
     /// A point of the curve: the best so far, and how `swarm` fares.

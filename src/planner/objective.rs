@@ -2,7 +2,7 @@
 
 use super::coding::{Cartesian, Coding};
 use super::guide::Guide;
-use super::price::{PRICED_FROM, price};
+use super::price::{PRICED_FROM, ROUGH, price};
 use super::{Stop, why_stop};
 use crate::cost::Model;
 use crate::cost::batch::{LANES, PointRow, Pricer};
@@ -62,7 +62,7 @@ impl<'s> Routes<'s> {
         Self {
             coding,
             guide,
-            pricer: Pricer::new(model, quadrature, tolerance),
+            pricer: Pricer::new(model, quadrature, tolerance).roughly(ROUGH),
             model: model.clone(),
             route: Vec::new(),
             points: Vec::new(),

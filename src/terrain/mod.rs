@@ -74,7 +74,8 @@ impl Terrain {
 
     /// How far the part `window` of `leg` dips below `floor` and rises above `ceiling` (heights
     /// above ground), metres, each >= 0. The same as by [`Terrain::height_range`], but cheap where
-    /// the leg keeps well within them.
+    /// the leg keeps well within them. Each may be missed by the share `rough` of itself, which is
+    /// quicker; whether it is 0 may not.
     #[must_use]
     pub fn excess(
         &self,
@@ -82,6 +83,7 @@ impl Terrain {
         window: (f64, f64),
         floor: f64,
         ceiling: f64,
+        rough: f64,
     ) -> (f64, f64) {
         let range = match self {
             Self::Peaks(peaks) => peaks.height_range_beyond(
@@ -91,6 +93,7 @@ impl Terrain {
                     min: floor,
                     max: ceiling,
                 },
+                rough,
             ),
             Self::Flat(_) | Self::Grid(_) => self.height_range(leg, window),
         };

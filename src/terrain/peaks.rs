@@ -59,26 +59,31 @@ impl Peaks {
             min: f64::INFINITY,
             max: f64::NEG_INFINITY,
         };
-        self.search(leg, window, everything, ACCURACY)
+        self.search(leg, window, everything, |_| ACCURACY)
     }
 
-    /// As `height_range`, but only where it reaches beyond `band`, to 0.1 mm.
+    /// As `height_range`, but only where it reaches beyond `band`, to 0.1 mm, or to the share
+    /// `rough` of how far that is.
     pub(super) fn height_range_beyond(
         &self,
         leg: &Segment,
         window: (f64, f64),
         band: HeightRange,
+        rough: f64,
     ) -> HeightRange {
-        self.search(leg, window, band, BAND_ACCURACY)
+        self.search(leg, window, band, |range| {
+            let beyond = (band.min - range.min).max(range.max - band.max);
+            BAND_ACCURACY.max(rough * beyond)
+        })
     }
 
-    /// Branch and bound for the extremes beyond `band`.
+    /// Branch and bound for the extremes beyond `band`, as accurate as what is found asks for.
     fn search(
         &self,
         leg: &Segment,
         (t0, t1): (f64, f64),
         band: HeightRange,
-        accuracy: f64,
+        accuracy: impl Fn(HeightRange) -> f64,
     ) -> HeightRange {
         let profile = self.profile(leg);
         let (h0, h1) = (profile.at(t0), profile.at(t1));
@@ -90,6 +95,7 @@ impl Peaks {
         while let Some((t0, h0, t1, h1)) = open.pop() {
             // A curve keeps within bend * width^2 / 8 of its chord.
             let slack = profile.bend(t0, t1) * (t1 - t0) * (t1 - t0) / 8.0;
+            let accuracy = accuracy(range);
             let may_dip = h0.min(h1) - slack < range.min.min(band.min) - accuracy;
             let may_rise = h0.max(h1) + slack > range.max.max(band.max) + accuracy;
             if (may_dip || may_rise) && slack > accuracy {
@@ -246,7 +252,7 @@ mod tests {
             prop_assert!(range.min <= seen.min + 2e-6 && range.max >= seen.max - 2e-6, "{range:?} {seen:?}");
             prop_assert!(seen.min - range.min < 0.05 && range.max - seen.max < 0.05, "{range:?} {seen:?}");
             let band = HeightRange { min: 20.0, max: 250.0 };
-            let beyond = peaks.height_range_beyond(&leg, (t0, t1), band);
+            let beyond = peaks.height_range_beyond(&leg, (t0, t1), band, 0.0);
             prop_assert!(((band.min - beyond.min).max(0.0) - (band.min - range.min).max(0.0)).abs() < 2e-4);
             prop_assert!(((beyond.max - band.max).max(0.0) - (range.max - band.max).max(0.0)).abs() < 2e-4);
         }

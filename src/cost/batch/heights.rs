@@ -5,6 +5,7 @@ use pulp::Simd;
 
 use super::leg::{Leg, Point};
 use super::peaks::{Massif, Panorama};
+use super::pyramid::Pyramid;
 use super::{PointRow, Pricer};
 use crate::cost::{Model, Tolerance};
 use crate::geometry::Point2;
@@ -32,7 +33,7 @@ pub(super) struct Heights {
 enum Surface {
     Flat(f64),
     Peaks(Massif),
-    Grid,
+    Grid(Pyramid),
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -70,7 +71,7 @@ impl Heights {
             surface: match &model.scenario.terrain {
                 Terrain::Flat(flat) => Surface::Flat(flat.elevation),
                 Terrain::Peaks(peaks) => Surface::Peaks(Massif::of(peaks)),
-                Terrain::Grid(_) => Surface::Grid,
+                Terrain::Grid(grid) => Surface::Grid(Pyramid::of(grid)),
             },
         }
     }
@@ -128,7 +129,7 @@ impl Pricer<'_> {
                 self.heights.within(ends, none, &inside, [0.0, 1.0])
             }
             Surface::Peaks(massif) => massif.clear(leg, panorama, &inside, &self.heights),
-            Surface::Grid => leg.splat(1.0).lt(leg.splat(0.0)),
+            Surface::Grid(pyramid) => self.clear_of_grid(leg, &inside, pyramid),
         };
         let clear = clear & !inside.unclear;
         if !(!clear).any() {
@@ -136,10 +137,15 @@ impl Pricer<'_> {
         }
         (!clear).map(|lane| {
             let mut violation = 0.0;
-            self.model
-                .heights(0, &leg.segment(lane), self.tolerance, &mut |breach| {
+            self.model.heights(
+                0,
+                &leg.segment(lane),
+                self.tolerance,
+                self.rough,
+                &mut |breach| {
                     violation += breach.amount;
-                });
+                },
+            );
             violation
         })
     }
@@ -151,7 +157,7 @@ impl Pricer<'_> {
         match &self.heights.surface {
             Surface::Flat(elevation) => point.x.with(*elevation),
             Surface::Peaks(massif) => massif.elevation(point),
-            Surface::Grid => point.x.map(|lane, _| {
+            Surface::Grid(_) => point.x.map(|lane, _| {
                 let below = row.get(part * S::F64_LANES + lane).xy();
                 self.model.scenario.terrain.elevation(below)
             }),
@@ -166,12 +172,31 @@ impl Pricer<'_> {
         let ground = match &self.heights.surface {
             Surface::Flat(elevation) => leg.splat(*elevation),
             Surface::Peaks(_) => panorama.ground(),
-            Surface::Grid => leg.b.z.map(|lane, _| {
+            Surface::Grid(_) => leg.b.z.map(|lane, _| {
                 let below = leg.segment(lane).b.xy();
                 self.model.scenario.terrain.elevation(below)
             }),
         };
         (leg.b.z - ground - middle).abs()
+    }
+
+    /// Where a leg is proven to keep its heights above a grid.
+    #[inline(always)]
+    fn clear_of_grid<S: Simd>(
+        &self,
+        leg: &Leg<S>,
+        inside: &Inside<S>,
+        pyramid: &Pyramid,
+    ) -> Mask<S> {
+        let (zero, one) = (leg.splat(0.0), leg.splat(1.0));
+        let heights = &self.heights;
+        let wholly = inside.enter.le(zero) & one.le(inside.leave);
+        let floor = wholly.select(leg.splat(heights.ground), leg.splat(heights.floor));
+        let proven = floor.map(|lane, floor| {
+            let clear = pyramid.clears(&leg.segment(lane), floor, heights.ceiling);
+            f64::from(u8::from(clear))
+        });
+        zero.lt(proven)
     }
 
     /// Where each leg lies in a terminal zone.

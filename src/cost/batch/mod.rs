@@ -11,6 +11,7 @@ mod heights;
 mod index;
 mod leg;
 mod peaks;
+mod pyramid;
 mod route;
 mod threats;
 
@@ -89,6 +90,8 @@ impl Price {
 pub struct Pricer<'s> {
     model: Model<'s>,
     tolerance: Tolerance,
+    /// By what share of itself a breach of the band or the ground may be missed.
+    rough: f64,
     quadrature: Quadrature,
     limits: Limits,
     threats: Threats,
@@ -106,9 +109,19 @@ impl<'s> Pricer<'s> {
             heights: Heights::of(model, tolerance),
             model: model.clone(),
             tolerance,
+            rough: 0.0,
             quadrature,
             arch: Arch::new(),
         }
+    }
+
+    /// Measures by how much routes leave the band or meet the ground over mountains to within the
+    /// share `rough` of it, for a search that need not know better; whether they do, and all else,
+    /// stays as it is.
+    #[must_use]
+    pub fn roughly(mut self, rough: f64) -> Self {
+        self.rough = rough;
+        self
     }
 
     /// Price [`LANES`] routes of as many points: start, free waypoints, target.

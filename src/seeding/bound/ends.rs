@@ -16,7 +16,7 @@ use crate::threat::{Cylinder, Shape, Threat};
 const MOST_CORNERS: usize = 80;
 
 /// What proving legs may take: one for each sector, more for each string.
-const EFFORT: usize = 10_000;
+const EFFORT: usize = 12_000;
 
 /// Sectors are not cut finer than this share of the way.
 const FINEST: f64 = 0.003;

@@ -130,6 +130,30 @@ impl Model<'_> {
         range
     }
 
+    /// How far a leg leaves the band and dips below the ground at some points, as many as `samples`,
+    /// metres: no more than by [`Model::heights`].
+    pub(super) fn sampled_heights(&self, leg: &Segment, samples: usize) -> f64 {
+        let (mut underground, mut off_band) = (0.0_f64, 0.0_f64);
+        let step = 1.0 / samples as f64;
+        self.sections(leg, |section| {
+            let mut t = ((section.t0 / step - 0.5).ceil() + 0.5) * step;
+            while t < section.t1 {
+                let point = leg.at(t);
+                let height = point.z - self.scenario.terrain.elevation(point.xy());
+                let below = section.floor - height;
+                off_band = off_band.max(height - section.ceiling);
+                if section.terminal {
+                    underground = underground.max(below);
+                } else {
+                    off_band = off_band.max(below);
+                    underground = underground.max(-height);
+                }
+                t += step;
+            }
+        });
+        off_band + underground
+    }
+
     /// Report a leg that leaves the band or meets the ground, by how much to within the share
     /// `rough` of it.
     pub(super) fn heights(

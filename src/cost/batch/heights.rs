@@ -52,6 +52,34 @@ pub(super) struct Inside<S: Simd> {
     unclear: Mask<S>,
 }
 
+/// The greatest breaches of the band and of the ground at points of a leg.
+#[derive(Clone, Copy)]
+pub(super) struct Breach<S: Simd> {
+    band: Lane<S>,
+    ground: Lane<S>,
+}
+
+impl<S: Simd> Breach<S> {
+    #[inline(always)]
+    pub(super) fn none(zero: Lane<S>) -> Self {
+        Self {
+            band: zero,
+            ground: zero,
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn sum(self) -> Lane<S> {
+        self.band + self.ground
+    }
+}
+
+/// Points of a leg at which a rough pricer looks at a grid.
+const GLANCES: usize = 8;
+
+/// A breach at a point of a leg, of more metres than this, spares a rough pricer the exact one.
+const SURELY: f64 = 0.05;
+
 impl Heights {
     pub(super) fn of(model: &Model, tolerance: Tolerance) -> Self {
         let band = model.scenario.altitude;
@@ -78,6 +106,24 @@ impl Heights {
 }
 
 impl Heights {
+    /// The breach of a leg that is `height` above ground at `t`, or the one before if greater.
+    #[inline(always)]
+    pub(super) fn breach<S: Simd>(
+        &self,
+        height: Lane<S>,
+        inside: &Inside<S>,
+        t: f64,
+        before: Breach<S>,
+    ) -> Breach<S> {
+        let (zero, at) = (height.with(0.0), height.with(t));
+        let off = (height.with(self.floor) - height).max(height - self.ceiling);
+        let in_zone = inside.enter.le(at) & at.le(inside.leave);
+        Breach {
+            band: before.band.max((!in_zone).keep(off.max(zero))),
+            ground: before.ground.max(height.with(self.ground) - height),
+        }
+    }
+
     /// Where a leg keeps its heights over its part `[t0, t1]`, being `from` and `to` at the ends of
     /// it and between them at most `dip` below and `rise` above the line that joins these.
     #[inline(always)]
@@ -122,20 +168,35 @@ impl Pricer<'_> {
     #[inline(always)]
     pub(super) fn heights<S: Simd>(&self, leg: &Leg<S>, panorama: &Panorama<S>) -> Lane<S> {
         let inside = self.inside(leg);
-        let clear = match &self.heights.surface {
+        let none = leg.splat(0.0);
+        let (clear, seen) = match &self.heights.surface {
             Surface::Flat(elevation) => {
                 let ends = [leg.a.z - *elevation, leg.b.z - *elevation];
-                let none = [leg.splat(0.0); 2];
-                self.heights.within(ends, none, &inside, [0.0, 1.0])
+                let slack = [none; 2];
+                (self.heights.within(ends, slack, &inside, [0.0, 1.0]), none)
             }
             Surface::Peaks(massif) => massif.clear(leg, panorama, &inside, &self.heights),
-            Surface::Grid(pyramid) => self.clear_of_grid(leg, &inside, pyramid),
+            Surface::Grid(pyramid) => (self.clear_of_grid(leg, &inside, pyramid), none),
         };
         let clear = clear & !inside.unclear;
         if !(!clear).any() {
-            return leg.splat(0.0);
+            return none;
         }
-        (!clear).map(|lane| {
+        let seen = if self.rough > 0.0 { seen } else { none };
+        let sure = leg.splat(SURELY).lt(seen) & !clear & !inside.unclear;
+        let seen = sure.keep(seen);
+        let open = !(clear | sure);
+        if !open.any() {
+            return seen;
+        }
+        seen + open.map(|lane| {
+            if self.rough > 0.0
+                && let Surface::Grid(_) = self.heights.surface
+                && let breach = self.model.sampled_heights(&leg.segment(lane), GLANCES)
+                && breach > SURELY
+            {
+                return breach;
+            }
             let mut violation = 0.0;
             self.model.heights(
                 0,

@@ -90,7 +90,7 @@ impl Price {
 pub struct Pricer<'s> {
     model: Model<'s>,
     tolerance: Tolerance,
-    /// By what share of itself a breach of the band or the ground may be missed.
+    /// By about what share of itself a breach of the band or the ground may be missed.
     rough: f64,
     quadrature: Quadrature,
     limits: Limits,
@@ -115,9 +115,9 @@ impl<'s> Pricer<'s> {
         }
     }
 
-    /// Measures by how much routes leave the band or meet the ground over mountains to within the
-    /// share `rough` of it, for a search that need not know better; whether they do, and all else,
-    /// stays as it is.
+    /// Measures only roughly, to about the share `rough`, by how much routes leave the band or meet
+    /// the ground, for a search that need not know better; whether they do, and all else, stays as
+    /// it is.
     #[must_use]
     pub fn roughly(mut self, rough: f64) -> Self {
         self.rough = rough;

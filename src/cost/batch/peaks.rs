@@ -9,7 +9,7 @@
 
 use pulp::Simd;
 
-use super::heights::{Heights, Inside};
+use super::heights::{Breach, Heights, Inside};
 use super::leg::{Leg, Point};
 use crate::geometry::Point2;
 use crate::geometry::lane::{Lane, Mask};
@@ -137,7 +137,8 @@ impl Massif {
         panorama.ground = [panorama.ground[1], ground];
     }
 
-    /// Where a leg is proven to keep within `heights`; `panorama` is that of its ends.
+    /// Where a leg is proven to keep within `heights`, and by how much it is seen not to where it is
+    /// not; `panorama` is that of its ends.
     #[inline(always)]
     pub(super) fn clear<S: Simd>(
         &self,
@@ -145,16 +146,17 @@ impl Massif {
         panorama: &Panorama<S>,
         inside: &Inside<S>,
         heights: &Heights,
-    ) -> Mask<S> {
+    ) -> (Mask<S>, Lane<S>) {
         let clear = self.clear_by_ends(leg, panorama, inside, heights);
         if !(!clear).any() {
-            return clear;
+            return (clear, leg.splat(0.0));
         }
         let clear = clear | self.clear_by_middle(leg, panorama, inside, heights);
         if !(!clear).any() {
-            return clear;
+            return (clear, leg.splat(0.0));
         }
-        clear | self.clear_by_steps(leg, panorama, inside, heights)
+        let (by_steps, breach) = self.clear_by_steps(leg, panorama, inside, heights);
+        (clear | by_steps, breach)
     }
 
     /// The ends of the leg, and the chord between them.
@@ -243,7 +245,7 @@ impl Massif {
             & !unclear
     }
 
-    /// Some points of the leg, and the chords between them.
+    /// Some points of the leg, and the chords between them; with the greatest breach at the points.
     #[inline(always)]
     fn clear_by_steps<S: Simd>(
         &self,
@@ -251,7 +253,7 @@ impl Massif {
         panorama: &Panorama<S>,
         inside: &Inside<S>,
         heights: &Heights,
-    ) -> Mask<S> {
+    ) -> (Mask<S>, Lane<S>) {
         let (zero, one) = (leg.splat(0.0), leg.splat(1.0));
         let mut ground = [leg.splat(self.base); STEPS + 1];
         let mut slack = Slack {
@@ -300,15 +302,18 @@ impl Massif {
         }
         let mut clear = !unclear;
         let mut before = leg.a.z - ground[0];
+        let mut seen = Breach::none(zero);
         let mut sample = 0;
         while sample < STEPS {
             let (t0, t1) = (STEP * sample as f64, STEP * (sample + 1) as f64);
             let after = leg.a.z + leg.dz * t1 - ground[sample + 1];
             clear = clear & heights.within([before, after], slack.both(), inside, [t0, t1]);
+            seen = heights.breach(after, inside, t1, seen);
             before = after;
             sample += 1;
         }
-        clear
+        // What is not followed is not seen.
+        (clear, (!unclear).keep(seen.sum()))
     }
 }
 

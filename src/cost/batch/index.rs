@@ -62,25 +62,35 @@ impl Index {
         index
     }
 
-    /// The threats whose boxes meet that of any of `legs`, in order.
-    pub(super) fn find(&self, legs: impl Iterator<Item = Segment>, found: &mut Vec<u32>) {
+    /// The threats whose boxes meet those of `legs`, in order, and maybe some more.
+    pub(super) fn find(&self, legs: impl Iterator<Item = Segment> + Clone, found: &mut Vec<u32>) {
         found.clear();
-        for leg in legs {
-            let own = Rect {
-                min: Point2::new(leg.a.x.min(leg.b.x), leg.a.y.min(leg.b.y)),
-                max: Point2::new(leg.a.x.max(leg.b.x), leg.a.y.max(leg.b.y)),
-            };
-            if !meet(&own, &self.extent) {
-                continue;
-            }
-            for cell in self.cells(&own).iter(self.columns) {
-                let range = self.starts[cell] as usize..self.starts[cell + 1] as usize;
-                let near = self.threats[range].iter();
-                found.extend(near.filter(|threat| meet(&own, &self.boxes[**threat as usize])));
-            }
+        let ends = legs.clone().flat_map(|leg| [leg.a.xy(), leg.b.xy()]);
+        let Some(around) = Rect::around(ends) else {
+            return;
+        };
+        let apart: usize = legs
+            .clone()
+            .map(|leg| self.cells(&box_of(&leg)).count())
+            .sum();
+        if self.cells(&around).count() <= 2 * apart {
+            self.find_in(&around, found);
+        } else {
+            legs.for_each(|leg| self.find_in(&box_of(&leg), found));
         }
         found.sort_unstable();
         found.dedup();
+    }
+
+    fn find_in(&self, own: &Rect, found: &mut Vec<u32>) {
+        if !meet(own, &self.extent) {
+            return;
+        }
+        for cell in self.cells(own).iter(self.columns) {
+            let range = self.starts[cell] as usize..self.starts[cell + 1] as usize;
+            let near = self.threats[range].iter();
+            found.extend(near.filter(|threat| meet(own, &self.boxes[**threat as usize])));
+        }
     }
 
     fn cells(&self, of: &Rect) -> Cells {
@@ -94,20 +104,33 @@ impl Index {
 }
 
 impl Cells {
+    fn count(&self) -> usize {
+        let side = |range: &std::ops::RangeInclusive<usize>| range.end() - range.start() + 1;
+        side(&self.columns) * side(&self.rows)
+    }
+
     fn iter(self, width: usize) -> impl Iterator<Item = usize> {
         let Self { columns, rows } = self;
         rows.flat_map(move |row| columns.clone().map(move |column| row * width + column))
     }
 }
 
-/// Cells in either direction for `count` threats: about four of them to a threat, not too many.
+fn box_of(leg: &Segment) -> Rect {
+    Rect {
+        min: Point2::new(leg.a.x.min(leg.b.x), leg.a.y.min(leg.b.y)),
+        max: Point2::new(leg.a.x.max(leg.b.x), leg.a.y.max(leg.b.y)),
+    }
+}
+
+/// Cells in either direction for `count` threats: four threats to a cell, about as wide as a leg
+/// where threats are many, and not too many cells.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "the root of a count is positive and small"
 )]
 fn side(count: usize) -> usize {
-    ((2.0 * (count as f64).sqrt()) as usize).clamp(1, 256)
+    ((0.5 * (count as f64).sqrt()) as usize).clamp(1, 64)
 }
 
 #[expect(

@@ -3,6 +3,7 @@
 mod count;
 mod known;
 mod over;
+mod roadmap;
 mod tangents;
 
 pub(super) use count::with_waypoints;
@@ -27,8 +28,11 @@ const STARTS: usize = 12;
 /// Free waypoints of a coarse route, unless its bends ask for more.
 const COARSE: usize = 4;
 
+/// Routes taken from the net of places.
+const OVERLAND: usize = 5;
+
 /// A start this much dearer than the best, as a share, is not worth refining.
-const HOPELESS: f64 = 0.25;
+const HOPELESS: f64 = 0.08;
 
 /// Greatest and least step by which a start is pulled into place, as shares of the way.
 const ROUGH_STEPS: (f64, f64) = (0.03, 0.005);
@@ -46,7 +50,11 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let settings = &model.scenario.planner;
     let mut shapes = match settings.seeding {
         Seeding::Random => Vec::new(),
-        Seeding::Tangent => along_strings(model),
+        Seeding::Tangent => {
+            let mut shapes = along_strings(model);
+            shapes.extend(roadmap::routes(model, OVERLAND));
+            shapes
+        }
     };
     if let Some(WarmStart::Waypoints(points)) = &settings.warm_start {
         shapes.insert(0, known::route(model, points));
@@ -85,17 +93,19 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     Some(starts)
 }
 
-/// Pull the routes that may still win roughly into place.
+/// Pull the routes that may still win roughly into place; those that break a limit only while no
+/// other is there.
 fn refine(
     model: &Model,
-    priced: &mut [(Fitness, Vec<Point3>)],
+    priced: &mut Vec<(Fitness, Vec<Point3>)>,
     stop: &dyn Stop,
     evaluations: &mut u64,
 ) {
     let mut polish = Polish::new(model, stop);
     let mut best = Fitness::WORST;
     for (fitness, route) in priced.iter_mut() {
-        if fitness.violation <= best.violation && fitness.cost > best.cost * (1.0 + HOPELESS) {
+        let hopeless = fitness.cost > best.cost * (1.0 + HOPELESS);
+        if best.is_feasible() && (hopeless || !fitness.is_feasible()) {
             continue;
         }
         *fitness = polish.descend(route, ROUGH_STEPS.0, ROUGH_STEPS.1);

@@ -1,0 +1,179 @@
+//! Ways over the ground: the cheapest routes through a net of places in the middle of the band.
+//!
+//! Taut strings know threats, but neither mountains nor what crossing a soft zone costs. Here every
+//! leg between two of some hundred places is priced as it is, those that break a limit left out, and
+//! the cheapest chains from start to target are found; turns alone are not looked at.
+
+use super::lifted;
+use crate::cost::Model;
+use crate::cost::batch::{LANES, PointRow, Price, Pricer};
+use crate::geometry::{Point2, Point3, Vector2};
+use crate::planner::price::{PRICED_FROM, ROUGH};
+
+/// Places of the net, besides both ends.
+const PLACES: usize = 160;
+
+/// The net covers all points of which the way over them is at most so many times the direct one.
+const DETOUR: f64 = 1.4;
+
+/// What a waypoint must gain, as a share of the direct way's fuel.
+const WORTH: f64 = 1e-4;
+
+/// Up to `count` routes that differ, the cheapest first.
+pub(super) fn routes(model: &Model, count: usize) -> Vec<Vec<Point3>> {
+    let places = places(model);
+    let legs = legs(model, &places);
+    let target = places.len() - 1;
+    let (from_start, before) = cheapest(&legs, 0);
+    let (to_target, after) = cheapest(&legs, target);
+    // The cheapest route over each place; neighbours of a route's own places give it again.
+    let mut over: Vec<(f64, usize)> = (0..places.len())
+        .map(|place| (from_start[place] + to_target[place], place))
+        .filter(|(cost, _)| cost.is_finite())
+        .collect();
+    over.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
+    let mut routes: Vec<Vec<Point3>> = Vec::new();
+    for (_, place) in over {
+        let mut chain = trace(&before, place);
+        chain.reverse();
+        chain.extend(trace(&after, place).into_iter().skip(1));
+        let route: Vec<Point3> = chain.into_iter().map(|idx| places[idx]).collect();
+        if !routes.iter().any(|other| near(model, &route, other)) {
+            routes.push(route);
+        }
+        if routes.len() == count {
+            break;
+        }
+    }
+    routes
+}
+
+/// Start, a hexagonal net, target.
+fn places(model: &Model) -> Vec<Point3> {
+    let scenario = model.scenario;
+    let (start, target) = (scenario.start.xy(), scenario.target.xy());
+    let way = target - start;
+    let direct = way.norm();
+    let along = way / direct;
+    let across = Vector2::new(-along.y, along.x);
+    // An ellipse with both ends as its foci.
+    let (long, wide) = (
+        0.5 * DETOUR * direct,
+        0.5 * direct * (DETOUR * DETOUR - 1.0).sqrt(),
+    );
+    let step = (std::f64::consts::PI * long * wide / (0.866 * PLACES as f64)).sqrt();
+    let middle = nalgebra::center(&start, &target);
+    let mut places = vec![scenario.start];
+    let (rows, columns) = ((wide / (0.866 * step)).floor(), (long / step).ceil());
+    let mut row = -rows;
+    while row <= rows {
+        let shift = if row.rem_euclid(2.0) < 0.5 { 0.0 } else { 0.5 };
+        let mut column = -columns;
+        while column <= columns {
+            let (x, y) = ((column + shift) * step, row * 0.866 * step);
+            let at: Point2 = middle + along * x + across * y;
+            let inside = (x / long) * (x / long) + (y / wide) * (y / wide) <= 1.0;
+            if inside && scenario.area.contains(at) {
+                places.push(lifted(scenario, at));
+            }
+            column += 1.0;
+        }
+        row += 1.0;
+    }
+    places.push(scenario.target);
+    places
+}
+
+/// What each leg between two places costs, row by row; infinite where it breaks a limit.
+fn legs(model: &Model, places: &[Point3]) -> Vec<Vec<f64>> {
+    let scenario = model.scenario;
+    let tolerance = model.tolerance.scaled(PRICED_FROM);
+    let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).roughly(ROUGH);
+    let count = places.len();
+    let (mut from, mut to, mut pairs) = (Vec::new(), Vec::new(), Vec::new());
+    for a in 0..count {
+        for b in a + 1..count {
+            let lane = pairs.len() % LANES;
+            if lane == 0 {
+                from.push(PointRow::splat(places[a]));
+                to.push(PointRow::splat(places[b]));
+            }
+            let row = from.len() - 1;
+            from[row].set(lane, places[a]);
+            to[row].set(lane, places[b]);
+            pairs.push((a, b));
+        }
+    }
+    let mut prices = vec![Price::ZERO; from.len()];
+    pricer.legs(&from, &to, &mut prices);
+    let own: Vec<(f64, f64)> = places
+        .iter()
+        .map(|&place| model.waypoint(place, tolerance))
+        .collect();
+    let direct = (scenario.target - scenario.start).norm();
+    let worth = WORTH * direct * scenario.weights.fuel * scenario.vehicle.fuel_per_km / 1000.0;
+    let mut legs = vec![vec![f64::INFINITY; count]; count];
+    for (idx, (a, b)) in pairs.into_iter().enumerate() {
+        let (price, lane) = (&prices[idx / LANES], idx % LANES);
+        if price.violation[lane] > 0.0 {
+            continue;
+        }
+        // Half of what either end costs as a waypoint; the ends of the route cost nothing.
+        let of = |place: usize| {
+            if place == 0 || place == count - 1 {
+                0.0
+            } else {
+                0.5 * (own[place].1 + worth)
+            }
+        };
+        let cost = price.cost[lane] + of(a) + of(b);
+        (legs[a][b], legs[b][a]) = (cost, cost);
+    }
+    legs
+}
+
+/// Of the cheapest chains of `legs` from `source`: what each costs, and the place before its last.
+fn cheapest(legs: &[Vec<f64>], source: usize) -> (Vec<f64>, Vec<usize>) {
+    let count = legs.len();
+    let mut costs = vec![f64::INFINITY; count];
+    let mut before: Vec<usize> = (0..count).collect();
+    let mut open = vec![true; count];
+    costs[source] = 0.0;
+    for _ in 0..count {
+        let nearest = (0..count).filter(|&place| open[place]);
+        let Some(place) = nearest.min_by(|&a, &b| costs[a].total_cmp(&costs[b])) else {
+            break;
+        };
+        open[place] = false;
+        for next in 0..count {
+            let cost = costs[place] + legs[place][next];
+            if cost < costs[next] {
+                costs[next] = cost;
+                before[next] = place;
+            }
+        }
+    }
+    (costs, before)
+}
+
+/// From `place` back to where all chains begin.
+fn trace(before: &[usize], mut place: usize) -> Vec<usize> {
+    let mut chain = vec![place];
+    while before[place] != place {
+        place = before[place];
+        chain.push(place);
+    }
+    chain
+}
+
+/// Whether every waypoint of `route` lies near to a leg of `other`.
+fn near(model: &Model, route: &[Point3], other: &[Point3]) -> bool {
+    let reach = 3.0 * super::super::SAME * (model.scenario.target - model.scenario.start).norm();
+    route.iter().all(|point| {
+        other.windows(2).any(|ends| {
+            let way = ends[1] - ends[0];
+            let share = ((point - ends[0]).dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
+            (ends[0] + way * share - point).norm() <= reach
+        })
+    })
+}

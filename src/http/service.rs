@@ -11,6 +11,7 @@ use super::params::Params;
 use super::problem::Problem;
 use super::{AppState, Phase, events, plans, prefer, retry};
 use crate::optimizer::{self, Algorithm, Parameter};
+use crate::scenario::json::{COMMON, CommonParameter, Takes};
 
 /// The description of this service.
 const OPENAPI_YAML: &str = include_str!("../../openapi.yaml");
@@ -93,6 +94,8 @@ pub(super) async fn limits(State(state): State<AppState>, uri: Uri) -> Result<Re
 /// What may be named in `planner.algorithm`.
 #[derive(Serialize)]
 pub(super) struct AlgorithmsDocument {
+    /// What every one of them has.
+    parameters: Vec<ParameterDocument>,
     algorithms: Vec<AlgorithmDocument>,
 }
 
@@ -107,10 +110,23 @@ struct AlgorithmDocument {
 #[derive(Serialize)]
 struct ParameterDocument {
     name: &'static str,
-    default: f64,
-    min: f64,
-    max: f64,
+    #[serde(flatten)]
+    takes: TakesDocument,
     meaning: &'static str,
+}
+
+#[derive(Serialize)]
+#[serde(untagged)]
+enum TakesDocument {
+    Choice {
+        default: &'static str,
+        choices: &'static [&'static str],
+    },
+    Number {
+        default: f64,
+        min: f64,
+        max: f64,
+    },
 }
 
 impl From<&Algorithm> for AlgorithmDocument {
@@ -128,9 +144,24 @@ impl From<&Parameter> for ParameterDocument {
     fn from(parameter: &Parameter) -> Self {
         Self {
             name: parameter.name,
-            default: parameter.default,
-            min: parameter.min,
-            max: parameter.max,
+            takes: TakesDocument::Number {
+                default: parameter.default,
+                min: parameter.min,
+                max: parameter.max,
+            },
+            meaning: parameter.meaning,
+        }
+    }
+}
+
+impl From<&CommonParameter> for ParameterDocument {
+    fn from(parameter: &CommonParameter) -> Self {
+        Self {
+            name: parameter.name,
+            takes: match parameter.takes {
+                Takes::Choice { default, choices } => TakesDocument::Choice { default, choices },
+                Takes::Number { default, min, max } => TakesDocument::Number { default, min, max },
+            },
             meaning: parameter.meaning,
         }
     }
@@ -139,8 +170,10 @@ impl From<&Parameter> for ParameterDocument {
 /// `GET /algorithms`.
 pub(super) async fn algorithms(uri: Uri) -> Result<Json<AlgorithmsDocument>, Problem> {
     Params::read(&uri, &[])?;
-    let algorithms = optimizer::ALL.iter().map(AlgorithmDocument::from).collect();
-    Ok(Json(AlgorithmsDocument { algorithms }))
+    Ok(Json(AlgorithmsDocument {
+        parameters: COMMON.iter().map(Into::into).collect(),
+        algorithms: optimizer::ALL.iter().map(Into::into).collect(),
+    }))
 }
 
 /// `GET /openapi.yaml`.

@@ -1,7 +1,7 @@
 //! The search algorithms that a request may name: listed everywhere, and planning as they should.
 
 use noctule::planner::{self, ConvergencePoint, Incumbent, Observer, Outcome, Stop};
-use noctule::scenario::json::{self, Rules};
+use noctule::scenario::json::{self, COMMON, CommonParameter, Rules, Takes};
 use noctule::scenario::limits::Limits;
 use serde_json::Value;
 
@@ -110,6 +110,10 @@ fn the_smallest_population_and_a_single_waypoint_will_do() {
 #[tokio::test]
 async fn every_algorithm_is_listed_with_its_source() {
     let listed = Api::new().get("/algorithms").await.json();
+    assert_eq!(
+        listed["parameters"][0]["choices"],
+        serde_json::json!(["integral", "paper"])
+    );
     let listed = listed["algorithms"].as_array().expect("a list");
     let listed_names: Vec<&str> = listed
         .iter()
@@ -133,5 +137,53 @@ async fn every_algorithm_is_listed_with_its_source() {
             page.contains(&heading),
             "docs/EQUATIONS.md has no {heading}"
         );
+    }
+}
+
+/// Whatever is listed as common is taken by each algorithm, to the ends of its range and no farther,
+/// and is its default when absent.
+#[test]
+fn every_algorithm_takes_the_common_parameters() {
+    let rules = Rules {
+        limits: Limits::default(),
+        algorithms: planner::algorithm_rules(),
+    };
+    let accepted = |parameters: Value, algorithm: &str| {
+        let text = include_str!("../../scenarios/paper-1.json");
+        let mut document: Value = serde_json::from_str(text).expect("JSON");
+        document["planner"]["algorithm"] = algorithm.into();
+        document["planner"]["parameters"] = parameters;
+        json::read(document.to_string().as_bytes(), &rules, 1).ok()
+    };
+    for name in names() {
+        let absent = accepted(serde_json::json!({}), name).expect("nothing is needed");
+        for CommonParameter {
+            name: key, takes, ..
+        } in COMMON
+        {
+            let with = |value: Value| accepted(serde_json::json!({ key: value }), name);
+            let (default, taken, refused): (Value, Vec<Value>, Vec<Value>) = match takes {
+                Takes::Choice { default, choices } => (
+                    default.into(),
+                    choices.iter().map(|choice| (*choice).into()).collect(),
+                    vec!["none of them".into()],
+                ),
+                Takes::Number { default, min, max } => (
+                    default.into(),
+                    vec![min.into(), max.into()],
+                    vec![(min - 1e-3).into(), (max + 1.0).into()],
+                ),
+            };
+            assert_eq!(with(default).as_ref(), Some(&absent), "{name}, {key}");
+            let mut different = 0;
+            for value in taken {
+                let scenario = with(value).unwrap_or_else(|| panic!("{name} refuses {key}"));
+                different += u32::from(scenario != absent);
+            }
+            assert!(different > 0, "{name} takes {key} and does not keep it");
+            for value in refused {
+                assert!(with(value).is_none(), "{name} takes any {key}");
+            }
+        }
     }
 }

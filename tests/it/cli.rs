@@ -92,6 +92,43 @@ fn no_feasible_route_exits_3_with_the_least_bad_one() {
     assert_ne!(result["checks"]["violations"], json!([]));
 }
 
+/// A search may end as soon as its route is proven to be good enough.
+#[test]
+fn a_gap_that_is_asked_for_ends_the_search() {
+    let text = include_str!("../../scenarios/paper-2.json");
+    let mut document: Value = serde_json::from_str(text).expect("JSON");
+    document["planner"]["population"] = json!(40);
+    document["planner"]["iterations"] = json!(60);
+    let mut planned = |gap: f64| -> Value {
+        document["planner"]["parameters"]["gap"] = json!(gap);
+        let output = run(&["plan", "-"], &document.to_string());
+        assert_eq!(output.status.code(), Some(0));
+        serde_json::from_slice(&output.stdout).expect("JSON")
+    };
+    let early = planned(0.05);
+    check_schema(
+        &json!({"$ref": "#/components/schemas/ResultDocument"}),
+        &early,
+        "the result",
+    );
+    assert_eq!(early["stop_reason"], "converged");
+    let gap = early["bound"]["gap"].as_f64().expect("a feasible route");
+    assert!((0.0..=0.05).contains(&gap), "{gap}");
+
+    let whole = planned(0.0);
+    assert_eq!(whole["stop_reason"], "iterations");
+    let evaluations = |result: &Value| result["evaluations"].as_u64().expect("a count");
+    assert!(
+        2 * evaluations(&early) < evaluations(&whole),
+        "{} evaluations, {} without a gap",
+        evaluations(&early),
+        evaluations(&whole)
+    );
+
+    // No route is proven to be better than the best.
+    assert_eq!(planned(1e-9)["stop_reason"], "iterations");
+}
+
 #[test]
 fn anything_else_exits_1() {
     for arguments in [

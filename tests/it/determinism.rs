@@ -5,7 +5,8 @@ use serde_json::Value;
 
 use crate::support::process::{Service, run};
 
-/// The shipped scenarios with two seeds each, small enough for a test.
+/// The shipped scenarios, small enough for a test: with the defaults, and by the plain algorithm with
+/// two seeds.
 fn documents() -> Vec<Value> {
     let shipped = [
         include_str!("../../scenarios/paper-1.json"),
@@ -14,16 +15,22 @@ fn documents() -> Vec<Value> {
         include_str!("../../scenarios/paper-4.json"),
         include_str!("../../scenarios/jacksboro.json"),
     ];
-    let small = |text: &str, seed: u64| {
+    let small = |text: &str, seed: u64, plain: bool| {
         let mut document: Value = serde_json::from_str(text).expect("JSON");
-        document["planner"]["population"] = 20.into();
-        document["planner"]["iterations"] = 20.into();
-        document["planner"]["seed"] = seed.into();
+        let planner = &mut document["planner"];
+        planner["population"] = 20.into();
+        planner["iterations"] = 20.into();
+        planner["seed"] = seed.into();
+        if plain {
+            planner["seeding"] = "random".into();
+            planner["polish"] = false.into();
+        }
         document
     };
+    let variants = [(1, true), (2, true), (1, false)];
     shipped
         .iter()
-        .flat_map(|text| [1, 2].map(|seed| small(text, seed)))
+        .flat_map(|text| variants.map(|(seed, plain)| small(text, seed, plain)))
         .collect()
 }
 
@@ -50,14 +57,46 @@ async fn by_service(workers: &str, documents: &[Value]) -> Vec<String> {
     .await
 }
 
+fn alone(document: &Value) -> String {
+    essence(&run(&["plan", "-"], &document.to_string()).stdout)
+}
+
 #[tokio::test]
 async fn the_route_depends_on_the_request_alone() {
     let documents = documents();
-    let alone: Vec<String> = documents
-        .iter()
-        .map(|document| essence(&run(&["plan", "-"], &document.to_string()).stdout))
-        .collect();
-    assert_ne!(alone[0], alone[1], "the seed matters");
+    let alone: Vec<String> = documents.iter().map(alone).collect();
+    let waypoints = |essence: &str| {
+        let result: Value = serde_json::from_str(essence).expect("JSON");
+        result["waypoints"].clone()
+    };
+    assert_ne!(
+        waypoints(&alone[0]),
+        waypoints(&alone[1]),
+        "the seed matters"
+    );
     assert_eq!(by_service("1", &documents).await, alone);
     assert_eq!(by_service("4", &documents).await, alone);
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    for mut document in documents() {
+        // Enough for every thread to have some.
+        document["planner"]["population"] = 100.into();
+        document["planner"]["iterations"] = 10.into();
+        let mut with_threads = |threads: u64| {
+            document["planner"]["parameters"]["threads"] = threads.into();
+            let mut result: Value = serde_json::from_str(&alone(&document)).expect("JSON");
+            // Of a document that names the threads.
+            result
+                .as_object_mut()
+                .expect("an object")
+                .remove("scenario_sha256");
+            result
+        };
+        let one = with_threads(1);
+        for threads in [2, 4, 7] {
+            assert_eq!(with_threads(threads), one, "{threads} threads");
+        }
+    }
 }

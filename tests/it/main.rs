@@ -17,4 +17,5 @@ mod store_conformance;
 mod store_sqlite;
 mod support;
 mod svg;
+mod warm_start;
 mod worker;

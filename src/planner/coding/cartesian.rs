@@ -98,7 +98,8 @@ mod tests {
             [1000.0, 1000.0, 200.0, 1000.0, 1000.0, 200.0]
         );
         let mut route = Vec::new();
-        coding.decode(&[10.0, 20.0, 30.0, 400.0, 500.0, 60.0], &mut route);
+        let given = [10.0, 20.0, 30.0, 400.0, 500.0, 60.0];
+        coding.decode(&given, &mut route);
         let expected = [
             scenario.start,
             Point3::new(10.0, 20.0, 70.0),
@@ -108,6 +109,8 @@ mod tests {
         assert_eq!(route, expected);
         let mut position = [0.0; 6];
         coding.encode(&route, &mut position);
-        assert_eq!(position, [10.0, 20.0, 30.0, 400.0, 500.0, 60.0]);
+        for (encoded, given) in position.iter().zip(given) {
+            assert!((encoded - given).abs() < 1e-9, "{encoded} for {given}");
+        }
     }
 }

@@ -11,6 +11,7 @@ mod document;
 mod ends;
 mod fault;
 mod fields;
+mod parameters;
 mod path;
 mod planner;
 mod point;
@@ -24,6 +25,7 @@ mod vehicle;
 mod writer;
 
 pub use fault::{CODES, Fault, MAX_LISTED, Refusal};
+pub use parameters::{COMMON, CommonParameter, Takes};
 
 use super::Scenario;
 use super::limits::Limits;
@@ -33,7 +35,7 @@ use super::limits::Limits;
 pub struct AlgorithmRule {
     /// As in `planner.algorithm`.
     pub name: &'static str,
-    /// What `planner.parameters` may set, besides `quadrature`.
+    /// What `planner.parameters` may set, besides what is [`COMMON`].
     pub parameters: Vec<ParameterRule>,
 }
 

@@ -1,15 +1,14 @@
 //! `planner`: the algorithm, its size, its seed and its constants.
 
-use std::collections::BTreeMap;
-
 use crate::geometry::Point3;
-use crate::scenario::{PlannerSettings, Quadrature, Seeding, Smoothing, WarmStart};
+use crate::scenario::{PlannerSettings, Seeding, Smoothing, WarmStart};
 
 use super::fault::Faults;
-use super::fields::{nearest, unknown_key};
+use super::fields::nearest;
+use super::parameters::{Parameters, parameters};
 use super::path::Path;
 use super::point::point3;
-use super::ranges::{DEGREE, GAP, MIN_POPULATION, Range, SEED, SPACING, THREADS, TIME_LIMIT_MS};
+use super::ranges::{DEGREE, MIN_POPULATION, SEED, SPACING, TIME_LIMIT_MS};
 use super::tree::Node;
 use super::value::{At, quote};
 use super::{AlgorithmRule, Rules};
@@ -22,9 +21,6 @@ const DEFAULT_SMOOTHING: Smoothing = Smoothing {
     degree: 3,
     spacing: 5.0,
 };
-
-/// These stand among the algorithm's constants, but are every algorithm's.
-const COMMON: [&str; 3] = ["quadrature", "gap", "threads"];
 
 const FIELDS: &[&str] = &[
     "algorithm",
@@ -100,6 +96,10 @@ pub(super) fn planner(
                 _ => Seeding::Tangent,
             })
     });
+    #[expect(
+        clippy::redundant_closure_for_method_calls,
+        reason = "the method by its name takes one lifetime only"
+    )]
     let polish = fields.or("polish", true, faults, |at, faults| at.boolean(faults));
     let warm_start = fields.or("warm_start", None, faults, |at, faults| {
         warm_start(at, limits.waypoints, faults)
@@ -220,82 +220,6 @@ fn smoothing(at: At<'_>, faults: &mut Faults) -> Option<Smoothing> {
         degree: usize::try_from(degree?).ok()?,
         spacing: spacing?,
     })
-}
-
-/// What `parameters` may hold.
-struct Parameters {
-    quadrature: Quadrature,
-    gap: f64,
-    threads: usize,
-    constants: BTreeMap<String, f64>,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            quadrature: Quadrature::Integral,
-            gap: 0.0,
-            threads: 1,
-            constants: BTreeMap::new(),
-        }
-    }
-}
-
-/// What every algorithm has, and the constants that `rule` allows; with the algorithm unknown, none
-/// is checked.
-fn parameters(at: At<'_>, rule: Option<&AlgorithmRule>, faults: &mut Faults) -> Option<Parameters> {
-    let Node::Object(entries) = at.node else {
-        at.fields(&[], faults);
-        return None;
-    };
-    let rule = rule?;
-    let mut allowed = COMMON.to_vec();
-    allowed.extend(rule.parameters.iter().map(|parameter| parameter.name));
-    let mut seen = vec![false; allowed.len()];
-    let mut sound = true;
-    let mut parameters = Parameters::default();
-    for (key, node) in entries {
-        let Some(slot) = allowed.iter().position(|name| *name == &**key) else {
-            let role = format!("parameter of {}", rule.name);
-            unknown_key(at.path, key, "unknown-parameter", &role, &allowed, faults);
-            sound = false;
-            continue;
-        };
-        let path = Path::Key(at.path, key);
-        if std::mem::replace(&mut seen[slot], true) {
-            faults.add(&path, "duplicate-key", || {
-                format!("{key} is given twice, must be given once")
-            });
-            continue;
-        }
-        let at = At { node, path: &path };
-        sound &= match COMMON.get(slot) {
-            Some(&"quadrature") => at
-                .choice(&["integral", "paper"], &[], faults)
-                .map(|choice| {
-                    if choice == "paper" {
-                        parameters.quadrature = Quadrature::Paper;
-                    }
-                })
-                .is_some(),
-            Some(&"gap") => at
-                .number(GAP, faults)
-                .map(|gap| parameters.gap = gap)
-                .is_some(),
-            Some(_) => at
-                .whole(THREADS, faults)
-                .and_then(|threads| usize::try_from(threads).ok())
-                .map(|threads| parameters.threads = threads)
-                .is_some(),
-            None => {
-                let constant = rule.parameters[slot - COMMON.len()];
-                at.number(Range::closed(constant.min, constant.max), faults)
-                    .map(|value| parameters.constants.insert(key.to_string(), value))
-                    .is_some()
-            }
-        };
-    }
-    sound.then_some(parameters)
 }
 
 /// population * iterations * waypoints against the operator's limit.

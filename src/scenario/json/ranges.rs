@@ -6,8 +6,8 @@ use std::fmt::{self, Display};
 /// An interval of numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Range {
-    min: f64,
-    max: f64,
+    pub(super) min: f64,
+    pub(super) max: f64,
     /// Whether `min` itself is allowed.
     closed_min: bool,
     /// Whether `max` itself is allowed.

@@ -236,13 +236,6 @@ const CASES: &[Case] = &[
     ),
     (
         r#""warm_start":null"#,
-        r#""warm_start":{"plan_id":"x","waypoints":[]}"#,
-        "/planner/warm_start/waypoints",
-        "not-applicable",
-        "waypoints is given, must be left out where plan_id is given",
-    ),
-    (
-        r#""warm_start":null"#,
         r#""warm_start":{}"#,
         "/planner/warm_start/plan_id",
         "missing-field",
@@ -253,7 +246,7 @@ const CASES: &[Case] = &[
         r#""warm_start":{"waypoints":[{"x":1,"y":2}]}"#,
         "/planner/warm_start/waypoints/0/z",
         "missing-field",
-        "z is missing, must be a number",
+        "z is missing, must be given",
     ),
     (
         r#""quadrature":"paper""#,
@@ -291,6 +284,13 @@ const CASES: &[Case] = &[
         "altitude_datum is given, must be left out where frame is local",
     ),
     (
+        r#""warm_start":null"#,
+        r#""warm_start":{"plan_id":"x","waypoints":[]}"#,
+        "/planner/warm_start/waypoints",
+        "not-applicable",
+        "waypoints is given, must be left out where plan_id is given",
+    ),
+    (
         r#""tms-sba""#,
         r#""tms-sab""#,
         "/planner/algorithm",
@@ -302,7 +302,7 @@ const CASES: &[Case] = &[
         r#""loundess":0.5"#,
         "/planner/parameters/loundess",
         "unknown-parameter",
-        "\"loundess\" is no parameter of tms-sba, allowed: quadrature, f_min, loudness, did you mean loudness?",
+        "\"loundess\" is no parameter of tms-sba, allowed: quadrature, gap, threads, f_min, loudness, did you mean loudness?",
     ),
     (
         r#""influence":90"#,
@@ -456,6 +456,17 @@ pub(crate) fn all_cases() -> Vec<(String, Fault)> {
     );
     let detail = "threats has 10001 items, must have at most 10000 (limit threats)";
     cases.push((crowded, fault("/threats", "too-many", detail)));
+    let known = r#"{"x":1,"y":2,"z":3},"#.repeat(203);
+    let winding = edited(
+        r#""warm_start":null"#,
+        &format!(
+            r#""warm_start":{{"waypoints":[{}]}}"#,
+            known.trim_end_matches(',')
+        ),
+    );
+    let detail = "waypoints has 203 items, must have at most 202 (limit waypoints, and both ends)";
+    let pointer = "/planner/warm_start/waypoints";
+    cases.push((winding, fault(pointer, "too-many", detail)));
     let vertices = r#"{"x":500,"y":500},"#.repeat(20_000);
     let detailed = edited(r#""vertices":["#, &format!(r#""vertices":[{vertices}"#));
     let detail = "the polygons have 20003 vertices together, must have at most 20000 (limit polygon_vertices)";

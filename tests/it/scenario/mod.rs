@@ -134,6 +134,7 @@ fn the_least_document_is_filled_with_the_defaults() {
     insta::assert_snapshot!(json::write(&scenario));
     assert_eq!(scenario.planner.seed, 11);
     assert_eq!(scenario.planner.seeding, Seeding::Tangent);
+    assert!(scenario.planner.polish);
     assert_eq!(scenario.planner.quadrature, Quadrature::Integral);
     // |ST| / (10 (N + 1)) with |ST| = 500 and N = 10, and a box of 300 by 400 plus a quarter of 500 around.
     assert!((scenario.vehicle.min_leg - 500.0 / 110.0).abs() < 1e-12);
@@ -187,6 +188,16 @@ fn what_is_nearly_a_fault_is_none() {
         ),
         (r#""influence":90,"#, r#""influence":60,"#),
         (r#""name":"full""#, r#""name":null"#),
+        // A known route may name its ends, or nothing at all.
+        (r#""warm_start":null"#, r#""warm_start":{"waypoints":[]}"#),
+        (
+            r#""warm_start":null"#,
+            r#""warm_start":{"waypoints":[{"x":100,"y":100,"z":0},{"x":-5000,"y":9,"z":-7}]}"#,
+        ),
+        (
+            r#""quadrature":"paper""#,
+            r#""gap":10,"threads":256,"quadrature":"paper""#,
+        ),
     ] {
         let scenario = read(&edited(from, to)).unwrap_or_else(|refusal| panic!("{to}: {refusal}"));
         assert!(

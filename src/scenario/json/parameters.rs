@@ -1,0 +1,159 @@
+//! `planner.parameters`: the algorithm's constants, and what every algorithm has besides.
+
+use std::collections::BTreeMap;
+
+use crate::scenario::Quadrature;
+
+use super::AlgorithmRule;
+use super::fault::Faults;
+use super::fields::unknown_key;
+use super::path::Path;
+use super::ranges::{GAP, Range, THREADS};
+use super::tree::Node;
+use super::value::At;
+
+/// A parameter that stands among the algorithm's constants, but is every algorithm's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommonParameter {
+    /// Its key in `planner.parameters`.
+    pub name: &'static str,
+    /// What it takes, and what it is when absent.
+    pub takes: Takes,
+    /// One sentence, for people.
+    pub meaning: &'static str,
+}
+
+/// The values of a [`CommonParameter`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Takes {
+    /// One of some words.
+    Choice {
+        /// Taken when absent.
+        default: &'static str,
+        /// All of them.
+        choices: &'static [&'static str],
+    },
+    /// A number.
+    Number {
+        /// Taken when absent.
+        default: f64,
+        /// Least allowed value.
+        min: f64,
+        /// Greatest allowed value.
+        max: f64,
+    },
+}
+
+const QUADRATURES: &[&str] = &["integral", "paper"];
+const NO_GAP: f64 = 0.0;
+const ONE_THREAD: usize = 1;
+
+/// Every [`CommonParameter`].
+pub const COMMON: [CommonParameter; 3] = [
+    CommonParameter {
+        name: "quadrature",
+        takes: Takes::Choice {
+            default: QUADRATURES[0],
+            choices: QUADRATURES,
+        },
+        meaning: "how a leg is priced: integral exactly, paper by the published five samples",
+    },
+    CommonParameter {
+        name: "gap",
+        takes: Takes::Number {
+            default: NO_GAP,
+            min: GAP.min,
+            max: GAP.max,
+        },
+        meaning: "the search ends once its cost is proven to be within this share of the optimum; 0 never ends it",
+    },
+    CommonParameter {
+        name: "threads",
+        takes: Takes::Number {
+            default: ONE_THREAD as f64,
+            min: THREADS.min,
+            max: THREADS.max,
+        },
+        meaning: "threads that may price routes, a whole number; the result does not depend on it",
+    },
+];
+
+/// What `parameters` may hold.
+pub(super) struct Parameters {
+    pub(super) quadrature: Quadrature,
+    pub(super) gap: f64,
+    pub(super) threads: usize,
+    pub(super) constants: BTreeMap<String, f64>,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            quadrature: Quadrature::Integral,
+            gap: NO_GAP,
+            threads: ONE_THREAD,
+            constants: BTreeMap::new(),
+        }
+    }
+}
+
+/// What every algorithm has, and the constants that `rule` allows; with the algorithm unknown, none
+/// is checked.
+pub(super) fn parameters(
+    at: At<'_>,
+    rule: Option<&AlgorithmRule>,
+    faults: &mut Faults,
+) -> Option<Parameters> {
+    let Node::Object(entries) = at.node else {
+        at.fields(&[], faults);
+        return None;
+    };
+    let rule = rule?;
+    let mut allowed: Vec<&str> = COMMON.iter().map(|parameter| parameter.name).collect();
+    allowed.extend(rule.parameters.iter().map(|parameter| parameter.name));
+    let mut seen = vec![false; allowed.len()];
+    let mut sound = true;
+    let mut parameters = Parameters::default();
+    for (key, node) in entries {
+        let Some(slot) = allowed.iter().position(|name| *name == &**key) else {
+            let role = format!("parameter of {}", rule.name);
+            unknown_key(at.path, key, "unknown-parameter", &role, &allowed, faults);
+            sound = false;
+            continue;
+        };
+        let path = Path::Key(at.path, key);
+        if std::mem::replace(&mut seen[slot], true) {
+            faults.add(&path, "duplicate-key", || {
+                format!("{key} is given twice, must be given once")
+            });
+            continue;
+        }
+        let at = At { node, path: &path };
+        sound &= match allowed[slot] {
+            "quadrature" => at
+                .choice(QUADRATURES, &[], faults)
+                .map(|choice| {
+                    if choice == "paper" {
+                        parameters.quadrature = Quadrature::Paper;
+                    }
+                })
+                .is_some(),
+            "gap" => at
+                .number(GAP, faults)
+                .map(|gap| parameters.gap = gap)
+                .is_some(),
+            "threads" => at
+                .whole(THREADS, faults)
+                .and_then(|threads| usize::try_from(threads).ok())
+                .map(|threads| parameters.threads = threads)
+                .is_some(),
+            _ => {
+                let constant = rule.parameters[slot - COMMON.len()];
+                at.number(Range::closed(constant.min, constant.max), faults)
+                    .map(|value| parameters.constants.insert(key.to_string(), value))
+                    .is_some()
+            }
+        };
+    }
+    sound.then_some(parameters)
+}

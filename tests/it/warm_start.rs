@@ -1,0 +1,176 @@
+//! Starting from a route that is known: out of the store, or given.
+
+use noctule::job::Status;
+use serde_json::{Value, json};
+
+use crate::support::api::Api;
+use crate::support::process::{Service, run};
+use crate::support::{run as worker, scenario};
+
+/// The small scenario, to be planned from the route of a plan.
+fn from_plan(id: &str) -> Value {
+    let mut document = scenario();
+    document["planner"]["warm_start"] = json!({"plan_id": id});
+    document
+}
+
+fn id_of(address: &str) -> String {
+    address.rsplit('/').next().expect("an id").to_owned()
+}
+
+#[tokio::test]
+async fn a_plans_waypoints_take_the_place_of_its_id() {
+    let api = Api::new();
+    let first = api.submit().await;
+    worker::complete(&*api.store, vec![worker::convergence(0, 0.1)]).await;
+    let result = api.get(&format!("{first}/result")).await.json();
+
+    let accepted = api.post("/plans", &from_plan(&id_of(&first))).await;
+    assert_eq!(accepted.status, 202, "{accepted:?}");
+    let again = accepted.header("location");
+    let kept = api.get(&format!("{again}/scenario")).await;
+    let start = &kept.json()["planner"]["warm_start"];
+    let points = start["waypoints"].as_array().expect("waypoints");
+    assert!(start.get("plan_id").is_none(), "{start}");
+    assert_eq!(points.len(), 3);
+    for (point, delivered) in points
+        .iter()
+        .zip(result["waypoints"].as_array().expect("some"))
+    {
+        for axis in ["x", "y", "z"] {
+            assert_eq!(point[axis].as_f64(), delivered[axis].as_f64());
+        }
+    }
+
+    // The accepted document stands for itself: the first plan may go.
+    assert_eq!(api.delete(&first).await.status, 204);
+    let answer = api.post("/plans", &kept.json()).await;
+    assert_eq!(answer.status, 202, "{answer:?}");
+    let once_more = answer.header("location");
+    let once_more = api.get(&format!("{once_more}/scenario")).await;
+    assert_eq!(once_more.body, kept.body);
+}
+
+#[tokio::test]
+async fn validation_alone_shows_the_waypoints_too() {
+    let api = Api::new();
+    let first = api.submit().await;
+    worker::complete(&*api.store, vec![worker::convergence(0, 0.1)]).await;
+    let answer = api
+        .post("/plans?validate_only=true", &from_plan(&id_of(&first)))
+        .await;
+    assert_eq!(answer.status, 200, "{answer:?}");
+    let start = &answer.json()["scenario"]["planner"]["warm_start"];
+    assert_eq!(start["waypoints"].as_array().map(Vec::len), Some(3));
+}
+
+#[tokio::test]
+async fn a_plan_without_a_route_is_no_start() {
+    let api = Api::new();
+    let deleted = api.submit().await;
+    worker::complete(&*api.store, vec![worker::convergence(0, 0.1)]).await;
+    assert_eq!(api.delete(&deleted).await.status, 204);
+    let failed = api.submit().await;
+    let lease = api.store.claim().await.expect("a queued plan");
+    worker::fail(&*api.store, &lease).await;
+    let running = api.submit().await;
+    let lease = api.store.claim().await.expect("a queued plan");
+    let queued = api.submit().await;
+
+    let no_such = "no plan has this id";
+    let no_route = "that plan has no route yet";
+    let cases = [
+        ("01936f2c-7d1a-7c55-9a53-27b1b44c1a10".to_owned(), no_such),
+        ("first".to_owned(), "must be the id of a plan, a UUID"),
+        (String::new(), "must be the id of a plan, a UUID"),
+        (id_of(&deleted), no_such),
+        (id_of(&failed), no_route),
+        (id_of(&running), no_route),
+        (id_of(&queued), no_route),
+    ];
+    for (id, why) in cases {
+        for uri in ["/plans", "/plans?validate_only=true"] {
+            let answer = api.post(uri, &from_plan(&id)).await;
+            let problem = answer.expect_problem(422, "invalid-scenario");
+            let fault = json!({
+                "pointer": "/planner/warm_start/plan_id",
+                "code": "unknown-plan",
+                "detail": format!("plan_id is \"{id}\", {why}"),
+            });
+            assert_eq!(problem["errors"], json!([fault]));
+        }
+    }
+
+    // A cancelled one has the best route so far.
+    worker::finish(&*api.store, &lease, Status::Cancelled).await;
+    let answer = api.post("/plans", &from_plan(&id_of(&running))).await;
+    assert_eq!(answer.status, 202, "{answer:?}");
+}
+
+#[tokio::test]
+async fn an_unreadable_store_is_not_the_callers_fault() {
+    let api = Api::new();
+    let first = api.submit().await;
+    worker::complete(&*api.store, vec![worker::convergence(0, 0.1)]).await;
+    api.store.close().await;
+    api.post("/plans?validate_only=true", &from_plan(&id_of(&first)))
+        .await
+        .expect_problem(503, "store-unavailable");
+}
+
+#[test]
+fn without_the_service_there_are_no_plans_to_start_from() {
+    let refused = run(
+        &["plan", "-"],
+        &from_plan("01936f2c-7d1a-7c55-9a53-27b1b44c1a10").to_string(),
+    );
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(refused.stdout.is_empty());
+    let faults = String::from_utf8(refused.stderr).expect("UTF-8");
+    for part in [
+        "/planner/warm_start/plan_id: plan_id is \"01936f2c-7d1a-7c55-9a53-27b1b44c1a10\"",
+        "only the service keeps plans: give waypoints in its place",
+        "unknown-plan",
+    ] {
+        assert!(faults.contains(part), "{part} is not in\n{faults}");
+    }
+}
+
+/// A plan from the route of another: with a budget that finds nothing good of itself, never worse
+/// than what it starts from.
+#[tokio::test]
+async fn a_search_does_not_lose_the_route_it_starts_from() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &[]);
+    let planned = async |document: &Value| {
+        let address = service.submit(document).await;
+        assert_eq!(service.ended(&address).await["status"], "succeeded");
+        let result = service.bytes(&format!("{address}/result")).await;
+        let result: Value = serde_json::from_slice(&result).expect("JSON");
+        (id_of(&address), result)
+    };
+    let (id, good) = planned(&scenario()).await;
+    assert_eq!(good["feasible"], true);
+
+    let mut quick = from_plan(&id);
+    quick["planner"]["seeding"] = "random".into();
+    quick["planner"]["polish"] = false.into();
+    quick["planner"]["population"] = 2.into();
+    quick["planner"]["iterations"] = 1.into();
+    let (_, warm) = planned(&quick).await;
+    assert_eq!(warm["feasible"], true);
+    let total = |result: &Value| result["cost"]["total"].as_f64().expect("a figure");
+    assert!(
+        total(&warm) <= total(&good) * (1.0 + 1e-9),
+        "{} after {}",
+        total(&warm),
+        total(&good)
+    );
+
+    quick["planner"]["warm_start"] = Value::Null;
+    let (_, cold) = planned(&quick).await;
+    assert!(
+        cold["feasible"] == false || total(&cold) > 1.01 * total(&good),
+        "the budget alone finds no such route"
+    );
+}

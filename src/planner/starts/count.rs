@@ -141,7 +141,8 @@ fn change(model: &Model, old: &[Point3], new: &[Point3]) -> Fitness {
 fn crossing(a: Point3, b: Point3, c: Point3, d: Point3) -> Option<Point3> {
     let (ahead, back, gap) = (b.xy() - a.xy(), c.xy() - d.xy(), c.xy() - b.xy());
     let area = ahead.perp(&back);
-    if area.abs() < LEVEL * (ahead.norm() + back.norm()) {
+    // Legs without extent have no direction either.
+    if area.abs() <= LEVEL * (ahead.norm() + back.norm()) {
         return None;
     }
     // b + ahead s = c + back t
@@ -151,4 +152,68 @@ fn crossing(a: Point3, b: Point3, c: Point3, d: Point3) -> Option<Point3> {
     }
     let at = b.xy() + ahead * s;
     Some(Point3::new(at.x, at.y, 0.5 * (b.z + c.z)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::tests::scenario;
+
+    fn points(route: &[[f64; 3]]) -> Vec<Point3> {
+        route.iter().map(|&point| Point3::from(point)).collect()
+    }
+
+    /// Start, free waypoints, target of the three radars; those between are given.
+    fn route(free: &[[f64; 3]]) -> Vec<Point3> {
+        let scenario = scenario();
+        let mut route = vec![scenario.start];
+        route.extend(points(free));
+        route.push(scenario.target);
+        route
+    }
+
+    #[test]
+    fn spare_waypoints_cost_nothing_and_break_nothing() {
+        let scenario = scenario();
+        let model = Model::new(&scenario);
+        let few = route(&[[150.0, 400.0, 100.0], [300.0, 900.0, 100.0]]);
+        let before = price(&model, &few);
+        for waypoints in [3, 10, 40] {
+            let many = with_waypoints(&model, few.clone(), waypoints);
+            assert_eq!(many.len(), waypoints + 2);
+            let after = price(&model, &many);
+            assert!(
+                (after.cost - before.cost).abs() < 1e-6,
+                "{before:?} {after:?}"
+            );
+            assert!(after.violation <= before.violation);
+            let shortest = many.windows(2).map(|ends| (ends[1] - ends[0]).norm());
+            assert!(shortest.fold(f64::INFINITY, f64::min) >= scenario.vehicle.min_leg);
+        }
+    }
+
+    #[test]
+    fn the_waypoint_that_is_missed_least_is_left_out() {
+        let scenario = scenario();
+        let model = Model::new(&scenario);
+        let many = route(&[
+            [150.0, 400.0, 100.0],
+            [225.0, 650.0, 100.0],
+            [300.0, 900.0, 100.0],
+        ]);
+        let few = with_waypoints(&model, many, 2);
+        assert_eq!(few, route(&[[150.0, 400.0, 100.0], [300.0, 900.0, 100.0]]));
+    }
+
+    #[test]
+    fn waypoints_on_one_place_are_finite_when_left_out() {
+        let scenario = scenario();
+        let model = Model::new(&scenario);
+        let many = route(&[[500.0, 480.0, 100.0]; 6]);
+        let few = with_waypoints(&model, many, 1);
+        assert!(
+            few.iter()
+                .all(|point| point.coords.iter().all(|x| x.is_finite()))
+        );
+    }
 }

@@ -245,6 +245,9 @@ def _height_fault(point, scenario, both):
 def _bound(report, scenario, result):
     bound, total = result["bound"], result["cost"]["total"]
     lower, gap = bound["lower"], bound["gap"]
+    if result["stop_reason"] == "converged":
+        proven = gap is not None and 0.0 < scenario.gap and gap <= scenario.gap * (1.0 + 1e-9)
+        report.that(proven, f"stop_reason: converged with a gap of {gap!r}, asked for {scenario.gap!r}")
     if not result["feasible"] or not lower:
         report.same("bound.gap", gap, None)
         report.that(lower is None or lower >= 0.0, f"bound.lower: {lower!r}")

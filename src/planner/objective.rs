@@ -33,6 +33,9 @@ pub(super) struct Routes<'s> {
 /// So many steps, each some nanoseconds, may pass between two looks at the clock.
 const STEPS_UNWATCHED: usize = 1_000_000;
 
+/// Fewer routes are not worth the start of a thread.
+const WORTH_THREADS: usize = 64;
+
 impl<'s> Routes<'s> {
     /// Of a plain search in the coding of its algorithm.
     pub(super) fn plain(model: &Model<'s>, stop: &'s dyn Stop) -> Self {
@@ -84,26 +87,30 @@ impl<'s> Routes<'s> {
         !self.interrupted
     }
 
-    /// Price the routes of up to [`LANES`] positions side by side. It depends on each position alone.
-    fn price_lanes(&self, positions: &[f64], points: &mut Vec<PointRow>, fitness: &mut [Fitness]) {
-        let dimension = self.coding.bounds().dimension();
-        // Spare lanes repeat the last position.
-        let own = |lane: usize| {
-            let from = lane.min(fitness.len() - 1) * dimension;
-            &positions[from..from + dimension]
-        };
-        let lanes = std::array::from_fn(own);
-        self.coding.decode_lanes(lanes, &self.pricer, points);
-        let price = self.pricer.routes(points);
-        for (lane, fitness) in fitness.iter_mut().enumerate() {
-            *fitness = Fitness {
-                violation: price.violation[lane],
-                cost: price.cost[lane],
-            };
+    /// Price all positions on several threads, each a run of whole blocks; no price depends on which.
+    fn side_by_side(&mut self, threads: usize, positions: &[f64], fitness: &mut [Fitness]) {
+        if !self.may_go_on(fitness.len()) {
+            return fitness.fill(Fitness::WORST);
         }
+        self.evaluations += fitness.len() as u64;
+        let (coding, pricer) = (&self.coding, &self.pricer);
+        let dimension = coding.bounds().dimension();
+        let share = fitness.len().div_ceil(threads).next_multiple_of(LANES);
+        std::thread::scope(|scope| {
+            let shares = positions.chunks(share * dimension);
+            for (positions, fitness) in shares.zip(fitness.chunks_mut(share)) {
+                scope.spawn(move || {
+                    let mut points = Vec::new();
+                    let blocks = positions.chunks(LANES * dimension);
+                    for (positions, fitness) in blocks.zip(fitness.chunks_mut(LANES)) {
+                        price_block(coding, pricer, positions, &mut points, fitness);
+                    }
+                });
+            }
+        });
     }
 
-    /// As `price_lanes`, where a single route takes long: between two of them a run may end.
+    /// As `price_block`, where a single route takes long: between two of them a run may end.
     fn one_by_one(&mut self, positions: &[f64], fitness: &mut [Fitness]) {
         let dimension = self.coding.bounds().dimension();
         let mut route = std::mem::take(&mut self.route);
@@ -144,6 +151,10 @@ impl Objective for Routes<'_> {
 
     fn evaluate(&mut self, positions: &[f64], fitness: &mut [Fitness]) {
         let dimension = self.coding.bounds().dimension();
+        let threads = self.model.scenario.planner.threads;
+        if threads > 1 && fitness.len() >= WORTH_THREADS && self.stride >= fitness.len() as u64 {
+            return self.side_by_side(threads, positions, fitness);
+        }
         let blocks = positions.chunks(LANES * dimension);
         let mut points = std::mem::take(&mut self.points);
         for (positions, fitness) in blocks.zip(fitness.chunks_mut(LANES)) {
@@ -152,13 +163,38 @@ impl Objective for Routes<'_> {
                 continue;
             }
             if self.may_go_on(fitness.len()) {
-                self.price_lanes(positions, &mut points, fitness);
+                price_block(&self.coding, &self.pricer, positions, &mut points, fitness);
                 self.evaluations += fitness.len() as u64;
             } else {
                 fitness.fill(Fitness::WORST);
             }
         }
         self.points = points;
+    }
+}
+
+/// Price the routes of up to [`LANES`] positions side by side. It depends on each position alone.
+fn price_block(
+    coding: &Coding,
+    pricer: &Pricer,
+    positions: &[f64],
+    points: &mut Vec<PointRow>,
+    fitness: &mut [Fitness],
+) {
+    let dimension = coding.bounds().dimension();
+    // Spare lanes repeat the last position.
+    let own = |lane: usize| {
+        let from = lane.min(fitness.len() - 1) * dimension;
+        &positions[from..from + dimension]
+    };
+    let lanes = std::array::from_fn(own);
+    coding.decode_lanes(lanes, pricer, points);
+    let price = pricer.routes(points);
+    for (lane, fitness) in fitness.iter_mut().enumerate() {
+        *fitness = Fitness {
+            violation: price.violation[lane],
+            cost: price.cost[lane],
+        };
     }
 }
 

@@ -23,13 +23,19 @@ use crate::threat::Threat;
 const STRINGS: usize = 5;
 
 /// Routes to start from at most.
-const STARTS: usize = 12;
+const STARTS: usize = 16;
 
 /// Free waypoints of a coarse route, unless its bends ask for more.
 const COARSE: usize = 4;
 
+/// Over hills, where every leg must also follow the ground.
+const COARSE_OVER_HILLS: usize = 7;
+
+/// Free waypoints of a coarse route at most.
+const MOST_COARSE: usize = 12;
+
 /// Routes taken from the net of places.
-const OVERLAND: usize = 5;
+const OVERLAND: usize = 8;
 
 /// A start this much dearer than the best, as a share, is not worth refining.
 const HOPELESS: f64 = 0.08;
@@ -65,9 +71,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     // A known route keeps its bends; a string needs but as many waypoints as it has.
     let coarse = match settings.warm_start {
         Some(_) => settings.waypoints,
-        None => least_bends(model, &shapes)
-            .max(COARSE)
-            .min(settings.waypoints),
+        None => bends(model, &shapes).min(settings.waypoints),
     };
     let mut starts = Starts {
         routes: Vec::new(),
@@ -93,8 +97,8 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     Some(starts)
 }
 
-/// Pull the routes that may still win roughly into place; those that break a limit only while no
-/// other is there.
+/// Pull the routes that may still win roughly into place. What one that breaks a limit will cost
+/// cannot be told before.
 fn refine(
     model: &Model,
     priced: &mut Vec<(Fitness, Vec<Point3>)>,
@@ -105,7 +109,7 @@ fn refine(
     let mut best = Fitness::WORST;
     for (fitness, route) in priced.iter_mut() {
         let hopeless = fitness.cost > best.cost * (1.0 + HOPELESS);
-        if best.is_feasible() && (hopeless || !fitness.is_feasible()) {
+        if best.is_feasible() && hopeless && fitness.is_feasible() {
             continue;
         }
         *fitness = polish.descend(route, ROUGH_STEPS.0, ROUGH_STEPS.1);
@@ -117,12 +121,32 @@ fn refine(
     priced.sort_by(|one, other| one.0.rank(&other.0));
 }
 
-/// Bends of the route that costs least as it is.
-fn least_bends(model: &Model, shapes: &[Vec<Point3>]) -> usize {
-    shapes
-        .iter()
-        .min_by(|one, other| price(model, one).rank(&price(model, other)))
-        .map_or(0, |route| route.len() - 2)
+/// Bends of the routes that may still win, at most.
+fn bends(model: &Model, shapes: &[Vec<Point3>]) -> usize {
+    let priced = || {
+        shapes
+            .iter()
+            .map(|route| (price(model, route), route.len() - 2))
+    };
+    let best = priced()
+        .map(|(fitness, _)| fitness)
+        .fold(
+            Fitness::WORST,
+            |best, next| {
+                if next.beats(&best) { next } else { best }
+            },
+        );
+    let least = match model.scenario.terrain {
+        Terrain::Flat(_) => COARSE,
+        Terrain::Peaks(_) | Terrain::Grid(_) => COARSE_OVER_HILLS,
+    };
+    priced()
+        .filter(|(fitness, _)| {
+            fitness.violation <= best.violation && fitness.cost <= best.cost * (1.0 + HOPELESS)
+        })
+        .map(|(_, bends)| bends)
+        .fold(least, usize::max)
+        .min(MOST_COARSE)
 }
 
 /// Routes with as few waypoints as each needs, along the taut strings of several scenes: round the

@@ -9,9 +9,13 @@ use crate::cost::Model;
 use crate::cost::batch::{LANES, PointRow, Price, Pricer};
 use crate::geometry::{Point2, Point3, Vector2};
 use crate::planner::price::{PRICED_FROM, ROUGH};
+use crate::terrain::Terrain;
 
-/// Places of the net, besides both ends.
+/// Places of the net, besides both ends, on level ground.
 const PLACES: usize = 160;
+
+/// Over hills, where passes are narrow.
+const PLACES_OVER_HILLS: usize = 320;
 
 /// The net covers all points of which the way over them is at most so many times the direct one.
 const DETOUR: f64 = 1.4;
@@ -61,7 +65,11 @@ fn places(model: &Model) -> Vec<Point3> {
         0.5 * DETOUR * direct,
         0.5 * direct * (DETOUR * DETOUR - 1.0).sqrt(),
     );
-    let step = (std::f64::consts::PI * long * wide / (0.866 * PLACES as f64)).sqrt();
+    let count = match scenario.terrain {
+        Terrain::Flat(_) => PLACES,
+        Terrain::Peaks(_) | Terrain::Grid(_) => PLACES_OVER_HILLS,
+    };
+    let step = (std::f64::consts::PI * long * wide / (0.866 * count as f64)).sqrt();
     let middle = nalgebra::center(&start, &target);
     let mut places = vec![scenario.start];
     let (rows, columns) = ((wide / (0.866 * step)).floor(), (long / step).ceil());
@@ -168,7 +176,7 @@ fn trace(before: &[usize], mut place: usize) -> Vec<usize> {
 
 /// Whether every waypoint of `route` lies near to a leg of `other`.
 fn near(model: &Model, route: &[Point3], other: &[Point3]) -> bool {
-    let reach = 3.0 * super::super::SAME * (model.scenario.target - model.scenario.start).norm();
+    let reach = 2.0 * super::super::SAME * (model.scenario.target - model.scenario.start).norm();
     route.iter().all(|point| {
         other.windows(2).any(|ends| {
             let way = ends[1] - ends[0];

@@ -134,7 +134,26 @@ class _Scene:
             for name, ends in PARAMETERS.items():
                 if rng.random() < 0.5:
                     found["parameters"][name] = rng.choice([*ends, rng.uniform(*ends)])
+        self.search(found, random.Random(f"search {seed}"))
         return found
+
+    def search(self, planner, rng):
+        """How to search, drawn apart so that the scene of a seed stays what it was: often the defaults."""
+        if rng.random() < 0.3:
+            planner["seeding"] = rng.choice(["random", "tangent"])
+        if rng.random() < 0.3:
+            planner["polish"] = rng.choice([False, False, True])
+        if rng.random() < 0.15:
+            planner["parameters"]["gap"] = rng.choice([1e-6, 0.02, 0.5, 10.0])
+        if rng.random() < 0.15:
+            planner["parameters"]["threads"] = rng.choice([2, 5])
+        if rng.random() < 0.2:
+            planner["warm_start"] = {"waypoints": [self.anywhere(rng) for _ in range(rng.choice([0, 1, 2, 5, 60]))]}
+
+    def anywhere(self, rng):
+        """A point of no good route: it may lie in a threat, under ground or outside the area."""
+        (x, y), reach = self.start[:2], 2.0 * self.size
+        return _plane(x + rng.uniform(-reach, reach), y + rng.uniform(-reach, reach)) | {"z": rng.uniform(-50.0, 300.0)}
 
     def terrain(self, area):
         rng = self.rng

@@ -43,6 +43,7 @@ class Scenario:
     degree: int
     spacing: float
     paper_quadrature: bool
+    gap: float  # the search may end once so much is proven; 0 is never
     algorithm: str | None
     seed: int | None
     scale: float  # the diagonal of everything, for tolerances
@@ -93,6 +94,7 @@ def read_scenario(document):
         degree=smoothing["degree"],
         spacing=smoothing["spacing"],
         paper_quadrature=(planner.get("parameters") or {}).get("quadrature") == "paper",
+        gap=(planner.get("parameters") or {}).get("gap", 0.0),
         algorithm=planner.get("algorithm"),
         seed=planner.get("seed"),
         scale=_diagonal(area, start, target, threats),

@@ -246,6 +246,13 @@ class Falsehood(Case):
         self.found(put(self.truth, ("bound", "lower"), lambda x: 1.2 * x), "above the total")
         self.found(put(self.truth, ("bound", "gap"), lambda _: None), "bound.gap")
 
+    def test_a_convergence_that_nothing_proves(self):
+        converged = put(self.truth, ("stop_reason",), lambda _: "converged")
+        self.found(converged, "asked for 0.0")
+        for asked, sound in [(2.0 * self.truth["bound"]["gap"], True), (0.5 * self.truth["bound"]["gap"], False)]:
+            planner = SCENARIO["planner"] | {"parameters": {"gap": asked}}
+            self.assertEqual(self.complaints(converged, planner=planner) == [], sound, asked)
+
     def test_what_is_no_number(self):
         self.found(put(self.truth, ("cost", "total"), lambda _: "471"), "no number")
         self.found(put(self.truth, ("waypoints", 1, "x"), lambda _: "100"), "ill-formed")

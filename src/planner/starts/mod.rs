@@ -101,7 +101,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
 /// cannot be told before.
 fn refine(
     model: &Model,
-    priced: &mut Vec<(Fitness, Vec<Point3>)>,
+    priced: &mut [(Fitness, Vec<Point3>)],
     stop: &dyn Stop,
     evaluations: &mut u64,
 ) {

@@ -14,7 +14,8 @@ def mealpy_search(make):
         problem = {"bounds": bounds, "obj_func": pricer.objective, "minmax": "min", "log_to": None}
         # A little more than enough: the pricer ends the search when the budget is spent.
         model = make(budget // population + 2, population)
-        model.solve(problem, seed=seed, starting_solutions=beginning(coding, population, seed))
+        first = numpy.array(beginning(coding, population, seed))
+        model.solve(problem, seed=seed, starting_solutions=first)
 
     return search
 
@@ -54,23 +55,18 @@ def differential_evolution(pricer, seed, budget):
     coding, population = pricer.coding, 50
     seen = {}
 
-    def whole(positions):
-        """scipy asks for violations and costs in turn, of a column or of columns."""
-        columns = numpy.atleast_2d(positions.T)
-        missing = [column for column in columns if column.tobytes() not in seen]
-        if missing:
-            if len(seen) > 20 * population:
-                seen.clear()
-                missing = list(columns)
-            for column, price in zip(missing, pricer.prices(missing)):
-                seen[column.tobytes()] = price
-        prices = numpy.array([seen[column.tobytes()] for column in columns])
-        return prices if positions.ndim > 1 else prices[0]
+    def priced(positions):
+        """Violations and costs of columns; scipy asks for the two in turn."""
+        columns = [numpy.array(column) for column in numpy.reshape(positions.T, (-1, len(positions)))]
+        if any(column.tobytes() not in seen for column in columns):
+            seen.clear()
+            seen.update(zip((column.tobytes() for column in columns), pricer.prices(columns)))
+        return numpy.reshape([seen[column.tobytes()] for column in columns], (-1, 2)).T
 
     evolve(
-        lambda x: whole(x)[..., 1],
+        lambda x: priced(x)[1],
         Bounds(coding.lower, coding.upper),
-        constraints=NonlinearConstraint(lambda x: whole(x)[..., 0][None] if x.ndim > 1 else whole(x)[0], 0, 0),
+        constraints=NonlinearConstraint(lambda x: priced(x)[:1], 0, 0),
         strategy="currenttobest1bin",
         init=numpy.array(beginning(coding, population, seed)),
         maxiter=2 * budget // population,

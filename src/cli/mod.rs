@@ -36,7 +36,7 @@ mod exit {
     pub(super) const DONE: u8 = 0;
     /// Anything without a code of its own, a wrong command line included.
     pub(super) const FAILED: u8 = 1;
-    /// A scenario is refused.
+    /// A scenario, or a line of routes to price, is refused.
     pub(super) const BAD_INPUT: u8 = 2;
     /// No feasible route was found.
     pub(super) const INFEASIBLE: u8 = 3;

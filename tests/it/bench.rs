@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use serde_json::{Value, json};
+
 use crate::support::process::run;
 use crate::support::scenario;
 
@@ -290,4 +292,80 @@ fn faults_of_a_scenario_are_told() {
         "",
     );
     assert_eq!(refused.status.code(), Some(2));
+}
+
+#[test]
+fn routes_are_priced_as_the_planner_prices_them() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let file = directory.path().join("scenario.json");
+    let mut hilly = scenario();
+    hilly["terrain"] = json!({"kind": "flat", "elevation": 30});
+    for end in ["start", "target"] {
+        hilly[end]["z"] = json!(90);
+    }
+    fs::write(&file, hilly.to_string()).expect("written");
+    let file = file.to_str().expect("UTF-8");
+    let planned = run(&["plan", file], "");
+    assert_eq!(planned.status.code(), Some(0), "{planned:?}");
+    let planned: Value = serde_json::from_slice(&planned.stdout).expect("JSON");
+    let all = planned["waypoints"].as_array().expect("waypoints");
+    let free = |lift: f64| -> Vec<[f64; 3]> {
+        let coordinate = |point: &Value, axis| point[axis].as_f64().expect("a number");
+        let point = |point| {
+            let [x, y, z] = ["x", "y", "z"].map(|axis| coordinate(point, axis));
+            [x, y, z - lift]
+        };
+        all[1..all.len() - 1].iter().map(point).collect()
+    };
+    // More than fit side by side, of several lengths; the last goes under the ground.
+    let mut routes = vec![free(0.0); 9];
+    routes.push(vec![]);
+    routes.push(free(500.0));
+    let asked = format!("[]\n{}", json!(routes));
+    let priced = run(&["bench", "price", file], &asked);
+    assert_eq!(priced.status.code(), Some(0), "{priced:?}");
+    let text = String::from_utf8(priced.stdout).expect("UTF-8");
+    let answers: Vec<Vec<[f64; 2]>> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("pairs"))
+        .collect();
+    assert_eq!(answers.len(), 2);
+    assert!(answers[0].is_empty());
+    assert_eq!(answers[1].len(), 11);
+    let cost = planned["cost"]["total"].as_f64().expect("a number");
+    for [violation, price] in &answers[1][..9] {
+        assert!(violation.abs() < 1e-12, "{violation}");
+        assert!((price - cost).abs() < 1e-9 * cost, "{price} {cost}");
+    }
+    assert!(answers[1][10][0] > 100.0);
+
+    let above = run(
+        &["bench", "price", file, "--above-ground"],
+        &json!([free(30.0)]).to_string(),
+    );
+    let above: Vec<[f64; 2]> = serde_json::from_slice(&above.stdout).expect("a line");
+    assert!((above[0][1] - cost).abs() < 1e-9 * cost);
+}
+
+#[test]
+fn a_line_without_routes_is_refused() {
+    for (line, why) in [
+        ("nope", "an array of routes"),
+        ("", "an array of routes"),
+        ("[[[1,2]]]", "[x, y, z]"),
+        ("[[[1,2,null]]]", "[x, y, z]"),
+        ("[[[1,2,1e999]]]", "out of range"),
+        ("[[[1,2,-1e10]]]", "must be within"),
+    ] {
+        let refused = run(&["bench", "price", "paper-1"], &format!("[]\n{line}\n"));
+        assert_eq!(refused.status.code(), Some(2), "{line}: {refused:?}");
+        assert_eq!(refused.stdout, b"[]\n");
+        let told = String::from_utf8(refused.stderr).expect("UTF-8");
+        assert!(told.contains("line 2") && told.contains(why), "{told}");
+    }
+    let long = json!([vec![[1, 2, 3]; 201]]).to_string();
+    let refused = run(&["bench", "price", "paper-1"], &long);
+    assert_eq!(refused.status.code(), Some(2), "{refused:?}");
+    let missing = run(&["bench", "price", "/nowhere/scenario.json"], "[]");
+    assert_eq!(missing.status.code(), Some(1));
 }

@@ -115,6 +115,14 @@ fn rules() -> Rules {
 }
 
 impl Case {
+    /// The scenario with its own planner.
+    ///
+    /// # Errors
+    /// [`Refused`]; a document from a file was read before and is not.
+    pub(super) fn as_it_is(&self) -> anyhow::Result<Scenario> {
+        self.read(&self.document)
+    }
+
     /// The scenario with `planner` in place of its own.
     ///
     /// # Errors

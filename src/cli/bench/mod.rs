@@ -6,6 +6,7 @@ mod case;
 mod chart;
 mod clock;
 mod paper;
+mod price;
 mod progress;
 mod quality;
 mod rank_sum;
@@ -21,7 +22,8 @@ use anyhow::Context;
 use clap::{Args, Subcommand};
 
 use super::exit;
-use case::Refused;
+use case::{Case, Refused};
+use price::BadLine;
 use report::Report;
 
 #[derive(Subcommand)]
@@ -32,6 +34,8 @@ pub(super) enum Command {
     Quality(quality::Arguments),
     /// Routes priced in a second, by waypoints, threats and population
     Speed(speed::Arguments),
+    /// The violation and cost of routes from standard input, for searches outside of this program
+    Price(price::Arguments),
 }
 
 /// What all measurements are asked.
@@ -45,31 +49,41 @@ struct Common {
     scenario: Vec<PathBuf>,
 }
 
-/// Measure, and write what came of it.
+/// Do what is asked, and say by the exit code how it went.
 pub(super) fn run(command: &Command) -> anyhow::Result<u8> {
-    let (common, name) = match command {
-        Command::Paper(arguments) => (&arguments.common, "paper"),
-        Command::Quality(arguments) => (&arguments.common, "quality"),
-        Command::Speed(arguments) => (&arguments.common, "speed"),
+    let done = match command {
+        Command::Paper(arguments) => report(&arguments.common, "paper", |cases| {
+            paper::measure(arguments, cases)
+        }),
+        Command::Quality(arguments) => report(&arguments.common, "quality", |cases| {
+            quality::measure(arguments, cases)
+        }),
+        Command::Speed(arguments) => report(&arguments.common, "speed", |cases| {
+            speed::measure(arguments, cases)
+        }),
+        Command::Price(arguments) => price::run(arguments),
     };
-    let done = case::cases(&common.scenario).and_then(|cases| match command {
-        Command::Paper(arguments) => paper::measure(arguments, &cases),
-        Command::Quality(arguments) => quality::measure(arguments, &cases),
-        Command::Speed(arguments) => speed::measure(arguments, &cases),
-    });
-    match done {
-        Ok(report) => {
-            write(&report, common, name).context("cannot write the report")?;
-            Ok(exit::DONE)
-        }
-        Err(error) => match error.downcast::<Refused>() {
-            Ok(refused) => {
-                super::plan::report(&refused.file, &refused.refusal);
-                Ok(exit::BAD_INPUT)
-            }
-            Err(error) => Err(error),
-        },
+    let Err(error) = done else {
+        return Ok(exit::DONE);
+    };
+    if let Some(refused) = error.downcast_ref::<Refused>() {
+        super::plan::report(&refused.file, &refused.refusal);
+    } else if let Some(line) = error.downcast_ref::<BadLine>() {
+        eprintln!("{line}");
+    } else {
+        return Err(error);
     }
+    Ok(exit::BAD_INPUT)
+}
+
+/// Measure all cases, and write what came of it.
+fn report(
+    common: &Common,
+    name: &str,
+    measure: impl FnOnce(&[Case]) -> anyhow::Result<Report>,
+) -> anyhow::Result<()> {
+    let report = measure(&case::cases(&common.scenario)?)?;
+    write(&report, common, name).context("cannot write the report")
 }
 
 fn write(report: &Report, common: &Common, name: &str) -> std::io::Result<()> {

@@ -115,7 +115,8 @@ fn why_stop(scenario: &Scenario, stop: &dyn Stop) -> Option<StopReason> {
 
 /// Price, smooth and certify the best route.
 fn deliver(model: &Model, log: Log, stop_reason: StopReason) -> Outcome {
-    let (mut convergence, route, lower) = (log.convergence, log.route, log.lower);
+    let (mut convergence, lower) = (log.convergence, log.lower);
+    let route = starts::spread(model, log.route);
     let evaluations = convergence.last().map_or(0, |last| last.evaluations);
     let quadrature = model.scenario.planner.quadrature;
     let cost = model.figures(&route, quadrature);

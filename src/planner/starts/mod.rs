@@ -6,7 +6,7 @@ mod over;
 mod roadmap;
 mod tangents;
 
-pub(super) use count::with_waypoints;
+pub(super) use count::{spread, with_waypoints};
 
 use super::polish::Polish;
 use super::price::price;

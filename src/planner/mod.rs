@@ -155,7 +155,9 @@ fn deliver(model: &Model, log: Log, stop_reason: StopReason) -> Outcome {
 mod tests {
     use super::*;
     use crate::geometry::{Point2, Rect};
-    use crate::scenario::{AltitudeBand, PlannerSettings, Seeding, Smoothing, Vehicle, Weights};
+    use crate::scenario::{
+        AltitudeBand, PlannerSettings, Seeding, Smoothing, Vehicle, WarmStart, Weights,
+    };
     use crate::terrain::{Flat, Terrain};
     use crate::threat::{Cylinder, Shape, Threat};
 
@@ -303,6 +305,44 @@ mod tests {
         };
         assert_eq!(run(1), run(1));
         assert_ne!(run(1).waypoints, run(2).waypoints);
+    }
+
+    /// A radar pops up beside the route: from the known one, a tenth of the work does as well.
+    #[test]
+    fn a_warm_start_needs_a_tenth_of_the_evaluations() {
+        let mut scenario = scenario();
+        scenario.planner.seeding = Seeding::Tangent;
+        scenario.planner.polish = true;
+        scenario.planner.population = 200;
+        scenario.planner.iterations = 200;
+        let never = Looks::until(u32::MAX);
+        let before = plan(&scenario, &mut Diary::default(), &never);
+        let middle = before.waypoints[6];
+        let mut popped_up = scenario.threats[0].clone();
+        popped_up.shape = Shape::Cylinder(Cylinder {
+            center: Point2::new(middle.x + 10.0, middle.y - 10.0),
+            radius: 15.0,
+            influence: 30.0,
+        });
+        scenario.threats.push(popped_up);
+        let cold = plan(&scenario, &mut Diary::default(), &never);
+        scenario.planner.population = 10;
+        scenario.planner.iterations = 20;
+        scenario.planner.warm_start = Some(WarmStart::Waypoints(before.waypoints));
+        let warm = plan(&scenario, &mut Diary::default(), &never);
+        assert!(cold.feasible && warm.feasible);
+        assert!(
+            warm.cost.total <= 1.002 * cold.cost.total,
+            "{:?} {:?}",
+            warm.cost,
+            cold.cost
+        );
+        assert!(
+            warm.evaluations * 8 <= cold.evaluations,
+            "{} {}",
+            warm.evaluations,
+            cold.evaluations
+        );
     }
 
     #[test]

@@ -54,28 +54,34 @@ pub(super) struct Starts {
 /// Where the search of `model` starts; `None` for the algorithm alone.
 pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let settings = &model.scenario.planner;
-    let mut shapes = match settings.seeding {
-        Seeding::Random => Vec::new(),
-        Seeding::Tangent => {
-            let mut shapes = along_strings(model);
-            shapes.extend(roadmap::routes(model, OVERLAND));
-            shapes
-        }
+    let known = match &settings.warm_start {
+        Some(WarmStart::Waypoints(points)) => Some(known::route(model, points)),
+        Some(WarmStart::Plan(_)) | None => None,
     };
-    if let Some(WarmStart::Waypoints(points)) = &settings.warm_start {
-        shapes.insert(0, known::route(model, points));
+    let warm = known.is_some();
+    let mut legs_priced = 0;
+    let mut shapes: Vec<Vec<Point3>> = known.into_iter().collect();
+    if settings.seeding == Seeding::Tangent {
+        shapes.extend(along_strings(model));
+        // Who brings a route has been over the hills already.
+        if !warm {
+            let net = roadmap::routes(model, OVERLAND);
+            shapes.extend(net.routes);
+            legs_priced = net.legs_priced;
+        }
     }
     if shapes.is_empty() {
         return None;
     }
     // A known route keeps its bends; a string needs but as many waypoints as it has.
-    let coarse = match settings.warm_start {
-        Some(_) => settings.waypoints,
-        None => bends(model, &shapes).min(settings.waypoints),
+    let coarse = if warm {
+        settings.waypoints
+    } else {
+        bends(model, &shapes).min(settings.waypoints)
     };
     let mut starts = Starts {
         routes: Vec::new(),
-        evaluations: 0,
+        evaluations: legs_priced / (coarse as u64 + 1),
     };
     let mut priced: Vec<(Fitness, Vec<Point3>)> = Vec::new();
     for shape in shapes {
@@ -88,10 +94,13 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
             priced.push((price(model, &route), route));
         }
     }
-    priced.sort_by(|one, other| one.0.rank(&other.0));
+    // The known route goes first, so that others are refined only where they are cheaper as they are.
+    let others = usize::from(warm);
+    priced[others..].sort_by(|one, other| one.0.rank(&other.0));
     priced.truncate(STARTS);
     if settings.polish {
-        refine(model, &mut priced, stop, &mut starts.evaluations);
+        let hopeless = if warm { 0.0 } else { HOPELESS };
+        refine(model, &mut priced, hopeless, stop, &mut starts.evaluations);
     }
     starts.routes = priced.into_iter().map(|(_, route)| route).collect();
     Some(starts)
@@ -102,14 +111,16 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
 fn refine(
     model: &Model,
     priced: &mut [(Fitness, Vec<Point3>)],
+    hopeless: f64,
     stop: &dyn Stop,
     evaluations: &mut u64,
 ) {
     let mut polish = Polish::new(model, stop);
     let mut best = Fitness::WORST;
     for (fitness, route) in priced.iter_mut() {
-        let hopeless = fitness.cost > best.cost * (1.0 + HOPELESS);
-        if best.is_feasible() && hopeless && fitness.is_feasible() {
+        let dear = fitness.cost > best.cost * (1.0 + hopeless);
+        // With a good route at hand, one that breaks a limit need not be tried either.
+        if best.is_feasible() && dear && (fitness.is_feasible() || hopeless <= 0.0) {
             continue;
         }
         *fitness = polish.descend(route, ROUGH_STEPS.0, ROUGH_STEPS.1);

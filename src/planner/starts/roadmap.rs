@@ -23,9 +23,18 @@ const DETOUR: f64 = 1.4;
 /// What a waypoint must gain, as a share of the direct way's fuel.
 const WORTH: f64 = 1e-4;
 
-/// Up to `count` routes that differ, the cheapest first.
-pub(super) fn routes(model: &Model, count: usize) -> Vec<Vec<Point3>> {
+/// What the net gave.
+pub(super) struct Net {
+    /// Routes that differ, the cheapest first.
+    pub(super) routes: Vec<Vec<Point3>>,
+    /// Legs priced for it.
+    pub(super) legs_priced: u64,
+}
+
+/// Up to `count` routes that differ.
+pub(super) fn routes(model: &Model, count: usize) -> Net {
     let places = places(model);
+    let legs_priced = (places.len() * (places.len() - 1) / 2) as u64;
     let legs = legs(model, &places);
     let target = places.len() - 1;
     let (from_start, before) = cheapest(&legs, 0);
@@ -49,7 +58,10 @@ pub(super) fn routes(model: &Model, count: usize) -> Vec<Vec<Point3>> {
             break;
         }
     }
-    routes
+    Net {
+        routes,
+        legs_priced,
+    }
 }
 
 /// Start, a hexagonal net, target.

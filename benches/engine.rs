@@ -8,7 +8,7 @@ use std::fs;
 use noctule::cost::Model;
 use noctule::cost::batch::{LANES, PointRow, Pricer};
 use noctule::geometry::{Point2, Point3};
-use noctule::planner::{self, ConvergencePoint, Incumbent, Observer, Stop};
+use noctule::planner::{self, Nobody};
 use noctule::scenario::json::{self, Rules};
 use noctule::scenario::limits::Limits;
 use noctule::scenario::{Quadrature, Scenario};
@@ -35,22 +35,6 @@ fn rules() -> Rules {
 
 fn scenario(name: &str) -> Scenario {
     json::read(&document(name), &rules(), 1).expect("a shipped scenario has no fault")
-}
-
-struct Nobody;
-
-impl Observer for Nobody {
-    fn iteration(&mut self, _: &ConvergencePoint) {}
-    fn incumbent(&mut self, _: &Incumbent) {}
-}
-
-impl Stop for Nobody {
-    fn requested(&self) -> bool {
-        false
-    }
-    fn elapsed_ms(&self) -> f64 {
-        0.0
-    }
 }
 
 /// Pricing one good route; the counter makes it evaluations a second.

@@ -6,6 +6,7 @@ pub mod bspline;
 pub mod lane;
 mod quadratic;
 mod rect;
+pub mod ring;
 mod segment;
 
 pub use quadratic::Quadratic;

@@ -165,31 +165,11 @@ impl Optimizer for Ba {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::optimizer::Bounds;
-
-    /// The distance from 0.9 in [0, 1].
-    struct Line(Bounds);
-
-    impl Objective for Line {
-        fn bounds(&self) -> &Bounds {
-            &self.0
-        }
-        fn evaluate(&mut self, positions: &[f64], fitness: &mut [Fitness]) {
-            for (position, fitness) in positions.iter().zip(fitness) {
-                *fitness = Fitness {
-                    violation: 0.0,
-                    cost: (position - 0.9).abs(),
-                };
-            }
-        }
-    }
+    use crate::optimizer::tests::Line;
 
     /// Two bats at 0.5 and at 0.8, the best; frequency 0.5, no walk, and `loudness` throughout.
     fn two_bats(loudness: f64) -> (Line, Ba) {
-        let mut line = Line(Bounds {
-            lower: vec![0.0],
-            upper: vec![1.0],
-        });
+        let mut line = Line::new();
         let settings = Settings {
             population: 2,
             seed: 1,

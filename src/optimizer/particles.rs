@@ -116,31 +116,7 @@ impl Optimizer for Particles {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::optimizer::Bounds;
-
-    /// The distance from 0.9 in [0, 1].
-    struct Line(Bounds);
-
-    impl Objective for Line {
-        fn bounds(&self) -> &Bounds {
-            &self.0
-        }
-        fn evaluate(&mut self, positions: &[f64], fitness: &mut [Fitness]) {
-            for (position, fitness) in positions.iter().zip(fitness) {
-                *fitness = Fitness {
-                    violation: 0.0,
-                    cost: (position - 0.9).abs(),
-                };
-            }
-        }
-    }
-
-    fn line() -> Line {
-        Line(Bounds {
-            lower: vec![0.0],
-            upper: vec![1.0],
-        })
-    }
+    use crate::optimizer::tests::Line;
 
     /// Without pulls, a velocity is kept from iteration to iteration, shrinks by the inertia alone, and
     /// turns round at a wall.
@@ -154,15 +130,15 @@ mod tests {
             v_max: 0.2,
             rebound: -1.0,
         };
-        let mut particles = Particles::start(1, 3, flight, &mut line());
+        let mut particles = Particles::start(1, 3, flight, &mut Line::new());
         particles.candidates[0] = 0.95;
         particles.velocities[0] = 1.0;
         // 0.5 after the inertia, 0.2 at most, and the wall is 0.05 away.
-        particles.iterate(&mut line(), 0.1);
+        particles.iterate(&mut Line::new(), 0.1);
         assert!((particles.velocities[0] + 0.2).abs() < 1e-12);
         assert!((particles.swarm.position(0)[0] - 1.0).abs() < 1e-12);
         // The inertia has halved.
-        particles.iterate(&mut line(), 0.2);
+        particles.iterate(&mut Line::new(), 0.2);
         assert!((particles.velocities[0] + 0.05).abs() < 1e-12);
         assert!((particles.swarm.position(0)[0] - 0.95).abs() < 1e-12);
     }
@@ -178,12 +154,12 @@ mod tests {
             v_max: 1.0,
             rebound: 0.0,
         };
-        let mut particles = Particles::start(1, 3, flight, &mut line());
+        let mut particles = Particles::start(1, 3, flight, &mut Line::new());
         particles.candidates[0] = 0.8;
         particles.velocities[0] = 0.1;
-        particles.iterate(&mut line(), 0.1);
+        particles.iterate(&mut Line::new(), 0.1);
         particles.velocities[0] = -0.4;
-        particles.iterate(&mut line(), 0.2);
+        particles.iterate(&mut Line::new(), 0.2);
         assert!((particles.swarm.position(0)[0] - 0.5).abs() < 1e-12);
         assert!((particles.memory[0] - 0.9).abs() < 1e-12);
         assert!((particles.swarm.best_position()[0] - 0.9).abs() < 1e-12);

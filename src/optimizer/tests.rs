@@ -42,6 +42,32 @@ impl Objective for Standard {
     }
 }
 
+/// The distance from 0.9 in [0, 1].
+pub(super) struct Line(Bounds);
+
+impl Line {
+    pub(super) fn new() -> Self {
+        Self(Bounds {
+            lower: vec![0.0],
+            upper: vec![1.0],
+        })
+    }
+}
+
+impl Objective for Line {
+    fn bounds(&self) -> &Bounds {
+        &self.0
+    }
+    fn evaluate(&mut self, positions: &[f64], fitness: &mut [Fitness]) {
+        for (position, fitness) in positions.iter().zip(fitness) {
+            *fitness = Fitness {
+                violation: 0.0,
+                cost: (position - 0.9).abs(),
+            };
+        }
+    }
+}
+
 /// The position seen from the minimum of the function, which lies off the middle of the box.
 fn shifted(position: &[f64]) -> impl Iterator<Item = f64> + '_ {
     let shift = |(dim, x): (usize, &f64)| x - dim as f64 * 0.3;

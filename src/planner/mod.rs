@@ -49,6 +49,24 @@ pub trait Stop {
     fn elapsed_ms(&self) -> f64;
 }
 
+/// Nobody looks on, and nobody stops the run: for planning without an audience.
+#[derive(Debug, Clone, Copy)]
+pub struct Nobody;
+
+impl Observer for Nobody {
+    fn iteration(&mut self, _: &ConvergencePoint) {}
+    fn incumbent(&mut self, _: &Incumbent) {}
+}
+
+impl Stop for Nobody {
+    fn requested(&self) -> bool {
+        false
+    }
+    fn elapsed_ms(&self) -> f64 {
+        0.0
+    }
+}
+
 /// The algorithms that a scenario may name, as the reader of scenarios wants them.
 #[must_use]
 pub fn algorithm_rules() -> Vec<AlgorithmRule> {

@@ -121,13 +121,14 @@ fn run(
     let settings = &model.scenario.planner;
     let algorithm = optimizer::by_name(&settings.algorithm)
         .expect("the reader accepts only names in the table");
-    let before = log.evaluations;
+    let mut counted = 0;
     // A stop within the first population leaves the rest of it unpriced.
     let mut search = (algorithm.start)(&search_settings(model, algorithm), routes);
     let (first, last) = (*iterations.start(), *iterations.end());
     let mut offered = Fitness::WORST;
     let mut note = |iteration: usize, search: &dyn Optimizer, routes: &Routes, log: &mut Log| {
-        log.evaluations = before + routes.evaluations;
+        log.evaluations += routes.evaluations - counted;
+        counted = routes.evaluations;
         let best = search.swarm().best_fitness();
         if best.beats(&offered) || log.route.is_empty() {
             offered = best;

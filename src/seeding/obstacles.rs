@@ -8,7 +8,7 @@ use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
 use super::arc::{Arc, crossing, point_segment, segment_segment};
-use crate::geometry::{Point2, Rect};
+use crate::geometry::{Point2, Rect, ring};
 use crate::scenario::Scenario;
 use crate::threat::{Shape, Threat};
 
@@ -76,10 +76,10 @@ impl Outline {
         match &self.shape {
             OutlineShape::Disc(center) => (point - center).norm(),
             OutlineShape::Ring(ring) => {
-                if ring_contains(ring, point) {
+                if ring::contains(ring, point) {
                     0.0
                 } else {
-                    ring_distance(ring, point)
+                    ring::distance(ring, point)
                 }
             }
         }
@@ -236,7 +236,7 @@ impl Obstacles {
             && self
                 .ends
                 .iter()
-                .any(|end| ring_contains(ring, *end) && ring_distance(ring, *end) > self.touch)
+                .any(|end| ring::contains(ring, *end) && ring::distance(ring, *end) > self.touch)
         {
             return;
         }
@@ -434,8 +434,8 @@ impl Obstacles {
             touches.windows(2).any(|pair| {
                 let middle = a + along * (0.5 * (pair[0] + pair[1]));
                 pair[1] - pair[0] > 4.0 * self.touch
-                    && ring_contains(&ring.vertices, middle)
-                    && ring_distance(&ring.vertices, middle) > 2.0 * self.touch
+                    && ring::contains(&ring.vertices, middle)
+                    && ring::distance(&ring.vertices, middle) > 2.0 * self.touch
             })
         };
         self.rings.iter().find(slips).map(|ring| ring.outline)
@@ -466,23 +466,4 @@ fn touches(arc: &Arc, body: &Body, touch: f64) -> bool {
         || [arc.start(), arc.end()]
             .into_iter()
             .any(|end| point_segment(end, body.a, body.b) <= touch)
-}
-
-/// Whether `point` lies inside `ring`, by the even-odd rule.
-pub(super) fn ring_contains(ring: &[Point2], point: Point2) -> bool {
-    let count = ring.len();
-    let crossed = (0..count).filter(|&i| {
-        let (a, b) = (ring[i], ring[(i + 1) % count]);
-        (a.y > point.y) != (b.y > point.y)
-            && point.x < a.x + (b.x - a.x) * (point.y - a.y) / (b.y - a.y)
-    });
-    crossed.count() % 2 == 1
-}
-
-/// Distance of `point` to the edges of `ring`.
-pub(super) fn ring_distance(ring: &[Point2], point: Point2) -> f64 {
-    let count = ring.len();
-    (0..count)
-        .map(|i| point_segment(point, ring[i], ring[(i + 1) % count]))
-        .fold(f64::INFINITY, f64::min)
 }

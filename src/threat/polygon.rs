@@ -5,7 +5,7 @@
 //! cuts a leg where the nearest feature changes; on each piece everything has a closed form.
 
 use super::{Cylinder, hover_exposure, intensity};
-use crate::geometry::{LEVEL, Point2, Quadratic, Rect, Segment};
+use crate::geometry::{LEVEL, Point2, Quadratic, Rect, Segment, ring};
 
 /// A simple ring that is never entered, and a soft zone outside it.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,11 +91,7 @@ impl Polygon {
 
     /// Whether `point` is strictly inside, by the even-odd rule.
     pub(super) fn contains(&self, point: Point2) -> bool {
-        let crossings = self.edges().filter(|(a, b)| {
-            (a.y > point.y) != (b.y > point.y)
-                && point.x < a.x + (b.x - a.x) * (point.y - a.y) / (b.y - a.y)
-        });
-        crossings.count() % 2 == 1 && self.ring_distance(point) > 0.0
+        ring::contains(&self.vertices, point) && self.ring_distance(point) > 0.0
     }
 
     pub(super) fn intensity(&self, point: Point2) -> f64 {
@@ -203,20 +199,8 @@ impl Polygon {
         mean * share * (piece.t1 - piece.t0) * leg.length()
     }
 
-    fn edges(&self) -> impl Iterator<Item = (Point2, Point2)> + '_ {
-        let next = self.vertices.iter().cycle().skip(1);
-        self.vertices.iter().copied().zip(next.copied())
-    }
-
     fn ring_distance(&self, point: Point2) -> f64 {
-        self.edges()
-            .map(|(a, b)| {
-                let along = b - a;
-                let t = ((point - a).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
-                (point - (a + along * t)).norm_squared()
-            })
-            .fold(f64::INFINITY, f64::min)
-            .sqrt()
+        ring::distance(&self.vertices, point)
     }
 
     /// The part `window` of `leg` in order, cut where the nearest feature of the ring changes and
@@ -245,7 +229,7 @@ impl Polygon {
 
     fn features(&self, leg: &Segment) -> Vec<Feature> {
         let mut features = Vec::with_capacity(2 * self.vertices.len());
-        for (a, b) in self.edges() {
+        for (a, b) in ring::edges(&self.vertices) {
             features.push(Feature {
                 kind: Kind::Vertex(a),
                 squared: leg.squared_distance_to(a),

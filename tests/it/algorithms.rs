@@ -1,28 +1,12 @@
 //! The search algorithms that a request may name: listed everywhere, and planning as they should.
 
-use noctule::planner::{self, ConvergencePoint, Incumbent, Observer, Outcome, Stop};
+use noctule::planner::{self, Nobody, Outcome};
 use noctule::scenario::json::{self, COMMON, CommonParameter, Rules, Takes};
 use noctule::scenario::limits::Limits;
 use serde_json::Value;
 
 use crate::support::api::Api;
 use crate::support::description::DESCRIPTION;
-
-struct Nobody;
-
-impl Observer for Nobody {
-    fn iteration(&mut self, _: &ConvergencePoint) {}
-    fn incumbent(&mut self, _: &Incumbent) {}
-}
-
-impl Stop for Nobody {
-    fn requested(&self) -> bool {
-        false
-    }
-    fn elapsed_ms(&self) -> f64 {
-        0.0
-    }
-}
 
 fn names() -> Vec<&'static str> {
     let rules = planner::algorithm_rules();

@@ -12,11 +12,11 @@ use super::progress;
 use super::report::Report;
 use super::summary::median;
 use super::table::{Cell, Table};
-use super::trial::{self, Nobody};
+use super::trial;
 use crate::cost::Model;
 use crate::cost::batch::{LANES, PointRow, Pricer};
 use crate::optimizer::{self, Fitness, Objective, Random, Settings};
-use crate::planner;
+use crate::planner::{self, Nobody};
 use crate::scenario::{Scenario, Seeding};
 
 #[derive(Args)]

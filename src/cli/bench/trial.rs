@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use super::clock::Stopwatch;
 use crate::optimizer::Fitness;
-use crate::planner::{self, ConvergencePoint, Incumbent, Observer, Stop};
+use crate::planner::{self, Nobody};
 use crate::scenario::Scenario;
 
 /// What is kept of a run.
@@ -60,22 +60,5 @@ pub(super) fn run(scenario: &Scenario) -> Trial {
             .iter()
             .map(|point| point.best_cost)
             .collect(),
-    }
-}
-
-/// Nobody looks on, and nobody stops the run.
-pub(super) struct Nobody;
-
-impl Observer for Nobody {
-    fn iteration(&mut self, _: &ConvergencePoint) {}
-    fn incumbent(&mut self, _: &Incumbent) {}
-}
-
-impl Stop for Nobody {
-    fn requested(&self) -> bool {
-        false
-    }
-    fn elapsed_ms(&self) -> f64 {
-        0.0
     }
 }

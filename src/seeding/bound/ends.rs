@@ -4,10 +4,10 @@
 use nalgebra::Vector2;
 
 use super::super::arc::point_segment;
-use super::super::obstacles::{Obstacles, OutlineShape, ring_contains, ring_distance};
+use super::super::obstacles::{Obstacles, OutlineShape};
 use super::wall::Wall;
 use super::{Prices, length, shortest, slack};
-use crate::geometry::{Point2, Segment};
+use crate::geometry::{Point2, Segment, ring};
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;
 use crate::threat::{Cylinder, Shape, Threat};
@@ -241,8 +241,8 @@ impl Leg<'_> {
             }
             OutlineShape::Ring(ring) => (1..=16).any(|i| {
                 let point = self.from + (at - self.from) * (f64::from(i) / 16.0);
-                ring_contains(ring, point)
-                    && ring_distance(ring, point) > spread + 2.0 * self.prices.tolerance
+                ring::contains(ring, point)
+                    && ring::distance(ring, point) > spread + 2.0 * self.prices.tolerance
             }),
         })
     }

@@ -2,10 +2,10 @@
 //! at least: slip between two walls, cut a corner, fly over or under.
 
 use super::super::arc::{crossing, nearest_points, point_segment};
-use super::super::obstacles::{OutlineShape, ring_contains};
+use super::super::obstacles::OutlineShape;
 use super::Prices;
 use super::wall::Wall;
-use crate::geometry::Point2;
+use crate::geometry::{Point2, ring};
 
 /// Pairs of cores looked at before the search for gaps gives up.
 const MOST_PAIRS: usize = 300_000;
@@ -209,5 +209,5 @@ fn is_closed(wall: &Wall, one: &Core, other: &Core, p: Point2, q: Point2) -> boo
         return true;
     }
     let middle = p + (q - p) * 0.5;
-    edges().all(|edge| crossing(edge, (p, q)).is_none()) && ring_contains(ring, middle)
+    edges().all(|edge| crossing(edge, (p, q)).is_none()) && ring::contains(ring, middle)
 }

@@ -1,0 +1,59 @@
+//! A simple ring of points: its edges, what lies inside, and how far away it is.
+
+use super::Point2;
+
+/// The edges of `ring`, the last one back to the first point.
+pub fn edges(ring: &[Point2]) -> impl Iterator<Item = (Point2, Point2)> + '_ {
+    let next = ring.iter().cycle().skip(1);
+    ring.iter().copied().zip(next.copied())
+}
+
+/// Whether `point` lies inside `ring`, by the even-odd rule; on the ring itself, either.
+#[must_use]
+pub fn contains(ring: &[Point2], point: Point2) -> bool {
+    let crossed = edges(ring).filter(|(a, b)| {
+        (a.y > point.y) != (b.y > point.y)
+            && point.x < a.x + (b.x - a.x) * (point.y - a.y) / (b.y - a.y)
+    });
+    crossed.count() % 2 == 1
+}
+
+/// Distance of `point` to the edges of `ring`, metres; infinite without edges.
+#[must_use]
+pub fn distance(ring: &[Point2], point: Point2) -> f64 {
+    edges(ring)
+        .map(|(a, b)| {
+            let along = b - a;
+            let t = (point - a).dot(&along) / along.norm_squared();
+            // An edge without extent is its point.
+            let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) };
+            (point - (a + along * t)).norm_squared()
+        })
+        .fold(f64::INFINITY, f64::min)
+        .sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_square_with_a_repeated_corner() {
+        let ring = [
+            [0.0, 0.0],
+            [10.0, 0.0],
+            [10.0, 10.0],
+            [10.0, 10.0],
+            [0.0, 10.0],
+        ];
+        let ring = ring.map(Point2::from);
+        let check = |x, y, inside, expected: f64| {
+            let point = Point2::new(x, y);
+            assert_eq!(contains(&ring, point), inside, "{point}");
+            assert!((distance(&ring, point) - expected).abs() < 1e-12, "{point}");
+        };
+        check(4.0, 5.0, true, 4.0);
+        check(13.0, 14.0, false, 5.0);
+        check(5.0, -2.0, false, 2.0);
+    }
+}

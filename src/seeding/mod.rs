@@ -6,11 +6,13 @@
 mod arc;
 mod bound;
 mod obstacles;
+mod outline;
 mod steep;
 mod taut;
 
 pub use bound::lower_bound;
-pub use obstacles::{Obstacles, Outline, OutlineShape};
+pub use obstacles::Obstacles;
+pub use outline::{Outline, OutlineShape};
 pub use steep::steep_ground;
 pub use taut::{Piece, TautString, TautStrings, taut_strings};
 

@@ -4,7 +4,8 @@
 use nalgebra::Vector2;
 
 use super::super::arc::point_segment;
-use super::super::obstacles::{Obstacles, OutlineShape};
+use super::super::obstacles::Obstacles;
+use super::super::outline::OutlineShape;
 use super::wall::Wall;
 use super::{Prices, length, shortest, slack};
 use crate::geometry::{Point2, Segment, ring};

@@ -2,7 +2,7 @@
 //! at least: slip between two walls, cut a corner, fly over or under.
 
 use super::super::arc::{crossing, nearest_points, point_segment};
-use super::super::obstacles::OutlineShape;
+use super::super::outline::OutlineShape;
 use super::Prices;
 use super::wall::Wall;
 use crate::geometry::{Point2, ring};

@@ -1,7 +1,7 @@
 //! Threats as a bound sees them: how far each may be widened for free, and which may be passed by
 //! flying over or under them.
 
-use super::super::obstacles::{Outline, OutlineShape};
+use super::super::outline::{Outline, OutlineShape};
 use super::Prices;
 use crate::geometry::Point2;
 use crate::scenario::Scenario;

@@ -1,0 +1,416 @@
+//! The search for taut strings: A* over arrivals at circles.
+//!
+//! A straight part is checked against the obstacles only when its turn comes, and far obstacles join
+//! only when one of them is found in the way.
+
+use std::cmp::{Ordering, Reverse};
+use std::collections::{BinaryHeap, HashMap};
+
+use super::super::arc::{Arc, Rounding, Sense, Tangent, crossing, tangent};
+use super::super::obstacles::{Corner, Obstacles};
+use super::{Piece, TautString, TautStrings, same};
+use crate::geometry::Point2;
+
+/// With so many corners or fewer, all take part from the beginning when several strings are wanted.
+const FEW_CORNERS: usize = 64;
+
+/// So many corners are passed over in the time that one way takes.
+const LOOKS_PER_WAY: usize = 16;
+
+/// Strings that are longer by more than this share of the way are looked at only when no shorter
+/// one is left; the share doubles with each look.
+const FIRST_REACH: f64 = 0.002;
+
+/// An arrival at a corner: the string so far.
+struct Step {
+    place: Place,
+    /// From which step, along which arc of its circle, then straight.
+    before: Option<(usize, Arc, Tangent)>,
+    length: f64,
+    /// Where it is, for a first guess at what lies ahead.
+    at: Point2,
+    /// Ways on are known as far as strings up to this length are concerned.
+    reach: f64,
+    /// By how much the reach grows next.
+    growth: f64,
+}
+
+/// A corner and the sense in which it is rounded, or an end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+enum Place {
+    Start,
+    Corner(usize, bool),
+    Target,
+}
+
+/// A way on from a step that has not been checked yet, ordered by the length of the shortest string
+/// that it could become, then by age. Back to the start stands for all ways beyond the step's reach.
+struct Way {
+    least: f64,
+    age: usize,
+    step: usize,
+    to: Place,
+}
+
+impl PartialEq for Way {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Way {}
+impl PartialOrd for Way {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Way {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.least
+            .total_cmp(&other.least)
+            .then(self.age.cmp(&other.age))
+    }
+}
+
+/// A search for the shortest few strings of one scene.
+pub(super) struct Search<'o> {
+    obstacles: &'o Obstacles,
+    k: usize,
+    steps: Vec<Step>,
+    open: BinaryHeap<Reverse<Way>>,
+    ways: usize,
+    most_ways: usize,
+    /// Corners that take part, and by outline whether its corners do.
+    active: Vec<usize>,
+    is_active: Vec<bool>,
+    /// What is in the way of the straight part between two places; looked up, never walked through.
+    blocked: HashMap<(Place, Place), Option<usize>>,
+    /// Arrivals at each place.
+    arrivals: HashMap<Place, Vec<usize>>,
+    strings: Vec<TautString>,
+}
+
+impl<'o> Search<'o> {
+    pub(super) fn new(obstacles: &'o Obstacles, k: usize, most_ways: usize) -> Self {
+        let mut search = Self {
+            obstacles,
+            k,
+            steps: Vec::new(),
+            open: BinaryHeap::new(),
+            ways: 0,
+            most_ways,
+            active: Vec::new(),
+            is_active: vec![false; obstacles.corners_of.len()],
+            blocked: HashMap::new(),
+            arrivals: HashMap::new(),
+            strings: Vec::new(),
+        };
+        if k > 1 && obstacles.corners.len() <= FEW_CORNERS {
+            search.active = (0..obstacles.corners.len()).collect();
+            search.is_active.fill(true);
+        }
+        search.add_step(Place::Start, None, 0.0, obstacles.ends[0]);
+        search
+    }
+
+    /// Until there are enough, or too many ways were looked at.
+    pub(super) fn run(mut self) -> TautStrings {
+        let mut beyond = f64::INFINITY;
+        while let Some(Reverse(way)) = self.open.pop() {
+            if self.strings.len() >= self.k || self.ways > self.most_ways {
+                beyond = way.least;
+                break;
+            }
+            if way.to == Place::Start {
+                self.widen(way.step);
+            } else {
+                self.follow(&way);
+            }
+        }
+        self.strings
+            .sort_by(|one, other| one.length.total_cmp(&other.length));
+        TautStrings {
+            strings: self.strings,
+            beyond,
+            ways: self.ways,
+        }
+    }
+
+    fn rounding(&self, place: Place) -> Rounding {
+        let end = |center| Rounding {
+            center,
+            radius: 0.0,
+            sense: Sense::Left,
+        };
+        match place {
+            Place::Start => end(self.obstacles.ends[0]),
+            Place::Target => end(self.obstacles.ends[1]),
+            Place::Corner(corner, left) => Rounding {
+                center: self.obstacles.corners[corner].center,
+                radius: self.obstacles.corners[corner].radius,
+                sense: if left { Sense::Left } else { Sense::Right },
+            },
+        }
+    }
+
+    fn corner(&self, place: Place) -> Option<&Corner> {
+        match place {
+            Place::Corner(corner, _) => Some(&self.obstacles.corners[corner]),
+            Place::Start | Place::Target => None,
+        }
+    }
+
+    /// The arc along the circle of `step` and the straight part to `to`, where geometry allows.
+    fn leave(&self, step: &Step, to: Place) -> Option<(Arc, Tangent)> {
+        let on = self.rounding(step.place);
+        let straight = tangent(&on, &self.rounding(to))?;
+        for place in [step.place, to] {
+            if let (Some(corner), Place::Corner(_, left)) = (self.corner(place), place)
+                && let Some(edges) = corner.edges
+            {
+                // The edges must lie on the side that the string bends to.
+                let side = if left { 1.0 } else { -1.0 };
+                if edges
+                    .iter()
+                    .any(|edge| straight.along.perp(edge) * side < -1e-9)
+                {
+                    return None;
+                }
+            }
+        }
+        let arc = match &step.before {
+            None => {
+                let away = outward(&on, &straight);
+                Arc::new(on, away, away)
+            }
+            Some((_, _, before)) => Arc::new(on, outward(&on, before), outward(&on, &straight)),
+        };
+        // Nor does a string turn back at the corner of a ring.
+        let turns_back = self.corner(step.place).is_some_and(|c| c.edges.is_some())
+            && arc.turn > std::f64::consts::PI + 1e-9;
+        (!turns_back).then_some((arc, straight))
+    }
+
+    fn add_step(
+        &mut self,
+        place: Place,
+        before: Option<(usize, Arc, Tangent)>,
+        length: f64,
+        at: Point2,
+    ) {
+        let [start, target] = self.obstacles.ends;
+        let growth = FIRST_REACH * (target - start).norm();
+        self.steps.push(Step {
+            place,
+            before,
+            length,
+            at,
+            reach: f64::NEG_INFINITY,
+            growth,
+        });
+        self.widen(self.steps.len() - 1);
+    }
+
+    /// Look further from `step`: at the ways on that strings longer than before may take.
+    fn widen(&mut self, step: usize) {
+        let known = self.steps[step].reach;
+        let here = &self.steps[step];
+        let direct = here.length + (self.obstacles.ends[1] - here.at).norm();
+        let reach = known.max(direct) + here.growth;
+        self.steps[step].growth *= 2.0;
+        self.steps[step].reach = reach;
+        self.push(step, Place::Target, known);
+        for at in 0..self.active.len() {
+            self.push_corner(step, self.active[at], known);
+        }
+        self.ways += self.active.len() / LOOKS_PER_WAY;
+        // Beyond the longest way there is nothing more to widen to.
+        if reach - self.steps[step].length <= self.obstacles.longest_way {
+            self.ways += 1;
+            self.open.push(Reverse(Way {
+                least: reach,
+                age: self.ways,
+                step,
+                to: Place::Start,
+            }));
+        }
+    }
+
+    /// Note the way from `step` to `to` if it may become a string longer than `known` and no longer
+    /// than the step's reach.
+    fn push(&mut self, step: usize, to: Place, known: f64) {
+        let reach = self.steps[step].reach;
+        let Some((arc, straight)) = self.leave(&self.steps[step], to) else {
+            return;
+        };
+        let length = self.steps[step].length + arc.length() + straight.length;
+        let remaining = match to {
+            Place::Target => 0.0,
+            _ => (self.obstacles.ends[1] - straight.to).norm(),
+        };
+        let least = length + remaining;
+        if least > known && least <= reach {
+            self.ways += 1;
+            self.open.push(Reverse(Way {
+                least,
+                age: self.ways,
+                step,
+                to,
+            }));
+        }
+    }
+
+    fn push_corner(&mut self, step: usize, corner: usize, known: f64) {
+        let here = &self.steps[step];
+        if matches!(here.place, Place::Corner(at, _) if at == corner) {
+            return;
+        }
+        // However the corner is reached from here, the string is at least so long.
+        let Corner { center, radius, .. } = self.obstacles.corners[corner];
+        let least = here.length + (center - here.at).norm() - radius
+            + (self.obstacles.ends[1] - center).norm()
+            - radius;
+        if least > here.reach {
+            return;
+        }
+        for left in [true, false] {
+            self.push(step, Place::Corner(corner, left), known);
+        }
+    }
+
+    /// Check a way; where it is free, go on from its end.
+    fn follow(&mut self, way: &Way) {
+        self.ways += 1;
+        let from = &self.steps[way.step];
+        let Some((arc, straight)) = self.leave(from, way.to) else {
+            return;
+        };
+        if self.k > 1 && self.crosses_itself(way, &straight) {
+            return;
+        }
+        let (place, length) = (from.place, from.length + arc.length() + straight.length);
+        if self.obstacles.leaves_area(&arc) {
+            return;
+        }
+        if let Some(outline) = self.in_the_way_of(place, &arc, way.to, &straight) {
+            self.activate(outline);
+            return;
+        }
+        if way.to == Place::Target {
+            let string = self.string(way.step, &arc, &straight, length);
+            if !self.strings.iter().any(|known| same(known, &string)) {
+                self.strings.push(string);
+            }
+            return;
+        }
+        if self.is_dominated(way.to, &straight, length) {
+            return;
+        }
+        self.arrivals
+            .entry(way.to)
+            .or_default()
+            .push(self.steps.len());
+        let before = Some((way.step, arc, straight));
+        self.add_step(way.to, before, length, straight.to);
+    }
+
+    fn in_the_way_of(&mut self, from: Place, arc: &Arc, to: Place, way: &Tangent) -> Option<usize> {
+        let own = |place| self.corner(place).map_or(&[][..], |corner| &corner.bodies);
+        if let Some(outline) = self.obstacles.blocks_arc(arc, own(from)) {
+            return Some(outline);
+        }
+        if let Some(known) = self.blocked.get(&(from, to)) {
+            return *known;
+        }
+        let both: Vec<usize> = own(from).iter().chain(own(to)).copied().collect();
+        let found = self.obstacles.blocks_segment(way.from, way.to, &both);
+        self.blocked.insert((from, to), found);
+        found
+    }
+
+    /// Let the corners of `outline` take part, as if they always had.
+    fn activate(&mut self, outline: usize) {
+        if self.is_active[outline] {
+            return;
+        }
+        self.is_active[outline] = true;
+        self.ways += self.steps.len() * self.obstacles.corners_of[outline].len() / LOOKS_PER_WAY;
+        for corner in self.obstacles.corners_of[outline].clone() {
+            self.active.push(corner);
+            for step in 0..self.steps.len() {
+                self.push_corner(step, corner, f64::NEG_INFINITY);
+            }
+        }
+    }
+
+    /// Whether a string comes back to a corner in the same sense, or crosses an earlier part of
+    /// itself: it winds round something for nothing.
+    fn crosses_itself(&self, way: &Way, straight: &Tangent) -> bool {
+        let mut step = way.step;
+        loop {
+            if self.steps[step].place == way.to {
+                return true;
+            }
+            let Some((before, _, earlier)) = &self.steps[step].before else {
+                return false;
+            };
+            if crossing((earlier.from, earlier.to), (straight.from, straight.to)).is_some() {
+                return true;
+            }
+            step = *before;
+        }
+    }
+
+    /// Whether `k` earlier arrivals at `place` reach this one's point along the circle without
+    /// being longer, so that whatever it becomes, they become something better.
+    fn is_dominated(&self, place: Place, straight: &Tangent, length: f64) -> bool {
+        let Some(earlier) = self.arrivals.get(&place) else {
+            return false;
+        };
+        let on = self.rounding(place);
+        let here = outward(&on, straight);
+        let own = self.corner(place).map_or(&[][..], |corner| &corner.bodies);
+        let better = earlier.iter().filter(|&&step| {
+            let Some((_, _, before)) = &self.steps[step].before else {
+                return false;
+            };
+            let arc = Arc::new(on, outward(&on, before), here);
+            self.steps[step].length + arc.length() <= length
+                && self.obstacles.blocks_arc(&arc, own).is_none()
+                && !self.obstacles.leaves_area(&arc)
+        });
+        better.take(self.k).count() >= self.k
+    }
+
+    fn string(&self, last: usize, arc: &Arc, straight: &Tangent, length: f64) -> TautString {
+        let mut pieces = Vec::new();
+        let (mut step, mut arc, mut straight) = (last, arc, straight);
+        loop {
+            pieces.push(Piece::Straight {
+                from: straight.from,
+                to: straight.to,
+            });
+            let at = &self.steps[step];
+            let (Some(corner), Some((before, earlier_arc, earlier))) =
+                (self.corner(at.place), &at.before)
+            else {
+                break;
+            };
+            pieces.push(Piece::Arc {
+                outline: corner.outline,
+                center: corner.center,
+                radius: corner.radius,
+                from: earlier.to,
+                to: straight.from,
+                turn: arc.on.sense.sign() * arc.turn,
+            });
+            (step, arc, straight) = (*before, earlier_arc, earlier);
+        }
+        pieces.reverse();
+        TautString { length, pieces }
+    }
+}
+
+/// From the centre of the circle to where the tangent touches it.
+fn outward(on: &Rounding, tangent: &Tangent) -> nalgebra::Vector2<f64> {
+    nalgebra::Vector2::new(tangent.along.y, -tangent.along.x) * on.sense.sign()
+}

@@ -1,0 +1,193 @@
+//! A simple ring: exact distance along a leg, and the integral of its soft zone.
+//!
+//! Deliberately absent: which feature of the ring is nearest along a leg, see [`nearest`].
+
+mod nearest;
+
+use super::{Cylinder, hover_exposure, intensity};
+use crate::geometry::{LEVEL, Point2, Rect, Segment, ring};
+use nearest::{Kind, Piece, clearance_of, cut};
+
+/// A simple ring that is never entered, and a soft zone outside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polygon {
+    vertices: Vec<Point2>,
+    margin: f64,
+    extent: Rect,
+}
+
+impl Polygon {
+    /// The ring through `vertices` (three or more, simple, the first not repeated), with a soft
+    /// zone of width `margin` outside.
+    ///
+    /// # Panics
+    /// Without vertices.
+    #[must_use]
+    pub fn new(vertices: Vec<Point2>, margin: f64) -> Self {
+        let extent = Rect::around(vertices.iter().copied())
+            .expect("a ring has vertices")
+            .grown(margin);
+        Self {
+            vertices,
+            margin,
+            extent,
+        }
+    }
+
+    /// Corners in the order of the request.
+    #[must_use]
+    pub fn vertices(&self) -> &[Point2] {
+        &self.vertices
+    }
+
+    /// Width of the soft zone, metres.
+    #[must_use]
+    pub fn margin(&self) -> f64 {
+        self.margin
+    }
+
+    pub(super) fn extent(&self) -> Rect {
+        self.extent
+    }
+
+    /// Whether `point` is strictly inside, by the even-odd rule.
+    pub(super) fn contains(&self, point: Point2) -> bool {
+        ring::contains(&self.vertices, point) && self.ring_distance(point) > 0.0
+    }
+
+    pub(super) fn intensity(&self, point: Point2) -> f64 {
+        let distance = if self.contains(point) {
+            0.0
+        } else {
+            self.ring_distance(point)
+        };
+        intensity(self.margin, distance)
+    }
+
+    /// Whether the box round `leg` meets the box round the soft zone, and its line the soft zone.
+    pub(super) fn may_reach(&self, leg: &Segment) -> bool {
+        let box_of = |low: f64, high: f64, min: f64, max: f64| low <= max && high >= min;
+        box_of(
+            leg.a.x.min(leg.b.x),
+            leg.a.x.max(leg.b.x),
+            self.extent.min.x,
+            self.extent.max.x,
+        ) && box_of(
+            leg.a.y.min(leg.b.y),
+            leg.a.y.max(leg.b.y),
+            self.extent.min.y,
+            self.extent.max.y,
+        ) && self.line_may_reach(leg)
+    }
+
+    /// Whether the ring does not lie wholly to one side of the line of `leg`, beyond the margin.
+    fn line_may_reach(&self, leg: &Segment) -> bool {
+        let way = leg.b.xy() - leg.a.xy();
+        let reach = self.margin * way.norm();
+        let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
+        for vertex in &self.vertices {
+            let across = way.perp(&(vertex - leg.a.xy()));
+            least = least.min(across);
+            greatest = greatest.max(across);
+        }
+        least <= reach && greatest >= -reach
+    }
+
+    /// Distance to the ring, metres, negative inside.
+    pub(super) fn distance(&self, point: Point2) -> f64 {
+        let distance = self.ring_distance(point);
+        if self.contains(point) {
+            -distance
+        } else {
+            distance
+        }
+    }
+
+    /// Least distance of the part `window` of `leg` to the ring, metres; where the leg enters, the
+    /// greatest depth that it reaches, negative.
+    pub(super) fn clearance(&self, leg: &Segment, window: (f64, f64)) -> f64 {
+        clearance_of(&self.pieces(leg, window), leg)
+    }
+
+    /// Integral of `T` over the part `window` of `leg`: `margin - distance` outside the ring up to
+    /// `margin`, `margin` inside it.
+    #[cfg(test)]
+    fn exposure(&self, leg: &Segment, window: (f64, f64)) -> f64 {
+        self.encounter(leg, window).1
+    }
+
+    /// Clearance and exposure of the part `window` of `leg`.
+    pub(super) fn encounter(&self, leg: &Segment, window: (f64, f64)) -> (f64, f64) {
+        let pieces = self.pieces(leg, window);
+        let clearance = clearance_of(&pieces, leg);
+        let exposure = if self.margin <= 0.0 {
+            0.0
+        } else if leg.horizontal_length() < LEVEL {
+            hover_exposure(leg, window, |point| self.intensity(point))
+        } else {
+            pieces
+                .iter()
+                .map(|piece| self.piece_exposure(leg, piece))
+                .sum()
+        };
+        (clearance, exposure)
+    }
+
+    fn piece_exposure(&self, leg: &Segment, piece: &Piece) -> f64 {
+        if piece.inside {
+            return self.margin * (piece.t1 - piece.t0) * leg.length();
+        }
+        if let Kind::Vertex(center) = piece.nearest.kind {
+            let corner = Cylinder {
+                center,
+                radius: 0.0,
+                influence: self.margin,
+            };
+            return corner.exposure(leg, (piece.t0, piece.t1));
+        }
+        // The distance to an edge's line is linear: a trapezium, cut where it reaches the margin.
+        let (d0, d1) = piece.end_distances(leg);
+        let (near, far) = (d0.min(d1), d0.max(d1));
+        if near >= self.margin {
+            return 0.0;
+        }
+        let share = if far <= self.margin {
+            1.0
+        } else {
+            (self.margin - near) / (far - near)
+        };
+        let mean = self.margin - 0.5 * (near + far.min(self.margin));
+        mean * share * (piece.t1 - piece.t0) * leg.length()
+    }
+
+    fn ring_distance(&self, point: Point2) -> f64 {
+        ring::distance(&self.vertices, point)
+    }
+
+    /// The part `window` of `leg` in order, cut where the nearest feature of the ring changes and
+    /// where the leg crosses the ring.
+    fn pieces(&self, leg: &Segment, window: (f64, f64)) -> Vec<Piece> {
+        let mut pieces = Vec::new();
+        cut(
+            &nearest::features(&self.vertices, leg),
+            window,
+            leg.horizontal_length(),
+            &mut pieces,
+        );
+        let hair = 1e-6 * (1.0 + leg.horizontal_length());
+        let (mut inside, mut at_ring) = (false, true);
+        for piece in &mut pieces {
+            let (d0, d1) = piece.end_distances(leg);
+            // Only where it meets the ring does a leg change sides.
+            if at_ring || d0 < hair {
+                inside = self.contains(leg.at(0.5 * (piece.t0 + piece.t1)).xy());
+            }
+            piece.inside = inside;
+            at_ring = d1 < hair;
+        }
+        pieces
+    }
+}
+
+#[cfg(test)]
+mod tests;

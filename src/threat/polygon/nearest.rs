@@ -1,0 +1,249 @@
+//! The nearest feature of a ring along a leg.
+//!
+//! Seen from a moving point, the distance to a ring is the lower envelope of the distances to its
+//! vertices and edges, whose squares are quadratics of the leg's parameter. [`cut`] cuts a leg where
+//! the nearest feature changes; on each piece everything has a closed form.
+
+use crate::geometry::{LEVEL, Point2, Quadratic, Segment, ring};
+use crate::threat::Cylinder;
+
+/// The nearest feature of the ring along a part of a leg.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece {
+    pub(super) t0: f64,
+    pub(super) t1: f64,
+    pub(super) nearest: Feature,
+    /// Whether this part of the leg lies within the ring.
+    pub(super) inside: bool,
+}
+
+/// A vertex or an edge seen from a leg.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Feature {
+    pub(super) kind: Kind,
+    /// Squared distance. It tells which feature is nearer; along a leg of 100 km it is off by a
+    /// square millimetre, so that no figure is taken from it.
+    squared: Quadratic,
+    /// Where the leg's points project onto the feature.
+    valid: (f64, f64),
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Kind {
+    Vertex(Point2),
+    /// Signed distance from the edge's line: `at_start + gain * t`.
+    Edge {
+        at_start: f64,
+        gain: f64,
+    },
+}
+
+/// Shares of a leg nearer than this are one.
+const NO_TIME: f64 = 1e-9;
+
+/// With so many features or fewer, leaving some out costs more than it saves.
+const FEW_FEATURES: usize = 24;
+
+/// Parts of a leg shorter than this share of it are not cut further.
+const SHORTEST_PIECE: f64 = 1e-12;
+
+/// The vertices and edges of the ring through `vertices`, as seen from `leg`.
+pub(super) fn features(vertices: &[Point2], leg: &Segment) -> Vec<Feature> {
+    let mut features = Vec::with_capacity(2 * vertices.len());
+    for (a, b) in ring::edges(vertices) {
+        features.push(Feature {
+            kind: Kind::Vertex(a),
+            squared: leg.squared_distance_to(a),
+            valid: (f64::NEG_INFINITY, f64::INFINITY),
+        });
+        features.extend(edge_feature(leg, a, b));
+    }
+    features
+}
+
+/// The line through `a` and `b` as seen from `leg`, valid where the leg projects between them.
+fn edge_feature(leg: &Segment, a: Point2, b: Point2) -> Option<Feature> {
+    let length = (b - a).norm();
+    let along = (b - a) / length;
+    let (origin, way) = (leg.a.xy() - a, leg.b.xy() - leg.a.xy());
+    // Distance from the line and way along it, both linear in t.
+    let (across0, across1) = (origin.perp(&along), way.perp(&along));
+    let (along0, along1) = (origin.dot(&along), way.dot(&along));
+    let valid = if along1.abs() < LEVEL {
+        (along0 >= 0.0 && along0 <= length).then_some((f64::NEG_INFINITY, f64::INFINITY))?
+    } else {
+        let (u, v) = (-along0 / along1, (length - along0) / along1);
+        (u.min(v), u.max(v))
+    };
+    let squared = Quadratic {
+        a: across1 * across1,
+        b: 2.0 * across0 * across1,
+        c: across0 * across0,
+    };
+    Some(Feature {
+        kind: Kind::Edge {
+            at_start: across0,
+            gain: across1,
+        },
+        squared,
+        valid,
+    })
+}
+
+impl Feature {
+    /// Distance at `t`, where the feature is valid.
+    fn distance(&self, leg: &Segment, t: f64) -> f64 {
+        match self.kind {
+            Kind::Vertex(vertex) => (leg.at(t).xy() - vertex).norm(),
+            Kind::Edge { at_start, gain } => (at_start + gain * t).abs(),
+        }
+    }
+}
+
+impl Piece {
+    pub(super) fn end_distances(&self, leg: &Segment) -> (f64, f64) {
+        (
+            self.nearest.distance(leg, self.t0),
+            self.nearest.distance(leg, self.t1),
+        )
+    }
+
+    fn least_distance(&self, leg: &Segment) -> f64 {
+        match self.nearest.kind {
+            Kind::Vertex(center) => {
+                let corner = Cylinder {
+                    center,
+                    radius: 0.0,
+                    influence: 0.0,
+                };
+                corner.clearance(leg, (self.t0, self.t1))
+            }
+            // Pieces are cut where a leg crosses an edge.
+            Kind::Edge { .. } => {
+                let (d0, d1) = self.end_distances(leg);
+                d0.min(d1)
+            }
+        }
+    }
+}
+
+pub(super) fn clearance_of(pieces: &[Piece], leg: &Segment) -> f64 {
+    // Inside, distance grows convexly on each piece, so that its ends hold the greatest depth.
+    let depth = pieces
+        .iter()
+        .filter(|piece| piece.inside)
+        .map(|piece| piece.end_distances(leg))
+        .fold(0.0, |depth: f64, (d0, d1)| depth.max(d0).max(d1));
+    if depth > 0.0 {
+        return -depth;
+    }
+    pieces
+        .iter()
+        .map(|piece| piece.least_distance(leg))
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Append the pieces of `window` of a leg of horizontal `length`, in order: the nearest feature at
+/// its middle reigns over a part of it, the rest is cut in turn.
+pub(super) fn cut(
+    features: &[Feature],
+    (t0, t1): (f64, f64),
+    length: f64,
+    pieces: &mut Vec<Piece>,
+) {
+    let middle = 0.5 * (t0 + t1);
+    let nearest = nearest_at(features, middle);
+    let kept;
+    let features = if features.len() > FEW_FEATURES {
+        // At either end the nearest feature is half the window farther at most, and every other
+        // half the window nearer.
+        let reach = nearest.squared.at(middle).max(0.0).sqrt() + (t1 - t0) * length;
+        let reach = reach * reach * (1.0 + 1e-9) + 1e-9 * (1.0 + length * length);
+        let may_reign = |feature: &&Feature| {
+            feature.valid.0 <= t1 && feature.valid.1 >= t0 && feature.squared.at(middle) <= reach
+        };
+        kept = features
+            .iter()
+            .filter(may_reign)
+            .copied()
+            .collect::<Vec<_>>();
+        &kept[..]
+    } else {
+        features
+    };
+    let (from, to) = reign(features, nearest, middle, (t0, t1));
+    if from - t0 > SHORTEST_PIECE {
+        cut(features, (t0, from), length, pieces);
+    }
+    let mut push = |t0, t1| {
+        pieces.push(Piece {
+            t0,
+            t1,
+            nearest: *nearest,
+            inside: false,
+        });
+    };
+    match nearest.kind {
+        // A leg crosses an edge where the distance is 0.
+        Kind::Edge { at_start, gain } if -at_start / gain > from && -at_start / gain < to => {
+            push(from, -at_start / gain);
+            push(-at_start / gain, to);
+        }
+        _ => push(from, to),
+    }
+    if t1 - to > SHORTEST_PIECE {
+        cut(features, (to, t1), length, pieces);
+    }
+}
+
+fn nearest_at(features: &[Feature], t: f64) -> &Feature {
+    features
+        .iter()
+        .filter(|feature| feature.valid.0 <= t && t <= feature.valid.1)
+        .min_by(|f, g| f.squared.at(t).total_cmp(&g.squared.at(t)))
+        .expect("vertices are valid everywhere")
+}
+
+/// The largest part of `window` round `middle` in which `nearest` stays the nearest.
+fn reign(features: &[Feature], nearest: &Feature, middle: f64, window: (f64, f64)) -> (f64, f64) {
+    let (mut from, mut to) = (window.0.max(nearest.valid.0), window.1.min(nearest.valid.1));
+    let mut shrink_to = |t: f64| {
+        if t < middle {
+            from = from.max(t);
+        } else if t > middle {
+            to = to.min(t);
+        }
+    };
+    let (mut ends_here, mut begins_here) = (false, false);
+    for rival in features {
+        let ahead = rival.squared.minus(&nearest.squared);
+        for root in ahead.roots().into_iter().flatten() {
+            if root < rival.valid.0 || root > rival.valid.1 {
+                continue;
+            }
+            if (root - middle).abs() > NO_TIME {
+                shrink_to(root);
+                continue;
+            }
+            // Both are as near at the middle: the slope tells on which side the rival is nearer.
+            let slope = 2.0 * ahead.a * root + ahead.b;
+            ends_here |= slope < 0.0 || (slope == 0.0 && ahead.a < 0.0);
+            begins_here |= slope > 0.0 || (slope == 0.0 && ahead.a < 0.0);
+        }
+        // An edge takes over from its own end exactly where it becomes valid: a double root, which
+        // rounding may hide.
+        for t in [rival.valid.0, rival.valid.1] {
+            if t.is_finite() && ahead.at(t) <= 1e-9 * (1.0 + nearest.squared.at(t)) {
+                shrink_to(t);
+            }
+        }
+    }
+    (
+        if begins_here {
+            middle
+        } else {
+            from.min(middle)
+        },
+        if ends_here { middle } else { to.max(middle) },
+    )
+}

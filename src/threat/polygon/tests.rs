@@ -1,0 +1,174 @@
+//! Distances and integrals worked by hand, and against fine sums.
+
+use super::*;
+use crate::geometry::Point3;
+use proptest::prelude::*;
+
+fn square(margin: f64) -> Polygon {
+    ring(
+        &[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]],
+        margin,
+    )
+}
+
+fn ring(vertices: &[[f64; 2]], margin: f64) -> Polygon {
+    Polygon::new(vertices.iter().map(|&v| Point2::from(v)).collect(), margin)
+}
+
+fn leg(a: [f64; 3], b: [f64; 3]) -> Segment {
+    Segment {
+        a: Point3::from(a),
+        b: Point3::from(b),
+    }
+}
+
+#[test]
+fn clearance_is_exact_and_signed() {
+    let check = |a, b, expected: f64| {
+        let clearance = square(0.0).clearance(&leg(a, b), (0.0, 1.0));
+        assert!(
+            (clearance - expected).abs() < 1e-9,
+            "{clearance} {expected}"
+        );
+    };
+    check([-5.0, 13.0, 0.0], [15.0, 13.0, 0.0], 3.0);
+    check([-5.0, 5.0, 0.0], [15.0, 5.0, 0.0], -5.0);
+    check([-5.0, 9.0, 0.0], [15.0, 9.0, 0.0], -1.0);
+    check([13.0, 14.0, 0.0], [20.0, 30.0, 0.0], 5.0);
+    // Along an edge and through a corner: touching is not entering.
+    check([-5.0, 10.0, 0.0], [15.0, 10.0, 0.0], 0.0);
+    check([-5.0, 5.0, 0.0], [5.0, -5.0, 0.0], 0.0);
+    check([4.0, 4.0, 0.0], [4.0, 4.0, 9.0], -4.0);
+}
+
+/// Across the square at mid-height: two ramps of the margin outside and 10 m inside.
+#[test]
+fn exposure_across() {
+    let exposure = square(2.0).exposure(&leg([-20.0, 5.0, 0.0], [30.0, 5.0, 0.0]), (0.0, 1.0));
+    assert!((exposure - (2.0 + 2.0 + 20.0)).abs() < 1e-9, "{exposure}");
+}
+
+/// The middle of the leg is as far from both walls of a bay; beyond it the other wall is nearer.
+#[test]
+fn a_tie_at_the_middle_is_seen() {
+    let bay = ring(
+        &[
+            [-10.0, -5.0],
+            [10.0, -5.0],
+            [10.0, 20.0],
+            [5.0, 20.0],
+            [5.0, 0.0],
+            [-5.0, 0.0],
+            [-5.0, 20.0],
+            [-10.0, 20.0],
+        ],
+        5.0,
+    );
+    let across = leg([-4.0, 10.0, 0.0], [4.0, 10.0, 0.0]);
+    let (clearance, exposure) = bay.encounter(&across, (0.0, 1.0));
+    assert!((clearance - 1.0).abs() < 1e-9, "{clearance}");
+    // T falls from 4 m to 0 at the middle and rises again.
+    assert!((exposure - 16.0).abs() < 1e-9, "{exposure}");
+}
+
+fn star() -> Polygon {
+    ring(
+        &[
+            [0.0, 20.0],
+            [4.0, 5.0],
+            [20.0, 4.0],
+            [6.0, -4.0],
+            [10.0, -20.0],
+            [-2.0, -6.0],
+            [-18.0, -9.0],
+            [-6.0, 3.0],
+        ],
+        7.0,
+    )
+}
+
+/// 100 km along an edge, half a millimetre within and without.
+#[test]
+fn a_long_leg_is_measured_as_exactly_as_a_short_one() {
+    let strip = ring(&[[-1e5, 0.0], [2e5, 0.0], [2e5, 1e4], [-1e5, 1e4]], 0.0);
+    for away in [-5e-4, 5e-4, 1e-6, -1e-6] {
+        let (sin, cos) = (0.5 * away, away);
+        let clearance = strip.clearance(&leg([0.0, -sin, 0.0], [1e5, -cos, 0.0]), (0.0, 1.0));
+        let expected = if away < 0.0 { away } else { sin };
+        assert!(
+            (clearance - expected).abs() < 1e-9,
+            "{clearance} {expected}"
+        );
+    }
+    let corner = ring(&[[5e4, 0.0], [6e4, 1e4], [4e4, 1e4]], 0.0);
+    let clearance = corner.clearance(&leg([0.0, -1e-4, 0.0], [1e5, -1e-4, 0.0]), (0.0, 1.0));
+    assert!((clearance - 1e-4).abs() < 1e-9, "{clearance}");
+}
+
+/// A ring of 20 000 vertices along a leg took minutes once.
+#[test]
+fn a_ring_of_many_vertices_agrees_with_sums() {
+    let vertices = (0..20_000).map(|corner| {
+        let angle = std::f64::consts::TAU * f64::from(corner) / 20_000.0;
+        let away = if corner % 2 == 0 { 1000.0 } else { 900.0 };
+        Point2::new(away * libm::cos(angle), away * libm::sin(angle))
+    });
+    let flower = Polygon::new(vertices.collect(), 200.0);
+    for (a, b) in [
+        ([-2000.0, 1100.0, 0.0], [2000.0, 900.0, 0.0]),
+        ([-2000.0, 10.0, 0.0], [1500.0, 300.0, 0.0]),
+    ] {
+        let leg = leg(a, b);
+        let (clearance, exposure) = flower.encounter(&leg, (0.0, 1.0));
+        let steps = 400;
+        let points = (0..steps).map(|i| leg.at((f64::from(i) + 0.5) / f64::from(steps)).xy());
+        let (mut sum, mut signed) = (0.0, f64::INFINITY);
+        for point in points {
+            sum += flower.intensity(point) * leg.length() / f64::from(steps);
+            signed = signed.min(flower.distance(point));
+        }
+        assert!(
+            (exposure - sum).abs() < 0.01 * (1.0 + sum),
+            "{exposure} {sum}"
+        );
+        assert!((clearance - signed).abs() < 10.0, "{clearance} {signed}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn a_concave_ring_agrees_with_sums(
+        a in prop::array::uniform3(-30.0..30.0f64), b in prop::array::uniform3(-30.0..30.0f64),
+        t0 in 0.0..0.4f64, t1 in 0.6..1.0f64,
+    ) {
+        let (star, leg) = (star(), leg(a, b));
+        let steps = 20_000;
+        let points = (0..steps).map(|i| leg.at(t0 + (t1 - t0) * (f64::from(i) + 0.5) / f64::from(steps)).xy());
+        let (mut sum, mut signed) = (0.0, f64::INFINITY);
+        for point in points {
+            sum += star.intensity(point);
+            let distance = star.ring_distance(point);
+            signed = signed.min(if star.contains(point) { -distance } else { distance });
+        }
+        sum *= leg.length() * (t1 - t0) / f64::from(steps);
+        let exposure = star.exposure(&leg, (t0, t1));
+        prop_assert!((exposure - sum).abs() <= 2e-4 * (1.0 + sum), "{exposure} {sum}");
+        let clearance = star.clearance(&leg, (t0, t1));
+        prop_assert!((clearance - signed).abs() <= leg.length() / f64::from(steps), "{clearance} {signed}");
+        if !star.may_reach(&leg) {
+            prop_assert!(exposure.abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn pieces_cover_the_window_in_order(
+        a in prop::array::uniform3(-30.0..30.0f64), b in prop::array::uniform3(-30.0..30.0f64),
+    ) {
+        let pieces = star().pieces(&leg(a, b), (0.1, 0.9));
+        prop_assert!((pieces[0].t0 - 0.1).abs() < 1e-9);
+        prop_assert!((pieces[pieces.len() - 1].t1 - 0.9).abs() < 1e-9);
+        for pair in pieces.windows(2) {
+            prop_assert!((pair[0].t1 - pair[1].t0).abs() < 1e-9);
+        }
+    }
+}

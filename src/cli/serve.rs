@@ -12,13 +12,13 @@ use tokio::time::Instant;
 
 use super::exit;
 use crate::config::Serve;
-use crate::http::{self, AppState, Capacity, Phase};
+use crate::http::{self, AppState, Capacity, InFlight, Phase};
 use crate::job::Failure;
 use crate::scenario::json::{self, Rules};
 use crate::scenario::limits::Limits;
 use crate::store::sqlite::SqliteStore;
 use crate::store::{self, Store};
-use crate::worker::{self, Engine, Pool};
+use crate::worker::{self, Engine, Pool, Sweeper};
 use crate::{planner, telemetry};
 
 /// A request's body must be complete after this.
@@ -55,6 +55,7 @@ async fn serve(config: &Serve) -> anyhow::Result<()> {
         clock: store::wall_clock(),
     };
     let pool = Pool::start(store.clone(), settings, engine(rules.clone()));
+    let sweeper = Sweeper::start(store.clone(), store::wall_clock());
     let (phase, watched) = watch::channel(Phase::Serving);
     let router = http::router(AppState {
         store: store.clone(),
@@ -63,6 +64,8 @@ async fn serve(config: &Serve) -> anyhow::Result<()> {
             workers: workers.get(),
             queue: config.queue.get() as usize,
         },
+        in_flight: InFlight::default(),
+        clock_jump_ms: sweeper.clock_jump_ms(),
         body_timeout: BODY_TIMEOUT,
         phase: watched.clone(),
     });
@@ -84,6 +87,7 @@ async fn serve(config: &Serve) -> anyhow::Result<()> {
     if let Ok(ended) = tokio::time::timeout_at(signalled + times.answers, server).await {
         ended.context("the server broke")?;
     }
+    drop(sweeper);
     store.close().await;
     tracing::info!(
         duration_ms = signalled.elapsed().as_secs_f64() * 1e3,
@@ -121,10 +125,7 @@ fn open_store(config: &Serve) -> anyhow::Result<Arc<dyn Store>> {
     let data_dir = config
         .data_dir()
         .context("the user has no home; name a directory with --data-dir")?;
-    let options = store::Options {
-        queue_limit: config.queue.get().into(),
-        clock: store::wall_clock(),
-    };
+    let options = store::Options::new(config.queue.get().into());
     let store = SqliteStore::open(&data_dir, options)
         .with_context(|| format!("cannot open the store in {}", data_dir.display()))?;
     tracing::info!(data_dir = %data_dir.display(), "the store is open");

@@ -9,6 +9,7 @@ use futures_util::stream;
 use std::convert::Infallible;
 use std::sync::Arc;
 
+use super::caller::Caller;
 use super::feed::{Feed, Told};
 use super::params::{self, Id, Params};
 use super::problem::Problem;
@@ -28,6 +29,7 @@ pub(super) const RATES_HZ: std::ops::RangeInclusive<f64> = 0.01..=1000.0;
 /// `GET /plans/{id}/events`.
 pub(super) async fn follow(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
     uri: Uri,
     headers: HeaderMap,
@@ -40,10 +42,13 @@ pub(super) async fn follow(
             asked: accept::asked(&headers),
             available: Wire::MEDIA_TYPES.to_vec(),
         })?;
-    let plan = state.store.get(id).await?;
-    if plan.status.is_final() && state.store.events(id, after, 1).await?.is_empty() {
-        // All has been told; EventSource stops asking at a 204.
-        return Ok(StatusCode::NO_CONTENT.into_response());
+    let plan = caller.plan(&*state.store, id).await?;
+    if plan.status.is_final() {
+        let rest = state.store.events(id, after, 1).await?;
+        if rest.events.is_empty() {
+            // All has been told; EventSource stops asking at a 204.
+            return Ok(StatusCode::NO_CONTENT.into_response());
+        }
     }
     let feed = Feed::new(state.store.clone(), state.phase.clone(), id, after, rate_hz);
     Ok(streamed(feed, state.store, Wire::of(media_type)))
@@ -79,6 +84,11 @@ fn streamed(feed: Feed, store: Arc<dyn Store>, wire: Wire) -> Response {
     let told = stream::unfold((feed, store), move |(mut feed, store)| async move {
         let text = match feed.next().await? {
             Told::Events(events) => write_events(&feed, &*store, events, wire).await,
+            Told::Gap { from, to } => {
+                let mut text = String::new();
+                wire.write(Outgoing::gap(from, to), &mut text);
+                text
+            }
             Told::Silence => wire.silence().to_owned(),
             Told::Stopping(events) => {
                 write_events(&feed, &*store, events, wire).await + wire.stopping()

@@ -6,12 +6,15 @@
 
 mod planning;
 mod run;
+mod sweeper;
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::watch;
 use tokio::task::JoinSet;
+
+pub use sweeper::Sweeper;
 
 use crate::job::Failure;
 use crate::planner::{Observer, Outcome, Stop};

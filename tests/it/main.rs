@@ -8,6 +8,7 @@ mod cli;
 mod crash;
 mod determinism;
 mod events;
+mod idempotency;
 mod layering;
 mod openapi;
 mod refusals;

@@ -29,8 +29,7 @@ pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
     let loaded = config::load(flags, |name| std::env::var_os(name))
         .map_err(|faults| anyhow::anyhow!("wrong configuration\n  {}", faults.join("\n  ")))?;
     if flags.print_config {
-        std::io::stdout().write_all(loaded.to_toml().as_bytes())?;
-        return Ok(());
+        return Ok(loaded.write_toml(&mut std::io::stdout().lock())?);
     }
     let config = &loaded.config;
     telemetry::init(config);

@@ -47,10 +47,10 @@ impl Args for Flags {
 }
 
 fn argument(setting: &Setting, defaults: &Config) -> Arg {
-    let mut help = format!("{} [env: {}]", setting.help, setting.variable());
-    if let Some(default) = setting.shown(defaults) {
-        help += &format!(" [default: {}]", default.trim_matches(['"', '\'']));
-    }
+    let default = setting.shown(defaults).map_or_else(String::new, |default| {
+        format!(" [default: {}]", default.trim_matches(['"', '\'']))
+    });
+    let help = format!("{} [env: {}]{default}", setting.help, setting.variable());
     let argument = Arg::new(setting.key)
         .long(setting.flag())
         .value_name(setting.placeholder)

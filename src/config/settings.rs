@@ -7,10 +7,16 @@ use std::time::Duration;
 use super::Config;
 use super::value::{Given, Value};
 
-/// Every setting, in the order in which they are shown; those of a table together.
+/// Every setting, in the order in which they are shown.
 pub(super) fn all() -> Vec<Setting> {
-    const TIMEOUT: RangeInclusive<Duration> =
-        Duration::from_millis(100)..=Duration::from_secs(3600);
+    [service(), http(), limits()]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// Those without a table.
+fn service() -> Vec<Setting> {
     vec![
         row(
             "listen",
@@ -61,6 +67,13 @@ pub(super) fn all() -> Vec<Setting> {
             ..,
             |c| &mut c.log_format,
         ),
+    ]
+}
+
+fn http() -> Vec<Setting> {
+    const TIMEOUT: RangeInclusive<Duration> =
+        Duration::from_millis(100)..=Duration::from_secs(3600);
+    vec![
         row(
             "http.head_timeout",
             "SECONDS",
@@ -82,6 +95,11 @@ pub(super) fn all() -> Vec<Setting> {
             1..=1_000_000,
             |c| &mut c.http.max_connections,
         ),
+    ]
+}
+
+fn limits() -> Vec<Setting> {
+    vec![
         row(
             "limits.body_bytes",
             "BYTES",

@@ -1,23 +1,20 @@
 //! What the operator reads: log lines on stderr, with the ids of the request and the plan in fields.
 //!
-//! `NOCTULE_LOG` sets what is logged, in the syntax of tracing's `EnvFilter`; `info` by default.
+//! The setting `log` says what is logged, in the syntax of tracing's `EnvFilter`.
 
 use std::panic::PanicHookInfo;
 
-use tracing_subscriber::EnvFilter;
-
-use crate::config::LogFormat;
+use crate::config::{Config, LogFormat};
 
 /// Start to write log lines, and let panics be among them.
 ///
 /// # Panics
 /// When called twice.
-pub fn init(format: LogFormat) {
-    let filter = EnvFilter::try_from_env("NOCTULE_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
+pub fn init(config: &Config) {
     let lines = tracing_subscriber::fmt()
-        .with_env_filter(filter)
+        .with_env_filter(config.log.to_env_filter())
         .with_writer(std::io::stderr);
-    match format {
+    match config.log_format {
         LogFormat::Text => lines
             .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
             .init(),

@@ -20,7 +20,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Answer plans over HTTP
-    Serve(crate::config::Serve),
+    Serve(crate::config::Flags),
     /// Plan one scenario here and now, without a server
     Plan(plan::Arguments),
     /// Measure the algorithms: against each other, against the best known routes, against the clock
@@ -59,7 +59,7 @@ pub fn run() -> ExitCode {
         }
     };
     let done = match command {
-        Command::Serve(config) => serve::run(&config).map(|()| exit::DONE),
+        Command::Serve(flags) => serve::run(&flags).map(|()| exit::DONE),
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Bench(command) => bench::run(&command),
         Command::Healthcheck(arguments) => healthcheck::run(&arguments).map(|()| exit::DONE),

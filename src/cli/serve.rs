@@ -11,7 +11,7 @@ use tokio::sync::watch;
 use tokio::time::Instant;
 
 use super::exit;
-use crate::config::Serve;
+use crate::config::{self, Config, Flags};
 use crate::http::{self, AppState, Capacity, InFlight, Phase};
 use crate::job::Failure;
 use crate::scenario::json::{self, Rules};
@@ -21,15 +21,18 @@ use crate::store::{self, Store};
 use crate::worker::{self, Engine, Pool, Sweeper};
 use crate::{planner, telemetry};
 
-/// A request's body must be complete after this.
-const BODY_TIMEOUT: Duration = Duration::from_secs(30);
-
 /// Connections may finish their answers for so long at the end, if the grace period lasts so long.
 const LAST_ANSWERS: Duration = Duration::from_secs(5);
 
-/// Serve until a signal.
-pub(super) fn run(config: &Serve) -> anyhow::Result<()> {
-    telemetry::init(config.log_format);
+/// Serve until a signal, or print the configuration.
+pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
+    let loaded = config::load(flags, |name| std::env::var_os(name))
+        .map_err(|faults| anyhow::anyhow!("wrong configuration\n  {}", faults.join("\n  ")))?;
+    if flags.print_config {
+        return Ok(loaded.write_toml(&mut std::io::stdout().lock())?);
+    }
+    let config = &loaded.config;
+    telemetry::init(config);
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
         .build()?;
@@ -39,43 +42,51 @@ pub(super) fn run(config: &Serve) -> anyhow::Result<()> {
     Ok(())
 }
 
-async fn serve(config: &Serve) -> anyhow::Result<()> {
+async fn serve(config: &Config) -> anyhow::Result<()> {
     let mut signals = Signals::new()?;
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("cannot listen on {}", config.listen))?;
     let store = open_store(config)?;
-    let workers = config.workers();
     let rules = Arc::new(Rules {
-        limits: Limits::default(),
+        limits: config.limits,
         algorithms: planner::algorithm_rules(),
     });
     let settings = worker::Settings {
-        workers: workers.get(),
+        workers: config.workers,
         clock: store::wall_clock(),
     };
-    let pool = Pool::start(store.clone(), settings, engine(rules.clone()));
+    let pool = Pool::start(store.clone(), settings, engine());
     let sweeper = Sweeper::start(store.clone(), store::wall_clock());
     let (phase, watched) = watch::channel(Phase::Serving);
     let router = http::router(AppState {
         store: store.clone(),
         rules,
         capacity: Capacity {
-            workers: workers.get(),
-            queue: config.queue.get() as usize,
+            workers: config.workers,
+            queue: config.queue,
         },
         in_flight: InFlight::default(),
         clock_jump_ms: sweeper.clock_jump_ms(),
-        body_timeout: BODY_TIMEOUT,
+        body_timeout: config.http.body_timeout,
         phase: watched.clone(),
     });
     announce(&listener)?;
-    let times = Times::within(Duration::from_secs(config.grace));
-    let server = tokio::spawn(http::server::serve(listener, router, watched, LAST_ANSWERS));
+    let times = Times::within(config.grace);
+    let settings = http::server::Settings {
+        head_timeout: config.http.head_timeout,
+        max_connections: config.http.max_connections,
+        patience: LAST_ANSWERS,
+    };
+    let server = tokio::spawn(http::server::serve(listener, router, watched, settings));
 
     let name = signals.next().await;
     let signalled = Instant::now();
-    tracing::info!(signal = name, grace_s = config.grace, "shutting down");
+    tracing::info!(
+        signal = name,
+        grace_s = config.grace.as_secs_f64(),
+        "shutting down"
+    );
     tokio::spawn(async move {
         signals.next().await;
         tracing::warn!("a second signal, leaving at once");
@@ -97,7 +108,11 @@ async fn serve(config: &Serve) -> anyhow::Result<()> {
 }
 
 /// What the pool runs: the accepted document, read again, and planned.
-fn engine(rules: Arc<Rules>) -> Engine {
+fn engine() -> Engine {
+    let rules = Rules {
+        limits: Limits::NONE,
+        algorithms: planner::algorithm_rules(),
+    };
     Arc::new(move |document, observer, stop| {
         // The document names its seed; none is drawn.
         let scenario = json::read(document.as_bytes(), &rules, 0).map_err(|refusal| Failure {
@@ -121,15 +136,31 @@ async fn drain(pool: Pool, times: &Times) {
     }
 }
 
-fn open_store(config: &Serve) -> anyhow::Result<Arc<dyn Store>> {
+fn open_store(config: &Config) -> anyhow::Result<Arc<dyn Store>> {
     let data_dir = config
-        .data_dir()
+        .data_dir
+        .as_deref()
         .context("the user has no home; name a directory with --data-dir")?;
-    let options = store::Options::new(config.queue.get().into());
-    let store = SqliteStore::open(&data_dir, options)
+    let options = store::Options {
+        retention: retention(config.retention),
+        events_kept: config.retention.events,
+        ..store::Options::new(config.queue as u64)
+    };
+    let store = SqliteStore::open(data_dir, options)
         .with_context(|| format!("cannot open the store in {}", data_dir.display()))?;
     tracing::info!(data_dir = %data_dir.display(), "the store is open");
     Ok(Arc::new(store))
+}
+
+/// Of a setting, 0 is no limit.
+fn retention(settings: config::Retention) -> store::Retention {
+    let limit = |setting: u64| (setting > 0).then_some(setting);
+    let age_ms = i64::try_from(settings.age.as_millis()).unwrap_or(i64::MAX);
+    store::Retention {
+        age_ms: (age_ms > 0).then_some(age_ms),
+        plans: limit(settings.plans),
+        bytes: limit(settings.bytes),
+    }
 }
 
 /// One plain line for people and scripts, with the port that was taken.

@@ -22,25 +22,30 @@ use tower::ServiceExt as _;
 use super::Phase;
 use super::phase::stopping;
 
-/// A request's head must be complete after this; also how long a connection may idle.
-const HEAD_TIMEOUT: Duration = Duration::from_secs(30);
-
-/// Connections open at once; more wait in the listener's backlog.
-const MAX_CONNECTIONS: usize = 20_000;
+/// How connections are kept.
+#[derive(Debug, Clone, Copy)]
+pub struct Settings {
+    /// A request's head must be complete after this; also how long a connection may idle.
+    pub head_timeout: Duration,
+    /// Connections open at once; more wait in the listener's backlog.
+    pub max_connections: usize,
+    /// At the end, open connections may finish their answers for so long.
+    pub patience: Duration,
+}
 
 /// Pause after a failed accept, such as when file descriptors run out.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
 /// Answer on `listener` until the phase is [`Phase::Stopping`], then let open connections finish
-/// their answers for at most `patience`.
+/// their answers.
 pub async fn serve(
     listener: TcpListener,
     router: Router,
     mut phase: watch::Receiver<Phase>,
-    patience: Duration,
+    settings: Settings,
 ) {
     let connections = GracefulShutdown::new();
-    let places = Arc::new(Semaphore::new(MAX_CONNECTIONS));
+    let places = Arc::new(Semaphore::new(settings.max_connections));
     loop {
         let arrival = tokio::select! {
             arrival = accept(&listener, &places) => arrival,
@@ -48,8 +53,16 @@ pub async fn serve(
         };
         match arrival {
             Ok((stream, place)) => {
-                let answer = answer(stream, router.clone(), connections.watcher(), place);
-                tokio::spawn(answer);
+                let answer = answer(
+                    stream,
+                    router.clone(),
+                    connections.watcher(),
+                    settings.head_timeout,
+                );
+                tokio::spawn(async move {
+                    answer.await;
+                    drop(place);
+                });
             }
             Err(error) => {
                 tracing::warn!(%error, "a connection could not be accepted");
@@ -58,7 +71,7 @@ pub async fn serve(
         }
     }
     drop(listener);
-    if tokio::time::timeout(patience, connections.shutdown())
+    if tokio::time::timeout(settings.patience, connections.shutdown())
         .await
         .is_err()
     {
@@ -76,8 +89,8 @@ async fn accept(
     Ok((stream, place.expect("the semaphore is never closed")))
 }
 
-/// Answer the requests of one connection; it keeps its place until it ends.
-async fn answer(stream: TcpStream, router: Router, watcher: Watcher, place: OwnedSemaphorePermit) {
+/// Answer the requests of one connection.
+async fn answer(stream: TcpStream, router: Router, watcher: Watcher, head_timeout: Duration) {
     let begun = Arc::new(AtomicBool::new(false));
     let service = {
         let begun = begun.clone();
@@ -90,11 +103,11 @@ async fn answer(stream: TcpStream, router: Router, watcher: Watcher, place: Owne
     builder
         .http1()
         .timer(TokioTimer::new())
-        .header_read_timeout(HEAD_TIMEOUT);
+        .header_read_timeout(head_timeout);
     builder
         .http2()
         .timer(TokioTimer::new())
-        .keep_alive_interval(HEAD_TIMEOUT)
+        .keep_alive_interval(head_timeout)
         .max_concurrent_streams(256);
     let connection =
         builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
@@ -103,15 +116,14 @@ async fn answer(stream: TcpStream, router: Router, watcher: Watcher, place: Owne
         ended = connection => if let Err(error) = ended {
             tracing::debug!(%error, "a connection broke off");
         },
-        () = never_began(&begun) => tracing::debug!("a connection sent no request"),
+        () = never_began(&begun, head_timeout) => tracing::debug!("a connection sent no request"),
     }
-    drop(place);
 }
 
 /// Until it is clear that no first request comes. hyper's own timer starts only after the protocol
 /// is known, which a silent caller never lets it be.
-async fn never_began(begun: &AtomicBool) {
-    tokio::time::sleep(HEAD_TIMEOUT).await;
+async fn never_began(begun: &AtomicBool, head_timeout: Duration) {
+    tokio::time::sleep(head_timeout).await;
     if begun.load(Ordering::Relaxed) {
         std::future::pending::<()>().await;
     }

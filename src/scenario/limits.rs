@@ -29,6 +29,22 @@ pub struct Limits {
     pub path_samples: usize,
 }
 
+impl Limits {
+    /// For a document that was accepted before: what is allowed now does not take that back.
+    pub const NONE: Self = Self {
+        body_bytes: usize::MAX,
+        threats: usize::MAX,
+        polygon_vertices: usize::MAX,
+        terrain_nodes: usize::MAX,
+        peaks: usize::MAX,
+        waypoints: usize::MAX,
+        population: usize::MAX,
+        iterations: usize::MAX,
+        work: u64::MAX,
+        path_samples: usize::MAX,
+    };
+}
+
 impl Default for Limits {
     fn default() -> Self {
         Self {

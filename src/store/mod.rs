@@ -163,20 +163,20 @@ pub struct Options {
 }
 
 impl Options {
-    /// For `queue_limit` waiting plans; the rest as by default, on the machine's clock.
+    /// For `queue_limit` waiting plans, with no other limit, on the machine's clock.
     #[must_use]
     pub fn new(queue_limit: u64) -> Self {
         Self {
             queue_limit,
             clock: wall_clock(),
             retention: Retention::default(),
-            events_kept: 10_000,
+            events_kept: u64::MAX,
         }
     }
 }
 
 /// How long ended plans are kept: until the first of these limits; `None` is no limit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Retention {
     /// From the end of a plan, milliseconds. It becomes the plan's `expires_ms` when it ends, and
     /// that stands whatever is set later.
@@ -185,16 +185,6 @@ pub struct Retention {
     pub plans: Option<u64>,
     /// Bytes of their documents and events.
     pub bytes: Option<u64>,
-}
-
-impl Default for Retention {
-    fn default() -> Self {
-        Self {
-            age_ms: Some(7 * 24 * 60 * 60 * 1_000),
-            plans: Some(100_000),
-            bytes: Some(10 << 30),
-        }
-    }
 }
 
 /// The answer to a submission.

@@ -6,6 +6,7 @@ use axum::body::Body;
 use axum::http::{Method, StatusCode};
 use noctule::http::Phase;
 use noctule::job::Status;
+use noctule::store::{Options, Retention};
 use serde_json::{Value, json};
 
 use crate::support::api::Api;
@@ -442,7 +443,14 @@ async fn a_body_that_never_ends_is_cut_off() {
 
 #[tokio::test]
 async fn a_plan_past_its_time_is_gone_and_says_so() {
-    let api = Api::new();
+    let retention = Retention {
+        age_ms: Some(1),
+        ..Retention::default()
+    };
+    let api = Api::with_store(Options {
+        retention,
+        ..Options::new(10)
+    });
     let address = api.submit().await;
     run::complete(&*api.store, Vec::new()).await;
     let ended = api.get(&address).await.json();

@@ -26,7 +26,7 @@ const ROOMS: [(&str, Imports); 16] = [
     ("planner", Above),
     ("export", Above),
     ("job", Above),
-    ("config", Only(&[])),
+    ("config", Only(&["scenario"])),
     ("telemetry", Only(&["config"])),
     ("store", Above),
     ("worker", Above),

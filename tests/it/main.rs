@@ -5,6 +5,7 @@ mod api;
 mod bench;
 mod bound;
 mod cli;
+mod config;
 mod crash;
 mod determinism;
 mod events;

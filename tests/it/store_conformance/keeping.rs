@@ -7,12 +7,6 @@ use crate::support::plans::{ending, failure, history, kind, point, submission};
 use crate::support::run::incumbent;
 use crate::support::stores::{Fixture, on_every_backend};
 
-const FOR_EVER: Retention = Retention {
-    age_ms: None,
-    plans: None,
-    bytes: None,
-};
-
 /// Submit a plan and end it now.
 async fn ended(store: &Fixture) -> PlanId {
     store.submit(submission()).await.unwrap();
@@ -35,7 +29,7 @@ async fn a_plan_is_kept_for_its_time_from_its_end() {
     on_every_backend(10, async |store| {
         store.retention = Retention {
             age_ms: Some(1_000),
-            ..FOR_EVER
+            ..Retention::default()
         };
         store.reopen().await;
         let done = ended(store).await;
@@ -63,7 +57,7 @@ async fn a_plan_is_kept_for_its_time_from_its_end() {
 
         // The promise of a time stands when the setting changes.
         let promised = ended(store).await;
-        store.retention = FOR_EVER;
+        store.retention = Retention::default();
         store.reopen().await;
         let endless = ended(store).await;
         store.pass_ms(1_000_000);
@@ -78,7 +72,7 @@ async fn of_too_many_the_longest_ended_go() {
     on_every_backend(1_000, async |store| {
         store.retention = Retention {
             plans: Some(3),
-            ..FOR_EVER
+            ..Retention::default()
         };
         store.reopen().await;
         // The order of the ends counts, not that of acceptance.
@@ -108,7 +102,7 @@ async fn of_too_many_the_longest_ended_go() {
 #[tokio::test(flavor = "multi_thread")]
 async fn of_too_many_bytes_the_longest_ended_go() {
     on_every_backend(10, async |store| {
-        store.retention = FOR_EVER;
+        store.retention = Retention::default();
         store.reopen().await;
         let mut ids = Vec::new();
         for _ in 0..4 {
@@ -137,7 +131,7 @@ async fn a_sweep_is_short_and_goes_on_at_the_next() {
     on_every_backend(10, async |store| {
         store.retention = Retention {
             plans: Some(0),
-            ..FOR_EVER
+            ..Retention::default()
         };
         store.reopen().await;
         for _ in 0..SWEEP + 5 {

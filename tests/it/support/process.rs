@@ -14,24 +14,23 @@ const PATIENCE: Duration = Duration::from_secs(60);
 fn noctule() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_noctule"));
     // What the tests are run with must not change what they see.
-    for name in [
-        "LISTEN",
-        "DATA_DIR",
-        "WORKERS",
-        "QUEUE",
-        "GRACE",
-        "LOG_FORMAT",
-        "LOG",
-        "HEALTHCHECK_URL",
-    ] {
-        command.env_remove(format!("NOCTULE_{name}"));
+    for (name, _) in std::env::vars_os() {
+        if name.to_string_lossy().starts_with("NOCTULE_") {
+            command.env_remove(name);
+        }
     }
     command
 }
 
 /// Run the binary to its end, with `input` as its standard input.
 pub(crate) fn run(arguments: &[&str], input: &str) -> Output {
+    run_with(&[], arguments, input)
+}
+
+/// The same with environment variables.
+pub(crate) fn run_with(variables: &[(&str, &str)], arguments: &[&str], input: &str) -> Output {
     let mut child = noctule()
+        .envs(variables.iter().copied())
         .args(arguments)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use noctule::http::server::{self, Settings};
 use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 
@@ -19,12 +20,16 @@ impl Server {
     pub(crate) async fn start(api: &Api) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
         let address = listener.local_addr().expect("bound");
-        let patience = Duration::from_secs(5);
-        let serving = noctule::http::server::serve(
+        let settings = Settings {
+            head_timeout: Duration::from_secs(30),
+            max_connections: 20_000,
+            patience: Duration::from_secs(5),
+        };
+        let serving = server::serve(
             listener,
             api.router.clone(),
             api.state.phase.clone(),
-            patience,
+            settings,
         );
         Self {
             address,

@@ -40,7 +40,7 @@ impl Fixture {
             directory: TempDir::new().expect("a temporary directory"),
             queue_limit,
             retention: Retention::default(),
-            events_kept: 10_000,
+            events_kept: u64::MAX,
             now_ms: Arc::new(AtomicI64::new(10_000)),
             store: None,
         };

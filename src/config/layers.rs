@@ -1,0 +1,239 @@
+//! Which value counts where several are given: the flag's, then the variable's, then the file's,
+//! then the default. All of them must be right, also those that do not count.
+
+use std::ffi::OsString;
+use std::fmt;
+use std::path::PathBuf;
+
+use super::settings::{self, Setting};
+use super::value::Given;
+use super::{Config, Flags, file};
+
+/// What is in effect.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The settings.
+    pub config: Config,
+    /// Where each comes from, in the order of the table.
+    pub(super) sources: Vec<Source>,
+}
+
+/// Where a value comes from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Source {
+    Default,
+    /// With the line, from 1.
+    File(PathBuf, usize),
+    /// Its name.
+    Variable(String),
+    /// Its name, with dashes.
+    Flag(String),
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Default => write!(f, "default"),
+            Self::File(path, line) => write!(f, "{}:{line}", path.display()),
+            Self::Variable(name) | Self::Flag(name) => write!(f, "{name}"),
+        }
+    }
+}
+
+/// Put the layers together. `variable` looks into the environment.
+///
+/// # Errors
+/// Everything that is wrong, a line each: where it stands, what it is, and what it must be.
+pub fn load(
+    flags: &Flags,
+    variable: impl Fn(&str) -> Option<OsString>,
+) -> Result<Loaded, Vec<String>> {
+    let settings = settings::all();
+    let mut layers = Layers {
+        config: Config::default(),
+        sources: vec![Source::Default; settings.len()],
+        settings: &settings,
+        faults: Vec::new(),
+    };
+    layers.file(flags);
+    layers.environment(variable);
+    layers.flags(flags);
+    if layers.faults.is_empty() {
+        let (config, sources) = (layers.config, layers.sources);
+        Ok(Loaded { config, sources })
+    } else {
+        Err(layers.faults)
+    }
+}
+
+struct Layers<'a> {
+    config: Config,
+    sources: Vec<Source>,
+    settings: &'a [Setting],
+    faults: Vec<String>,
+}
+
+impl Layers<'_> {
+    fn file(&mut self, flags: &Flags) {
+        let Some(path) = &flags.config else {
+            return;
+        };
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(error) => {
+                let fault = format!("cannot read the configuration {}: {error}", path.display());
+                return self.faults.push(fault);
+            }
+        };
+        let (entries, faults) = file::read(&text, self.settings);
+        for fault in faults {
+            let fault = format!("{}:{}: {}", path.display(), fault.line, fault.detail);
+            self.faults.push(fault);
+        }
+        for entry in entries {
+            let source = Source::File(path.clone(), entry.line);
+            let place = format!("{source}: {}", entry.setting.key);
+            self.put(entry.setting.key, &entry.given, source, &place);
+        }
+    }
+
+    /// An empty variable is as none.
+    fn environment(&mut self, variable: impl Fn(&str) -> Option<OsString>) {
+        for setting in self.settings {
+            let name = setting.variable();
+            match variable(&name).map(OsString::into_string) {
+                None => {}
+                Some(Ok(word)) if word.is_empty() => {}
+                Some(Ok(word)) => {
+                    let source = Source::Variable(name.clone());
+                    self.put(setting.key, &Given::Word(word), source, &name);
+                }
+                Some(Err(_)) => self.faults.push(format!("{name} is not UTF-8")),
+            }
+        }
+    }
+
+    fn flags(&mut self, flags: &Flags) {
+        for (key, word) in &flags.given {
+            let place = format!("--{}", self.settings[self.index(key)].flag());
+            let source = Source::Flag(place.clone());
+            self.put(key, &Given::Word(word.clone()), source, &place);
+        }
+    }
+
+    fn put(&mut self, key: &str, given: &Given, source: Source, place: &str) {
+        let index = self.index(key);
+        match self.settings[index].set(&mut self.config, given) {
+            Ok(()) => self.sources[index] = source,
+            Err(allowed) => {
+                let fault = format!("{place} is {}, must be {allowed}", given.shown());
+                self.faults.push(fault);
+            }
+        }
+    }
+
+    fn index(&self, key: &str) -> usize {
+        let mut settings = self.settings.iter();
+        settings
+            .position(|setting| setting.key == key)
+            .expect("keys come from the table")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+    use std::time::Duration;
+
+    use super::*;
+
+    /// Load with a file of these lines, these variables and these flags.
+    fn loaded(
+        lines: &str,
+        variables: &[(&str, &str)],
+        given: &[(&'static str, &str)],
+    ) -> Result<Loaded, Vec<String>> {
+        let mut file = tempfile::NamedTempFile::new().expect("a file");
+        file.write_all(lines.as_bytes()).expect("written");
+        let flags = Flags {
+            config: Some(file.path().to_owned()),
+            print_config: false,
+            given: given
+                .iter()
+                .map(|(key, word)| (*key, (*word).to_owned()))
+                .collect(),
+        };
+        let variable = |name: &str| {
+            let found = variables.iter().find(|(known, _)| *known == name);
+            found.map(|(_, word)| OsString::from(word))
+        };
+        let name = file.path().display().to_string();
+        load(&flags, variable).map_err(|faults| {
+            let faults = faults.into_iter();
+            faults.map(|fault| fault.replace(&name, "FILE")).collect()
+        })
+    }
+
+    #[test]
+    fn flags_count_before_variables_before_the_file_before_defaults() {
+        let lines = "queue = 3\nworkers = 3\ngrace = 3\n[limits]\nthreats = 3\n";
+        let variables = [
+            ("NOCTULE_QUEUE", "2"),
+            ("NOCTULE_WORKERS", "2"),
+            ("NOCTULE_LIMITS_PEAKS", ""),
+        ];
+        let loaded = loaded(lines, &variables, &[("queue", "1")]).expect("right");
+        let config = &loaded.config;
+        assert_eq!((config.queue, config.workers), (1, 2));
+        assert_eq!(config.grace, Duration::from_secs(3));
+        assert_eq!(config.limits.threats, 3);
+        assert_eq!(config.limits.peaks, Config::default().limits.peaks);
+        let source = |key: &str| {
+            let index = settings::all()
+                .iter()
+                .position(|setting| setting.key == key);
+            loaded.sources[index.expect("known")].clone()
+        };
+        assert_eq!(source("queue"), Source::Flag("--queue".to_owned()));
+        assert_eq!(
+            source("workers"),
+            Source::Variable("NOCTULE_WORKERS".to_owned())
+        );
+        assert!(matches!(source("grace"), Source::File(_, 3)));
+        assert!(matches!(source("limits.threats"), Source::File(_, 5)));
+        assert_eq!(source("limits.peaks"), Source::Default);
+    }
+
+    #[test]
+    fn everything_that_is_wrong_is_told_at_once_with_its_place() {
+        let lines = "workers = 0\nwokers = 2\nlimits = 3\n[http]\nhead_timeout = \"soon\"\nheads = 1\n[htpp]\n";
+        let variables = [("NOCTULE_QUEUE", "many")];
+        let faults = loaded(lines, &variables, &[("log_format", "xml")]).expect_err("wrong");
+        let expected = [
+            "FILE:2: wokers is unknown, must be one of listen, data_dir, workers, queue, grace, log, log_format, http, limits",
+            "FILE:3: limits must be a table with body_bytes, threats, polygon_vertices, terrain_nodes, peaks, waypoints, population, iterations, work, path_samples",
+            "FILE:6: http.heads is unknown, must be one of head_timeout, body_timeout, max_connections",
+            "FILE:7: htpp is unknown, must be one of listen, data_dir, workers, queue, grace, log, log_format, http, limits",
+            "FILE:1: workers is 0, must be a whole number from 1 to 4096",
+            "FILE:5: http.head_timeout is \"soon\", must be seconds, or a number with a unit such as 250ms, 30s, 15m, 12h or 30d, from 0.1 to 3600",
+            "NOCTULE_QUEUE is \"many\", must be a whole number from 1 to 100000000",
+            "--log-format is \"xml\", must be text or json",
+        ];
+        assert_eq!(faults, expected);
+    }
+
+    #[test]
+    fn a_file_that_is_no_toml_is_refused_with_the_line() {
+        let faults = loaded("queue = 3\nqueue = = 4\n", &[], &[]).expect_err("wrong");
+        assert!(faults[0].starts_with("FILE:2: "), "{faults:?}");
+        let faults = loaded("queue = 3\nqueue = 4\n", &[], &[]).expect_err("wrong");
+        assert_eq!(faults, ["FILE:2: duplicate key"]);
+    }
+
+    #[test]
+    fn numbers_may_be_written_in_every_way_of_toml() {
+        let lines = "queue = 1_000\n[limits]\nwork = 0xff\n";
+        let config = loaded(lines, &[], &[]).expect("right").config;
+        assert_eq!((config.queue, config.limits.work), (1000, 255));
+    }
+}

@@ -1,0 +1,110 @@
+//! What the operator sets, as plain structs that are handed down in parts.
+//!
+//! A setting is a field here with its default, and a row in [`settings`]; its flag, its variable and
+//! its key in the file follow from the row. Where several give it, the flag counts, then the
+//! variable, then the file. Deliberately absent: what a setting does.
+
+mod file;
+mod flags;
+mod layers;
+mod print;
+mod settings;
+mod value;
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+use std::time::Duration;
+
+pub use flags::Flags;
+pub use layers::{Loaded, load};
+pub use value::{Filter, LogFormat};
+
+use crate::scenario::limits::Limits;
+
+/// How the service runs. The defaults stand in [`Config::default`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Config {
+    /// Address and port to listen on; port 0 takes a free one.
+    pub listen: SocketAddr,
+    /// Directory for the plans; `None` when none is named and the user has no home.
+    pub data_dir: Option<PathBuf>,
+    /// Plans run at the same time.
+    pub workers: usize,
+    /// Plans that may wait.
+    pub queue: usize,
+    /// Time from a signal to the exit.
+    pub grace: Duration,
+    /// What is logged.
+    pub log: Filter,
+    /// How log lines are written.
+    pub log_format: LogFormat,
+    /// Of connections and requests.
+    pub http: Http,
+    /// How long plans are kept.
+    pub retention: Retention,
+    /// Upper limits on a scenario.
+    pub limits: Limits,
+}
+
+/// Of connections and requests.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Http {
+    /// A request's head must be complete after this; also how long a connection may idle.
+    pub head_timeout: Duration,
+    /// A request's body must be complete after this.
+    pub body_timeout: Duration,
+    /// Connections open at once; more wait in the listener's backlog.
+    pub max_connections: usize,
+}
+
+/// How long ended plans are kept: until the first of these limits; 0 is none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Retention {
+    /// From the end of a plan.
+    pub age: Duration,
+    /// Ended plans.
+    pub plans: u64,
+    /// Bytes of their documents and events.
+    pub bytes: u64,
+    /// Events of each plan.
+    pub events: u64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
+            data_dir: directories::ProjectDirs::from("", "", "noctule")
+                .map(|directories| directories.data_dir().to_owned()),
+            workers: std::thread::available_parallelism().map_or(1, Into::into),
+            queue: 1000,
+            grace: Duration::from_secs(10),
+            log: Filter::default(),
+            log_format: LogFormat::Text,
+            http: Http::default(),
+            retention: Retention::default(),
+            limits: Limits::default(),
+        }
+    }
+}
+
+impl Default for Http {
+    fn default() -> Self {
+        Self {
+            head_timeout: Duration::from_secs(30),
+            body_timeout: Duration::from_secs(30),
+            max_connections: 20_000,
+        }
+    }
+}
+
+impl Default for Retention {
+    fn default() -> Self {
+        Self {
+            age: Duration::from_secs(7 * 24 * 60 * 60),
+            plans: 100_000,
+            bytes: 10 << 30,
+            events: 10_000,
+        }
+    }
+}

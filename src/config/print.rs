@@ -1,0 +1,29 @@
+//! `noctule serve --print-config`: what is in effect, as a file that says the same.
+
+use std::io::Write;
+
+use super::layers::Loaded;
+use super::settings;
+
+impl Loaded {
+    /// TOML, with what each setting is and where its value comes from in comments.
+    ///
+    /// # Errors
+    /// When `out` fails.
+    pub fn write_toml(&self, out: &mut impl Write) -> std::io::Result<()> {
+        let mut table = "";
+        for (setting, source) in settings::all().iter().zip(&self.sources) {
+            let (its_table, key) = setting.path();
+            if its_table != table {
+                table = its_table;
+                writeln!(out, "\n[{table}]")?;
+            }
+            writeln!(out, "# {}", setting.help)?;
+            match setting.shown(&self.config) {
+                Some(value) => writeln!(out, "{key} = {value} # {source}")?,
+                None => writeln!(out, "# {key} is not set")?,
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,413 @@
+//! Which settings there are: one row each.
+
+use std::fmt::Write as _;
+use std::ops::{RangeFrom, RangeFull, RangeInclusive};
+use std::time::Duration;
+
+use super::Config;
+use super::value::{Given, Value};
+
+/// Every setting, in the order in which they are shown.
+pub(super) fn all() -> Vec<Setting> {
+    [service(), http(), retention(), limits()]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// Those without a table.
+fn service() -> Vec<Setting> {
+    vec![
+        row(
+            "listen",
+            "ADDRESS",
+            "Address and port to listen on; port 0 takes a free one",
+            ..,
+            |c| &mut c.listen,
+        ),
+        row(
+            "data_dir",
+            "DIR",
+            "Directory for the plans, created if need be",
+            ..,
+            |c| &mut c.data_dir,
+        ),
+        row(
+            "workers",
+            "N",
+            "Plans run at the same time",
+            1..=4096,
+            |c| &mut c.workers,
+        ),
+        row(
+            "queue",
+            "N",
+            "Plans that may wait; more are refused with 503 queue-full",
+            1..=100_000_000,
+            |c| &mut c.queue,
+        ),
+        row(
+            "grace",
+            "SECONDS",
+            "Time from a signal to the exit: what runs may finish in it, the rest goes back to the queue",
+            Duration::ZERO..=Duration::from_secs(3600),
+            |c| &mut c.grace,
+        ),
+        row(
+            "log",
+            "FILTER",
+            "What is logged, in the syntax of tracing's EnvFilter",
+            ..,
+            |c| &mut c.log,
+        ),
+        row(
+            "log_format",
+            "FORMAT",
+            "How log lines are written to stderr: text or json, an object a line",
+            ..,
+            |c| &mut c.log_format,
+        ),
+    ]
+}
+
+fn http() -> Vec<Setting> {
+    const TIMEOUT: RangeInclusive<Duration> =
+        Duration::from_millis(100)..=Duration::from_secs(3600);
+    vec![
+        row(
+            "http.head_timeout",
+            "SECONDS",
+            "A request's head must be complete after this; also how long a connection may idle",
+            TIMEOUT,
+            |c| &mut c.http.head_timeout,
+        ),
+        row(
+            "http.body_timeout",
+            "SECONDS",
+            "A request's body must be complete after this",
+            TIMEOUT,
+            |c| &mut c.http.body_timeout,
+        ),
+        row(
+            "http.max_connections",
+            "N",
+            "Connections open at once; more wait in the listener's backlog",
+            1..=1_000_000,
+            |c| &mut c.http.max_connections,
+        ),
+    ]
+}
+
+fn retention() -> Vec<Setting> {
+    vec![
+        row(
+            "retention.age",
+            "SECONDS",
+            "Ended plans are kept so long; 0 for ever",
+            Duration::ZERO..=Duration::from_secs(100 * 365 * 24 * 60 * 60),
+            |c| &mut c.retention.age,
+        ),
+        row(
+            "retention.plans",
+            "N",
+            "Ended plans kept, the longest ended go first; 0 for any number",
+            ..,
+            |c| &mut c.retention.plans,
+        ),
+        row(
+            "retention.bytes",
+            "BYTES",
+            "Bytes of ended plans' documents and events kept; 0 for any number",
+            ..,
+            |c| &mut c.retention.bytes,
+        ),
+        row(
+            "retention.events",
+            "N",
+            "Newest events kept of each plan",
+            100..,
+            |c| &mut c.retention.events,
+        ),
+    ]
+}
+
+fn limits() -> Vec<Setting> {
+    vec![
+        row(
+            "limits.body_bytes",
+            "BYTES",
+            "Length of a request's body",
+            1..,
+            |c| &mut c.limits.body_bytes,
+        ),
+        row("limits.threats", "N", "Threats of a scenario", 1.., |c| {
+            &mut c.limits.threats
+        }),
+        row(
+            "limits.polygon_vertices",
+            "N",
+            "Vertices of all polygons of a scenario together",
+            3..,
+            |c| &mut c.limits.polygon_vertices,
+        ),
+        row(
+            "limits.terrain_nodes",
+            "N",
+            "Nodes of a terrain grid",
+            4..,
+            |c| &mut c.limits.terrain_nodes,
+        ),
+        row(
+            "limits.peaks",
+            "N",
+            "Peaks of an analytic terrain",
+            1..,
+            |c| &mut c.limits.peaks,
+        ),
+        row(
+            "limits.waypoints",
+            "N",
+            "Free waypoints of a route",
+            1..,
+            |c| &mut c.limits.waypoints,
+        ),
+        row(
+            "limits.population",
+            "N",
+            "Members of a population",
+            1..,
+            |c| &mut c.limits.population,
+        ),
+        row(
+            "limits.iterations",
+            "N",
+            "Iterations of a search",
+            1..,
+            |c| &mut c.limits.iterations,
+        ),
+        row(
+            "limits.work",
+            "N",
+            "population * iterations * waypoints, which bounds the time of one plan",
+            1..,
+            |c| &mut c.limits.work,
+        ),
+        row(
+            "limits.path_samples",
+            "N",
+            "Samples of the delivered path",
+            2..,
+            |c| &mut c.limits.path_samples,
+        ),
+    ]
+}
+
+/// One setting.
+pub(super) struct Setting {
+    /// In the file: `table.key`, or `key` at its top.
+    pub(super) key: &'static str,
+    /// Of its value, in the help.
+    pub(super) placeholder: &'static str,
+    /// One sentence without its full stop.
+    pub(super) help: &'static str,
+    place: Box<dyn Place>,
+}
+
+impl Setting {
+    /// Its table in the file, empty at the top, and its key there.
+    pub(super) fn path(&self) -> (&'static str, &'static str) {
+        self.key.split_once('.').unwrap_or(("", self.key))
+    }
+
+    /// Without the dashes before it.
+    pub(super) fn flag(&self) -> String {
+        self.key.replace(['.', '_'], "-")
+    }
+
+    /// Its environment variable.
+    pub(super) fn variable(&self) -> String {
+        format!("NOCTULE_{}", self.key.replace('.', "_").to_uppercase())
+    }
+
+    /// Put `given` into `config`.
+    ///
+    /// # Errors
+    /// What is allowed, when it is not that.
+    pub(super) fn set(&self, config: &mut Config, given: &Given) -> Result<(), String> {
+        self.place.set(config, given)
+    }
+
+    /// The value in `config`, as TOML; `None` when there is none.
+    pub(super) fn shown(&self, config: &Config) -> Option<String> {
+        self.place.shown(config)
+    }
+
+    /// Whether its flag may stand without a value.
+    pub(super) fn is_switch(&self) -> bool {
+        self.place.is_switch()
+    }
+}
+
+fn row<T: Value>(
+    key: &'static str,
+    placeholder: &'static str,
+    help: &'static str,
+    range: impl Into<Range<T>>,
+    field: fn(&mut Config) -> &mut T,
+) -> Setting {
+    let range = range.into();
+    Setting {
+        key,
+        placeholder,
+        help,
+        place: Box::new(Field { range, field }),
+    }
+}
+
+/// Where a setting's value goes, whatever its type.
+trait Place {
+    fn set(&self, config: &mut Config, given: &Given) -> Result<(), String>;
+    fn shown(&self, config: &Config) -> Option<String>;
+    fn is_switch(&self) -> bool;
+}
+
+struct Field<T> {
+    range: Range<T>,
+    field: fn(&mut Config) -> &mut T,
+}
+
+impl<T: Value> Place for Field<T> {
+    fn set(&self, config: &mut Config, given: &Given) -> Result<(), String> {
+        let value = T::read(given).filter(|value| self.range.holds(value));
+        *(self.field)(config) = value.ok_or_else(|| self.range.allowed())?;
+        Ok(())
+    }
+
+    fn shown(&self, config: &Config) -> Option<String> {
+        (self.field)(&mut config.clone()).to_toml()
+    }
+
+    fn is_switch(&self) -> bool {
+        T::IS_SWITCH
+    }
+}
+
+/// What a value may be beside what its type says.
+struct Range<T> {
+    least: Option<T>,
+    most: Option<T>,
+}
+
+impl<T: Value> Range<T> {
+    fn holds(&self, value: &T) -> bool {
+        self.least.as_ref().is_none_or(|least| value >= least)
+            && self.most.as_ref().is_none_or(|most| value <= most)
+    }
+
+    fn allowed(&self) -> String {
+        let mut text = T::ALLOWED.to_owned();
+        for (word, bound) in [("from", &self.least), ("to", &self.most)] {
+            if let Some(bound) = bound.as_ref().and_then(Value::to_toml) {
+                write!(text, " {word} {bound}").expect("writing to a string cannot fail");
+            }
+        }
+        text
+    }
+}
+
+impl<T> From<RangeFull> for Range<T> {
+    fn from(RangeFull: RangeFull) -> Self {
+        let (least, most) = (None, None);
+        Self { least, most }
+    }
+}
+
+impl<T> From<RangeFrom<T>> for Range<T> {
+    fn from(range: RangeFrom<T>) -> Self {
+        Self {
+            least: Some(range.start),
+            most: None,
+        }
+    }
+}
+
+impl<T> From<RangeInclusive<T>> for Range<T> {
+    fn from(range: RangeInclusive<T>) -> Self {
+        let (least, most) = range.into_inner();
+        Self {
+            least: Some(least),
+            most: Some(most),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn each_has_names_of_its_own_and_those_of_a_table_stand_together() {
+        let settings = all();
+        let mut seen = BTreeSet::new();
+        let mut tables = Vec::new();
+        for setting in &settings {
+            assert!(seen.insert(setting.flag()), "--{} twice", setting.flag());
+            let (table, _) = setting.path();
+            if tables.last() != Some(&table) {
+                assert!(!tables.contains(&table), "{table} in two parts");
+                tables.push(table);
+            }
+        }
+        assert_eq!(
+            tables.first(),
+            Some(&""),
+            "those without a table come first"
+        );
+    }
+
+    /// A default that its own row refuses could not be printed and read back.
+    #[test]
+    fn each_takes_its_default() {
+        let defaults = Config::default();
+        for setting in all() {
+            let Some(shown) = setting.shown(&defaults) else {
+                continue;
+            };
+            let word = Given::Word(shown.trim_matches('"').to_owned());
+            let mut config = defaults.clone();
+            assert_eq!(setting.set(&mut config, &word), Ok(()), "{}", setting.key);
+            assert_eq!(config, defaults, "{}", setting.key);
+        }
+    }
+
+    #[test]
+    fn a_refusal_says_what_is_allowed() {
+        let check = |key: &str, word: &str, expected: Result<(), &str>| {
+            let settings = all();
+            let setting = settings.iter().find(|setting| setting.key == key);
+            let given = Given::Word(word.to_owned());
+            let set = setting.expect(key).set(&mut Config::default(), &given);
+            assert_eq!(set, expected.map_err(str::to_owned), "{key} = {word}");
+        };
+        check("workers", "4096", Ok(()));
+        check("workers", "0", Err("a whole number from 1 to 4096"));
+        check("workers", "2.5", Err("a whole number from 1 to 4096"));
+        check("limits.population", "-1", Err("a whole number from 1"));
+        check("http.head_timeout", "1m", Ok(()));
+        check(
+            "http.head_timeout",
+            "2h",
+            Err(
+                "seconds, or a number with a unit such as 250ms, 30s, 15m, 12h or 30d, from 0.1 to 3600",
+            ),
+        );
+        check("log_format", "xml", Err("text or json"));
+        check(
+            "listen",
+            "here",
+            Err("an address and a port such as 127.0.0.1:8080"),
+        );
+    }
+}

@@ -1,0 +1,130 @@
+//! The configuration as the operator meets it: `--print-config`, and refusals at the start.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::support::process::{Service, run, run_with};
+
+/// What `--print-config` prints.
+fn printed(variables: &[(&str, &str)], arguments: &[&str]) -> String {
+    let arguments = [&["serve", "--print-config"], arguments].concat();
+    let output = run_with(variables, &arguments, "");
+    let errors = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(0), "{errors}");
+    String::from_utf8(output.stdout).expect("UTF-8")
+}
+
+fn values(text: &str) -> toml::Table {
+    text.parse()
+        .unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+#[test]
+fn what_is_printed_says_where_it_comes_from_and_reads_back_the_same() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let path = |name: &str| {
+        let path = directory.path().join(name);
+        path.to_str().expect("UTF-8").to_owned()
+    };
+    let given = "data_dir = '/var/lib/a \"b\"'\n[http]\nhead_timeout = \"250ms\"\n[limits]\npopulation = 77\n";
+    fs::write(path("given.toml"), given).expect("written");
+    let text = printed(
+        &[
+            ("NOCTULE_QUEUE", "12"),
+            ("NOCTULE_CONFIG", &path("given.toml")),
+        ],
+        &["--grace", "0.5", "--limits-waypoints=9"],
+    );
+    for line in [
+        "queue = 12 # NOCTULE_QUEUE",
+        "grace = 0.5 # --grace",
+        "listen = \"127.0.0.1:8080\" # default",
+        &format!("population = 77 # {}:5", path("given.toml")),
+        &format!("head_timeout = 0.25 # {}:3", path("given.toml")),
+        "waypoints = 9 # --limits-waypoints",
+    ] {
+        assert!(text.lines().any(|found| found == line), "{line}\n{text}");
+    }
+
+    fs::write(path("printed.toml"), &text).expect("written");
+    let again = printed(&[], &["--config", &path("printed.toml")]);
+    assert_eq!(values(&again), values(&text));
+    assert!(!again.contains("# default"), "{again}");
+}
+
+#[test]
+fn what_is_wrong_is_refused_before_anything_is_opened() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let file = directory.path().join("noctule.toml");
+    fs::write(&file, "quue = 5\n\n[limits]\nthreats = \"many\"\n").expect("written");
+    let data_dir = directory.path().join("data");
+    let (file, data_dir) = (
+        file.to_str().expect("UTF-8"),
+        data_dir.to_str().expect("UTF-8"),
+    );
+    let refused = run_with(
+        &[("NOCTULE_WORKERS", "-1")],
+        &[
+            "serve",
+            "--config",
+            file,
+            "--data-dir",
+            data_dir,
+            "--grace",
+            "2h",
+        ],
+        "",
+    );
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(refused.stdout.is_empty());
+    let text = String::from_utf8(refused.stderr).expect("UTF-8");
+    for part in [
+        &format!("{file}:1: quue is unknown, must be one of listen, data_dir,"),
+        &format!("{file}:4: limits.threats is \"many\", must be a whole number from 1"),
+        "NOCTULE_WORKERS is \"-1\", must be a whole number from 1 to 4096",
+        "--grace is \"2h\", must be seconds",
+    ] {
+        assert!(text.contains(part), "{part} is not in\n{text}");
+    }
+    assert!(
+        !fs::exists(data_dir).expect("readable"),
+        "the store was opened"
+    );
+
+    let missing = run(&["serve", "--config", "/nowhere.toml"], "");
+    let text = String::from_utf8(missing.stderr).expect("UTF-8");
+    assert!(
+        text.contains("cannot read the configuration /nowhere.toml"),
+        "{text}"
+    );
+}
+
+#[test]
+fn the_help_tells_flag_variable_and_default() {
+    let help = run(&["serve", "--help"], "");
+    let text = String::from_utf8(help.stdout).expect("UTF-8");
+    let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    for part in [
+        "--config <FILE>",
+        "--queue <N> Plans that may wait; more are refused with 503 queue-full [env: NOCTULE_QUEUE] [default: 1000]",
+        "--limits-body-bytes <BYTES>",
+    ] {
+        assert!(words.contains(part), "{part} is not in\n{text}");
+    }
+}
+
+/// The limits that are set are those that hold, and those that are shown.
+#[tokio::test]
+async fn a_limit_that_is_set_holds() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &["--limits-population", "10"]);
+    let shown = service.bytes("/limits").await;
+    let shown: Value = serde_json::from_slice(&shown).expect("JSON");
+    assert_eq!(shown["population"], 10);
+    let refused = service.post(&crate::support::scenario()).await;
+    assert_eq!(refused.status(), 422);
+    let problem: Value = refused.json().await.expect("JSON");
+    let detail = "population is 20, must be <= 10 (limit population)";
+    assert_eq!(problem["errors"][0]["detail"], detail);
+}

@@ -1,9 +1,10 @@
-//! The command line: serve, plan, bench, healthcheck.
+//! The command line: serve, plan, bench, store, healthcheck.
 
 mod bench;
 mod healthcheck;
 mod plan;
 mod serve;
+mod store;
 
 use std::process::ExitCode;
 
@@ -26,6 +27,9 @@ enum Command {
     /// Measure the algorithms: against each other, against the best known routes, against the clock
     #[command(subcommand)]
     Bench(bench::Command),
+    /// Copy the stored plans, or look for damage among them
+    #[command(subcommand)]
+    Store(store::Command),
     /// Ask a running service whether it is ready; for containers
     Healthcheck(healthcheck::Arguments),
 }
@@ -62,6 +66,7 @@ pub fn run() -> ExitCode {
         Command::Serve(flags) => serve::run(&flags).map(|()| exit::DONE),
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Bench(command) => bench::run(&command),
+        Command::Store(command) => store::run(command),
         Command::Healthcheck(arguments) => healthcheck::run(&arguments).map(|()| exit::DONE),
     };
     done.unwrap_or_else(|error| {

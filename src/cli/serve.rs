@@ -16,6 +16,7 @@ use crate::http::{self, AppState, Capacity, InFlight, Phase};
 use crate::job::Failure;
 use crate::scenario::json::{self, Rules};
 use crate::scenario::limits::Limits;
+use crate::store::reopening::{Open, Reopening};
 use crate::store::sqlite::SqliteStore;
 use crate::store::{self, Store};
 use crate::worker::{self, Engine, Pool, Sweeper};
@@ -47,7 +48,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("cannot listen on {}", config.listen))?;
-    let store = open_store(config)?;
+    let store = open_store(config).await?;
     let rules = Arc::new(Rules {
         limits: config.limits,
         algorithms: planner::algorithm_rules(),
@@ -136,20 +137,27 @@ async fn drain(pool: Pool, times: &Times) {
     }
 }
 
-fn open_store(config: &Config) -> anyhow::Result<Arc<dyn Store>> {
+async fn open_store(config: &Config) -> anyhow::Result<Arc<dyn Store>> {
     let data_dir = config
         .data_dir
-        .as_deref()
+        .clone()
         .context("the user has no home; name a directory with --data-dir")?;
     let options = store::Options {
         retention: retention(config.retention),
         events_kept: config.retention.events,
         ..store::Options::new(config.queue as u64)
     };
-    let store = SqliteStore::open(data_dir, options)
-        .with_context(|| format!("cannot open the store in {}", data_dir.display()))?;
-    tracing::info!(data_dir = %data_dir.display(), "the store is open");
-    Ok(Arc::new(store))
+    let open: Open = Arc::new(move |suspicious| {
+        let open = if suspicious {
+            SqliteStore::open_suspicious
+        } else {
+            SqliteStore::open
+        };
+        let store = open(&data_dir, options.clone())?;
+        tracing::info!(data_dir = %data_dir.display(), "the store is open");
+        Ok(Arc::new(store))
+    });
+    Ok(Arc::new(Reopening::start(open).await))
 }
 
 /// Of a setting, 0 is no limit.

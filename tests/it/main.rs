@@ -17,6 +17,7 @@ mod scenario;
 mod shutdown;
 mod store_conformance;
 mod store_sqlite;
+mod store_trouble;
 mod support;
 mod svg;
 mod warm_start;

@@ -13,13 +13,29 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 fn noctule() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_noctule"));
+    clean(&mut command);
+    command
+}
+
+/// The binary with a disk of its own, mounted on `data_dir` where nobody else sees it.
+fn on_a_small_disk(data_dir: &Path, options: &str) -> Command {
+    const MOUNT: &str = "mount -t tmpfs -o \"$0\" tmpfs \"$1\" && shift && exec \"$@\"";
+    let mut command = Command::new("unshare");
+    command
+        .args(["--map-root-user", "--mount", "sh", "-c", MOUNT, options])
+        .arg(data_dir)
+        .arg(env!("CARGO_BIN_EXE_noctule"));
+    clean(&mut command);
+    command
+}
+
+fn clean(command: &mut Command) {
     // What the tests are run with must not change what they see.
     for (name, _) in std::env::vars_os() {
         if name.to_string_lossy().starts_with("NOCTULE_") {
             command.env_remove(name);
         }
     }
-    command
 }
 
 /// Run the binary to its end, with `input` as its standard input.
@@ -56,7 +72,16 @@ pub(crate) struct Service {
 impl Service {
     /// On a free port; returns when it listens.
     pub(crate) fn start(data_dir: &Path, arguments: &[&str]) -> Self {
-        let mut child = noctule()
+        Self::start_as(noctule(), data_dir, arguments)
+    }
+
+    /// With `data_dir` on a disk of its own, mounted with such options as `size=3m`.
+    pub(crate) fn start_on_a_small_disk(data_dir: &Path, options: &str) -> Self {
+        Self::start_as(on_a_small_disk(data_dir, options), data_dir, &[])
+    }
+
+    fn start_as(mut command: Command, data_dir: &Path, arguments: &[&str]) -> Self {
+        let mut child = command
             .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
             .arg(data_dir)
             .args(arguments)
@@ -129,6 +154,42 @@ impl Service {
         let answer = self.get(path).send().await.expect("an answer");
         assert_eq!(answer.status(), 200, "{path}");
         answer.bytes().await.expect("a whole body")
+    }
+
+    /// `path` as the process sees it.
+    pub(crate) fn seen(&self, path: &Path) -> std::path::PathBuf {
+        let path = path.strip_prefix("/").expect("absolute");
+        let process = Path::new("/proc").join(self.child.id().to_string());
+        process.join("root").join(path)
+    }
+
+    /// Mount the small disk on `data_dir` anew, with these options.
+    pub(crate) fn remount(&self, data_dir: &Path, options: &str) {
+        let done = Command::new("nsenter")
+            .args(["--user", "--mount", "--preserve-credentials", "--target"])
+            .args([&self.child.id().to_string(), "mount", "-o"])
+            .arg(format!("remount,{options}"))
+            .arg(data_dir)
+            .status()
+            .expect("nsenter runs");
+        assert!(done.success());
+    }
+
+    /// Wait until `/readyz` answers so; its detail.
+    pub(crate) async fn until_ready(&self, status: u16) -> String {
+        let answer = async {
+            loop {
+                let answer = self.get("/readyz").send().await.expect("an answer");
+                if answer.status() == status {
+                    let document: Value = answer.json().await.expect("JSON");
+                    return document["detail"].as_str().unwrap_or_default().to_owned();
+                }
+                tokio::time::sleep(Duration::from_millis(20)).await;
+            }
+        };
+        tokio::time::timeout(PATIENCE, answer)
+            .await
+            .unwrap_or_else(|_| panic!("/readyz is never {status}"))
     }
 
     /// Send `SIG{name}`.

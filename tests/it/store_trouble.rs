@@ -160,10 +160,14 @@ async fn damage_that_is_met_on_the_way_closes_the_store_until_it_is_mended() {
     let sound = std::fs::read(&path).unwrap();
     let file = File::options().write(true).open(&path).unwrap();
     // A page that holds nothing but a part of a document, and the number of the page that goes on.
-    const PAGE: usize = 4096;
-    let part = (0..sound.len() / PAGE)
-        .map(|page| page * PAGE)
-        .find(|at| sound[at + 4..at + PAGE].iter().all(|byte| *byte == b'x'))
+    let page_bytes = 4096;
+    let part = (0..sound.len() / page_bytes)
+        .map(|page| page * page_bytes)
+        .find(|at| {
+            sound[at + 4..at + page_bytes]
+                .iter()
+                .all(|byte| *byte == b'x')
+        })
         .expect("the documents are long");
     file.write_all_at(&[0xff; 4], part as u64).unwrap();
     assert!(!upkeep::check(directory.path()).unwrap().faults.is_empty());

@@ -100,15 +100,18 @@ impl Layers<'_> {
     /// An empty variable is as none.
     fn environment(&mut self, variable: impl Fn(&str) -> Option<OsString>) {
         for setting in self.settings {
-            let name = setting.variable();
-            match variable(&name).map(OsString::into_string) {
-                None => {}
-                Some(Ok(word)) if word.is_empty() => {}
-                Some(Ok(word)) => {
-                    let source = Source::Variable(name.clone());
-                    self.put(setting.key, &Given::Word(word), source, &name);
+            let own = setting.variable();
+            // The later counts.
+            for name in setting.shared_variable.into_iter().chain([own.as_str()]) {
+                match variable(name).map(OsString::into_string) {
+                    None => {}
+                    Some(Ok(word)) if word.is_empty() => {}
+                    Some(Ok(word)) => {
+                        let source = Source::Variable(name.to_owned());
+                        self.put(setting.key, &Given::Word(word), source, name);
+                    }
+                    Some(Err(_)) => self.faults.push(format!("{name} is not UTF-8")),
                 }
-                Some(Err(_)) => self.faults.push(format!("{name} is not UTF-8")),
             }
         }
     }
@@ -210,10 +213,10 @@ mod tests {
         let variables = [("NOCTULE_QUEUE", "many")];
         let faults = loaded(lines, &variables, &[("log_format", "xml")]).expect_err("wrong");
         let expected = [
-            "FILE:2: wokers is unknown, must be one of listen, data_dir, workers, queue, grace, log, log_format, http, limits",
+            "FILE:2: wokers is unknown, must be one of listen, data_dir, workers, queue, grace, log, log_format, otlp_endpoint, http, limits",
             "FILE:3: limits must be a table with body_bytes, threats, polygon_vertices, terrain_nodes, peaks, waypoints, population, iterations, work, path_samples",
             "FILE:6: http.heads is unknown, must be one of head_timeout, body_timeout, max_connections",
-            "FILE:7: htpp is unknown, must be one of listen, data_dir, workers, queue, grace, log, log_format, http, limits",
+            "FILE:7: htpp is unknown, must be one of listen, data_dir, workers, queue, grace, log, log_format, otlp_endpoint, http, limits",
             "FILE:1: workers is 0, must be a whole number from 1 to 4096",
             "FILE:5: http.head_timeout is \"soon\", must be seconds, or a number with a unit such as 250ms, 30s, 15m, 12h or 30d, from 0.1 to 3600",
             "NOCTULE_QUEUE is \"many\", must be a whole number from 1 to 100000000",

@@ -17,7 +17,7 @@ use std::time::Duration;
 
 pub use flags::Flags;
 pub use layers::{Loaded, load};
-pub use value::{Filter, LogFormat};
+pub use value::{Endpoint, Filter, LogFormat};
 
 use crate::scenario::limits::Limits;
 
@@ -38,6 +38,8 @@ pub struct Config {
     pub log: Filter,
     /// How log lines are written.
     pub log_format: LogFormat,
+    /// Where traces are sent; `None` is nowhere.
+    pub otlp_endpoint: Option<Endpoint>,
     /// Of connections and requests.
     pub http: Http,
     /// Upper limits on a scenario.
@@ -66,6 +68,7 @@ impl Default for Config {
             grace: Duration::from_secs(10),
             log: Filter::default(),
             log_format: LogFormat::Text,
+            otlp_endpoint: None,
             http: Http::default(),
             limits: Limits::default(),
         }

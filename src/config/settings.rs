@@ -67,6 +67,14 @@ fn service() -> Vec<Setting> {
             ..,
             |c| &mut c.log_format,
         ),
+        row(
+            "otlp_endpoint",
+            "URL",
+            "Send traces to this OpenTelemetry collector, by OTLP over HTTP",
+            ..,
+            |c| &mut c.otlp_endpoint,
+        )
+        .or_variable("OTEL_EXPORTER_OTLP_ENDPOINT"),
     ]
 }
 
@@ -177,10 +185,17 @@ pub(super) struct Setting {
     pub(super) placeholder: &'static str,
     /// One sentence without its full stop.
     pub(super) help: &'static str,
+    /// A variable that other programs share, which counts when its own is not set.
+    pub(super) shared_variable: Option<&'static str>,
     place: Box<dyn Place>,
 }
 
 impl Setting {
+    fn or_variable(mut self, name: &'static str) -> Self {
+        self.shared_variable = Some(name);
+        self
+    }
+
     /// Its table in the file, empty at the top, and its key there.
     pub(super) fn path(&self) -> (&'static str, &'static str) {
         self.key.split_once('.').unwrap_or(("", self.key))
@@ -227,6 +242,7 @@ fn row<T: Value>(
         key,
         placeholder,
         help,
+        shared_variable: None,
         place: Box::new(Field { range, field }),
     }
 }

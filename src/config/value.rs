@@ -123,6 +123,41 @@ impl Value for Filter {
     }
 }
 
+/// The address of a collector that speaks HTTP without encryption.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd)]
+pub struct Endpoint(String);
+
+impl Endpoint {
+    /// Without a slash at its end.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl Value for Option<Endpoint> {
+    const ALLOWED: &'static str = "an address such as http://127.0.0.1:4318, without encryption";
+
+    fn read(given: &Given) -> Option<Self> {
+        let text = given.text()?.trim_end_matches('/');
+        let (host, _) = split_http(text)?;
+        let (name, port) = host.rsplit_once(':').unwrap_or((host, "80"));
+        let is_sane = |byte: u8| byte.is_ascii_graphic() && !b"@?#".contains(&byte);
+        let sane = !name.is_empty() && text.bytes().all(is_sane) && port.parse::<u16>().is_ok();
+        sane.then(|| Some(Endpoint(text.to_owned())))
+    }
+
+    fn to_toml(&self) -> Option<String> {
+        self.as_ref().map(|endpoint| quoted(&endpoint.0))
+    }
+}
+
+/// Host with port, and path, of an `http` URL.
+fn split_http(url: &str) -> Option<(&str, &str)> {
+    let rest = url.strip_prefix("http://")?;
+    Some(rest.split_at(rest.find('/').unwrap_or(rest.len())))
+}
+
 impl Value for SocketAddr {
     const ALLOWED: &'static str = "an address and a port such as 127.0.0.1:8080";
 
@@ -277,6 +312,26 @@ mod tests {
         ] {
             let expected = expected_ms.map(Duration::from_millis);
             assert_eq!(Duration::read(&given), expected, "{given:?}");
+        }
+    }
+
+    #[test]
+    fn an_endpoint_is_an_http_url() {
+        for (text, taken) in [
+            ("http://127.0.0.1:4318", true),
+            ("http://collector:4318/", true),
+            ("http://[::1]:4318/otlp", true),
+            ("http://collector", true),
+            ("https://collector:4318", false),
+            ("collector:4318", false),
+            ("http://", false),
+            ("http://:4318", false),
+            ("http://user@collector", false),
+            ("http://collector:port", false),
+            ("http://a b", false),
+        ] {
+            let read = <Option<Endpoint>>::read(&Given::Word(text.to_owned()));
+            assert_eq!(read.is_some(), taken, "{text}");
         }
     }
 

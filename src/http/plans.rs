@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use axum::Json;
 use axum::body::Body;
-use axum::extract::State;
+use axum::extract::{Extension, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use base64::Engine as _;
@@ -24,6 +24,7 @@ use super::{AppState, Phase, body, off_thread, retry, warm_start};
 use crate::job::{self, Plan, PlanId, Status, Submission};
 use crate::scenario::json;
 use crate::store::{ListQuery, StoreError};
+use crate::telemetry::{Origin, spans};
 
 /// Plans on a page of the list, unless asked otherwise.
 const DEFAULT_PAGE: usize = 50;
@@ -34,6 +35,7 @@ pub(super) const MAX_PAGE: usize = 1000;
 pub(super) async fn submit(
     State(state): State<AppState>,
     uri: Uri,
+    Extension(origin): Extension<Origin>,
     headers: HeaderMap,
     body: Body,
 ) -> Result<Response, Problem> {
@@ -50,7 +52,15 @@ pub(super) async fn submit(
         return Ok(valid(&submission));
     }
 
-    let plan = match state.store.submit(submission).await {
+    let id = submission.id;
+    spans::name_plan(id);
+    // Before it can be claimed.
+    state.instruments.origins.remember(id, origin);
+    let submitted = state.store.submit(submission).await;
+    if submitted.is_err() {
+        state.instruments.origins.forget(id);
+    }
+    let plan = match submitted {
         Ok(plan) => plan,
         Err(StoreError::QueueFull { queued }) => {
             let retry_after_s = retry::for_room(&state.store.stats().await?, state.capacity);
@@ -61,7 +71,8 @@ pub(super) async fn submit(
         }
         Err(error) => return Err(error.into()),
     };
-    tracing::info!(plan = %plan.id, "accepted");
+    state.instruments.metrics.accepted();
+    tracing::info!("accepted");
 
     let address = HeaderValue::from_str(&location(plan.id)).expect("an id is visible ASCII");
     let Some(wait) = Wait::of(&headers) else {

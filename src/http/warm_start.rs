@@ -44,7 +44,7 @@ pub(super) async fn resolve(state: &AppState, scenario: &mut Scenario) -> Result
         Err(error) => return Err(error.into()),
     };
     let route: Route = serde_json::from_str(&result).map_err(|error| {
-        tracing::error!(%plan, %error, "a stored result cannot be read");
+        tracing::error!(warm_start_plan_id = %plan, %error, "a stored result cannot be read");
         Problem::Internal
     })?;
     let points = route.waypoints.iter();

@@ -10,6 +10,9 @@ mod crash;
 mod determinism;
 mod events;
 mod layering;
+
+mod logs;
+mod metrics;
 mod openapi;
 mod refusals;
 mod scenario;

@@ -12,8 +12,10 @@ use noctule::http::{self, AppState, Capacity, Phase};
 use noctule::planner;
 use noctule::scenario::json::Rules;
 use noctule::scenario::limits::Limits;
+use noctule::store::measured::MeasuredStore;
 use noctule::store::sqlite::SqliteStore;
 use noctule::store::{Options, Store, wall_clock};
+use noctule::telemetry::Instruments;
 use serde_json::Value;
 use tempfile::TempDir;
 use tokio::sync::watch;
@@ -51,7 +53,9 @@ impl Api {
             queue_limit: queue as u64,
             clock: wall_clock(),
         };
-        let store = Arc::new(SqliteStore::open(directory.path(), options).expect("a fresh store"));
+        let instruments = Arc::new(Instruments::default());
+        let store = SqliteStore::open(directory.path(), options).expect("a fresh store");
+        let store = Arc::new(MeasuredStore::new(Arc::new(store), instruments.clone()));
         let (phase, watched) = watch::channel(Phase::Serving);
         let state = AppState {
             store: store.clone(),
@@ -65,6 +69,7 @@ impl Api {
             capacity: Capacity { workers: 2, queue },
             body_timeout: Duration::from_secs(30),
             phase: watched,
+            instruments,
         };
         Self {
             router: http::router(state.clone()),

@@ -56,13 +56,22 @@ pub(crate) struct Service {
 impl Service {
     /// On a free port; returns when it listens.
     pub(crate) fn start(data_dir: &Path, arguments: &[&str]) -> Self {
+        Self::start_with_log(data_dir, arguments, Stdio::null())
+    }
+
+    /// The same, with its log.
+    pub(crate) fn start_with_log(
+        data_dir: &Path,
+        arguments: &[&str],
+        log: impl Into<Stdio>,
+    ) -> Self {
         let mut child = noctule()
             .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
             .arg(data_dir)
             .args(arguments)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
-            .stderr(Stdio::null())
+            .stderr(log)
             .spawn()
             .expect("the binary starts");
         let mut line = String::new();
@@ -88,6 +97,10 @@ impl Service {
 
     pub(crate) fn get(&self, path: &str) -> RequestBuilder {
         self.client.get(self.url(path))
+    }
+
+    pub(crate) fn request(&self, method: reqwest::Method, path: &str) -> RequestBuilder {
+        self.client.request(method, self.url(path))
     }
 
     pub(crate) async fn post(&self, document: &Value) -> Response {

@@ -10,6 +10,7 @@ mod events;
 mod feed;
 mod metrics;
 mod off_thread;
+mod pages;
 mod params;
 mod phase;
 mod plans;
@@ -94,7 +95,10 @@ pub fn routes() -> Vec<Route> {
         get("/livez", service::livez),
         get("/readyz", service::readyz),
         get("/metrics", metrics::show),
-        get("/openapi.yaml", service::openapi_yaml),
+        get("/openapi.yaml", pages::openapi_yaml),
+        get("/openapi.json", pages::openapi_json),
+        get("/docs", pages::docs),
+        get("/problems/{slug}", pages::problem),
     ]
 }
 

@@ -17,7 +17,7 @@ use std::time::Duration;
 
 pub use flags::Flags;
 pub use layers::{Loaded, load};
-pub use value::{Endpoint, Filter, LogFormat};
+pub use value::{Endpoint, Filter, Headers, LogFormat};
 
 use crate::scenario::limits::Limits;
 
@@ -40,6 +40,8 @@ pub struct Config {
     pub log_format: LogFormat,
     /// Where traces are sent; `None` is nowhere.
     pub otlp_endpoint: Option<Endpoint>,
+    /// What is sent with them.
+    pub otlp_headers: Headers,
     /// Of connections and requests.
     pub http: Http,
     /// Upper limits on a scenario.
@@ -69,6 +71,7 @@ impl Default for Config {
             log: Filter::default(),
             log_format: LogFormat::Text,
             otlp_endpoint: None,
+            otlp_headers: Headers::default(),
             http: Http::default(),
             limits: Limits::default(),
         }

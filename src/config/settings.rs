@@ -75,6 +75,14 @@ fn service() -> Vec<Setting> {
             |c| &mut c.otlp_endpoint,
         )
         .or_variable("OTEL_EXPORTER_OTLP_ENDPOINT"),
+        row(
+            "otlp_headers",
+            "HEADERS",
+            "Send these headers with traces, name=value between commas",
+            ..,
+            |c| &mut c.otlp_headers,
+        )
+        .or_variable("OTEL_EXPORTER_OTLP_HEADERS"),
     ]
 }
 
@@ -224,6 +232,11 @@ impl Setting {
         self.place.shown(config)
     }
 
+    /// Whether its value is never shown.
+    pub(super) fn is_secret(&self) -> bool {
+        self.place.is_secret()
+    }
+
     /// Whether its flag may stand without a value.
     pub(super) fn is_switch(&self) -> bool {
         self.place.is_switch()
@@ -252,6 +265,7 @@ trait Place {
     fn set(&self, config: &mut Config, given: &Given) -> Result<(), String>;
     fn shown(&self, config: &Config) -> Option<String>;
     fn is_switch(&self) -> bool;
+    fn is_secret(&self) -> bool;
 }
 
 struct Field<T> {
@@ -272,6 +286,10 @@ impl<T: Value> Place for Field<T> {
 
     fn is_switch(&self) -> bool {
         T::IS_SWITCH
+    }
+
+    fn is_secret(&self) -> bool {
+        T::IS_SECRET
     }
 }
 

@@ -41,7 +41,10 @@ pub fn init(config: &Config) -> Log {
             .with_span_list(false)
             .boxed(),
     };
-    let exporter = config.otlp_endpoint.as_ref().map(Exporter::to);
+    let exporter = config
+        .otlp_endpoint
+        .as_ref()
+        .map(|endpoint| Exporter::to(endpoint, config.otlp_headers.clone()));
     let traces = exporter.as_ref().map(|exporter| {
         tracing_opentelemetry::layer()
             .with_tracer(exporter.tracer())

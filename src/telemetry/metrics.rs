@@ -367,3 +367,28 @@ fn store_buckets() -> Histogram {
 fn seconds(ms: i64) -> f64 {
     ms.max(0) as f64 / 1e3
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The operator reads metrics also when the store cannot be read.
+    #[test]
+    fn what_is_not_known_is_not_a_number() {
+        let queue = Queue {
+            queued: None,
+            running: None,
+            oldest_queued_ms: None,
+            limit: 7,
+            workers: 2,
+        };
+        let text = Metrics::default().text(queue);
+        for line in [
+            "noctule_plans{status=\"queued\"} NaN",
+            "noctule_queue_oldest_age_seconds NaN",
+            "noctule_queue_limit 7.0",
+        ] {
+            assert!(text.lines().any(|found| found == line), "{line}\n{text}");
+        }
+    }
+}

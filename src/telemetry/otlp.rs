@@ -14,7 +14,7 @@ use opentelemetry_otlp::{Protocol, SpanExporter, WithExportConfig as _, WithHttp
 use opentelemetry_sdk::Resource;
 use opentelemetry_sdk::trace::{SdkTracer, SdkTracerProvider};
 
-use crate::config::Endpoint;
+use crate::config::{Endpoint, Headers};
 
 /// For the connection, and for each read and write.
 const TIMEOUT: Duration = Duration::from_secs(5);
@@ -26,11 +26,14 @@ const LAST_SPANS: Duration = Duration::from_secs(1);
 pub(super) struct Exporter(SdkTracerProvider);
 
 impl Exporter {
-    /// To the collector at `endpoint`.
-    pub(super) fn to(endpoint: &Endpoint) -> Self {
+    /// To the collector at `endpoint`, with `headers`.
+    pub(super) fn to(endpoint: &Endpoint, headers: Headers) -> Self {
         let exporter = SpanExporter::builder()
             .with_http()
-            .with_http_client(Client::default())
+            .with_http_client(Client {
+                headers,
+                failing: AtomicBool::new(false),
+            })
             .with_endpoint(format!("{}/v1/traces", endpoint.as_str()))
             .with_protocol(Protocol::HttpJson)
             .with_timeout(TIMEOUT)
@@ -71,8 +74,10 @@ fn is_named_by_environment() -> bool {
 }
 
 /// Blocks, for it has a thread to itself.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Client {
+    /// Those of the same name count before what the library sends.
+    headers: Headers,
     /// Whether the last batch was refused or lost.
     failing: AtomicBool,
 }
@@ -80,7 +85,7 @@ struct Client {
 #[async_trait]
 impl HttpClient for Client {
     async fn send_bytes(&self, request: Request<Bytes>) -> Result<Response<Bytes>, HttpError> {
-        let answer = post(&request);
+        let answer = post(&request, &self.headers);
         let failure = match &answer {
             Ok(200..=299) => None,
             Ok(status) => Some(format!("it answers {status}")),
@@ -110,7 +115,7 @@ impl Client {
 }
 
 /// The status of the answer.
-fn post(request: &Request<Bytes>) -> io::Result<u16> {
+fn post(request: &Request<Bytes>, own: &Headers) -> io::Result<u16> {
     let uri = request.uri();
     let invalid = || io::Error::from(io::ErrorKind::InvalidInput);
     let authority = uri.authority().ok_or_else(invalid)?;
@@ -120,7 +125,13 @@ fn post(request: &Request<Bytes>) -> io::Result<u16> {
     stream.set_write_timeout(Some(TIMEOUT))?;
 
     let mut head = format!("POST {} HTTP/1.1\r\nhost: {authority}\r\n", uri.path()).into_bytes();
+    for (name, value) in own.iter() {
+        write!(head, "{name}: {value}\r\n")?;
+    }
     for (name, value) in request.headers() {
+        if own.iter().any(|(known, _)| known == name.as_str()) {
+            continue;
+        }
         head.extend_from_slice(name.as_str().as_bytes());
         head.extend_from_slice(b": ");
         head.extend_from_slice(value.as_bytes());

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::support::collector::Collector;
+use crate::support::collector::{Collector, Taken};
 use crate::support::process::Service;
 use crate::support::scenario;
 
@@ -74,8 +74,17 @@ async fn lines_of_a_plan_name_it_and_the_request_that_it_came_from() {
 /// The spans that a collector took.
 fn spans(collector: &Collector) -> Vec<Value> {
     let mut spans = Vec::new();
-    for (path, document) in collector.taken() {
+    for Taken {
+        path,
+        headers,
+        document,
+    } in collector.taken()
+    {
         assert_eq!(path, "/v1/traces");
+        let authorized = headers
+            .iter()
+            .filter(|line| *line == "authorization: Bearer hush");
+        assert_eq!(authorized.count(), 1, "{headers:?}");
         for resource in document["resourceSpans"].as_array().expect("a list") {
             let attributes = resource["resource"]["attributes"].to_string();
             assert!(attributes.contains("noctule"), "{attributes}");
@@ -92,7 +101,14 @@ async fn a_plan_and_its_request_are_exported_as_parts_of_the_callers_trace() {
     let collector = Collector::start();
     let endpoint = format!("http://{}", collector.address);
     let (id, lines) = logged(
-        &["--otlp-endpoint", &endpoint, "--log", "warn"],
+        &[
+            "--otlp-endpoint",
+            &endpoint,
+            "--otlp-headers",
+            "authorization=Bearer%20hush",
+            "--log",
+            "warn",
+        ],
         &scenario(),
     )
     .await;

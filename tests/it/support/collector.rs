@@ -6,10 +6,18 @@ use std::sync::mpsc::{Receiver, channel};
 
 use serde_json::Value;
 
+/// A document that was posted.
+pub(crate) struct Taken {
+    pub(crate) path: String,
+    /// Lines `name: value`.
+    pub(crate) headers: Vec<String>,
+    pub(crate) document: Value,
+}
+
 /// Listens until the process ends.
 pub(crate) struct Collector {
     pub(crate) address: SocketAddr,
-    taken: Receiver<(String, Value)>,
+    taken: Receiver<Taken>,
 }
 
 impl Collector {
@@ -27,24 +35,26 @@ impl Collector {
         Self { address, taken }
     }
 
-    /// What has been posted: paths and documents.
-    pub(crate) fn taken(&self) -> Vec<(String, Value)> {
+    /// What has been posted.
+    pub(crate) fn taken(&self) -> Vec<Taken> {
         self.taken.try_iter().collect()
     }
 }
 
-fn read(stream: TcpStream) -> (String, Value) {
+fn read(stream: TcpStream) -> Taken {
     let mut reader = BufReader::new(stream);
     let mut line = String::new();
     reader.read_line(&mut line).expect("a line");
     let path = line.split(' ').nth(1).expect("a path").to_owned();
     let mut length = 0;
+    let mut headers = Vec::new();
     loop {
         line.clear();
         reader.read_line(&mut line).expect("a line");
         let Some((name, value)) = line.trim_end().split_once(": ") else {
             break;
         };
+        headers.push(line.trim_end().to_owned());
         if name == "content-length" {
             length = value.parse().expect("a number");
         }
@@ -53,5 +63,9 @@ fn read(stream: TcpStream) -> (String, Value) {
     reader.read_exact(&mut body).expect("a whole body");
     let answer = b"HTTP/1.1 200 OK\r\ncontent-length: 2\r\n\r\n{}";
     reader.get_mut().write_all(answer).expect("answered");
-    (path, serde_json::from_slice(&body).expect("JSON"))
+    Taken {
+        path,
+        headers,
+        document: serde_json::from_slice(&body).expect("JSON"),
+    }
 }

@@ -12,7 +12,7 @@ pub(crate) struct Reading {
 }
 
 impl Reading {
-    /// Panics at the first line that is not as OpenMetrics says.
+    /// Panics at the first line that is not as `OpenMetrics` says.
     pub(crate) fn read(text: &str) -> Self {
         let mut lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.pop(), Some("# EOF"), "the end is marked");

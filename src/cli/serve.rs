@@ -14,13 +14,15 @@ use super::exit;
 use crate::config::{self, Config, Flags};
 use crate::http::{self, AppState, Capacity, InFlight, Phase};
 use crate::job::Failure;
+use crate::planner;
 use crate::scenario::json::{self, Rules};
 use crate::scenario::limits::Limits;
+use crate::store::measured::MeasuredStore;
 use crate::store::reopening::{Open, Reopening};
 use crate::store::sqlite::SqliteStore;
 use crate::store::{self, Store};
+use crate::telemetry::{self, Instruments};
 use crate::worker::{self, Engine, Pool, Sweeper};
-use crate::{planner, telemetry};
 
 /// Connections may finish their answers for so long at the end, if the grace period lasts so long.
 const LAST_ANSWERS: Duration = Duration::from_secs(5);
@@ -33,13 +35,14 @@ pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
         return Ok(loaded.write_toml(&mut std::io::stdout().lock())?);
     }
     let config = &loaded.config;
-    telemetry::init(config);
+    let log = telemetry::log::init(config);
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
         .build()?;
     runtime.block_on(serve(config))?;
     // Whatever still runs has been given back to the queue; the process does not wait for it.
     runtime.shutdown_background();
+    log.close();
     Ok(())
 }
 
@@ -48,7 +51,9 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("cannot listen on {}", config.listen))?;
+    let instruments = Arc::new(Instruments::default());
     let store = open_store(config).await?;
+    let store: Arc<dyn Store> = Arc::new(MeasuredStore::new(store, instruments.clone()));
     let rules = Arc::new(Rules {
         limits: config.limits,
         algorithms: planner::algorithm_rules(),
@@ -56,6 +61,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let settings = worker::Settings {
         workers: config.workers,
         clock: store::wall_clock(),
+        instruments: instruments.clone(),
     };
     let pool = Pool::start(store.clone(), settings, engine());
     let sweeper = Sweeper::start(store.clone(), store::wall_clock());
@@ -71,6 +77,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         clock_jump_ms: sweeper.clock_jump_ms(),
         body_timeout: config.http.body_timeout,
         phase: watched.clone(),
+        instruments: instruments.clone(),
     });
     announce(&listener)?;
     let times = Times::within(config.grace);
@@ -78,6 +85,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         head_timeout: config.http.head_timeout,
         max_connections: config.http.max_connections,
         patience: LAST_ANSWERS,
+        instruments,
     };
     let server = tokio::spawn(http::server::serve(listener, router, watched, settings));
 

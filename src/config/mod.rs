@@ -17,7 +17,7 @@ use std::time::Duration;
 
 pub use flags::Flags;
 pub use layers::{Loaded, load};
-pub use value::{Filter, LogFormat};
+pub use value::{Endpoint, Filter, Headers, LogFormat};
 
 use crate::scenario::limits::Limits;
 
@@ -38,6 +38,10 @@ pub struct Config {
     pub log: Filter,
     /// How log lines are written.
     pub log_format: LogFormat,
+    /// Where traces are sent; `None` is nowhere.
+    pub otlp_endpoint: Option<Endpoint>,
+    /// What is sent with them.
+    pub otlp_headers: Headers,
     /// Of connections and requests.
     pub http: Http,
     /// How long plans are kept.
@@ -81,6 +85,8 @@ impl Default for Config {
             grace: Duration::from_secs(10),
             log: Filter::default(),
             log_format: LogFormat::Text,
+            otlp_endpoint: None,
+            otlp_headers: Headers::default(),
             http: Http::default(),
             retention: Retention::default(),
             limits: Limits::default(),

@@ -10,7 +10,9 @@ mod documents;
 mod events;
 mod feed;
 mod idempotency;
+mod metrics;
 mod off_thread;
+mod pages;
 mod params;
 mod phase;
 mod plans;
@@ -40,6 +42,7 @@ pub use phase::Phase;
 
 use crate::scenario::json::Rules;
 use crate::store::Store;
+use crate::telemetry::Instruments;
 use problem::Problem;
 
 /// What every handler can reach.
@@ -59,6 +62,8 @@ pub struct AppState {
     pub clock_jump_ms: watch::Receiver<Option<i64>>,
     /// Where the service stands between its start and its end.
     pub phase: watch::Receiver<Phase>,
+    /// What is reported to the operator.
+    pub instruments: Arc<Instruments>,
 }
 
 /// How much the service does at once.
@@ -96,7 +101,11 @@ pub fn routes() -> Vec<Route> {
         get("/version", service::version),
         get("/livez", service::livez),
         get("/readyz", service::readyz),
-        get("/openapi.yaml", service::openapi_yaml),
+        get("/metrics", metrics::show),
+        get("/openapi.yaml", pages::openapi_yaml),
+        get("/openapi.json", pages::openapi_json),
+        get("/docs", pages::docs),
+        get("/problems/{slug}", pages::problem),
     ]
 }
 
@@ -109,15 +118,18 @@ pub fn router(state: AppState) -> Router {
         })
         .method_not_allowed_fallback(async || Problem::MethodNotAllowed)
         .fallback(async |uri: Uri| Problem::NoSuchResource(uri.path().to_owned()))
-        .with_state(state);
-    wrap(router)
+        .with_state(state.clone());
+    wrap(router, state.instruments)
 }
 
 /// What goes round every handler.
-fn wrap(router: Router) -> Router {
+fn wrap(router: Router, instruments: Arc<Instruments>) -> Router {
     router
         .layer(CatchPanicLayer::custom(problem::after_panic))
-        .layer(axum::middleware::from_fn(request_id::assign))
+        .layer(axum::middleware::from_fn_with_state(
+            instruments,
+            request_id::assign,
+        ))
 }
 
 fn get<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
@@ -158,7 +170,7 @@ mod tests {
         let request = Request::get("/")
             .header("x-request-id", "caller-1")
             .body(Body::empty());
-        let answer = wrap(broken)
+        let answer = wrap(broken, Arc::default())
             .oneshot(request.expect("a request"))
             .await
             .expect("an answer");

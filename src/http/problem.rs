@@ -230,7 +230,7 @@ impl Problem {
             Self::BodyIncomplete => "the connection ended before the body did".to_owned(),
             Self::InvalidParameter { detail, .. } => detail.clone(),
             Self::NoSuchResource(path) => {
-                format!("nothing is at {path}; GET /openapi.yaml lists what is")
+                format!("nothing is at {path}; GET /docs lists what is")
             }
             Self::NoSuchPlan(id) => format!("there is no plan {id}"),
             Self::MethodNotAllowed => {

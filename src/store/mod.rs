@@ -3,6 +3,7 @@
 //! A store holds the queue, the records, the documents and the events of all plans, and makes each
 //! step durable before it answers. Deliberately absent: what a plan means, and who may see it.
 
+pub mod measured;
 pub mod reopening;
 pub mod sqlite;
 
@@ -302,6 +303,8 @@ pub struct ListQuery {
 pub struct Stats {
     /// Plans waiting.
     pub queued: u64,
+    /// When the plan at the head of the queue was accepted, milliseconds since 1970; `None` without one.
+    pub oldest_queued_ms: Option<i64>,
     /// Plans being run.
     pub running: u64,
     /// Mean run time of the last few plans that ended with a result, milliseconds; `None` before the first.

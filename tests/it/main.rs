@@ -11,6 +11,9 @@ mod determinism;
 mod events;
 mod idempotency;
 mod layering;
+
+mod logs;
+mod metrics;
 mod openapi;
 mod refusals;
 mod scenario;

@@ -246,8 +246,16 @@ pub(super) fn stats(connection: &Connection) -> Result<Stats, StoreError> {
              WHERE stop_reason IS NOT NULL ORDER BY finished_ms DESC LIMIT ?1)",
         )?
         .query_row([RUNS], |row| row.get(0))?;
+    let oldest_queued_ms = connection
+        .prepare_cached(
+            "SELECT created_ms FROM plans INDEXED BY plans_queue WHERE status = 'queued' \
+             ORDER BY seq LIMIT 1",
+        )?
+        .query_row([], |row| row.get(0))
+        .optional()?;
     Ok(Stats {
         queued: count(Status::Queued)?,
+        oldest_queued_ms,
         running: count(Status::Running)?,
         mean_run_ms,
     })

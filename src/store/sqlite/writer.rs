@@ -164,7 +164,7 @@ impl Drop for Delivery {
                 if let Err(error) = done.and(durable.map_err(StoreError::clone))
                     && !matches!(error, StoreError::LeaseLost(_))
                 {
-                    tracing::error!(plan = %id, %error, "an undelivered plan stays claimed until the next start");
+                    tracing::error!(plan_id = %id, %error, "an undelivered plan stays claimed until the next start");
                 }
             })
         });

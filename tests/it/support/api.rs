@@ -12,8 +12,10 @@ use noctule::http::{self, AppState, Capacity, InFlight, Phase};
 use noctule::planner;
 use noctule::scenario::json::Rules;
 use noctule::scenario::limits::Limits;
+use noctule::store::measured::MeasuredStore;
 use noctule::store::sqlite::SqliteStore;
 use noctule::store::{Options, Store};
+use noctule::telemetry::Instruments;
 use serde_json::Value;
 use tempfile::TempDir;
 use tokio::sync::watch;
@@ -54,7 +56,9 @@ impl Api {
     pub(crate) fn with_store(options: Options) -> Self {
         let queue = usize::try_from(options.queue_limit).expect("a small number");
         let directory = tempfile::tempdir().expect("a temporary directory");
-        let store = Arc::new(SqliteStore::open(directory.path(), options).expect("a fresh store"));
+        let instruments = Arc::new(Instruments::default());
+        let store = SqliteStore::open(directory.path(), options).expect("a fresh store");
+        let store = Arc::new(MeasuredStore::new(Arc::new(store), instruments.clone()));
         let clock = watch::channel(None);
         let (phase, watched) = watch::channel(Phase::Serving);
         let state = AppState {
@@ -71,6 +75,7 @@ impl Api {
             clock_jump_ms: clock.1,
             body_timeout: Duration::from_secs(30),
             phase: watched,
+            instruments,
         };
         Self {
             router: http::router(state.clone()),

@@ -72,22 +72,37 @@ pub(crate) struct Service {
 impl Service {
     /// On a free port; returns when it listens.
     pub(crate) fn start(data_dir: &Path, arguments: &[&str]) -> Self {
-        Self::start_as(noctule(), data_dir, arguments)
+        Self::start_with_log(data_dir, arguments, Stdio::null())
+    }
+
+    /// The same, with its log.
+    pub(crate) fn start_with_log(
+        data_dir: &Path,
+        arguments: &[&str],
+        log: impl Into<Stdio>,
+    ) -> Self {
+        Self::start_as(noctule(), data_dir, arguments, log)
     }
 
     /// With `data_dir` on a disk of its own, mounted with such options as `size=3m`.
     pub(crate) fn start_on_a_small_disk(data_dir: &Path, options: &str) -> Self {
-        Self::start_as(on_a_small_disk(data_dir, options), data_dir, &[])
+        let command = on_a_small_disk(data_dir, options);
+        Self::start_as(command, data_dir, &[], Stdio::null())
     }
 
-    fn start_as(mut command: Command, data_dir: &Path, arguments: &[&str]) -> Self {
+    fn start_as(
+        mut command: Command,
+        data_dir: &Path,
+        arguments: &[&str],
+        log: impl Into<Stdio>,
+    ) -> Self {
         let mut child = command
             .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
             .arg(data_dir)
             .args(arguments)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
-            .stderr(Stdio::null())
+            .stderr(log)
             .spawn()
             .expect("the binary starts");
         let mut line = String::new();
@@ -113,6 +128,10 @@ impl Service {
 
     pub(crate) fn get(&self, path: &str) -> RequestBuilder {
         self.client.get(self.url(path))
+    }
+
+    pub(crate) fn request(&self, method: reqwest::Method, path: &str) -> RequestBuilder {
+        self.client.request(method, self.url(path))
     }
 
     pub(crate) async fn post(&self, document: &Value) -> Response {

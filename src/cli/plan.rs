@@ -13,7 +13,8 @@ use clap::builder::PossibleValuesParser;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::exit;
-use crate::export::document::{Origin, ResultDocument, Timing, scenario_sha256};
+use crate::export::document::{Origin, ResultDocument, Timing};
+use crate::export::sha256_hex;
 use crate::export::{self, Format, ResultInput};
 use crate::job::draw_seed;
 use crate::planner::{self, ConvergencePoint, Incumbent, Observer, Outcome, Stop};
@@ -107,7 +108,7 @@ fn document(scenario: &Scenario, outcome: &Outcome, run_ms: f64, format: &Format
         plan_id: None,
         algorithm: scenario.planner.algorithm.clone(),
         seed: scenario.planner.seed,
-        scenario_sha256: scenario_sha256(&accepted),
+        scenario_sha256: sha256_hex(accepted.as_bytes()),
         timing: Timing {
             queued_ms: 0.0,
             run_ms,

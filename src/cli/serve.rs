@@ -12,7 +12,7 @@ use tokio::time::Instant;
 
 use super::exit;
 use crate::config::{self, Config, Flags};
-use crate::http::{self, AppState, Capacity, Phase};
+use crate::http::{self, AppState, Capacity, InFlight, Phase};
 use crate::job::Failure;
 use crate::planner;
 use crate::scenario::json::{self, Rules};
@@ -21,7 +21,7 @@ use crate::store::measured::MeasuredStore;
 use crate::store::sqlite::SqliteStore;
 use crate::store::{self, Store};
 use crate::telemetry::{self, Instruments};
-use crate::worker::{self, Engine, Pool};
+use crate::worker::{self, Engine, Pool, Sweeper};
 
 /// Connections may finish their answers for so long at the end, if the grace period lasts so long.
 const LAST_ANSWERS: Duration = Duration::from_secs(5);
@@ -63,6 +63,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         instruments: instruments.clone(),
     };
     let pool = Pool::start(store.clone(), settings, engine());
+    let sweeper = Sweeper::start(store.clone(), store::wall_clock());
     let (phase, watched) = watch::channel(Phase::Serving);
     let router = http::router(AppState {
         store: store.clone(),
@@ -71,6 +72,8 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
             workers: config.workers,
             queue: config.queue,
         },
+        in_flight: InFlight::default(),
+        clock_jump_ms: sweeper.clock_jump_ms(),
         body_timeout: config.http.body_timeout,
         phase: watched.clone(),
         instruments: instruments.clone(),
@@ -103,6 +106,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     if let Ok(ended) = tokio::time::timeout_at(signalled + times.answers, server).await {
         ended.context("the server broke")?;
     }
+    drop(sweeper);
     store.close().await;
     tracing::info!(
         duration_ms = signalled.elapsed().as_secs_f64() * 1e3,
@@ -146,13 +150,25 @@ fn open_store(config: &Config) -> anyhow::Result<Arc<dyn Store>> {
         .as_deref()
         .context("the user has no home; name a directory with --data-dir")?;
     let options = store::Options {
-        queue_limit: config.queue as u64,
-        clock: store::wall_clock(),
+        retention: retention(config.retention),
+        events_kept: config.retention.events,
+        ..store::Options::new(config.queue as u64)
     };
     let store = SqliteStore::open(data_dir, options)
         .with_context(|| format!("cannot open the store in {}", data_dir.display()))?;
     tracing::info!(data_dir = %data_dir.display(), "the store is open");
     Ok(Arc::new(store))
+}
+
+/// Of a setting, 0 is no limit.
+fn retention(settings: config::Retention) -> store::Retention {
+    let limit = |setting: u64| (setting > 0).then_some(setting);
+    let age_ms = i64::try_from(settings.age.as_millis()).unwrap_or(i64::MAX);
+    store::Retention {
+        age_ms: (age_ms > 0).then_some(age_ms),
+        plans: limit(settings.plans),
+        bytes: limit(settings.bytes),
+    }
 }
 
 /// One plain line for people and scripts, with the port that was taken.

@@ -44,6 +44,8 @@ pub struct Config {
     pub otlp_headers: Headers,
     /// Of connections and requests.
     pub http: Http,
+    /// How long plans are kept.
+    pub retention: Retention,
     /// Upper limits on a scenario.
     pub limits: Limits,
 }
@@ -57,6 +59,19 @@ pub struct Http {
     pub body_timeout: Duration,
     /// Connections open at once; more wait in the listener's backlog.
     pub max_connections: usize,
+}
+
+/// How long ended plans are kept: until the first of these limits; 0 is none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Retention {
+    /// From the end of a plan.
+    pub age: Duration,
+    /// Ended plans.
+    pub plans: u64,
+    /// Bytes of their documents and events.
+    pub bytes: u64,
+    /// Events of each plan.
+    pub events: u64,
 }
 
 impl Default for Config {
@@ -73,6 +88,7 @@ impl Default for Config {
             otlp_endpoint: None,
             otlp_headers: Headers::default(),
             http: Http::default(),
+            retention: Retention::default(),
             limits: Limits::default(),
         }
     }
@@ -84,6 +100,17 @@ impl Default for Http {
             head_timeout: Duration::from_secs(30),
             body_timeout: Duration::from_secs(30),
             max_connections: 20_000,
+        }
+    }
+}
+
+impl Default for Retention {
+    fn default() -> Self {
+        Self {
+            age: Duration::from_secs(7 * 24 * 60 * 60),
+            plans: 100_000,
+            bytes: 10 << 30,
+            events: 10_000,
         }
     }
 }

@@ -9,7 +9,7 @@ use super::value::{Given, Value};
 
 /// Every setting, in the order in which they are shown.
 pub(super) fn all() -> Vec<Setting> {
-    [service(), http(), limits()]
+    [service(), http(), retention(), limits()]
         .into_iter()
         .flatten()
         .collect()
@@ -110,6 +110,39 @@ fn http() -> Vec<Setting> {
             "Connections open at once; more wait in the listener's backlog",
             1..=1_000_000,
             |c| &mut c.http.max_connections,
+        ),
+    ]
+}
+
+fn retention() -> Vec<Setting> {
+    vec![
+        row(
+            "retention.age",
+            "SECONDS",
+            "Ended plans are kept so long; 0 for ever",
+            Duration::ZERO..=Duration::from_secs(100 * 365 * 24 * 60 * 60),
+            |c| &mut c.retention.age,
+        ),
+        row(
+            "retention.plans",
+            "N",
+            "Ended plans kept, the longest ended go first; 0 for any number",
+            ..,
+            |c| &mut c.retention.plans,
+        ),
+        row(
+            "retention.bytes",
+            "BYTES",
+            "Bytes of ended plans' documents and events kept; 0 for any number",
+            ..,
+            |c| &mut c.retention.bytes,
+        ),
+        row(
+            "retention.events",
+            "N",
+            "Newest events kept of each plan",
+            100..,
+            |c| &mut c.retention.events,
         ),
     ]
 }
@@ -380,6 +413,20 @@ mod tests {
             let mut config = defaults.clone();
             assert_eq!(setting.set(&mut config, &word), Ok(()), "{}", setting.key);
             assert_eq!(config, defaults, "{}", setting.key);
+        }
+    }
+
+    #[test]
+    fn each_is_in_the_manual() {
+        let manual = include_str!("../../docs/OPERATIONS.md");
+        let rows = manual.lines().filter(|line| line.contains(" | `--"));
+        let rows: Vec<&str> = rows.collect();
+        let settings = all();
+        assert_eq!(rows.len(), settings.len());
+        for (row, setting) in rows.iter().zip(settings) {
+            let (key, flag, variable) = (setting.key, setting.flag(), setting.variable());
+            let expected = format!("| `{key}` | `--{flag}` | `{variable}` ");
+            assert!(row.starts_with(&expected), "{row} is not {expected}");
         }
     }
 

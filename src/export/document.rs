@@ -187,24 +187,10 @@ pub struct Origin {
     pub algorithm: String,
     /// Of the run.
     pub seed: u64,
-    /// See [`scenario_sha256`].
+    /// Of the accepted scenario document, by [`sha256_hex`](super::sha256_hex).
     pub scenario_sha256: String,
     /// Wall times.
     pub timing: Timing,
-}
-
-/// Hexadecimal SHA-256 of an accepted scenario document.
-#[must_use]
-pub fn scenario_sha256(document: &str) -> String {
-    use sha2::{Digest, Sha256};
-    use std::fmt::Write as _;
-
-    Sha256::digest(document.as_bytes())
-        .iter()
-        .fold(String::with_capacity(64), |mut hex, byte| {
-            write!(hex, "{byte:02x}").expect("writing to a string cannot fail");
-            hex
-        })
 }
 
 impl ResultDocument {

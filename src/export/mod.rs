@@ -1,7 +1,10 @@
 //! A delivered plan in the formats that people take away. Adding one is one file and one row.
 
 pub mod document;
+mod sha256;
 mod svg;
+
+pub use sha256::sha256_hex;
 
 /// A format of a result.
 pub struct Format {

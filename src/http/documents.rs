@@ -4,6 +4,7 @@ use axum::extract::State;
 use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
 
+use super::caller::Caller;
 use super::params::{self, Id, Params};
 use super::problem::Problem;
 use super::{AppState, accept, off_thread, retry};
@@ -12,10 +13,12 @@ use crate::export::{self, Format, ResultInput};
 /// `GET /plans/{id}/scenario`.
 pub(super) async fn scenario(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
     uri: Uri,
 ) -> Result<Response, Problem> {
     Params::read(&uri, &[])?;
+    caller.plan(&*state.store, id).await?;
     let document = state.store.scenario(id).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], document).into_response())
 }
@@ -23,12 +26,13 @@ pub(super) async fn scenario(
 /// `GET /plans/{id}/result`.
 pub(super) async fn result(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let params = Params::read(&uri, &["format"])?;
-    let plan = state.store.get(id).await?;
+    let plan = caller.plan(&*state.store, id).await?;
     let format = choose_format(&params, &headers)?;
     if !plan.status.is_final() {
         let retry_after_s = retry::for_end(&plan, &state.store.stats().await?, state.capacity);

@@ -10,6 +10,7 @@ use std::convert::Infallible;
 use std::sync::Arc;
 use tracing::{Instrument as _, Span};
 
+use super::caller::Caller;
 use super::feed::{Feed, Told};
 use super::params::{self, Id, Params};
 use super::problem::Problem;
@@ -30,6 +31,7 @@ pub(super) const RATES_HZ: std::ops::RangeInclusive<f64> = 0.01..=1000.0;
 /// `GET /plans/{id}/events`.
 pub(super) async fn follow(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
     uri: Uri,
     headers: HeaderMap,
@@ -42,10 +44,13 @@ pub(super) async fn follow(
             asked: accept::asked(&headers),
             available: Wire::MEDIA_TYPES.to_vec(),
         })?;
-    let plan = state.store.get(id).await?;
-    if plan.status.is_final() && state.store.events(id, after, 1).await?.is_empty() {
-        // All has been told; EventSource stops asking at a 204.
-        return Ok(StatusCode::NO_CONTENT.into_response());
+    let plan = caller.plan(&*state.store, id).await?;
+    if plan.status.is_final() {
+        let rest = state.store.events(id, after, 1).await?;
+        if rest.events.is_empty() {
+            // All has been told; EventSource stops asking at a 204.
+            return Ok(StatusCode::NO_CONTENT.into_response());
+        }
     }
     let feed = Feed::new(state.store.clone(), state.phase.clone(), id, after, rate_hz);
     let stream = Stream {
@@ -118,6 +123,11 @@ impl Stream {
     async fn next(&mut self, wire: Wire) -> Option<String> {
         Some(match self.feed.next().await? {
             Told::Events(events) => self.written(events, wire).await,
+            Told::Gap { from, to } => {
+                let mut text = String::new();
+                wire.write(Outgoing::gap(from, to), &mut text);
+                text
+            }
             Told::Silence => wire.silence().to_owned(),
             Told::Stopping(events) => self.written(events, wire).await + wire.stopping(),
         })

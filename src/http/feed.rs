@@ -30,6 +30,13 @@ const SILENCE: Duration = Duration::from_secs(15);
 pub(super) enum Told {
     /// One or more events; after the `end` nothing follows.
     Events(Vec<NumberedEvent>),
+    /// The store no longer keeps the events `from` to `to`.
+    Gap {
+        /// The first that is missing.
+        from: u64,
+        /// The last that is missing.
+        to: u64,
+    },
     /// Nothing has happened for a while.
     Silence,
     /// The service ends, after these events; the reader may resume with the next process.
@@ -94,8 +101,11 @@ impl Feed {
                     break;
                 }
             };
-            let quiet = page.is_empty();
-            self.take(page, &mut out);
+            if page.forgotten > self.after {
+                return self.skip(page.forgotten).await;
+            }
+            let quiet = page.events.is_empty();
+            self.take(page.events, &mut out);
             if stopping && !self.over {
                 if quiet || self.last_pages == 0 {
                     // A reader who is further behind reads the rest from the next process.
@@ -123,6 +133,30 @@ impl Feed {
         }
         self.over = true;
         None
+    }
+
+    /// Go on behind the events that the store has forgotten. A reader who comes fresh asked for none
+    /// of them, and begins with the record as it is.
+    async fn skip(&mut self, forgotten: u64) -> Option<Told> {
+        if self.throttle.holds() {
+            let mut out = Vec::new();
+            self.throttle.flush(&mut out);
+            self.held_since = None;
+            return Some(Told::Events(out));
+        }
+        let from = self.after + 1;
+        self.after = forgotten;
+        if from > 1 {
+            return Some(Told::Gap {
+                from,
+                to: forgotten,
+            });
+        }
+        let plan = self.store.get(self.id).await.ok()?;
+        Some(Told::Events(vec![NumberedEvent {
+            id: forgotten,
+            event: Event::Status(Box::new(plan)),
+        }]))
     }
 
     fn take(&mut self, page: Vec<NumberedEvent>, out: &mut Vec<NumberedEvent>) {

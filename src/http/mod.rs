@@ -5,9 +5,11 @@
 
 mod accept;
 mod body;
+mod caller;
 mod documents;
 mod events;
 mod feed;
+mod idempotency;
 mod metrics;
 mod off_thread;
 mod pages;
@@ -35,6 +37,7 @@ use axum::routing::{self, MethodRouter};
 use tokio::sync::watch;
 use tower_http::catch_panic::CatchPanicLayer;
 
+pub use idempotency::InFlight;
 pub use phase::Phase;
 
 use crate::scenario::json::Rules;
@@ -51,8 +54,12 @@ pub struct AppState {
     pub rules: Arc<Rules>,
     /// How much may be done at once.
     pub capacity: Capacity,
+    /// Idempotency keys that are being worked on.
+    pub in_flight: InFlight,
     /// A request's body must be complete after this.
     pub body_timeout: Duration,
+    /// By how much the wall clock has jumped, milliseconds, while nothing expires for it.
+    pub clock_jump_ms: watch::Receiver<Option<i64>>,
     /// Where the service stands between its start and its end.
     pub phase: watch::Receiver<Phase>,
     /// What is reported to the operator.

@@ -15,6 +15,8 @@ use serde::Serialize;
 use tokio::time::Instant;
 use uuid::Uuid;
 
+use super::caller::Caller;
+use super::idempotency::IDEMPOTENCY_REPLAYED;
 use super::params::{self, Id, Params};
 use super::phase::stopping;
 use super::prefer::{PREFERENCE_APPLIED, Wait};
@@ -23,7 +25,7 @@ use super::status::{StatusDocument, etag, location};
 use super::{AppState, Phase, body, off_thread, retry, warm_start};
 use crate::job::{self, Plan, PlanId, Status, Submission};
 use crate::scenario::json;
-use crate::store::{ListQuery, StoreError};
+use crate::store::{ListQuery, StoreError, Submitted};
 use crate::telemetry::{Origin, spans};
 
 /// Plans on a page of the list, unless asked otherwise.
@@ -34,6 +36,7 @@ pub(super) const MAX_PAGE: usize = 1000;
 /// `POST /plans`.
 pub(super) async fn submit(
     State(state): State<AppState>,
+    caller: Caller,
     uri: Uri,
     Extension(origin): Extension<Origin>,
     headers: HeaderMap,
@@ -46,39 +49,81 @@ pub(super) async fn submit(
     if !validate_only {
         refuse_when_draining(&state).await?;
     }
+    let once = state.in_flight.begin(&caller, &headers)?;
     let bytes = body::read_json(&state, &headers, body).await?;
-    let submission = accept(&state, bytes).await?;
+    let idempotency = once.as_ref().map(|once| once.with(&bytes));
+    let submission = Submission {
+        idempotency,
+        ..accept(&state, &caller, bytes).await?
+    };
     if validate_only {
         return Ok(valid(&submission));
     }
-
-    let id = submission.id;
-    spans::name_plan(id);
-    // Before it can be claimed.
-    state.instruments.origins.remember(id, origin);
-    let submitted = state.store.submit(submission).await;
-    if submitted.is_err() {
-        state.instruments.origins.forget(id);
-    }
-    let plan = match submitted {
-        Ok(plan) => plan,
-        Err(StoreError::QueueFull { queued }) => {
-            let retry_after_s = retry::for_room(&state.store.stats().await?, state.capacity);
-            return Err(Problem::QueueFull {
-                queued,
-                retry_after_s,
-            });
-        }
-        Err(error) => return Err(error.into()),
-    };
-    state.instruments.metrics.accepted();
-    tracing::info!("accepted");
+    let Submitted { plan, replayed } = hand_in(&state, submission, origin).await?;
+    drop(once);
 
     let address = HeaderValue::from_str(&location(plan.id)).expect("an id is visible ASCII");
-    let Some(wait) = Wait::of(&headers) else {
+    let mut answer = answer(&state, &headers, plan, address).await?;
+    if replayed {
+        answer
+            .headers_mut()
+            .insert(IDEMPOTENCY_REPLAYED, HeaderValue::from_static("true"));
+    }
+    Ok(answer)
+}
+
+/// Make a plan durable, or say when there may be room for it.
+async fn hand_in(
+    state: &AppState,
+    submission: Submission,
+    origin: Origin,
+) -> Result<Submitted, Problem> {
+    let (id, instruments) = (submission.id, &state.instruments);
+    // Before it can be claimed.
+    instruments.origins.remember(id, origin);
+    let submitted = state.store.submit(submission).await;
+    if !matches!(&submitted, Ok(submitted) if !submitted.replayed) {
+        instruments.origins.forget(id);
+    }
+    match submitted {
+        Ok(submitted) => {
+            let Submitted { plan, replayed } = &submitted;
+            spans::name_plan(plan.id);
+            if !replayed {
+                instruments.metrics.accepted();
+            }
+            tracing::info!(replayed, "accepted");
+            Ok(submitted)
+        }
+        Err(StoreError::QueueFull { queued }) => {
+            let retry_after_s = retry::for_room(&state.store.stats().await?, state.capacity);
+            Err(Problem::QueueFull {
+                queued,
+                retry_after_s,
+            })
+        }
+        Err(StoreError::QuotaReached { active }) => {
+            let retry_after_s = retry::for_room(&state.store.stats().await?, state.capacity);
+            Err(Problem::QuotaReached {
+                active,
+                retry_after_s,
+            })
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// What an accepted plan is answered with, as soon as the caller wants it.
+async fn answer(
+    state: &AppState,
+    headers: &HeaderMap,
+    plan: Plan,
+    address: HeaderValue,
+) -> Result<Response, Problem> {
+    let Some(wait) = Wait::of(headers) else {
         return Ok(accepted(plan, address));
     };
-    let plan = wait_for(&state, plan.id, wait.duration(), |plan| {
+    let plan = wait_for(state, plan.id, wait.duration(), |plan| {
         plan.status.is_final()
     })
     .await?;
@@ -111,11 +156,12 @@ async fn refuse_when_draining(state: &AppState) -> Result<(), Problem> {
 }
 
 /// Read a document into a submission, off the threads that answer.
-async fn accept(state: &AppState, document: Bytes) -> Result<Submission, Problem> {
+async fn accept(state: &AppState, caller: &Caller, document: Bytes) -> Result<Submission, Problem> {
     let rules = state.rules.clone();
     let mut scenario =
         off_thread::run(move || json::read(&document, &rules, job::draw_seed())).await??;
-    warm_start::resolve(state, &mut scenario).await?;
+    warm_start::resolve(state, caller, &mut scenario).await?;
+    let Caller { owner, quota, .. } = caller.clone();
     let submission = move || Submission {
         id: job::new_id(),
         scenario: json::write(&scenario),
@@ -124,6 +170,9 @@ async fn accept(state: &AppState, document: Bytes) -> Result<Submission, Problem
         seed: scenario.planner.seed,
         iterations: scenario.planner.iterations as u64,
         created_ms: now_ms(),
+        owner,
+        quota,
+        idempotency: None,
     };
     off_thread::run(submission).await
 }
@@ -147,7 +196,11 @@ struct PageLinks {
 }
 
 /// `GET /plans`.
-pub(super) async fn list(State(state): State<AppState>, uri: Uri) -> Result<Response, Problem> {
+pub(super) async fn list(
+    State(state): State<AppState>,
+    caller: Caller,
+    uri: Uri,
+) -> Result<Response, Problem> {
     let params = Params::read(&uri, &["status", "limit", "cursor"])?;
     let status = params.text("status").map(read_status).transpose()?;
     let limit = params
@@ -165,6 +218,7 @@ pub(super) async fn list(State(state): State<AppState>, uri: Uri) -> Result<Resp
     // One more than asked for tells whether there is a next page.
     let query = ListQuery {
         status,
+        owner: caller.owner.filter(|_| !caller.sees_all),
         before,
         limit: limit + 1,
     };
@@ -216,11 +270,13 @@ fn next_page(status: Option<Status>, limit: usize, last: PlanId) -> String {
 /// `GET /plans/{id}`.
 pub(super) async fn show(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     Params::read(&uri, &[])?;
+    caller.plan(&*state.store, id).await?;
     let wait = Wait::of(&headers);
     let known = KnownTags::of(&headers);
     let patience = wait.map_or(Duration::ZERO, Wait::duration);
@@ -283,10 +339,12 @@ impl KnownTags {
 /// `POST /plans/{id}/cancel`.
 pub(super) async fn cancel(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
     uri: Uri,
 ) -> Result<Response, Problem> {
     Params::read(&uri, &[])?;
+    caller.plan(&*state.store, id).await?;
     let plan = state.store.request_cancel(id, now_ms()).await?;
     let status = if plan.status.is_final() {
         StatusCode::OK
@@ -299,11 +357,17 @@ pub(super) async fn cancel(
 /// `DELETE /plans/{id}`.
 pub(super) async fn delete(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
     uri: Uri,
 ) -> Result<StatusCode, Problem> {
     Params::read(&uri, &[])?;
-    state.store.delete(id, now_ms()).await?;
+    match caller.plan(&*state.store, id).await {
+        Ok(_) => state.store.delete(id, now_ms()).await?,
+        // Whoever asks again had no answer the first time.
+        Err(Problem::Gone(_)) => {}
+        Err(problem) => return Err(problem),
+    }
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 
 use crate::job::{Failure, PlanId, Status};
 use crate::scenario::json::{Fault, Refusal};
-use crate::store::StoreError;
+use crate::store::{StoreError, Tombstone};
 
 /// Everything that a request can be refused for.
 #[derive(Debug, Clone)]
@@ -24,8 +24,8 @@ pub(super) enum Problem {
     NoSuchResource(String),
     /// There never was such a plan, or nothing with that name can be one.
     NoSuchPlan(String),
-    /// The plan was deleted.
-    Gone(PlanId),
+    /// The plan was removed.
+    Gone(Tombstone),
     /// The path exists, the method does not; axum adds `Allow`.
     MethodNotAllowed,
     /// None of the formats the caller accepts is there.
@@ -90,6 +90,17 @@ pub(super) enum Problem {
         /// See [`super::retry`].
         retry_after_s: u64,
     },
+    /// The caller has as many active plans as it may.
+    QuotaReached {
+        /// How many.
+        active: u64,
+        /// See [`super::retry`].
+        retry_after_s: u64,
+    },
+    /// The idempotency key came with another body before.
+    IdempotencyKeyReused,
+    /// Another request with the same idempotency key is being answered.
+    IdempotencyInFlight,
     /// The service is about to end.
     Draining {
         /// See [`super::retry`].
@@ -143,7 +154,12 @@ impl Problem {
             ),
             Self::NotReady { .. } => (StatusCode::CONFLICT, "not-ready", "The plan has not ended"),
             Self::NoResult { .. } => (StatusCode::CONFLICT, "no-result", "The plan has no result"),
-            Self::Gone(_) => (StatusCode::GONE, "gone", "The plan was deleted"),
+            Self::IdempotencyInFlight => (
+                StatusCode::CONFLICT,
+                "idempotency-in-flight",
+                "The same request is being answered",
+            ),
+            Self::Gone(_) => (StatusCode::GONE, "gone", "The plan was removed"),
             Self::BodyTooLarge(_) => (
                 StatusCode::PAYLOAD_TOO_LARGE,
                 "body-too-large",
@@ -158,6 +174,16 @@ impl Problem {
                 StatusCode::UNPROCESSABLE_ENTITY,
                 "invalid-scenario",
                 "The scenario cannot be planned",
+            ),
+            Self::IdempotencyKeyReused => (
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "idempotency-key-reused",
+                "The idempotency key was used before",
+            ),
+            Self::QuotaReached { .. } => (
+                StatusCode::TOO_MANY_REQUESTS,
+                "quota-reached",
+                "The quota of active plans is reached",
             ),
             Self::Internal => (
                 StatusCode::INTERNAL_SERVER_ERROR,
@@ -232,7 +258,19 @@ impl Problem {
             } => {
                 format!("plan {id} was {} before it had a route", status.name())
             }
-            Self::Gone(id) => format!("plan {id} was deleted"),
+            Self::Gone(Tombstone { id, expired, .. }) if *expired => {
+                format!("plan {id} was kept as long as the service keeps plans, and removed")
+            }
+            Self::Gone(Tombstone { id, .. }) => format!("plan {id} was deleted"),
+            Self::IdempotencyInFlight => {
+                "a request with this Idempotency-Key has not been answered yet; try again for its answer".to_owned()
+            }
+            Self::IdempotencyKeyReused => {
+                "a request with this Idempotency-Key had another body; take a new key for a new request".to_owned()
+            }
+            Self::QuotaReached { active, retry_after_s } => {
+                format!("{active} plans of this key are queued or running, its quota; try again in {retry_after_s} s")
+            }
             Self::BodyTooLarge(limit) => {
                 format!(
                     "the body is longer than {limit} bytes, the limit body_bytes of GET /limits"
@@ -266,8 +304,9 @@ impl Problem {
         match self {
             Self::NotReady { retry_after_s, .. }
             | Self::QueueFull { retry_after_s, .. }
+            | Self::QuotaReached { retry_after_s, .. }
             | Self::Draining { retry_after_s } => Some(*retry_after_s),
-            Self::StoreUnavailable => Some(1),
+            Self::StoreUnavailable | Self::IdempotencyInFlight => Some(1),
             _ => None,
         }
     }
@@ -357,7 +396,12 @@ impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
         match error {
             StoreError::NotFound(id) => Self::NoSuchPlan(id.to_string()),
-            StoreError::Gone(id) => Self::Gone(id),
+            StoreError::Gone(tombstone) => Self::Gone(tombstone),
+            StoreError::KeyReused => Self::IdempotencyKeyReused,
+            StoreError::QuotaReached { active } => Self::QuotaReached {
+                active,
+                retry_after_s: 1,
+            },
             StoreError::QueueFull { queued } => Self::QueueFull {
                 queued,
                 retry_after_s: 1,

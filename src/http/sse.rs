@@ -90,6 +90,22 @@ impl Outgoing {
         };
         Self { id, event, data }
     }
+
+    /// The events `from` to `to` are no longer kept. Its id is that of the last of them.
+    pub(super) fn gap(from: u64, to: u64) -> Self {
+        Self {
+            id: to,
+            event: "gap",
+            data: json(Gap { from, to }),
+        }
+    }
+}
+
+/// The data of a `gap` event.
+#[derive(Serialize)]
+struct Gap {
+    from: u64,
+    to: u64,
 }
 
 /// The data of an `end` event.

@@ -4,12 +4,12 @@
 use serde::Deserialize;
 
 use super::AppState;
+use super::caller::Caller;
 use super::problem::Problem;
 use crate::geometry::Point3;
 use crate::job::PlanId;
 use crate::scenario::json::Fault;
 use crate::scenario::{Scenario, WarmStart};
-use crate::store::StoreError;
 
 /// The part of a result document that counts here.
 #[derive(Deserialize)]
@@ -28,7 +28,11 @@ struct Waypoint {
 ///
 /// # Errors
 /// An invalid scenario when that plan is not there or has no route yet.
-pub(super) async fn resolve(state: &AppState, scenario: &mut Scenario) -> Result<(), Problem> {
+pub(super) async fn resolve(
+    state: &AppState,
+    caller: &Caller,
+    scenario: &mut Scenario,
+) -> Result<(), Problem> {
     let Some(WarmStart::Plan(id)) = &scenario.planner.warm_start else {
         return Ok(());
     };
@@ -36,13 +40,15 @@ pub(super) async fn resolve(state: &AppState, scenario: &mut Scenario) -> Result
     let plan: PlanId = id
         .parse()
         .map_err(|_| unknown("must be the id of a plan, a UUID"))?;
-    let result = match state.store.result(plan).await {
-        Ok(result) => result.ok_or_else(|| unknown("that plan has no route yet"))?,
-        Err(StoreError::NotFound(_) | StoreError::Gone(_)) => {
+    match caller.plan(&*state.store, plan).await {
+        Ok(_) => {}
+        Err(Problem::NoSuchPlan(_) | Problem::Gone(_)) => {
             return Err(unknown("no plan has this id"));
         }
-        Err(error) => return Err(error.into()),
-    };
+        Err(problem) => return Err(problem),
+    }
+    let result = state.store.result(plan).await?;
+    let result = result.ok_or_else(|| unknown("that plan has no route yet"))?;
     let route: Route = serde_json::from_str(&result).map_err(|error| {
         tracing::error!(warm_start_plan_id = %plan, %error, "a stored result cannot be read");
         Problem::Internal

@@ -10,6 +10,7 @@ impl Plan {
     pub fn accepted(submission: &Submission, queue_position: u64) -> Self {
         Self {
             id: submission.id,
+            owner: submission.owner.clone(),
             name: submission.name.clone(),
             status: Status::Queued,
             stop_reason: None,
@@ -143,6 +144,9 @@ mod tests {
             iterations: 200,
             scenario: "{}".to_owned(),
             created_ms: 1_000,
+            owner: None,
+            quota: None,
+            idempotency: None,
         };
         Plan::accepted(&submission, 3)
     }

@@ -10,5 +10,5 @@ pub mod state;
 
 pub use event::{Event, NumberedEvent};
 pub use id::{draw_seed, new_id};
-pub use plan::{Failure, Plan, PlanId, Submission};
+pub use plan::{Failure, Idempotency, Owner, Plan, PlanId, Submission};
 pub use state::Status;

@@ -25,6 +25,24 @@ pub struct Submission {
     pub scenario: String,
     /// Now, milliseconds since 1970.
     pub created_ms: i64,
+    /// Whose plan it is; `None` where nobody has a key.
+    pub owner: Option<Owner>,
+    /// Active plans that its owner may have, this one included; `None` for any number.
+    pub quota: Option<u64>,
+    /// Tells a repeated request from a new one.
+    pub idempotency: Option<Idempotency>,
+}
+
+/// The name of the key that a plan was handed in with.
+pub type Owner = String;
+
+/// What makes a request the same as an earlier one of the same owner.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Idempotency {
+    /// Chosen by the caller.
+    pub key: String,
+    /// SHA-256 of the request's body, hexadecimal.
+    pub body_sha256: String,
 }
 
 /// The record of a plan. Times are milliseconds since 1970.
@@ -32,6 +50,9 @@ pub struct Submission {
 pub struct Plan {
     /// See [`PlanId`].
     pub id: PlanId,
+    /// Whose plan it is; `None` where nobody has a key.
+    #[serde(default)]
+    pub owner: Option<Owner>,
     /// The scenario's name.
     pub name: Option<String>,
     /// Where it stands.

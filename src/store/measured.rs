@@ -6,8 +6,9 @@ use std::time::Instant;
 use async_trait::async_trait;
 use tokio::sync::watch;
 
-use super::{Ending, Lease, ListQuery, Stats, Store, StoreError};
-use crate::job::{Event, NumberedEvent, Plan, PlanId, Submission};
+use super::{Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted};
+use crate::export::document::Incumbent;
+use crate::job::{Event, Plan, PlanId, Submission};
 use crate::telemetry::Instruments;
 
 /// Does what the wrapped store does, and reports how long it took.
@@ -49,7 +50,7 @@ impl MeasuredStore {
 
 #[async_trait]
 impl Store for MeasuredStore {
-    async fn submit(&self, submission: Submission) -> Result<Plan, StoreError> {
+    async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError> {
         self.measured("submit", self.store.submit(submission)).await
     }
 
@@ -97,14 +98,17 @@ impl Store for MeasuredStore {
         self.measured("list", self.store.list(query)).await
     }
 
-    async fn events(
-        &self,
-        id: PlanId,
-        after: u64,
-        limit: usize,
-    ) -> Result<Vec<NumberedEvent>, StoreError> {
+    async fn incumbent(&self, id: PlanId) -> Result<Option<Incumbent>, StoreError> {
+        self.measured("incumbent", self.store.incumbent(id)).await
+    }
+
+    async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<EventPage, StoreError> {
         self.measured("events", self.store.events(id, after, limit))
             .await
+    }
+
+    async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError> {
+        self.measured("sweep", self.store.sweep(now_ms)).await
     }
 
     fn changes(&self, id: PlanId) -> watch::Receiver<u64> {

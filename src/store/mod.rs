@@ -11,19 +11,25 @@ use std::sync::Arc;
 use async_trait::async_trait;
 use tokio::sync::watch;
 
+use crate::export::document::Incumbent;
 use crate::job::state::Refused;
-use crate::job::{Event, Failure, NumberedEvent, Plan, PlanId, Status, Submission};
+use crate::job::{Event, Failure, NumberedEvent, Owner, Plan, PlanId, Status, Submission};
 
 /// The queue, the records, the documents and the events of all plans.
 ///
 /// Every method that changes something returns after the change is durable.
 #[async_trait]
 pub trait Store: Send + Sync + 'static {
-    /// Put a plan at the end of the queue; its first event is its `queued` status.
+    /// Put a plan at the end of the queue; its first event is its `queued` status. A submission
+    /// whose idempotency key has been seen within [`IDEMPOTENCY_MS`] changes nothing and gets the
+    /// plan of the first one, however full the queue is.
     ///
     /// # Errors
-    /// [`StoreError::QueueFull`] when as many plans are queued as the store was opened for.
-    async fn submit(&self, submission: Submission) -> Result<Plan, StoreError>;
+    /// [`StoreError::QueueFull`] when as many plans are queued as the store was opened for,
+    /// [`StoreError::QuotaReached`] when its owner has as many active plans as the submission allows,
+    /// [`StoreError::KeyReused`] when its idempotency key came with another body,
+    /// [`StoreError::Gone`] when the plan of the first one was deleted.
+    async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError>;
 
     /// Wait for the plan at the head of the queue and take it: queued -> running, at the time that
     /// the store's clock shows then. Dropping the future before it is done takes nothing.
@@ -87,23 +93,31 @@ pub trait Store: Send + Sync + 'static {
     /// As [`Store::get`].
     async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError>;
 
+    /// The best route so far: the newest [`Event::Incumbent`] of the present run; `None` before the
+    /// first, and after an end without a result.
+    ///
+    /// # Errors
+    /// As [`Store::get`].
+    async fn incumbent(&self, id: PlanId) -> Result<Option<Incumbent>, StoreError>;
+
     /// Newest first: by id, from the greatest down.
     async fn list(&self, query: ListQuery) -> Result<Vec<Plan>, StoreError>;
 
     /// At most `limit` events after the one numbered `after`, in order; none when there are none yet.
+    /// Of a plan's events the store keeps the newest, at least as many as it was opened for.
     ///
     /// # Errors
     /// As [`Store::get`].
-    async fn events(
-        &self,
-        id: PlanId,
-        after: u64,
-        limit: usize,
-    ) -> Result<Vec<NumberedEvent>, StoreError>;
+    async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<EventPage, StoreError>;
 
     /// Ticks after each change of the plan or its events has become readable, and once more when it is deleted.
     /// Subscribe before reading, and no change is missed.
     fn changes(&self, id: PlanId) -> watch::Receiver<u64>;
+
+    /// Remove ended plans that are past their time or beyond the limits of [`Retention`], the longest
+    /// ended first, at most [`SWEEP`] of them; returns how many. Their tombstones say so for
+    /// [`TOMBSTONE_MS`]. What has expired of tombstones and idempotency keys goes too.
+    async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError>;
 
     /// Counts for the queue's head-room and `Retry-After`.
     async fn stats(&self) -> Result<Stats, StoreError>;
@@ -117,6 +131,12 @@ pub trait Store: Send + Sync + 'static {
 
 /// How long a deleted plan is remembered, milliseconds.
 pub const TOMBSTONE_MS: i64 = 24 * 60 * 60 * 1_000;
+
+/// How long an idempotency key is remembered, milliseconds.
+pub const IDEMPOTENCY_MS: i64 = 24 * 60 * 60 * 1_000;
+
+/// Plans that one [`Store::sweep`] removes at most, so that nobody waits long behind it.
+pub const SWEEP: usize = 256;
 
 /// Tells the time: milliseconds since 1970.
 pub type Clock = Arc<dyn Fn() -> i64 + Send + Sync>;
@@ -137,6 +157,64 @@ pub struct Options {
     pub queue_limit: u64,
     /// Of claims, tombstones and recovery.
     pub clock: Clock,
+    /// How long plans are kept.
+    pub retention: Retention,
+    /// Events kept of each plan; of a longer history the oldest are forgotten.
+    pub events_kept: u64,
+}
+
+impl Options {
+    /// For `queue_limit` waiting plans, with no other limit, on the machine's clock.
+    #[must_use]
+    pub fn new(queue_limit: u64) -> Self {
+        Self {
+            queue_limit,
+            clock: wall_clock(),
+            retention: Retention::default(),
+            events_kept: u64::MAX,
+        }
+    }
+}
+
+/// How long ended plans are kept: until the first of these limits; `None` is no limit.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Retention {
+    /// From the end of a plan, milliseconds. It becomes the plan's `expires_ms` when it ends, and
+    /// that stands whatever is set later.
+    pub age_ms: Option<i64>,
+    /// Ended plans kept.
+    pub plans: Option<u64>,
+    /// Bytes of their documents and events.
+    pub bytes: Option<u64>,
+}
+
+/// The answer to a submission.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Submitted {
+    /// As it now stands.
+    pub plan: Plan,
+    /// Whether an earlier submission with the same idempotency key had made it.
+    pub replayed: bool,
+}
+
+/// A page of a plan's events.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EventPage {
+    /// Events up to this id are no longer kept; 0 when all are.
+    pub forgotten: u64,
+    /// In order.
+    pub events: Vec<NumberedEvent>,
+}
+
+/// What remains of a removed plan.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Tombstone {
+    /// Which plan it was.
+    pub id: PlanId,
+    /// Whose.
+    pub owner: Option<Owner>,
+    /// Whether its time had come; otherwise somebody deleted it.
+    pub expired: bool,
 }
 
 /// The right to run one plan, from [`Store::claim`] to [`Store::finish`] or [`Store::release`].
@@ -207,10 +285,12 @@ impl Ending {
 }
 
 /// What [`Store::list`] returns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ListQuery {
     /// Only these, or all.
     pub status: Option<Status>,
+    /// Only this owner's, or everybody's.
+    pub owner: Option<Owner>,
     /// Only plans older than this one.
     pub before: Option<PlanId>,
     /// At most so many.
@@ -236,15 +316,24 @@ pub enum StoreError {
     /// There never was such a plan, or its tombstone has expired.
     #[error("no plan {0}")]
     NotFound(PlanId),
-    /// It was deleted.
-    #[error("plan {0} was deleted")]
-    Gone(PlanId),
+    /// It was removed, less than a day ago.
+    #[error("plan {} is gone", .0.id)]
+    Gone(Tombstone),
     /// As many plans are queued as the store was opened for.
     #[error("the queue holds {queued} plans, its limit")]
     QueueFull {
         /// How many.
         queued: u64,
     },
+    /// The owner has as many active plans as the submission allows.
+    #[error("the owner has {active} active plans, the quota")]
+    QuotaReached {
+        /// How many.
+        active: u64,
+    },
+    /// The idempotency key came with another body before.
+    #[error("the idempotency key was used with another body")]
+    KeyReused,
     /// The plan ended, was deleted or was claimed by another worker.
     #[error("plan {0} is no longer this worker's to run")]
     LeaseLost(PlanId),

@@ -6,6 +6,7 @@
 
 mod planning;
 mod run;
+mod sweeper;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,6 +14,8 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 use tracing::Instrument as _;
+
+pub use sweeper::Sweeper;
 
 use crate::job::Failure;
 use crate::planner::{Observer, Outcome, Stop};

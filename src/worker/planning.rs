@@ -10,7 +10,8 @@ use tokio::sync::{mpsc, oneshot};
 use tracing::Span;
 
 use super::Engine;
-use crate::export::document::{Origin, ResultDocument, Timing, scenario_sha256};
+use crate::export::document::{Origin, ResultDocument, Timing};
+use crate::export::sha256_hex;
 use crate::job::{Event, Failure, Plan, Status};
 use crate::planner::{ConvergencePoint, Incumbent, Observer, Outcome, Stop, StopReason};
 use crate::store::{Ending, Lease};
@@ -109,7 +110,7 @@ fn ending(outcome: &Outcome, plan: &Plan, scenario: &str, run_ms: f64) -> Ending
         plan_id: Some(plan.id),
         algorithm: plan.algorithm.clone(),
         seed: plan.seed,
-        scenario_sha256: scenario_sha256(scenario),
+        scenario_sha256: sha256_hex(scenario.as_bytes()),
         timing: Timing {
             // The wall clock may have been set back between the two.
             queued_ms: (started_ms - plan.created_ms).max(0) as f64,

@@ -6,6 +6,7 @@ use axum::body::Body;
 use axum::http::{Method, StatusCode};
 use noctule::http::Phase;
 use noctule::job::Status;
+use noctule::store::{Options, Retention};
 use serde_json::{Value, json};
 
 use crate::support::api::Api;
@@ -438,4 +439,36 @@ async fn a_body_that_never_ends_is_cut_off() {
         .send(Method::POST, "/plans", &headers, Body::from_stream(broken))
         .await;
     answer.expect_problem(400, "incomplete-body");
+}
+
+#[tokio::test]
+async fn a_plan_past_its_time_is_gone_and_says_so() {
+    let retention = Retention {
+        age_ms: Some(1),
+        ..Retention::default()
+    };
+    let api = Api::with_store(Options {
+        retention,
+        ..Options::new(10)
+    });
+    let address = api.submit().await;
+    run::complete(&*api.store, Vec::new()).await;
+    let ended = api.get(&address).await.json();
+    assert!(ended["expires_at"].is_string(), "{ended}");
+    assert_eq!(api.store.sweep(i64::MAX).await.expect("open"), 1);
+    let problem = api.get(&address).await.expect_problem(410, "gone");
+    let detail = problem["detail"].as_str().expect("text");
+    assert!(detail.contains("as long as the service keeps"), "{detail}");
+}
+
+#[tokio::test]
+async fn a_clock_that_jumped_is_told_and_keeps_nobody_out() {
+    let api = Api::new();
+    let sound = api.get("/readyz").await.json();
+    assert_eq!(sound, json!({"status": "ok"}));
+    api.clock.send_replace(Some(-7_200_000));
+    let answer = api.get("/readyz").await;
+    assert_eq!(answer.status, StatusCode::OK);
+    let warning = answer.json()["warnings"][0].to_string();
+    assert!(warning.contains("-7200000 ms"), "{warning}");
 }

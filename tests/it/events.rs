@@ -4,6 +4,7 @@ use axum::http::StatusCode;
 use futures_util::future::join_all;
 use noctule::http::Phase;
 use noctule::job::{Event, Status};
+use noctule::store::Options;
 use reqwest::{Client, RequestBuilder};
 use serde_json::Value;
 
@@ -36,7 +37,10 @@ struct Followed {
 
 impl Followed {
     async fn new() -> Self {
-        let api = Api::new();
+        Self::over(Api::new()).await
+    }
+
+    async fn over(api: Api) -> Self {
         Self {
             server: Server::start(&api).await,
             address: api.submit().await,
@@ -324,4 +328,59 @@ async fn many_readers_of_one_plan_read_the_same() {
     for reader in readers {
         assert_eq!(reader.await.expect("read"), expected);
     }
+}
+
+/// A plan of whose history the first `forgotten` events are no longer kept, and its last id.
+async fn with_a_forgotten_beginning() -> (Followed, u64, u64) {
+    let options = Options {
+        events_kept: 40,
+        ..Options::new(10)
+    };
+    let plan = Followed::over(Api::with_store(options)).await;
+    let lease = plan.api.store.claim().await.expect("a queued plan");
+    for batch in a_run().chunks(10) {
+        let batch = batch.to_vec();
+        plan.api.store.append(&lease, batch).await.expect("held");
+    }
+    run::finish(&*plan.api.store, &lease, Status::Succeeded).await;
+    let id = lease.plan.id;
+    let page = plan.api.store.events(id, 0, 1_000).await.expect("there");
+    let last = page.events.last().expect("an end").id;
+    assert!(page.forgotten > 10);
+    (plan, page.forgotten, last)
+}
+
+#[tokio::test]
+async fn who_asks_for_forgotten_events_is_told_which_are_missing() {
+    let (plan, forgotten, last) = with_a_forgotten_beginning().await;
+    for after in [1, 2, forgotten - 1] {
+        let blocks = plan.read(&format!("?rate=0&last_event_id={after}")).await;
+        let Block::Event { id, name, data } = &blocks[0] else {
+            panic!("{blocks:?}")
+        };
+        assert_eq!((*id, name.as_str()), (forgotten, "gap"));
+        let missing = serde_json::json!({"from": after + 1, "to": forgotten});
+        assert_eq!(*data, missing);
+        let ids: Vec<u64> = events(&blocks).into_iter().map(|(id, _)| id).collect();
+        assert_eq!(ids, (forgotten..=last).collect::<Vec<_>>());
+    }
+    // Nothing is missing for who has read as far as that.
+    let blocks = plan
+        .read(&format!("?rate=0&last_event_id={forgotten}"))
+        .await;
+    assert_eq!(events(&blocks)[0].0, forgotten + 1);
+    assert!(events(&blocks).iter().all(|(_, name)| name != "gap"));
+}
+
+#[tokio::test]
+async fn who_comes_fresh_to_a_long_history_begins_with_the_record_as_it_is() {
+    let (plan, forgotten, last) = with_a_forgotten_beginning().await;
+    let blocks = plan.read("?rate=0").await;
+    let Block::Event { id, name, data } = &blocks[0] else {
+        panic!("{blocks:?}")
+    };
+    assert_eq!((*id, name.as_str()), (forgotten, "status"));
+    assert_eq!(data["status"], "succeeded");
+    let ids: Vec<u64> = events(&blocks).into_iter().map(|(id, _)| id).collect();
+    assert_eq!(ids, (forgotten..=last).collect::<Vec<_>>());
 }

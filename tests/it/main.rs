@@ -9,6 +9,7 @@ mod config;
 mod crash;
 mod determinism;
 mod events;
+mod idempotency;
 mod layering;
 
 mod logs;

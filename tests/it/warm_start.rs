@@ -144,7 +144,8 @@ async fn a_search_does_not_lose_the_route_it_starts_from() {
     let service = Service::start(directory.path(), &[]);
     let planned = async |document: &Value| {
         let address = service.submit(document).await;
-        assert_eq!(service.ended(&address).await["status"], "succeeded");
+        let ended = service.ended(&address).await;
+        assert_eq!(ended["status"], "succeeded", "{ended}");
         let result = service.bytes(&format!("{address}/result")).await;
         let result: Value = serde_json::from_slice(&result).expect("JSON");
         (id_of(&address), result)

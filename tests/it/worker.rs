@@ -39,7 +39,7 @@ async fn submit(store: &dyn Store, scenario: &str) -> PlanId {
         scenario: scenario.to_owned(),
         ..submission()
     };
-    store.submit(submission).await.unwrap().id
+    store.submit(submission).await.unwrap().plan.id
 }
 
 async fn ended(store: &dyn Store, id: PlanId) -> Status {

@@ -197,11 +197,13 @@ fn warm_start(at: At<'_>, limit: usize, faults: &mut Faults) -> Option<Option<Wa
 /// Points of a route; start and target may be among them.
 fn waypoints(at: At<'_>, limit: usize, faults: &mut Faults) -> Option<Vec<Point3>> {
     let count = at.len(faults)?;
-    if count > limit.saturating_add(2) {
+    // With start and target.
+    let most = limit.saturating_add(2);
+    if count > most {
         faults.add(at.path, "too-many", || {
             format!(
                 "waypoints has {count} items, must have at most {} (limit waypoints, and both ends)",
-                limit.saturating_add(2)
+                most
             )
         });
         return None;

@@ -4,8 +4,10 @@
 //! process died is queued again when the next one opens the file.
 
 mod changes;
+mod idempotency;
 mod operations;
 mod read;
+mod removal;
 mod row;
 mod schema;
 mod transaction;
@@ -23,9 +25,12 @@ use tokio::sync::watch;
 use self::changes::Changes;
 use self::read::Readers;
 use self::writer::Writer;
-use super::{Clock, Ending, Lease, ListQuery, Options, Stats, Store, StoreError};
+use super::{
+    Clock, Ending, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError, Submitted,
+};
+use crate::export::document::Incumbent;
 use crate::job::state::Refused;
-use crate::job::{Event, NumberedEvent, Plan, PlanId, Status, Submission};
+use crate::job::{Event, Plan, PlanId, Status, Submission};
 
 /// Name of the database in the data directory.
 const DATABASE: &str = "noctule.db";
@@ -83,7 +88,7 @@ impl SqliteStore {
 
 #[async_trait]
 impl Store for SqliteStore {
-    async fn submit(&self, submission: Submission) -> Result<Plan, StoreError> {
+    async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError> {
         self.writer
             .change(move |tx| operations::submit(tx, &submission))
             .await
@@ -154,18 +159,20 @@ impl Store for SqliteStore {
             .await
     }
 
+    async fn incumbent(&self, id: PlanId) -> Result<Option<Incumbent>, StoreError> {
+        let now_ms = (self.clock)();
+        self.readers
+            .read(move |connection| read::incumbent(connection, id, now_ms))
+            .await
+    }
+
     async fn list(&self, query: ListQuery) -> Result<Vec<Plan>, StoreError> {
         self.readers
             .read(move |connection| read::list(connection, query))
             .await
     }
 
-    async fn events(
-        &self,
-        id: PlanId,
-        after: u64,
-        limit: usize,
-    ) -> Result<Vec<NumberedEvent>, StoreError> {
+    async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<EventPage, StoreError> {
         let now_ms = (self.clock)();
         self.readers
             .read(move |connection| read::events(connection, id, after, limit, now_ms))
@@ -174,6 +181,12 @@ impl Store for SqliteStore {
 
     fn changes(&self, id: PlanId) -> watch::Receiver<u64> {
         self.changes.subscribe(id)
+    }
+
+    async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError> {
+        self.writer
+            .change(move |tx| removal::sweep(tx, now_ms))
+            .await
     }
 
     async fn stats(&self) -> Result<Stats, StoreError> {
@@ -266,7 +279,6 @@ fn sync_directory(data_dir: &Path) -> Result<(), StoreError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::wall_clock;
 
     fn submission(bytes: usize) -> Submission {
         Submission {
@@ -277,6 +289,9 @@ mod tests {
             iterations: 200,
             scenario: "x".repeat(bytes),
             created_ms: 1_000,
+            owner: None,
+            quota: None,
+            idempotency: None,
         }
     }
 
@@ -289,17 +304,14 @@ mod tests {
         connection
             .pragma_update(None, "max_page_count", 200)
             .expect("the file is smaller");
-        let options = Options {
-            queue_limit: 1_000,
-            clock: wall_clock(),
-        };
+        let options = Options::new(1_000);
         let store =
             SqliteStore::assemble(connection, lock, file, options).expect("the tables are there");
 
         let mut accepted = Vec::new();
         let refusal = loop {
             match store.submit(submission(20_000)).await {
-                Ok(plan) => accepted.push(plan.id),
+                Ok(submitted) => accepted.push(submitted.plan.id),
                 Err(error) => break error,
             }
         };
@@ -311,7 +323,7 @@ mod tests {
         // Those that came with one that has no room are refused at worst, never half done.
         let together = [20, 500_000, 30].map(|bytes| store.submit(submission(bytes)));
         for answer in futures_util::future::join_all(together).await {
-            accepted.extend(answer.map(|plan| plan.id));
+            accepted.extend(answer.map(|submitted| submitted.plan.id));
         }
         for id in &accepted[..5] {
             store.delete(*id, 0).await.expect("deleting makes room");
@@ -320,7 +332,7 @@ mod tests {
             .submit(submission(20_000))
             .await
             .expect("there is room again");
-        assert_eq!(last.queue_position, Some(accepted.len() as u64 - 4));
+        assert_eq!(last.plan.queue_position, Some(accepted.len() as u64 - 4));
         for id in &accepted[5..] {
             let lease = store.claim().await.expect("they are queued");
             assert_eq!(lease.plan.id, *id);

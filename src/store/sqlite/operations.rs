@@ -8,30 +8,66 @@ use tokio::sync::watch;
 use super::read::missing;
 use super::row::PlanRow;
 use super::transaction::{Effect, Transaction};
+use super::{idempotency, removal};
+use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Status, Submission};
-use crate::store::{Ending, Lease, StoreError, TOMBSTONE_MS};
+use crate::store::{Ending, Lease, StoreError, Submitted, Tombstone};
 
 pub(super) fn submit(
     tx: &mut Transaction<'_>,
     submission: &Submission,
-) -> Result<Plan, StoreError> {
-    if tx.queued >= tx.queue_limit {
+) -> Result<Submitted, StoreError> {
+    if let Some(first) = idempotency::earlier(tx, submission)? {
+        return match PlanRow::load(tx.connection, first)? {
+            Some(row) => Ok(Submitted {
+                plan: row.plan,
+                replayed: true,
+            }),
+            None => Err(missing(tx.connection, first, tx.now_ms())?),
+        };
+    }
+    if tx.queued >= tx.options.queue_limit {
         return Err(StoreError::QueueFull { queued: tx.queued });
     }
+    within_quota(tx, submission)?;
     let mut row = PlanRow {
         seq: 0,
         attempt: 0,
         last_event: 0,
+        forgotten: 0,
+        bytes: submission.scenario.len() as u64,
         plan: Plan::accepted(submission, tx.queued + 1),
     };
     row.insert(tx.connection)?;
     tx.connection
         .prepare_cached("INSERT INTO scenarios (plan_seq, document) VALUES (?1, ?2)")?
         .execute(params![row.seq, submission.scenario])?;
+    idempotency::remember(tx, submission)?;
     tx.queued += 1;
     tell_status(tx, &mut row)?;
     row.update(tx.connection)?;
-    Ok(row.plan)
+    Ok(Submitted {
+        plan: row.plan,
+        replayed: false,
+    })
+}
+
+fn within_quota(tx: &Transaction<'_>, submission: &Submission) -> Result<(), StoreError> {
+    let Some(quota) = submission.quota else {
+        return Ok(());
+    };
+    let active: i64 = tx
+        .connection
+        .prepare_cached(
+            "SELECT count(*) FROM plans INDEXED BY plans_active \
+             WHERE owner IS ?1 AND status IN ('queued', 'running')",
+        )?
+        .query_row([&submission.owner], |row| row.get(0))?;
+    let active = active.cast_unsigned();
+    if active >= quota {
+        return Err(StoreError::QuotaReached { active });
+    }
+    Ok(())
 }
 
 /// `None` when nothing is queued.
@@ -39,7 +75,7 @@ pub(super) fn claim(tx: &mut Transaction<'_>) -> Result<Option<Lease>, StoreErro
     let Some(mut row) = PlanRow::head(tx.connection)? else {
         return Ok(None);
     };
-    row.plan.start((tx.clock)())?;
+    row.plan.start(tx.now_ms())?;
     row.attempt += 1;
     tx.queued -= 1;
     tell_status(tx, &mut row)?;
@@ -72,6 +108,13 @@ pub(super) fn append(
     if let Some(point) = last_point {
         row.plan.advance(point);
     }
+    let best = events.iter().rev().find_map(|event| match event {
+        Event::Incumbent(incumbent) => Some(incumbent),
+        _ => None,
+    });
+    if let Some(best) = best {
+        keep_incumbent(tx, &row, best)?;
+    }
     tx.tell(&mut row, events)?;
     row.update(tx.connection)?;
     Ok(())
@@ -86,7 +129,9 @@ pub(super) fn finish(
 ) -> Result<Plan, StoreError> {
     let mut row = leased(tx, id, attempt)?;
     ending.apply(&mut row.plan, now_ms)?;
+    forget_incumbent(tx, &row)?;
     if let Ending::Result { document, .. } = ending {
+        row.bytes += document.len() as u64;
         tx.connection
             .prepare_cached("INSERT INTO results (plan_seq, document) VALUES (?1, ?2)")?
             .execute(params![row.seq, document])?;
@@ -131,7 +176,7 @@ pub(super) fn request_cancel(
     now_ms: i64,
 ) -> Result<Plan, StoreError> {
     let Some(mut row) = PlanRow::load(tx.connection, id)? else {
-        return Err(missing(tx.connection, id, (tx.clock)())?);
+        return Err(missing(tx.connection, id, tx.now_ms())?);
     };
     match row.plan.status {
         Status::Queued => {
@@ -152,39 +197,30 @@ pub(super) fn request_cancel(
 }
 
 pub(super) fn delete(tx: &mut Transaction<'_>, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
-    bury_for_good(tx, now_ms)?;
+    removal::bury_for_good(tx, now_ms)?;
     let Some(row) = PlanRow::load(tx.connection, id)? else {
         return match missing(tx.connection, id, now_ms)? {
             StoreError::Gone(_) => Ok(()),
             other => Err(other),
         };
     };
-    tx.connection
-        .prepare_cached("DELETE FROM plans WHERE seq = ?1")?
-        .execute([row.seq])?;
-    tx.connection
-        .prepare_cached("INSERT OR REPLACE INTO tombstones (id, deleted_ms) VALUES (?1, ?2)")?
-        .execute(params![id.to_string(), now_ms])?;
+    let tombstone = Tombstone {
+        id,
+        owner: row.plan.owner,
+        expired: false,
+    };
+    removal::remove(tx, row.seq, tombstone, now_ms)?;
     if row.plan.status == Status::Queued {
         tx.queued -= 1;
     }
-    tx.effects
-        .extend([Effect::Stop(id), Effect::Unleased(id), Effect::Changed(id)]);
-    Ok(())
-}
-
-/// Forget the tombstones that have expired.
-pub(super) fn bury_for_good(tx: &mut Transaction<'_>, now_ms: i64) -> Result<(), StoreError> {
-    tx.connection
-        .prepare_cached("DELETE FROM tombstones WHERE deleted_ms <= ?1")?
-        .execute([now_ms.saturating_sub(TOMBSTONE_MS)])?;
+    tx.effects.extend([Effect::Stop(id), Effect::Unleased(id)]);
     Ok(())
 }
 
 pub(super) fn touch(tx: &mut Transaction<'_>) -> Result<(), StoreError> {
     tx.connection
         .prepare_cached("UPDATE health SET checked_ms = ?1")?
-        .execute([(tx.clock)()])?;
+        .execute([tx.now_ms()])?;
     Ok(())
 }
 
@@ -198,12 +234,13 @@ fn leased(tx: &Transaction<'_>, id: PlanId, attempt: u64) -> Result<PlanRow, Sto
 /// Back to the queue, or to its end when that was asked for.
 fn give_back(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<(), StoreError> {
     if row.plan.cancel_requested {
-        row.plan.cancel((tx.clock)())?;
+        row.plan.cancel(tx.now_ms())?;
         tell_end(tx, &mut row)?;
         row.update(tx.connection)?;
         return Ok(());
     }
     row.plan.requeue()?;
+    forget_incumbent(tx, &row)?;
     tx.queued += 1;
     // Its place is counted over the others, so its own state must be in the table first.
     row.update(tx.connection)?;
@@ -213,12 +250,33 @@ fn give_back(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<(), StoreErro
     Ok(())
 }
 
+fn keep_incumbent(tx: &Transaction<'_>, row: &PlanRow, best: &Incumbent) -> Result<(), StoreError> {
+    let document = serde_json::to_string(best).map_err(|error| {
+        StoreError::Unavailable(format!("best route of plan {}: {error}", row.plan.id))
+    })?;
+    tx.connection
+        .prepare_cached("INSERT OR REPLACE INTO incumbents (plan_seq, document) VALUES (?1, ?2)")?
+        .execute(params![row.seq, document])?;
+    Ok(())
+}
+
+fn forget_incumbent(tx: &Transaction<'_>, row: &PlanRow) -> Result<(), StoreError> {
+    tx.connection
+        .prepare_cached("DELETE FROM incumbents WHERE plan_seq = ?1")?
+        .execute([row.seq])?;
+    Ok(())
+}
+
 fn tell_status(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
     let status = Event::Status(Box::new(row.plan.clone()));
     tx.tell(row, &[status])
 }
 
+/// The caller has just ended the plan. From now on its time runs.
 fn tell_end(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
+    let age_ms = tx.options.retention.age_ms;
+    let expires_ms = row.plan.finished_ms.zip(age_ms);
+    row.plan.expires_ms = expires_ms.map(|(end, age)| end.saturating_add(age));
     let status = Event::Status(Box::new(row.plan.clone()));
     let end = Event::End(row.plan.status);
     tx.tell(row, &[status, end])

@@ -9,8 +9,9 @@ use tokio::sync::Semaphore;
 
 use super::row::{COLUMNS, PlanRow};
 use super::{BUSY_TIMEOUT, closed};
+use crate::export::document::Incumbent;
 use crate::job::{Event, NumberedEvent, Plan, PlanId, Status};
-use crate::store::{ListQuery, Stats, StoreError, TOMBSTONE_MS};
+use crate::store::{EventPage, ListQuery, Stats, StoreError, TOMBSTONE_MS, Tombstone};
 
 /// Reads at the same time; more wait.
 const CONNECTIONS: u32 = 8;
@@ -111,6 +112,19 @@ pub(super) fn result(
     document(connection, sql, id, now_ms)
 }
 
+/// See [`Store::incumbent`](crate::store::Store::incumbent).
+pub(super) fn incumbent(
+    connection: &Connection,
+    id: PlanId,
+    now_ms: i64,
+) -> Result<Option<Incumbent>, StoreError> {
+    let sql = "SELECT document FROM plans LEFT JOIN incumbents ON plan_seq = seq WHERE id = ?1";
+    let document = document(connection, sql, id, now_ms)?;
+    let read = document.map(|document| serde_json::from_str(&document));
+    read.transpose()
+        .map_err(|error| StoreError::Unavailable(format!("best route of plan {id}: {error}")))
+}
+
 fn document(
     connection: &Connection,
     sql: &str,
@@ -133,6 +147,10 @@ pub(super) fn list(connection: &Connection, query: ListQuery) -> Result<Vec<Plan
     if let Some(status) = query.status {
         conditions.push("status = ?");
         values.push(Value::from(status.name().to_owned()));
+    }
+    if let Some(owner) = query.owner {
+        conditions.push("owner = ?");
+        values.push(Value::from(owner));
     }
     if let Some(before) = query.before {
         conditions.push("id < ?");
@@ -181,12 +199,12 @@ pub(super) fn events(
     after: u64,
     limit: usize,
     now_ms: i64,
-) -> Result<Vec<NumberedEvent>, StoreError> {
-    let seq: Option<i64> = connection
-        .prepare_cached("SELECT seq FROM plans WHERE id = ?1")?
-        .query_row([id.to_string()], |row| row.get(0))
+) -> Result<EventPage, StoreError> {
+    let plan: Option<(i64, i64)> = connection
+        .prepare_cached("SELECT seq, forgotten FROM plans WHERE id = ?1")?
+        .query_row([id.to_string()], |row| Ok((row.get(0)?, row.get(1)?)))
         .optional()?;
-    let Some(seq) = seq else {
+    let Some((seq, forgotten)) = plan else {
         return Err(missing(connection, id, now_ms)?);
     };
     let after = i64::try_from(after).unwrap_or(i64::MAX);
@@ -209,7 +227,10 @@ pub(super) fn events(
         }));
     }
     events.truncate(limit);
-    Ok(events)
+    Ok(EventPage {
+        forgotten: forgotten.cast_unsigned(),
+        events,
+    })
 }
 
 pub(super) fn stats(connection: &Connection) -> Result<Stats, StoreError> {
@@ -246,13 +267,16 @@ pub(super) fn missing(
     id: PlanId,
     now_ms: i64,
 ) -> Result<StoreError, StoreError> {
-    let deleted_ms: Option<i64> = connection
-        .prepare_cached("SELECT deleted_ms FROM tombstones WHERE id = ?1")?
-        .query_row([id.to_string()], |row| row.get(0))
+    let tombstone: Option<(i64, Tombstone)> = connection
+        .prepare_cached("SELECT deleted_ms, owner, expired FROM tombstones WHERE id = ?1")?
+        .query_row([id.to_string()], |row| {
+            let (owner, expired) = (row.get(1)?, row.get(2)?);
+            Ok((row.get(0)?, Tombstone { id, owner, expired }))
+        })
         .optional()?;
-    Ok(match deleted_ms {
-        Some(deleted_ms) if now_ms.saturating_sub(deleted_ms) < TOMBSTONE_MS => {
-            StoreError::Gone(id)
+    Ok(match tombstone {
+        Some((deleted_ms, tombstone)) if now_ms.saturating_sub(deleted_ms) < TOMBSTONE_MS => {
+            StoreError::Gone(tombstone)
         }
         _ => StoreError::NotFound(id),
     })

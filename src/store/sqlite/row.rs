@@ -5,9 +5,10 @@ use rusqlite::{Connection, OptionalExtension, Row, named_params};
 use crate::job::{Failure, Plan, PlanId, Status};
 
 /// The columns that [`PlanRow::read`] wants.
-pub(super) const COLUMNS: &str = "seq, id, name, status, stop_reason, feasible, best_cost, progress, \
+pub(super) const COLUMNS: &str = "seq, id, owner, name, status, stop_reason, feasible, best_cost, progress, \
      iteration, iterations, evaluations, algorithm, seed, created_ms, started_ms, finished_ms, expires_ms, \
-     cancel_requested, error_kind, error_detail, revision, attempt, last_event";
+     cancel_requested, error_kind, error_detail, revision, attempt, last_event, \
+     forgotten, bytes";
 
 /// A record with what the store alone knows of it.
 #[derive(Debug)]
@@ -15,6 +16,10 @@ pub(super) struct PlanRow {
     pub(super) seq: i64,
     pub(super) attempt: u64,
     pub(super) last_event: u64,
+    /// Events up to this one are no longer kept.
+    pub(super) forgotten: u64,
+    /// Of its documents and events.
+    pub(super) bytes: u64,
     /// `queue_position` is no column: see [`queue_position`].
     pub(super) plan: Plan,
 }
@@ -23,6 +28,7 @@ impl PlanRow {
     pub(super) fn read(row: &Row<'_>) -> rusqlite::Result<Self> {
         let plan = Plan {
             id: text(row, "id", |id| PlanId::parse_str(id).ok())?,
+            owner: row.get("owner")?,
             name: row.get("name")?,
             status: text(row, "status", Status::from_name)?,
             stop_reason: row.get("stop_reason")?,
@@ -47,6 +53,8 @@ impl PlanRow {
             seq: row.get("seq")?,
             attempt: count(row, "attempt")?,
             last_event: count(row, "last_event")?,
+            forgotten: count(row, "forgotten")?,
+            bytes: count(row, "bytes")?,
             plan,
         })
     }
@@ -87,13 +95,14 @@ impl PlanRow {
         let plan = &self.plan;
         connection
             .prepare_cached(
-                "INSERT INTO plans (id, name, status, progress, iteration, iterations, evaluations, \
-                 algorithm, seed, created_ms, cancel_requested, revision, attempt, last_event) \
-                 VALUES (:id, :name, :status, :progress, :iteration, :iterations, :evaluations, \
-                 :algorithm, :seed, :created_ms, :cancel_requested, :revision, :attempt, :last_event)",
+                "INSERT INTO plans (id, owner, name, status, progress, iteration, iterations, evaluations, \
+                 algorithm, seed, created_ms, cancel_requested, revision, attempt, last_event, bytes) \
+                 VALUES (:id, :owner, :name, :status, :progress, :iteration, :iterations, :evaluations, \
+                 :algorithm, :seed, :created_ms, :cancel_requested, :revision, :attempt, :last_event, :bytes)",
             )?
             .execute(named_params! {
                 ":id": plan.id.to_string(),
+                ":owner": plan.owner,
                 ":name": plan.name,
                 ":status": plan.status.name(),
                 ":progress": plan.progress,
@@ -107,6 +116,7 @@ impl PlanRow {
                 ":revision": plan.revision.cast_signed(),
                 ":attempt": self.attempt.cast_signed(),
                 ":last_event": self.last_event.cast_signed(),
+                ":bytes": self.bytes.cast_signed(),
             })?;
         self.seq = connection.last_insert_rowid();
         Ok(())
@@ -123,7 +133,8 @@ impl PlanRow {
                  evaluations = :evaluations, started_ms = :started_ms, finished_ms = :finished_ms, \
                  expires_ms = :expires_ms, cancel_requested = :cancel_requested, \
                  error_kind = :error_kind, error_detail = :error_detail, revision = :revision, \
-                 attempt = :attempt, last_event = :last_event WHERE seq = :seq",
+                 attempt = :attempt, last_event = :last_event, forgotten = :forgotten, \
+                 bytes = :bytes WHERE seq = :seq",
             )?
             .execute(named_params! {
                 ":status": plan.status.name(),
@@ -142,6 +153,8 @@ impl PlanRow {
                 ":revision": plan.revision.cast_signed(),
                 ":attempt": self.attempt.cast_signed(),
                 ":last_event": self.last_event.cast_signed(),
+                ":forgotten": self.forgotten.cast_signed(),
+                ":bytes": self.bytes.cast_signed(),
                 ":seq": self.seq,
             })?;
         Ok(())

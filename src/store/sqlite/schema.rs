@@ -4,10 +4,11 @@ use rusqlite::Connection;
 
 use crate::store::StoreError;
 
-/// Kept in `user_version`.
-const VERSION: i64 = 1;
-
-const TABLES: &str = "
+/// What leads from each version to the next, the first from an empty file. The version reached is
+/// kept in `user_version`. Rows are only ever added here: a file of any earlier version is brought
+/// up step by step, and a new one takes the same way.
+const STEPS: &[&str] = &[
+    "
 CREATE TABLE plans (
     seq INTEGER PRIMARY KEY AUTOINCREMENT, -- order of acceptance, and of the queue
     id TEXT NOT NULL UNIQUE,               -- UUID version 7: sorts by the time of acceptance
@@ -65,23 +66,60 @@ CREATE TABLE health (                      -- one row, touched to see whether wr
     checked_ms INTEGER NOT NULL
 ) STRICT;
 INSERT INTO health VALUES (1, 0);
-";
+",
+    "
+ALTER TABLE plans ADD COLUMN owner TEXT;                         -- name of the key it came with
+ALTER TABLE plans ADD COLUMN forgotten INTEGER NOT NULL DEFAULT 0; -- events up to this id are no longer kept
+ALTER TABLE plans ADD COLUMN bytes INTEGER NOT NULL DEFAULT 0;   -- of its documents and events
+UPDATE plans SET bytes =
+    coalesce((SELECT octet_length(document) FROM scenarios WHERE plan_seq = seq), 0)
+    + coalesce((SELECT octet_length(document) FROM results WHERE plan_seq = seq), 0)
+    + coalesce((SELECT sum(octet_length(batch)) FROM events WHERE plan_seq = seq), 0);
+CREATE INDEX plans_by_owner ON plans (owner, id);
+CREATE INDEX plans_active ON plans (owner) WHERE status IN ('queued', 'running');
+CREATE INDEX plans_ended ON plans (finished_ms, bytes) WHERE finished_ms IS NOT NULL;
+CREATE INDEX plans_expiring ON plans (expires_ms) WHERE expires_ms IS NOT NULL;
 
-/// Create the tables in a new file; refuse those of a newer version.
+CREATE TABLE incumbents (                  -- the best route of each run so far
+    plan_seq INTEGER PRIMARY KEY REFERENCES plans (seq) ON DELETE CASCADE,
+    document TEXT NOT NULL
+) STRICT;
+
+ALTER TABLE tombstones ADD COLUMN owner TEXT;
+ALTER TABLE tombstones ADD COLUMN expired INTEGER NOT NULL DEFAULT 0; -- else deleted by somebody
+CREATE INDEX tombstones_by_age ON tombstones (deleted_ms);
+
+CREATE TABLE idempotency_keys (            -- for a day
+    owner TEXT NOT NULL,                   -- '' where nobody has a key
+    key TEXT NOT NULL,
+    body_sha256 TEXT NOT NULL,
+    plan_id TEXT NOT NULL,
+    seen_ms INTEGER NOT NULL,
+    PRIMARY KEY (owner, key)
+) STRICT, WITHOUT ROWID;
+CREATE INDEX idempotency_keys_by_age ON idempotency_keys (seen_ms);
+",
+];
+
+/// Bring the file up to this version; refuse those of a newer one.
 pub(super) fn prepare(connection: &mut Connection) -> Result<(), StoreError> {
     let transaction = connection.transaction()?;
     let version: i64 = transaction.query_row("PRAGMA user_version", [], |row| row.get(0))?;
-    match version {
-        VERSION => {}
-        0 => {
-            transaction.execute_batch(TABLES)?;
-            transaction.pragma_update(None, "user_version", VERSION)?;
-        }
-        other => {
-            return Err(StoreError::Unavailable(format!(
-                "the database has schema version {other}, this program knows up to {VERSION}: use a newer one"
-            )));
-        }
+    let missing = usize::try_from(version)
+        .ok()
+        .and_then(|version| STEPS.get(version..));
+    let Some(missing) = missing else {
+        let newest = STEPS.len();
+        return Err(StoreError::Unavailable(format!(
+            "the database has schema version {version}, this program knows up to {newest}: use a newer one"
+        )));
+    };
+    for step in missing {
+        transaction.execute_batch(step)?;
+    }
+    if !missing.is_empty() {
+        let version = version + missing.len().cast_signed() as i64;
+        transaction.pragma_update(None, "user_version", version)?;
     }
     transaction.commit()?;
     Ok(())

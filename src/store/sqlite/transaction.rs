@@ -5,7 +5,7 @@ use tokio::sync::watch;
 
 use super::row::PlanRow;
 use crate::job::{Event, PlanId};
-use crate::store::{Clock, StoreError};
+use crate::store::{Options, StoreError};
 
 /// Events in a row of the table, at most.
 const BATCH: usize = 256;
@@ -13,8 +13,7 @@ const BATCH: usize = 256;
 /// An open transaction and what it has come to so far.
 pub(super) struct Transaction<'a> {
     pub(super) connection: &'a Connection,
-    pub(super) clock: &'a Clock,
-    pub(super) queue_limit: u64,
+    pub(super) options: &'a Options,
     /// Plans queued, what this transaction did included.
     pub(super) queued: u64,
     /// What the world is told once it is durable.
@@ -74,7 +73,13 @@ impl Transaction<'_> {
         Ok(())
     }
 
-    /// Add to the events of a plan; the caller writes the row.
+    /// Now, milliseconds since 1970.
+    pub(super) fn now_ms(&self) -> i64 {
+        (self.options.clock)()
+    }
+
+    /// Add to the events of a plan, and forget its oldest when there are too many; the caller writes
+    /// the row.
     pub(super) fn tell(&mut self, row: &mut PlanRow, events: &[Event]) -> Result<(), StoreError> {
         for batch in events.chunks(BATCH) {
             let first_id = row.last_event + 1;
@@ -82,6 +87,7 @@ impl Transaction<'_> {
             let text = serde_json::to_string(batch).map_err(|error| {
                 StoreError::Unavailable(format!("events of plan {}: {error}", row.plan.id))
             })?;
+            row.bytes += text.len() as u64;
             self.connection
                 .prepare_cached(
                     "INSERT INTO events (plan_seq, last_id, first_id, batch) VALUES (?1, ?2, ?3, ?4)",
@@ -94,6 +100,31 @@ impl Transaction<'_> {
                 ])?;
         }
         self.effects.push(Effect::Changed(row.plan.id));
+        self.forget(row)
+    }
+
+    /// Whole batches at once, and only when there are half as many again as are to be kept: so that
+    /// most steps delete nothing.
+    fn forget(&mut self, row: &mut PlanRow) -> Result<(), StoreError> {
+        let kept = self.options.events_kept;
+        if row.last_event - row.forgotten <= kept.saturating_add(kept / 2) {
+            return Ok(());
+        }
+        let oldest = (row.last_event - kept).cast_signed();
+        let (last_id, bytes): (Option<i64>, Option<i64>) = self
+            .connection
+            .prepare_cached(
+                "SELECT max(last_id), sum(octet_length(batch)) FROM events \
+                 WHERE plan_seq = ?1 AND last_id <= ?2",
+            )?
+            .query_row([row.seq, oldest], |sums| Ok((sums.get(0)?, sums.get(1)?)))?;
+        if let (Some(last_id), Some(bytes)) = (last_id, bytes) {
+            self.connection
+                .prepare_cached("DELETE FROM events WHERE plan_seq = ?1 AND last_id <= ?2")?
+                .execute([row.seq, last_id])?;
+            row.forgotten = last_id.cast_unsigned();
+            row.bytes = row.bytes.saturating_sub(bytes.cast_unsigned());
+        }
         Ok(())
     }
 }

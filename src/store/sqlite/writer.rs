@@ -12,8 +12,8 @@ use tokio::sync::{oneshot, watch};
 
 use super::changes::Changes;
 use super::closed;
-use super::operations;
 use super::transaction::{Effect, Transaction};
+use super::{operations, removal};
 use crate::job::PlanId;
 use crate::store::{Lease, Options, StoreError};
 
@@ -199,7 +199,7 @@ impl Desk {
         let now_ms = (self.options.clock)();
         self.commit(|tx, _| {
             tx.savepoint(|tx| {
-                operations::bury_for_good(tx, now_ms)?;
+                removal::bury_for_good(tx, now_ms)?;
                 operations::recover(tx)
             })
         })?
@@ -289,8 +289,7 @@ impl Desk {
             .execute([])?;
         let mut tx = Transaction {
             connection: &self.connection,
-            clock: &self.options.clock,
-            queue_limit: self.options.queue_limit,
+            options: &self.options,
             queued: self.queued,
             effects: Vec::new(),
             lost: None,

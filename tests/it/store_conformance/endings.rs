@@ -12,7 +12,7 @@ use crate::support::stores::on_every_backend;
 #[tokio::test(flavor = "multi_thread")]
 async fn a_run_moves_the_record() {
     on_every_backend(10, async |store| {
-        let id = store.submit(submission()).await.unwrap().id;
+        let id = store.submit(submission()).await.unwrap().plan.id;
         let lease = store.claim().await.unwrap();
         store
             .append(&lease, vec![point(0, None), point(1, None)])
@@ -71,7 +71,7 @@ async fn a_run_moves_the_record() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_failed_run_tells_why() {
     on_every_backend(10, async |store| {
-        let id = store.submit(submission()).await.unwrap().id;
+        let id = store.submit(submission()).await.unwrap().plan.id;
         let lease = store.claim().await.unwrap();
         store.finish(&lease, failure(), 12_000).await.unwrap();
         let plan = store.get(id).await.unwrap();
@@ -92,7 +92,7 @@ async fn a_failed_run_tells_why() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_result_is_kept_byte_for_byte() {
     on_every_backend(10, async |store| {
-        let id = store.submit(submission()).await.unwrap().id;
+        let id = store.submit(submission()).await.unwrap().plan.id;
         let lease = store.claim().await.unwrap();
         store
             .finish(&lease, ending(Status::Succeeded), 0)
@@ -114,7 +114,7 @@ async fn a_result_is_kept_byte_for_byte() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_lease_that_is_over_changes_nothing() {
     on_every_backend(10, async |store| {
-        let id = store.submit(submission()).await.unwrap().id;
+        let id = store.submit(submission()).await.unwrap().plan.id;
         let released = store.claim().await.unwrap();
         store.release(&released).await.unwrap();
         let recovered = store.claim().await.unwrap();
@@ -153,8 +153,8 @@ async fn a_lease_that_is_over_changes_nothing() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_queued_plan_is_cancelled_at_once_without_a_result() {
     on_every_backend(10, async |store| {
-        let id = store.submit(submission()).await.unwrap().id;
-        let next = store.submit(submission()).await.unwrap().id;
+        let id = store.submit(submission()).await.unwrap().plan.id;
+        let next = store.submit(submission()).await.unwrap().plan.id;
         let plan = store.request_cancel(id, 11_000).await.unwrap();
         assert_eq!(
             (plan.status, plan.finished_ms),
@@ -177,7 +177,7 @@ async fn a_queued_plan_is_cancelled_at_once_without_a_result() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_running_plan_is_told_to_stop_and_ends_with_its_result() {
     on_every_backend(10, async |store| {
-        let id = store.submit(submission()).await.unwrap().id;
+        let id = store.submit(submission()).await.unwrap().plan.id;
         let mut lease = store.claim().await.unwrap();
         assert!(!*lease.cancel.borrow());
         let plan = store.request_cancel(id, 11_000).await.unwrap();
@@ -214,12 +214,12 @@ async fn a_running_plan_is_told_to_stop_and_ends_with_its_result() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_cancelled_run_that_comes_back_is_not_run_again() {
     on_every_backend(10, async |store| {
-        let released = store.submit(submission()).await.unwrap().id;
+        let released = store.submit(submission()).await.unwrap().plan.id;
         let lease = store.claim().await.unwrap();
         store.request_cancel(released, 11_000).await.unwrap();
         store.release(&lease).await.unwrap();
 
-        let recovered = store.submit(submission()).await.unwrap().id;
+        let recovered = store.submit(submission()).await.unwrap().plan.id;
         let _lease = store.claim().await.unwrap();
         store.request_cancel(recovered, 11_000).await.unwrap();
         store.reopen().await;
@@ -242,7 +242,7 @@ async fn a_cancelled_run_that_comes_back_is_not_run_again() {
 async fn a_plan_ends_once_however_its_endings_race() {
     on_every_backend(300, async |store| {
         for round in 0..150 {
-            let id = store.submit(submission()).await.unwrap().id;
+            let id = store.submit(submission()).await.unwrap().plan.id;
             let (claimer, canceller) = (store.share(), store.share());
             // In half of the rounds the plan runs before anybody can cancel it.
             let lease = if round % 2 == 0 {

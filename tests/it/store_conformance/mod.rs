@@ -3,6 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
 mod endings;
+mod keeping;
 mod model;
 mod queue;
 mod reading;
+mod repetition;

@@ -10,6 +10,7 @@ use crate::support::stores::on_every_backend;
 
 const ALL: ListQuery = ListQuery {
     status: None,
+    owner: None,
     before: None,
     limit: 1_000,
 };
@@ -19,7 +20,7 @@ async fn an_accepted_plan_reads_back_as_it_was_handed_in() {
     on_every_backend(10, async |store| {
         let first = submission();
         store.submit(submission()).await.unwrap();
-        let accepted = store.submit(first.clone()).await.unwrap();
+        let accepted = store.submit(first.clone()).await.unwrap().plan;
         let read = store.get(first.id).await.unwrap();
         assert_eq!(read, accepted);
         assert_eq!(
@@ -43,7 +44,7 @@ async fn plans_run_in_the_order_of_acceptance() {
     on_every_backend(20, async |store| {
         let mut ids = Vec::new();
         for _ in 0..20 {
-            ids.push(store.submit(submission()).await.unwrap().id);
+            ids.push(store.submit(submission()).await.unwrap().plan.id);
         }
         for (place, id) in ids.iter().enumerate() {
             let position = store.get(*id).await.unwrap().queue_position;
@@ -101,7 +102,7 @@ async fn a_claim_waits_for_a_plan() {
         }
         let mut submitted = Vec::new();
         for _ in 0..3 {
-            submitted.push(store.submit(submission()).await.unwrap().id);
+            submitted.push(store.submit(submission()).await.unwrap().plan.id);
         }
         let claimed = join_all(claims).await;
         let mut claimed: Vec<_> = claimed
@@ -121,8 +122,8 @@ async fn a_dropped_claim_takes_nothing() {
         let mut waiting = Box::pin(store.claim());
         assert!(waiting.as_mut().now_or_never().is_none());
         drop(waiting);
-        let id = store.submit(submission()).await.unwrap().id;
-        let second = store.submit(submission()).await.unwrap().id;
+        let id = store.submit(submission()).await.unwrap().plan.id;
+        let second = store.submit(submission()).await.unwrap().plan.id;
         assert_eq!(store.get(id).await.unwrap().status, Status::Queued);
 
         // Dropped at any time after it has been sent, its answer on the way or already there.
@@ -160,9 +161,9 @@ async fn a_dropped_submission_is_still_told_to_claimers_and_followers() {
 async fn a_released_plan_is_next_and_begins_anew() {
     on_every_backend(10, async |store| {
         let ids = [
-            store.submit(submission()).await.unwrap().id,
-            store.submit(submission()).await.unwrap().id,
-            store.submit(submission()).await.unwrap().id,
+            store.submit(submission()).await.unwrap().plan.id,
+            store.submit(submission()).await.unwrap().plan.id,
+            store.submit(submission()).await.unwrap().plan.id,
         ];
         let first = store.claim().await.unwrap();
         let second = store.claim().await.unwrap();

@@ -8,6 +8,7 @@ use crate::support::stores::on_every_backend;
 
 const ALL: ListQuery = ListQuery {
     status: None,
+    owner: None,
     before: None,
     limit: 1_000,
 };
@@ -29,9 +30,9 @@ async fn an_unknown_plan_is_not_found() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_deleted_plan_is_gone_for_a_day_and_then_unknown() {
     on_every_backend(10, async |store| {
-        let queued = store.submit(submission()).await.unwrap().id;
-        let running = store.submit(submission()).await.unwrap().id;
-        let ended = store.submit(submission()).await.unwrap().id;
+        let queued = store.submit(submission()).await.unwrap().plan.id;
+        let running = store.submit(submission()).await.unwrap().plan.id;
+        let ended = store.submit(submission()).await.unwrap().plan.id;
         store.delete(queued, store.now_ms()).await.unwrap();
         let mut lease = store.claim().await.unwrap();
         assert_eq!(lease.plan.id, running);
@@ -85,7 +86,7 @@ async fn a_deleted_plan_is_gone_for_a_day_and_then_unknown() {
 #[tokio::test(flavor = "multi_thread")]
 async fn events_are_read_without_loss_or_repeat_from_any_place() {
     on_every_backend(10, async |store| {
-        let id = store.submit(submission()).await.unwrap().id;
+        let id = store.submit(submission()).await.unwrap().plan.id;
         let lease = store.claim().await.unwrap();
         let mut iteration = 0;
         for size in [1, 2, 0, 7, 300, 3] {
@@ -100,7 +101,7 @@ async fn events_are_read_without_loss_or_repeat_from_any_place() {
             .await
             .unwrap();
 
-        let all = store.events(id, 0, usize::MAX).await.unwrap();
+        let all = store.events(id, 0, usize::MAX).await.unwrap().events;
         assert_eq!(all.len(), 2 + 313 + 2);
         assert_eq!(all[0].id, 1);
         assert!(all.windows(2).all(|pair| pair[0].id < pair[1].id));
@@ -118,12 +119,12 @@ async fn events_are_read_without_loss_or_repeat_from_any_place() {
                 .cloned()
                 .collect();
             assert_eq!(
-                store.events(id, after, usize::MAX).await.unwrap(),
+                store.events(id, after, usize::MAX).await.unwrap().events,
                 rest,
                 "after {after}"
             );
         }
-        assert_eq!(store.events(id, 0, 0).await.unwrap(), []);
+        assert_eq!(store.events(id, 0, 0).await.unwrap().events, []);
     })
     .await;
 }
@@ -132,7 +133,7 @@ async fn read_by(store: &dyn Store, id: PlanId, limit: usize) -> Vec<NumberedEve
     let mut read: Vec<NumberedEvent> = Vec::new();
     loop {
         let after = read.last().map_or(0, |last| last.id);
-        let page = store.events(id, after, limit).await.unwrap();
+        let page = store.events(id, after, limit).await.unwrap().events;
         assert!(page.len() <= limit);
         if page.is_empty() {
             return read;
@@ -144,7 +145,7 @@ async fn read_by(store: &dyn Store, id: PlanId, limit: usize) -> Vec<NumberedEve
 #[tokio::test(flavor = "multi_thread")]
 async fn event_ids_grow_over_releases_and_restarts() {
     on_every_backend(10, async |store| {
-        let id = store.submit(submission()).await.unwrap().id;
+        let id = store.submit(submission()).await.unwrap().plan.id;
         for round in 0..4 {
             let lease = store.claim().await.unwrap();
             store
@@ -157,7 +158,7 @@ async fn event_ids_grow_over_releases_and_restarts() {
                 store.reopen().await;
             }
         }
-        let all = store.events(id, 0, usize::MAX).await.unwrap();
+        let all = store.events(id, 0, usize::MAX).await.unwrap().events;
         assert_eq!(all.len(), 1 + 4 * 3);
         assert!(all.windows(2).all(|pair| pair[0].id < pair[1].id));
         let told = history(&**store, id).await;
@@ -179,7 +180,7 @@ async fn event_ids_grow_over_releases_and_restarts() {
 async fn whoever_subscribes_and_then_reads_misses_nothing() {
     on_every_backend(50, async |store| {
         for _ in 0..20 {
-            let id = store.submit(submission()).await.unwrap().id;
+            let id = store.submit(submission()).await.unwrap().plan.id;
             let lease = store.claim().await.unwrap();
             let shared = store.share();
             let followers = [0, 1, 2].map(|_| {
@@ -195,7 +196,7 @@ async fn whoever_subscribes_and_then_reads_misses_nothing() {
                         })
                     ) {
                         let after = read.last().map_or(0, |last| last.id);
-                        let page = store.events(id, after, 4).await.unwrap();
+                        let page = store.events(id, after, 4).await.unwrap().events;
                         if page.is_empty() {
                             changes.changed().await.unwrap();
                         }
@@ -214,7 +215,7 @@ async fn whoever_subscribes_and_then_reads_misses_nothing() {
                 .finish(&lease, ending(Status::Succeeded), 0)
                 .await
                 .unwrap();
-            let all = shared.events(id, 0, usize::MAX).await.unwrap();
+            let all = shared.events(id, 0, usize::MAX).await.unwrap().events;
             for follower in followers {
                 assert_eq!(follower.await.unwrap(), all);
             }
@@ -228,7 +229,7 @@ async fn plans_are_listed_newest_first_by_status_and_page() {
     on_every_backend(50, async |store| {
         let mut ids = Vec::new();
         for _ in 0..25 {
-            ids.push(store.submit(submission()).await.unwrap().id);
+            ids.push(store.submit(submission()).await.unwrap().plan.id);
         }
         let lease = store.claim().await.unwrap();
         store
@@ -253,6 +254,7 @@ async fn plans_are_listed_newest_first_by_status_and_page() {
                 let before = paged.last().copied();
                 let query = ListQuery {
                     status: None,
+                    owner: None,
                     before,
                     limit,
                 };
@@ -267,6 +269,7 @@ async fn plans_are_listed_newest_first_by_status_and_page() {
         let of_status = async |status, before| {
             let query = ListQuery {
                 status: Some(status),
+                owner: None,
                 before,
                 limit: 1_000,
             };
@@ -318,7 +321,7 @@ async fn the_mean_run_time_is_that_of_the_last_runs_with_a_result() {
             .finish(&lease, failure(), store.now_ms())
             .await
             .unwrap();
-        let unseen = store.submit(submission()).await.unwrap();
+        let unseen = store.submit(submission()).await.unwrap().plan;
         store
             .request_cancel(unseen.id, store.now_ms())
             .await
@@ -337,7 +340,7 @@ async fn a_new_process_queues_what_was_running_and_keeps_the_order() {
     on_every_backend(50, async |store| {
         let mut ids = Vec::new();
         for _ in 0..9 {
-            ids.push(store.submit(submission()).await.unwrap().id);
+            ids.push(store.submit(submission()).await.unwrap().plan.id);
         }
         let lease = store.claim().await.unwrap();
         store
@@ -390,8 +393,8 @@ async fn a_closed_store_refuses_and_keeps_what_it_acknowledged() {
         assert_eq!(kind(error), Err("unavailable"));
         let mut acknowledged = Vec::new();
         for task in tasks {
-            if let Ok(plan) = task.await.unwrap() {
-                acknowledged.push(plan.id);
+            if let Ok(submitted) = task.await.unwrap() {
+                acknowledged.push(submitted.plan.id);
             }
         }
         assert_eq!(kind(shared.health().await), Err("unavailable"));

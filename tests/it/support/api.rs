@@ -8,13 +8,13 @@ use axum::body::Body;
 use axum::http::{HeaderMap, Method, Request, StatusCode};
 use bytes::Bytes;
 use http_body_util::BodyExt as _;
-use noctule::http::{self, AppState, Capacity, Phase};
+use noctule::http::{self, AppState, Capacity, InFlight, Phase};
 use noctule::planner;
 use noctule::scenario::json::Rules;
 use noctule::scenario::limits::Limits;
 use noctule::store::measured::MeasuredStore;
 use noctule::store::sqlite::SqliteStore;
-use noctule::store::{Options, Store, wall_clock};
+use noctule::store::{Options, Store};
 use noctule::telemetry::Instruments;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -29,6 +29,7 @@ pub(crate) struct Api {
     pub(crate) state: AppState,
     pub(crate) router: Router,
     pub(crate) phase: watch::Sender<Phase>,
+    pub(crate) clock: watch::Sender<Option<i64>>,
     _directory: TempDir,
 }
 
@@ -48,14 +49,17 @@ impl Api {
 
     /// With room for `queue` plans.
     pub(crate) fn with_queue(queue: usize) -> Self {
+        Self::with_store(Options::new(queue as u64))
+    }
+
+    /// Over a store with these options.
+    pub(crate) fn with_store(options: Options) -> Self {
+        let queue = usize::try_from(options.queue_limit).expect("a small number");
         let directory = tempfile::tempdir().expect("a temporary directory");
-        let options = Options {
-            queue_limit: queue as u64,
-            clock: wall_clock(),
-        };
         let instruments = Arc::new(Instruments::default());
         let store = SqliteStore::open(directory.path(), options).expect("a fresh store");
         let store = Arc::new(MeasuredStore::new(Arc::new(store), instruments.clone()));
+        let clock = watch::channel(None);
         let (phase, watched) = watch::channel(Phase::Serving);
         let state = AppState {
             store: store.clone(),
@@ -67,6 +71,8 @@ impl Api {
                 algorithms: planner::algorithm_rules(),
             }),
             capacity: Capacity { workers: 2, queue },
+            in_flight: InFlight::default(),
+            clock_jump_ms: clock.1,
             body_timeout: Duration::from_secs(30),
             phase: watched,
             instruments,
@@ -76,6 +82,7 @@ impl Api {
             store,
             state,
             phase,
+            clock: clock.0,
             _directory: directory,
         }
     }

@@ -4,8 +4,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use async_trait::async_trait;
-use noctule::job::{Event, NumberedEvent, Plan, PlanId, Submission};
-use noctule::store::{Ending, Lease, ListQuery, Stats, Store, StoreError};
+use noctule::export::document::Incumbent;
+use noctule::job::{Event, Plan, PlanId, Submission};
+use noctule::store::{Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted};
 use tokio::sync::watch;
 
 pub(crate) struct FaultyStore {
@@ -32,7 +33,7 @@ impl FaultyStore {
 
 #[async_trait]
 impl Store for FaultyStore {
-    async fn submit(&self, submission: Submission) -> Result<Plan, StoreError> {
+    async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError> {
         self.sound.submit(submission).await
     }
 
@@ -76,21 +77,24 @@ impl Store for FaultyStore {
         self.sound.result(id).await
     }
 
+    async fn incumbent(&self, id: PlanId) -> Result<Option<Incumbent>, StoreError> {
+        self.sound.incumbent(id).await
+    }
+
     async fn list(&self, query: ListQuery) -> Result<Vec<Plan>, StoreError> {
         self.sound.list(query).await
     }
 
-    async fn events(
-        &self,
-        id: PlanId,
-        after: u64,
-        limit: usize,
-    ) -> Result<Vec<NumberedEvent>, StoreError> {
+    async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<EventPage, StoreError> {
         self.sound.events(id, after, limit).await
     }
 
     fn changes(&self, id: PlanId) -> watch::Receiver<u64> {
         self.sound.changes(id)
+    }
+
+    async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError> {
+        self.sound.sweep(now_ms).await
     }
 
     async fn stats(&self) -> Result<Stats, StoreError> {

@@ -15,6 +15,9 @@ pub(crate) fn submission() -> Submission {
         iterations: 10,
         scenario: format!("{{\"name\":\"{id}\"}}"),
         created_ms: 1_000,
+        owner: None,
+        quota: None,
+        idempotency: None,
     }
 }
 
@@ -52,11 +55,14 @@ pub(crate) fn failure() -> Ending {
 
 /// All events of a plan.
 pub(crate) async fn history(store: &dyn Store, id: PlanId) -> Vec<Event> {
-    let events = store
+    let page = store
         .events(id, 0, usize::MAX)
         .await
         .expect("the plan is there");
-    events.into_iter().map(|numbered| numbered.event).collect()
+    page.events
+        .into_iter()
+        .map(|numbered| numbered.event)
+        .collect()
 }
 
 /// The statuses that a plan has gone through, as its events tell.
@@ -86,6 +92,8 @@ pub(crate) fn kind<T>(result: Result<T, StoreError>) -> Result<(), &'static str>
         StoreError::NotFound(_) => "not found",
         StoreError::Gone(_) => "gone",
         StoreError::QueueFull { .. } => "queue full",
+        StoreError::QuotaReached { .. } => "quota reached",
+        StoreError::KeyReused => "key reused",
         StoreError::LeaseLost(_) => "lease lost",
         StoreError::InUse(_) => "in use",
         StoreError::Unavailable(_) => "unavailable",

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 
 use noctule::store::sqlite::SqliteStore;
-use noctule::store::{Options, Store, StoreError};
+use noctule::store::{Options, Retention, Store, StoreError};
 use tempfile::TempDir;
 
 type Open = fn(&Path, Options) -> Result<Arc<dyn Store>, StoreError>;
@@ -25,6 +25,10 @@ pub(crate) struct Fixture {
     open: Open,
     directory: TempDir,
     queue_limit: u64,
+    /// Of the next opening.
+    pub(crate) retention: Retention,
+    /// Of the next opening.
+    pub(crate) events_kept: u64,
     now_ms: Arc<AtomicI64>,
     store: Option<Arc<dyn Store>>,
 }
@@ -35,6 +39,8 @@ impl Fixture {
             open,
             directory: TempDir::new().expect("a temporary directory"),
             queue_limit,
+            retention: Retention::default(),
+            events_kept: u64::MAX,
             now_ms: Arc::new(AtomicI64::new(10_000)),
             store: None,
         };
@@ -44,8 +50,10 @@ impl Fixture {
 
     fn open(&mut self) {
         let options = Options {
-            queue_limit: self.queue_limit,
             clock: self.clock(),
+            retention: self.retention,
+            events_kept: self.events_kept,
+            ..Options::new(self.queue_limit)
         };
         self.store = Some((self.open)(self.directory.path(), options).expect("the store opens"));
     }

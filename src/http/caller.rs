@@ -1,0 +1,77 @@
+//! Who asks, and what is theirs to see.
+
+use std::convert::Infallible;
+
+use axum::extract::FromRequestParts;
+use axum::http::request::Parts;
+
+use super::AppState;
+use super::problem::Problem;
+use crate::job::{Owner, Plan, PlanId};
+use crate::store::{Store, StoreError};
+
+/// Who asks.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Caller {
+    /// The name of the key that came with the request; `None` where nobody has one.
+    pub(super) owner: Option<Owner>,
+    /// Whether everybody's plans are this caller's to see.
+    pub(super) sees_all: bool,
+    /// Active plans that this caller may have.
+    pub(super) quota: Option<u64>,
+}
+
+impl Caller {
+    /// Where nobody has a key, everybody may do everything.
+    pub(super) const ANYBODY: Self = Self {
+        owner: None,
+        sees_all: true,
+        quota: None,
+    };
+
+    /// The record of a plan that is this caller's to see; that of another is not there.
+    pub(super) async fn plan(&self, store: &dyn Store, id: PlanId) -> Result<Plan, Problem> {
+        match store.get(id).await {
+            Ok(plan) if self.may_see(plan.owner.as_ref()) => Ok(plan),
+            Err(StoreError::Gone(tombstone)) if self.may_see(tombstone.owner.as_ref()) => {
+                Err(StoreError::Gone(tombstone).into())
+            }
+            Ok(_) | Err(StoreError::Gone(_)) => Err(Problem::NoSuchPlan(id.to_string())),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn may_see(&self, owner: Option<&Owner>) -> bool {
+        self.sees_all || (owner.is_some() && self.owner.as_ref() == owner)
+    }
+}
+
+impl FromRequestParts<AppState> for Caller {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _: &AppState) -> Result<Self, Infallible> {
+        Ok(parts.extensions.get().cloned().unwrap_or(Self::ANYBODY))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plan_is_its_owners_and_the_overseers() {
+        let named = |name: &str| Caller {
+            owner: Some(name.to_owned()),
+            sees_all: false,
+            quota: None,
+        };
+        let (alice, bob) = ("alice".to_owned(), "bob".to_owned());
+        assert!(named("alice").may_see(Some(&alice)));
+        assert!(!named("alice").may_see(Some(&bob)));
+        assert!(
+            !named("alice").may_see(None),
+            "of a time when nobody had a key"
+        );
+        assert!(Caller::ANYBODY.may_see(None) && Caller::ANYBODY.may_see(Some(&bob)));
+    }
+}

@@ -1,0 +1,74 @@
+//! Which submission was the first with its idempotency key.
+
+use rusqlite::{OptionalExtension, params};
+
+use super::transaction::Transaction;
+use crate::job::{PlanId, Submission};
+use crate::store::{IDEMPOTENCY_MS, StoreError};
+
+/// The plan of an earlier submission with the same key, owner and body.
+pub(super) fn earlier(
+    tx: &Transaction<'_>,
+    submission: &Submission,
+) -> Result<Option<PlanId>, StoreError> {
+    let Some(idempotency) = &submission.idempotency else {
+        return Ok(None);
+    };
+    let seen: Option<(String, String)> = tx
+        .connection
+        .prepare_cached(
+            "SELECT body_sha256, plan_id FROM idempotency_keys \
+             WHERE owner = ?1 AND key = ?2 AND seen_ms > ?3",
+        )?
+        .query_row(
+            params![owner(submission), idempotency.key, oldest(tx.now_ms())],
+            |row| Ok((row.get(0)?, row.get(1)?)),
+        )
+        .optional()?;
+    let Some((body_sha256, plan)) = seen else {
+        return Ok(None);
+    };
+    if body_sha256 != idempotency.body_sha256 {
+        return Err(StoreError::KeyReused);
+    }
+    let plan = PlanId::parse_str(&plan)
+        .map_err(|error| StoreError::Unavailable(format!("plan id {plan:?}: {error}")))?;
+    Ok(Some(plan))
+}
+
+/// Keep the key of a submission that made a plan.
+pub(super) fn remember(tx: &Transaction<'_>, submission: &Submission) -> Result<(), StoreError> {
+    if let Some(idempotency) = &submission.idempotency {
+        // One that has expired but was not swept yet is replaced.
+        tx.connection
+            .prepare_cached(
+                "INSERT OR REPLACE INTO idempotency_keys (owner, key, body_sha256, plan_id, seen_ms) \
+                 VALUES (?1, ?2, ?3, ?4, ?5)",
+            )?
+            .execute(params![
+                owner(submission),
+                idempotency.key,
+                idempotency.body_sha256,
+                submission.id.to_string(),
+                tx.now_ms()
+            ])?;
+    }
+    Ok(())
+}
+
+/// Forget the keys that have expired.
+pub(super) fn forget(tx: &Transaction<'_>, now_ms: i64) -> Result<(), StoreError> {
+    tx.connection
+        .prepare_cached("DELETE FROM idempotency_keys WHERE seen_ms <= ?1")?
+        .execute([oldest(now_ms)])?;
+    Ok(())
+}
+
+fn oldest(now_ms: i64) -> i64 {
+    now_ms.saturating_sub(IDEMPOTENCY_MS)
+}
+
+/// A part of the key must not be null.
+fn owner(submission: &Submission) -> &str {
+    submission.owner.as_deref().unwrap_or_default()
+}

@@ -1,0 +1,123 @@
+//! Plans whose time has come, and what remains of the removed ones.
+
+use rusqlite::params;
+
+use super::idempotency;
+use super::transaction::{Effect, Transaction};
+use crate::job::PlanId;
+use crate::store::{SWEEP, StoreError, TOMBSTONE_MS, Tombstone};
+
+/// An ended plan that may have to go.
+struct Ended {
+    seq: i64,
+    id: String,
+    owner: Option<String>,
+    bytes: u64,
+}
+
+/// See [`Store::sweep`](crate::store::Store::sweep).
+pub(super) fn sweep(tx: &mut Transaction<'_>, now_ms: i64) -> Result<usize, StoreError> {
+    bury_for_good(tx, now_ms)?;
+    idempotency::forget(tx, now_ms)?;
+    let mut removed = 0;
+    for plan in expired(tx, now_ms)? {
+        expire(tx, plan, now_ms)?;
+        removed += 1;
+    }
+    for plan in beyond_limits(tx, SWEEP - removed)? {
+        expire(tx, plan, now_ms)?;
+        removed += 1;
+    }
+    Ok(removed)
+}
+
+fn expired(tx: &Transaction<'_>, now_ms: i64) -> Result<Vec<Ended>, StoreError> {
+    ended(
+        tx,
+        "SELECT seq, id, owner, bytes FROM plans WHERE expires_ms <= ?1 ORDER BY expires_ms LIMIT ?2",
+        [now_ms, SWEEP.cast_signed() as i64],
+    )
+}
+
+/// The longest ended plans, as far as there are more, or more bytes of them, than are kept.
+fn beyond_limits(tx: &Transaction<'_>, at_most: usize) -> Result<Vec<Ended>, StoreError> {
+    let retention = tx.options.retention;
+    let max_plans = retention.plans.unwrap_or(u64::MAX);
+    let max_bytes = retention.bytes.unwrap_or(u64::MAX);
+    let (plans, bytes): (i64, i64) = tx
+        .connection
+        .prepare_cached(
+            "SELECT count(*), coalesce(sum(bytes), 0) FROM plans INDEXED BY plans_ended \
+             WHERE finished_ms IS NOT NULL",
+        )?
+        .query_row([], |row| Ok((row.get(0)?, row.get(1)?)))?;
+    let (mut plans, mut bytes) = (plans.cast_unsigned(), bytes.cast_unsigned());
+    if plans <= max_plans && bytes <= max_bytes {
+        return Ok(Vec::new());
+    }
+    let oldest = ended(
+        tx,
+        "SELECT seq, id, owner, bytes FROM plans INDEXED BY plans_ended \
+         WHERE finished_ms IS NOT NULL AND seq > ?1 ORDER BY finished_ms LIMIT ?2",
+        [0, at_most.cast_signed() as i64],
+    )?;
+    let beyond = oldest.into_iter().take_while(|plan| {
+        let too_many = plans > max_plans || bytes > max_bytes;
+        plans -= 1;
+        bytes = bytes.saturating_sub(plan.bytes);
+        too_many
+    });
+    Ok(beyond.collect())
+}
+
+fn ended(tx: &Transaction<'_>, sql: &str, parameters: [i64; 2]) -> Result<Vec<Ended>, StoreError> {
+    let mut statement = tx.connection.prepare_cached(sql)?;
+    let rows = statement.query_map(parameters, |row| {
+        Ok(Ended {
+            seq: row.get(0)?,
+            id: row.get(1)?,
+            owner: row.get(2)?,
+            bytes: row.get::<_, i64>(3)?.cast_unsigned(),
+        })
+    })?;
+    Ok(rows.collect::<Result<_, _>>()?)
+}
+
+fn expire(tx: &mut Transaction<'_>, plan: Ended, now_ms: i64) -> Result<(), StoreError> {
+    let id = PlanId::parse_str(&plan.id)
+        .map_err(|error| StoreError::Unavailable(format!("plan id {:?}: {error}", plan.id)))?;
+    let tombstone = Tombstone {
+        id,
+        owner: plan.owner,
+        expired: true,
+    };
+    remove(tx, plan.seq, tombstone, now_ms)
+}
+
+/// Remove a plan and all that belongs to it; its tombstone remains.
+pub(super) fn remove(
+    tx: &mut Transaction<'_>,
+    seq: i64,
+    tombstone: Tombstone,
+    now_ms: i64,
+) -> Result<(), StoreError> {
+    let Tombstone { id, owner, expired } = tombstone;
+    tx.connection
+        .prepare_cached("DELETE FROM plans WHERE seq = ?1")?
+        .execute([seq])?;
+    tx.connection
+        .prepare_cached(
+            "INSERT OR REPLACE INTO tombstones (id, deleted_ms, owner, expired) VALUES (?1, ?2, ?3, ?4)",
+        )?
+        .execute(params![id.to_string(), now_ms, owner, expired])?;
+    tx.effects.push(Effect::Changed(id));
+    Ok(())
+}
+
+/// Forget the tombstones that have expired.
+pub(super) fn bury_for_good(tx: &Transaction<'_>, now_ms: i64) -> Result<(), StoreError> {
+    tx.connection
+        .prepare_cached("DELETE FROM tombstones WHERE deleted_ms <= ?1")?
+        .execute([now_ms.saturating_sub(TOMBSTONE_MS)])?;
+    Ok(())
+}

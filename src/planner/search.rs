@@ -55,7 +55,7 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
     let mut elites = starts.routes;
     let mut reason = StopReason::Iterations;
     if turning > 0 {
-        let mut routes = Routes::guided(model, log.stop, elites);
+        let mut routes = Routes::guided(model, log.stop, &elites);
         let (search, why) = run(model, &mut routes, 0..=turning, log);
         elites = distinct(model, &routes, search.as_ref());
         reason = why;
@@ -67,7 +67,7 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
     }
     let elites = whole(elites, log);
     if reason == StopReason::Iterations {
-        let mut routes = Routes::guided(model, log.stop, elites);
+        let mut routes = Routes::guided(model, log.stop, &elites);
         let first = if turning > 0 { turning + 1 } else { 0 };
         (_, reason) = run(model, &mut routes, first..=settings.iterations, log);
     }

@@ -16,7 +16,7 @@ pub(in crate::planner) struct Cartesian<'s> {
 }
 
 /// Numbers of one waypoint.
-const PER_WAYPOINT: usize = 3;
+pub(in crate::planner) const PER_WAYPOINT: usize = 3;
 
 impl<'s> Cartesian<'s> {
     /// The coding of routes of `scenario` with so many free waypoints.
@@ -59,16 +59,18 @@ impl<'s> Cartesian<'s> {
         positions: [&[f64]; LANES],
         points: &mut Vec<PointRow>,
     ) {
-        let waypoints = positions[0].len() / PER_WAYPOINT;
+        let positions = positions.map(|position| position.as_chunks::<PER_WAYPOINT>().0);
         points.clear();
-        points.resize(waypoints + 2, PointRow::splat(self.scenario.start));
-        points[waypoints + 1] = PointRow::splat(self.scenario.target);
-        for (lane, position) in positions.into_iter().enumerate() {
-            let waypoints = position.chunks_exact(PER_WAYPOINT);
-            for (row, waypoint) in points[1..].iter_mut().zip(waypoints) {
-                row.set(lane, Point3::new(waypoint[0], waypoint[1], waypoint[2]));
+        points.push(PointRow::splat(self.scenario.start));
+        points.extend((0..positions[0].len()).map(|idx| {
+            let waypoints = positions.map(|position| position[idx]);
+            PointRow {
+                x: waypoints.map(|waypoint| waypoint[0]),
+                y: waypoints.map(|waypoint| waypoint[1]),
+                z: waypoints.map(|waypoint| waypoint[2]),
             }
-        }
+        }));
+        points.push(PointRow::splat(self.scenario.target));
     }
 
     /// Write the position of `route` into `position`; what the bounds do not hold is cut off.

@@ -90,12 +90,12 @@ fn finish(model: &Model, reason: StopReason, log: &mut Log) {
 fn polish(
     model: &Model,
     route: &mut Vec<Point3>,
-    (from, to): (f64, f64),
+    steps: (f64, f64),
     log: &mut Log,
 ) -> Option<Fitness> {
     model.scenario.planner.polish.then(|| {
         let mut polish = Polish::new(model, log.stop);
-        let fitness = polish.descend(route, from, to);
+        let fitness = polish.descend(route, steps);
         log.evaluations += polish.evaluations(route.len() - 2);
         fitness
     })

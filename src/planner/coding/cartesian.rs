@@ -59,17 +59,17 @@ impl<'s> Cartesian<'s> {
         positions: [&[f64]; LANES],
         points: &mut Vec<PointRow>,
     ) {
-        let positions = positions.map(|position| position.as_chunks::<PER_WAYPOINT>().0);
+        let waypoints = positions[0].len() / PER_WAYPOINT;
         points.clear();
         points.push(PointRow::splat(self.scenario.start));
-        points.extend((0..positions[0].len()).map(|idx| {
-            let waypoints = positions.map(|position| position[idx]);
-            PointRow {
-                x: waypoints.map(|waypoint| waypoint[0]),
-                y: waypoints.map(|waypoint| waypoint[1]),
-                z: waypoints.map(|waypoint| waypoint[2]),
+        for first in (0..PER_WAYPOINT * waypoints).step_by(PER_WAYPOINT) {
+            let mut row = PointRow::splat(Point3::origin());
+            for lane in 0..LANES {
+                let waypoint = &positions[lane][first..first + PER_WAYPOINT];
+                (row.x[lane], row.y[lane], row.z[lane]) = (waypoint[0], waypoint[1], waypoint[2]);
             }
-        }));
+            points.push(row);
+        }
         points.push(PointRow::splat(self.scenario.target));
     }
 

@@ -3,7 +3,7 @@
 mod lattice;
 
 use super::price::price;
-use super::{Stop, why_stop};
+use super::{Stop, same, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
@@ -34,7 +34,19 @@ impl<'m, 's> Polish<'m, 's> {
     }
 
     /// Improve `route` by steps that shrink from the share `from` of the way to the share `to`.
-    pub(super) fn descend(&mut self, route: &mut Vec<Point3>, from: f64, to: f64) -> Fitness {
+    pub(super) fn descend(&mut self, route: &mut Vec<Point3>, steps: (f64, f64)) -> Fitness {
+        self.descend_unless_known(route, steps, &[])
+            .expect("no route is known")
+    }
+
+    /// As [`Polish::descend`]; `None` as soon as the route has become the same as one of `known` that
+    /// it does not beat.
+    pub(super) fn descend_unless_known(
+        &mut self,
+        route: &mut Vec<Point3>,
+        (from, to): (f64, f64),
+        known: &[(Fitness, Vec<Point3>)],
+    ) -> Option<Fitness> {
         let scenario = self.model.scenario;
         let way = (scenario.target - scenario.start).norm();
         let mut best = price(self.model, route);
@@ -49,6 +61,12 @@ impl<'m, 's> Polish<'m, 's> {
                         || best.cost - exact.cost > GAIN * best.cost;
                     best = exact;
                     *route = trial;
+                    let is_known = |(fitness, other): &(Fitness, Vec<Point3>)| {
+                        !best.beats(fitness) && same(scenario, route, other)
+                    };
+                    if known.iter().any(is_known) {
+                        return None;
+                    }
                 }
             }
             kind += 1;
@@ -58,6 +76,6 @@ impl<'m, 's> Polish<'m, 's> {
                 failed = 0;
             }
         }
-        best
+        Some(best)
     }
 }

@@ -106,30 +106,38 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     Some(starts)
 }
 
-/// Pull the routes that may still win roughly into place. What one that breaks a limit will cost
-/// cannot be told before.
+/// Pull the routes that may still win roughly into place, and leave out those that end up where
+/// another one is. What one that breaks a limit will cost cannot be told before.
 fn refine(
     model: &Model,
-    priced: &mut [(Fitness, Vec<Point3>)],
+    priced: &mut Vec<(Fitness, Vec<Point3>)>,
     hopeless: f64,
     stop: &dyn Stop,
     evaluations: &mut u64,
 ) {
     let mut polish = Polish::new(model, stop);
+    let waypoints = priced.first().map_or(0, |(_, route)| route.len() - 2);
     let mut best = Fitness::WORST;
-    for (fitness, route) in priced.iter_mut() {
-        let dear = fitness.cost > best.cost * (1.0 + hopeless);
+    let mut refined: Vec<(Fitness, Vec<Point3>)> = Vec::new();
+    let mut dear = Vec::new();
+    for (fitness, mut route) in priced.drain(..) {
+        let is_dear = fitness.cost > best.cost * (1.0 + hopeless);
         // With a good route at hand, one that breaks a limit need not be tried either.
-        if best.is_feasible() && dear && (fitness.is_feasible() || hopeless <= 0.0) {
+        if best.is_feasible() && is_dear && (fitness.is_feasible() || hopeless <= 0.0) {
+            dear.push((fitness, route));
             continue;
         }
-        *fitness = polish.descend(route, ROUGH_STEPS.0, ROUGH_STEPS.1);
-        if fitness.beats(&best) {
-            best = *fitness;
+        if let Some(fitness) = polish.descend_unless_known(&mut route, ROUGH_STEPS, &refined) {
+            if fitness.beats(&best) {
+                best = fitness;
+            }
+            refined.push((fitness, route));
         }
     }
-    *evaluations += polish.evaluations(priced.first().map_or(0, |(_, route)| route.len() - 2));
-    priced.sort_by(|one, other| one.0.rank(&other.0));
+    *evaluations += polish.evaluations(waypoints);
+    refined.append(&mut dear);
+    refined.sort_by(|one, other| one.0.rank(&other.0));
+    *priced = refined;
 }
 
 /// Bends of the routes that may still win, at most.

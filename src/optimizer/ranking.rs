@@ -14,6 +14,8 @@ pub(super) struct Ranking {
     /// What the order was made of.
     fitness: Vec<Fitness>,
     changed: Vec<usize>,
+    /// Of each member, whether it is among them.
+    is_changed: Vec<bool>,
     merged: Vec<usize>,
 }
 
@@ -21,17 +23,20 @@ impl Ranking {
     /// The order of members of such `fitness`. It depends on that alone, not on what came before.
     pub(super) fn of(&mut self, fitness: &[Fitness]) -> &[usize] {
         let known = self.fitness.len().min(fitness.len());
+        self.fitness.truncate(known);
         self.changed.clear();
-        self.changed
-            .extend((0..known).filter(|&idx| !is_same(&self.fitness[idx], &fitness[idx])));
-        self.changed.extend(known..fitness.len());
-        for &idx in &self.changed {
-            if idx < known {
-                self.fitness[idx] = fitness[idx];
+        self.is_changed.clear();
+        for (idx, (before, now)) in self.fitness.iter_mut().zip(fitness).enumerate() {
+            let changes = !is_same(before, now);
+            self.is_changed.push(changes);
+            if changes {
+                *before = *now;
+                self.changed.push(idx);
             }
         }
-        self.fitness.truncate(fitness.len());
         self.fitness.extend_from_slice(&fitness[known..]);
+        self.changed.extend(known..fitness.len());
+        self.is_changed.resize(fitness.len(), true);
         if !self.changed.is_empty() || self.order.len() != fitness.len() {
             self.merge();
         }
@@ -41,10 +46,8 @@ impl Ranking {
     fn merge(&mut self) {
         let fitness = &self.fitness;
         let rank = |a: usize, b: usize| fitness[a].rank(&fitness[b]).then(a.cmp(&b));
-        // Indices rise in `changed` until it is sorted.
-        let is_changed = |idx: usize, changed: &[usize]| changed.binary_search(&idx).is_ok();
         self.order
-            .retain(|&idx| idx < fitness.len() && !is_changed(idx, &self.changed));
+            .retain(|&idx| self.is_changed.get(idx) == Some(&false));
         self.changed.sort_unstable_by(|&a, &b| rank(a, b));
         self.merged.clear();
         let mut kept = self.order.iter().copied().peekable();

@@ -35,8 +35,7 @@ impl<'s> Moves<'s> {
     /// start to target. It stays within area and band.
     pub(super) fn move_a_part(&self, position: &mut [f64], random: &mut Random, size: f64) {
         let (route, _) = position.as_chunks_mut::<PER_WAYPOINT>();
-        // Sizes of every order: most steps near the optimum must be small.
-        let reach = self.way * size * libm::exp(-5.0 * random.unit());
+        let reach = self.way * size * order(random.unit());
         let kind = random.unit();
         if kind < 0.55 {
             self.shift(route, random, reach);
@@ -118,6 +117,14 @@ impl<'s> Moves<'s> {
             height.clamp(band.min, band.max),
         ]
     }
+}
+
+/// Sizes of every order down to exp(-5), as `share` goes from 0 to 1: most steps near the optimum must
+/// be small.
+fn order(share: f64) -> f64 {
+    let sixth = 1.0 - 0.5654 * share;
+    let half = sixth * sixth * sixth;
+    half * half
 }
 
 /// The first of one to four neighbours among so many free waypoints, and how many they are.

@@ -10,12 +10,12 @@ pub(super) use count::{spread, with_waypoints};
 
 use super::polish::Polish;
 use super::price::price;
-use super::{Stop, same};
+use super::{Stop, same, why_stop};
 use crate::cost::Model;
 use crate::geometry::{Point2, Point3};
 use crate::optimizer::Fitness;
 use crate::scenario::{Scenario, Seeding, WarmStart};
-use crate::seeding::{Obstacles, Outline, TautString, steep_ground, taut_strings};
+use crate::seeding::{Obstacles, Outline, TautString, steep_ground, taut_strings_until};
 use crate::terrain::Terrain;
 use crate::threat::Threat;
 
@@ -62,7 +62,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let mut legs_priced = 0;
     let mut shapes: Vec<Vec<Point3>> = known.into_iter().collect();
     if settings.seeding == Seeding::Tangent {
-        shapes.extend(along_strings(model));
+        shapes.extend(along_strings(model, stop));
         // Who brings a route has been over the hills already.
         if !warm {
             let net = roadmap::routes(model, OVERLAND);
@@ -170,13 +170,14 @@ fn bends(model: &Model, shapes: &[Vec<Point3>]) -> usize {
 
 /// Routes with as few waypoints as each needs, along the taut strings of several scenes: round the
 /// soft zones, round the threats alone, over those that can be overflown, round steep ground.
-fn along_strings(model: &Model) -> Vec<Vec<Point3>> {
+fn along_strings(model: &Model, stop: &dyn Stop) -> Vec<Vec<Point3>> {
     let scenario = model.scenario;
+    let is_over = || why_stop(scenario, stop).is_some();
     let everything = |_: usize, _: &Threat| true;
     let in_the_way = |_: usize, threat: &Threat| !over::passable(scenario, threat);
     let mut shapes = Vec::new();
     let mut follow = |obstacles: &Obstacles| {
-        for string in taut_strings(obstacles, STRINGS).strings {
+        for string in taut_strings_until(obstacles, STRINGS, &is_over).strings {
             shapes.push(along(model, &string));
         }
     };

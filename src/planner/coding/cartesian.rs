@@ -64,8 +64,8 @@ impl<'s> Cartesian<'s> {
         points.push(PointRow::splat(self.scenario.start));
         for first in (0..PER_WAYPOINT * waypoints).step_by(PER_WAYPOINT) {
             let mut row = PointRow::splat(Point3::origin());
-            for lane in 0..LANES {
-                let waypoint = &positions[lane][first..first + PER_WAYPOINT];
+            for (lane, position) in positions.iter().enumerate() {
+                let waypoint = &position[first..first + PER_WAYPOINT];
                 (row.x[lane], row.y[lane], row.z[lane]) = (waypoint[0], waypoint[1], waypoint[2]);
             }
             points.push(row);

@@ -8,7 +8,7 @@ mod tangents;
 
 pub(super) use count::{spread, with_waypoints};
 
-use super::polish::Polish;
+use super::polish::{Polish, Steps};
 use super::price::price;
 use super::{Stop, same, why_stop};
 use crate::cost::Model;
@@ -40,8 +40,15 @@ const OVERLAND: usize = 8;
 /// A start this much dearer than the best, as a share, is not worth refining.
 const HOPELESS: f64 = 0.08;
 
-/// Greatest and least step by which a start is pulled into place, as shares of the way.
-const ROUGH_STEPS: (f64, f64) = (0.03, 0.005);
+/// By which a start is pulled into place.
+const ROUGH_STEPS: Steps = Steps {
+    from: 0.03,
+    to: 0.005,
+    gain: 1e-6,
+};
+
+/// A known route is in place but for what has changed; the polish at the end goes on with it.
+const GAIN_OF_KNOWN: f64 = 1e-4;
 
 /// Where a search starts.
 pub(super) struct Starts {
@@ -116,6 +123,15 @@ fn refine(
     evaluations: &mut u64,
 ) {
     let mut polish = Polish::new(model, stop);
+    let is_known = hopeless <= 0.0;
+    let steps = Steps {
+        gain: if is_known {
+            GAIN_OF_KNOWN
+        } else {
+            ROUGH_STEPS.gain
+        },
+        ..ROUGH_STEPS
+    };
     let waypoints = priced.first().map_or(0, |(_, route)| route.len() - 2);
     let mut best = Fitness::WORST;
     let mut refined: Vec<(Fitness, Vec<Point3>)> = Vec::new();
@@ -123,11 +139,11 @@ fn refine(
     for (fitness, mut route) in priced.drain(..) {
         let is_dear = fitness.cost > best.cost * (1.0 + hopeless);
         // With a good route at hand, one that breaks a limit need not be tried either.
-        if best.is_feasible() && is_dear && (fitness.is_feasible() || hopeless <= 0.0) {
+        if best.is_feasible() && is_dear && (fitness.is_feasible() || is_known) {
             dear.push((fitness, route));
             continue;
         }
-        if let Some(fitness) = polish.descend_unless_known(&mut route, ROUGH_STEPS, &refined) {
+        if let Some(fitness) = polish.descend_unless_known(&mut route, steps, &refined) {
             if fitness.beats(&best) {
                 best = fitness;
             }

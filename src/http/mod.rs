@@ -36,6 +36,8 @@ use axum::http::Uri;
 use axum::routing::{self, MethodRouter};
 use tokio::sync::watch;
 use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::compression::CompressionLayer;
+use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
 
 pub use idempotency::InFlight;
 pub use phase::Phase;
@@ -122,9 +124,18 @@ pub fn router(state: AppState) -> Router {
     wrap(router, state.instruments)
 }
 
+/// Streams are not: what is told must leave at once.
+fn worth_compressing() -> impl Predicate {
+    let plain = NotForContentType::const_new;
+    SizeAbove::new(1024)
+        .and(plain("text/event-stream"))
+        .and(plain("application/x-ndjson"))
+}
+
 /// What goes round every handler.
 fn wrap(router: Router, instruments: Arc<Instruments>) -> Router {
     router
+        .layer(CompressionLayer::new().compress_when(worth_compressing()))
         .layer(CatchPanicLayer::custom(problem::after_panic))
         .layer(axum::middleware::from_fn_with_state(
             instruments,

@@ -7,7 +7,7 @@ use flate2::write::GzEncoder;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
-use super::PATIENCE;
+use super::{Dice, PATIENCE};
 use crate::support::api::Api;
 use crate::support::process::Service;
 use crate::support::server::Server;
@@ -106,7 +106,10 @@ async fn a_body_is_held_to_the_limit_however_it_comes() {
         }
     }
     // Long before it is packed, but not after.
-    let noise: Vec<u8> = (0..=LIMIT).map(|idx| (idx * idx / 7 % 251) as u8).collect();
+    let mut dice = Dice::new(5);
+    let noise: Vec<u8> = (0..=LIMIT)
+        .map(|_| u8::try_from(dice.below(256)).expect("below"))
+        .collect();
     let sent = post(
         &format!(
             "connection: close\r\ncontent-encoding: gzip\r\ncontent-length: {}",

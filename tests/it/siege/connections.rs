@@ -15,10 +15,9 @@ use crate::support::process::Service;
 /// Everything until the service closes the connection.
 async fn until_closed(mut stream: TcpStream) -> String {
     let mut text = Vec::new();
-    match tokio::time::timeout(PATIENCE, stream.read_to_end(&mut text)).await {
-        Ok(Ok(_)) => {}
-        Ok(Err(error)) => assert_eq!(error.kind(), ErrorKind::ConnectionReset),
-        Err(_) => panic!("the connection is never closed"),
+    let read = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut text)).await;
+    if let Err(error) = read.expect("the connection is closed in time") {
+        assert_eq!(error.kind(), ErrorKind::ConnectionReset);
     }
     String::from_utf8(text).expect("UTF-8")
 }
@@ -35,9 +34,8 @@ async fn drip(address: SocketAddr, text: &str, drip: u8) -> String {
     });
     let mut text = Vec::new();
     let read = tokio::time::timeout(PATIENCE, reading.read_to_end(&mut text)).await;
-    match read.expect("the connection is closed in time") {
-        Ok(_) => {}
-        Err(error) => assert_eq!(error.kind(), ErrorKind::ConnectionReset),
+    if let Err(error) = read.expect("the connection is closed in time") {
+        assert_eq!(error.kind(), ErrorKind::ConnectionReset);
     }
     dripping.abort();
     String::from_utf8(text).expect("UTF-8")
@@ -59,7 +57,7 @@ async fn slow_and_silent_callers_are_let_go_while_others_are_served() {
     let (done, over) = watch::channel(());
     let watched = async {
         let mut answers = 0;
-        while !matches!(over.has_changed(), Err(_)) {
+        while over.has_changed().is_ok() {
             let answer = service.get("/readyz").send().await.expect("an answer");
             assert_eq!(answer.status(), 200);
             answers += 1;
@@ -140,7 +138,7 @@ async fn an_idle_stream_costs_little_memory() {
     for _ in 0..n_streams {
         streams.push(open().await);
     }
-    let each = (service.rss_kib().saturating_sub(before)) as f64 / n_streams as f64;
+    let each = service.rss_kib().saturating_sub(before) as f64 / f64::from(n_streams);
     println!("{each:.1} KiB for each of {n_streams} idle streams");
     assert!(each <= MOST_KIB, "{each:.1} KiB for each stream");
 }

@@ -24,14 +24,13 @@ fn nested(depth: usize) -> Vec<u8> {
     ))
 }
 
-#[tokio::test]
-async fn documents_at_the_edge_of_json_get_exact_answers() {
-    let api = Api::new();
+/// Documents, each with its name, the status and the kind of problem.
+fn cases() -> Vec<(&'static str, Vec<u8>, (u16, &'static str))> {
     let good = with_number("300");
     let valid = (200, "");
     let no_json = (400, "invalid-json");
     let no_scenario = (422, "invalid-scenario");
-    let cases: Vec<(&str, Vec<u8>, (u16, &str))> = vec![
+    vec![
         ("127 levels", nested(127), no_scenario),
         ("128 levels", nested(128), no_json),
         ("4000 levels", b"[".repeat(4_000), no_json),
@@ -117,8 +116,13 @@ async fn documents_at_the_edge_of_json_get_exact_answers() {
         ("nothing", Vec::new(), no_json),
         ("null", b"null".to_vec(), no_scenario),
         ("a list", b"[]".to_vec(), no_scenario),
-    ];
-    for (name, document, (status, slug)) in cases {
+    ]
+}
+
+#[tokio::test]
+async fn documents_at_the_edge_of_json_get_exact_answers() {
+    let api = Api::new();
+    for (name, document, (status, slug)) in cases() {
         let headers = [("content-type", "application/json")];
         let path = "/plans?validate_only=true";
         let answer = api

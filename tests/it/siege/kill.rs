@@ -42,7 +42,7 @@ impl Known {
                 self.finished.insert(address.clone(), result);
             }
         }
-        std::future::pending().await
+        std::future::pending::<()>().await;
     }
 }
 

@@ -1,7 +1,9 @@
-//! The command line: serve, plan, bench, healthcheck.
+//! The command line: serve, plan, bench, key, healthcheck.
 
+mod access;
 mod bench;
 mod healthcheck;
+mod key;
 mod plan;
 mod serve;
 
@@ -26,6 +28,9 @@ enum Command {
     /// Measure the algorithms: against each other, against the best known routes, against the clock
     #[command(subcommand)]
     Bench(bench::Command),
+    /// Make keys for those who may use a service
+    #[command(subcommand)]
+    Key(key::Command),
     /// Ask a running service whether it is ready; for containers
     Healthcheck(healthcheck::Arguments),
 }
@@ -62,6 +67,7 @@ pub fn run() -> ExitCode {
         Command::Serve(flags) => serve::run(&flags).map(|()| exit::DONE),
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Bench(command) => bench::run(&command),
+        Command::Key(command) => key::run(&command).map(|()| exit::DONE),
         Command::Healthcheck(arguments) => healthcheck::run(&arguments).map(|()| exit::DONE),
     };
     done.unwrap_or_else(|error| {

@@ -4,15 +4,15 @@ use std::io::Write as _;
 use std::sync::Arc;
 use std::time::Duration;
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use tokio::net::TcpListener;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::watch;
 use tokio::time::Instant;
 
-use super::exit;
+use super::{access, exit};
 use crate::config::{self, Config, Flags};
-use crate::http::{self, AppState, Capacity, InFlight, Phase};
+use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase};
 use crate::job::Failure;
 use crate::scenario::json::{self, Rules};
 use crate::scenario::limits::Limits;
@@ -27,7 +27,7 @@ const LAST_ANSWERS: Duration = Duration::from_secs(5);
 /// Serve until a signal, or print the configuration.
 pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
     let loaded = config::load(flags, |name| std::env::var_os(name))
-        .map_err(|faults| anyhow::anyhow!("wrong configuration\n  {}", faults.join("\n  ")))?;
+        .map_err(|faults| anyhow!("wrong configuration\n  {}", faults.join("\n  ")))?;
     if flags.print_config {
         return Ok(loaded.write_toml(&mut std::io::stdout().lock())?);
     }
@@ -44,6 +44,9 @@ pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
 
 async fn serve(config: &Config) -> anyhow::Result<()> {
     let mut signals = Signals::new()?;
+    let access = access::open(config)?;
+    let cors =
+        Origins::read(&config.cors_origins).map_err(|fault| anyhow!("cors_origins: {fault}"))?;
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("cannot listen on {}", config.listen))?;
@@ -69,8 +72,11 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         in_flight: InFlight::default(),
         clock_jump_ms: sweeper.clock_jump_ms(),
         body_timeout: config.http.body_timeout,
+        access: access.clone(),
+        cors,
         phase: watched.clone(),
     });
+    access::reload_on_hangup(config, access)?;
     announce(&listener)?;
     let times = Times::within(config.grace);
     let settings = http::server::Settings {

@@ -34,6 +34,12 @@ pub struct Config {
     pub queue: usize,
     /// Time from a signal to the exit.
     pub grace: Duration,
+    /// The keys of those who may use the service; `None` when it is for everybody who reaches it.
+    pub keys_file: Option<PathBuf>,
+    /// Whether it may be reached from other machines without keys.
+    pub allow_anonymous: bool,
+    /// Origins of pages from elsewhere that may use it.
+    pub cors_origins: Vec<String>,
     /// What is logged.
     pub log: Filter,
     /// How log lines are written.
@@ -55,6 +61,10 @@ pub struct Http {
     pub body_timeout: Duration,
     /// Connections open at once; more wait in the listener's backlog.
     pub max_connections: usize,
+    /// Event streams open at once.
+    pub streams: usize,
+    /// Event streams open at once of the owner of a key.
+    pub streams_per_key: usize,
 }
 
 /// How long ended plans are kept: until the first of these limits; 0 is none.
@@ -79,6 +89,9 @@ impl Default for Config {
             workers: std::thread::available_parallelism().map_or(1, Into::into),
             queue: 1000,
             grace: Duration::from_secs(10),
+            keys_file: None,
+            allow_anonymous: false,
+            cors_origins: Vec::new(),
             log: Filter::default(),
             log_format: LogFormat::Text,
             http: Http::default(),
@@ -94,6 +107,8 @@ impl Default for Http {
             head_timeout: Duration::from_secs(30),
             body_timeout: Duration::from_secs(30),
             max_connections: 20_000,
+            streams: 10_000,
+            streams_per_key: 1_000,
         }
     }
 }

@@ -54,6 +54,27 @@ fn service() -> Vec<Setting> {
             |c| &mut c.grace,
         ),
         row(
+            "keys_file",
+            "FILE",
+            "Keys of those who may use the service, see noctule key new; NOCTULE_KEYS may hold them instead",
+            ..,
+            |c| &mut c.keys_file,
+        ),
+        row(
+            "allow_anonymous",
+            "BOOL",
+            "Let the service be reached from other machines though it has no keys",
+            ..,
+            |c| &mut c.allow_anonymous,
+        ),
+        row(
+            "cors_origins",
+            "ORIGINS",
+            "Origins of pages from elsewhere that may use the service, such as https://plans.example",
+            ..,
+            |c| &mut c.cors_origins,
+        ),
+        row(
             "log",
             "FILTER",
             "What is logged, in the syntax of tracing's EnvFilter",
@@ -94,6 +115,20 @@ fn http() -> Vec<Setting> {
             "Connections open at once; more wait in the listener's backlog",
             1..=1_000_000,
             |c| &mut c.http.max_connections,
+        ),
+        row(
+            "http.streams",
+            "N",
+            "Event streams open at once; more are refused with 429 too-many-streams",
+            1..=1_000_000,
+            |c| &mut c.http.streams,
+        ),
+        row(
+            "http.streams_per_key",
+            "N",
+            "Event streams open at once of the owner of a key",
+            1..=1_000_000,
+            |c| &mut c.http.streams_per_key,
         ),
     ]
 }

@@ -9,6 +9,7 @@ use futures_util::stream;
 use std::convert::Infallible;
 use std::sync::Arc;
 
+use super::auth::{Access, Digest, Permit};
 use super::caller::Caller;
 use super::feed::{Feed, Told};
 use super::params::{self, Id, Params};
@@ -34,7 +35,7 @@ pub(super) async fn follow(
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let params = Params::read(&uri, &["rate", "last_event_id"])?;
+    let params = Params::read(&uri, &["rate", "last_event_id", "ticket"])?;
     let rate_hz = read_rate(&params)?;
     let after = read_last_event_id(&params, &headers)?;
     let media_type =
@@ -50,8 +51,23 @@ pub(super) async fn follow(
             return Ok(StatusCode::NO_CONTENT.into_response());
         }
     }
+    let leave = Leave {
+        _permit: state
+            .access
+            .open_stream(caller.owner.as_ref())
+            .map_err(Problem::TooManyStreams)?,
+        access: state.access,
+        key: caller.key,
+    };
     let feed = Feed::new(state.store.clone(), state.phase.clone(), id, after, rate_hz);
-    Ok(streamed(feed, state.store, Wire::of(media_type)))
+    Ok(streamed(feed, leave, state.store, Wire::of(media_type)))
+}
+
+/// What a stream has as long as it is open, whether anybody reads it or not.
+struct Leave {
+    _permit: Permit,
+    access: Access,
+    key: Option<Digest>,
 }
 
 fn read_rate(params: &Params) -> Result<f64, Problem> {
@@ -79,10 +95,16 @@ fn read_last_event_id(params: &Params, headers: &HeaderMap) -> Result<u64, Probl
         .map_err(|_| params::refused(LAST_EVENT_ID.as_str(), &header, ALLOWED))
 }
 
-fn streamed(feed: Feed, store: Arc<dyn Store>, wire: Wire) -> Response {
+fn streamed(feed: Feed, leave: Leave, store: Arc<dyn Store>, wire: Wire) -> Response {
     let prologue = stream::iter([Ok(Bytes::from_static(wire.prologue().as_bytes()))]);
-    let told = stream::unfold((feed, store), move |(mut feed, store)| async move {
-        let text = match feed.next().await? {
+    let begin = (feed, store, leave);
+    let told = stream::unfold(begin, move |(mut feed, store, leave)| async move {
+        let told = tokio::select! {
+            told = feed.next() => told?,
+            // A key that is taken away takes its streams along.
+            () = leave.access.withdrawn(leave.key) => return None,
+        };
+        let text = match told {
             Told::Events(events) => write_events(&feed, &*store, events, wire).await,
             Told::Gap { from, to } => {
                 let mut text = String::new();
@@ -94,7 +116,7 @@ fn streamed(feed: Feed, store: Arc<dyn Store>, wire: Wire) -> Response {
                 write_events(&feed, &*store, events, wire).await + wire.stopping()
             }
         };
-        Some((Ok::<_, Infallible>(Bytes::from(text)), (feed, store)))
+        Some((Ok::<_, Infallible>(Bytes::from(text)), (feed, store, leave)))
     });
     let headers = [
         (

@@ -4,7 +4,9 @@
 //! the worker's threads, and storage, which sits behind [`Store`].
 
 mod accept;
+pub mod auth;
 mod body;
+mod browser;
 mod caller;
 mod documents;
 mod events;
@@ -23,6 +25,7 @@ mod service;
 mod sse;
 mod status;
 mod throttle;
+mod tickets;
 mod warm_start;
 
 use std::sync::Arc;
@@ -31,15 +34,18 @@ use std::time::Duration;
 use axum::Router;
 use axum::handler::Handler;
 use axum::http::Uri;
+use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::{self, MethodRouter};
 use tokio::sync::watch;
 use tower_http::catch_panic::CatchPanicLayer;
 
+pub use browser::Origins;
 pub use idempotency::InFlight;
 pub use phase::Phase;
 
 use crate::scenario::json::Rules;
 use crate::store::Store;
+use auth::{Access, Needs};
 use problem::Problem;
 
 /// What every handler can reach.
@@ -57,6 +63,10 @@ pub struct AppState {
     pub body_timeout: Duration,
     /// By how much the wall clock has jumped, milliseconds, while nothing expires for it.
     pub clock_jump_ms: watch::Receiver<Option<i64>>,
+    /// Who may do what.
+    pub access: Access,
+    /// Pages from elsewhere that may use this service.
+    pub cors: Origins,
     /// Where the service stands between its start and its end.
     pub phase: watch::Receiver<Phase>,
 }
@@ -76,6 +86,8 @@ pub struct Route {
     pub method: &'static str,
     /// With `{id}` for a plan's id.
     pub path: &'static str,
+    /// Of its caller.
+    pub needs: Needs,
     handler: MethodRouter<AppState>,
 }
 
@@ -91,6 +103,7 @@ pub fn routes() -> Vec<Route> {
         get("/plans/{id}/result", documents::result),
         get("/plans/{id}/scenario", documents::scenario),
         get("/plans/{id}/events", events::follow),
+        post("/plans/{id}/tickets", tickets::issue),
         get("/algorithms", service::algorithms),
         get("/limits", service::limits),
         get("/version", service::version),
@@ -102,22 +115,26 @@ pub fn routes() -> Vec<Route> {
 
 /// The service: every route, every refusal a problem, every answer with its request's id.
 pub fn router(state: AppState) -> Router {
+    let (access, cors) = (state.access.clone(), state.cors.clone());
     let router = routes()
         .into_iter()
         .fold(Router::new(), |router, route| {
-            router.route(route.path, route.handler)
+            let gate = from_fn_with_state((access.clone(), route.needs), auth::gate);
+            router.route(route.path, route.handler.route_layer(gate))
         })
         .method_not_allowed_fallback(async || Problem::MethodNotAllowed)
         .fallback(async |uri: Uri| Problem::NoSuchResource(uri.path().to_owned()))
         .with_state(state);
-    wrap(router)
+    wrap(router, &cors)
 }
 
 /// What goes round every handler.
-fn wrap(router: Router) -> Router {
+fn wrap(router: Router, cors: &Origins) -> Router {
     router
+        .layer(from_fn(auth::refuse_keys_in_urls))
         .layer(CatchPanicLayer::custom(problem::after_panic))
-        .layer(axum::middleware::from_fn(request_id::assign))
+        .layer(cors.layer())
+        .layer(from_fn(request_id::assign))
 }
 
 fn get<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
@@ -136,6 +153,7 @@ fn row(method: &'static str, path: &'static str, handler: MethodRouter<AppState>
     Route {
         method,
         path,
+        needs: Needs::of(method, path),
         handler,
     }
 }
@@ -158,7 +176,7 @@ mod tests {
         let request = Request::get("/")
             .header("x-request-id", "caller-1")
             .body(Body::empty());
-        let answer = wrap(broken)
+        let answer = wrap(broken, &Origins::default())
             .oneshot(request.expect("a request"))
             .await
             .expect("an answer");

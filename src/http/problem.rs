@@ -13,6 +13,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::auth::{Scope, TooMany, Unauthorized};
 use crate::job::{Failure, PlanId, Status};
 use crate::scenario::json::{Fault, Refusal};
 use crate::store::{StoreError, Tombstone};
@@ -63,6 +64,12 @@ pub(super) enum Problem {
         /// The value and what is allowed.
         detail: String,
     },
+    /// A key stands in the address.
+    KeyInUrl,
+    /// The caller has shown nothing that lets them in.
+    Unauthorized(Unauthorized),
+    /// The caller's key has not this scope.
+    Forbidden(Scope),
     /// The body is JSON, but not a scenario that can be planned.
     InvalidScenario(Vec<Fault>),
     /// The plan has not ended yet.
@@ -97,6 +104,13 @@ pub(super) enum Problem {
         /// See [`super::retry`].
         retry_after_s: u64,
     },
+    /// The caller asks faster than their key may.
+    RateLimited {
+        /// Until the key may ask again.
+        retry_after_s: u64,
+    },
+    /// As many event streams are open as may be.
+    TooManyStreams(TooMany),
     /// The idempotency key came with another body before.
     IdempotencyKeyReused,
     /// Another request with the same idempotency key is being answered.
@@ -133,6 +147,17 @@ impl Problem {
                 StatusCode::BAD_REQUEST,
                 "invalid-parameter",
                 "Invalid parameter",
+            ),
+            Self::KeyInUrl => (
+                StatusCode::BAD_REQUEST,
+                "key-in-url",
+                "Keys do not belong in URLs",
+            ),
+            Self::Unauthorized(_) => (StatusCode::UNAUTHORIZED, "unauthorized", "A key is needed"),
+            Self::Forbidden(_) => (
+                StatusCode::FORBIDDEN,
+                "forbidden",
+                "The key may not do this",
             ),
             Self::NoSuchResource(_) | Self::NoSuchPlan(_) => {
                 (StatusCode::NOT_FOUND, "not-found", "No such resource")
@@ -185,6 +210,16 @@ impl Problem {
                 "quota-reached",
                 "The quota of active plans is reached",
             ),
+            Self::RateLimited { .. } => (
+                StatusCode::TOO_MANY_REQUESTS,
+                "rate-limited",
+                "Too many requests",
+            ),
+            Self::TooManyStreams(_) => (
+                StatusCode::TOO_MANY_REQUESTS,
+                "too-many-streams",
+                "Too many event streams",
+            ),
             Self::Internal => (
                 StatusCode::INTERNAL_SERVER_ERROR,
                 "internal",
@@ -229,6 +264,17 @@ impl Problem {
             }
             Self::BodyIncomplete => "the connection ended before the body did".to_owned(),
             Self::InvalidParameter { detail, .. } => detail.clone(),
+            Self::KeyInUrl => {
+                "URLs are written down on their way: send the key as Authorization: Bearer, and replace this one".to_owned()
+            }
+            Self::Unauthorized(why) => why.detail().to_owned(),
+            Self::Forbidden(scope) => format!("the key has not the scope {}", scope.name()),
+            Self::RateLimited { retry_after_s } => {
+                format!("the key has asked more often than it may; try again in {retry_after_s} s")
+            }
+            Self::TooManyStreams(TooMany { limit, most }) => {
+                format!("{most} event streams are open, the limit {limit} of GET /limits; close one, or wait")
+            }
             Self::NoSuchResource(path) => {
                 format!("nothing is at {path}; GET /openapi.yaml lists what is")
             }
@@ -305,8 +351,30 @@ impl Problem {
             Self::NotReady { retry_after_s, .. }
             | Self::QueueFull { retry_after_s, .. }
             | Self::QuotaReached { retry_after_s, .. }
+            | Self::RateLimited { retry_after_s }
             | Self::Draining { retry_after_s } => Some(*retry_after_s),
             Self::StoreUnavailable | Self::IdempotencyInFlight => Some(1),
+            Self::TooManyStreams(_) => Some(5),
+            _ => None,
+        }
+    }
+
+    /// What would let the caller in, RFC 6750 section 3.
+    fn challenge(&self) -> Option<HeaderValue> {
+        match self {
+            Self::Unauthorized(Unauthorized::Nothing) => {
+                Some(HeaderValue::from_static("Bearer realm=\"noctule\""))
+            }
+            Self::Unauthorized(_) => Some(HeaderValue::from_static(
+                "Bearer realm=\"noctule\", error=\"invalid_token\"",
+            )),
+            Self::Forbidden(scope) => {
+                let scope = scope.name();
+                let text = format!(
+                    "Bearer realm=\"noctule\", error=\"insufficient_scope\", scope=\"{scope}\""
+                );
+                Some(HeaderValue::from_str(&text).expect("names are visible ASCII"))
+            }
             _ => None,
         }
     }
@@ -341,6 +409,8 @@ impl Problem {
             }
             Self::InvalidParameter { name, .. } => json!({"parameter": name}),
             Self::NotAcceptable { available, .. } => json!({"available": available}),
+            Self::Forbidden(scope) => json!({"scope": scope.name()}),
+            Self::TooManyStreams(TooMany { limit, .. }) => json!({"limit": limit}),
             _ => json!({}),
         }
     }
@@ -380,6 +450,11 @@ impl IntoResponse for Problem {
             response
                 .headers_mut()
                 .insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        if let Some(challenge) = self.challenge() {
+            response
+                .headers_mut()
+                .insert(header::WWW_AUTHENTICATE, challenge);
         }
         if matches!(self, Self::UnsupportedCoding(_)) {
             response.headers_mut().insert(

@@ -1,9 +1,12 @@
 //! The integration tests: one binary, one module a subject.
 
+mod access;
 mod algorithms;
 mod api;
+mod auth;
 mod bench;
 mod bound;
+mod browser;
 mod cli;
 mod config;
 mod crash;

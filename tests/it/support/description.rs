@@ -88,14 +88,23 @@ pub(crate) fn check(
 }
 
 fn check_headers(response: &Value, headers: &HeaderMap, place: &str) {
-    // Every answer has these, or transport adds them.
-    const COMMON: [&str; 7] = [
+    // Every answer has these, or every answer to the holder of a limited key or to a page from
+    // elsewhere, or transport adds them.
+    const COMMON: [&str; 15] = [
+        "access-control-allow-origin",
+        "access-control-expose-headers",
+        "content-security-policy",
+        "cross-origin-resource-policy",
+        "ratelimit",
+        "ratelimit-policy",
+        "referrer-policy",
         "content-type",
         "content-length",
         "cache-control",
         "x-content-type-options",
         "x-request-id",
         "transfer-encoding",
+        "vary",
         "date",
     ];
     let described = response["headers"]

@@ -4,6 +4,7 @@ pub(crate) mod api;
 pub(crate) mod description;
 pub(crate) mod engines;
 pub(crate) mod faulty_store;
+pub(crate) mod keys;
 pub(crate) mod plans;
 pub(crate) mod process;
 pub(crate) mod run;

@@ -56,13 +56,28 @@ pub(crate) struct Service {
 impl Service {
     /// On a free port; returns when it listens.
     pub(crate) fn start(data_dir: &Path, arguments: &[&str]) -> Self {
+        Self::launch("127.0.0.1:0", data_dir, arguments, Stdio::null())
+    }
+
+    /// The same on `listen`, and what is logged goes to `log`.
+    pub(crate) fn start_logged(
+        listen: &str,
+        data_dir: &Path,
+        arguments: &[&str],
+        log: &Path,
+    ) -> Self {
+        let log = std::fs::File::create(log).expect("a file for the log");
+        Self::launch(listen, data_dir, arguments, log.into())
+    }
+
+    fn launch(listen: &str, data_dir: &Path, arguments: &[&str], log: Stdio) -> Self {
         let mut child = noctule()
-            .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
+            .args(["serve", "--listen", listen, "--data-dir"])
             .arg(data_dir)
             .args(arguments)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
-            .stderr(Stdio::null())
+            .stderr(log)
             .spawn()
             .expect("the binary starts");
         let mut line = String::new();
@@ -84,6 +99,10 @@ impl Service {
 
     pub(crate) fn url(&self, path: &str) -> String {
         format!("{}{path}", self.url)
+    }
+
+    pub(crate) fn client(&self) -> &Client {
+        &self.client
     }
 
     pub(crate) fn get(&self, path: &str) -> RequestBuilder {

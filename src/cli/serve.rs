@@ -12,6 +12,7 @@ use tokio::time::Instant;
 
 use super::{access, exit};
 use crate::config::{self, Config, Flags};
+use crate::http::webhook::{self, Secret, Sender};
 use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase};
 use crate::job::Failure;
 use crate::scenario::json::{self, Rules};
@@ -47,6 +48,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let access = access::open(config)?;
     let cors =
         Origins::read(&config.cors_origins).map_err(|fault| anyhow!("cors_origins: {fault}"))?;
+    let webhooks = webhooks(&config.webhook)?;
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("cannot listen on {}", config.listen))?;
@@ -61,6 +63,9 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     };
     let pool = Pool::start(store.clone(), settings, engine());
     let sweeper = Sweeper::start(store.clone(), store::wall_clock());
+    let sender = webhooks
+        .clone()
+        .map(|settings| Sender::start(store.clone(), settings));
     let (phase, watched) = watch::channel(Phase::Serving);
     let router = http::router(AppState {
         store: store.clone(),
@@ -73,6 +78,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         clock_jump_ms: sweeper.clock_jump_ms(),
         body_timeout: config.http.body_timeout,
         access: access.clone(),
+        webhooks: webhooks.clone(),
         cors,
         phase: watched.clone(),
     });
@@ -104,7 +110,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     if let Ok(ended) = tokio::time::timeout_at(signalled + times.answers, server).await {
         ended.context("the server broke")?;
     }
-    drop(sweeper);
+    drop((sweeper, sender));
     store.close().await;
     tracing::info!(
         duration_ms = signalled.elapsed().as_secs_f64() * 1e3,
@@ -156,6 +162,20 @@ fn open_store(config: &Config) -> anyhow::Result<Arc<dyn Store>> {
         .with_context(|| format!("cannot open the store in {}", data_dir.display()))?;
     tracing::info!(data_dir = %data_dir.display(), "the store is open");
     Ok(Arc::new(store))
+}
+
+/// How ends of plans are told; `None` when nobody is.
+fn webhooks(config: &config::Webhook) -> anyhow::Result<Option<webhook::Settings>> {
+    let Some(path) = &config.secret_file else {
+        return Ok(None);
+    };
+    let place = || format!("the webhook secret of {}", path.display());
+    let text = std::fs::read_to_string(path).with_context(place)?;
+    let secret = Secret::read(&text).map_err(|allowed| anyhow!("{} {allowed}", place()))?;
+    Ok(Some(webhook::Settings {
+        secret,
+        allow_private: config.allow_private,
+    }))
 }
 
 /// Of a setting, 0 is no limit.

@@ -46,6 +46,8 @@ pub struct Config {
     pub log_format: LogFormat,
     /// Of connections and requests.
     pub http: Http,
+    /// Of the ends of plans, told to addresses that callers name.
+    pub webhook: Webhook,
     /// How long plans are kept.
     pub retention: Retention,
     /// Upper limits on a scenario.
@@ -65,6 +67,15 @@ pub struct Http {
     pub streams: usize,
     /// Event streams open at once of the owner of a key.
     pub streams_per_key: usize,
+}
+
+/// Of the ends of plans, told to addresses that callers name.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Webhook {
+    /// Holds the secret that is shared with receivers; `None` tells nobody.
+    pub secret_file: Option<PathBuf>,
+    /// Whether receivers may be elsewhere than on the public internet, and without TLS.
+    pub allow_private: bool,
 }
 
 /// How long ended plans are kept: until the first of these limits; 0 is none.
@@ -95,6 +106,7 @@ impl Default for Config {
             log: Filter::default(),
             log_format: LogFormat::Text,
             http: Http::default(),
+            webhook: Webhook::default(),
             retention: Retention::default(),
             limits: Limits::default(),
         }

@@ -9,7 +9,7 @@ use super::value::{Given, Value};
 
 /// Every setting, in the order in which they are shown.
 pub(super) fn all() -> Vec<Setting> {
-    [service(), http(), retention(), limits()]
+    [service(), http(), webhook(), retention(), limits()]
         .into_iter()
         .flatten()
         .collect()
@@ -129,6 +129,25 @@ fn http() -> Vec<Setting> {
             "Event streams open at once of the owner of a key",
             1..=1_000_000,
             |c| &mut c.http.streams_per_key,
+        ),
+    ]
+}
+
+fn webhook() -> Vec<Setting> {
+    vec![
+        row(
+            "webhook.secret_file",
+            "FILE",
+            "Holds the secret, whsec_..., that signs webhooks; without one there are none",
+            ..,
+            |c| &mut c.webhook.secret_file,
+        ),
+        row(
+            "webhook.allow_private",
+            "BOOL",
+            "Let webhooks go to private addresses too, and without TLS",
+            ..,
+            |c| &mut c.webhook.allow_private,
         ),
     ]
 }

@@ -27,6 +27,7 @@ mod status;
 mod throttle;
 mod tickets;
 mod warm_start;
+pub mod webhook;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -65,6 +66,8 @@ pub struct AppState {
     pub clock_jump_ms: watch::Receiver<Option<i64>>,
     /// Who may do what.
     pub access: Access,
+    /// How ends of plans are told; `None` when they are not.
+    pub webhooks: Option<webhook::Settings>,
     /// Pages from elsewhere that may use this service.
     pub cors: Origins,
     /// Where the service stands between its start and its end.

@@ -146,6 +146,7 @@ mod tests {
             created_ms: 1_000,
             owner: None,
             quota: None,
+            webhook: None,
             idempotency: None,
         };
         Plan::accepted(&submission, 3)

@@ -23,4 +23,5 @@ mod store_sqlite;
 mod support;
 mod svg;
 mod warm_start;
+mod webhook;
 mod worker;

@@ -11,6 +11,7 @@ mod removal;
 mod row;
 mod schema;
 mod transaction;
+mod webhooks;
 mod writer;
 
 use std::fs::{DirBuilder, File, TryLockError};
@@ -27,6 +28,7 @@ use self::read::Readers;
 use self::writer::Writer;
 use super::{
     Clock, Ending, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError, Submitted,
+    Webhook,
 };
 use crate::export::document::Incumbent;
 use crate::job::state::Refused;
@@ -189,6 +191,18 @@ impl Store for SqliteStore {
             .await
     }
 
+    async fn due_webhooks(&self, now_ms: i64, limit: usize) -> Result<Vec<Webhook>, StoreError> {
+        self.readers
+            .read(move |connection| webhooks::due(connection, now_ms, limit))
+            .await
+    }
+
+    async fn webhook_tried(&self, id: PlanId, next_ms: Option<i64>) -> Result<(), StoreError> {
+        self.writer
+            .change(move |tx| webhooks::tried(tx, id, next_ms))
+            .await
+    }
+
     async fn stats(&self) -> Result<Stats, StoreError> {
         self.readers.read(read::stats).await
     }
@@ -291,6 +305,7 @@ mod tests {
             created_ms: 1_000,
             owner: None,
             quota: None,
+            webhook: None,
             idempotency: None,
         }
     }

@@ -9,6 +9,7 @@ use axum::http::{HeaderMap, Method, Request, StatusCode};
 use bytes::Bytes;
 use http_body_util::BodyExt as _;
 use noctule::http::auth::{Access, Keys, Settings};
+use noctule::http::webhook;
 use noctule::http::{self, AppState, Capacity, InFlight, Origins, Phase};
 use noctule::planner;
 use noctule::scenario::json::Rules;
@@ -73,6 +74,14 @@ impl Api {
         Self::made(Options::new(1000), access, origins)
     }
 
+    /// Which tells ends of plans.
+    pub(crate) fn with_webhooks(settings: webhook::Settings) -> Self {
+        let mut api = Self::new();
+        api.state.webhooks = Some(settings);
+        api.router = http::router(api.state.clone());
+        api
+    }
+
     fn made(options: Options, access: Access, origins: &[&str]) -> Self {
         let queue = usize::try_from(options.queue_limit).expect("a small number");
         let directory = tempfile::tempdir().expect("a temporary directory");
@@ -94,6 +103,7 @@ impl Api {
             clock_jump_ms: clock.1,
             body_timeout: Duration::from_secs(30),
             access,
+            webhooks: None,
             cors: Origins::read(&origins).expect("origins"),
             phase: watched,
         };

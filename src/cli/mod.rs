@@ -1,4 +1,4 @@
-//! The command line: serve, plan, bench, key, healthcheck.
+//! The command line: serve, plan, bench, key, store, healthcheck.
 
 mod access;
 mod bench;
@@ -6,6 +6,7 @@ mod healthcheck;
 mod key;
 mod plan;
 mod serve;
+mod store;
 
 use std::process::ExitCode;
 
@@ -31,6 +32,9 @@ enum Command {
     /// Make keys for those who may use a service
     #[command(subcommand)]
     Key(key::Command),
+    /// Copy the stored plans, or look for damage among them
+    #[command(subcommand)]
+    Store(store::Command),
     /// Ask a running service whether it is ready; for containers
     Healthcheck(healthcheck::Arguments),
 }
@@ -68,6 +72,7 @@ pub fn run() -> ExitCode {
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Bench(command) => bench::run(&command),
         Command::Key(command) => key::run(&command).map(|()| exit::DONE),
+        Command::Store(command) => store::run(command),
         Command::Healthcheck(arguments) => healthcheck::run(&arguments).map(|()| exit::DONE),
     };
     done.unwrap_or_else(|error| {

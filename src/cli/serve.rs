@@ -15,12 +15,15 @@ use crate::config::{self, Config, Flags};
 use crate::http::webhook::{self, Secret, Sender};
 use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase};
 use crate::job::Failure;
+use crate::planner;
 use crate::scenario::json::{self, Rules};
 use crate::scenario::limits::Limits;
+use crate::store::measured::MeasuredStore;
+use crate::store::reopening::{Open, Reopening};
 use crate::store::sqlite::SqliteStore;
 use crate::store::{self, Store};
+use crate::telemetry::{self, Instruments};
 use crate::worker::{self, Engine, Pool, Sweeper};
-use crate::{planner, telemetry};
 
 /// Connections may finish their answers for so long at the end, if the grace period lasts so long.
 const LAST_ANSWERS: Duration = Duration::from_secs(5);
@@ -33,13 +36,14 @@ pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
         return Ok(loaded.write_toml(&mut std::io::stdout().lock())?);
     }
     let config = &loaded.config;
-    telemetry::init(config);
+    let log = telemetry::log::init(config);
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
         .build()?;
     runtime.block_on(serve(config))?;
     // Whatever still runs has been given back to the queue; the process does not wait for it.
     runtime.shutdown_background();
+    log.close();
     Ok(())
 }
 
@@ -52,7 +56,9 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("cannot listen on {}", config.listen))?;
-    let store = open_store(config)?;
+    let instruments = Arc::new(Instruments::default());
+    let store = open_store(config).await?;
+    let store: Arc<dyn Store> = Arc::new(MeasuredStore::new(store, instruments.clone()));
     let rules = Arc::new(Rules {
         limits: config.limits,
         algorithms: planner::algorithm_rules(),
@@ -60,6 +66,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let settings = worker::Settings {
         workers: config.workers,
         clock: store::wall_clock(),
+        instruments: instruments.clone(),
     };
     let pool = Pool::start(store.clone(), settings, engine());
     let sweeper = Sweeper::start(store.clone(), store::wall_clock());
@@ -81,6 +88,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         webhooks: webhooks.clone(),
         cors,
         phase: watched.clone(),
+        instruments: instruments.clone(),
     });
     access::reload_on_hangup(config, access)?;
     announce(&listener)?;
@@ -89,6 +97,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         head_timeout: config.http.head_timeout,
         max_connections: config.http.max_connections,
         patience: LAST_ANSWERS,
+        instruments,
     };
     let server = tokio::spawn(http::server::serve(listener, router, watched, settings));
 
@@ -148,20 +157,27 @@ async fn drain(pool: Pool, times: &Times) {
     }
 }
 
-fn open_store(config: &Config) -> anyhow::Result<Arc<dyn Store>> {
+async fn open_store(config: &Config) -> anyhow::Result<Arc<dyn Store>> {
     let data_dir = config
         .data_dir
-        .as_deref()
+        .clone()
         .context("the user has no home; name a directory with --data-dir")?;
     let options = store::Options {
         retention: retention(config.retention),
         events_kept: config.retention.events,
         ..store::Options::new(config.queue as u64)
     };
-    let store = SqliteStore::open(data_dir, options)
-        .with_context(|| format!("cannot open the store in {}", data_dir.display()))?;
-    tracing::info!(data_dir = %data_dir.display(), "the store is open");
-    Ok(Arc::new(store))
+    let open: Open = Arc::new(move |suspicious| {
+        let open = if suspicious {
+            SqliteStore::open_suspicious
+        } else {
+            SqliteStore::open
+        };
+        let store = open(&data_dir, options.clone())?;
+        tracing::info!(data_dir = %data_dir.display(), "the store is open");
+        Ok(Arc::new(store))
+    });
+    Ok(Arc::new(Reopening::start(open).await))
 }
 
 /// How ends of plans are told; `None` when nobody is.

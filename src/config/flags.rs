@@ -50,7 +50,16 @@ fn argument(setting: &Setting, defaults: &Config) -> Arg {
     let default = setting.shown(defaults).map_or_else(String::new, |default| {
         format!(" [default: {}]", default.trim_matches(['"', '\'']))
     });
-    let help = format!("{} [env: {}]{default}", setting.help, setting.variable());
+    let own = setting.variable();
+    let variables: Vec<&str> = [own.as_str()]
+        .into_iter()
+        .chain(setting.shared_variable)
+        .collect();
+    let help = format!(
+        "{} [env: {}]{default}",
+        setting.help,
+        variables.join(" or ")
+    );
     let argument = Arg::new(setting.key)
         .long(setting.flag())
         .value_name(setting.placeholder)

@@ -100,15 +100,18 @@ impl Layers<'_> {
     /// An empty variable is as none.
     fn environment(&mut self, variable: impl Fn(&str) -> Option<OsString>) {
         for setting in self.settings {
-            let name = setting.variable();
-            match variable(&name).map(OsString::into_string) {
-                None => {}
-                Some(Ok(word)) if word.is_empty() => {}
-                Some(Ok(word)) => {
-                    let source = Source::Variable(name.clone());
-                    self.put(setting.key, &Given::Word(word), source, &name);
+            let own = setting.variable();
+            // The later counts.
+            for name in setting.shared_variable.into_iter().chain([own.as_str()]) {
+                match variable(name).map(OsString::into_string) {
+                    None => {}
+                    Some(Ok(word)) if word.is_empty() => {}
+                    Some(Ok(word)) => {
+                        let source = Source::Variable(name.to_owned());
+                        self.put(setting.key, &Given::Word(word), source, name);
+                    }
+                    Some(Err(_)) => self.faults.push(format!("{name} is not UTF-8")),
                 }
-                Some(Err(_)) => self.faults.push(format!("{name} is not UTF-8")),
             }
         }
     }
@@ -126,8 +129,13 @@ impl Layers<'_> {
         match self.settings[index].set(&mut self.config, given) {
             Ok(()) => self.sources[index] = source,
             Err(allowed) => {
-                let fault = format!("{place} is {}, must be {allowed}", given.shown());
-                self.faults.push(fault);
+                let found = if self.settings[index].is_secret() {
+                    "wrong".to_owned()
+                } else {
+                    given.shown()
+                };
+                self.faults
+                    .push(format!("{place} is {found}, must be {allowed}"));
             }
         }
     }
@@ -210,10 +218,10 @@ mod tests {
         let variables = [("NOCTULE_QUEUE", "many")];
         let faults = loaded(lines, &variables, &[("log_format", "xml")]).expect_err("wrong");
         let expected = [
-            "FILE:2: wokers is unknown, must be one of listen, data_dir, workers, queue, grace, log, log_format, http, limits",
+            "FILE:2: wokers is unknown, must be one of listen, data_dir, workers, queue, grace, keys_file, allow_anonymous, cors_origins, log, log_format, otlp_endpoint, otlp_headers, http, webhook, retention, limits",
             "FILE:3: limits must be a table with body_bytes, threats, polygon_vertices, terrain_nodes, peaks, waypoints, population, iterations, work, path_samples",
-            "FILE:6: http.heads is unknown, must be one of head_timeout, body_timeout, max_connections",
-            "FILE:7: htpp is unknown, must be one of listen, data_dir, workers, queue, grace, log, log_format, http, limits",
+            "FILE:6: http.heads is unknown, must be one of head_timeout, body_timeout, max_connections, streams, streams_per_key",
+            "FILE:7: htpp is unknown, must be one of listen, data_dir, workers, queue, grace, keys_file, allow_anonymous, cors_origins, log, log_format, otlp_endpoint, otlp_headers, http, webhook, retention, limits",
             "FILE:1: workers is 0, must be a whole number from 1 to 4096",
             "FILE:5: http.head_timeout is \"soon\", must be seconds, or a number with a unit such as 250ms, 30s, 15m, 12h or 30d, from 0.1 to 3600",
             "NOCTULE_QUEUE is \"many\", must be a whole number from 1 to 100000000",
@@ -228,6 +236,22 @@ mod tests {
         assert!(faults[0].starts_with("FILE:2: "), "{faults:?}");
         let faults = loaded("queue = 3\nqueue = 4\n", &[], &[]).expect_err("wrong");
         assert_eq!(faults, ["FILE:2: duplicate key"]);
+    }
+
+    #[test]
+    fn a_secret_is_never_shown() {
+        let secret = [("NOCTULE_OTLP_HEADERS", "authorization=hush")];
+        let loaded_secret = loaded("", &secret, &[]).expect("right");
+        let mut printed = Vec::new();
+        loaded_secret.write_toml(&mut printed).expect("written");
+        let printed = String::from_utf8(printed).expect("UTF-8");
+        let line = "# otlp_headers is set by NOCTULE_OTLP_HEADERS, and not shown";
+        assert!(printed.lines().any(|found| found == line), "{printed}");
+        assert!(!printed.contains("hush"), "{printed}");
+        assert!(!format!("{loaded_secret:?}").contains("hush"));
+        let faults = loaded("otlp_headers = \"hush\"\n", &[], &[]).expect_err("wrong");
+        assert!(faults[0].starts_with("FILE:1: otlp_headers is wrong, must be name=value"));
+        assert!(!faults[0].contains("hush"), "{faults:?}");
     }
 
     #[test]

@@ -17,7 +17,7 @@ use std::time::Duration;
 
 pub use flags::Flags;
 pub use layers::{Loaded, load};
-pub use value::{Filter, LogFormat};
+pub use value::{Endpoint, Filter, Headers, LogFormat};
 
 use crate::scenario::limits::Limits;
 
@@ -44,6 +44,10 @@ pub struct Config {
     pub log: Filter,
     /// How log lines are written.
     pub log_format: LogFormat,
+    /// Where traces are sent; `None` is nowhere.
+    pub otlp_endpoint: Option<Endpoint>,
+    /// What is sent with them.
+    pub otlp_headers: Headers,
     /// Of connections and requests.
     pub http: Http,
     /// Of the ends of plans, told to addresses that callers name.
@@ -105,6 +109,8 @@ impl Default for Config {
             cors_origins: Vec::new(),
             log: Filter::default(),
             log_format: LogFormat::Text,
+            otlp_endpoint: None,
+            otlp_headers: Headers::default(),
             http: Http::default(),
             webhook: Webhook::default(),
             retention: Retention::default(),

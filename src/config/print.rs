@@ -20,6 +20,9 @@ impl Loaded {
             }
             writeln!(out, "# {}", setting.help)?;
             match setting.shown(&self.config) {
+                Some(_) if setting.is_secret() => {
+                    writeln!(out, "# {key} is set by {source}, and not shown")?;
+                }
                 Some(value) => writeln!(out, "{key} = {value} # {source}")?,
                 None => writeln!(out, "# {key} is not set")?,
             }

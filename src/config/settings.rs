@@ -88,6 +88,22 @@ fn service() -> Vec<Setting> {
             ..,
             |c| &mut c.log_format,
         ),
+        row(
+            "otlp_endpoint",
+            "URL",
+            "Send traces to this OpenTelemetry collector, by OTLP over HTTP",
+            ..,
+            |c| &mut c.otlp_endpoint,
+        )
+        .or_variable("OTEL_EXPORTER_OTLP_ENDPOINT"),
+        row(
+            "otlp_headers",
+            "HEADERS",
+            "Send these headers with traces, name=value between commas",
+            ..,
+            |c| &mut c.otlp_headers,
+        )
+        .or_variable("OTEL_EXPORTER_OTLP_HEADERS"),
     ]
 }
 
@@ -264,10 +280,17 @@ pub(super) struct Setting {
     pub(super) placeholder: &'static str,
     /// One sentence without its full stop.
     pub(super) help: &'static str,
+    /// A variable that other programs share, which counts when its own is not set.
+    pub(super) shared_variable: Option<&'static str>,
     place: Box<dyn Place>,
 }
 
 impl Setting {
+    fn or_variable(mut self, name: &'static str) -> Self {
+        self.shared_variable = Some(name);
+        self
+    }
+
     /// Its table in the file, empty at the top, and its key there.
     pub(super) fn path(&self) -> (&'static str, &'static str) {
         self.key.split_once('.').unwrap_or(("", self.key))
@@ -296,6 +319,11 @@ impl Setting {
         self.place.shown(config)
     }
 
+    /// Whether its value is never shown.
+    pub(super) fn is_secret(&self) -> bool {
+        self.place.is_secret()
+    }
+
     /// Whether its flag may stand without a value.
     pub(super) fn is_switch(&self) -> bool {
         self.place.is_switch()
@@ -314,6 +342,7 @@ fn row<T: Value>(
         key,
         placeholder,
         help,
+        shared_variable: None,
         place: Box::new(Field { range, field }),
     }
 }
@@ -323,6 +352,7 @@ trait Place {
     fn set(&self, config: &mut Config, given: &Given) -> Result<(), String>;
     fn shown(&self, config: &Config) -> Option<String>;
     fn is_switch(&self) -> bool;
+    fn is_secret(&self) -> bool;
 }
 
 struct Field<T> {
@@ -343,6 +373,10 @@ impl<T: Value> Place for Field<T> {
 
     fn is_switch(&self) -> bool {
         T::IS_SWITCH
+    }
+
+    fn is_secret(&self) -> bool {
+        T::IS_SECRET
     }
 }
 

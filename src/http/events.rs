@@ -8,6 +8,7 @@ use bytes::Bytes;
 use futures_util::stream;
 use std::convert::Infallible;
 use std::sync::Arc;
+use tracing::{Instrument as _, Span};
 
 use super::auth::{Access, Digest, Permit};
 use super::caller::Caller;
@@ -18,6 +19,7 @@ use super::sse::{Outgoing, Wire};
 use super::{AppState, accept};
 use crate::job::{Event, NumberedEvent};
 use crate::store::Store;
+use crate::telemetry::metrics::Held;
 
 const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
 const X_ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering");
@@ -51,23 +53,21 @@ pub(super) async fn follow(
             return Ok(StatusCode::NO_CONTENT.into_response());
         }
     }
-    let leave = Leave {
-        _permit: state
-            .access
-            .open_stream(caller.owner.as_ref())
-            .map_err(Problem::TooManyStreams)?,
+    let permit = state
+        .access
+        .open_stream(caller.owner.as_ref())
+        .map_err(Problem::TooManyStreams)?;
+    let feed = Feed::new(state.store.clone(), state.phase.clone(), id, after, rate_hz);
+    let stream = Stream {
+        feed,
+        store: state.store,
+        _permit: permit,
+        _counted: state.instruments.metrics.stream(),
         access: state.access,
         key: caller.key,
+        span: Span::current(),
     };
-    let feed = Feed::new(state.store.clone(), state.phase.clone(), id, after, rate_hz);
-    Ok(streamed(feed, leave, state.store, Wire::of(media_type)))
-}
-
-/// What a stream has as long as it is open, whether anybody reads it or not.
-struct Leave {
-    _permit: Permit,
-    access: Access,
-    key: Option<Digest>,
+    Ok(streamed(stream, Wire::of(media_type)))
 }
 
 fn read_rate(params: &Params) -> Result<f64, Problem> {
@@ -95,28 +95,24 @@ fn read_last_event_id(params: &Params, headers: &HeaderMap) -> Result<u64, Probl
         .map_err(|_| params::refused(LAST_EVENT_ID.as_str(), &header, ALLOWED))
 }
 
-fn streamed(feed: Feed, leave: Leave, store: Arc<dyn Store>, wire: Wire) -> Response {
+/// What one open stream holds on to, whether anybody reads it or not.
+struct Stream {
+    feed: Feed,
+    store: Arc<dyn Store>,
+    _permit: Permit,
+    _counted: Held,
+    access: Access,
+    key: Option<Digest>,
+    /// The request's: its lines are written after its answer has begun.
+    span: Span,
+}
+
+fn streamed(stream: Stream, wire: Wire) -> Response {
     let prologue = stream::iter([Ok(Bytes::from_static(wire.prologue().as_bytes()))]);
-    let begin = (feed, store, leave);
-    let told = stream::unfold(begin, move |(mut feed, store, leave)| async move {
-        let told = tokio::select! {
-            told = feed.next() => told?,
-            // A key that is taken away takes its streams along.
-            () = leave.access.withdrawn(leave.key) => return None,
-        };
-        let text = match told {
-            Told::Events(events) => write_events(&feed, &*store, events, wire).await,
-            Told::Gap { from, to } => {
-                let mut text = String::new();
-                wire.write(Outgoing::gap(from, to), &mut text);
-                text
-            }
-            Told::Silence => wire.silence().to_owned(),
-            Told::Stopping(events) => {
-                write_events(&feed, &*store, events, wire).await + wire.stopping()
-            }
-        };
-        Some((Ok::<_, Infallible>(Bytes::from(text)), (feed, store, leave)))
+    let told = stream::unfold(stream, move |mut stream| async move {
+        let span = stream.span.clone();
+        let text = stream.next(wire).instrument(span).await?;
+        Some((Ok::<_, Infallible>(Bytes::from(text)), stream))
     });
     let headers = [
         (
@@ -133,17 +129,34 @@ fn streamed(feed: Feed, leave: Leave, store: Arc<dyn Store>, wire: Wire) -> Resp
     (headers, body).into_response()
 }
 
-async fn write_events(
-    feed: &Feed,
-    store: &dyn Store,
-    events: Vec<NumberedEvent>,
-    wire: Wire,
-) -> String {
-    let mut text = String::new();
-    for event in events {
-        let ends = matches!(event.event, Event::End(_));
-        let has_result = ends && matches!(store.result(feed.plan_id()).await, Ok(Some(_)));
-        wire.write(Outgoing::new(feed.plan_id(), event, has_result), &mut text);
+impl Stream {
+    /// What is sent next; `None` at the end.
+    async fn next(&mut self, wire: Wire) -> Option<String> {
+        let told = tokio::select! {
+            told = self.feed.next() => told?,
+            // A key that is taken away takes its streams along.
+            () = self.access.withdrawn(self.key) => return None,
+        };
+        Some(match told {
+            Told::Events(events) => self.written(events, wire).await,
+            Told::Gap { from, to } => {
+                let mut text = String::new();
+                wire.write(Outgoing::gap(from, to), &mut text);
+                text
+            }
+            Told::Silence => wire.silence().to_owned(),
+            Told::Stopping(events) => self.written(events, wire).await + wire.stopping(),
+        })
     }
-    text
+
+    async fn written(&self, events: Vec<NumberedEvent>, wire: Wire) -> String {
+        let plan = self.feed.plan_id();
+        let mut text = String::new();
+        for event in events {
+            let ends = matches!(event.event, Event::End(_));
+            let has_result = ends && matches!(self.store.result(plan).await, Ok(Some(_)));
+            wire.write(Outgoing::new(plan, event, has_result), &mut text);
+        }
+        text
+    }
 }

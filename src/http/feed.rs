@@ -97,7 +97,7 @@ impl Feed {
                 Ok(page) => page,
                 Err(StoreError::Gone(_) | StoreError::NotFound(_)) => break,
                 Err(error) => {
-                    tracing::warn!(plan = %self.id, %error, "a stream of events broke off");
+                    tracing::warn!(%error, "a stream of events broke off");
                     break;
                 }
             };

@@ -12,7 +12,9 @@ mod documents;
 mod events;
 mod feed;
 mod idempotency;
+mod metrics;
 mod off_thread;
+mod pages;
 mod params;
 mod phase;
 mod plans;
@@ -46,6 +48,7 @@ pub use phase::Phase;
 
 use crate::scenario::json::Rules;
 use crate::store::Store;
+use crate::telemetry::Instruments;
 use auth::{Access, Needs};
 use problem::Problem;
 
@@ -72,6 +75,8 @@ pub struct AppState {
     pub cors: Origins,
     /// Where the service stands between its start and its end.
     pub phase: watch::Receiver<Phase>,
+    /// What is reported to the operator.
+    pub instruments: Arc<Instruments>,
 }
 
 /// How much the service does at once.
@@ -112,7 +117,11 @@ pub fn routes() -> Vec<Route> {
         get("/version", service::version),
         get("/livez", service::livez),
         get("/readyz", service::readyz),
-        get("/openapi.yaml", service::openapi_yaml),
+        get("/metrics", metrics::show),
+        get("/openapi.yaml", pages::openapi_yaml),
+        get("/openapi.json", pages::openapi_json),
+        get("/docs", pages::docs),
+        get("/problems/{slug}", pages::problem),
     ]
 }
 
@@ -127,17 +136,17 @@ pub fn router(state: AppState) -> Router {
         })
         .method_not_allowed_fallback(async || Problem::MethodNotAllowed)
         .fallback(async |uri: Uri| Problem::NoSuchResource(uri.path().to_owned()))
-        .with_state(state);
-    wrap(router, &cors)
+        .with_state(state.clone());
+    wrap(router, &cors, state.instruments)
 }
 
 /// What goes round every handler.
-fn wrap(router: Router, cors: &Origins) -> Router {
+fn wrap(router: Router, cors: &Origins, instruments: Arc<Instruments>) -> Router {
     router
         .layer(from_fn(auth::refuse_keys_in_urls))
         .layer(CatchPanicLayer::custom(problem::after_panic))
         .layer(cors.layer())
-        .layer(from_fn(request_id::assign))
+        .layer(from_fn_with_state(instruments, request_id::assign))
 }
 
 fn get<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
@@ -179,7 +188,7 @@ mod tests {
         let request = Request::get("/")
             .header("x-request-id", "caller-1")
             .body(Body::empty());
-        let answer = wrap(broken, &Origins::default())
+        let answer = wrap(broken, &Origins::default(), Arc::default())
             .oneshot(request.expect("a request"))
             .await
             .expect("an answer");

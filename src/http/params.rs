@@ -11,6 +11,7 @@ use uuid::Uuid;
 use super::auth::holds_a_key;
 use super::problem::Problem;
 use crate::job::PlanId;
+use crate::telemetry::spans;
 
 /// The parameters of one request.
 pub(super) struct Params(Vec<(String, String)>);
@@ -113,7 +114,10 @@ impl<S: Send + Sync> FromRequestParts<S> for Id {
         };
         match Uuid::try_parse(&text) {
             // Only the canonical spelling: each plan has one address.
-            Ok(id) if id.to_string() == text => Ok(Self(id)),
+            Ok(id) if id.to_string() == text => {
+                spans::name_plan(id);
+                Ok(Self(id))
+            }
             _ => Err(Problem::NoSuchPlan(text)),
         }
     }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use axum::Json;
 use axum::body::Body;
-use axum::extract::State;
+use axum::extract::{Extension, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use base64::Engine as _;
@@ -26,6 +26,7 @@ use super::{AppState, Phase, body, off_thread, retry, warm_start, webhook};
 use crate::job::{self, Plan, PlanId, Status, Submission};
 use crate::scenario::json;
 use crate::store::{ListQuery, StoreError, Submitted};
+use crate::telemetry::{Origin, spans};
 
 /// Plans on a page of the list, unless asked otherwise.
 const DEFAULT_PAGE: usize = 50;
@@ -37,6 +38,7 @@ pub(super) async fn submit(
     State(state): State<AppState>,
     caller: Caller,
     uri: Uri,
+    Extension(origin): Extension<Origin>,
     headers: HeaderMap,
     body: Body,
 ) -> Result<Response, Problem> {
@@ -59,7 +61,7 @@ pub(super) async fn submit(
     if validate_only {
         return Ok(valid(&submission));
     }
-    let Submitted { plan, replayed } = hand_in(&state, submission).await?;
+    let Submitted { plan, replayed } = hand_in(&state, origin, submission).await?;
     drop(once);
 
     let address = HeaderValue::from_str(&location(plan.id)).expect("an id is visible ASCII");
@@ -73,11 +75,27 @@ pub(super) async fn submit(
 }
 
 /// Make a plan durable, or say when there may be room for it.
-async fn hand_in(state: &AppState, submission: Submission) -> Result<Submitted, Problem> {
-    match state.store.submit(submission).await {
+async fn hand_in(
+    state: &AppState,
+    origin: Origin,
+    submission: Submission,
+) -> Result<Submitted, Problem> {
+    let id = submission.id;
+    // Before it can be claimed.
+    state.instruments.origins.remember(id, origin);
+    let submitted = state.store.submit(submission).await;
+    if !matches!(&submitted, Ok(submitted) if !submitted.replayed) {
+        state.instruments.origins.forget(id);
+    }
+    match submitted {
         Ok(submitted) => {
-            let Submitted { plan, replayed } = &submitted;
-            tracing::info!(plan = %plan.id, replayed, "accepted");
+            spans::name_plan(submitted.plan.id);
+            if submitted.replayed {
+                tracing::info!("accepted before");
+            } else {
+                state.instruments.metrics.accepted();
+                tracing::info!("accepted");
+            }
             Ok(submitted)
         }
         Err(StoreError::QueueFull { queued }) => {

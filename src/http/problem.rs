@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use super::auth::{Scope, TooMany, Unauthorized};
 use crate::job::{Failure, PlanId, Status};
 use crate::scenario::json::{Fault, Refusal};
-use crate::store::{StoreError, Tombstone};
+use crate::store::{StoreError, Tombstone, Trouble};
 
 /// Everything that a request can be refused for.
 #[derive(Debug, Clone)]
@@ -120,8 +120,8 @@ pub(super) enum Problem {
         /// See [`super::retry`].
         retry_after_s: u64,
     },
-    /// The store cannot be read or written now.
-    StoreUnavailable,
+    /// The store cannot be read or written now; `None` when another process has it.
+    StoreUnavailable(Option<Trouble>),
     /// A defect of the service.
     Internal,
 }
@@ -235,7 +235,7 @@ impl Problem {
                 "queue-full",
                 "The queue is full",
             ),
-            Self::StoreUnavailable => (
+            Self::StoreUnavailable(_) => (
                 StatusCode::SERVICE_UNAVAILABLE,
                 "store-unavailable",
                 "The store is unavailable",
@@ -276,7 +276,7 @@ impl Problem {
                 format!("{most} event streams are open, the limit {limit} of GET /limits; close one, or wait")
             }
             Self::NoSuchResource(path) => {
-                format!("nothing is at {path}; GET /openapi.yaml lists what is")
+                format!("nothing is at {path}; GET /docs lists what is")
             }
             Self::NoSuchPlan(id) => format!("there is no plan {id}"),
             Self::MethodNotAllowed => {
@@ -340,8 +340,16 @@ impl Problem {
             } => {
                 format!("{queued} plans wait, the limit; try again in {retry_after_s} s")
             }
-            Self::StoreUnavailable => {
-                "plans can be neither read nor written now; the service's log says why".to_owned()
+            Self::StoreUnavailable(trouble) => {
+                let why = match trouble {
+                    Some(Trouble::Full) => "the disk of the store is full",
+                    Some(Trouble::ReadOnly) => "the data directory cannot be written",
+                    Some(Trouble::Damaged) => "the store's file is damaged",
+                    Some(Trouble::Newer) => "the store was written by a newer version",
+                    Some(Trouble::Other) => "the store does not answer",
+                    None => "another process uses the data directory",
+                };
+                format!("{why}; plans are taken again when that is mended, the service's log says more")
             }
         }
     }
@@ -353,7 +361,7 @@ impl Problem {
             | Self::QuotaReached { retry_after_s, .. }
             | Self::RateLimited { retry_after_s }
             | Self::Draining { retry_after_s } => Some(*retry_after_s),
-            Self::StoreUnavailable | Self::IdempotencyInFlight => Some(1),
+            Self::StoreUnavailable(_) | Self::IdempotencyInFlight => Some(1),
             Self::TooManyStreams(_) => Some(5),
             _ => None,
         }
@@ -481,9 +489,12 @@ impl From<StoreError> for Problem {
                 queued,
                 retry_after_s: 1,
             },
-            error @ (StoreError::Unavailable(_) | StoreError::InUse(_)) => {
+            error @ (StoreError::Unavailable { .. } | StoreError::InUse(_)) => {
                 tracing::error!(%error, "the store did not answer");
-                Self::StoreUnavailable
+                Self::StoreUnavailable(match error {
+                    StoreError::Unavailable { trouble, .. } => Some(trouble),
+                    _ => None,
+                })
             }
             error @ StoreError::LeaseLost(_) => {
                 tracing::error!(%error, "a handler met an error that only workers meet");

@@ -1,18 +1,21 @@
 //! A request's id: taken from the caller or drawn, in the log's span, on the answer and in its
 //! problem document.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use axum::body::Body;
-use axum::extract::Request;
+use axum::extract::{MatchedPath, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
 use axum::middleware::Next;
 use axum::response::Response;
-use tracing::Instrument;
+use tracing::{Instrument, Span};
 use uuid::Uuid;
 
 use super::problem::Problem;
 use super::{auth, browser};
+use crate::telemetry::traceparent::{self, TraceParent};
+use crate::telemetry::{Instruments, spans};
 
 const X_REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
@@ -20,11 +23,18 @@ const X_REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 const MAX_LENGTH: usize = 128;
 
 /// The outermost layer: every answer leaves through here.
-pub(super) async fn assign(request: Request, next: Next) -> Response {
+pub(super) async fn assign(
+    State(instruments): State<Arc<Instruments>>,
+    route: Option<MatchedPath>,
+    mut request: Request,
+    next: Next,
+) -> Response {
     let id = of_caller(request.headers()).unwrap_or_else(|| Uuid::now_v7().to_string());
     let method = request.method().clone();
     let path = printable(request.uri().path()).to_owned();
-    let span = tracing::info_span!("request", request_id = %id, key = tracing::field::Empty);
+    let caller = traceparent_of(request.headers());
+    let (span, origin) = spans::of_request(id.clone(), caller);
+    request.extensions_mut().insert(origin);
     async move {
         let begun = Instant::now();
         let mut response = next.run(request).await;
@@ -32,8 +42,15 @@ pub(super) async fn assign(request: Request, next: Next) -> Response {
             write_problem(&mut response, &problem, &id, &method);
         }
         dress(response.headers_mut(), &id);
-        let duration_ms = begun.elapsed().as_secs_f64() * 1e3;
-        tracing::debug!(%method, path, status = response.status().as_u16(), duration_ms, "answered");
+        let took = begun.elapsed();
+        let route = route.as_ref().map(MatchedPath::as_str);
+        let status = response.status().as_u16();
+        instruments
+            .metrics
+            .answered(method.as_str(), route, status, took);
+        spans::answered(&Span::current(), method.as_str(), route, status);
+        let duration_ms = took.as_secs_f64() * 1e3;
+        tracing::debug!(%method, path, status, duration_ms, "answered");
         response
     }
     .instrument(span)
@@ -55,6 +72,16 @@ fn of_caller(headers: &HeaderMap) -> Option<String> {
     let sane = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~=;+/@,".contains(&byte);
     let sane_length = (1..=MAX_LENGTH).contains(&id.len()) && !auth::holds_a_key(id);
     sane_length.then(|| id.bytes().all(sane).then(|| id.to_owned()))?
+}
+
+/// One that cannot be read is as none.
+fn traceparent_of(headers: &HeaderMap) -> Option<TraceParent> {
+    headers
+        .get(traceparent::HEADER)?
+        .to_str()
+        .ok()?
+        .parse()
+        .ok()
 }
 
 fn write_problem(response: &mut Response, problem: &Problem, id: &str, method: &Method) {

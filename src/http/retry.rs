@@ -54,6 +54,7 @@ mod tests {
         let room = |queued, mean_run_ms, workers| {
             let stats = Stats {
                 queued,
+                oldest_queued_ms: None,
                 running: 0,
                 mean_run_ms,
             };

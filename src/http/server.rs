@@ -21,9 +21,10 @@ use tower::ServiceExt as _;
 
 use super::Phase;
 use super::phase::stopping;
+use crate::telemetry::Instruments;
 
 /// How connections are kept.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Settings {
     /// A request's head must be complete after this; also how long a connection may idle.
     pub head_timeout: Duration,
@@ -31,6 +32,8 @@ pub struct Settings {
     pub max_connections: usize,
     /// At the end, open connections may finish their answers for so long.
     pub patience: Duration,
+    /// Connections are counted there.
+    pub instruments: Arc<Instruments>,
 }
 
 /// Pause after a failed accept, such as when file descriptors run out.
@@ -59,9 +62,10 @@ pub async fn serve(
                     connections.watcher(),
                     settings.head_timeout,
                 );
+                let counted = settings.instruments.metrics.connection();
                 tokio::spawn(async move {
                     answer.await;
-                    drop(place);
+                    drop((place, counted));
                 });
             }
             Err(error) => {

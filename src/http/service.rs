@@ -1,8 +1,8 @@
-//! The service about itself: alive, ready, its version, its limits, its algorithms, its description.
+//! The service about itself: alive, ready, its version, its limits, its algorithms.
 
 use axum::Json;
 use axum::extract::State;
-use axum::http::{Uri, header};
+use axum::http::Uri;
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -12,9 +12,6 @@ use super::problem::Problem;
 use super::{AppState, Phase, events, plans, prefer, retry};
 use crate::optimizer::{self, Algorithm, Parameter};
 use crate::scenario::json::{COMMON, CommonParameter, Takes};
-
-/// The description of this service.
-const OPENAPI_YAML: &str = include_str!("../../openapi.yaml");
 
 /// `GET /livez`: the process answers.
 pub(super) async fn livez(uri: Uri) -> Result<Response, Problem> {
@@ -183,10 +180,4 @@ pub(super) async fn algorithms(uri: Uri) -> Result<Json<AlgorithmsDocument>, Pro
         parameters: COMMON.iter().map(Into::into).collect(),
         algorithms: optimizer::ALL.iter().map(Into::into).collect(),
     }))
-}
-
-/// `GET /openapi.yaml`.
-pub(super) async fn openapi_yaml(uri: Uri) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
-    Ok(([(header::CONTENT_TYPE, "application/yaml")], OPENAPI_YAML).into_response())
 }

@@ -50,7 +50,7 @@ pub(super) async fn resolve(
     let result = state.store.result(plan).await?;
     let result = result.ok_or_else(|| unknown("that plan has no route yet"))?;
     let route: Route = serde_json::from_str(&result).map_err(|error| {
-        tracing::error!(%plan, %error, "a stored result cannot be read");
+        tracing::error!(warm_start_plan_id = %plan, %error, "a stored result cannot be read");
         Problem::Internal
     })?;
     let points = route.waypoints.iter();

@@ -3,6 +3,8 @@
 //! A store holds the queue, the records, the documents and the events of all plans, and makes each
 //! step durable before it answers. Deliberately absent: what a plan means, and who may see it.
 
+pub mod measured;
+pub mod reopening;
 pub mod sqlite;
 
 use std::sync::Arc;
@@ -321,6 +323,8 @@ pub struct ListQuery {
 pub struct Stats {
     /// Plans waiting.
     pub queued: u64,
+    /// When the plan at the head of the queue was accepted, milliseconds since 1970; `None` without one.
+    pub oldest_queued_ms: Option<i64>,
     /// Plans being run.
     pub running: u64,
     /// Mean run time of the last few plans that ended with a result, milliseconds; `None` before the first.
@@ -328,7 +332,7 @@ pub struct Stats {
 }
 
 /// Why a store did not do what it was asked.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 pub enum StoreError {
     /// There never was such a plan, or its tombstone has expired.
     #[error("no plan {0}")]
@@ -357,7 +361,37 @@ pub enum StoreError {
     /// Another process uses the data directory.
     #[error("data directory {0} is in use by another process")]
     InUse(std::path::PathBuf),
-    /// The file or the disk failed; details are for the log.
-    #[error("store unavailable: {0}")]
-    Unavailable(String),
+    /// It cannot be read or written now.
+    #[error("store unavailable: {detail}")]
+    Unavailable {
+        /// What an operator would look at first.
+        trouble: Trouble,
+        /// For the log.
+        detail: String,
+    },
+}
+
+impl StoreError {
+    /// For no reason that has a name.
+    pub fn unavailable(detail: impl Into<String>) -> Self {
+        Self::Unavailable {
+            trouble: Trouble::Other,
+            detail: detail.into(),
+        }
+    }
+}
+
+/// Why a store is unavailable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Trouble {
+    /// There is no room on the disk.
+    Full,
+    /// The directory or its files cannot be written or made.
+    ReadOnly,
+    /// What is in the file is not what was written.
+    Damaged,
+    /// The file was written by a newer version of the program.
+    Newer,
+    /// See the log.
+    Other,
 }

@@ -13,12 +13,14 @@ use std::time::Duration;
 
 use tokio::sync::watch;
 use tokio::task::JoinSet;
+use tracing::Instrument as _;
 
 pub use sweeper::Sweeper;
 
 use crate::job::Failure;
 use crate::planner::{Observer, Outcome, Stop};
 use crate::store::{Clock, Store};
+use crate::telemetry::{Instruments, spans};
 
 /// Plans an accepted scenario document, calling back as it goes. A panic of it fails its plan only.
 pub type Engine =
@@ -31,6 +33,8 @@ pub struct Settings {
     pub workers: usize,
     /// Of the time of ending.
     pub clock: Clock,
+    /// Runs are counted there.
+    pub instruments: Arc<Instruments>,
 }
 
 /// The running pool.
@@ -64,6 +68,7 @@ impl Pool {
             number: 0,
             store,
             clock: settings.clock,
+            instruments: settings.instruments,
             engine,
             phase: phase.subscribe(),
         };
@@ -103,6 +108,7 @@ struct Slot {
     number: usize,
     store: Arc<dyn Store>,
     clock: Clock,
+    instruments: Arc<Instruments>,
     engine: Engine,
     phase: watch::Receiver<Phase>,
 }
@@ -119,7 +125,9 @@ impl Slot {
             match claim {
                 Ok(lease) => {
                     pause = Pause::default();
-                    self.run(lease).await;
+                    let plan = lease.plan.id;
+                    let span = spans::of_run(plan, self.instruments.origins.of(plan).as_ref());
+                    self.run(lease).instrument(span).await;
                 }
                 Err(error) => {
                     tracing::warn!(%error, worker = self.number, "no plan could be claimed; trying again");

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Instant;
 
 use tokio::sync::{mpsc, oneshot};
+use tracing::Span;
 
 use super::Engine;
 use crate::export::document::{Origin, ResultDocument, Timing};
@@ -14,6 +15,7 @@ use crate::export::sha256_hex;
 use crate::job::{Event, Failure, Plan, Status};
 use crate::planner::{ConvergencePoint, Incumbent, Observer, Outcome, Stop, StopReason};
 use crate::store::{Ending, Lease};
+use crate::telemetry::Instruments;
 
 /// Why a run shall stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,7 +48,18 @@ impl StopFlag {
     }
 }
 
-/// Start planning on a thread of its own. The ending comes after the last event.
+/// Where a run's thread tells what it does, and learns that it shall stop.
+pub(super) struct Reports {
+    /// To be stored.
+    pub(super) events: mpsc::Sender<Event>,
+    /// Shared with those who may stop it.
+    pub(super) stop: Arc<StopFlag>,
+    /// For the operator.
+    pub(super) instruments: Arc<Instruments>,
+}
+
+/// Start planning on a thread of its own, within the span of the caller. The ending comes after the
+/// last event.
 ///
 /// # Errors
 /// When the machine has no thread left.
@@ -54,37 +67,39 @@ pub(super) fn start(
     thread_name: String,
     engine: Engine,
     lease: &Lease,
-    events: mpsc::Sender<Event>,
-    stop: Arc<StopFlag>,
+    reports: Reports,
 ) -> std::io::Result<oneshot::Receiver<Ending>> {
     let (ended, ending) = oneshot::channel();
     let (plan, scenario) = (lease.plan.clone(), Arc::clone(&lease.scenario));
+    let span = Span::current();
     std::thread::Builder::new()
         .name(thread_name)
         .spawn(move || {
+            let _within = span.enter();
             let end = catch_unwind(AssertUnwindSafe(|| {
-                plan_to_its_end(&engine, &plan, &scenario, events, stop)
+                plan_to_its_end(&engine, &plan, &scenario, reports)
             }));
             // Nobody listens when the pool was dropped.
-            let _ = ended.send(end.unwrap_or_else(|payload| panicked(&plan, &*payload)));
+            let _ = ended.send(end.unwrap_or_else(|payload| panicked(&*payload)));
         })?;
     Ok(ending)
 }
 
-fn plan_to_its_end(
-    engine: &Engine,
-    plan: &Plan,
-    scenario: &str,
-    events: mpsc::Sender<Event>,
-    stop: Arc<StopFlag>,
-) -> Ending {
+fn plan_to_its_end(engine: &Engine, plan: &Plan, scenario: &str, reports: Reports) -> Ending {
     let watch = Watch {
         began: Instant::now(),
-        stop: Arc::clone(&stop),
+        stop: Arc::clone(&reports.stop),
     };
-    let mut teller = Teller { events, stop };
+    let mut teller = Teller {
+        reports,
+        iterations: 0,
+        evaluations: 0,
+    };
     match engine(scenario, &mut teller, &watch) {
-        Ok(outcome) => ending(&outcome, plan, scenario, watch.elapsed_ms()),
+        Ok(outcome) => {
+            teller.ended(&outcome);
+            ending(&outcome, plan, scenario, watch.elapsed_ms())
+        }
         Err(failure) => Ending::Failed(failure),
     }
 }
@@ -121,13 +136,16 @@ fn ending(outcome: &Outcome, plan: &Plan, scenario: &str, run_ms: f64) -> Ending
     }
 }
 
-fn panicked(plan: &Plan, payload: &(dyn Any + Send)) -> Ending {
+fn panicked(payload: &(dyn Any + Send)) -> Ending {
     let message = payload
         .downcast_ref::<&str>()
         .copied()
         .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
         .unwrap_or("no message");
-    tracing::error!(plan = %plan.id, panic = message, "the planner panicked; its plan fails, the others go on");
+    tracing::error!(
+        panic = message,
+        "the planner panicked; its plan fails, the others go on"
+    );
     Ending::Failed(Failure {
         kind: "planner-panic".to_owned(),
         detail: "the planner broke on this scenario; the service's log says where".to_owned(),
@@ -136,20 +154,39 @@ fn panicked(plan: &Plan, payload: &(dyn Any + Send)) -> Ending {
 
 /// Hands events on; waits when they come faster than they can be stored.
 struct Teller {
-    events: mpsc::Sender<Event>,
-    stop: Arc<StopFlag>,
+    reports: Reports,
+    /// Counted so far.
+    iterations: u64,
+    evaluations: u64,
 }
 
 impl Teller {
     fn tell(&self, event: Event) {
-        if self.events.blocking_send(event).is_err() {
-            self.stop.raise(Reason::Abandoned);
+        if self.reports.events.blocking_send(event).is_err() {
+            self.reports.stop.raise(Reason::Abandoned);
+        }
+    }
+
+    /// Count what has been added since the last time.
+    fn count(&mut self, iterations: u64, evaluations: u64) {
+        self.reports.instruments.metrics.searched(
+            iterations.saturating_sub(self.iterations),
+            evaluations.saturating_sub(self.evaluations),
+        );
+        (self.iterations, self.evaluations) = (iterations, evaluations);
+    }
+
+    fn ended(&mut self, outcome: &Outcome) {
+        self.count(self.iterations, outcome.evaluations);
+        if let Some(gap) = outcome.bound.gap {
+            self.reports.instruments.metrics.gap(gap);
         }
     }
 }
 
 impl Observer for Teller {
     fn iteration(&mut self, point: &ConvergencePoint) {
+        self.count(point.iteration as u64, point.evaluations);
         self.tell(Event::Convergence(point.into()));
     }
 

@@ -7,10 +7,11 @@ use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tokio::time::Instant;
 
-use super::planning::{self, Reason, StopFlag};
+use super::planning::{self, Reason, Reports, StopFlag};
 use super::{Pause, Phase, Slot, reached};
 use crate::job::Event;
 use crate::store::{Ending, Lease, StoreError};
+use crate::telemetry::metrics::Ended;
 
 /// Events on their way from the planning thread; when there are more, it waits.
 const ON_THE_WAY: usize = 256;
@@ -24,16 +25,28 @@ const DELAY: Duration = Duration::from_millis(50);
 impl Slot {
     /// Run the plan, store what it tells, and end it or give it back.
     pub(super) async fn run(&self, lease: Lease) {
-        let plan = lease.plan.id;
-        tracing::info!(%plan, worker = self.number, attempt = lease.attempt, "plan started");
+        tracing::info!(
+            worker = self.number,
+            attempt = lease.attempt,
+            "plan started"
+        );
+        if let Some(started_ms) = lease.plan.started_ms {
+            let waited_ms = started_ms - lease.plan.created_ms;
+            self.instruments.metrics.started(waited_ms);
+        }
         let stop = Arc::new(StopFlag::default());
         let (events, told) = mpsc::channel(ON_THE_WAY);
         let thread_name = format!("planner-{}", self.number);
         let engine = Arc::clone(&self.engine);
-        let ending = match planning::start(thread_name, engine, &lease, events, Arc::clone(&stop)) {
+        let reports = Reports {
+            events,
+            stop: Arc::clone(&stop),
+            instruments: Arc::clone(&self.instruments),
+        };
+        let ending = match planning::start(thread_name, engine, &lease, reports) {
             Ok(ending) => ending,
             Err(error) => {
-                tracing::error!(%plan, %error, "no thread to plan on; the plan goes back to the queue");
+                tracing::error!(%error, "no thread to plan on; the plan goes back to the queue");
                 self.give_back(&lease).await;
                 // Soon there may be one.
                 return Pause::default().wait().await;
@@ -92,14 +105,19 @@ impl Slot {
                 .finished_ms
                 .zip(plan.started_ms)
                 .map(|(end, start)| end - start);
-            tracing::info!(plan = %plan.id, status = plan.status.name(), run_ms, "plan ended");
+            tracing::info!(status = plan.status.name(), run_ms, "plan ended");
+            self.instruments.origins.forget(plan.id);
+            self.instruments.metrics.ended(Ended {
+                status: plan.status.name(),
+                run_ms,
+            });
         }
     }
 
     async fn give_back(&self, lease: &Lease) {
         let release = || self.store.release(lease);
         if self.persist("release", release).await.is_some() {
-            tracing::info!(plan = %lease.plan.id, "plan given back to the queue");
+            tracing::info!("plan given back to the queue");
         }
     }
 
@@ -115,7 +133,8 @@ impl Slot {
             match step().await {
                 Ok(done) => return Some(done),
                 Err(StoreError::LeaseLost(plan)) => {
-                    tracing::debug!(%plan, "the plan was taken from its worker");
+                    self.instruments.origins.forget(plan);
+                    tracing::debug!("the plan was taken from its worker");
                     return None;
                 }
                 Err(error) if last_try => {

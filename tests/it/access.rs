@@ -139,7 +139,12 @@ async fn with_leave_or_keys_it_listens_everywhere() {
             StatusCode::UNAUTHORIZED,
         ),
     ] {
-        let service = Service::start_logged("0.0.0.0:0", &path("data"), arguments, &path("log"));
+        let service = Service::start_on(
+            "0.0.0.0:0",
+            &path("data"),
+            arguments,
+            fs::File::create(path("log")).expect("a file"),
+        );
         let listed = service.get("/plans").send().await.expect("an answer");
         assert_eq!(listed.status(), anonymous, "{arguments:?}");
         assert_eq!(lists(&service, &key).await, StatusCode::OK);
@@ -161,7 +166,12 @@ async fn a_hangup_reads_the_keys_again_and_a_fault_changes_nothing() {
         "--keys-file",
         keys.to_str().expect("UTF-8"),
     ];
-    let service = Service::start_logged("127.0.0.1:0", &path("data"), &arguments, &path("log"));
+    let service = Service::start_on(
+        "127.0.0.1:0",
+        &path("data"),
+        &arguments,
+        fs::File::create(path("log")).expect("a file"),
+    );
     let request = service
         .client()
         .post(service.url("/plans"))
@@ -210,7 +220,12 @@ async fn neither_keys_nor_tickets_are_logged() {
         "--keys-file",
         keys.to_str().expect("UTF-8"),
     ];
-    let service = Service::start_logged("127.0.0.1:0", &path("data"), &arguments, &path("log"));
+    let service = Service::start_on(
+        "127.0.0.1:0",
+        &path("data"),
+        &arguments,
+        fs::File::create(path("log")).expect("a file"),
+    );
     let request = service
         .client()
         .post(service.url("/plans"))

@@ -78,18 +78,3 @@ fn oldest(addresses: &[String], n: usize) -> String {
     sorted.sort();
     sorted.swap_remove(n)
 }
-
-#[tokio::test]
-async fn a_second_process_is_kept_out() {
-    let directory = tempfile::tempdir().expect("a temporary directory");
-    let service = Service::start(directory.path(), &[]);
-    let data_dir = directory.path().to_str().expect("UTF-8");
-    let second = crate::support::process::run(
-        &["serve", "--listen", "127.0.0.1:0", "--data-dir", data_dir],
-        "",
-    );
-    assert_eq!(second.status.code(), Some(1));
-    let reason = String::from_utf8(second.stderr).expect("UTF-8");
-    assert!(reason.contains("in use by another process"), "{reason}");
-    assert_eq!(service.bytes("/livez").await, r#"{"status":"ok"}"#);
-}

@@ -35,7 +35,7 @@ const ROOMS: [(&str, Imports); 16] = [
 ];
 
 /// Libraries that only these rooms may name.
-const LIBRARIES: [(&str, &[&str]); 9] = [
+const LIBRARIES: [(&str, &[&str]); 11] = [
     ("axum", &["http", "cli"]),
     ("hyper", &["http", "cli"]),
     ("hyper_util", &["http", "cli"]),
@@ -44,6 +44,8 @@ const LIBRARIES: [(&str, &[&str]); 9] = [
     ("tower_http", &["http", "cli"]),
     ("tokio", &["store", "worker", "http", "cli"]),
     ("rusqlite", &["store"]),
+    ("prometheus_client", &["telemetry"]),
+    ("opentelemetry", &["telemetry"]),
     ("anyhow", &["cli"]),
 ];
 

@@ -14,12 +14,16 @@ mod determinism;
 mod events;
 mod idempotency;
 mod layering;
+
+mod logs;
+mod metrics;
 mod openapi;
 mod refusals;
 mod scenario;
 mod shutdown;
 mod store_conformance;
 mod store_sqlite;
+mod store_trouble;
 mod support;
 mod svg;
 mod warm_start;

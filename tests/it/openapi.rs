@@ -4,7 +4,10 @@
 use std::collections::BTreeSet;
 
 use axum::http::Method;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::Value;
+use sha2::{Digest as _, Sha256};
 
 use crate::support::api::Api;
 use crate::support::description::{DESCRIPTION, check_schema, resolve};
@@ -137,6 +140,94 @@ async fn example_scenarios_are_accepted() {
     for example in body["examples"].as_object().expect("examples").values() {
         assert_eq!(api.post("/plans", &example["value"]).await.status, 202);
     }
+}
+
+/// Programs that read JSON read the same.
+#[tokio::test]
+async fn the_description_comes_as_yaml_and_as_json() {
+    let api = Api::new();
+    let yaml = api.get("/openapi.yaml").await;
+    let yaml: Value = serde_yaml_ng::from_slice(&yaml.body).expect("YAML");
+    assert_eq!(api.get("/openapi.json").await.json(), yaml);
+    assert_eq!(yaml, *DESCRIPTION);
+}
+
+/// Every operation and every schema has its place on the page, and every link leads to one.
+#[tokio::test]
+async fn the_reference_is_whole() {
+    let answer = Api::new().get("/docs").await;
+    let page = std::str::from_utf8(&answer.body).expect("UTF-8");
+    let attributes = |name: &str| {
+        let opening = format!(" {name}=\"");
+        let parts = page.split(&opening).skip(1);
+        let values = parts.map(|part| part.split('"').next().expect("one at least").to_owned());
+        values.collect::<Vec<_>>()
+    };
+    let places: BTreeSet<String> = attributes("id").into_iter().collect();
+    assert_eq!(
+        places.len(),
+        attributes("id").len(),
+        "an id stands for one place"
+    );
+    for (path, item) in DESCRIPTION["paths"].as_object().expect("paths") {
+        for (method, operation) in item.as_object().expect("an object") {
+            if let Some(id) = operation["operationId"].as_str() {
+                assert!(places.contains(id), "{method} {path} is not there");
+            }
+        }
+    }
+    let schemas = DESCRIPTION["components"]["schemas"].as_object();
+    for name in schemas.expect("schemas").keys() {
+        assert!(
+            places.contains(&format!("schema-{name}")),
+            "{name} is not there"
+        );
+    }
+    for link in attributes("href") {
+        match link.strip_prefix('#') {
+            Some(place) => assert!(places.contains(place), "{link} leads nowhere"),
+            None => assert!(link.starts_with('/'), "{link} leads elsewhere"),
+        }
+    }
+    assert!(attributes("src").is_empty(), "nothing is loaded");
+}
+
+/// The page's policy lets in its own style and nothing else.
+#[tokio::test]
+async fn pages_are_closed_to_everything_but_their_style() {
+    let api = Api::new();
+    for path in ["/docs", "/problems/queue-full"] {
+        let answer = api.get(path).await;
+        let page = std::str::from_utf8(&answer.body).expect("UTF-8");
+        let style = page.split("<style>").nth(1).expect("a style");
+        let style = style.split("</style>").next().expect("its end");
+        let hash = BASE64.encode(Sha256::digest(style));
+        let policy = answer.header("content-security-policy");
+        let expected = format!("default-src 'none'; style-src 'sha256-{hash}';");
+        assert!(policy.starts_with(&expected), "{policy}");
+        assert!(
+            !page.contains("style=") && !page.contains("<script"),
+            "{path}"
+        );
+    }
+}
+
+/// The `type` of a problem is an address.
+#[tokio::test]
+async fn problem_types_lead_to_their_pages() {
+    let api = Api::new();
+    let types = DESCRIPTION["components"]["schemas"]["Problem"]["properties"]["type"]["enum"]
+        .as_array()
+        .expect("a list");
+    for kind in types.iter().filter_map(Value::as_str) {
+        let answer = api.get(kind).await;
+        assert_eq!(answer.status, 200, "{kind}");
+        let slug = kind.trim_start_matches("/problems/");
+        let page = std::str::from_utf8(&answer.body).expect("UTF-8");
+        assert!(page.contains(&format!("<h2>{slug}</h2>")), "{page}");
+    }
+    let unknown = api.get("/problems/nothing").await;
+    unknown.expect_problem(404, "not-found");
 }
 
 #[test]

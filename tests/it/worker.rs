@@ -10,7 +10,7 @@ use futures_util::FutureExt;
 use noctule::export::document::ResultDocument;
 use noctule::job::{Event, Failure, PlanId, Status, Submission};
 use noctule::planner::StopReason;
-use noctule::store::Store;
+use noctule::store::{Clock, Store};
 use noctule::worker::{Engine, Pool, Settings};
 
 use crate::support::engines::{deterministic, endless, engine, incumbent, outcome, point};
@@ -21,9 +21,17 @@ use crate::support::stores::{Fixture, on_every_backend};
 /// Longer than any test waits.
 const AGES: Duration = Duration::from_secs(3_600);
 
+fn settings(workers: usize, clock: Clock) -> Settings {
+    Settings {
+        workers,
+        clock,
+        instruments: Arc::default(),
+    }
+}
+
 fn pool(fixture: &Fixture, workers: usize, engine: Engine) -> Pool {
     let clock = fixture.clock();
-    Pool::start(fixture.share(), Settings { workers, clock }, engine)
+    Pool::start(fixture.share(), settings(workers, clock), engine)
 }
 
 async fn submit(store: &dyn Store, scenario: &str) -> PlanId {
@@ -365,7 +373,7 @@ async fn a_store_that_fails_now_and_then_loses_nothing() {
     on_every_backend(20, async |store| {
         let faulty = Arc::new(FaultyStore::new(store.share()));
         let clock = store.clock();
-        let pool = Pool::start(faulty, Settings { workers: 1, clock }, deterministic(2_000));
+        let pool = Pool::start(faulty, settings(1, clock), deterministic(2_000));
         for _ in 0..3 {
             let id = submit(&**store, "{}").await;
             assert_eq!(ended(&**store, id).await, Status::Succeeded);

@@ -35,6 +35,7 @@ use super::caller::Caller;
 use super::params::ticket_of;
 use super::problem::Problem;
 use crate::job::{Owner, PlanId};
+use crate::telemetry::spans;
 use rate::{Buckets, Taken};
 use streams::Streams;
 use ticket::Tickets;
@@ -200,7 +201,7 @@ impl Access {
         if key.has_expired(Timestamp::now()) {
             return Err(Unauthorized::Expired.into());
         }
-        tracing::Span::current().record("key", &key.name);
+        spans::name_key(&key.name);
         let taken = key
             .rate
             .map(|rate| self.0.buckets.take(&key.name, rate, Instant::now()));

@@ -59,7 +59,7 @@ impl Needs {
             (
                 "GET",
                 "/" | "/algorithms" | "/docs" | "/limits" | "/livez" | "/openapi.json"
-                | "/openapi.yaml" | "/readyz" | "/version",
+                | "/openapi.yaml" | "/problems/{slug}" | "/readyz" | "/version",
             ) => Self::Nothing,
             ("GET", "/metrics") => Self::Scope(Scope::Metrics),
             ("GET", "/plans/{id}/events") => Self::Ticket,

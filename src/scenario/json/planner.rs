@@ -202,8 +202,7 @@ fn waypoints(at: At<'_>, limit: usize, faults: &mut Faults) -> Option<Vec<Point3
     if count > most {
         faults.add(at.path, "too-many", || {
             format!(
-                "waypoints has {count} items, must have at most {} (limit waypoints, and both ends)",
-                most
+                "waypoints has {count} items, must have at most {most} (limit waypoints, and both ends)"
             )
         });
         return None;

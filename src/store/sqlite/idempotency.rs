@@ -32,7 +32,7 @@ pub(super) fn earlier(
         return Err(StoreError::KeyReused);
     }
     let plan = PlanId::parse_str(&plan)
-        .map_err(|error| StoreError::Unavailable(format!("plan id {plan:?}: {error}")))?;
+        .map_err(|error| StoreError::unavailable(format!("plan id {plan:?}: {error}")))?;
     Ok(Some(plan))
 }
 

@@ -11,6 +11,7 @@ mod removal;
 mod row;
 mod schema;
 mod transaction;
+pub mod upkeep;
 mod webhooks;
 mod writer;
 
@@ -20,7 +21,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use async_trait::async_trait;
-use rusqlite::Connection;
+use rusqlite::{Connection, ErrorCode};
 use tokio::sync::watch;
 
 use self::changes::Changes;
@@ -28,7 +29,7 @@ use self::read::Readers;
 use self::writer::Writer;
 use super::{
     Clock, Ending, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError, Submitted,
-    Webhook,
+    Trouble, Webhook,
 };
 use crate::export::document::Incumbent;
 use crate::job::state::Refused;
@@ -61,12 +62,39 @@ impl SqliteStore {
     /// [`StoreError::InUse`] when another process has it open; [`StoreError::Unavailable`] when the
     /// directory or the file cannot be used, or was written by a newer version.
     pub fn open(data_dir: &Path, options: Options) -> Result<Self, StoreError> {
+        Self::open_after(data_dir, options, |_| Ok(Vec::new()))
+    }
+
+    /// As [`SqliteStore::open`], of a file that may be damaged.
+    ///
+    /// # Errors
+    /// Also [`StoreError::Unavailable`] with [`Trouble::Damaged`] when it is.
+    pub fn open_suspicious(data_dir: &Path, options: Options) -> Result<Self, StoreError> {
+        Self::open_after(data_dir, options, upkeep::damage)
+    }
+
+    fn open_after(
+        data_dir: &Path,
+        options: Options,
+        damage: impl FnOnce(&Connection) -> rusqlite::Result<Vec<String>>,
+    ) -> Result<Self, StoreError> {
         create_directory(data_dir)?;
         let lock = lock(data_dir)?;
         let file = data_dir.join(DATABASE);
-        let connection = open_database(&file).map_err(|error| {
-            StoreError::Unavailable(format!("database {}: {error}", file.display()))
+        let connection = open_database(&file).map_err(|error| match error {
+            StoreError::Unavailable { trouble, detail } => StoreError::Unavailable {
+                trouble,
+                detail: format!("database {}: {detail}", file.display()),
+            },
+            other => other,
         })?;
+        let damage = damage(&connection)?;
+        if let Some(first) = damage.first() {
+            return Err(StoreError::Unavailable {
+                trouble: Trouble::Damaged,
+                detail: format!("database {}: {first}", file.display()),
+            });
+        }
         sync_directory(data_dir)?;
         Self::assemble(connection, lock, file, options)
     }
@@ -219,18 +247,39 @@ impl Store for SqliteStore {
 
 impl From<rusqlite::Error> for StoreError {
     fn from(error: rusqlite::Error) -> Self {
-        Self::Unavailable(error.to_string())
+        let trouble = match error.sqlite_error_code() {
+            Some(ErrorCode::DiskFull) => Trouble::Full,
+            Some(ErrorCode::ReadOnly | ErrorCode::PermissionDenied | ErrorCode::CannotOpen) => {
+                Trouble::ReadOnly
+            }
+            Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase) => Trouble::Damaged,
+            _ => Trouble::Other,
+        };
+        Self::Unavailable {
+            trouble,
+            detail: error.to_string(),
+        }
     }
 }
 
 impl From<Refused> for StoreError {
     fn from(refused: Refused) -> Self {
-        Self::Unavailable(refused.to_string())
+        Self::unavailable(refused.to_string())
     }
 }
 
 fn closed() -> StoreError {
-    StoreError::Unavailable("the store is closed".to_owned())
+    StoreError::unavailable("the store is closed".to_owned())
+}
+
+fn failed(what: &str, error: &std::io::Error) -> StoreError {
+    StoreError::Unavailable {
+        trouble: match error.kind() {
+            std::io::ErrorKind::StorageFull => Trouble::Full,
+            _ => Trouble::ReadOnly,
+        },
+        detail: format!("{what}: {error}"),
+    }
 }
 
 fn create_directory(data_dir: &Path) -> Result<(), StoreError> {
@@ -239,17 +288,14 @@ fn create_directory(data_dir: &Path) -> Result<(), StoreError> {
     #[cfg(unix)]
     std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
     builder.create(data_dir).map_err(|error| {
-        StoreError::Unavailable(format!(
-            "data directory {} cannot be made: {error}",
-            data_dir.display()
-        ))
+        let what = format!("data directory {} cannot be made", data_dir.display());
+        failed(&what, &error)
     })
 }
 
 fn lock(data_dir: &Path) -> Result<File, StoreError> {
     let path = data_dir.join(LOCK);
-    let unusable =
-        |error| StoreError::Unavailable(format!("lock file {}: {error}", path.display()));
+    let unusable = |error| failed(&format!("lock file {}", path.display()), &error);
     let file = File::options()
         .create(true)
         .truncate(false)
@@ -282,9 +328,7 @@ fn sync_directory(data_dir: &Path) -> Result<(), StoreError> {
     #[cfg(unix)]
     File::open(data_dir)
         .and_then(|directory| directory.sync_all())
-        .map_err(|error| {
-            StoreError::Unavailable(format!("data directory {}: {error}", data_dir.display()))
-        })?;
+        .map_err(|error| failed(&format!("data directory {}", data_dir.display()), &error))?;
     #[cfg(not(unix))]
     let _ = data_dir;
     Ok(())

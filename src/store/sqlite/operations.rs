@@ -163,7 +163,7 @@ pub(super) fn recover(tx: &mut Transaction<'_>) -> Result<(), StoreError> {
         .collect::<Result<Vec<_>, _>>()?;
     for id in ids {
         let id = PlanId::parse_str(&id)
-            .map_err(|error| StoreError::Unavailable(format!("plan id {id:?}: {error}")))?;
+            .map_err(|error| StoreError::unavailable(format!("plan id {id:?}: {error}")))?;
         if let Some(row) = PlanRow::load(tx.connection, id)? {
             give_back(tx, row)?;
         }
@@ -253,7 +253,7 @@ fn give_back(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<(), StoreErro
 
 fn keep_incumbent(tx: &Transaction<'_>, row: &PlanRow, best: &Incumbent) -> Result<(), StoreError> {
     let document = serde_json::to_string(best).map_err(|error| {
-        StoreError::Unavailable(format!("best route of plan {}: {error}", row.plan.id))
+        StoreError::unavailable(format!("best route of plan {}: {error}", row.plan.id))
     })?;
     tx.connection
         .prepare_cached("INSERT OR REPLACE INTO incumbents (plan_seq, document) VALUES (?1, ?2)")?

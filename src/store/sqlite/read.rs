@@ -58,7 +58,7 @@ impl Readers {
             result
         });
         task.await
-            .map_err(|broken| StoreError::Unavailable(format!("a read broke: {broken}")))?
+            .map_err(|broken| StoreError::unavailable(format!("a read broke: {broken}")))?
     }
 
     /// Wait for the reads under way; later ones fail.
@@ -100,7 +100,7 @@ pub(super) fn scenario(
 ) -> Result<String, StoreError> {
     let sql = "SELECT document FROM plans LEFT JOIN scenarios ON plan_seq = seq WHERE id = ?1";
     let document = document(connection, sql, id, now_ms)?;
-    document.ok_or_else(|| StoreError::Unavailable(format!("plan {id} has lost its scenario")))
+    document.ok_or_else(|| StoreError::unavailable(format!("plan {id} has lost its scenario")))
 }
 
 pub(super) fn result(
@@ -122,7 +122,7 @@ pub(super) fn incumbent(
     let document = document(connection, sql, id, now_ms)?;
     let read = document.map(|document| serde_json::from_str(&document));
     read.transpose()
-        .map_err(|error| StoreError::Unavailable(format!("best route of plan {id}: {error}")))
+        .map_err(|error| StoreError::unavailable(format!("best route of plan {id}: {error}")))
 }
 
 fn document(
@@ -219,7 +219,7 @@ pub(super) fn events(
         let first_id: i64 = row.get(0)?;
         let batch: String = row.get(1)?;
         let batch: Vec<Event> = serde_json::from_str(&batch)
-            .map_err(|error| StoreError::Unavailable(format!("events of plan {id}: {error}")))?;
+            .map_err(|error| StoreError::unavailable(format!("events of plan {id}: {error}")))?;
         let numbered = (first_id..).zip(batch).filter(|(id, _)| *id > after);
         events.extend(numbered.map(|(id, event)| NumberedEvent {
             id: id.cast_unsigned(),
@@ -246,8 +246,16 @@ pub(super) fn stats(connection: &Connection) -> Result<Stats, StoreError> {
              WHERE stop_reason IS NOT NULL ORDER BY finished_ms DESC LIMIT ?1)",
         )?
         .query_row([RUNS], |row| row.get(0))?;
+    let oldest_queued_ms = connection
+        .prepare_cached(
+            "SELECT created_ms FROM plans INDEXED BY plans_queue WHERE status = 'queued' \
+             ORDER BY seq LIMIT 1",
+        )?
+        .query_row([], |row| row.get(0))
+        .optional()?;
     Ok(Stats {
         queued: count(Status::Queued)?,
+        oldest_queued_ms,
         running: count(Status::Running)?,
         mean_run_ms,
     })

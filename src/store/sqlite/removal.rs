@@ -85,7 +85,7 @@ fn ended(tx: &Transaction<'_>, sql: &str, parameters: [i64; 2]) -> Result<Vec<En
 
 fn expire(tx: &mut Transaction<'_>, plan: Ended, now_ms: i64) -> Result<(), StoreError> {
     let id = PlanId::parse_str(&plan.id)
-        .map_err(|error| StoreError::Unavailable(format!("plan id {:?}: {error}", plan.id)))?;
+        .map_err(|error| StoreError::unavailable(format!("plan id {:?}: {error}", plan.id)))?;
     let tombstone = Tombstone {
         id,
         owner: plan.owner,

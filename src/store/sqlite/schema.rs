@@ -2,7 +2,7 @@
 
 use rusqlite::Connection;
 
-use crate::store::StoreError;
+use crate::store::{StoreError, Trouble};
 
 /// What leads from each version to the next, the first from an empty file. The version reached is
 /// kept in `user_version`. Rows are only ever added here: a file of any earlier version is brought
@@ -119,9 +119,12 @@ pub(super) fn prepare(connection: &mut Connection) -> Result<(), StoreError> {
         .and_then(|version| STEPS.get(version..));
     let Some(missing) = missing else {
         let newest = STEPS.len();
-        return Err(StoreError::Unavailable(format!(
-            "the database has schema version {version}, this program knows up to {newest}: use a newer one"
-        )));
+        return Err(StoreError::Unavailable {
+            trouble: Trouble::Newer,
+            detail: format!(
+                "the database has schema version {version}, this program knows up to {newest}: use a newer one"
+            ),
+        });
     };
     for step in missing {
         transaction.execute_batch(step)?;

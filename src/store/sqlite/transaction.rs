@@ -61,7 +61,7 @@ impl Transaction<'_> {
     pub(super) fn still_open(&self) -> Result<(), StoreError> {
         if self.connection.is_autocommit() {
             let cause = self.lost.as_deref().unwrap_or("unknown");
-            return Err(StoreError::Unavailable(format!(
+            return Err(StoreError::unavailable(format!(
                 "the transaction was lost: {cause}"
             )));
         }
@@ -85,7 +85,7 @@ impl Transaction<'_> {
             let first_id = row.last_event + 1;
             row.last_event += batch.len() as u64;
             let text = serde_json::to_string(batch).map_err(|error| {
-                StoreError::Unavailable(format!("events of plan {}: {error}", row.plan.id))
+                StoreError::unavailable(format!("events of plan {}: {error}", row.plan.id))
             })?;
             row.bytes += text.len() as u64;
             self.connection

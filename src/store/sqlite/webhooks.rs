@@ -47,7 +47,7 @@ pub(super) fn due(
     for row in rows {
         let (id, url, tries): (String, String, u32) = row?;
         let id = PlanId::parse_str(&id)
-            .map_err(|error| StoreError::Unavailable(format!("plan id {id:?}: {error}")))?;
+            .map_err(|error| StoreError::unavailable(format!("plan id {id:?}: {error}")))?;
         if let Some(row) = PlanRow::load(connection, id)? {
             let plan = row.plan;
             due.push(Webhook { plan, url, tries });

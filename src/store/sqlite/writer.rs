@@ -70,7 +70,7 @@ impl Writer {
                 }
             })
             .map_err(|error| {
-                StoreError::Unavailable(format!("no thread for the writer: {error}"))
+                StoreError::unavailable(format!("no thread for the writer: {error}"))
             })?;
         Ok(Self {
             messages,
@@ -90,7 +90,7 @@ impl Writer {
             Box::new(move |durable| {
                 let outcome = match durable {
                     Ok(()) => done,
-                    Err(error) => Err(unavailable(error)),
+                    Err(error) => Err(error.clone()),
                 };
                 // Nobody waits when the caller was dropped; the change stands all the same.
                 reply.send(outcome).ok();
@@ -161,10 +161,10 @@ impl Drop for Delivery {
             );
             Box::new(move |durable| {
                 // A plan that was deleted meanwhile is nobody's loss.
-                if let Err(error) = done.and(durable.map_err(unavailable))
+                if let Err(error) = done.and(durable.map_err(StoreError::clone))
                     && !matches!(error, StoreError::LeaseLost(_))
                 {
-                    tracing::error!(plan = %id, %error, "an undelivered plan stays claimed until the next start");
+                    tracing::error!(plan_id = %id, %error, "an undelivered plan stays claimed until the next start");
                 }
             })
         });
@@ -273,7 +273,7 @@ impl Desk {
                 messages: self.messages.clone(),
             }),
             (Ok(()), Err(error)) => Err(error),
-            (Err(error), _) => Err(unavailable(error)),
+            (Err(error), _) => Err(error.clone()),
         };
         // What cannot be delivered goes back to the queue when it is dropped.
         drop(claimer.send(answer));
@@ -328,13 +328,5 @@ impl Desk {
                 }
             }
         }
-    }
-}
-
-/// The same failure, for each of those that it struck.
-fn unavailable(error: &StoreError) -> StoreError {
-    match error {
-        StoreError::Unavailable(detail) => StoreError::Unavailable(detail.clone()),
-        other => StoreError::Unavailable(other.to_string()),
     }
 }

@@ -14,8 +14,10 @@ use noctule::http::{self, AppState, Capacity, InFlight, Origins, Phase};
 use noctule::planner;
 use noctule::scenario::json::Rules;
 use noctule::scenario::limits::Limits;
+use noctule::store::measured::MeasuredStore;
 use noctule::store::sqlite::SqliteStore;
 use noctule::store::{Options, Store};
+use noctule::telemetry::Instruments;
 use serde_json::Value;
 use tempfile::TempDir;
 use tokio::sync::watch;
@@ -85,7 +87,9 @@ impl Api {
     fn made(options: Options, access: Access, origins: &[&str]) -> Self {
         let queue = usize::try_from(options.queue_limit).expect("a small number");
         let directory = tempfile::tempdir().expect("a temporary directory");
-        let store = Arc::new(SqliteStore::open(directory.path(), options).expect("a fresh store"));
+        let instruments = Arc::new(Instruments::default());
+        let store = SqliteStore::open(directory.path(), options).expect("a fresh store");
+        let store = Arc::new(MeasuredStore::new(Arc::new(store), instruments.clone()));
         let clock = watch::channel(None);
         let origins: Vec<String> = origins.iter().map(ToString::to_string).collect();
         let (phase, watched) = watch::channel(Phase::Serving);
@@ -106,6 +110,7 @@ impl Api {
             webhooks: None,
             cors: Origins::read(&origins).expect("origins"),
             phase: watched,
+            instruments,
         };
         Self {
             router: http::router(state.clone()),

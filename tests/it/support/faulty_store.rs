@@ -27,7 +27,7 @@ impl FaultyStore {
     /// Fails for the first, third, fifth caller and so on.
     fn stumble(&self) -> Result<(), StoreError> {
         match self.steps.fetch_add(1, Ordering::SeqCst) % 2 {
-            0 => Err(StoreError::Unavailable("disk full".to_owned())),
+            0 => Err(StoreError::unavailable("disk full")),
             _ => Ok(()),
         }
     }

@@ -1,10 +1,12 @@
 //! What several subjects need: a service over a fresh store, and hands to play the worker with.
 
 pub(crate) mod api;
+pub(crate) mod collector;
 pub(crate) mod description;
 pub(crate) mod engines;
 pub(crate) mod faulty_store;
 pub(crate) mod keys;
+pub(crate) mod openmetrics;
 pub(crate) mod plans;
 pub(crate) mod process;
 pub(crate) mod run;

@@ -97,6 +97,6 @@ pub(crate) fn kind<T>(result: Result<T, StoreError>) -> Result<(), &'static str>
         StoreError::KeyReused => "key reused",
         StoreError::LeaseLost(_) => "lease lost",
         StoreError::InUse(_) => "in use",
-        StoreError::Unavailable(_) => "unavailable",
+        StoreError::Unavailable { .. } => "unavailable",
     })
 }

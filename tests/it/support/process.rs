@@ -8,18 +8,37 @@ use std::time::Duration;
 use reqwest::{Client, RequestBuilder, Response};
 use serde_json::Value;
 
+/// A free port of this machine alone.
+const LOOPBACK: &str = "127.0.0.1:0";
+
 /// More than anything here takes.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 fn noctule() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_noctule"));
+    clean(&mut command);
+    command
+}
+
+/// The binary with a disk of its own, mounted on `data_dir` where nobody else sees it.
+fn on_a_small_disk(data_dir: &Path, options: &str) -> Command {
+    const MOUNT: &str = "mount -t tmpfs -o \"$0\" tmpfs \"$1\" && shift && exec \"$@\"";
+    let mut command = Command::new("unshare");
+    command
+        .args(["--map-root-user", "--mount", "sh", "-c", MOUNT, options])
+        .arg(data_dir)
+        .arg(env!("CARGO_BIN_EXE_noctule"));
+    clean(&mut command);
+    command
+}
+
+fn clean(command: &mut Command) {
     // What the tests are run with must not change what they see.
     for (name, _) in std::env::vars_os() {
         if name.to_string_lossy().starts_with("NOCTULE_") {
             command.env_remove(name);
         }
     }
-    command
 }
 
 /// Run the binary to its end, with `input` as its standard input.
@@ -56,22 +75,42 @@ pub(crate) struct Service {
 impl Service {
     /// On a free port; returns when it listens.
     pub(crate) fn start(data_dir: &Path, arguments: &[&str]) -> Self {
-        Self::launch("127.0.0.1:0", data_dir, arguments, Stdio::null())
+        Self::start_with_log(data_dir, arguments, Stdio::null())
     }
 
-    /// The same on `listen`, and what is logged goes to `log`.
-    pub(crate) fn start_logged(
+    /// The same, with its log.
+    pub(crate) fn start_with_log(
+        data_dir: &Path,
+        arguments: &[&str],
+        log: impl Into<Stdio>,
+    ) -> Self {
+        Self::start_as(noctule(), LOOPBACK, data_dir, arguments, log)
+    }
+
+    /// The same on another address.
+    pub(crate) fn start_on(
         listen: &str,
         data_dir: &Path,
         arguments: &[&str],
-        log: &Path,
+        log: impl Into<Stdio>,
     ) -> Self {
-        let log = std::fs::File::create(log).expect("a file for the log");
-        Self::launch(listen, data_dir, arguments, log.into())
+        Self::start_as(noctule(), listen, data_dir, arguments, log)
     }
 
-    fn launch(listen: &str, data_dir: &Path, arguments: &[&str], log: Stdio) -> Self {
-        let mut child = noctule()
+    /// With `data_dir` on a disk of its own, mounted with such options as `size=3m`.
+    pub(crate) fn start_on_a_small_disk(data_dir: &Path, options: &str) -> Self {
+        let command = on_a_small_disk(data_dir, options);
+        Self::start_as(command, LOOPBACK, data_dir, &[], Stdio::null())
+    }
+
+    fn start_as(
+        mut command: Command,
+        listen: &str,
+        data_dir: &Path,
+        arguments: &[&str],
+        log: impl Into<Stdio>,
+    ) -> Self {
+        let mut child = command
             .args(["serve", "--listen", listen, "--data-dir"])
             .arg(data_dir)
             .args(arguments)
@@ -107,6 +146,10 @@ impl Service {
 
     pub(crate) fn get(&self, path: &str) -> RequestBuilder {
         self.client.get(self.url(path))
+    }
+
+    pub(crate) fn request(&self, method: reqwest::Method, path: &str) -> RequestBuilder {
+        self.client.request(method, self.url(path))
     }
 
     pub(crate) async fn post(&self, document: &Value) -> Response {
@@ -148,6 +191,42 @@ impl Service {
         let answer = self.get(path).send().await.expect("an answer");
         assert_eq!(answer.status(), 200, "{path}");
         answer.bytes().await.expect("a whole body")
+    }
+
+    /// `path` as the process sees it.
+    pub(crate) fn seen(&self, path: &Path) -> std::path::PathBuf {
+        let path = path.strip_prefix("/").expect("absolute");
+        let process = Path::new("/proc").join(self.child.id().to_string());
+        process.join("root").join(path)
+    }
+
+    /// Mount the small disk on `data_dir` anew, with these options.
+    pub(crate) fn remount(&self, data_dir: &Path, options: &str) {
+        let done = Command::new("nsenter")
+            .args(["--user", "--mount", "--preserve-credentials", "--target"])
+            .args([&self.child.id().to_string(), "mount", "-o"])
+            .arg(format!("remount,{options}"))
+            .arg(data_dir)
+            .status()
+            .expect("nsenter runs");
+        assert!(done.success());
+    }
+
+    /// Wait until `/readyz` answers so; its detail.
+    pub(crate) async fn until_ready(&self, status: u16) -> String {
+        let answer = async {
+            loop {
+                let answer = self.get("/readyz").send().await.expect("an answer");
+                if answer.status() == status {
+                    let document: Value = answer.json().await.expect("JSON");
+                    return document["detail"].as_str().unwrap_or_default().to_owned();
+                }
+                tokio::time::sleep(Duration::from_millis(20)).await;
+            }
+        };
+        tokio::time::timeout(PATIENCE, answer)
+            .await
+            .unwrap_or_else(|_| panic!("/readyz is never {status}"))
     }
 
     /// Send `SIG{name}`.

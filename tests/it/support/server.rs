@@ -24,6 +24,7 @@ impl Server {
             head_timeout: Duration::from_secs(30),
             max_connections: 20_000,
             patience: Duration::from_secs(5),
+            instruments: api.state.instruments.clone(),
         };
         let serving = server::serve(
             listener,

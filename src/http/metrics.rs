@@ -1,0 +1,32 @@
+//! `GET /metrics`: what Prometheus reads.
+
+use axum::extract::State;
+use axum::http::{Uri, header};
+use axum::response::{IntoResponse, Response};
+use jiff::Timestamp;
+
+use super::AppState;
+use super::params::Params;
+use super::problem::Problem;
+use crate::telemetry::metrics::{MEDIA_TYPE, Queue};
+
+/// Answers also when the store does not: the operator needs it then.
+pub(super) async fn show(State(state): State<AppState>, uri: Uri) -> Result<Response, Problem> {
+    Params::read(&uri, &[])?;
+    let stats = state.store.stats().await;
+    let stats = stats
+        .inspect_err(|error| tracing::warn!(%error, "the queue could not be counted"))
+        .ok();
+    let now_ms = Timestamp::now().as_millisecond();
+    let queue = Queue {
+        queued: stats.map(|stats| stats.queued),
+        running: stats.map(|stats| stats.running),
+        oldest_queued_ms: stats
+            .and_then(|stats| stats.oldest_queued_ms)
+            .map(|since_ms| now_ms - since_ms),
+        limit: state.capacity.queue,
+        workers: state.capacity.workers,
+    };
+    let text = state.instruments.metrics.text(queue);
+    Ok(([(header::CONTENT_TYPE, MEDIA_TYPE)], text).into_response())
+}

@@ -1,0 +1,149 @@
+//! Pages for people: the reference of the interface, and one for each type of problem.
+//!
+//! They are made once, of the same documents that programs read, and need nothing from elsewhere: no
+//! script, no font, one style sheet within the page, which its policy names by its hash.
+
+mod markdown;
+mod reference;
+mod schema;
+
+use std::sync::LazyLock;
+
+use axum::extract::Path;
+use axum::http::{HeaderValue, Uri, header};
+use axum::response::{IntoResponse, Response};
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use serde_json::Value;
+use sha2::{Digest as _, Sha256};
+
+use super::params::Params;
+use super::problem::Problem;
+
+/// The description of this service.
+const OPENAPI_YAML: &str = include_str!("../../../openapi.yaml");
+
+/// A section for each type of problem.
+const PROBLEMS: &str = include_str!("../../../docs/PROBLEMS.md");
+
+const STYLE: &str = include_str!("style.css");
+
+/// The description, read.
+static DESCRIPTION: LazyLock<Value> = LazyLock::new(|| {
+    serde_yaml_ng::from_str(OPENAPI_YAML).expect("the description is well-formed, as its tests say")
+});
+
+/// `GET /openapi.yaml`.
+pub(super) async fn openapi_yaml(uri: Uri) -> Result<Response, Problem> {
+    Params::read(&uri, &[])?;
+    Ok(([(header::CONTENT_TYPE, "application/yaml")], OPENAPI_YAML).into_response())
+}
+
+/// `GET /openapi.json`.
+pub(super) async fn openapi_json(uri: Uri) -> Result<Response, Problem> {
+    static JSON: LazyLock<String> = LazyLock::new(|| DESCRIPTION.to_string());
+    Params::read(&uri, &[])?;
+    Ok(([(header::CONTENT_TYPE, "application/json")], JSON.as_str()).into_response())
+}
+
+/// `GET /docs`.
+pub(super) async fn docs(uri: Uri) -> Result<Response, Problem> {
+    static PAGE: LazyLock<String> = LazyLock::new(|| {
+        let title = "Noctule: reference of the HTTP interface";
+        page(title, &reference::body(&DESCRIPTION))
+    });
+    Params::read(&uri, &[])?;
+    Ok(html(&PAGE))
+}
+
+/// `GET /problems/{slug}`: what the `type` of a problem leads to.
+pub(super) async fn problem(uri: Uri, slug: Option<Path<String>>) -> Result<Response, Problem> {
+    Params::read(&uri, &[])?;
+    let section = slug.as_ref().and_then(|Path(slug)| section(slug));
+    let Some(text) = section else {
+        return Err(Problem::NoSuchResource(uri.path().to_owned()));
+    };
+    let body = format!(
+        "<p><a href=\"/docs\">Reference</a></p>\n<main>{}</main>",
+        markdown::html(text)
+    );
+    let title = text.lines().next().unwrap_or_default();
+    Ok(html(&page(title.trim_start_matches("## "), &body)))
+}
+
+/// The section of the page of problems called `slug`, with its heading.
+fn section(slug: &str) -> Option<&'static str> {
+    let heading = format!("\n## {slug}\n");
+    let start = PROBLEMS.find(&heading)? + 1;
+    let text = &PROBLEMS[start..];
+    let end = text[1..].find("\n## ").map_or(text.len(), |end| end + 1);
+    Some(&text[..end])
+}
+
+/// A whole page; `title` is text, `body` is HTML.
+fn page(title: &str, body: &str) -> String {
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>{}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n{body}\n</body>\n</html>\n",
+        escape(title)
+    )
+}
+
+fn html(page: &str) -> Response {
+    static POLICY: LazyLock<HeaderValue> = LazyLock::new(|| {
+        let hash = BASE64.encode(Sha256::digest(STYLE));
+        let policy = format!(
+            "default-src 'none'; style-src 'sha256-{hash}'; base-uri 'none'; form-action 'none'; \
+             frame-ancestors 'none'"
+        );
+        HeaderValue::from_str(&policy).expect("visible ASCII")
+    });
+    let headers = [
+        (
+            header::CONTENT_TYPE,
+            HeaderValue::from_static("text/html; charset=utf-8"),
+        ),
+        (header::CONTENT_SECURITY_POLICY, POLICY.clone()),
+    ];
+    (headers, page.to_owned()).into_response()
+}
+
+/// `text` as it may stand in an element or an attribute.
+fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\'' => escaped.push_str("&#39;"),
+            other => escaped.push(other),
+        }
+    }
+    escaped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_section_ends_where_the_next_begins() {
+        let text = section("invalid-json").expect("there");
+        assert!(text.starts_with("## invalid-json\n"), "{text}");
+        assert_eq!(text.matches("\n## ").count(), 0, "{text}");
+        assert!(text.trim_end().len() > 100, "{text}");
+        assert_eq!(section("nothing"), None);
+        assert_eq!(section(""), None);
+    }
+
+    #[test]
+    fn text_does_not_become_markup() {
+        assert_eq!(
+            escape("<a href='x'>\"&\"</a>"),
+            "&lt;a href=&#39;x&#39;&gt;&quot;&amp;&quot;&lt;/a&gt;"
+        );
+    }
+}

@@ -1,0 +1,237 @@
+//! A store that is opened as soon as it can be, and again when it turns out to be damaged.
+//!
+//! A service whose store cannot be opened does not end: whatever starts it again would only do so
+//! for ever. It answers, says that it is not ready and why, and takes plans when the cause is gone.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use async_trait::async_trait;
+use tokio::sync::watch;
+use tokio::task::JoinHandle;
+
+use super::{
+    Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Trouble, Webhook,
+};
+use crate::export::document::Incumbent;
+use crate::job::{Event, Plan, PlanId, Submission};
+
+/// Opens the store; `true` asks it to look for damage first. May block.
+pub type Open = Arc<dyn Fn(bool) -> Result<Arc<dyn Store>, StoreError> + Send + Sync>;
+
+/// Between two tries to open it.
+const PAUSE: Duration = Duration::from_secs(1);
+
+/// How it stands: open, or why not.
+type State = Result<Arc<dyn Store>, StoreError>;
+
+/// See the module's documentation.
+pub struct Reopening {
+    state: watch::Receiver<State>,
+    /// Which store was found to be damaged.
+    damaged: watch::Sender<Option<Arc<dyn Store>>>,
+    opener: JoinHandle<()>,
+}
+
+impl Reopening {
+    /// Try to open it, and go on trying.
+    ///
+    /// # Panics
+    /// Outside a tokio runtime.
+    pub async fn start(open: Open) -> Self {
+        let (damaged, reports) = watch::channel(None);
+        let first = try_to_open(&open, false).await;
+        if let Err(error) = &first {
+            tracing::error!(%error, "the store cannot be opened; trying again every second");
+        }
+        let (told, state) = watch::channel(first);
+        let opener = tokio::spawn(keep_open(open, told, reports));
+        Self {
+            state,
+            damaged,
+            opener,
+        }
+    }
+
+    fn store(&self) -> State {
+        self.state.borrow().clone()
+    }
+
+    /// Pass an answer on, and have the store opened anew when it says that it is damaged.
+    fn heed<T>(
+        &self,
+        store: &Arc<dyn Store>,
+        answer: Result<T, StoreError>,
+    ) -> Result<T, StoreError> {
+        if let Err(StoreError::Unavailable {
+            trouble: Trouble::Damaged,
+            ..
+        }) = &answer
+        {
+            self.damaged.send_replace(Some(Arc::clone(store)));
+        }
+        answer
+    }
+}
+
+impl Drop for Reopening {
+    fn drop(&mut self) {
+        self.opener.abort();
+    }
+}
+
+async fn try_to_open(open: &Open, suspicious: bool) -> State {
+    let open = Arc::clone(open);
+    tokio::task::spawn_blocking(move || open(suspicious))
+        .await
+        .unwrap_or_else(|broken| {
+            Err(StoreError::unavailable(format!(
+                "opening the store broke: {broken}"
+            )))
+        })
+}
+
+async fn keep_open(
+    open: Open,
+    state: watch::Sender<State>,
+    mut reports: watch::Receiver<Option<Arc<dyn Store>>>,
+) {
+    let mut suspicious = false;
+    loop {
+        let now = state.borrow().clone();
+        if let Ok(store) = now {
+            if reports.changed().await.is_err() {
+                return;
+            }
+            let reported = reports.borrow_and_update().clone();
+            // A late word about a store that has been replaced since says nothing.
+            if reported.is_none_or(|reported| !Arc::ptr_eq(&reported, &store)) {
+                continue;
+            }
+            tracing::error!("the store is damaged; it is opened again once it is sound");
+            let checking = Err(StoreError::Unavailable {
+                trouble: Trouble::Damaged,
+                detail: "damage was found; the file is being checked".to_owned(),
+            });
+            drop(state.send_replace(checking));
+            store.close().await;
+            suspicious = true;
+        } else {
+            tokio::time::sleep(PAUSE).await;
+        }
+        let opened = try_to_open(&open, suspicious).await;
+        suspicious &= opened.is_err();
+        drop(state.send_replace(opened));
+    }
+}
+
+#[async_trait]
+impl Store for Reopening {
+    async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.submit(submission).await)
+    }
+
+    /// Waits for the store to be open, too.
+    async fn claim(&self) -> Result<Lease, StoreError> {
+        let mut state = self.state.clone();
+        let opened = state.wait_for(Result::is_ok).await;
+        let store = opened
+            .map_err(|_| StoreError::unavailable("the store is closed"))?
+            .clone()?;
+        self.heed(&store, store.claim().await)
+    }
+
+    async fn append(&self, lease: &Lease, events: Vec<Event>) -> Result<(), StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.append(lease, events).await)
+    }
+
+    async fn finish(&self, lease: &Lease, ending: Ending, now_ms: i64) -> Result<Plan, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.finish(lease, ending, now_ms).await)
+    }
+
+    async fn release(&self, lease: &Lease) -> Result<(), StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.release(lease).await)
+    }
+
+    async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.request_cancel(id, now_ms).await)
+    }
+
+    async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.delete(id, now_ms).await)
+    }
+
+    async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.get(id).await)
+    }
+
+    async fn scenario(&self, id: PlanId) -> Result<String, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.scenario(id).await)
+    }
+
+    async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.result(id).await)
+    }
+
+    async fn incumbent(&self, id: PlanId) -> Result<Option<Incumbent>, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.incumbent(id).await)
+    }
+
+    async fn list(&self, query: ListQuery) -> Result<Vec<Plan>, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.list(query).await)
+    }
+
+    async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<EventPage, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.events(id, after, limit).await)
+    }
+
+    /// While it is not open, the sender is gone: whoever waits reads again, and learns why.
+    fn changes(&self, id: PlanId) -> watch::Receiver<u64> {
+        self.store()
+            .map_or_else(|_| watch::channel(0).1, |store| store.changes(id))
+    }
+
+    async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.sweep(now_ms).await)
+    }
+
+    async fn due_webhooks(&self, now_ms: i64, limit: usize) -> Result<Vec<Webhook>, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.due_webhooks(now_ms, limit).await)
+    }
+
+    async fn webhook_tried(&self, id: PlanId, next_ms: Option<i64>) -> Result<(), StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.webhook_tried(id, next_ms).await)
+    }
+
+    async fn stats(&self) -> Result<Stats, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.stats().await)
+    }
+
+    async fn health(&self) -> Result<(), StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.health().await)
+    }
+
+    async fn close(&self) {
+        self.opener.abort();
+        if let Ok(store) = self.store() {
+            store.close().await;
+        }
+    }
+}

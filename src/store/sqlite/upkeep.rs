@@ -1,0 +1,161 @@
+//! What an operator does with the file: look for damage, and copy it.
+
+use std::fs::File;
+use std::path::Path;
+
+use rusqlite::{Connection, OpenFlags};
+
+use super::{BUSY_TIMEOUT, DATABASE, StoreError};
+use crate::job::{PlanId, Status};
+use crate::store::Trouble;
+
+/// What [`check`] looked at, and what it found wrong.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Findings {
+    /// Plans looked at; none in a file that is damaged.
+    pub plans: u64,
+    /// A sentence for each thing that is wrong.
+    pub faults: Vec<String>,
+}
+
+/// Damage that the database itself finds in its file: pages, indexes, rows that refer to none.
+pub(super) fn damage(connection: &Connection) -> rusqlite::Result<Vec<String>> {
+    let mut faults: Vec<String> = connection
+        .prepare("PRAGMA quick_check(20)")?
+        .query_map([], |row| row.get(0))?
+        .collect::<Result<_, _>>()?;
+    faults.retain(|fault| fault != "ok");
+    Ok(faults)
+}
+
+/// Look at the whole store in `data_dir`, beside a service that uses it or not: the database's own
+/// integrity, and that each plan's record, documents and events agree.
+///
+/// # Errors
+/// [`StoreError::Unavailable`] when there is no store to look at, or it cannot be read at all.
+pub fn check(data_dir: &Path) -> Result<Findings, StoreError> {
+    let mut connection = open(data_dir)?;
+    // All in one transaction, or a busy service would seem to contradict itself.
+    let connection = connection.transaction()?;
+    let mut faults: Vec<String> = connection
+        .prepare("PRAGMA integrity_check(100)")?
+        .query_map([], |row| row.get(0))?
+        .collect::<Result<_, _>>()?;
+    faults.retain(|fault| fault != "ok");
+    let plans = if faults.is_empty() {
+        records(&connection, &mut faults)?
+    } else {
+        // Its records cannot be relied on, or not even be read.
+        0
+    };
+    Ok(Findings { plans, faults })
+}
+
+/// Whether each plan's record, documents and events agree; returns how many plans there are.
+fn records(connection: &Connection, faults: &mut Vec<String>) -> Result<u64, StoreError> {
+    for (sql, what) in CONTRADICTIONS {
+        let plans = connection
+            .prepare(sql)?
+            .query_map([], |row| row.get::<_, String>(0))?
+            .collect::<Result<Vec<_>, _>>()?;
+        faults.extend(plans.into_iter().map(|id| format!("plan {id} {what}")));
+    }
+    let mut plans = 0;
+    let mut statement = connection.prepare(
+        "SELECT id, status, (SELECT batch FROM events WHERE plan_seq = seq ORDER BY last_id DESC LIMIT 1) \
+         FROM plans",
+    )?;
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        plans += 1;
+        let (id, status, batch): (String, String, Option<String>) =
+            (row.get(0)?, row.get(1)?, row.get(2)?);
+        if PlanId::parse_str(&id).is_err() {
+            faults.push(format!("plan {id:?} has no id"));
+        }
+        let status = Status::from_name(&status);
+        let ended = status.is_some_and(Status::is_final);
+        if ended != batch.is_some_and(|batch| ends(&batch)) {
+            faults.push(format!(
+                "plan {id} and its last event disagree on whether it has ended"
+            ));
+        }
+    }
+    Ok(plans)
+}
+
+/// What no plan may be, and the ids of those that are.
+const CONTRADICTIONS: [(&str, &str); 5] = [
+    (
+        "SELECT id FROM plans LEFT JOIN scenarios ON plan_seq = seq WHERE document IS NULL",
+        "has lost its scenario",
+    ),
+    (
+        "SELECT id FROM plans LEFT JOIN results ON plan_seq = seq \
+         WHERE (stop_reason IS NULL) <> (document IS NULL)",
+        "has a result and no reason for its end, or the reason and no result",
+    ),
+    (
+        "SELECT id FROM plans LEFT JOIN results ON plan_seq = seq \
+         WHERE document IS NOT NULL AND NOT json_valid(document)",
+        "has a result that is not JSON",
+    ),
+    (
+        "SELECT id FROM plans WHERE (finished_ms IS NULL) <> (status IN ('queued', 'running'))",
+        "has ended without a time, or has a time without an end",
+    ),
+    (
+        "SELECT id FROM plans WHERE last_event - forgotten <> \
+         (SELECT coalesce(sum(last_id - first_id + 1), 0) FROM events WHERE plan_seq = seq)",
+        "has lost events",
+    ),
+];
+
+fn ends(batch: &str) -> bool {
+    let events: Vec<serde_json::Value> = serde_json::from_str(batch).unwrap_or_default();
+    events.last().is_some_and(|event| event["event"] == "end")
+}
+
+/// Write a compact copy of the store in `data_dir` to the new file `to`, as it is at one moment,
+/// beside a service that uses it or not. It is on the disk when this returns.
+///
+/// # Errors
+/// [`StoreError::Unavailable`] when there is no store, or `to` exists or cannot be written.
+pub fn backup(data_dir: &Path, to: &Path) -> Result<(), StoreError> {
+    let unusable =
+        |error: std::io::Error| StoreError::unavailable(format!("{}: {error}", to.display()));
+    if to.exists() {
+        return Err(StoreError::unavailable(format!("{} exists", to.display())));
+    }
+    let connection = open(data_dir)?;
+    // Under another name until it is whole, so that nobody takes half of it for a backup.
+    let mut name = to.file_name().unwrap_or_default().to_owned();
+    name.push(".part");
+    let part = to.with_file_name(name);
+    let _ = std::fs::remove_file(&part);
+    connection.execute("VACUUM INTO ?1", [part.to_string_lossy()])?;
+    let finished = File::open(&part)
+        .and_then(|file| file.sync_all())
+        .and_then(|()| std::fs::rename(&part, to))
+        .and_then(|()| {
+            let directory = to.parent().filter(|parent| !parent.as_os_str().is_empty());
+            File::open(directory.unwrap_or(Path::new(".")))?.sync_all()
+        });
+    if finished.is_err() {
+        let _ = std::fs::remove_file(&part);
+    }
+    finished.map_err(unusable)
+}
+
+fn open(data_dir: &Path) -> Result<Connection, StoreError> {
+    let file = data_dir.join(DATABASE);
+    if !file.is_file() {
+        return Err(StoreError::Unavailable {
+            trouble: Trouble::Other,
+            detail: format!("there is no store at {}", file.display()),
+        });
+    }
+    let connection = Connection::open_with_flags(&file, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
+    connection.busy_timeout(BUSY_TIMEOUT)?;
+    Ok(connection)
+}

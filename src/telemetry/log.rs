@@ -1,0 +1,78 @@
+//! Log lines on stderr, with the ids of the request and the plan in fields.
+//!
+//! The setting `log` says what is logged, in the syntax of tracing's `EnvFilter`.
+
+use std::io::IsTerminal as _;
+use std::panic::PanicHookInfo;
+
+use tracing::{Level, Metadata};
+use tracing_subscriber::filter::filter_fn;
+use tracing_subscriber::layer::SubscriberExt as _;
+use tracing_subscriber::util::SubscriberInitExt as _;
+use tracing_subscriber::{Layer as _, fmt};
+
+use super::otlp::Exporter;
+use crate::config::{Config, LogFormat};
+
+/// Whatever is written to until the end of the program.
+#[must_use = "what is left is sent when it is closed"]
+pub struct Log(Option<Exporter>);
+
+impl Log {
+    /// Let go of what has been taken in.
+    pub fn close(self) {
+        if let Some(exporter) = self.0 {
+            exporter.close();
+        }
+    }
+}
+
+/// Start to write log lines, and to export traces if there is a collector. Panics are among the lines.
+///
+/// # Panics
+/// When called twice.
+pub fn init(config: &Config) -> Log {
+    let lines = fmt::layer().with_writer(std::io::stderr);
+    let lines = match config.log_format {
+        LogFormat::Text => lines.with_ansi(std::io::stderr().is_terminal()).boxed(),
+        LogFormat::Json => lines
+            .json()
+            .flatten_event(true)
+            .with_span_list(false)
+            .boxed(),
+    };
+    let exporter = config
+        .otlp_endpoint
+        .as_ref()
+        .map(|endpoint| Exporter::to(endpoint, config.otlp_headers.clone()));
+    let traces = exporter.as_ref().map(|exporter| {
+        tracing_opentelemetry::layer()
+            .with_tracer(exporter.tracer())
+            .with_location(false)
+            .with_threads(false)
+            .with_filter(filter_fn(is_exported))
+    });
+    tracing_subscriber::registry()
+        .with(lines.with_filter(config.log.to_env_filter()))
+        .with(traces)
+        .init();
+    std::panic::set_hook(Box::new(log_panic));
+    Log(exporter)
+}
+
+/// The program's own spans and their usual lines, whatever is written to the log.
+fn is_exported(metadata: &Metadata) -> bool {
+    metadata.target().starts_with(env!("CARGO_PKG_NAME")) && *metadata.level() <= Level::INFO
+}
+
+/// The one line of a panic; the spans round it name the request or the plan.
+fn log_panic(panic: &PanicHookInfo) {
+    let payload = panic.payload();
+    let text = payload.downcast_ref::<String>().map(String::as_str);
+    let message = text
+        .or_else(|| payload.downcast_ref().copied())
+        .unwrap_or("no message");
+    let place = panic.location().map(ToString::to_string);
+    let thread = std::thread::current().name().map(ToOwned::to_owned);
+    tracing::error!(message, place, thread, "panicked");
+}

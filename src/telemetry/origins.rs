@@ -1,0 +1,72 @@
+//! Which request a plan came from, so that the lines of its run can name it.
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
+
+use uuid::Uuid;
+
+use super::traceparent::TraceParent;
+
+/// Plans that are remembered; of more, the oldest are forgotten.
+const REMEMBERED: usize = 10_000;
+
+/// The request that a plan came from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Origin {
+    /// In its answer's `x-request-id`.
+    pub request_id: String,
+    /// The trace that it belongs to.
+    pub traceparent: Option<TraceParent>,
+}
+
+/// Of the plans that this process accepted and that have not ended. It is lost at a restart: plans
+/// that were accepted earlier have none.
+#[derive(Debug, Default)]
+pub struct Origins(Mutex<BTreeMap<Uuid, Origin>>);
+
+impl Origins {
+    /// The plan called `plan` comes from `origin`.
+    pub fn remember(&self, plan: Uuid, origin: Origin) {
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        known.insert(plan, origin);
+        if known.len() > REMEMBERED {
+            // Ids begin with the time.
+            known.pop_first();
+        }
+    }
+
+    /// Where the plan called `plan` comes from, if that is known.
+    #[must_use]
+    pub fn of(&self, plan: Uuid) -> Option<Origin> {
+        let known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        known.get(&plan).cloned()
+    }
+
+    /// It has ended.
+    pub fn forget(&self, plan: Uuid) {
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        known.remove(&plan);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_oldest_are_forgotten_first() {
+        let origins = Origins::default();
+        let origin = Origin {
+            request_id: "r".to_owned(),
+            traceparent: None,
+        };
+        let plans: Vec<Uuid> = (0..=REMEMBERED as u128).map(Uuid::from_u128).collect();
+        for plan in &plans {
+            origins.remember(*plan, origin.clone());
+        }
+        assert_eq!(origins.of(plans[0]), None);
+        assert_eq!(origins.of(plans[1]), Some(origin));
+        origins.forget(plans[1]);
+        assert_eq!(origins.of(plans[1]), None);
+    }
+}

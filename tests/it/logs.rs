@@ -1,0 +1,150 @@
+//! The log: which lines there are, and that each names its request and its plan.
+
+use std::fs::{self, File};
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use crate::support::collector::{Collector, Taken};
+use crate::support::process::Service;
+use crate::support::scenario;
+
+const TRACE_ID: &str = "4bf92f3577b34da6a3ce929d0e0e4736";
+
+/// Post `document` to a service with JSON lines, as request `caller-1` of a trace, and stop the
+/// service when the plan has ended. The plan's id and the lines.
+async fn logged(arguments: &[&str], document: &Value) -> (String, Vec<Value>) {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let log = directory.path().join("log");
+    let file = File::create(&log).expect("a file");
+    let arguments = [&["--log-format", "json"], arguments].concat();
+    let service = Service::start_with_log(&directory.path().join("data"), &arguments, file);
+    let request = service
+        .request(reqwest::Method::POST, "/plans")
+        .header("x-request-id", "caller-1")
+        .header("traceparent", format!("00-{TRACE_ID}-00f067aa0ba902b7-01"))
+        .json(document);
+    let accepted: Value = request
+        .send()
+        .await
+        .expect("an answer")
+        .json()
+        .await
+        .expect("JSON");
+    let id = accepted["id"].as_str().expect("an id").to_owned();
+    service.ended(&format!("/plans/{id}")).await;
+    service.signal("TERM");
+    assert!(service.exit().await.success());
+    (id, lines(&log))
+}
+
+fn lines(log: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(log).expect("UTF-8");
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap_or_else(|_| panic!("no JSON: {line}")))
+        .collect()
+}
+
+fn line<'a>(lines: &'a [Value], message: &str) -> &'a Value {
+    let found = lines.iter().find(|line| line["message"] == message);
+    found.unwrap_or_else(|| panic!("{message} is not in {lines:#?}"))
+}
+
+#[tokio::test]
+async fn lines_of_a_plan_name_it_and_the_request_that_it_came_from() {
+    let (id, lines) = logged(&["--log", "debug"], &scenario()).await;
+    for (message, span) in [
+        ("accepted", "request"),
+        ("answered", "request"),
+        ("plan started", "plan"),
+        ("plan ended", "plan"),
+    ] {
+        let line = line(&lines, message);
+        assert_eq!(
+            line["span"],
+            json!({"name": span, "plan_id": id, "request_id": "caller-1", "trace_id": TRACE_ID}),
+            "{line}"
+        );
+    }
+    let ended = line(&lines, "plan ended");
+    assert_eq!(ended["status"], "succeeded");
+    assert!(ended["run_ms"].is_number(), "{ended}");
+}
+
+/// The spans that a collector took.
+fn spans(collector: &Collector) -> Vec<Value> {
+    let mut spans = Vec::new();
+    for Taken {
+        path,
+        headers,
+        document,
+    } in collector.taken()
+    {
+        assert_eq!(path, "/v1/traces");
+        let authorized = headers
+            .iter()
+            .filter(|line| *line == "authorization: Bearer hush");
+        assert_eq!(authorized.count(), 1, "{headers:?}");
+        for resource in document["resourceSpans"].as_array().expect("a list") {
+            let attributes = resource["resource"]["attributes"].to_string();
+            assert!(attributes.contains("noctule"), "{attributes}");
+            for scope in resource["scopeSpans"].as_array().expect("a list") {
+                spans.extend(scope["spans"].as_array().expect("a list").iter().cloned());
+            }
+        }
+    }
+    spans
+}
+
+#[tokio::test]
+async fn a_plan_and_its_request_are_exported_as_parts_of_the_callers_trace() {
+    let collector = Collector::start();
+    let endpoint = format!("http://{}", collector.address);
+    let (id, lines) = logged(
+        &[
+            "--otlp-endpoint",
+            &endpoint,
+            "--otlp-headers",
+            "authorization=Bearer%20hush",
+            "--log",
+            "warn",
+        ],
+        &scenario(),
+    )
+    .await;
+    assert!(lines.is_empty(), "{lines:#?}");
+    let spans = spans(&collector);
+    let span = |name: &str| {
+        let found = spans.iter().find(|span| span["name"] == name);
+        found.unwrap_or_else(|| panic!("{name} is not in {spans:#?}"))
+    };
+    let (request, run) = (span("POST /plans"), span("plan"));
+    assert_eq!(request["traceId"], TRACE_ID);
+    assert_eq!(request["parentSpanId"], "00f067aa0ba902b7");
+    assert_eq!(run["traceId"], TRACE_ID);
+    assert_eq!(run["parentSpanId"], request["spanId"]);
+    for (span, part) in [
+        (request, "\"caller-1\""),
+        (request, "http.response.status_code"),
+        (request, &id),
+        (run, &id),
+        (run, "plan ended"),
+    ] {
+        assert!(span.to_string().contains(part), "{part} is not in {span:#}");
+    }
+}
+
+#[tokio::test]
+async fn without_a_collector_plans_run_and_one_line_tells() {
+    // Nobody listens on a port that has just been given back.
+    let endpoint = {
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
+        format!("http://{}", listener.local_addr().expect("bound"))
+    };
+    let (_, lines) = logged(&["--otlp-endpoint", &endpoint], &scenario()).await;
+    let told = lines
+        .iter()
+        .filter(|line| line["message"] == "traces cannot be exported; they are dropped");
+    assert_eq!(told.count(), 1, "{lines:#?}");
+    line(&lines, "plan ended");
+}

@@ -1,0 +1,182 @@
+//! `GET /metrics`: well-formed, true, and of so many series only.
+
+use axum::http::Method;
+use serde_json::{Value, json};
+
+use crate::support::api::Api;
+use crate::support::openmetrics::Reading;
+use crate::support::process::Service;
+use crate::support::scenario;
+
+async fn read(api: &Api) -> Reading {
+    let answer = api.get("/metrics").await;
+    Reading::read(std::str::from_utf8(&answer.body).expect("UTF-8"))
+}
+
+async fn read_from(service: &Service) -> Reading {
+    let text = service.bytes("/metrics").await;
+    Reading::read(std::str::from_utf8(&text).expect("UTF-8"))
+}
+
+#[tokio::test]
+async fn the_queue_is_as_it_is_now() {
+    let api = Api::with_queue(5);
+    let empty = read(&api).await;
+    assert!(empty.value("noctule_queue_oldest_age_seconds") == 0.0);
+    for _ in 0..3 {
+        api.submit().await;
+    }
+    let lease = api.store.claim().await.expect("a plan");
+    let reading = read(&api).await;
+    for (series, expected) in [
+        ("noctule_plans{status=\"queued\"}", 2.0),
+        ("noctule_plans{status=\"running\"}", 1.0),
+        ("noctule_plans_accepted_total", 3.0),
+        ("noctule_queue_limit", 5.0),
+        ("noctule_workers", 2.0),
+        (
+            "noctule_store_operation_seconds_count{operation=\"submit\"}",
+            3.0,
+        ),
+        (
+            "noctule_http_requests_total{method=\"POST\",route=\"/plans\",status=\"202\"}",
+            3.0,
+        ),
+    ] {
+        let value = reading.value(series);
+        assert!((value - expected).abs() < 0.5, "{series} is {value}");
+    }
+    let age_s = reading.value("noctule_queue_oldest_age_seconds");
+    assert!((0.0..60.0).contains(&age_s), "{age_s}");
+    drop(lease);
+}
+
+/// Whatever callers send, there are no more series.
+#[tokio::test]
+async fn callers_cannot_make_series() {
+    let api = Api::new();
+    let provoke = async |number: u128| {
+        let id = uuid::Uuid::from_u128(number);
+        for path in [format!("/plans/{id}"), format!("/nothing/{id}")] {
+            api.get(&path).await;
+            let method = Method::from_bytes(format!("M{number}").as_bytes()).expect("a token");
+            api.send(method, &path, &[], "").await;
+        }
+    };
+    provoke(0).await;
+    read(&api).await;
+    let before = read(&api).await;
+    for number in 1..20 {
+        provoke(number).await;
+    }
+    let after = read(&api).await;
+    let names = |reading: &Reading| reading.series.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&before), names(&after));
+    let route = "{method=\"GET\",route=\"/plans/{id}\",status=\"404\"}";
+    let known = after.value(&format!("noctule_http_requests_total{route}"));
+    assert!((known - 20.0).abs() < 0.5, "{known}");
+    let unmatched = "{method=\"OTHER\",route=\"unmatched\",status=\"404\"}";
+    after.value(&format!("noctule_http_requests_total{unmatched}"));
+}
+
+#[tokio::test]
+async fn a_run_is_counted() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &[]);
+    let address = service.submit(&scenario()).await;
+    let status = service.ended(&address).await;
+    assert_eq!(status["status"], "succeeded");
+    let reading = read_from(&service).await;
+    let count = |series: &str| reading.value(series);
+    for series in [
+        "noctule_plans_ended_total{status=\"succeeded\"}",
+        "noctule_plan_run_seconds_count{status=\"succeeded\"}",
+        "noctule_plan_wait_seconds_count",
+        "noctule_plan_gap_ratio_count",
+    ] {
+        assert!((count(series) - 1.0).abs() < 0.5, "{series}");
+    }
+    assert!(count("noctule_plans_ended_total{status=\"failed\"}") < 0.5);
+    for (series, told) in [
+        ("noctule_search_iterations_total", "iteration"),
+        ("noctule_search_evaluations_total", "evaluations"),
+    ] {
+        let told = status[told].as_f64().expect("a count");
+        assert!((count(series) - told).abs() < 0.5, "{series} is not {told}");
+    }
+    assert!(count("noctule_http_connections") >= 1.0);
+    let build = format!(
+        "noctule_build_info{{version=\"{}\"}}",
+        env!("CARGO_PKG_VERSION")
+    );
+    assert!((count(&build) - 1.0).abs() < 0.5);
+}
+
+/// What is shown and what alerts are raised on is there.
+#[tokio::test]
+async fn dashboard_and_alerts_name_metrics_that_there_are() {
+    const DASHBOARD: &str = include_str!("../../deploy/grafana/noctule.json");
+    const ALERTS: &str = include_str!("../../deploy/prometheus/alerts.yml");
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &[]);
+    let address = service.submit(&scenario()).await;
+    service.ended(&address).await;
+    let reading = read_from(&service).await;
+    // People call a histogram by its name; what reads it names a series.
+    let histograms = reading.families.iter();
+    let histograms = histograms.filter(|(_, kind)| *kind == "histogram");
+    let mut exported = reading.names();
+    exported.extend(histograms.map(|(name, _)| name.as_str()));
+
+    let _: Value = serde_json::from_str(DASHBOARD).expect("JSON");
+    let _: Value = serde_yaml_ng::from_str(ALERTS).expect("YAML");
+    let is_part = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
+    let mut named: Vec<&str> = [DASHBOARD, ALERTS]
+        .iter()
+        .flat_map(|text| text.split(|letter| !is_part(letter)))
+        .filter(|word| word.starts_with("noctule_"))
+        .collect();
+    named.sort_unstable();
+    named.dedup();
+    assert!(named.len() > 15, "{named:?}");
+    for name in named {
+        assert!(exported.contains(name), "{name} is not in {exported:#?}");
+    }
+}
+
+/// `docs/OPERATIONS.md` tells of every metric, and of no other.
+#[tokio::test]
+async fn every_metric_is_in_the_manual() {
+    let manual = include_str!("../../docs/OPERATIONS.md");
+    let api = Api::new();
+    api.submit().await;
+    let families = read(&api).await.families;
+    for (family, kind) in &families {
+        let suffix = match kind.as_str() {
+            "counter" => "_total",
+            "info" => "_info",
+            _ => "",
+        };
+        let row = format!("| `{family}{suffix}` |");
+        assert!(manual.contains(&row), "no row begins with {row}");
+    }
+    let rows = manual
+        .lines()
+        .filter(|line| line.starts_with("| `noctule_"));
+    assert_eq!(rows.count(), families.len());
+}
+
+#[tokio::test]
+async fn streams_are_counted_while_they_are_open() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &[]);
+    let mut long = scenario();
+    long["planner"] = json!({"population": 200, "iterations": 100_000, "seed": 1});
+    let address = service.submit(&long).await;
+    let stream = service.get(&format!("{address}/events")).send().await;
+    let stream = stream.expect("an answer");
+    let open = |reading: &Reading| reading.value("noctule_http_event_streams");
+    assert!((open(&read_from(&service).await) - 1.0).abs() < 0.5);
+    drop(stream);
+    while open(&read_from(&service).await) > 0.5 {}
+}

@@ -1,0 +1,206 @@
+//! Disks that are full, read-only or damaged, and data directories that somebody else has: the
+//! service says so, loses nothing, and goes on when the cause is gone.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
+
+use std::fs::File;
+use std::io::Write as _;
+use std::os::unix::fs::FileExt as _;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use noctule::job::{PlanId, Submission};
+use noctule::store::reopening::{Open, Reopening};
+use noctule::store::sqlite::{SqliteStore, upkeep};
+use noctule::store::{Options, Store, StoreError, Trouble};
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::support::plans::submission;
+use crate::support::process::{Service, run};
+use crate::support::scenario;
+
+/// Take what room is left at `path`.
+fn fill(path: &Path) {
+    let mut ballast = File::create(path).unwrap();
+    while ballast.write_all(&[1; 4096]).is_ok() {}
+    // The last bytes too.
+    while ballast.write_all(&[1]).is_ok() {}
+}
+
+async fn all_end(service: &Service, accepted: &[String]) {
+    for address in accepted {
+        let ended = service.ended(address).await;
+        assert_eq!(ended["status"], "succeeded", "{ended}");
+    }
+}
+
+#[tokio::test]
+async fn a_full_disk_refuses_plans_and_loses_none() {
+    let directory = TempDir::new().unwrap();
+    let service = Service::start_on_a_small_disk(directory.path(), "size=3m");
+    let mut accepted = vec![service.submit(&scenario()).await];
+    service.ended(&accepted[0]).await;
+    let ballast = service.seen(&directory.path().join("ballast"));
+    fill(&ballast);
+
+    let refused = loop {
+        let answer = service.post(&scenario()).await;
+        if answer.status() != 202 {
+            assert_eq!(answer.status(), 503);
+            break answer.json::<Value>().await.unwrap();
+        }
+        let address = answer.headers()["location"].to_str().unwrap();
+        accepted.push(address.to_owned());
+    };
+    assert_eq!(refused["type"], "/problems/store-unavailable");
+    let detail = service.until_ready(503).await;
+    assert!(detail.contains("disk of the store is full"), "{detail}");
+    service.bytes("/livez").await;
+    // What was done can still be read.
+    service.bytes(&format!("{}/result", accepted[0])).await;
+
+    std::fs::remove_file(&ballast).unwrap();
+    service.until_ready(200).await;
+    accepted.push(service.submit(&scenario()).await);
+    all_end(&service, &accepted).await;
+}
+
+#[tokio::test]
+async fn a_read_only_directory_is_told_and_tried_again() {
+    let directory = TempDir::new().unwrap();
+    let service = Service::start_on_a_small_disk(directory.path(), "size=3m,ro");
+    let detail = service.until_ready(503).await;
+    assert!(detail.contains("directory cannot be written"), "{detail}");
+    service.bytes("/livez").await;
+    assert_eq!(service.post(&scenario()).await.status(), 503);
+    service.remount(directory.path(), "rw");
+    service.until_ready(200).await;
+    let accepted = service.submit(&scenario()).await;
+    all_end(&service, &[accepted]).await;
+}
+
+#[tokio::test]
+async fn a_second_process_waits_until_the_first_is_gone() {
+    let directory = TempDir::new().unwrap();
+    let first = Service::start(directory.path(), &[]);
+    let accepted = first.submit(&scenario()).await;
+    let second = Service::start(directory.path(), &[]);
+    let detail = second.until_ready(503).await;
+    assert!(detail.contains("another process"), "{detail}");
+    first.until_ready(200).await;
+    first.kill();
+    second.until_ready(200).await;
+    all_end(&second, &[accepted]).await;
+}
+
+#[tokio::test]
+async fn a_damaged_file_is_told_and_its_backup_can_be_put_back() {
+    let directory = TempDir::new().unwrap();
+    let file = directory.path().join("noctule.db");
+    let backup = directory.path().join("backup.db");
+    let paths = [directory.path(), &backup].map(|path| path.to_str().unwrap());
+    let service = Service::start(directory.path(), &[]);
+    let address = service.submit(&scenario()).await;
+    service.ended(&address).await;
+    // Beside the running service.
+    let copied = run(&["store", "backup", "--data-dir", paths[0], paths[1]], "");
+    assert_eq!(copied.status.code(), Some(0), "{copied:?}");
+    let again = run(&["store", "backup", "--data-dir", paths[0], paths[1]], "");
+    assert_eq!(again.status.code(), Some(1), "nothing is overwritten");
+    let checked = run(&["store", "check", "--data-dir", paths[0]], "");
+    assert_eq!(checked.stdout, b"1 plans, 0 faults\n", "{checked:?}");
+    let result = service.bytes(&format!("{address}/result")).await;
+    service.kill();
+
+    for name in ["noctule.db", "noctule.db-wal"] {
+        let _ = std::fs::remove_file(directory.path().join(name));
+    }
+    std::fs::write(&file, "a letter to my aunt, ".repeat(1_000)).unwrap();
+    let service = Service::start(directory.path(), &[]);
+    let detail = service.until_ready(503).await;
+    assert!(detail.contains("damaged"), "{detail}");
+    service.bytes("/livez").await;
+    let checked = run(&["store", "check", "--data-dir", paths[0]], "");
+    assert_eq!(checked.status.code(), Some(1), "{checked:?}");
+
+    std::fs::rename(&backup, &file).unwrap();
+    service.until_ready(200).await;
+    let again = service.bytes(&format!("{address}/result")).await;
+    assert_eq!(again, result);
+    service.submit(&scenario()).await;
+}
+
+/// Damage that shows only when the page in question is read.
+#[tokio::test(flavor = "multi_thread")]
+async fn damage_that_is_met_on_the_way_closes_the_store_until_it_is_mended() {
+    let directory = TempDir::new().unwrap();
+    let data_dir = directory.path().to_owned();
+    let open: Open = Arc::new(move |suspicious| {
+        let open = if suspicious {
+            SqliteStore::open_suspicious
+        } else {
+            SqliteStore::open
+        };
+        Ok(Arc::new(open(&data_dir, Options::new(1_000))?))
+    });
+    let store = Reopening::start(Arc::clone(&open)).await;
+    let mut ids: Vec<PlanId> = Vec::new();
+    for _ in 0..200 {
+        let large = Submission {
+            scenario: "x".repeat(50_000),
+            ..submission()
+        };
+        ids.push(store.submit(large).await.unwrap().plan.id);
+    }
+    store.close().await;
+
+    let path = directory.path().join("noctule.db");
+    let sound = std::fs::read(&path).unwrap();
+    let file = File::options().write(true).open(&path).unwrap();
+    // A page that holds nothing but a part of a document, and the number of the page that goes on.
+    let page_bytes = 4096;
+    let part = (0..sound.len() / page_bytes)
+        .map(|page| page * page_bytes)
+        .find(|at| {
+            sound[at + 4..at + page_bytes]
+                .iter()
+                .all(|byte| *byte == b'x')
+        })
+        .expect("the documents are long");
+    file.write_all_at(&[0xff; 4], part as u64).unwrap();
+    assert!(!upkeep::check(directory.path()).unwrap().faults.is_empty());
+
+    let store = Reopening::start(open).await;
+    store.stats().await.expect("the rest is sound");
+    let mut told = None;
+    for id in &ids {
+        if let Err(StoreError::Unavailable { trouble, .. }) = store.scenario(*id).await {
+            told = Some(trouble);
+            break;
+        }
+    }
+    assert_eq!(told, Some(Trouble::Damaged));
+    // Closed, also for what would not have met the damage.
+    until(&store, false).await;
+    file.write_all_at(&sound[part..part + 4], part as u64)
+        .unwrap();
+    until(&store, true).await;
+    for id in &ids {
+        assert_eq!(store.scenario(*id).await.unwrap().len(), 50_000);
+    }
+    store.close().await;
+    assert_eq!(upkeep::check(directory.path()).unwrap().faults, [""; 0]);
+}
+
+async fn until(store: &Reopening, healthy: bool) {
+    let changed = async {
+        while store.health().await.is_ok() != healthy {
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    };
+    tokio::time::timeout(Duration::from_secs(30), changed)
+        .await
+        .unwrap_or_else(|_| panic!("never healthy = {healthy}"));
+}

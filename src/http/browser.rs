@@ -38,7 +38,7 @@ const EXPOSED: [HeaderName; 11] = [
 ];
 
 /// Headers that pages elsewhere may send.
-const ALLOWED: [HeaderName; 10] = [
+const ALLOWED: [HeaderName; 11] = [
     header::ACCEPT,
     header::AUTHORIZATION,
     header::CONTENT_ENCODING,
@@ -46,6 +46,7 @@ const ALLOWED: [HeaderName; 10] = [
     header::IF_NONE_MATCH,
     HeaderName::from_static("idempotency-key"),
     HeaderName::from_static("last-event-id"),
+    HeaderName::from_static("noctule-webhook"),
     HeaderName::from_static("prefer"),
     HeaderName::from_static("traceparent"),
     HeaderName::from_static("x-request-id"),

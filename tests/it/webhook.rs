@@ -95,6 +95,7 @@ async fn axum_serve(listener: TcpListener, router: Router) {
         head_timeout: Duration::from_secs(30),
         max_connections: 10,
         patience: Duration::ZERO,
+        instruments: Arc::default(),
     };
     noctule::http::server::serve(listener, router, watched, settings).await;
 }

@@ -126,8 +126,32 @@ pub(super) fn digest(secret: &[u8]) -> Digest {
     Sha256::digest(secret).into()
 }
 
-/// Whether `text` holds what looks like a key.
+/// Whether `text` holds what looks like a key, percent-encoded or not.
 pub(in crate::http) fn holds_a_key(text: &str) -> bool {
+    looks_like_a_key(text) || (text.contains('%') && looks_like_a_key(&decoded(text)))
+}
+
+fn decoded(text: &str) -> String {
+    let digit = |at: usize| char::from(*text.as_bytes().get(at)?).to_digit(16);
+    let mut bytes = Vec::with_capacity(text.len());
+    let mut at = 0;
+    while let Some(&byte) = text.as_bytes().get(at) {
+        let coded = (byte == b'%').then(|| Some(digit(at + 1)? * 16 + digit(at + 2)?));
+        match coded.flatten().and_then(|code| u8::try_from(code).ok()) {
+            Some(code) => {
+                bytes.push(code);
+                at += 3;
+            }
+            None => {
+                bytes.push(byte);
+                at += 1;
+            }
+        }
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+fn looks_like_a_key(text: &str) -> bool {
     /// Of a key's own length; half a key in a log is too much already.
     const ENOUGH: usize = 16;
     text.match_indices(PREFIX).any(|(start, _)| {
@@ -164,6 +188,9 @@ mod tests {
         let key = format!("{PREFIX}{}", "0a".repeat(32));
         assert!(holds_a_key(&key));
         assert!(holds_a_key(&format!("/plans/{key}/x")));
+        assert!(holds_a_key(&key.replace('_', "%5f")));
+        assert!(holds_a_key(&key.replace('n', "%6E")));
+        assert!(!holds_a_key("100%, %zz, %5"));
         assert!(!holds_a_key("/terrains/noctule_alps"));
         assert!(!holds_a_key("/plans"));
     }

@@ -131,6 +131,7 @@ type Kind = (StatusCode, &'static str, &'static str);
 
 impl Problem {
     /// The one table from error to status. Slugs are stable; `docs/PROBLEMS.md` has a section for each.
+    #[expect(clippy::too_many_lines, reason = "one table")]
     fn kind(&self) -> Kind {
         match self {
             Self::InvalidJson { .. } => (
@@ -244,6 +245,7 @@ impl Problem {
     }
 
     /// For people: what happened this time, and what would help.
+    #[expect(clippy::too_many_lines, reason = "one table")]
     fn detail(&self) -> String {
         match self {
             Self::InvalidJson {

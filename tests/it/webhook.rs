@@ -304,3 +304,72 @@ async fn a_restart_forgets_no_webhook() {
     assert_eq!(told["status"], "succeeded");
     drop(service);
 }
+
+#[tokio::test]
+async fn tls_is_spoken_with_whom_the_machine_trusts() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let secret = directory.path().join("secret");
+    std::fs::write(&secret, SECRET).expect("written");
+    let arguments = [
+        "--workers",
+        "1",
+        "--webhook-allow-private",
+        "--webhook-secret-file",
+        secret.to_str().expect("UTF-8"),
+    ];
+    let data = directory.path().join("data");
+    let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
+    let port = listener.local_addr().expect("bound").port();
+    let acceptor = acceptor();
+    let accept = async || {
+        let (stream, _) = listener.accept().await.expect("a connection");
+        acceptor.accept(stream).await
+    };
+
+    // Of an authority that nobody knows.
+    let service = Service::start(&data, &arguments);
+    let request = service
+        .client()
+        .post(service.url("/plans"))
+        .json(&scenario());
+    let url = format!("https://localhost:{port}/hook?x=1");
+    let accepted = request.header("noctule-webhook", url).send().await;
+    let accepted = accepted.expect("an answer");
+    assert_eq!(accepted.status(), 202);
+    let plan = accepted.headers()["location"]
+        .to_str()
+        .expect("text")
+        .to_owned();
+    let refused = accept().await.expect_err("nothing is said to a stranger");
+    assert!(refused.to_string().contains("UnknownCA"), "{refused}");
+    service.kill();
+
+    let authority = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/fixtures/tls/ca.pem");
+    let _service = Service::start_with(&[("SSL_CERT_FILE", authority)], &data, &arguments);
+    let stream = accept().await.expect("a handshake");
+    let (sender, mut messages) = mpsc::unbounded_channel();
+    let statuses = Arc::new(std::sync::Mutex::new(vec![].into_iter()));
+    let router = Router::new().fallback(hear).with_state((sender, statuses));
+    let service = hyper_util::service::TowerToHyperService::new(router);
+    let connection = hyper::server::conn::http1::Builder::new()
+        .serve_connection(hyper_util::rt::TokioIo::new(stream), service);
+    tokio::spawn(async move { connection.await.is_ok() });
+    let message = tokio::time::timeout(Duration::from_secs(60), messages.recv()).await;
+    check(&message.expect("in time").expect("a message"), &plan);
+}
+
+/// Of a receiver called localhost.
+fn acceptor() -> tokio_rustls::TlsAcceptor {
+    use tokio_rustls::rustls::pki_types::pem::PemObject as _;
+    use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
+    use tokio_rustls::rustls::{ServerConfig, crypto::ring};
+
+    let certificate = CertificateDer::from_pem_slice(include_bytes!("fixtures/tls/localhost.pem"));
+    let key = PrivateKeyDer::from_pem_slice(include_bytes!("fixtures/tls/localhost.key"));
+    let config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
+        .with_safe_default_protocol_versions()
+        .expect("ring has the default versions")
+        .with_no_client_auth()
+        .with_single_cert(vec![certificate.expect("PEM")], key.expect("PEM"));
+    Arc::new(config.expect("a certificate and its key")).into()
+}

@@ -137,16 +137,9 @@ fn decoded(text: &str) -> String {
     let mut at = 0;
     while let Some(&byte) = text.as_bytes().get(at) {
         let coded = (byte == b'%').then(|| Some(digit(at + 1)? * 16 + digit(at + 2)?));
-        match coded.flatten().and_then(|code| u8::try_from(code).ok()) {
-            Some(code) => {
-                bytes.push(code);
-                at += 3;
-            }
-            None => {
-                bytes.push(byte);
-                at += 1;
-            }
-        }
+        let coded = coded.flatten().and_then(|code| u8::try_from(code).ok());
+        bytes.push(coded.unwrap_or(byte));
+        at += if coded.is_some() { 3 } else { 1 };
     }
     String::from_utf8_lossy(&bytes).into_owned()
 }

@@ -38,7 +38,7 @@ use crate::job::{Owner, PlanId};
 use crate::telemetry::spans;
 use rate::{Buckets, Taken};
 use streams::Streams;
-use ticket::Tickets;
+use ticket::{Holder, Tickets};
 
 /// How often a stream looks whether its key has expired.
 const EXPIRY_LOOK: Duration = Duration::from_secs(60);
@@ -194,7 +194,7 @@ impl Access {
         let key = match holder {
             None => keys.find(secret(headers)?).ok_or(Unauthorized::NoKey)?,
             // Of a key that has been withdrawn since.
-            Some(holder) => holder
+            Some(Holder(holder)) => holder
                 .and_then(|holder| keys.with_digest(&holder))
                 .ok_or(Unauthorized::NoTicket)?,
         };

@@ -26,6 +26,10 @@ struct Ticket {
     until: Instant,
 }
 
+/// The sum of the key that a ticket was issued for; `None` where nobody had one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Holder(pub(super) Option<Digest>);
+
 impl Tickets {
     /// A ticket for the plan's events, in the place of the key `holder`.
     pub(super) fn issue(
@@ -55,10 +59,10 @@ impl Tickets {
     }
 
     /// Whose ticket for the plan `text` is, if it is one.
-    pub(super) fn holder(&self, text: &str, plan: PlanId, now: Instant) -> Option<Option<Digest>> {
+    pub(super) fn holder(&self, text: &str, plan: PlanId, now: Instant) -> Option<Holder> {
         let tickets = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let ticket = tickets.get(&digest(text.as_bytes()))?;
-        (ticket.plan == plan && ticket.until > now).then_some(ticket.holder)
+        (ticket.plan == plan && ticket.until > now).then_some(Holder(ticket.holder))
     }
 }
 
@@ -74,9 +78,13 @@ mod tests {
         let tickets = Tickets::default();
         let (plan, now, key) = (new_id(), Instant::now(), Some([1; 32]));
         let ticket = tickets.issue(plan, key, now, LIFE).expect("random");
-        assert_eq!(tickets.holder(&ticket, plan, now), Some(key));
+        assert_eq!(tickets.holder(&ticket, plan, now), Some(Holder(key)));
         let later = now + LIFE - Duration::from_millis(1);
-        assert_eq!(tickets.holder(&ticket, plan, later), Some(key), "again");
+        assert_eq!(
+            tickets.holder(&ticket, plan, later),
+            Some(Holder(key)),
+            "again"
+        );
         assert_eq!(tickets.holder(&ticket, new_id(), now), None);
         assert_eq!(tickets.holder(&ticket, plan, now + LIFE), None);
         assert_eq!(tickets.holder("", plan, now), None);

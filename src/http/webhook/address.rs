@@ -44,10 +44,10 @@ impl Target {
             return None;
         }
         Some(Self {
+            uri,
             host,
             port,
             tls,
-            uri,
         })
     }
 }
@@ -81,7 +81,7 @@ fn is_public_v4(address: Ipv4Addr) -> bool {
         || a >= 224)
 }
 
-/// Global unicast, 2000::/3, but for its special blocks and those that hold an address of version 4.
+/// Global unicast, `2000::/3`, but for its special blocks and those that hold an address of version 4.
 fn is_public_v6(address: Ipv6Addr) -> bool {
     let [a, b, ..] = address.segments();
     (0x2000..0x4000).contains(&a)

@@ -145,8 +145,8 @@ impl Delivery {
                 tracing::info!(plan = %id, tries, "the webhook's receiver is gone");
                 None
             }
-            Ok(status) => self.again(id, tries, &format!("the answer is {status}")),
-            Err(error) => self.again(id, tries, &error.to_string()),
+            Ok(status) => again(id, tries, &format!("the answer is {status}")),
+            Err(error) => again(id, tries, &error.to_string()),
         };
         match self.store.webhook_tried(id, next_ms).await {
             // Of a plan that has been deleted meanwhile nobody wants to hear.
@@ -178,18 +178,18 @@ impl Delivery {
         }
         self.client.post(&target, headers, body).await
     }
+}
 
-    /// When to try again. The address stays out of the log: it may hold the receiver's own secret.
-    fn again(&self, id: PlanId, tries: u32, why: &str) -> Option<i64> {
-        let jitter = f64::from(getrandom::u32().unwrap_or(u32::MAX / 2)) / f64::from(u32::MAX);
-        if let Some(pause_ms) = retry::pause_ms(tries, jitter) {
-            let pause_s = pause_ms / 1000;
-            tracing::warn!(plan = %id, tries, pause_s, why, "a webhook did not get through");
-            Some(Timestamp::now().as_millisecond() + pause_ms)
-        } else {
-            tracing::error!(plan = %id, tries, why, "a webhook did not get through and is given up");
-            None
-        }
+/// When to try again. The address stays out of the log: it may hold the receiver's own secret.
+fn again(id: PlanId, tries: u32, why: &str) -> Option<i64> {
+    let jitter = f64::from(getrandom::u32().unwrap_or(u32::MAX / 2)) / f64::from(u32::MAX);
+    if let Some(pause_ms) = retry::pause_ms(tries, jitter) {
+        let pause_s = pause_ms / 1000;
+        tracing::warn!(plan = %id, tries, pause_s, why, "a webhook did not get through");
+        Some(Timestamp::now().as_millisecond() + pause_ms)
+    } else {
+        tracing::error!(plan = %id, tries, why, "a webhook did not get through and is given up");
+        None
     }
 }
 

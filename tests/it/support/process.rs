@@ -87,6 +87,17 @@ impl Service {
         Self::start_as(noctule(), LOOPBACK, data_dir, arguments, log)
     }
 
+    /// The same with environment variables.
+    pub(crate) fn start_with(
+        variables: &[(&str, &str)],
+        data_dir: &Path,
+        arguments: &[&str],
+    ) -> Self {
+        let mut command = noctule();
+        command.envs(variables.iter().copied());
+        Self::start_as(command, LOOPBACK, data_dir, arguments, Stdio::null())
+    }
+
     /// The same on another address.
     pub(crate) fn start_on(
         listen: &str,

@@ -154,6 +154,8 @@ async fn lists_show_what_is_ones_own() {
 
 #[tokio::test]
 async fn without_a_good_key_there_is_no_way_in() {
+    const NONE: &str = "Bearer realm=\"noctule\"";
+    const WRONG: &str = "Bearer realm=\"noctule\", error=\"invalid_token\"";
     let api = Api::with_keys(&house());
     let plan = submit(&api, "of alice").await;
     let asked = format!("GET {plan}");
@@ -162,8 +164,6 @@ async fn without_a_good_key_there_is_no_way_in() {
         assert_eq!(answer.header("www-authenticate"), challenge);
         problem["detail"].as_str().expect("text").to_owned()
     };
-    const NONE: &str = "Bearer realm=\"noctule\"";
-    const WRONG: &str = "Bearer realm=\"noctule\", error=\"invalid_token\"";
 
     refuse(&api.get(&plan).await, NONE);
     // Unknown and malformed ones are told the same.

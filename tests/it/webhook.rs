@@ -71,7 +71,7 @@ async fn hear(
 impl Receiver {
     async fn new(statuses: &[u16]) -> Self {
         let (sender, messages) = mpsc::unbounded_channel();
-        let statuses = Arc::new(std::sync::Mutex::new(statuses.to_vec().into_iter()));
+        let statuses = Arc::new(std::sync::Mutex::new(Vec::from(statuses).into_iter()));
         let router = Router::new().fallback(hear).with_state((sender, statuses));
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
         let address = listener.local_addr().expect("bound");

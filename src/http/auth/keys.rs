@@ -160,13 +160,13 @@ mod tests {
 
     #[test]
     fn finds_each_key_and_no_other() {
-        let text: String = (0..5)
+        let entries: Vec<String> = (0..5)
             .map(|n| {
                 let sum = sha256_hex(format!("secret {n}").as_bytes());
                 format!("[[key]]\nname = \"k{n}\"\nsha256 = \"{sum}\"\nscopes = [\"read\"]\n")
             })
             .collect();
-        let keys = Keys::read(&text).expect("five keys");
+        let keys = Keys::read(&entries.concat()).expect("five keys");
         for n in 0..5 {
             let found = keys.find(format!("secret {n}").as_bytes());
             assert_eq!(found.map(|key| key.name.clone()), Some(format!("k{n}")));

@@ -471,6 +471,20 @@ mod tests {
     }
 
     #[test]
+    fn each_is_in_the_manual() {
+        let manual = include_str!("../../docs/OPERATIONS.md");
+        let rows = manual.lines().filter(|line| line.contains(" | `--"));
+        let rows: Vec<&str> = rows.collect();
+        let settings = all();
+        assert_eq!(rows.len(), settings.len());
+        for (row, setting) in rows.iter().zip(settings) {
+            let (key, flag, variable) = (setting.key, setting.flag(), setting.variable());
+            let expected = format!("| `{key}` | `--{flag}` | `{variable}` ");
+            assert!(row.starts_with(&expected), "{row} is not {expected}");
+        }
+    }
+
+    #[test]
     fn a_refusal_says_what_is_allowed() {
         let check = |key: &str, word: &str, expected: Result<(), &str>| {
             let settings = all();

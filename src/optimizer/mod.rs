@@ -8,6 +8,7 @@ mod ba;
 mod particles;
 mod pso;
 mod random;
+mod ranking;
 mod sba;
 mod spso;
 mod swarm;
@@ -87,7 +88,9 @@ impl Bounds {
     /// Bring `position` into the box.
     pub fn clamp(&self, position: &mut [f64]) {
         for (value, (lower, upper)) in position.iter_mut().zip(self.lower.iter().zip(&self.upper)) {
-            *value = value.clamp(*lower, *upper);
+            // As `f64::clamp`, which first asks whether the bounds are in order: this runs in lanes.
+            let raised = if *value < *lower { *lower } else { *value };
+            *value = if raised > *upper { *upper } else { raised };
         }
     }
 }

@@ -3,6 +3,7 @@
 //! The spherical coding is the objective's affair; here a bat is a point in a box. All bats of an
 //! iteration move by the same best position and are priced together.
 
+use super::ranking::Ranking;
 use super::{
     Algorithm, Fitness, Objective, Optimizer, Parameter, Random, Settings, Swarm, parameter,
 };
@@ -113,6 +114,7 @@ pub(super) struct TmsSba {
     expansion: f64,
     candidates: Vec<f64>,
     outcome: Vec<Fitness>,
+    ranking: Ranking,
 }
 
 impl TmsSba {
@@ -153,6 +155,7 @@ impl TmsSba {
             expansion,
             candidates: vec![0.0; swarm.len() * dimension],
             outcome: vec![Fitness::WORST; swarm.len()],
+            ranking: Ranking::default(),
             swarm,
         }
     }
@@ -176,9 +179,9 @@ impl TmsSba {
         let best = self.swarm.best_position();
         // A walk of the objective's own starts from any of the best few, ever fewer.
         let elite = if objective.walks() {
-            self.swarm.ranking()
+            self.ranking.of(self.swarm.fitness())
         } else {
-            Vec::new()
+            &[]
         };
         let n_elite = share_of(elite.len(), ELITE * (1.0 - progress)).max(1);
         for bat_idx in 0..self.swarm.len() {
@@ -186,9 +189,8 @@ impl TmsSba {
             let candidate = &mut self.candidates[bat_idx * dimension..(bat_idx + 1) * dimension];
             let velocity = &mut self.velocities[bat_idx * dimension..(bat_idx + 1) * dimension];
             let frequency = self.random.between(self.f_min, self.f_max); // Eq. 10
-            for dim in 0..dimension {
-                velocity[dim] += (best[dim] - here[dim]) * frequency; // Eq. 11, 20
-                candidate[dim] = here[dim] + velocity[dim]; // Eq. 12, 21
+            for (velocity, (best, here)) in velocity.iter_mut().zip(best.iter().zip(here)) {
+                *velocity += (best - here) * frequency; // Eq. 11, 20
             }
             let walks = self.random.unit() >= self.pulse_rates[bat_idx]; // Eq. 13
             if walks && !elite.is_empty() {
@@ -202,6 +204,11 @@ impl TmsSba {
                     if dim == chosen || self.random.unit() < share {
                         *value += self.random.normal() * size * objective.bounds().range(dim);
                     }
+                }
+            } else {
+                for (value, (here, velocity)) in candidate.iter_mut().zip(here.iter().zip(velocity))
+                {
+                    *value = here + *velocity; // Eq. 12, 21
                 }
             }
             objective.bounds().clamp(candidate);
@@ -225,7 +232,7 @@ impl TmsSba {
     /// the swarm is drawn anew from a wider range.
     fn stabilise(&mut self, objective: &mut dyn Objective) {
         let dimension = objective.bounds().dimension();
-        let ranking = self.swarm.ranking();
+        let ranking = self.ranking.of(self.swarm.fitness());
         // As truncation < 1, fewer than half are left out at each end.
         let left_out = share_of(ranking.len(), self.truncation / 2.0);
         let middle = &ranking[left_out..ranking.len() - left_out];
@@ -241,7 +248,7 @@ impl TmsSba {
             (self.swarm.position(worst)[dim] - mean[dim]).abs() <= STAGNATION * bounds.range(dim)
         });
         if stagnant {
-            self.reinitialise(objective, &mean, &ranking);
+            self.reinitialise(objective, &mean);
         } else {
             let mut fitness = [Fitness::WORST];
             self.swarm.price(objective, &mean, &mut fitness);
@@ -249,8 +256,9 @@ impl TmsSba {
         }
     }
 
-    fn reinitialise(&mut self, objective: &mut dyn Objective, mean: &[f64], ranking: &[usize]) {
+    fn reinitialise(&mut self, objective: &mut dyn Objective, mean: &[f64]) {
         let dimension = mean.len();
+        let ranking = self.ranking.of(self.swarm.fitness());
         let bounds = objective.bounds();
         // The range that the swarm still covers, widened.
         let reach: Vec<f64> = (0..dimension)

@@ -1,7 +1,7 @@
 //! What a guided search knows that a plain one does not: routes to start from, and moves of a route.
 
 use super::coding::{Cartesian, Spherical};
-use super::moves::move_a_part;
+use super::moves::Moves;
 use crate::geometry::Point3;
 use crate::optimizer::Random;
 use crate::scenario::Scenario;
@@ -17,11 +17,12 @@ const REACH: f64 = 0.3;
 
 /// Draws the first members of a swarm in space and walks about routes.
 pub(super) struct Guide<'s> {
-    scenario: &'s Scenario,
     space: Cartesian<'s>,
+    moves: Moves<'s>,
     /// Strangers are drawn in the spherical coding, whose random routes are flyable.
     spherical: Spherical<'s>,
-    seeds: Vec<Vec<Point3>>,
+    /// Positions of the routes to start from.
+    seeds: Vec<Vec<f64>>,
     /// Members drawn so far.
     drawn: usize,
     route: Vec<Point3>,
@@ -30,14 +31,20 @@ pub(super) struct Guide<'s> {
 
 impl<'s> Guide<'s> {
     /// From `seeds`, each of `waypoints` free waypoints.
-    pub(super) fn new(scenario: &'s Scenario, waypoints: usize, seeds: Vec<Vec<Point3>>) -> Self {
+    pub(super) fn new(scenario: &'s Scenario, waypoints: usize, seeds: &[Vec<Point3>]) -> Self {
+        let space = Cartesian::new(scenario, waypoints);
         let spherical = Spherical::new(scenario, waypoints);
+        let encode = |route: &Vec<Point3>| {
+            let mut position = vec![0.0; space.bounds().dimension()];
+            space.encode(route, &mut position);
+            position
+        };
         Self {
-            scenario,
-            space: Cartesian::new(scenario, waypoints),
+            seeds: seeds.iter().map(encode).collect(),
+            space,
+            moves: Moves::new(scenario),
             vectors: vec![0.0; spherical.bounds().dimension()],
             spherical,
-            seeds,
             drawn: 0,
             route: Vec::new(),
         }
@@ -51,25 +58,18 @@ impl<'s> Guide<'s> {
         if idx >= count && idx % STRANGERS == STRANGERS - 1 {
             self.spherical.bounds().draw(random, &mut self.vectors);
             self.spherical.decode(&self.vectors, &mut self.route);
+            self.space.encode(&self.route, position);
         } else {
-            self.route.clone_from(&self.seeds[idx % count]);
+            position.copy_from_slice(&self.seeds[idx % count]);
             for _ in 0..if idx < count { 0 } else { MOVES } {
-                move_a_part(self.scenario, &mut self.route, random, REACH);
+                self.moves.move_a_part(position, random, REACH);
             }
         }
-        self.space.encode(&self.route, position);
     }
 
     /// Write a neighbour of `base` into `candidate`.
-    pub(super) fn walk(
-        &mut self,
-        random: &mut Random,
-        base: &[f64],
-        size: f64,
-        candidate: &mut [f64],
-    ) {
-        self.space.decode(base, &mut self.route);
-        move_a_part(self.scenario, &mut self.route, random, size);
-        self.space.encode(&self.route, candidate);
+    pub(super) fn walk(&self, random: &mut Random, base: &[f64], size: f64, candidate: &mut [f64]) {
+        candidate.copy_from_slice(base);
+        self.moves.move_a_part(candidate, random, size);
     }
 }

@@ -19,14 +19,13 @@ pub(super) struct Log<'o> {
     told: Option<Vec<Point3>>,
     /// Routes priced so far.
     pub(super) evaluations: u64,
-    /// Proven: no route costs less.
-    pub(super) lower: f64,
+    /// Proven: no route costs less. Known only where the search makes use of it.
+    pub(super) lower: Option<f64>,
 }
 
 impl<'o> Log<'o> {
     pub(super) fn new(
         model: &'o Model<'o>,
-        lower: f64,
         observer: &'o mut dyn Observer,
         stop: &'o dyn Stop,
     ) -> Self {
@@ -39,14 +38,15 @@ impl<'o> Log<'o> {
             best: Fitness::WORST,
             told: None,
             evaluations: 0,
-            lower,
+            lower: None,
         }
     }
 
     /// Whether the best so far is proven to be as near to the optimum as was asked for.
     pub(super) fn has_converged(&self) -> bool {
         let gap = self.model.scenario.planner.gap;
-        gap > 0.0 && self.best.is_feasible() && self.best.cost <= self.lower * (1.0 + gap)
+        let near = |lower: f64| self.best.cost <= lower * (1.0 + gap);
+        gap > 0.0 && self.best.is_feasible() && self.lower.is_some_and(near)
     }
 
     /// Keep `route`, whose fitness was found in lanes, if it is the best so far; whether it is.

@@ -2,6 +2,7 @@
 //!
 //! Plain functions: no async, no store, no clock of their own.
 
+mod beside;
 mod certificate;
 mod coding;
 mod guide;
@@ -91,13 +92,24 @@ pub fn algorithm_rules() -> Vec<AlgorithmRule> {
 /// When the scenario names an algorithm that is not in the table; its reader refuses those.
 pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -> Outcome {
     let model = Model::new(scenario);
-    let lower = seeding::lower_bound(scenario);
-    let mut log = Log::new(&model, lower, observer, stop);
-    let stop_reason = match starts::routes(&model, stop) {
-        None => search::plain(&model, &mut log),
-        Some(starts) => search::guided(&model, starts, &mut log),
-    };
-    deliver(&model, log, stop_reason)
+    let mut log = Log::new(&model, observer, stop);
+    if scenario.planner.gap > 0.0 {
+        // The search asks at each step whether it is near enough to the bound.
+        let is_over = || why_stop(scenario, stop).is_some();
+        let lower = seeding::lower_bound_until(scenario, &is_over);
+        log.lower = Some(lower);
+        let stop_reason = search(&model, &mut log);
+        return deliver(&model, log, lower, stop_reason);
+    }
+    let (stop_reason, lower) = beside::bounded(scenario, || search(&model, &mut log));
+    deliver(&model, log, lower, stop_reason)
+}
+
+fn search(model: &Model, log: &mut Log) -> StopReason {
+    match starts::routes(model, log.stop) {
+        None => search::plain(model, log),
+        Some(starts) => search::guided(model, starts, log),
+    }
 }
 
 /// The routes of `scenario` as its algorithm sees them: positions in a box, each with its price.
@@ -132,8 +144,8 @@ fn why_stop(scenario: &Scenario, stop: &dyn Stop) -> Option<StopReason> {
 }
 
 /// Price, smooth and certify the best route.
-fn deliver(model: &Model, log: Log, stop_reason: StopReason) -> Outcome {
-    let (mut convergence, lower) = (log.convergence, log.lower);
+fn deliver(model: &Model, log: Log, lower: f64, stop_reason: StopReason) -> Outcome {
+    let mut convergence = log.convergence;
     let route = starts::spread(model, log.route);
     let evaluations = convergence.last().map_or(0, |last| last.evaluations);
     let quadrature = model.scenario.planner.quadrature;

@@ -1,100 +1,136 @@
-//! Eq. 13 as a move of the route: a neighbour that differs in one place, drawn in space and not in
-//! the numbers of the coding.
+//! Eq. 13 as a move of the route: a neighbour that differs in one place, drawn in space.
+//!
+//! A route is here the position of its Cartesian coding: x, y and the height above ground of each
+//! free waypoint. Moves keep heights above ground, so that none asks for the elevation anywhere.
 
-use crate::geometry::{LEVEL, Point2, Point3};
+use super::coding::PER_WAYPOINT;
+use crate::geometry::{LEVEL, Point3};
 use crate::optimizer::Random;
 use crate::scenario::Scenario;
 
-/// Change `route` in one place, by up to about `size` (0 to 1) of the way from start to target.
-pub(super) fn move_a_part(
-    scenario: &Scenario,
-    route: &mut [Point3],
-    random: &mut Random,
-    size: f64,
-) {
-    let free = route.len() - 2;
-    let way = (scenario.target - scenario.start).norm();
-    // Sizes of every order: most steps near the optimum must be small.
-    let reach = way * size * libm::exp(-5.0 * random.unit());
-    let kind = random.unit();
-    if kind < 0.55 {
-        shift(scenario, route, random, reach);
-    } else if kind < 0.75 {
-        lift(scenario, route, random, reach);
-    } else if kind < 0.9 || free < 2 {
-        slide(scenario, route, random);
-    } else {
-        transplant(scenario, route, random, reach);
-    }
+/// x, y, height above ground.
+type Waypoint = [f64; PER_WAYPOINT];
+
+/// Moves of the routes of one scenario.
+pub(super) struct Moves<'s> {
+    scenario: &'s Scenario,
+    /// Metres from start to target.
+    way: f64,
+    start: Waypoint,
+    target: Waypoint,
 }
 
-/// One to four neighbouring waypoints aside, the middle one farthest.
-fn shift(scenario: &Scenario, route: &mut [Point3], random: &mut Random, reach: f64) {
-    let free = route.len() - 2;
-    let (first, count) = part(free, random);
-    let (dx, dy) = (random.normal() * reach, random.normal() * reach);
-    for offset in 0..count {
-        let share = hat(offset, count);
-        let point = route[first + offset];
-        route[first + offset] = moved(
+impl<'s> Moves<'s> {
+    pub(super) fn new(scenario: &'s Scenario) -> Self {
+        let coded = |end: Point3| [end.x, end.y, end.z - scenario.terrain.elevation(end.xy())];
+        Self {
             scenario,
-            point,
-            Point2::new(point.x + dx * share, point.y + dy * share),
-            0.0,
-        );
+            way: (scenario.target - scenario.start).norm(),
+            start: coded(scenario.start),
+            target: coded(scenario.target),
+        }
+    }
+
+    /// Change the route of `position` in one place, by up to about `size` (0 to 1) of the way from
+    /// start to target. It stays within area and band.
+    pub(super) fn move_a_part(&self, position: &mut [f64], random: &mut Random, size: f64) {
+        let (route, _) = position.as_chunks_mut::<PER_WAYPOINT>();
+        let reach = self.way * size * order(random.unit());
+        let kind = random.unit();
+        if kind < 0.55 {
+            self.shift(route, random, reach);
+        } else if kind < 0.75 {
+            self.lift(route, random, reach);
+        } else if kind < 0.9 || route.len() < 2 {
+            self.slide(route, random);
+        } else {
+            self.transplant(route, random, reach);
+        }
+    }
+
+    /// One to four neighbouring waypoints aside, the middle one farthest.
+    fn shift(&self, route: &mut [Waypoint], random: &mut Random, reach: f64) {
+        let (first, count) = part(route.len(), random);
+        let [dx, dy] = random.normals().map(|normal| normal * reach);
+        for (offset, waypoint) in route[first..first + count].iter_mut().enumerate() {
+            let share = hat(offset, count);
+            let [x, y, height] = *waypoint;
+            *waypoint = self.within([x + dx * share, y + dy * share, height]);
+        }
+    }
+
+    /// One to four neighbouring waypoints up or down.
+    fn lift(&self, route: &mut [Waypoint], random: &mut Random, reach: f64) {
+        let (first, count) = part(route.len(), random);
+        let rise = random.normal() * reach;
+        for (offset, waypoint) in route[first..first + count].iter_mut().enumerate() {
+            let [x, y, height] = *waypoint;
+            *waypoint = self.within([x, y, height + rise * hat(offset, count)]);
+        }
+    }
+
+    /// A waypoint along one of its legs.
+    fn slide(&self, route: &mut [Waypoint], random: &mut Random) {
+        let idx = random.below(route.len());
+        let [before, after] = self.neighbours(route, idx);
+        let towards = if random.unit() < 0.5 { before } else { after };
+        let share = random.unit() * random.unit() * if random.unit() < 0.5 { 1.0 } else { -0.5 };
+        let [x, y, height] = route[idx];
+        let at = |own: f64, other: f64| own + (other - own) * share;
+        route[idx] = self.within([at(x, towards[0]), at(y, towards[1]), height]);
+    }
+
+    /// A waypoint out of its place and into another leg.
+    fn transplant(&self, route: &mut [Waypoint], random: &mut Random, reach: f64) {
+        let from = random.below(route.len());
+        let into = random.below(route.len());
+        if into > from {
+            route[from..=into].rotate_left(1);
+        } else {
+            route[into..=from].rotate_right(1);
+        }
+        let [before, after] = self.neighbours(route, into);
+        let share = random.unit();
+        let between = |dim: usize| before[dim] + (after[dim] - before[dim]) * share;
+        let (dx, dy) = (after[0] - before[0], after[1] - before[1]);
+        let length = (dx * dx + dy * dy).sqrt();
+        let aside = if length < LEVEL {
+            0.0
+        } else {
+            random.normal() * reach / length
+        };
+        route[into] = self.within([between(0) - dy * aside, between(1) + dx * aside, between(2)]);
+    }
+
+    /// The waypoints before and after number `idx`, or the ends of the route.
+    fn neighbours(&self, route: &[Waypoint], idx: usize) -> [Waypoint; 2] {
+        let before = if idx == 0 { self.start } else { route[idx - 1] };
+        let after = route.get(idx + 1).copied().unwrap_or(self.target);
+        [before, after]
+    }
+
+    fn within(&self, [x, y, height]: Waypoint) -> Waypoint {
+        let (area, band) = (&self.scenario.area, self.scenario.altitude);
+        [
+            x.clamp(area.min.x, area.max.x),
+            y.clamp(area.min.y, area.max.y),
+            height.clamp(band.min, band.max),
+        ]
     }
 }
 
-/// One to four neighbouring waypoints up or down.
-fn lift(scenario: &Scenario, route: &mut [Point3], random: &mut Random, reach: f64) {
-    let free = route.len() - 2;
-    let (first, count) = part(free, random);
-    let rise = random.normal() * reach;
-    for offset in 0..count {
-        let point = route[first + offset];
-        route[first + offset] = moved(scenario, point, point.xy(), rise * hat(offset, count));
-    }
+/// Sizes of every order down to exp(-5), as `share` goes from 0 to 1: most steps near the optimum must
+/// be small.
+fn order(share: f64) -> f64 {
+    let sixth = 1.0 - 0.5654 * share;
+    let half = sixth * sixth * sixth;
+    half * half
 }
 
-/// A waypoint along one of its legs.
-fn slide(scenario: &Scenario, route: &mut [Point3], random: &mut Random) {
-    let idx = 1 + random.below(route.len() - 2);
-    let towards = if random.unit() < 0.5 {
-        route[idx - 1]
-    } else {
-        route[idx + 1]
-    };
-    let share = random.unit() * random.unit() * if random.unit() < 0.5 { 1.0 } else { -0.5 };
-    let point = route[idx];
-    let at = point.xy() + (towards.xy() - point.xy()) * share;
-    route[idx] = moved(scenario, point, at, 0.0);
-}
-
-/// A waypoint out of its place and into another leg.
-fn transplant(scenario: &Scenario, route: &mut [Point3], random: &mut Random, reach: f64) {
-    let free = route.len() - 2;
-    let from = 1 + random.below(free);
-    let into = 1 + random.below(free);
-    if into > from {
-        route[from..=into].rotate_left(1);
-    } else {
-        route[into..=from].rotate_right(1);
-    }
-    let (before, after) = (route[into - 1], route[into + 1]);
-    let middle = before + (after - before) * random.unit();
-    let way = after.xy() - before.xy();
-    let length = way.norm();
-    let aside = if length < LEVEL {
-        way
-    } else {
-        nalgebra::Vector2::new(-way.y, way.x) / length * (random.normal() * reach)
-    };
-    route[into] = moved(scenario, middle, middle.xy() + aside, 0.0);
-}
-
+/// The first of one to four neighbours among so many free waypoints, and how many they are.
 fn part(free: usize, random: &mut Random) -> (usize, usize) {
     let count = 1 + random.below(4.min(free));
-    (1 + random.below(free - count + 1), count)
+    (random.below(free - count + 1), count)
 }
 
 /// Share of the move of the waypoint at `offset` of `count`.
@@ -103,14 +139,34 @@ fn hat(offset: usize, count: usize) -> f64 {
     1.0 - (offset as f64 - middle).abs() / (middle + 1.0)
 }
 
-/// `point` at `at`, as high above ground as before and `rise` more, within area and band.
-fn moved(scenario: &Scenario, point: Point3, at: Point2, rise: f64) -> Point3 {
-    let area = &scenario.area;
-    let at = Point2::new(
-        at.x.clamp(area.min.x, area.max.x),
-        at.y.clamp(area.min.y, area.max.y),
-    );
-    let height = point.z - scenario.terrain.elevation(point.xy()) + rise;
-    let height = height.clamp(scenario.altitude.min, scenario.altitude.max);
-    Point3::new(at.x, at.y, scenario.terrain.elevation(at) + height)
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::coding::Cartesian;
+    use crate::planner::tests::scenario;
+
+    /// Every move keeps to the box, and of many every waypoint takes part in some.
+    #[test]
+    fn moves_stay_in_the_box_and_reach_every_waypoint() {
+        let scenario = scenario();
+        let moves = Moves::new(&scenario);
+        for waypoints in [1, 2, 3, 10] {
+            let space = Cartesian::new(&scenario, waypoints);
+            let bounds = space.bounds();
+            let mut random = Random::new(3);
+            let mut base = vec![0.0; bounds.dimension()];
+            bounds.draw(&mut random, &mut base);
+            let mut moved = vec![false; bounds.dimension()];
+            for _ in 0..2000 {
+                let mut candidate = base.clone();
+                moves.move_a_part(&mut candidate, &mut random, 0.5);
+                assert_ne!(candidate, base);
+                for (dim, value) in candidate.iter().enumerate() {
+                    assert!((bounds.lower[dim]..=bounds.upper[dim]).contains(value));
+                    moved[dim] |= value.to_bits() != base[dim].to_bits();
+                }
+            }
+            assert!(moved.into_iter().all(|moved| moved), "N = {waypoints}");
+        }
+    }
 }

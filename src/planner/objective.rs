@@ -46,7 +46,7 @@ impl<'s> Routes<'s> {
 
     /// Of a search in space that starts from `seeds`, all with as many waypoints, and whose local
     /// walk is a move of the route.
-    pub(super) fn guided(model: &Model<'s>, stop: &'s dyn Stop, seeds: Vec<Vec<Point3>>) -> Self {
+    pub(super) fn guided(model: &Model<'s>, stop: &'s dyn Stop, seeds: &[Vec<Point3>]) -> Self {
         let waypoints = seeds[0].len() - 2;
         let coding = Coding::Cartesian(Cartesian::new(model.scenario, waypoints));
         let guide = Guide::new(model.scenario, waypoints, seeds);
@@ -144,7 +144,7 @@ impl Objective for Routes<'_> {
     }
 
     fn walk(&mut self, random: &mut Random, base: &[f64], size: f64, candidate: &mut [f64]) {
-        if let Some(guide) = &mut self.guide {
+        if let Some(guide) = &self.guide {
             guide.walk(random, base, size, candidate);
         }
     }

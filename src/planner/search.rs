@@ -2,7 +2,7 @@
 
 use super::log::Log;
 use super::objective::Routes;
-use super::polish::Polish;
+use super::polish::{Polish, Steps};
 use super::starts::Starts;
 use super::{StopReason, same, starts, why_stop};
 use crate::cost::Model;
@@ -18,11 +18,19 @@ const ELITES: usize = 4;
 /// A route that goes on costs at most this share more than the best.
 const PROMISING: f64 = 0.05;
 
-/// Greatest and least step of the polish between the stages, as shares of the way.
-const COARSE_STEPS: (f64, f64) = (0.02, 1e-3);
+/// Of the polish between the stages.
+const COARSE_STEPS: Steps = Steps {
+    from: 0.02,
+    to: 1e-3,
+    gain: 1e-6,
+};
 
 /// Of the polish at the end.
-const LAST_STEPS: (f64, f64) = (0.01, 5e-5);
+const LAST_STEPS: Steps = Steps {
+    from: 0.01,
+    to: 5e-5,
+    gain: 1e-6,
+};
 
 /// The algorithm alone, from random routes: the paper's.
 pub(super) fn plain(model: &Model, log: &mut Log) -> StopReason {
@@ -55,7 +63,7 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
     let mut elites = starts.routes;
     let mut reason = StopReason::Iterations;
     if turning > 0 {
-        let mut routes = Routes::guided(model, log.stop, elites);
+        let mut routes = Routes::guided(model, log.stop, &elites);
         let (search, why) = run(model, &mut routes, 0..=turning, log);
         elites = distinct(model, &routes, search.as_ref());
         reason = why;
@@ -67,7 +75,7 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
     }
     let elites = whole(elites, log);
     if reason == StopReason::Iterations {
-        let mut routes = Routes::guided(model, log.stop, elites);
+        let mut routes = Routes::guided(model, log.stop, &elites);
         let first = if turning > 0 { turning + 1 } else { 0 };
         (_, reason) = run(model, &mut routes, first..=settings.iterations, log);
     }
@@ -86,16 +94,11 @@ fn finish(model: &Model, reason: StopReason, log: &mut Log) {
     }
 }
 
-/// Improve `route` by steps between two shares of the way, if the scenario asks for polish.
-fn polish(
-    model: &Model,
-    route: &mut Vec<Point3>,
-    (from, to): (f64, f64),
-    log: &mut Log,
-) -> Option<Fitness> {
+/// Improve `route` by `steps`, if the scenario asks for polish.
+fn polish(model: &Model, route: &mut Vec<Point3>, steps: Steps, log: &mut Log) -> Option<Fitness> {
     model.scenario.planner.polish.then(|| {
         let mut polish = Polish::new(model, log.stop);
-        let fitness = polish.descend(route, from, to);
+        let fitness = polish.descend(route, steps);
         log.evaluations += polish.evaluations(route.len() - 2);
         fitness
     })

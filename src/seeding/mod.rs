@@ -10,11 +10,11 @@ mod outline;
 mod steep;
 mod taut;
 
-pub use bound::lower_bound;
+pub use bound::{lower_bound, lower_bound_until};
 pub use obstacles::Obstacles;
 pub use outline::{Outline, OutlineShape};
 pub use steep::steep_ground;
-pub use taut::{Piece, TautString, TautStrings, taut_strings};
+pub use taut::{Piece, TautString, TautStrings, taut_strings, taut_strings_until};
 
 #[cfg(test)]
 mod tests {

@@ -16,7 +16,7 @@ pub(in crate::planner) struct Cartesian<'s> {
 }
 
 /// Numbers of one waypoint.
-const PER_WAYPOINT: usize = 3;
+pub(in crate::planner) const PER_WAYPOINT: usize = 3;
 
 impl<'s> Cartesian<'s> {
     /// The coding of routes of `scenario` with so many free waypoints.
@@ -61,14 +61,16 @@ impl<'s> Cartesian<'s> {
     ) {
         let waypoints = positions[0].len() / PER_WAYPOINT;
         points.clear();
-        points.resize(waypoints + 2, PointRow::splat(self.scenario.start));
-        points[waypoints + 1] = PointRow::splat(self.scenario.target);
-        for (lane, position) in positions.into_iter().enumerate() {
-            let waypoints = position.chunks_exact(PER_WAYPOINT);
-            for (row, waypoint) in points[1..].iter_mut().zip(waypoints) {
-                row.set(lane, Point3::new(waypoint[0], waypoint[1], waypoint[2]));
+        points.push(PointRow::splat(self.scenario.start));
+        for first in (0..PER_WAYPOINT * waypoints).step_by(PER_WAYPOINT) {
+            let mut row = PointRow::splat(Point3::origin());
+            for (lane, position) in positions.iter().enumerate() {
+                let waypoint = &position[first..first + PER_WAYPOINT];
+                (row.x[lane], row.y[lane], row.z[lane]) = (waypoint[0], waypoint[1], waypoint[2]);
             }
+            points.push(row);
         }
+        points.push(PointRow::splat(self.scenario.target));
     }
 
     /// Write the position of `route` into `position`; what the bounds do not hold is cut off.

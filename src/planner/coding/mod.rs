@@ -8,7 +8,7 @@ mod course;
 mod lanes;
 mod spherical;
 
-pub(super) use cartesian::Cartesian;
+pub(super) use cartesian::{Cartesian, PER_WAYPOINT};
 pub(super) use course::Course;
 pub(super) use spherical::Spherical;
 

@@ -3,14 +3,22 @@
 mod lattice;
 
 use super::price::price;
-use super::{Stop, why_stop};
+use super::{Stop, same, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
 use lattice::Lattice;
 
-/// A gain below this share of the cost is none.
-const GAIN: f64 = 1e-6;
+/// How far a descent goes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Steps {
+    /// Greatest step, as a share of the way.
+    pub(super) from: f64,
+    /// Least.
+    pub(super) to: f64,
+    /// A gain below this share of the cost is none.
+    pub(super) gain: f64,
+}
 
 /// Polishes routes of one scenario.
 pub(super) struct Polish<'m, 's> {
@@ -33,8 +41,20 @@ impl<'m, 's> Polish<'m, 's> {
         self.lattice.legs_priced.div_ceil(waypoints as u64 + 1)
     }
 
-    /// Improve `route` by steps that shrink from the share `from` of the way to the share `to`.
-    pub(super) fn descend(&mut self, route: &mut Vec<Point3>, from: f64, to: f64) -> Fitness {
+    /// Improve `route` by `steps` that shrink.
+    pub(super) fn descend(&mut self, route: &mut Vec<Point3>, steps: Steps) -> Fitness {
+        self.descend_unless_known(route, steps, &[])
+            .expect("no route is known")
+    }
+
+    /// As [`Polish::descend`]; `None` as soon as the route has become the same as one of `known` that
+    /// it does not beat.
+    pub(super) fn descend_unless_known(
+        &mut self,
+        route: &mut Vec<Point3>,
+        Steps { from, to, gain }: Steps,
+        known: &[(Fitness, Vec<Point3>)],
+    ) -> Option<Fitness> {
         let scenario = self.model.scenario;
         let way = (scenario.target - scenario.start).norm();
         let mut best = price(self.model, route);
@@ -46,9 +66,15 @@ impl<'m, 's> Polish<'m, 's> {
                 let exact = price(self.model, &trial);
                 if exact.beats(&best) {
                     better = exact.violation < best.violation
-                        || best.cost - exact.cost > GAIN * best.cost;
+                        || best.cost - exact.cost > gain * best.cost;
                     best = exact;
                     *route = trial;
+                    let is_known = |(fitness, other): &(Fitness, Vec<Point3>)| {
+                        !best.beats(fitness) && same(scenario, route, other)
+                    };
+                    if known.iter().any(is_known) {
+                        return None;
+                    }
                 }
             }
             kind += 1;
@@ -58,6 +84,6 @@ impl<'m, 's> Polish<'m, 's> {
                 failed = 0;
             }
         }
-        best
+        Some(best)
     }
 }

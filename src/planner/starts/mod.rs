@@ -8,14 +8,14 @@ mod tangents;
 
 pub(super) use count::{spread, with_waypoints};
 
-use super::polish::Polish;
+use super::polish::{Polish, Steps};
 use super::price::price;
-use super::{Stop, same};
+use super::{Stop, same, why_stop};
 use crate::cost::Model;
 use crate::geometry::{Point2, Point3};
 use crate::optimizer::Fitness;
 use crate::scenario::{Scenario, Seeding, WarmStart};
-use crate::seeding::{Obstacles, Outline, TautString, steep_ground, taut_strings};
+use crate::seeding::{Obstacles, Outline, TautString, steep_ground, taut_strings_until};
 use crate::terrain::Terrain;
 use crate::threat::Threat;
 
@@ -40,8 +40,15 @@ const OVERLAND: usize = 8;
 /// A start this much dearer than the best, as a share, is not worth refining.
 const HOPELESS: f64 = 0.08;
 
-/// Greatest and least step by which a start is pulled into place, as shares of the way.
-const ROUGH_STEPS: (f64, f64) = (0.03, 0.005);
+/// By which a start is pulled into place.
+const ROUGH_STEPS: Steps = Steps {
+    from: 0.03,
+    to: 0.005,
+    gain: 1e-6,
+};
+
+/// A known route is in place but for what has changed; the polish at the end goes on with it.
+const GAIN_OF_KNOWN: f64 = 1e-4;
 
 /// Where a search starts.
 pub(super) struct Starts {
@@ -62,7 +69,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let mut legs_priced = 0;
     let mut shapes: Vec<Vec<Point3>> = known.into_iter().collect();
     if settings.seeding == Seeding::Tangent {
-        shapes.extend(along_strings(model));
+        shapes.extend(along_strings(model, stop));
         // Who brings a route has been over the hills already.
         if !warm {
             let net = roadmap::routes(model, OVERLAND);
@@ -106,30 +113,47 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     Some(starts)
 }
 
-/// Pull the routes that may still win roughly into place. What one that breaks a limit will cost
-/// cannot be told before.
+/// Pull the routes that may still win roughly into place, and leave out those that end up where
+/// another one is. What one that breaks a limit will cost cannot be told before.
 fn refine(
     model: &Model,
-    priced: &mut [(Fitness, Vec<Point3>)],
+    priced: &mut Vec<(Fitness, Vec<Point3>)>,
     hopeless: f64,
     stop: &dyn Stop,
     evaluations: &mut u64,
 ) {
     let mut polish = Polish::new(model, stop);
+    let is_known = hopeless <= 0.0;
+    let steps = Steps {
+        gain: if is_known {
+            GAIN_OF_KNOWN
+        } else {
+            ROUGH_STEPS.gain
+        },
+        ..ROUGH_STEPS
+    };
+    let waypoints = priced.first().map_or(0, |(_, route)| route.len() - 2);
     let mut best = Fitness::WORST;
-    for (fitness, route) in priced.iter_mut() {
-        let dear = fitness.cost > best.cost * (1.0 + hopeless);
+    let mut refined: Vec<(Fitness, Vec<Point3>)> = Vec::new();
+    let mut dear = Vec::new();
+    for (fitness, mut route) in priced.drain(..) {
+        let is_dear = fitness.cost > best.cost * (1.0 + hopeless);
         // With a good route at hand, one that breaks a limit need not be tried either.
-        if best.is_feasible() && dear && (fitness.is_feasible() || hopeless <= 0.0) {
+        if best.is_feasible() && is_dear && (fitness.is_feasible() || is_known) {
+            dear.push((fitness, route));
             continue;
         }
-        *fitness = polish.descend(route, ROUGH_STEPS.0, ROUGH_STEPS.1);
-        if fitness.beats(&best) {
-            best = *fitness;
+        if let Some(fitness) = polish.descend_unless_known(&mut route, steps, &refined) {
+            if fitness.beats(&best) {
+                best = fitness;
+            }
+            refined.push((fitness, route));
         }
     }
-    *evaluations += polish.evaluations(priced.first().map_or(0, |(_, route)| route.len() - 2));
-    priced.sort_by(|one, other| one.0.rank(&other.0));
+    *evaluations += polish.evaluations(waypoints);
+    refined.append(&mut dear);
+    refined.sort_by(|one, other| one.0.rank(&other.0));
+    *priced = refined;
 }
 
 /// Bends of the routes that may still win, at most.
@@ -162,13 +186,14 @@ fn bends(model: &Model, shapes: &[Vec<Point3>]) -> usize {
 
 /// Routes with as few waypoints as each needs, along the taut strings of several scenes: round the
 /// soft zones, round the threats alone, over those that can be overflown, round steep ground.
-fn along_strings(model: &Model) -> Vec<Vec<Point3>> {
+fn along_strings(model: &Model, stop: &dyn Stop) -> Vec<Vec<Point3>> {
     let scenario = model.scenario;
+    let is_over = || why_stop(scenario, stop).is_some();
     let everything = |_: usize, _: &Threat| true;
     let in_the_way = |_: usize, threat: &Threat| !over::passable(scenario, threat);
     let mut shapes = Vec::new();
     let mut follow = |obstacles: &Obstacles| {
-        for string in taut_strings(obstacles, STRINGS).strings {
+        for string in taut_strings_until(obstacles, STRINGS, &is_over).strings {
             shapes.push(along(model, &string));
         }
     };

@@ -42,8 +42,9 @@ pub(super) fn bound(
     prices: &Prices,
     walls: &[Wall],
     radii: &[Option<f64>],
+    stop: &dyn Fn() -> bool,
 ) -> f64 {
-    let (string, _) = length(walls, radii, prices);
+    let (string, _) = length(walls, radii, prices, (f64::INFINITY, stop));
     let level = prices.climbing(string, prices.rise());
     let Terrain::Flat(ground) = scenario.terrain else {
         return level;
@@ -72,6 +73,7 @@ pub(super) fn bound(
         failed: None,
         effort: EFFORT / 2,
         price: 4 + corners + corners * corners / 10,
+        stop,
     });
     level.max(with_legs(legs, prices.fuel * string))
 }
@@ -129,6 +131,7 @@ struct Leg<'a> {
     effort: usize,
     /// What pulling one string takes of it.
     price: usize,
+    stop: &'a dyn Fn() -> bool,
 }
 
 impl Leg<'_> {
@@ -189,7 +192,7 @@ impl Leg<'_> {
 
     /// As `is_dear`, of the legs whose heading is within `half` radians of `heading`.
     fn sector_is_dear(&mut self, length: f64, cost: f64, heading: f64, half: f64) -> bool {
-        if self.effort < self.price {
+        if self.effort < self.price || (self.stop)() {
             return false;
         }
         self.effort -= 1;
@@ -210,7 +213,7 @@ impl Leg<'_> {
         let direct = (self.to - self.from).norm();
         if spread <= COARSEST * direct {
             self.effort -= self.price.min(self.effort);
-            if self.remaining(at, spread) >= needed {
+            if self.is_far(at, spread, needed) {
                 return true;
             }
         }
@@ -273,9 +276,9 @@ impl Leg<'_> {
         discs.sum()
     }
 
-    /// No route from within `spread` of `at` to the other end is shorter, metres, `spread` and what
-    /// its soft zones cost included.
-    fn remaining(&self, at: Point2, spread: f64) -> f64 {
+    /// Whether no route from within `spread` of `at` to the other end is shorter than `needed` metres,
+    /// `spread` and what its soft zones cost included.
+    fn is_far(&self, at: Point2, spread: f64, needed: f64) -> bool {
         let outlines = self.walls.iter().zip(self.radii).map(|(wall, radius)| {
             let mut outline = wall.outline((*radius)?);
             outline.core = 0.0;
@@ -284,6 +287,8 @@ impl Leg<'_> {
             outline.radius = outline.radius.min(distance);
             (distance > 0.0).then_some(outline)
         });
-        shortest(&Obstacles::new(outlines, [at, self.to], None)).0 - self.slack
+        let scene = Obstacles::new(outlines, [at, self.to], None);
+        let enough = needed + self.slack;
+        shortest(&scene, (enough, self.stop)).0 >= enough
     }
 }

@@ -12,7 +12,7 @@ mod wall;
 use std::cell::Cell;
 
 use super::obstacles::Obstacles;
-use super::taut::taut_strings_within;
+use super::taut::{Limits, taut_strings_within};
 use crate::cost::Tolerance;
 use crate::geometry::Point3;
 use crate::scenario::{Quadrature, Scenario};
@@ -74,6 +74,13 @@ impl Prices {
     fn climbing(&self, length: f64, vertical: f64) -> f64 {
         self.fuel * (length * length + vertical * vertical).sqrt()
     }
+
+    /// Length, seen from above, of a way that costs `cost` with the rise of the ends, or a hair more.
+    fn length_of(&self, cost: f64) -> f64 {
+        let slant = cost / self.fuel;
+        let squared = (slant * slant - self.rise() * self.rise()).max(0.0);
+        squared.sqrt() * (1.0 + 1e-9)
+    }
 }
 
 /// The factor 1/5 of Eq. 4.
@@ -83,36 +90,45 @@ const THREAT_SHARE: f64 = 0.2;
 /// where fuel costs nothing. The argument is in docs/BOUND.md.
 #[must_use]
 pub fn lower_bound(scenario: &Scenario) -> f64 {
+    lower_bound_until(scenario, &|| false)
+}
+
+/// As [`lower_bound`]; once `stop` asks for it, what was proven so far.
+#[must_use]
+pub fn lower_bound_until(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
     let prices = Prices::of(scenario);
     let straight = prices.climbing(prices.direct(), prices.rise());
     if prices.fuel <= 0.0 {
         return 0.0;
     }
-    let bound = round_walls(scenario, &prices).max(straight);
+    let bound = round_walls(scenario, &prices, stop).max(straight);
     let bound = if bound.is_finite() { bound } else { straight };
     bound * (1.0 - ROUNDING)
 }
 
 /// The largest cost that can be proven: a route cheaper than it could use only the events that
 /// cost less, and without the others no route is cheaper.
-fn round_walls(scenario: &Scenario, prices: &Prices) -> f64 {
+fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) -> f64 {
     let walls = wall::walls(scenario, prices);
     let Some(events) = event::events(&walls, prices) else {
-        return plain(&walls, prices);
+        return plain(&walls, prices, stop);
     };
     let field = Field {
         scenario,
         prices,
         walls: &walls,
         ways: Cell::new(0),
+        stop,
     };
     // The first level at which the next event costs as much as can be proven without it; beyond
     // it, less can be proven.
     let (mut low, mut high) = (0, events.len());
     let (mut proven, mut level, mut best) = (0.0_f64, 0, 0);
     for _ in 0..MOST_LEVELS {
-        let bound = field.level(&events[..level]);
         let next = cost_of(&events, level);
+        // The string without any event is pulled to its end: it tells which events matter at all.
+        let enough = if level == 0 { f64::INFINITY } else { next };
+        let bound = field.level(&events[..level], enough);
         if bound.min(next) > proven {
             (proven, best) = (bound.min(next), level);
         }
@@ -123,9 +139,13 @@ fn round_walls(scenario: &Scenario, prices: &Prices) -> f64 {
             }
         } else {
             low = level + 1;
-            // No event dearer than what was proven without it need be looked at.
-            let affordable = events.partition_point(|event| event.cost < bound);
-            high = high.min(affordable).max(low);
+            if level == 0 {
+                // No event dearer than what was proven without it need be looked at.
+                high = events.partition_point(|event| event.cost < bound).max(low);
+            }
+        }
+        if stop() {
+            return proven;
         }
         // At the highest level first: there, all that is proven is the bound itself.
         level = if level == 0 {
@@ -158,25 +178,33 @@ fn cost_of(events: &[Event], level: usize) -> f64 {
 }
 
 /// Without widening anything: where there are too many gaps to look at.
-fn plain(walls: &[Wall], prices: &Prices) -> f64 {
+fn plain(walls: &[Wall], prices: &Prices, stop: &dyn Fn() -> bool) -> f64 {
     let radii: Vec<Option<f64>> = walls
         .iter()
         .map(|wall| wall.toll.is_none().then_some(wall.core))
         .collect();
-    prices.climbing(length(walls, &radii, prices).0, prices.rise())
+    let (length, _) = length(walls, &radii, prices, (f64::INFINITY, stop));
+    prices.climbing(length, prices.rise())
 }
 
 /// Length of the string round `walls` widened to `radii` (`None` leaves one out), metres, less what
-/// routes may cut off corners; infinite where there is none. With it, the ways looked at.
-fn length(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> (f64, usize) {
+/// routes may cut off corners; infinite where there is none. Once that is proven to be `enough`, or
+/// `stop` asks for it, what is proven. With it, the ways looked at.
+fn length(
+    walls: &[Wall],
+    radii: &[Option<f64>],
+    prices: &Prices,
+    (enough, stop): (f64, &dyn Fn() -> bool),
+) -> (f64, usize) {
     let outlines = walls.iter().zip(radii);
     let scene = Obstacles::new(
         outlines.map(|(wall, radius)| radius.map(|radius| wall.outline(radius))),
         prices.ends.map(|end| end.xy()),
         None,
     );
-    let (shortest, ways) = shortest(&scene);
-    (shortest - slack(walls, radii, prices), ways)
+    let slack = slack(walls, radii, prices);
+    let (shortest, ways) = shortest(&scene, (enough + slack, stop));
+    (shortest - slack, ways)
 }
 
 fn slack(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> f64 {
@@ -190,9 +218,14 @@ fn slack(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> f64 {
     length * (1.0 + prices.exposure * dearest / prices.fuel)
 }
 
-/// Length that no string in `scene` undercuts, and the ways looked at.
-fn shortest(scene: &Obstacles) -> (f64, usize) {
-    let found = taut_strings_within(scene, 1, MOST_WAYS);
+/// Length that no string in `scene` undercuts, or `enough` of it, and the ways looked at.
+fn shortest(scene: &Obstacles, (enough, stop): (f64, &dyn Fn() -> bool)) -> (f64, usize) {
+    let limits = Limits {
+        most_ways: MOST_WAYS,
+        enough,
+        stop,
+    };
+    let found = taut_strings_within(scene, 1, limits);
     let first = found.strings.first().map(|string| string.length);
     (first.unwrap_or(f64::INFINITY).min(found.beyond), found.ways)
 }
@@ -204,18 +237,21 @@ struct Field<'a> {
     walls: &'a [Wall],
     /// Looked at so far.
     ways: Cell<usize>,
+    stop: &'a dyn Fn() -> bool,
 }
 
 impl Field<'_> {
-    /// What no route undercuts that makes use of `allowed` events at most.
-    fn level(&self, allowed: &[Event]) -> f64 {
+    /// What no route undercuts that makes use of `allowed` events at most; `enough` or more where it
+    /// costs that much.
+    fn level(&self, allowed: &[Event], enough: f64) -> f64 {
+        let length_enough = self.prices.length_of(enough);
         let cost = |radii: &[Option<f64>]| {
-            let (length, ways) = length(self.walls, radii, self.prices);
+            let (length, ways) = length(self.walls, radii, self.prices, (length_enough, self.stop));
             self.ways.set(self.ways.get() + ways);
             self.prices.climbing(length, self.prices.rise())
         };
         let tame = cost(&self.radii(allowed));
-        if allowed.is_empty() || tame.is_infinite() {
+        if allowed.is_empty() || tame >= enough {
             return tame;
         }
         // Either no event happens, or one does: then its price comes on top, but what it is made
@@ -233,7 +269,8 @@ impl Field<'_> {
 
     /// As `level`, by the legs that begin at the start and end at the target.
     fn steep(&self, allowed: &[Event]) -> f64 {
-        ends::bound(self.scenario, self.prices, self.walls, &self.radii(allowed))
+        let radii = self.radii(allowed);
+        ends::bound(self.scenario, self.prices, self.walls, &radii, self.stop)
     }
 
     /// How far each wall may be widened so that it counts as hard whatever `allowed` events happen.

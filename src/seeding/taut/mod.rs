@@ -58,7 +58,7 @@ pub struct TautStrings {
     pub ways: usize,
 }
 
-/// Ways looked at before the search gives up.
+/// Ways looked at before a search gives up.
 const MOST_WAYS: usize = 2_000_000;
 
 /// Strings nearer than this share of their length everywhere are one.
@@ -67,16 +67,41 @@ const SAME: f64 = 1e-7;
 /// The `k` shortest taut strings between the ends of `obstacles`.
 #[must_use]
 pub fn taut_strings(obstacles: &Obstacles, k: usize) -> TautStrings {
-    taut_strings_within(obstacles, k, MOST_WAYS)
+    taut_strings_within(obstacles, k, Limits::NONE)
 }
 
-/// As [`taut_strings`], with so many ways looked at at most.
-pub(super) fn taut_strings_within(
-    obstacles: &Obstacles,
-    k: usize,
-    most_ways: usize,
-) -> TautStrings {
-    Search::new(obstacles, k, most_ways).run()
+/// As [`taut_strings`]; once `stop` asks for it, with what was found so far.
+pub fn taut_strings_until(obstacles: &Obstacles, k: usize, stop: &dyn Fn() -> bool) -> TautStrings {
+    let limits = Limits {
+        stop,
+        ..Limits::NONE
+    };
+    taut_strings_within(obstacles, k, limits)
+}
+
+/// When a search for strings ends before it has found what it looks for. What it has proven of those
+/// that it has not found holds all the same.
+#[derive(Clone, Copy)]
+pub(super) struct Limits<'s> {
+    /// Ways looked at.
+    pub(super) most_ways: usize,
+    /// No string shorter than this, metres, is left to find.
+    pub(super) enough: f64,
+    /// Asked now and then.
+    pub(super) stop: &'s dyn Fn() -> bool,
+}
+
+impl Limits<'_> {
+    const NONE: Limits<'static> = Limits {
+        most_ways: MOST_WAYS,
+        enough: f64::INFINITY,
+        stop: &|| false,
+    };
+}
+
+/// As [`taut_strings`], within `limits`.
+pub(super) fn taut_strings_within(obstacles: &Obstacles, k: usize, limits: Limits) -> TautStrings {
+    Search::new(obstacles, k, limits).run()
 }
 
 impl TautString {

@@ -5,10 +5,11 @@
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BinaryHeap, HashMap};
+use std::hash::{BuildHasherDefault, Hasher};
 
 use super::super::arc::{Arc, Rounding, Sense, Tangent, crossing, tangent};
 use super::super::obstacles::{Corner, Obstacles};
-use super::{Piece, TautString, TautStrings, same};
+use super::{Limits, Piece, TautString, TautStrings, same};
 use crate::geometry::Point2;
 
 /// With so many corners or fewer, all take part from the beginning when several strings are wanted.
@@ -20,6 +21,12 @@ const LOOKS_PER_WAY: usize = 16;
 /// Strings that are longer by more than this share of the way are looked at only when no shorter
 /// one is left; the share doubles with each look.
 const FIRST_REACH: f64 = 0.002;
+
+/// The same with few corners, of which each look costs little.
+const FIRST_REACH_OF_FEW: f64 = 0.02;
+
+/// So many ways are looked at between two questions whether to stop.
+const WAYS_UNWATCHED: usize = 1_000;
 
 /// An arrival at a corner: the string so far.
 struct Step {
@@ -78,30 +85,33 @@ pub(super) struct Search<'o> {
     steps: Vec<Step>,
     open: BinaryHeap<Reverse<Way>>,
     ways: usize,
-    most_ways: usize,
+    limits: Limits<'o>,
+    /// Ways at which it is next asked whether to stop.
+    next_look: usize,
     /// Corners that take part, and by outline whether its corners do.
     active: Vec<usize>,
     is_active: Vec<bool>,
     /// What is in the way of the straight part between two places; looked up, never walked through.
-    blocked: HashMap<(Place, Place), Option<usize>>,
+    blocked: HashMap<(Place, Place), Option<usize>, BuildHasherDefault<Mix>>,
     /// Arrivals at each place.
-    arrivals: HashMap<Place, Vec<usize>>,
+    arrivals: HashMap<Place, Vec<usize>, BuildHasherDefault<Mix>>,
     strings: Vec<TautString>,
 }
 
 impl<'o> Search<'o> {
-    pub(super) fn new(obstacles: &'o Obstacles, k: usize, most_ways: usize) -> Self {
+    pub(super) fn new(obstacles: &'o Obstacles, k: usize, limits: Limits<'o>) -> Self {
         let mut search = Self {
             obstacles,
             k,
             steps: Vec::new(),
             open: BinaryHeap::new(),
             ways: 0,
-            most_ways,
+            limits,
+            next_look: WAYS_UNWATCHED,
             active: Vec::new(),
             is_active: vec![false; obstacles.corners_of.len()],
-            blocked: HashMap::new(),
-            arrivals: HashMap::new(),
+            blocked: HashMap::default(),
+            arrivals: HashMap::default(),
             strings: Vec::new(),
         };
         if k > 1 && obstacles.corners.len() <= FEW_CORNERS {
@@ -112,11 +122,11 @@ impl<'o> Search<'o> {
         search
     }
 
-    /// Until there are enough, or too many ways were looked at.
+    /// Until there are enough, or a limit is met.
     pub(super) fn run(mut self) -> TautStrings {
         let mut beyond = f64::INFINITY;
         while let Some(Reverse(way)) = self.open.pop() {
-            if self.strings.len() >= self.k || self.ways > self.most_ways {
+            if self.strings.len() >= self.k || way.least >= self.limits.enough || self.must_end() {
                 beyond = way.least;
                 break;
             }
@@ -133,6 +143,17 @@ impl<'o> Search<'o> {
             beyond,
             ways: self.ways,
         }
+    }
+
+    /// Whether too many ways were looked at, or somebody wants it to end.
+    fn must_end(&mut self) -> bool {
+        if self.ways >= self.next_look {
+            self.next_look = self.ways + WAYS_UNWATCHED;
+            if (self.limits.stop)() {
+                return true;
+            }
+        }
+        self.ways > self.limits.most_ways
     }
 
     fn rounding(&self, place: Place) -> Rounding {
@@ -159,11 +180,11 @@ impl<'o> Search<'o> {
         }
     }
 
-    /// The arc along the circle of `step` and the straight part to `to`, where geometry allows.
-    fn leave(&self, step: &Step, to: Place) -> Option<(Arc, Tangent)> {
-        let on = self.rounding(step.place);
-        let straight = tangent(&on, &self.rounding(to))?;
-        for place in [step.place, to] {
+    /// The straight part from the circle of one place to that of the next, where a string can bend so at
+    /// both.
+    fn straight(&self, from: Place, to: Place) -> Option<Tangent> {
+        let straight = tangent(&self.rounding(from), &self.rounding(to))?;
+        for place in [from, to] {
             if let (Some(corner), Place::Corner(_, left)) = (self.corner(place), place)
                 && let Some(edges) = corner.edges
             {
@@ -177,17 +198,23 @@ impl<'o> Search<'o> {
                 }
             }
         }
+        Some(straight)
+    }
+
+    /// The part along the circle of `step` up to `straight`, where a string can go on so.
+    fn arc(&self, step: &Step, straight: &Tangent) -> Option<Arc> {
+        let on = self.rounding(step.place);
         let arc = match &step.before {
             None => {
-                let away = outward(&on, &straight);
+                let away = outward(&on, straight);
                 Arc::new(on, away, away)
             }
-            Some((_, _, before)) => Arc::new(on, outward(&on, before), outward(&on, &straight)),
+            Some((_, _, before)) => Arc::new(on, outward(&on, before), outward(&on, straight)),
         };
         // Nor does a string turn back at the corner of a ring.
         let turns_back = self.corner(step.place).is_some_and(|c| c.edges.is_some())
             && arc.turn > std::f64::consts::PI + 1e-9;
-        (!turns_back).then_some((arc, straight))
+        (!turns_back).then_some(arc)
     }
 
     fn add_step(
@@ -198,7 +225,12 @@ impl<'o> Search<'o> {
         at: Point2,
     ) {
         let [start, target] = self.obstacles.ends;
-        let growth = FIRST_REACH * (target - start).norm();
+        let share = if self.active.len() <= FEW_CORNERS {
+            FIRST_REACH_OF_FEW
+        } else {
+            FIRST_REACH
+        };
+        let growth = share * (target - start).norm();
         self.steps.push(Step {
             place,
             before,
@@ -239,15 +271,21 @@ impl<'o> Search<'o> {
     /// than the step's reach.
     fn push(&mut self, step: usize, to: Place, known: f64) {
         let reach = self.steps[step].reach;
-        let Some((arc, straight)) = self.leave(&self.steps[step], to) else {
+        let here = &self.steps[step];
+        let Some(straight) = self.straight(here.place, to) else {
             return;
         };
-        let length = self.steps[step].length + arc.length() + straight.length;
         let remaining = match to {
             Place::Target => 0.0,
             _ => (self.obstacles.ends[1] - straight.to).norm(),
         };
-        let least = length + remaining;
+        if here.length + straight.length + remaining > reach {
+            return;
+        }
+        let Some(arc) = self.arc(here, &straight) else {
+            return;
+        };
+        let least = here.length + arc.length() + straight.length + remaining;
         if least > known && least <= reach {
             self.ways += 1;
             self.open.push(Reverse(Way {
@@ -281,7 +319,10 @@ impl<'o> Search<'o> {
     fn follow(&mut self, way: &Way) {
         self.ways += 1;
         let from = &self.steps[way.step];
-        let Some((arc, straight)) = self.leave(from, way.to) else {
+        let Some(straight) = self.straight(from.place, way.to) else {
+            return;
+        };
+        let Some(arc) = self.arc(from, &straight) else {
             return;
         };
         if self.k > 1 && self.crosses_itself(way, &straight) {
@@ -413,4 +454,36 @@ impl<'o> Search<'o> {
 /// From the centre of the circle to where the tangent touches it.
 fn outward(on: &Rounding, tangent: &Tangent) -> nalgebra::Vector2<f64> {
     nalgebra::Vector2::new(tangent.along.y, -tangent.along.x) * on.sense.sign()
+}
+
+/// Mixes the few whole numbers that a [`Place`] is made of; nobody picks them to collide.
+#[derive(Default)]
+struct Mix(u64);
+
+impl Mix {
+    fn add(&mut self, value: u64) {
+        // The fractional part of the golden ratio: its multiples spread evenly.
+        self.0 = (self.0.rotate_left(23) ^ value).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+}
+
+impl Hasher for Mix {
+    fn write(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.add(u64::from(*byte));
+        }
+    }
+
+    fn write_u8(&mut self, value: u8) {
+        self.add(u64::from(value));
+    }
+
+    fn write_usize(&mut self, value: usize) {
+        self.add(value as u64);
+    }
+
+    fn finish(&self) -> u64 {
+        // Tables look at the low bits first, which a product fills last.
+        self.0 ^ (self.0 >> 32)
+    }
 }

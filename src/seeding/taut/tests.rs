@@ -284,7 +284,18 @@ proptest! {
         let brute = sampled(&free, ends);
         if let Some(&found) = found.first() {
             prop_assert!(found <= brute + 1e-6, "{found} {brute}");
-            prop_assert!(brute - found < 0.02 * found || brute.is_infinite(), "{found} {brute}");
+            // The sampled circles lie a little outside of the discs and close the narrowest gaps.
+            let is_narrow = |(i, (x, y, r)): (usize, &(f64, f64, f64))| {
+                free[..i].iter().any(|(u, v, s)| {
+                    let gap = ((x - u) * (x - u) + (y - v) * (y - v)).sqrt() - r - s;
+                    (0.0..0.2).contains(&gap)
+                })
+            };
+            let closed = free.iter().enumerate().any(is_narrow);
+            prop_assert!(
+                brute - found < 0.02 * found || brute.is_infinite() || closed,
+                "{found} {brute}"
+            );
         } else {
             prop_assert!(brute.is_infinite(), "{brute}");
         }

@@ -1,6 +1,6 @@
 //! What the operator sets, as plain structs that are handed down in parts.
 //!
-//! A setting is a field here with its default, and a row in [`settings`]; its flag, its variable and
+//! A setting is a field here with its default, and a row in `settings`; its flag, its variable and
 //! its key in the file follow from the row. Where several give it, the flag counts, then the
 //! variable, then the file. Deliberately absent: what a setting does.
 

@@ -1,7 +1,7 @@
 //! Who asks, and whether they may.
 //!
 //! One gate before each route that is not for everybody: it takes the caller's key or ticket, and
-//! leaves a [`Caller`] in the request. Whose plan is whose is decided there and in the store, not
+//! leaves a `Caller` in the request. Whose plan is whose is decided there and in the store, not
 //! here. Deliberately absent: names of people, passwords, sessions, any key in readable form.
 
 mod fresh;

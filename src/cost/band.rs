@@ -113,6 +113,18 @@ impl Model<'_> {
         self.zones.sections(leg, band.min, band.max, each);
     }
 
+    /// The whole of a leg that meets no terminal zone.
+    pub(super) fn outside(&self) -> Section {
+        let band = self.scenario.altitude;
+        Section {
+            t0: 0.0,
+            t1: 1.0,
+            terminal: false,
+            floor: band.min,
+            ceiling: band.max,
+        }
+    }
+
     /// Least and greatest height above ground of `leg` outside the terminal zones; `None` when it
     /// never leaves them.
     #[must_use]
@@ -130,60 +142,60 @@ impl Model<'_> {
         range
     }
 
-    /// How far a leg leaves the band and dips below the ground at some points, as many as `samples`,
-    /// metres: no more than by [`Model::heights`].
-    pub(super) fn sampled_heights(&self, leg: &Segment, samples: usize) -> f64 {
-        let (mut underground, mut off_band) = (0.0_f64, 0.0_f64);
-        let step = 1.0 / samples as f64;
-        self.sections(leg, |section| {
-            let mut t = ((section.t0 / step - 0.5).ceil() + 0.5) * step;
-            while t < section.t1 {
-                let point = leg.at(t);
-                let height = point.z - self.scenario.terrain.elevation(point.xy());
-                let below = section.floor - height;
-                off_band = off_band.max(height - section.ceiling);
-                if section.terminal {
-                    underground = underground.max(below);
-                } else {
-                    off_band = off_band.max(below);
-                    underground = underground.max(-height);
-                }
-                t += step;
-            }
-        });
-        off_band + underground
-    }
-
-    /// Report a leg that leaves the band or meets the ground, by how much to within the share
-    /// `rough` of it.
+    /// Report a leg that leaves the band or meets the ground.
     pub(super) fn heights(
         &self,
         leg_idx: usize,
         leg: &Segment,
         tolerance: Tolerance,
-        rough: f64,
         report: &mut impl FnMut(Breach),
     ) {
-        let (mut underground, mut off_band) = (0.0_f64, 0.0_f64);
+        let mut excess = Excess::default();
         self.sections(leg, |section| {
             let window = (section.t0, section.t1);
-            let (below, above) =
-                self.scenario
-                    .terrain
-                    .excess(leg, window, section.floor, section.ceiling, rough);
-            off_band = off_band.max(above);
-            if section.terminal {
-                underground = underground.max(below);
-            } else {
-                off_band = off_band.max(below);
-                underground = underground.max(below - section.floor);
-            }
+            let terrain = &self.scenario.terrain;
+            let beyond = terrain.excess(leg, window, section.floor, section.ceiling);
+            excess.join(section.terminal, section.floor, beyond);
         });
-        if off_band > tolerance.height_m {
-            report(Breach::on_leg(Constraint::Altitude, leg_idx, off_band));
+        if excess.off_band > tolerance.height_m {
+            let amount = excess.off_band;
+            report(Breach::on_leg(Constraint::Altitude, leg_idx, amount));
         }
-        if underground > tolerance.height_m {
-            report(Breach::on_leg(Constraint::Terrain, leg_idx, underground));
+        if excess.underground > tolerance.height_m {
+            let amount = excess.underground;
+            report(Breach::on_leg(Constraint::Terrain, leg_idx, amount));
         }
+    }
+}
+
+/// How far a leg leaves the band and dips below the ground, metres, each >= 0.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Excess {
+    off_band: f64,
+    underground: f64,
+}
+
+impl Excess {
+    /// Note a part of the leg that reaches `below` its floor and `above` its ceiling.
+    pub(super) fn join(&mut self, terminal: bool, floor: f64, (below, above): (f64, f64)) {
+        self.off_band = self.off_band.max(above);
+        if terminal {
+            self.underground = self.underground.max(below);
+        } else {
+            self.off_band = self.off_band.max(below);
+            self.underground = self.underground.max(below - floor);
+        }
+    }
+
+    /// The sum of what [`Model::heights`] reports.
+    pub(super) fn violation(self, tolerance: Tolerance) -> f64 {
+        let counted = |amount: f64| {
+            if amount > tolerance.height_m {
+                amount
+            } else {
+                0.0
+            }
+        };
+        counted(self.off_band) + counted(self.underground)
     }
 }

@@ -81,7 +81,7 @@ impl<'s> Model<'s> {
             let turn = turns.next().expect("one turn a leg");
             length += leg.length();
             exposure += self.threats(leg_idx, &leg, &nearby, quadrature, tolerance, &mut report);
-            self.heights(leg_idx, &leg, tolerance, 0.0, &mut report);
+            self.heights(leg_idx, &leg, tolerance, &mut report);
             self.manoeuvres(leg_idx, &leg, turn, tolerance, &mut report);
         }
         let free = &route[1..route.len() - 1];
@@ -118,7 +118,7 @@ impl<'s> Model<'s> {
         let mut violation = 0.0;
         let mut report = |breach: Breach| violation += breach.amount;
         let exposure = self.threats(0, &leg, &nearby, quadrature, tolerance, &mut report);
-        self.heights(0, &leg, tolerance, 0.0, &mut report);
+        self.heights(0, &leg, tolerance, &mut report);
         self.manoeuvres(0, &leg, 0.0, tolerance, &mut report);
         let weights = &self.scenario.weights;
         let fuel = weights.fuel * fuel::fuel(&self.scenario.vehicle, leg.length());

@@ -54,8 +54,9 @@ impl Quadratic {
     pub fn extremes(&self, t0: f64, t1: f64) -> (f64, f64) {
         let (v0, v1) = (self.at(t0), self.at(t1));
         let (mut least, mut greatest) = (v0.min(v1), v0.max(v1));
-        let vertex = -self.b / (2.0 * self.a);
-        if vertex > t0 && vertex < t1 {
+        // Where the slope changes its sign.
+        if (2.0 * self.a * t0 + self.b) * (2.0 * self.a * t1 + self.b) < 0.0 {
+            let vertex = -self.b / (2.0 * self.a);
             let value = self.at(vertex);
             least = least.min(value);
             greatest = greatest.max(value);

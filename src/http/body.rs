@@ -1,12 +1,15 @@
-//! A JSON body: the right media type, not too long, not too slow.
+//! A JSON body: the right media type, plain or gzip, not too long either way, not too slow.
+
+use std::io::Read as _;
 
 use axum::body::Body;
 use axum::http::{HeaderMap, header};
 use bytes::Bytes;
+use flate2::read::MultiGzDecoder;
 use http_body_util::{BodyExt, LengthLimitError, Limited};
 
-use super::AppState;
 use super::problem::Problem;
+use super::{AppState, off_thread};
 
 /// The whole body.
 pub(super) async fn read_json(
@@ -21,32 +24,63 @@ pub(super) async fn read_json(
             String::from_utf8_lossy(value.as_bytes()).into_owned()
         })));
     }
-    if let Some(coding) = coding(headers) {
-        return Err(Problem::UnsupportedCoding(coding));
-    }
+    let coding = Coding::of(headers)?;
     if announced_length(headers).is_some_and(|length| length > limit as u64) {
         return Err(Problem::BodyTooLarge(limit));
     }
-    match tokio::time::timeout(timeout, Limited::new(body, limit).collect()).await {
-        Ok(Ok(collected)) => Ok(collected.to_bytes()),
-        Ok(Err(error)) if error.is::<LengthLimitError>() => Err(Problem::BodyTooLarge(limit)),
+    let sent = match tokio::time::timeout(timeout, Limited::new(body, limit).collect()).await {
+        Ok(Ok(collected)) => collected.to_bytes(),
+        Ok(Err(error)) if error.is::<LengthLimitError>() => {
+            return Err(Problem::BodyTooLarge(limit));
+        }
         Ok(Err(error)) => {
             tracing::debug!(%error, "a body broke off");
-            Err(Problem::BodyIncomplete)
+            return Err(Problem::BodyIncomplete);
         }
-        Err(_) => Err(Problem::BodyTooSlow(timeout)),
+        Err(_) => return Err(Problem::BodyTooSlow(timeout)),
+    };
+    match coding {
+        Coding::Plain => Ok(sent),
+        Coding::Gzip => off_thread::run(move || unpack(&sent, limit)).await?,
     }
 }
 
-/// How the body is coded, when it is.
-fn coding(headers: &HeaderMap) -> Option<String> {
-    let coding = headers
-        .get_all(header::CONTENT_ENCODING)
-        .iter()
-        .map(|value| String::from_utf8_lossy(value.as_bytes()).trim().to_owned());
-    coding
-        .filter(|coding| !coding.is_empty() && !coding.eq_ignore_ascii_case("identity"))
-        .reduce(|all, one| format!("{all}, {one}"))
+/// What a gzip body unpacks to; it is given up as soon as that is longer than a body may be.
+fn unpack(packed: &[u8], limit: usize) -> Result<Bytes, Problem> {
+    let mut plain = Vec::new();
+    MultiGzDecoder::new(packed)
+        .take(limit as u64 + 1)
+        .read_to_end(&mut plain)
+        .map_err(|error| Problem::BodyNotGzip(error.to_string()))?;
+    if plain.len() > limit {
+        return Err(Problem::BodyTooLarge(limit));
+    }
+    Ok(plain.into())
+}
+
+/// How a body is coded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Coding {
+    Plain,
+    Gzip,
+}
+
+impl Coding {
+    fn of(headers: &HeaderMap) -> Result<Self, Problem> {
+        let codings: Vec<String> = headers
+            .get_all(header::CONTENT_ENCODING)
+            .iter()
+            .map(|value| String::from_utf8_lossy(value.as_bytes()).trim().to_owned())
+            .filter(|coding| !coding.is_empty() && !coding.eq_ignore_ascii_case("identity"))
+            .collect();
+        match codings.as_slice() {
+            [] => Ok(Self::Plain),
+            [only] if ["gzip", "x-gzip"].contains(&only.to_ascii_lowercase().as_str()) => {
+                Ok(Self::Gzip)
+            }
+            _ => Err(Problem::UnsupportedCoding(codings.join(", "))),
+        }
+    }
 }
 
 fn announced_length(headers: &HeaderMap) -> Option<u64> {
@@ -84,18 +118,53 @@ mod tests {
     #[test]
     fn tells_a_coded_body() {
         for (values, expected) in [
-            (&["gzip"][..], Some("gzip")),
-            (&["Identity"], None),
-            (&[""], None),
-            (&[], None),
-            (&["br", "identity", "zstd"], Some("br, zstd")),
+            (&["gzip"][..], Ok(Coding::Gzip)),
+            (&["X-Gzip"], Ok(Coding::Gzip)),
+            (&["Identity"], Ok(Coding::Plain)),
+            (&[""], Ok(Coding::Plain)),
+            (&[], Ok(Coding::Plain)),
+            (&["br", "identity", "zstd"], Err("br, zstd")),
+            (&["gzip", "gzip"], Err("gzip, gzip")),
         ] {
             let mut headers = HeaderMap::new();
             for value in values {
                 headers.append(header::CONTENT_ENCODING, HeaderValue::from_static(value));
             }
-            assert_eq!(coding(&headers).as_deref(), expected, "{values:?}");
+            let coding = Coding::of(&headers).map_err(|problem| match problem {
+                Problem::UnsupportedCoding(codings) => codings,
+                other => format!("{other:?}"),
+            });
+            assert_eq!(coding, expected.map_err(ToOwned::to_owned), "{values:?}");
         }
+    }
+
+    fn packed(plain: &[u8]) -> Vec<u8> {
+        let mut packed = Vec::new();
+        flate2::read::GzEncoder::new(plain, flate2::Compression::best())
+            .read_to_end(&mut packed)
+            .expect("reading from memory");
+        packed
+    }
+
+    #[test]
+    fn unpacks_as_much_as_a_body_may_have() {
+        let check = |packed: &[u8], expected: Result<&[u8], &str>| {
+            let unpacked = unpack(packed, 1000).map_err(|problem| match problem {
+                Problem::BodyTooLarge(1000) => "too large",
+                Problem::BodyNotGzip(_) => "not gzip",
+                _ => "another problem",
+            });
+            assert_eq!(unpacked.as_deref(), expected.as_deref());
+        };
+        check(&packed(b"{}"), Ok(b"{}"));
+        check(&packed(&[b' '; 1000]), Ok(&[b' '; 1000]));
+        check(&packed(&[b' '; 1001]), Err("too large"));
+        check(&packed(&vec![0; 100_000_000]), Err("too large"));
+        let members = [packed(b"{"), packed(b"}")].concat();
+        check(&members, Ok(b"{}"));
+        check(&packed(b"{}")[..10], Err("not gzip"));
+        check(b"{}", Err("not gzip"));
+        check(b"", Err("not gzip"));
     }
 
     #[test]

@@ -41,6 +41,8 @@ use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::{self, MethodRouter};
 use tokio::sync::watch;
 use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::compression::CompressionLayer;
+use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
 
 pub use browser::Origins;
 pub use idempotency::InFlight;
@@ -140,10 +142,19 @@ pub fn router(state: AppState) -> Router {
     wrap(router, &cors, state.instruments)
 }
 
+/// Streams are not: what is told must leave at once.
+fn worth_compressing() -> impl Predicate {
+    let plain = NotForContentType::const_new;
+    SizeAbove::new(1024)
+        .and(plain("text/event-stream"))
+        .and(plain("application/x-ndjson"))
+}
+
 /// What goes round every handler.
 fn wrap(router: Router, cors: &Origins, instruments: Arc<Instruments>) -> Router {
     router
         .layer(from_fn(auth::refuse_keys_in_urls))
+        .layer(CompressionLayer::new().compress_when(worth_compressing()))
         .layer(CatchPanicLayer::custom(problem::after_panic))
         .layer(cors.layer())
         .layer(from_fn_with_state(instruments, request_id::assign))

@@ -46,6 +46,8 @@ pub(super) enum Problem {
     BodyTooSlow(Duration),
     /// The body broke off.
     BodyIncomplete,
+    /// The body is said to be gzip and is not; what the reader met.
+    BodyNotGzip(String),
     /// The body is not JSON.
     InvalidJson {
         /// From 1.
@@ -143,6 +145,11 @@ impl Problem {
                 StatusCode::BAD_REQUEST,
                 "incomplete-body",
                 "The body broke off",
+            ),
+            Self::BodyNotGzip(_) => (
+                StatusCode::BAD_REQUEST,
+                "invalid-gzip",
+                "The body is not gzip",
             ),
             Self::InvalidParameter { .. } => (
                 StatusCode::BAD_REQUEST,
@@ -265,6 +272,7 @@ impl Problem {
                 format!("line {line}, column {column}, at {pointer}: {detail}")
             }
             Self::BodyIncomplete => "the connection ended before the body did".to_owned(),
+            Self::BodyNotGzip(detail) => format!("content-encoding is gzip, but: {detail}"),
             Self::InvalidParameter { detail, .. } => detail.clone(),
             Self::KeyInUrl => {
                 "URLs are written down on their way: send the key as Authorization: Bearer, and replace this one".to_owned()
@@ -326,7 +334,7 @@ impl Problem {
             }
             Self::UnsupportedMediaType(found) => unsupported_media_type(found.as_deref()),
             Self::UnsupportedCoding(found) => {
-                format!("content-encoding is {found}; send the body as it is")
+                format!("content-encoding is {found}; send the body as it is, or as gzip")
             }
             Self::InvalidScenario(faults) if faults.len() == 1 => "1 fault; see errors".to_owned(),
             Self::InvalidScenario(faults) => format!("{} faults; see errors", faults.len()),
@@ -469,7 +477,7 @@ impl IntoResponse for Problem {
         if matches!(self, Self::UnsupportedCoding(_)) {
             response.headers_mut().insert(
                 header::ACCEPT_ENCODING,
-                HeaderValue::from_static("identity"),
+                HeaderValue::from_static("gzip, identity"),
             );
         }
         response.extensions_mut().insert(self);

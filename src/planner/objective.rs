@@ -2,7 +2,7 @@
 
 use super::coding::{Cartesian, Coding};
 use super::guide::Guide;
-use super::price::{PRICED_FROM, ROUGH, price};
+use super::price::{PRICED_FROM, price};
 use super::{Stop, why_stop};
 use crate::cost::Model;
 use crate::cost::batch::{LANES, PointRow, Pricer};
@@ -65,7 +65,7 @@ impl<'s> Routes<'s> {
         Self {
             coding,
             guide,
-            pricer: Pricer::new(model, quadrature, tolerance).roughly(ROUGH),
+            pricer: Pricer::new(model, quadrature, tolerance),
             model: model.clone(),
             route: Vec::new(),
             points: Vec::new(),

@@ -8,9 +8,6 @@ use crate::optimizer::Fitness;
 /// others' rounding too.
 pub(super) const PRICED_FROM: f64 = 0.5;
 
-/// By what share of itself a search may misjudge how far a route leaves the band.
-pub(super) const ROUGH: f64 = 0.1;
-
 /// The fitness of `route`, which may be a part of one: its ends are not free waypoints.
 pub(super) fn price(model: &Model, route: &[Point3]) -> Fitness {
     let mut violation = 0.0;

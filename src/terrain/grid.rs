@@ -54,6 +54,10 @@ impl Grid {
         let (x0, y0) = self.in_cells(leg.a.xy());
         let (x1, y1) = self.in_cells(leg.b.xy());
         let (columns, rows) = ((self.columns - 1) as f64, (self.rows - 1) as f64);
+        let inside = |x: f64, y: f64| 0.0 <= x && x <= columns && 0.0 <= y && y <= rows;
+        if inside(x0, y0) && inside(x1, y1) {
+            return self.height_range_straight(leg, (t0, t1));
+        }
         // Beyond an edge its elevation goes on, so that the way over the ground bends there.
         let mut bends = [
             share_of_way(x0, x1, 0.0),
@@ -79,19 +83,29 @@ impl Grid {
         let (from, to) = (leg.at(t0), leg.at(t1));
         let (x0, y0) = self.onto_grid(self.in_cells(from.xy()));
         let (x1, y1) = self.onto_grid(self.in_cells(to.xy()));
+        let mut column = Walk::new(x0, x1, self.columns);
+        let mut row = Walk::new(y0, y1, self.rows);
         let mut range = HeightRange::EMPTY;
         let mut u = 0.0;
         // u runs from 0 to 1 over the window; each cell ends at the next grid line in either direction.
-        while u < 1.0 || range == HeightRange::EMPTY {
-            let next = next_line(x0, x1, u).min(next_line(y0, y1, u)).min(1.0);
-            let middle = 0.5 * (u + next);
-            let patch = self.patch(x0 + (x1 - x0) * middle, y0 + (y1 - y0) * middle);
-            let height = patch.height_below((x0, y0), (x1, y1), (from.z, to.z));
-            let (min, max) = height.extremes(u, next);
-            range = range.join(HeightRange { min, max });
-            u = next;
+        loop {
+            let next = column.leave.min(row.leave).min(1.0);
+            if next > u || (next >= 1.0 && range == HeightRange::EMPTY) {
+                let patch = self.patch_at(column.cell, row.cell);
+                let height = patch.height_below((x0, y0), (x1, y1), (from.z, to.z));
+                let (min, max) = height.extremes(u, next);
+                range = range.join(HeightRange { min, max });
+                u = next;
+            }
+            if next >= 1.0 {
+                return range;
+            }
+            if column.leave <= row.leave {
+                column.step();
+            } else {
+                row.step();
+            }
         }
-        range
     }
 
     /// `point` in cells from the first node.
@@ -112,8 +126,13 @@ impl Grid {
         reason = "both coordinates lie on the grid, between 0 and the number of nodes"
     )]
     fn patch(&self, x: f64, y: f64) -> Patch {
-        let column = (x as usize).min(self.columns - 2);
-        let row = (y as usize).min(self.rows - 2);
+        self.patch_at(
+            (x as usize).min(self.columns - 2),
+            (y as usize).min(self.rows - 2),
+        )
+    }
+
+    fn patch_at(&self, column: usize, row: usize) -> Patch {
         let south = row * self.columns + column;
         let north = south + self.columns;
         let z = &self.elevations;
@@ -134,25 +153,64 @@ fn share_of_way(a: f64, b: f64, value: f64) -> f64 {
     if t.is_nan() { f64::INFINITY } else { t }
 }
 
-/// The least `u` beyond `from` at which `a + (b - a) u` is a whole number; infinite when never.
-fn next_line(a: f64, b: f64, from: f64) -> f64 {
-    let way = b - a;
-    if way == 0.0 {
-        return f64::INFINITY;
+/// The columns, or the rows, that a way from `a` to `b` crosses.
+struct Walk {
+    /// The one where it is.
+    cell: usize,
+    /// The share of the way at which it leaves this for the next; infinite when never.
+    leave: f64,
+    a: f64,
+    /// 1 over the way.
+    inverse: f64,
+    last: usize,
+}
+
+impl Walk {
+    /// Over so many nodes, both ends among them.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the way lies on the grid, between 0 and the number of nodes"
+    )]
+    fn new(a: f64, b: f64, nodes: usize) -> Self {
+        let last = nodes - 2;
+        let cell = (a as usize).min(last);
+        // On a line, a way down begins in the cell before it.
+        let before = b < a && cell > 0 && a <= cell as f64;
+        let mut walk = Self {
+            cell: if before { cell - 1 } else { cell },
+            leave: f64::INFINITY,
+            a,
+            inverse: 1.0 / (b - a),
+            last,
+        };
+        walk.look();
+        walk
     }
-    let here = a + way * from;
-    let mut line = if way > 0.0 {
-        here.floor() + 1.0
-    } else {
-        here.ceil() - 1.0
-    };
-    loop {
-        let u = (line - a) / way;
-        // Rounding may find the line on which the leg already stands.
-        if u > from {
-            return u;
+
+    /// Into the next.
+    fn step(&mut self) {
+        if self.inverse > 0.0 {
+            self.cell += 1;
+        } else {
+            self.cell -= 1;
         }
-        line += way.signum();
+        self.look();
+    }
+
+    /// Where the cell ends; the first and the last have no end.
+    fn look(&mut self) {
+        let line = if self.inverse > 0.0 {
+            self.cell + 1
+        } else {
+            self.cell
+        };
+        let open = self.inverse.is_finite() && 0 < line && line <= self.last;
+        self.leave = if open {
+            (line as f64 - self.a) * self.inverse
+        } else {
+            f64::INFINITY
+        };
     }
 }
 

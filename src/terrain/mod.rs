@@ -8,6 +8,7 @@ mod peaks;
 
 pub use flat::Flat;
 pub use grid::Grid;
+pub(crate) use peaks::NEGLIGIBLE;
 pub use peaks::{Peak, Peaks};
 
 use crate::geometry::{Point2, Rect, Segment};
@@ -39,6 +40,15 @@ impl HeightRange {
         max: f64::NEG_INFINITY,
     };
 
+    /// Of one height alone.
+    #[must_use]
+    pub fn of(height: f64) -> Self {
+        Self {
+            min: height,
+            max: height,
+        }
+    }
+
     /// The range of both.
     #[must_use]
     pub fn join(self, other: Self) -> Self {
@@ -62,7 +72,7 @@ impl Terrain {
     }
 
     /// Least and greatest height above ground over the part `window` of `leg`: exact on flat
-    /// ground and grids, to a micrometre over peaks.
+    /// ground and grids, to a nanometre over peaks.
     #[must_use]
     pub fn height_range(&self, leg: &Segment, window: (f64, f64)) -> HeightRange {
         match self {
@@ -74,8 +84,7 @@ impl Terrain {
 
     /// How far the part `window` of `leg` dips below `floor` and rises above `ceiling` (heights
     /// above ground), metres, each >= 0. The same as by [`Terrain::height_range`], but cheap where
-    /// the leg keeps well within them. Each may be missed by the share `rough` of itself, which is
-    /// quicker; whether it is 0 may not.
+    /// the leg keeps well within them.
     #[must_use]
     pub fn excess(
         &self,
@@ -83,18 +92,13 @@ impl Terrain {
         window: (f64, f64),
         floor: f64,
         ceiling: f64,
-        rough: f64,
     ) -> (f64, f64) {
+        let band = HeightRange {
+            min: floor,
+            max: ceiling,
+        };
         let range = match self {
-            Self::Peaks(peaks) => peaks.height_range_beyond(
-                leg,
-                window,
-                HeightRange {
-                    min: floor,
-                    max: ceiling,
-                },
-                rough,
-            ),
+            Self::Peaks(peaks) => peaks.height_range_beyond(leg, window, band),
             Self::Flat(_) | Self::Grid(_) => self.height_range(leg, window),
         };
         ((floor - range.min).max(0.0), (range.max - ceiling).max(0.0))

@@ -1,7 +1,8 @@
 //! Analytic mountains.
 //!
-//! Along a leg each peak is a Gaussian of the way flown, whose second derivative is bounded, so
-//! that a leg's least and greatest height above them is found by branch and bound, to a micrometre.
+//! Along a leg each peak is a Gaussian of the way flown. Bounds of its second derivative tell which
+//! parts of a leg may be its lowest or highest; they are halved until they bend one way only, and there
+//! Newton's method finds the extreme, to a nanometre.
 
 use super::HeightRange;
 use crate::geometry::{LEVEL, Point2, Segment};
@@ -27,13 +28,14 @@ pub struct Peak {
 }
 
 /// Extremes are found to this many metres.
-const ACCURACY: f64 = 1e-6;
+const ACCURACY: f64 = 1e-9;
 
-/// How far they reach beyond a band, to this many: a tenth of what heights over peaks may be missed by.
-const BAND_ACCURACY: f64 = 1e-4;
+/// Beyond this exponent a peak no longer lifts the ground: e^-36 of it is lost in the rounding of its
+/// height.
+pub(crate) const NEGLIGIBLE: f64 = 36.0;
 
-/// Beyond this exponent a peak no longer lifts the ground: e^-50 of it is less than 10^-21.
-const NEGLIGIBLE: f64 = 50.0;
+/// Newton's steps after which an extreme is taken as it is; six do nearly always.
+const MOST_STEPS: usize = 60;
 
 /// One peak along a leg: `height * exp(-sharpness * (t - summit)^2)`.
 struct Bump {
@@ -55,59 +57,40 @@ impl Peaks {
     }
 
     pub(super) fn height_range(&self, leg: &Segment, window: (f64, f64)) -> HeightRange {
-        let everything = HeightRange {
-            min: f64::INFINITY,
-            max: f64::NEG_INFINITY,
-        };
-        self.search(leg, window, everything, |_| ACCURACY)
+        self.height_range_beyond(leg, window, HeightRange::EMPTY)
     }
 
-    /// As `height_range`, but only where it reaches beyond `band`, to 0.1 mm, or to the share
-    /// `rough` of how far that is.
+    /// As `height_range`, but only where it reaches beyond `band`: branch and bound until a part
+    /// bends one way only, then Newton's method.
     pub(super) fn height_range_beyond(
-        &self,
-        leg: &Segment,
-        window: (f64, f64),
-        band: HeightRange,
-        rough: f64,
-    ) -> HeightRange {
-        self.search(leg, window, band, |range| {
-            let beyond = (band.min - range.min).max(range.max - band.max);
-            BAND_ACCURACY.max(rough * beyond)
-        })
-    }
-
-    /// Branch and bound for the extremes beyond `band`, as accurate as what is found asks for.
-    fn search(
         &self,
         leg: &Segment,
         (t0, t1): (f64, f64),
         band: HeightRange,
-        accuracy: impl Fn(HeightRange) -> f64,
     ) -> HeightRange {
         let profile = self.profile(leg);
         let (h0, h1) = (profile.at(t0), profile.at(t1));
-        let mut range = HeightRange {
-            min: h0.min(h1),
-            max: h0.max(h1),
-        };
+        let mut range = HeightRange::of(h0).join(HeightRange::of(h1));
         let mut open = vec![(t0, h0, t1, h1)];
         while let Some((t0, h0, t1, h1)) = open.pop() {
-            // A curve keeps within bend * width^2 / 8 of its chord.
-            let slack = profile.bend(t0, t1) * (t1 - t0) * (t1 - t0) / 8.0;
-            let accuracy = accuracy(range);
-            let may_dip = h0.min(h1) - slack < range.min.min(band.min) - accuracy;
-            let may_rise = h0.max(h1) + slack > range.max.max(band.max) + accuracy;
-            if (may_dip || may_rise) && slack > accuracy {
-                let middle = 0.5 * (t0 + t1);
-                let height = profile.at(middle);
-                range = range.join(HeightRange {
-                    min: height,
-                    max: height,
-                });
-                open.push((t0, h0, middle, height));
-                open.push((middle, height, t1, h1));
+            let bend = profile.bend(t0, t1);
+            let (way, half_square) = (h1 - h0, 0.5 * (t1 - t0) * (t1 - t0));
+            let lowest = h0.min(h1) - sag(way, bend.max * half_square);
+            let highest = h0.max(h1) + sag(way, -bend.min * half_square);
+            let may_dip = lowest < range.min.min(band.min) - ACCURACY;
+            let may_rise = highest > range.max.max(band.max) + ACCURACY;
+            if !may_dip && !may_rise {
+                continue;
             }
+            if bend.min > 0.0 || bend.max < 0.0 {
+                range = range.join(HeightRange::of(profile.extreme(t0, t1)));
+                continue;
+            }
+            let middle = 0.5 * (t0 + t1);
+            let height = profile.at(middle);
+            range = range.join(HeightRange::of(height));
+            open.push((t0, h0, middle, height));
+            open.push((middle, height, t1, h1));
         }
         range
     }
@@ -162,9 +145,65 @@ impl Profile {
         self.z0 + self.rise * t - ground
     }
 
-    /// An upper bound of the second derivative over `[t0, t1]`.
-    fn bend(&self, t0: f64, t1: f64) -> f64 {
-        self.bumps.iter().map(|bump| bump.bend(t0, t1)).sum()
+    /// First and second derivative.
+    fn slope(&self, t: f64) -> (f64, f64) {
+        let (mut first, mut second) = (self.rise, 0.0);
+        for bump in &self.bumps {
+            let (value, steepness) = (bump.at(t), 2.0 * bump.sharpness * (t - bump.summit));
+            first += value * steepness;
+            second += value * (2.0 * bump.sharpness - steepness * steepness);
+        }
+        (first, second)
+    }
+
+    /// Bounds of the second derivative over `[t0, t1]`.
+    fn bend(&self, t0: f64, t1: f64) -> HeightRange {
+        let mut sum = HeightRange::of(0.0);
+        for bump in &self.bumps {
+            let bend = bump.bend(t0, t1);
+            sum.min += bend.min;
+            sum.max += bend.max;
+        }
+        sum
+    }
+
+    /// The height where the profile is level within `[t0, t1]`, over which its second derivative
+    /// does not change its sign; that of an end where it is not.
+    fn extreme(&self, mut t0: f64, mut t1: f64) -> f64 {
+        let (slope0, slope1) = (self.slope(t0).0, self.slope(t1).0);
+        if slope0 * slope1 >= 0.0 {
+            return self.at(if slope0.abs() < slope1.abs() { t0 } else { t1 });
+        }
+        let mut t = t0 - slope0 * (t1 - t0) / (slope1 - slope0);
+        for _ in 0..MOST_STEPS {
+            let (slope, bend) = self.slope(t);
+            if slope * slope <= ACCURACY * ACCURACY * bend.abs() {
+                break;
+            }
+            if slope * slope0 > 0.0 {
+                t0 = t;
+            } else {
+                t1 = t;
+            }
+            let next = t - slope / bend;
+            t = if t0 < next && next < t1 {
+                next
+            } else {
+                0.5 * (t0 + t1)
+            };
+        }
+        self.at(t)
+    }
+}
+
+/// How far a curve may lie below the lower of its ends, of which one is `way` above the other, when
+/// its second derivative times half the square of its width is at most `bend`.
+fn sag(way: f64, bend: f64) -> f64 {
+    let spare = bend - way.abs();
+    if spare > 0.0 {
+        spare * spare / (4.0 * bend)
+    } else {
+        0.0
     }
 }
 
@@ -179,28 +218,24 @@ impl Bump {
         }
     }
 
-    /// With x = sharpness * away^2 the second derivative is 2 sharpness (2x - 1) height e^-x: at
-    /// most 2 sharpness height, and falling in size beyond x = 3/2.
-    fn bend(&self, t0: f64, t1: f64) -> f64 {
-        let away = self.summit - self.summit.clamp(t0, t1);
-        let x = self.sharpness * away * away;
-        let factor = FALL
-            .iter()
-            .rfind(|(from, _)| x >= *from)
-            .map_or(1.0, |(_, factor)| *factor);
-        2.0 * self.sharpness * self.height.abs() * factor
+    /// Bounds of the second derivative of the height above it. With x = sharpness * away^2 that is
+    /// 2 sharpness height (1 - 2x) e^-x, which falls from x = 0 to x = 3/2 and rises to 0 beyond.
+    fn bend(&self, t0: f64, t1: f64) -> HeightRange {
+        let exponent = |t: f64| self.sharpness * (t - self.summit) * (t - self.summit);
+        let nearest = exponent(self.summit.clamp(t0, t1));
+        if nearest >= NEGLIGIBLE {
+            return HeightRange::of(0.0);
+        }
+        let farthest = exponent(t0).max(exponent(t1));
+        let share = |x: f64| HeightRange::of((1.0 - 2.0 * x) * libm::exp(-x));
+        let mut shares = share(nearest).join(share(farthest));
+        if nearest < 1.5 && farthest > 1.5 {
+            shares = shares.join(share(1.5));
+        }
+        let most = 2.0 * self.sharpness * self.height;
+        HeightRange::of(shares.min * most).join(HeightRange::of(shares.max * most))
     }
 }
-
-/// Values of (2x - 1) e^-x, rounded up: a bound for every x from there on, without an exponential.
-const FALL: [(f64, f64); 6] = [
-    (1.5, 0.4463),
-    (3.0, 0.2490),
-    (5.0, 0.0607),
-    (8.0, 0.005_04),
-    (12.0, 1.42e-4),
-    (20.0, 8.04e-8),
-];
 
 #[cfg(test)]
 mod tests {
@@ -234,6 +269,44 @@ mod tests {
         assert!((one_spread - (10.0 + 220.0 / std::f64::consts::E)).abs() < 1e-9);
     }
 
+    /// Needles, table mountains and pits; legs that stand still, only climb, or cross a summit.
+    #[test]
+    fn extremes_are_found_over_peaks_of_every_size() {
+        let check = |spread: f64, height: f64, a: [f64; 3], b: [f64; 3]| {
+            let peaks = Peaks {
+                base: 0.0,
+                peaks: vec![Peak {
+                    center: Point2::new(0.0, 0.0),
+                    height,
+                    spread: Point2::new(spread, spread),
+                }],
+            };
+            let leg = Segment {
+                a: Point3::from(a),
+                b: Point3::from(b),
+            };
+            let range = peaks.height_range(&leg, (0.0, 1.0));
+            let mut seen = HeightRange::EMPTY;
+            let shares = (0..=20_000).map(|i| f64::from(i) / 20_000.0);
+            for point in shares.map(|t| leg.at(t)) {
+                let height = point.z - peaks.elevation(point.xy());
+                seen = seen.join(HeightRange::of(height));
+            }
+            assert!(range.min <= seen.min + 1e-9 && range.max >= seen.max - 1e-9);
+            let between = 1e-4 * height.abs();
+            assert!(seen.min - range.min <= between && range.max - seen.max <= between);
+        };
+        for spread in [1.0, 80.0, 1e4, 1e6] {
+            for height in [250.0, -250.0] {
+                check(spread, height, [-40.0, 0.0, 100.0], [60.0, 0.0, 120.0]);
+                check(spread, height, [-40.0, 0.3, 100.0], [60.0, -0.2, 100.0]);
+                check(spread, height, [5.0, 5.0, 100.0], [5.0, 5.0, 120.0]);
+                check(spread, height, [5.0, 5.0, 100.0], [5.0, 5.0, 100.0]);
+                check(spread, height, [5.0, 5.0, 100.0], [5.0, 5.0 + 1e-10, 100.0]);
+            }
+        }
+    }
+
     proptest! {
         #[test]
         fn the_range_holds_every_sample_and_is_reached(
@@ -249,12 +322,12 @@ mod tests {
                 let height = point.z - peaks.elevation(point.xy());
                 seen = seen.join(HeightRange { min: height, max: height });
             }
-            prop_assert!(range.min <= seen.min + 2e-6 && range.max >= seen.max - 2e-6, "{range:?} {seen:?}");
+            prop_assert!(range.min <= seen.min + 1e-9 && range.max >= seen.max - 1e-9, "{range:?} {seen:?}");
             prop_assert!(seen.min - range.min < 0.05 && range.max - seen.max < 0.05, "{range:?} {seen:?}");
             let band = HeightRange { min: 20.0, max: 250.0 };
-            let beyond = peaks.height_range_beyond(&leg, (t0, t1), band, 0.0);
-            prop_assert!(((band.min - beyond.min).max(0.0) - (band.min - range.min).max(0.0)).abs() < 2e-4);
-            prop_assert!(((beyond.max - band.max).max(0.0) - (range.max - band.max).max(0.0)).abs() < 2e-4);
+            let beyond = peaks.height_range_beyond(&leg, (t0, t1), band);
+            prop_assert!(((band.min - beyond.min).max(0.0) - (band.min - range.min).max(0.0)).abs() < 2e-9);
+            prop_assert!(((beyond.max - band.max).max(0.0) - (range.max - band.max).max(0.0)).abs() < 2e-9);
         }
     }
 }

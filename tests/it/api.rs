@@ -1,5 +1,6 @@
 //! The service's answers, one by one; `support::api` holds each of them to `openapi.yaml`.
 
+use std::io::Read as _;
 use std::time::Duration;
 
 use axum::body::Body;
@@ -471,4 +472,47 @@ async fn a_clock_that_jumped_is_told_and_keeps_nobody_out() {
     assert_eq!(answer.status, StatusCode::OK);
     let warning = answer.json()["warnings"][0].to_string();
     assert!(warning.contains("-7200000 ms"), "{warning}");
+}
+
+fn gzip(plain: &[u8]) -> Vec<u8> {
+    let mut packed = Vec::new();
+    flate2::read::GzEncoder::new(plain, flate2::Compression::best())
+        .read_to_end(&mut packed)
+        .expect("reading from memory");
+    packed
+}
+
+#[tokio::test]
+async fn bodies_may_come_and_go_as_gzip() {
+    let api = Api::new();
+    let headers = [
+        ("content-type", "application/json"),
+        ("content-encoding", "gzip"),
+    ];
+    let post = async |plain: &[u8]| {
+        let body = Body::from(gzip(plain));
+        api.send(Method::POST, "/plans", &headers, body).await
+    };
+    let accepted = post(scenario().to_string().as_bytes()).await;
+    assert_eq!(accepted.status, StatusCode::ACCEPTED);
+    let bomb = vec![b' '; 10_000_000];
+    post(&bomb).await.expect_problem(413, "body-too-large");
+
+    run::complete(&*api.store, vec![run::convergence(0, 0.1)]).await;
+    let result = format!("{}/result", accepted.header("location"));
+    let plain = api.get(&result).await;
+    assert!(!plain.headers.contains_key("content-encoding"));
+    let packed = api.get_with(&result, &[("accept-encoding", "gzip")]).await;
+    assert_eq!(packed.header("content-encoding"), "gzip");
+    assert!(packed.header("vary").contains("accept-encoding"));
+    let mut unpacked = Vec::new();
+    flate2::read::GzDecoder::new(&packed.body[..])
+        .read_to_end(&mut unpacked)
+        .expect("gzip");
+    assert_eq!(unpacked, plain.body);
+
+    // Nothing comes between a stream and its reader.
+    let events = format!("{}/events", accepted.header("location"));
+    let told = api.get_with(&events, &[("accept-encoding", "gzip")]).await;
+    assert!(!told.headers.contains_key("content-encoding"));
 }

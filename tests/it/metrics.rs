@@ -86,10 +86,17 @@ async fn a_run_is_counted() {
     let address = service.submit(&scenario()).await;
     let status = service.ended(&address).await;
     assert_eq!(status["status"], "succeeded");
-    let reading = read_from(&service).await;
+    // The end is known to callers before the worker has counted it.
+    let ended = "noctule_plans_ended_total{status=\"succeeded\"}";
+    let reading = loop {
+        let reading = read_from(&service).await;
+        if reading.value(ended) > 0.5 {
+            break reading;
+        }
+    };
     let count = |series: &str| reading.value(series);
     for series in [
-        "noctule_plans_ended_total{status=\"succeeded\"}",
+        ended,
         "noctule_plan_run_seconds_count{status=\"succeeded\"}",
         "noctule_plan_wait_seconds_count",
         "noctule_plan_gap_ratio_count",

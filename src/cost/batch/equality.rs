@@ -41,10 +41,15 @@ impl Choices {
             });
         }
         if kind < 0.7 {
-            let peaks = (0..6).map(|_| Peak {
-                center: self.place(),
-                height: self.between(-60.0, 250.0),
-                spread: Point2::new(self.between(20.0, 150.0), self.between(20.0, 150.0)),
+            let peaks = (0..6).map(|_| {
+                // Some needles, ridges and table mountains among them.
+                let narrow = if self.one_in(6.0) { 1.0 } else { 20.0 };
+                let wide = if self.one_in(6.0) { 5000.0 } else { 150.0 };
+                Peak {
+                    center: self.place(),
+                    height: self.between(-60.0, 250.0),
+                    spread: Point2::new(self.between(narrow, wide), self.between(narrow, wide)),
+                }
             });
             return Terrain::Peaks(Peaks {
                 peaks: peaks.collect(),
@@ -211,6 +216,7 @@ proptest! {
         let quadrature = scenario.planner.quadrature;
         let tolerance = model.tolerance.scaled(0.5);
         let pricer = Pricer::new(&model, quadrature, tolerance);
+        let verdicts = pricer.clone().verdicts();
         let scalar = Pricer { arch: Arch::Scalar, ..pricer.clone() };
         let routes: Vec<_> = (0..LANES).map(|_| choices.route(&scenario)).collect();
         let points = rows(&routes);
@@ -238,6 +244,13 @@ proptest! {
             for (price, (violation, cost)) in prices.iter().zip(by_leg) {
                 prop_assert!(close(price.violation[lane], violation), "{} {violation}", price.violation[lane]);
                 prop_assert!(close(price.cost[lane], cost), "{} {cost}", price.cost[lane]);
+            }
+            let mut found = vec![Price::ZERO; prices.len()];
+            verdicts.legs(&points[..route.len() - 1], &points[1..], &mut found);
+            for (verdict, price) in found.iter().zip(&prices) {
+                prop_assert_eq!(verdict.violation[lane] > 0.0, price.violation[lane] > 0.0);
+                prop_assert!(verdict.violation[lane] <= price.violation[lane] + 1e-3);
+                prop_assert_eq!(verdict.cost[lane].to_bits(), price.cost[lane].to_bits());
             }
         }
     }

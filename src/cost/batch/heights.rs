@@ -1,15 +1,17 @@
-//! The band and the ground in lanes: most legs are proven to keep within them; the rest are left
-//! to the scalar code, which measures by how much they do not.
+//! The band and the ground in lanes: most legs are proven to keep within them; the rest are measured,
+//! above peaks in lanes, too, above grids by the scalar code.
 
 use pulp::Simd;
 
 use super::leg::{Leg, Point};
 use super::peaks::{Massif, Panorama};
 use super::pyramid::Pyramid;
+use super::suspects::Suspects;
 use super::{PointRow, Pricer};
-use crate::cost::{Model, Tolerance};
-use crate::geometry::Point2;
+use crate::cost::band::Excess;
+use crate::cost::{Model, Section, Tolerance};
 use crate::geometry::lane::{Lane, Mask};
+use crate::geometry::{Point2, Segment};
 use crate::terrain::Terrain;
 
 /// What a proof may overlook: less than what counts as a breach.
@@ -25,6 +27,8 @@ pub(super) struct Heights {
     ground: f64,
     /// Highest anywhere, likewise.
     ceiling: f64,
+    /// What may be overlooked, metres.
+    pub(super) overlooked: f64,
     surface: Surface,
 }
 
@@ -42,6 +46,12 @@ struct Zone {
     radius: f64,
 }
 
+/// Points of a section, as shares of it, at which a breach may be seen.
+const GLANCES: [f64; 3] = [0.5, 0.25, 0.75];
+
+/// A breach seen at a point, of more metres than this, is one.
+const SURELY: f64 = 0.05;
+
 /// The part of each leg in a terminal zone: `[enter, leave]`, 1 to 1 where there is none.
 pub(super) struct Inside<S: Simd> {
     enter: Lane<S>,
@@ -52,33 +62,13 @@ pub(super) struct Inside<S: Simd> {
     unclear: Mask<S>,
 }
 
-/// The greatest breaches of the band and of the ground at points of a leg.
-#[derive(Clone, Copy)]
-pub(super) struct Breach<S: Simd> {
-    band: Lane<S>,
-    ground: Lane<S>,
-}
-
-impl<S: Simd> Breach<S> {
+impl<S: Simd> Inside<S> {
+    /// Where a leg meets any zone.
     #[inline(always)]
-    pub(super) fn none(zero: Lane<S>) -> Self {
-        Self {
-            band: zero,
-            ground: zero,
-        }
-    }
-
-    #[inline(always)]
-    pub(super) fn sum(self) -> Lane<S> {
-        self.band + self.ground
+    fn met(&self) -> Mask<S> {
+        self.unclear | self.enter.lt(self.leave)
     }
 }
-
-/// Points of a leg at which a rough pricer looks at a grid.
-const GLANCES: usize = 8;
-
-/// A breach at a point of a leg, of more metres than this, spares a rough pricer the exact one.
-const SURELY: f64 = 0.05;
 
 impl Heights {
     pub(super) fn of(model: &Model, tolerance: Tolerance) -> Self {
@@ -96,6 +86,7 @@ impl Heights {
             floor: band.min - slack,
             ground: floors.fold(f64::NEG_INFINITY, f64::max) - slack,
             ceiling: band.max + slack,
+            overlooked: slack,
             surface: match &model.scenario.terrain {
                 Terrain::Flat(flat) => Surface::Flat(flat.elevation),
                 Terrain::Peaks(peaks) => Surface::Peaks(Massif::of(peaks)),
@@ -106,26 +97,9 @@ impl Heights {
 }
 
 impl Heights {
-    /// The breach of a leg that is `height` above ground at `t`, or the one before if greater.
-    #[inline(always)]
-    pub(super) fn breach<S: Simd>(
-        &self,
-        height: Lane<S>,
-        inside: &Inside<S>,
-        t: f64,
-        before: Breach<S>,
-    ) -> Breach<S> {
-        let (zero, at) = (height.with(0.0), height.with(t));
-        let off = (height.with(self.floor) - height).max(height - self.ceiling);
-        let in_zone = inside.enter.le(at) & at.le(inside.leave);
-        Breach {
-            band: before.band.max((!in_zone).keep(off.max(zero))),
-            ground: before.ground.max(height.with(self.ground) - height),
-        }
-    }
-
     /// Where a leg keeps its heights over its part `[t0, t1]`, being `from` and `to` at the ends of
-    /// it and between them at most `dip` below and `rise` above the line that joins these.
+    /// it and the curve between them, with a second derivative of so much that it sags at most by
+    /// `dip` below and rises by `rise` above the line that joins these.
     #[inline(always)]
     pub(super) fn within<S: Simd>(
         &self,
@@ -134,7 +108,11 @@ impl Heights {
         inside: &Inside<S>,
         [t0, t1]: [f64; 2],
     ) -> Mask<S> {
-        let (low, high) = (from.min(to) - dip, from.max(to) + rise);
+        // Below the lower end a parabola sags by (k - d)^2 / 4k, k four times its sag in the middle and d
+        // its way, so by no more than a quarter of k - d.
+        let quarter_way = (to - from).abs() * 0.25;
+        let low = from.min(to) - (dip - quarter_way).max(dip.with(0.0));
+        let high = from.max(to) + (rise - quarter_way).max(dip.with(0.0));
         let below_ceiling = high.le(high.with(self.ceiling));
         if !inside.any {
             return below_ceiling & low.with(self.floor).le(low);
@@ -153,6 +131,14 @@ impl Heights {
         let outside = outside.min(leave.lt(end).select(last, none)) - dip;
         below_ceiling & low.with(self.ground).le(low) & low.with(self.floor).le(outside)
     }
+
+    /// How far a leg is seen to leave the band at its end and in its middle, where no zone is.
+    #[inline(always)]
+    fn seen<S: Simd>(&self, inside: &Inside<S>, heights: &[Lane<S>; 3]) -> Lane<S> {
+        let off = |height: Lane<S>| (height.with(self.floor) - height).max(height - self.ceiling);
+        let most = off(heights[1]).max(off(heights[2]));
+        (inside.leave.le(inside.enter) & !inside.unclear).keep(most)
+    }
 }
 
 impl Pricer<'_> {
@@ -164,51 +150,142 @@ impl Pricer<'_> {
         }
     }
 
-    /// Beyond the band or below the ground; `panorama` is that of the leg's ends.
+    /// Beyond the band or below the ground; `panorama` is that of the leg's ends. What takes longer
+    /// to find is left to `suspects`, for the slots from `slot` on.
     #[inline(always)]
-    pub(super) fn heights<S: Simd>(&self, leg: &Leg<S>, panorama: &Panorama<S>) -> Lane<S> {
+    pub(super) fn heights<S: Simd>(
+        &self,
+        leg: &Leg<S>,
+        panorama: &Panorama<S>,
+        slot: usize,
+        suspects: &mut Suspects,
+    ) -> Lane<S> {
         let inside = self.inside(leg);
         let none = leg.splat(0.0);
-        let (clear, seen) = match &self.heights.surface {
+        let outlook = match &self.heights.surface {
             Surface::Flat(elevation) => {
                 let ends = [leg.a.z - *elevation, leg.b.z - *elevation];
-                let slack = [none; 2];
-                (self.heights.within(ends, slack, &inside, [0.0, 1.0]), none)
+                let clear = self.heights.within(ends, [none; 2], &inside, [0.0, 1.0]);
+                let open = !(clear & !inside.unclear);
+                if !open.any() {
+                    return none;
+                }
+                let in_zone = inside.met().row();
+                return open.map(|lane| {
+                    self.measured(&leg.segment(lane), in_zone[lane], |leg, section| {
+                        self.beyond(leg, (section.t0, section.t1), section)
+                    })
+                });
             }
-            Surface::Peaks(massif) => massif.clear(leg, panorama, &inside, &self.heights),
-            Surface::Grid(pyramid) => (self.clear_of_grid(leg, &inside, pyramid), none),
+            Surface::Grid(pyramid) => {
+                let in_zone = inside.met().row();
+                return none.map(|lane, _| {
+                    self.measured(&leg.segment(lane), in_zone[lane], |leg, section| {
+                        self.beyond_grid(pyramid, leg, section)
+                    })
+                });
+            }
+            Surface::Peaks(massif) => massif.outlook(leg, panorama, &inside, &self.heights),
         };
-        let clear = clear & !inside.unclear;
-        if !(!clear).any() {
+        let open = !(outlook.clear & !inside.unclear);
+        if !open.any() {
             return none;
         }
-        let seen = if self.rough > 0.0 { seen } else { none };
-        let sure = leg.splat(SURELY).lt(seen) & !clear & !inside.unclear;
-        let seen = sure.keep(seen);
-        let open = !(clear | sure);
-        if !open.any() {
-            return seen;
+        let seen = self.heights.seen(&inside, &outlook.heights);
+        let counts = if self.verdict { SURELY } else { f64::INFINITY };
+        let sure = open & leg.splat(counts).lt(seen);
+        let open = open & !sure;
+        if open.any() {
+            self.suspect(leg, open, outlook.widest, &inside, slot, suspects);
         }
-        seen + open.map(|lane| {
-            if self.rough > 0.0
-                && let Surface::Grid(_) = self.heights.surface
-                && let breach = self.model.sampled_heights(&leg.segment(lane), GLANCES)
-                && breach > SURELY
-            {
-                return breach;
+        sure.keep(seen)
+    }
+
+    /// The violation of a leg that reaches `beyond` the limits of its sections.
+    fn measured(
+        &self,
+        leg: &Segment,
+        in_zone: bool,
+        beyond: impl Fn(&Segment, &Section) -> (f64, f64),
+    ) -> f64 {
+        let mut excess = Excess::default();
+        let mut measure = |section: Section| {
+            let amounts = beyond(leg, &section);
+            excess.join(section.terminal, section.floor, amounts);
+        };
+        if in_zone {
+            self.model.sections(leg, measure);
+        } else {
+            measure(self.model.outside());
+        }
+        excess.violation(self.tolerance)
+    }
+
+    /// How far the part `window` of a leg reaches below and above the limits of `section`.
+    fn beyond(&self, leg: &Segment, window: (f64, f64), section: &Section) -> (f64, f64) {
+        let terrain = &self.model.scenario.terrain;
+        terrain.excess(leg, window, section.floor, section.ceiling)
+    }
+
+    /// As `beyond`, of a whole section above a grid.
+    fn beyond_grid(&self, pyramid: &Pyramid, leg: &Segment, section: &Section) -> (f64, f64) {
+        let overlooked = self.heights.overlooked;
+        let limits = (section.floor - overlooked, section.ceiling + overlooked);
+        let window = (section.t0, section.t1);
+        if pyramid.clears(leg, window, limits) {
+            return (0.0, 0.0);
+        }
+        if self.verdict {
+            for share in GLANCES {
+                let point = leg.at(window.0 + share * (window.1 - window.0));
+                let height = point.z - self.model.scenario.terrain.elevation(point.xy());
+                if section.floor - height > SURELY || height - section.ceiling > SURELY {
+                    let below = (section.floor - height).max(0.0);
+                    return (below, (height - section.ceiling).max(0.0));
+                }
             }
-            let mut violation = 0.0;
-            self.model.heights(
-                0,
-                &leg.segment(lane),
-                self.tolerance,
-                self.rough,
-                &mut |breach| {
-                    violation += breach.amount;
-                },
-            );
-            violation
-        })
+        }
+        self.beyond(leg, window, section)
+    }
+
+    /// Leave the legs of the lanes that are `open` to `suspects`.
+    #[inline(always)]
+    fn suspect<S: Simd>(
+        &self,
+        leg: &Leg<S>,
+        open: Mask<S>,
+        widest: Lane<S>,
+        inside: &Inside<S>,
+        slot: usize,
+        suspects: &mut Suspects,
+    ) {
+        let widest = widest.row();
+        let in_zone = inside.met().row();
+        open.each(|lane| {
+            let segment = leg.segment(lane);
+            suspects.next_leg();
+            if in_zone[lane] {
+                self.model.sections(&segment, |section| {
+                    suspects.push(slot + lane, &segment, &section, widest[lane]);
+                });
+            } else {
+                let whole = self.model.outside();
+                suspects.push(slot + lane, &segment, &whole, widest[lane]);
+            }
+        });
+    }
+
+    /// Measure all `suspects` and pass the violation of each leg on with its slot.
+    #[inline(always)]
+    pub(super) fn settle<S: Simd>(
+        &self,
+        simd: S,
+        suspects: &Suspects,
+        each: impl FnMut(usize, f64),
+    ) {
+        if let Surface::Peaks(massif) = &self.heights.surface {
+            self.measure(simd, massif, suspects, each);
+        }
     }
 
     /// The elevation of the ground below each point of a part of `row`.
@@ -239,25 +316,6 @@ impl Pricer<'_> {
             }),
         };
         (leg.b.z - ground - middle).abs()
-    }
-
-    /// Where a leg is proven to keep its heights above a grid.
-    #[inline(always)]
-    fn clear_of_grid<S: Simd>(
-        &self,
-        leg: &Leg<S>,
-        inside: &Inside<S>,
-        pyramid: &Pyramid,
-    ) -> Mask<S> {
-        let (zero, one) = (leg.splat(0.0), leg.splat(1.0));
-        let heights = &self.heights;
-        let wholly = inside.enter.le(zero) & one.le(inside.leave);
-        let floor = wholly.select(leg.splat(heights.ground), leg.splat(heights.floor));
-        let proven = floor.map(|lane, floor| {
-            let clear = pyramid.clears(&leg.segment(lane), floor, heights.ceiling);
-            f64::from(u8::from(clear))
-        });
-        zero.lt(proven)
     }
 
     /// Where each leg lies in a terminal zone.

@@ -91,10 +91,16 @@ impl<'a, S: Simd> Leg<'a, S> {
     /// at its middle.
     #[inline(always)]
     pub(super) fn may_reach(&self, center: Point2, radius: f64) -> bool {
+        self.near(center, radius).any()
+    }
+
+    /// Where it may.
+    #[inline(always)]
+    pub(super) fn near(&self, center: Point2, radius: f64) -> Mask<S> {
         let (x, y) = (self.middle[0] - center.x, self.middle[1] - center.y);
         // A hair more than half, for rounding.
         let reach = self.level * (0.5 + 1e-9) + radius * (1.0 + 1e-9);
-        (x * x + y * y).le(reach * reach).any()
+        (x * x + y * y).le(reach * reach)
     }
 
     /// How the leg lies to `center`.

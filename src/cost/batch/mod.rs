@@ -1,8 +1,8 @@
 //! Many routes priced at once, in lanes.
 //!
 //! [`Pricer`] asks of [`LANES`] routes side by side what [`Model::assess`] asks of one, and comes to
-//! the same within rounding: what it cannot settle in lanes (a leg that breaks the band, a polygon
-//! nearby) it leaves to the scalar code, lane by lane. A lane's bits depend on its own route alone,
+//! the same within rounding: what it cannot settle in lanes (a leg that breaks the band above a grid,
+//! a polygon nearby) it leaves to the scalar code, lane by lane. A lane's bits depend on its own route alone,
 //! not on its neighbours nor on the width of the processor.
 
 #[cfg(test)]
@@ -13,6 +13,8 @@ mod leg;
 mod peaks;
 mod pyramid;
 mod route;
+mod stretch;
+mod suspects;
 mod threats;
 
 pub use crate::geometry::lane::{LANES, Row};
@@ -26,6 +28,7 @@ use crate::scenario::Quadrature;
 use heights::Heights;
 use leg::Point;
 use route::Limits;
+use suspects::Suspects;
 use threats::Threats;
 
 /// [`LANES`] points side by side, metres.
@@ -90,8 +93,8 @@ impl Price {
 pub struct Pricer<'s> {
     model: Model<'s>,
     tolerance: Tolerance,
-    /// By about what share of itself a breach of the band or the ground may be missed.
-    rough: f64,
+    /// Whether it matters only that a leg leaves the band, not how far.
+    verdict: bool,
     quadrature: Quadrature,
     limits: Limits,
     threats: Threats,
@@ -109,18 +112,17 @@ impl<'s> Pricer<'s> {
             heights: Heights::of(model, tolerance),
             model: model.clone(),
             tolerance,
-            rough: 0.0,
+            verdict: false,
             quadrature,
             arch: Arch::new(),
         }
     }
 
-    /// Measures only roughly, to about the share `rough`, by how much routes leave the band or meet
-    /// the ground, for a search that need not know better; whether they do, and all else, stays as
-    /// it is.
+    /// Does not measure how far a leg leaves the band once it is seen to: for a search that has no
+    /// use for such a leg. Where there is no violation, and all else, stays as it is.
     #[must_use]
-    pub fn roughly(mut self, rough: f64) -> Self {
-        self.rough = rough;
+    pub fn verdicts(mut self) -> Self {
+        self.verdict = true;
         self
     }
 
@@ -196,13 +198,20 @@ impl WithSimd for Routes<'_, '_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        let mut suspects = Suspects::default();
         for part in 0..parts::<S>() {
-            let (violation, cost) = self.pricer.route(simd, part, self.points);
+            let (violation, cost) = self.pricer.route(simd, part, self.points, &mut suspects);
             violation.store(&mut self.price.violation, part);
             cost.store(&mut self.price.cost, part);
         }
+        self.pricer.settle(simd, &suspects, |slot, violation| {
+            self.price.violation[slot] += violation;
+        });
     }
 }
+
+/// Rows of legs whose suspects wait for each other.
+const AT_ONCE: usize = 64;
 
 struct Legs<'a, 's> {
     pricer: &'a Pricer<'s>,
@@ -216,12 +225,24 @@ impl WithSimd for Legs<'_, '_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        for ((a, b), price) in self.a.iter().zip(self.b).zip(self.prices) {
-            for part in 0..parts::<S>() {
-                let (violation, cost) = self.pricer.single_leg(simd, part, a, b);
-                violation.store(&mut price.violation, part);
-                cost.store(&mut price.cost, part);
+        let mut suspects = Suspects::default();
+        let chunks = self.a.chunks(AT_ONCE).zip(self.b.chunks(AT_ONCE));
+        for ((a, b), prices) in chunks.zip(self.prices.chunks_mut(AT_ONCE)) {
+            suspects.clear();
+            for (row, ends) in a.iter().zip(b).enumerate() {
+                for part in 0..parts::<S>() {
+                    let slot = row * LANES + part * S::F64_LANES;
+                    let ends = [ends.0, ends.1];
+                    let (violation, cost) =
+                        self.pricer
+                            .single_leg(simd, part, ends, slot, &mut suspects);
+                    violation.store(&mut prices[row].violation, part);
+                    cost.store(&mut prices[row].cost, part);
+                }
             }
+            self.pricer.settle(simd, &suspects, |slot, violation| {
+                prices[slot / LANES].violation[slot % LANES] += violation;
+            });
         }
     }
 }

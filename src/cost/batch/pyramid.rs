@@ -4,8 +4,8 @@
 use crate::geometry::{Point2, Segment};
 use crate::terrain::{Grid, HeightRange};
 
-/// A leg is cut in halves so often; what that does not prove clear is left to the scalar code.
-const CUTS: u32 = 4;
+/// A leg is cut in halves so often; one that is then not proven clear is left to the scalar code.
+const CUTS: u32 = 1;
 
 /// A grid's elevations by blocks of cells.
 #[derive(Debug, Clone)]
@@ -48,17 +48,22 @@ impl Pyramid {
         }
     }
 
-    /// Whether `leg` is proven to keep between `floor` and `ceiling` above ground.
-    pub(super) fn clears(&self, leg: &Segment, floor: f64, ceiling: f64) -> bool {
-        let place = |x: f64, y: f64, z: f64| {
+    /// Whether the part `window` of `leg` is proven to keep between `floor` and `ceiling` above ground.
+    pub(super) fn clears(
+        &self,
+        leg: &Segment,
+        window: (f64, f64),
+        (floor, ceiling): (f64, f64),
+    ) -> bool {
+        let place = |t: f64| {
+            let point = leg.at(t);
             [
-                (x - self.origin.x) * self.cells_a_metre,
-                (y - self.origin.y) * self.cells_a_metre,
-                z,
+                (point.x - self.origin.x) * self.cells_a_metre,
+                (point.y - self.origin.y) * self.cells_a_metre,
+                point.z,
             ]
         };
-        let (a, b) = (leg.a, leg.b);
-        let ends = [place(a.x, a.y, a.z), place(b.x, b.y, b.z)];
+        let ends = [place(window.0), place(window.1)];
         self.clears_part(ends, floor, ceiling, CUTS)
     }
 

@@ -4,6 +4,7 @@ use pulp::Simd;
 
 use super::leg::{Leg, Point};
 use super::peaks::Panorama;
+use super::suspects::Suspects;
 use super::threats::Candidates;
 use super::{PointRow, Pricer};
 use crate::cost::fuel;
@@ -53,13 +54,14 @@ struct Heading<S: Simd> {
 }
 
 impl Pricer<'_> {
-    /// Violation and cost of one part of the routes.
+    /// Violation and cost of one part of the routes, but for the violation of `suspects`.
     #[inline(always)]
     pub(super) fn route<S: Simd>(
         &self,
         simd: S,
         part: usize,
         points: &[PointRow],
+        suspects: &mut Suspects,
     ) -> (Lane<S>, Lane<S>) {
         let zero = Lane::splat(simd, 0.0);
         let (mut length, mut exposure, mut violation, mut off_middle) = (zero, zero, zero, zero);
@@ -76,7 +78,7 @@ impl Pricer<'_> {
             length = length + leg.length;
             self.look(leg.b, &mut panorama);
             self.threats(&leg, &mut candidates, &mut exposure, &mut violation);
-            violation = violation + self.heights(&leg, &panorama);
+            violation = violation + self.heights(&leg, &panorama, part * S::F64_LANES, suspects);
             let (near, sharp) = self.turn(&leg, &mut heading);
             let mut suspect = near | self.may_break_limits(&leg);
             let free = leg_idx + 2 < points.len();
@@ -95,14 +97,16 @@ impl Pricer<'_> {
         (violation, self.flown(length, exposure) + altitude)
     }
 
-    /// Violation and cost of one leg by itself.
+    /// Violation and cost of one leg by itself, but for the violation of `suspects`; its lanes have
+    /// the slots from `slot` on.
     #[inline(always)]
     pub(super) fn single_leg<S: Simd>(
         &self,
         simd: S,
         part: usize,
-        a: &PointRow,
-        b: &PointRow,
+        [a, b]: [&PointRow; 2],
+        slot: usize,
+        suspects: &mut Suspects,
     ) -> (Lane<S>, Lane<S>) {
         let leg = Leg::new(simd, part, [a, b]);
         let (mut exposure, mut violation) = (leg.splat(0.0), leg.splat(0.0));
@@ -115,7 +119,7 @@ impl Pricer<'_> {
             &mut exposure,
             &mut violation,
         );
-        violation = violation + self.heights(&leg, &panorama);
+        violation = violation + self.heights(&leg, &panorama, slot, suspects);
         if self.may_break_limits(&leg).any() {
             violation = violation + self.leg_limits(&leg);
         }

@@ -61,6 +61,14 @@ impl<S: Simd> Lane<S> {
         S::as_mut_simd_f64s(row).0[part] = self.values;
     }
 
+    /// In memory; 0 beyond the lanes that this has.
+    #[inline(always)]
+    pub(crate) fn row(self) -> Row {
+        let mut row = [0.0; LANES];
+        self.store(&mut row, 0);
+        row
+    }
+
     /// `value` in as many lanes as this has.
     #[inline(always)]
     pub(crate) fn with(self, value: f64) -> Self {
@@ -70,8 +78,7 @@ impl<S: Simd> Lane<S> {
     /// One number at a time, where there is no better way.
     #[inline(always)]
     pub(crate) fn map(self, mut each: impl FnMut(usize, f64) -> f64) -> Self {
-        let mut row = [0.0; LANES];
-        self.store(&mut row, 0);
+        let mut row = self.row();
         for (lane, value) in row[..S::F64_LANES].iter_mut().enumerate() {
             *value = each(lane, *value);
         }
@@ -81,8 +88,7 @@ impl<S: Simd> Lane<S> {
     /// As `map`, of both.
     #[inline(always)]
     pub(crate) fn zip(self, other: Self, mut each: impl FnMut(f64, f64) -> f64) -> Self {
-        let mut others = [0.0; LANES];
-        other.store(&mut others, 0);
+        let others = other.row();
         self.map(|lane, value| each(value, others[lane]))
     }
 
@@ -163,6 +169,22 @@ impl<S: Simd> Mask<S> {
     #[inline(always)]
     pub(crate) fn any(self) -> bool {
         self.simd.first_true_m64s(self.values) < S::F64_LANES
+    }
+
+    /// In memory; false beyond the lanes that this has.
+    #[inline(always)]
+    pub(crate) fn row(self) -> [bool; LANES] {
+        let one = Lane::splat(self.simd, 1.0);
+        self.keep(one).row().map(|holds| holds > 0.0)
+    }
+
+    /// Look at the lanes in which it holds.
+    #[inline(always)]
+    pub(crate) fn each(self, mut each: impl FnMut(usize)) {
+        let _ = self.map(|lane| {
+            each(lane);
+            0.0
+        });
     }
 
     /// `each` of the lanes in which it holds, elsewhere 0.

@@ -4,7 +4,7 @@
 //! priced alone; turns join two legs. The best combination of all places is found exactly, so that
 //! waypoints that only gain together, such as those of one bend, move together.
 
-use super::super::price::{PRICED_FROM, ROUGH};
+use super::super::price::PRICED_FROM;
 use crate::cost::batch::{LANES, PointRow, Price, Pricer, Row};
 use crate::cost::{Model, Tolerance};
 use crate::geometry::{LEVEL, Point2, Point3, Vector2, wrap_angle};
@@ -92,7 +92,7 @@ impl<'m, 's> Lattice<'m, 's> {
         let tolerance = model.tolerance.scaled(PRICED_FROM);
         Self {
             model,
-            pricer: Pricer::new(model, model.scenario.planner.quadrature, tolerance).roughly(ROUGH),
+            pricer: Pricer::new(model, model.scenario.planner.quadrature, tolerance),
             tolerance,
             steepest: libm::tan(vehicle.max_climb_deg.to_radians()),
             cos_turn: libm::cos(vehicle.max_turn_deg.to_radians()),

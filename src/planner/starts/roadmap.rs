@@ -8,7 +8,7 @@ use super::lifted;
 use crate::cost::Model;
 use crate::cost::batch::{LANES, PointRow, Price, Pricer};
 use crate::geometry::{Point2, Point3, Vector2};
-use crate::planner::price::{PRICED_FROM, ROUGH};
+use crate::planner::price::PRICED_FROM;
 use crate::terrain::Terrain;
 
 /// Places of the net, besides both ends, on level ground.
@@ -108,7 +108,7 @@ fn places(model: &Model) -> Vec<Point3> {
 fn legs(model: &Model, places: &[Point3]) -> Vec<Vec<f64>> {
     let scenario = model.scenario;
     let tolerance = model.tolerance.scaled(PRICED_FROM);
-    let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).roughly(ROUGH);
+    let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).verdicts();
     let count = places.len();
     let (mut from, mut to, mut pairs) = (Vec::new(), Vec::new(), Vec::new());
     for a in 0..count {

@@ -1,6 +1,7 @@
 //! `openapi.yaml`, and whether an answer is one that it describes.
 
 use std::collections::HashMap;
+use std::io::Read as _;
 use std::sync::{Arc, LazyLock, Mutex};
 
 use axum::http::{HeaderMap, Method, StatusCode};
@@ -52,6 +53,7 @@ pub(crate) fn check(
     headers: &HeaderMap,
     body: &[u8],
 ) {
+    let body = &plain(headers, body);
     let place = format!("{method} {path} -> {status}");
     assert!(
         headers.contains_key("x-request-id"),
@@ -89,10 +91,23 @@ pub(crate) fn check(
     }
 }
 
+/// As it was before it was packed for the way.
+fn plain(headers: &HeaderMap, body: &[u8]) -> Vec<u8> {
+    let mut plain = Vec::new();
+    if headers.contains_key("content-encoding") {
+        flate2::read::GzDecoder::new(body)
+            .read_to_end(&mut plain)
+            .expect("gzip");
+    } else {
+        plain.extend_from_slice(body);
+    }
+    plain
+}
+
 fn check_headers(response: &Value, headers: &HeaderMap, place: &str) {
     // Every answer has these, or every answer to the holder of a limited key or to a page from
     // elsewhere, or transport adds them.
-    const COMMON: [&str; 15] = [
+    const COMMON: [&str; 16] = [
         "access-control-allow-origin",
         "access-control-expose-headers",
         "content-security-policy",
@@ -106,6 +121,7 @@ fn check_headers(response: &Value, headers: &HeaderMap, place: &str) {
         "x-content-type-options",
         "x-request-id",
         "transfer-encoding",
+        "content-encoding",
         "vary",
         "date",
     ];

@@ -16,6 +16,7 @@ mod metrics;
 mod off_thread;
 mod pages;
 mod params;
+mod partial;
 mod phase;
 mod plans;
 mod prefer;

@@ -22,6 +22,7 @@ RUN mkdir src benches \
 COPY src src
 COPY openapi.yaml ./
 COPY docs/PROBLEMS.md docs/
+COPY scenarios scenarios
 # Cargo goes by times of change; those of the copied files may lie before the build above.
 RUN touch src/lib.rs src/main.rs \
     && cargo build --release --locked \

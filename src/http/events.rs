@@ -149,12 +149,18 @@ impl Stream {
         })
     }
 
+    /// As the record tells, which is shorter than the result.
+    async fn has_result(&self) -> bool {
+        let plan = self.store.get(self.feed.plan_id()).await;
+        plan.is_ok_and(|plan| plan.stop_reason.is_some())
+    }
+
     async fn written(&self, events: Vec<NumberedEvent>, wire: Wire) -> String {
         let plan = self.feed.plan_id();
         let mut text = String::new();
         for event in events {
             let ends = matches!(event.event, Event::End(_));
-            let has_result = ends && matches!(self.store.result(plan).await, Ok(Some(_)));
+            let has_result = ends && self.has_result().await;
             wire.write(Outgoing::new(plan, event, has_result), &mut text);
         }
         text

@@ -1,11 +1,12 @@
 //! `noctule serve`: put the parts together, and take them apart in the right order.
 
 use std::io::Write as _;
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, anyhow};
-use tokio::net::TcpListener;
+use tokio::net::{TcpListener, TcpSocket};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::watch;
 use tokio::time::Instant;
@@ -25,6 +26,10 @@ use crate::store::{self, Store};
 use crate::telemetry::{self, Instruments};
 use crate::worker::{self, Engine, Pool, Sweeper};
 
+/// Callers that may wait to be let in; Linux allows as many since 5.4. Who comes when there are more
+/// may be left waiting for an answer that never comes.
+const BACKLOG: u32 = 4_096;
+
 /// Connections may finish their answers for so long at the end, if the grace period lasts so long.
 const LAST_ANSWERS: Duration = Duration::from_secs(5);
 
@@ -35,7 +40,11 @@ pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
     if flags.print_config {
         return Ok(loaded.write_toml(&mut std::io::stdout().lock())?);
     }
-    let config = &loaded.config;
+    start(&loaded.config)
+}
+
+/// Serve until a signal.
+pub(super) fn start(config: &Config) -> anyhow::Result<()> {
     let log = telemetry::log::init(config);
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
@@ -53,9 +62,8 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let cors =
         Origins::read(&config.cors_origins).map_err(|fault| anyhow!("cors_origins: {fault}"))?;
     let webhooks = webhooks(&config.webhook)?;
-    let listener = TcpListener::bind(config.listen)
-        .await
-        .with_context(|| format!("cannot listen on {}", config.listen))?;
+    let listener =
+        listen(config.listen).with_context(|| format!("cannot listen on {}", config.listen))?;
     let instruments = Arc::new(Instruments::default());
     let store = open_store(config).await?;
     let store: Arc<dyn Store> = Arc::new(MeasuredStore::new(store, instruments.clone()));
@@ -203,6 +211,18 @@ fn retention(settings: config::Retention) -> store::Retention {
         plans: limit(settings.plans),
         bytes: limit(settings.bytes),
     }
+}
+
+/// Take the address, for as many callers at once as the system lets wait.
+fn listen(address: SocketAddr) -> std::io::Result<TcpListener> {
+    let socket = if address.is_ipv4() {
+        TcpSocket::new_v4()
+    } else {
+        TcpSocket::new_v6()
+    }?;
+    socket.set_reuseaddr(true)?;
+    socket.bind(address)?;
+    socket.listen(BACKLOG)
 }
 
 /// One plain line for people and scripts, with the port that was taken.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Instant;
 
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{mpsc, oneshot, watch};
 use tracing::Span;
 
 use super::Engine;
@@ -52,6 +52,8 @@ impl StopFlag {
 pub(super) struct Reports {
     /// To be stored.
     pub(super) events: mpsc::Sender<Event>,
+    /// Dropped when nothing more is told.
+    pub(super) _telling: watch::Sender<()>,
     /// Shared with those who may stop it.
     pub(super) stop: Arc<StopFlag>,
     /// For the operator.

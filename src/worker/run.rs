@@ -14,13 +14,16 @@ use crate::store::{Ending, Lease, StoreError};
 use crate::telemetry::metrics::Ended;
 
 /// Events on their way from the planning thread; when there are more, it waits.
-const ON_THE_WAY: usize = 256;
+const ON_THE_WAY: usize = 1024;
 
 /// Events stored in one step, at most.
 const BATCH: usize = 512;
 
 /// Events are stored at the latest so long after they happened.
 const DELAY: Duration = Duration::from_millis(50);
+
+/// Events of so long are taken at once: waking up for each of them costs more than storing it.
+const GATHERING: Duration = Duration::from_millis(5);
 
 impl Slot {
     /// Run the plan, store what it tells, and end it or give it back.
@@ -36,10 +39,12 @@ impl Slot {
         }
         let stop = Arc::new(StopFlag::default());
         let (events, told) = mpsc::channel(ON_THE_WAY);
+        let (telling, silent) = watch::channel(());
         let thread_name = format!("planner-{}", self.number);
         let engine = Arc::clone(&self.engine);
         let reports = Reports {
             events,
+            _telling: telling,
             stop: Arc::clone(&stop),
             instruments: Arc::clone(&self.instruments),
         };
@@ -53,7 +58,7 @@ impl Slot {
             }
         };
         let kept = tokio::select! {
-            kept = self.keep_events(&lease, told) => kept,
+            kept = self.keep_events(&lease, told, silent) => kept,
             never = stop_when_asked(&lease, self.phase.clone(), &stop) => match never {},
         };
         if !kept {
@@ -68,8 +73,14 @@ impl Slot {
         }
     }
 
-    /// Store events until there are no more; false when that became pointless.
-    async fn keep_events(&self, lease: &Lease, mut told: mpsc::Receiver<Event>) -> bool {
+    /// Store events until there are no more, of which `silent` tells by losing its sender; false
+    /// when that became pointless.
+    async fn keep_events(
+        &self,
+        lease: &Lease,
+        mut told: mpsc::Receiver<Event>,
+        mut silent: watch::Receiver<()>,
+    ) -> bool {
         let mut batch = Vec::new();
         let mut due = Instant::now();
         loop {
@@ -83,6 +94,10 @@ impl Slot {
                 due = Instant::now() + DELAY;
             }
             if more == Some(true) && batch.len() < BATCH {
+                tokio::select! {
+                    _ = silent.changed() => {}
+                    () = tokio::time::sleep(GATHERING) => {}
+                }
                 continue;
             }
             if !batch.is_empty() {

@@ -369,3 +369,38 @@ fn a_line_without_routes_is_refused() {
     let missing = run(&["bench", "price", "/nowhere/scenario.json"], "[]");
     assert_eq!(missing.status.code(), Some(1));
 }
+
+#[test]
+fn serve_measures_requests_refusals_streams_and_planning() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let out = directory.path().to_str().expect("UTF-8");
+    let least = [
+        "--rounds=1",
+        "--time-ms=50",
+        "--plans=2",
+        "--readers=3",
+        "--connections=2",
+    ];
+    let arguments = [
+        &["bench", "serve", "--out", out, "--scenario", "paper-1"],
+        &least[..],
+    ]
+    .concat();
+    let done = run(&arguments, "");
+    assert!(done.status.success(), "{done:?}");
+    for (table, rows, key) in [
+        ("requests", 3, "ratio"),
+        ("full-queue", 2, "p99 ms"),
+        ("streams", 2, "events 1/s"),
+        ("planning", 1, "ratio"),
+    ] {
+        let figures = column(&directory.path().join(format!("serve-{table}.csv")), key);
+        assert_eq!(figures.len(), rows, "{table}");
+        for figure in figures {
+            assert!(
+                figure.parse::<f64>().expect("a number") > 0.0,
+                "{table}: {figure}"
+            );
+        }
+    }
+}

@@ -14,13 +14,13 @@ mod determinism;
 mod events;
 mod idempotency;
 mod layering;
-
 mod logs;
 mod metrics;
 mod openapi;
 mod refusals;
 mod scenario;
 mod shutdown;
+mod siege;
 mod store_conformance;
 mod store_sqlite;
 mod store_trouble;

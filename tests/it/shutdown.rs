@@ -19,7 +19,13 @@ fn a_run_of(ms: u64) -> Value {
 
 /// Read until the plan is running.
 async fn running(service: &Service, address: &str) -> Stream {
-    let mut stream = Stream::open(service.get(&format!("{address}/events"))).await;
+    running_at(service, address, 10.0).await
+}
+
+/// The same, told so many points a second.
+async fn running_at(service: &Service, address: &str, rate_hz: f64) -> Stream {
+    let path = format!("{address}/events?rate={rate_hz}");
+    let mut stream = Stream::open(service.get(&path)).await;
     loop {
         match stream.next().await {
             Some(Block::Event { data, .. }) if data["status"] == "running" => return stream,
@@ -169,8 +175,9 @@ async fn open_streams_do_not_hold_up_the_end() {
     let service = Service::start(directory.path(), &["--workers", "1", "--grace", "2"]);
     let address = service.submit(&a_run_of(60_000)).await;
     let mut streams = Vec::new();
-    for _ in 0..100 {
-        streams.push(running(&service, &address).await);
+    for _ in 0..500 {
+        // Of so many readers only that they are let go matters.
+        streams.push(running_at(&service, &address, 0.01).await);
     }
     let begun = Instant::now();
     service.signal("TERM");

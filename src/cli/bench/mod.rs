@@ -11,6 +11,7 @@ mod progress;
 mod quality;
 mod rank_sum;
 mod report;
+mod serve;
 mod speed;
 mod summary;
 mod table;
@@ -34,6 +35,8 @@ pub(super) enum Command {
     Quality(quality::Arguments),
     /// Routes priced in a second, by waypoints, threats and population
     Speed(speed::Arguments),
+    /// The service under load: requests, refusals, streams and plans a second, beside a bare handler
+    Serve(serve::Arguments),
     /// The violation and cost of routes from standard input, for searches outside of this program
     Price(price::Arguments),
 }
@@ -60,6 +63,14 @@ pub(super) fn run(command: &Command) -> anyhow::Result<u8> {
         }),
         Command::Speed(arguments) => report(&arguments.common, "speed", |cases| {
             speed::measure(arguments, cases)
+        }),
+        Command::Serve(arguments) => serve::plays_a_role(arguments).and_then(|played| {
+            if played {
+                return Ok(());
+            }
+            report(&arguments.common, "serve", |cases| {
+                serve::measure(arguments, cases)
+            })
         }),
         Command::Price(arguments) => price::run(arguments),
     };

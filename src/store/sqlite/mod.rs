@@ -7,6 +7,7 @@ mod changes;
 mod idempotency;
 mod operations;
 mod read;
+mod records;
 mod removal;
 mod row;
 mod schema;
@@ -26,6 +27,7 @@ use tokio::sync::watch;
 
 use self::changes::Changes;
 use self::read::Readers;
+use self::records::Records;
 use self::writer::Writer;
 use super::{
     Clock, Ending, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError, Submitted,
@@ -51,6 +53,7 @@ pub struct SqliteStore {
     writer: Writer,
     readers: Arc<Readers>,
     changes: Arc<Changes>,
+    records: Arc<Records>,
     clock: Clock,
 }
 
@@ -106,11 +109,19 @@ impl SqliteStore {
         options: Options,
     ) -> Result<Self, StoreError> {
         let changes = Arc::new(Changes::default());
+        let records = Arc::new(Records::default());
         let clock = Arc::clone(&options.clock);
         Ok(Self {
-            writer: Writer::start(connection, lock, options, Arc::clone(&changes))?,
+            writer: Writer::start(
+                connection,
+                lock,
+                options,
+                Arc::clone(&changes),
+                Arc::clone(&records),
+            )?,
             readers: Readers::new(file),
             changes,
+            records,
             clock,
         })
     }
@@ -169,9 +180,18 @@ impl Store for SqliteStore {
     }
 
     async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {
+        if let Some(plan) = self.records.plan(id) {
+            return Ok(plan);
+        }
         let now_ms = (self.clock)();
+        let records = Arc::clone(&self.records);
         self.readers
-            .read(move |connection| read::get(connection, id, now_ms))
+            .read(move |connection| {
+                let version = records.version();
+                let plan = read::get(connection, id, now_ms)?;
+                records.keep_plan(version, &plan);
+                Ok(plan)
+            })
             .await
     }
 
@@ -232,7 +252,18 @@ impl Store for SqliteStore {
     }
 
     async fn stats(&self) -> Result<Stats, StoreError> {
-        self.readers.read(read::stats).await
+        if let Some(stats) = self.records.stats() {
+            return Ok(stats);
+        }
+        let records = Arc::clone(&self.records);
+        self.readers
+            .read(move |connection| {
+                let version = records.version();
+                let stats = read::stats(connection)?;
+                records.keep_stats(version, stats);
+                Ok(stats)
+            })
+            .await
     }
 
     async fn health(&self) -> Result<(), StoreError> {
@@ -242,6 +273,7 @@ impl Store for SqliteStore {
     async fn close(&self) {
         self.readers.close().await;
         self.writer.close().await;
+        self.records.close();
     }
 }
 

@@ -12,6 +12,7 @@ use tokio::sync::{oneshot, watch};
 
 use super::changes::Changes;
 use super::closed;
+use super::records::Records;
 use super::transaction::{Effect, Transaction};
 use super::{operations, removal};
 use crate::job::PlanId;
@@ -47,12 +48,14 @@ impl Writer {
         lock: File,
         options: Options,
         changes: Arc<Changes>,
+        records: Arc<Records>,
     ) -> Result<Self, StoreError> {
         let (messages, inbox) = channel();
         let mut desk = Desk {
             connection,
             options,
             changes,
+            records,
             messages: messages.clone(),
             waiting: VecDeque::new(),
             leases: HashMap::new(),
@@ -177,6 +180,7 @@ struct Desk {
     connection: Connection,
     options: Options,
     changes: Arc<Changes>,
+    records: Arc<Records>,
     messages: Sender<Message>,
     /// Claimers, in the order in which they came.
     waiting: VecDeque<Claimer>,
@@ -295,10 +299,16 @@ impl Desk {
             lost: None,
         };
         let result = work(&mut tx, &mut self.waiting);
+        let changed = tx.effects.iter().filter_map(|effect| match effect {
+            Effect::Changed(id) => Some(*id),
+            _ => None,
+        });
+        self.records.begin(changed);
         let committed = tx.still_open().and_then(|()| {
             tx.connection.prepare_cached("COMMIT")?.execute([])?;
             Ok(())
         });
+        self.records.end();
         if let Err(error) = committed {
             if !tx.connection.is_autocommit() {
                 tx.connection.execute_batch("ROLLBACK")?;

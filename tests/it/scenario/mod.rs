@@ -60,7 +60,7 @@ fn faults(text: &str) -> Vec<Fault> {
 const LEAST: &str = r#"{"start":{"x":0,"y":0,"z":0},"target":{"x":300,"y":400,"z":0},"altitude":{"min":0,"max":200}}"#;
 
 /// A document with everything in it; the cases below replace one part each.
-const FULL: &str = r#"{
+pub(crate) const FULL: &str = r#"{
 "name":"full","frame":"local",
 "start":{"x":100,"y":100,"z":0},"target":{"x":900,"y":800,"z":150},
 "area":{"min":{"x":0,"y":0},"max":{"x":1000,"y":1000}},

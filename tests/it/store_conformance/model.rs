@@ -22,6 +22,9 @@ enum Step {
     Release(usize),
     Cancel(usize),
     Delete(usize),
+    /// Where a plan stands; what is answered may come from what was read before.
+    Look(usize),
+    Sweep,
     Reopen,
 }
 
@@ -39,7 +42,9 @@ fn step() -> impl Strategy<Value = Step> {
         3 => (which.clone(), status).prop_map(|(lease, status)| Step::Finish(lease, status)),
         2 => which.clone().prop_map(Step::Release),
         2 => which.clone().prop_map(Step::Cancel),
-        1 => which.prop_map(Step::Delete),
+        1 => which.clone().prop_map(Step::Delete),
+        4 => which.prop_map(Step::Look),
+        1 => Just(Step::Sweep),
         1 => Just(Step::Reopen),
     ]
 }
@@ -98,6 +103,13 @@ impl Model {
                         .await;
                 }
             }
+            Step::Look(which) => {
+                if !self.plans.is_empty() {
+                    self.look(store, which % self.plans.len()).await;
+                }
+            }
+            // Nothing expires on a clock that stands.
+            Step::Sweep => assert_eq!(store.sweep(store.now_ms()).await.expect("it is open"), 0),
             Step::Reopen => {
                 store.reopen().await;
                 for which in 0..self.plans.len() {
@@ -177,17 +189,27 @@ impl Model {
         }
     }
 
+    async fn look(&self, store: &Fixture, which: usize) {
+        let expected = &self.plans[which];
+        let Some(status) = expected.status else {
+            assert_eq!(kind(store.get(expected.id).await), Err("gone"));
+            return;
+        };
+        let plan = store.get(expected.id).await.expect("it was not deleted");
+        assert_eq!(plan.status, status);
+        assert_eq!(plan.cancel_requested, expected.cancel_requested);
+        let place = self.queue.iter().position(|queued| *queued == which);
+        assert_eq!(plan.queue_position, place.map(|place| place as u64 + 1));
+        let stats = store.stats().await.expect("the store is open");
+        assert_eq!(stats.queued, self.queue.len() as u64);
+    }
+
     async fn compare(&self, store: &Fixture) {
         for (which, expected) in self.plans.iter().enumerate() {
+            self.look(store, which).await;
             let Some(status) = expected.status else {
-                assert_eq!(kind(store.get(expected.id).await), Err("gone"));
                 continue;
             };
-            let plan = store.get(expected.id).await.expect("it was not deleted");
-            assert_eq!(plan.status, status);
-            assert_eq!(plan.cancel_requested, expected.cancel_requested);
-            let place = self.queue.iter().position(|queued| *queued == which);
-            assert_eq!(plan.queue_position, place.map(|place| place as u64 + 1));
             compare_history(&history(&**store, expected.id).await, status);
         }
         for (which, (_, lease)) in self.leases.iter().enumerate() {

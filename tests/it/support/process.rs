@@ -1,6 +1,7 @@
 //! The real binary as a process of its own, always reaped.
 
 use std::io::{BufRead as _, BufReader, Write as _};
+use std::net::SocketAddr;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::time::Duration;
@@ -153,6 +154,33 @@ impl Service {
 
     pub(crate) fn client(&self) -> &Client {
         &self.client
+    }
+
+    /// Where it listens.
+    pub(crate) fn address(&self) -> SocketAddr {
+        let address = self
+            .url
+            .strip_prefix("http://")
+            .expect("it is announced so");
+        address.parse().expect("an address")
+    }
+
+    /// Memory that the process occupies now, KiB.
+    pub(crate) fn rss_kib(&self) -> u64 {
+        self.memory_kib("VmRSS:")
+    }
+
+    /// The most memory that the process has ever occupied, KiB.
+    pub(crate) fn peak_rss_kib(&self) -> u64 {
+        self.memory_kib("VmHWM:")
+    }
+
+    fn memory_kib(&self, name: &str) -> u64 {
+        let file = format!("/proc/{}/status", self.child.id());
+        let text = std::fs::read_to_string(file).expect("the process runs");
+        let line = text.lines().find_map(|line| line.strip_prefix(name));
+        let number = line.and_then(|line| line.split_whitespace().next());
+        number.expect("a line of it").parse().expect("a number")
     }
 
     pub(crate) fn get(&self, path: &str) -> RequestBuilder {

@@ -1,0 +1,170 @@
+//! Records that were read lately, so that asking where a plan stands again costs no query.
+//!
+//! What is returned is what a query would: nothing is, while a commit is under way, that the commit
+//! may change, and nothing read before a commit is kept after it. So whoever was answered about a
+//! change finds it.
+
+use std::collections::HashMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use crate::job::{Plan, PlanId};
+use crate::store::Stats;
+
+/// Records kept at most; when there are as many, all are forgotten.
+const CAPACITY: usize = 4_096;
+
+/// What was read, and as of which commit.
+#[derive(Default)]
+pub(super) struct Records(Mutex<Kept>);
+
+/// Counts the beginnings and ends of commits; odd while one is under way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Version(u64);
+
+#[derive(Default)]
+struct Kept {
+    version: u64,
+    plans: HashMap<PlanId, (u64, Plan)>,
+    stats: Option<(u64, Stats)>,
+}
+
+impl Records {
+    /// To be taken before what is to be kept is read.
+    pub(super) fn version(&self) -> Version {
+        Version(self.lock().version)
+    }
+
+    /// The record, if it is known to be as it was read: nothing has been committed since, or it has
+    /// ended and was not touched.
+    pub(super) fn plan(&self, id: PlanId) -> Option<Plan> {
+        let kept = self.lock();
+        let (version, plan) = kept.plans.get(&id)?;
+        (*version == kept.version || plan.status.is_final()).then(|| plan.clone())
+    }
+
+    /// The counts, if nothing has been committed since they were read.
+    pub(super) fn stats(&self) -> Option<Stats> {
+        let kept = self.lock();
+        let (version, stats) = kept.stats?;
+        (version == kept.version).then_some(stats)
+    }
+
+    /// Keep a record that was read after `version` was taken.
+    pub(super) fn keep_plan(&self, version: Version, plan: &Plan) {
+        let mut kept = self.lock();
+        if kept.still(version) {
+            if kept.plans.len() >= CAPACITY {
+                kept.plans.clear();
+            }
+            kept.plans.insert(plan.id, (version.0, plan.clone()));
+        }
+    }
+
+    /// Keep counts that were read after `version` was taken.
+    pub(super) fn keep_stats(&self, version: Version, stats: Stats) {
+        let mut kept = self.lock();
+        if kept.still(version) {
+            kept.stats = Some((version.0, stats));
+        }
+    }
+
+    /// A commit begins, which changes or removes these plans, and may change the places and counts of all.
+    pub(super) fn begin(&self, changed: impl Iterator<Item = PlanId>) {
+        let mut kept = self.lock();
+        kept.version += 1;
+        for id in changed {
+            kept.plans.remove(&id);
+        }
+    }
+
+    /// The commit is done, or has failed.
+    pub(super) fn end(&self) {
+        self.lock().version += 1;
+    }
+
+    /// Forget all for good.
+    pub(super) fn close(&self) {
+        let mut kept = self.lock();
+        *kept = Kept {
+            version: kept.version | 1,
+            ..Kept::default()
+        };
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Kept> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Kept {
+    fn still(&self, version: Version) -> bool {
+        version.0 == self.version && self.version.is_multiple_of(2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::{self, Status};
+
+    fn plan(id: u128, status: Status) -> Plan {
+        let submission = job::Submission {
+            id: PlanId::from_u128(id),
+            name: None,
+            algorithm: "tms-sba".to_owned(),
+            seed: 7,
+            iterations: 10,
+            scenario: String::new(),
+            created_ms: 0,
+            owner: None,
+            quota: None,
+            idempotency: None,
+            webhook: None,
+        };
+        Plan {
+            status,
+            ..Plan::accepted(&submission, 1)
+        }
+    }
+
+    #[test]
+    fn a_commit_ends_what_it_may_have_changed() {
+        let records = Records::default();
+        let [active, ended, touched] = [
+            (1, Status::Queued),
+            (2, Status::Failed),
+            (3, Status::Failed),
+        ]
+        .map(|(id, status)| plan(id, status));
+        for plan in [&active, &ended, &touched] {
+            records.keep_plan(records.version(), plan);
+            assert_eq!(records.plan(plan.id).as_ref(), Some(plan));
+        }
+        let before = records.version();
+        records.begin(std::iter::once(touched.id));
+        for during in [true, false] {
+            assert_eq!(records.plan(active.id), None);
+            assert_eq!(records.plan(touched.id), None);
+            assert_eq!(records.plan(ended.id).as_ref(), Some(&ended));
+            if during {
+                // Whether this was read before or after the commit cannot be known.
+                records.keep_plan(records.version(), &touched);
+                records.keep_plan(before, &touched);
+                records.end();
+            }
+        }
+        records.keep_plan(before, &touched);
+        assert_eq!(records.plan(touched.id), None, "read before the commit");
+        records.keep_plan(records.version(), &active);
+        assert_eq!(records.plan(active.id), Some(active));
+    }
+
+    #[test]
+    fn does_not_grow_without_bound() {
+        let records = Records::default();
+        for id in 0..3 * CAPACITY as u128 {
+            records.keep_plan(records.version(), &plan(id, Status::Failed));
+        }
+        assert!(records.lock().plans.len() <= CAPACITY);
+    }
+}

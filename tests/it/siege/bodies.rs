@@ -1,0 +1,174 @@
+//! Bodies that are longer than allowed, or not as long as they say.
+
+use std::io::Write as _;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::TcpStream;
+
+use super::PATIENCE;
+use crate::support::api::Api;
+use crate::support::process::Service;
+use crate::support::server::Server;
+
+/// Of the service of these tests.
+const LIMIT: usize = 4096;
+
+/// Send bytes, and read what is answered until the service closes the connection.
+async fn exchange(server: &Server, sent: &[u8]) -> String {
+    exchange_or_leave(server, sent, false).await
+}
+
+/// The same; who leaves says after the bytes that no more come.
+async fn exchange_or_leave(server: &Server, sent: &[u8], leaves: bool) -> String {
+    let mut stream = TcpStream::connect(server.address).await.expect("connected");
+    // The service may have had enough before all is sent.
+    let _ = stream.write_all(sent).await;
+    if leaves {
+        let _ = stream.shutdown().await;
+    }
+    let mut text = Vec::new();
+    let _ = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut text))
+        .await
+        .expect("an answer in time");
+    String::from_utf8(text).expect("UTF-8")
+}
+
+fn statuses(text: &str) -> Vec<&str> {
+    text.split("HTTP/1.1 ")
+        .skip(1)
+        .map(|answer| &answer[..3])
+        .collect()
+}
+
+fn post(headers: &str, body: &[u8]) -> Vec<u8> {
+    let head = format!(
+        "POST /plans HTTP/1.1\r\nhost: x\r\ncontent-type: application/json\r\n{headers}\r\n\r\n"
+    );
+    [head.as_bytes(), body].concat()
+}
+
+/// The small scenario, padded to so many bytes.
+fn document(length: usize) -> Vec<u8> {
+    let mut document = crate::support::scenario().to_string().into_bytes();
+    document.resize(length, b' ');
+    document
+}
+
+fn chunked(body: &[u8]) -> Vec<u8> {
+    let mut chunks = Vec::new();
+    for chunk in body.chunks(1000) {
+        chunks.extend(format!("{:x}\r\n", chunk.len()).into_bytes());
+        chunks.extend_from_slice(chunk);
+        chunks.extend(b"\r\n");
+    }
+    chunks.extend(b"0\r\n\r\n");
+    chunks
+}
+
+fn packed(plain: &[u8]) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(plain).expect("to memory");
+    encoder.finish().expect("to memory")
+}
+
+#[tokio::test]
+async fn a_body_is_held_to_the_limit_however_it_comes() {
+    let api = Api::new();
+    let server = Server::start(&api).await;
+    for (length, expected) in [(LIMIT, "202"), (LIMIT + 1, "413")] {
+        let plain = document(length);
+        let packed = packed(&plain);
+        for sent in [
+            post(
+                &format!("connection: close\r\ncontent-length: {length}"),
+                &plain,
+            ),
+            post(
+                "connection: close\r\ntransfer-encoding: chunked",
+                &chunked(&plain),
+            ),
+            post(
+                &format!(
+                    "connection: close\r\ncontent-encoding: gzip\r\ncontent-length: {}",
+                    packed.len()
+                ),
+                &packed,
+            ),
+            post(
+                "connection: close\r\ncontent-encoding: gzip\r\ntransfer-encoding: chunked",
+                &chunked(&packed),
+            ),
+        ] {
+            let answer = exchange(&server, &sent).await;
+            assert_eq!(statuses(&answer), [expected], "{answer}");
+        }
+    }
+    // Long before it is packed, but not after.
+    let noise: Vec<u8> = (0..=LIMIT).map(|idx| (idx * idx / 7 % 251) as u8).collect();
+    let sent = post(
+        &format!(
+            "connection: close\r\ncontent-encoding: gzip\r\ncontent-length: {}",
+            noise.len()
+        ),
+        &noise,
+    );
+    assert_eq!(statuses(&exchange(&server, &sent).await), ["413"]);
+}
+
+#[tokio::test]
+async fn a_false_length_harms_nobody_but_the_liar() {
+    let api = Api::new();
+    let server = Server::start(&api).await;
+    let body = document(1000);
+
+    // It says more than comes: half a document is no document.
+    let answer = exchange_or_leave(&server, &post("content-length: 2000", &body), true).await;
+    assert!(matches!(statuses(&answer)[..], [] | ["400"]), "{answer}");
+    // It says less: the rest is no request, and nothing after it is one either.
+    let answer = exchange(&server, &post("content-length: 10", &body)).await;
+    assert!(
+        statuses(&answer).iter().all(|status| *status == "400"),
+        "{answer}"
+    );
+    // It says two things, or nothing that is a length.
+    for headers in [
+        "content-length: 1000\r\ncontent-length: 10",
+        "content-length: -1",
+        "content-length: 1e3",
+        "content-length: 99999999999999999999999",
+        "transfer-encoding: chunked\r\ncontent-length: 10",
+    ] {
+        let answer = exchange(&server, &post(headers, &body)).await;
+        let known = ["400", "413"];
+        assert!(
+            statuses(&answer)
+                .iter()
+                .all(|status| known.contains(status)),
+            "{headers}: {answer}"
+        );
+    }
+    let stats = api.store.stats().await.expect("the store is open");
+    assert_eq!(stats.queued, 0);
+    assert_eq!(api.get("/readyz").await.status, 200);
+}
+
+#[tokio::test]
+async fn a_bomb_of_a_gibibyte_does_not_go_off() {
+    const MEMBERS: usize = 64;
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &["--workers", "1"]);
+    // Zeros, 16 MiB in each member.
+    let bomb = packed(&vec![0; 1 << 24]).repeat(MEMBERS);
+    let before = service.peak_rss_kib();
+    let request = service
+        .request(reqwest::Method::POST, "/plans")
+        .header("content-type", "application/json")
+        .header("content-encoding", "gzip")
+        .body(bomb);
+    let answer = request.send().await.expect("an answer");
+    assert_eq!(answer.status(), 413);
+    let grown = service.peak_rss_kib() - before;
+    assert!(grown < 64 * 1024, "{grown} KiB more");
+}

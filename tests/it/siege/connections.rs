@@ -1,0 +1,146 @@
+//! Callers who send too slowly or nothing at all, in masses, while others are served.
+
+use std::io::ErrorKind;
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use futures_util::future::join_all;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::TcpStream;
+use tokio::sync::watch;
+
+use super::{PATIENCE, size};
+use crate::support::process::Service;
+
+/// Everything until the service closes the connection.
+async fn until_closed(mut stream: TcpStream) -> String {
+    let mut text = Vec::new();
+    match tokio::time::timeout(PATIENCE, stream.read_to_end(&mut text)).await {
+        Ok(Ok(_)) => {}
+        Ok(Err(error)) => assert_eq!(error.kind(), ErrorKind::ConnectionReset),
+        Err(_) => panic!("the connection is never closed"),
+    }
+    String::from_utf8(text).expect("UTF-8")
+}
+
+/// Send `text` at once and then a byte of `drip` at a time until the service has had enough.
+async fn drip(address: SocketAddr, text: &str, drip: u8) -> String {
+    let stream = TcpStream::connect(address).await.expect("connected");
+    let (mut reading, mut writing) = stream.into_split();
+    writing.write_all(text.as_bytes()).await.expect("sent");
+    let dripping = tokio::spawn(async move {
+        while writing.write_all(&[drip]).await.is_ok() {
+            tokio::time::sleep(Duration::from_millis(100)).await;
+        }
+    });
+    let mut text = Vec::new();
+    let read = tokio::time::timeout(PATIENCE, reading.read_to_end(&mut text)).await;
+    match read.expect("the connection is closed in time") {
+        Ok(_) => {}
+        Err(error) => assert_eq!(error.kind(), ErrorKind::ConnectionReset),
+    }
+    dripping.abort();
+    String::from_utf8(text).expect("UTF-8")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn slow_and_silent_callers_are_let_go_while_others_are_served() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let limits = [
+        "--http-head-timeout",
+        "1",
+        "--http-body-timeout",
+        "1",
+        "--workers",
+        "1",
+    ];
+    let service = Service::start(directory.path(), &limits);
+    let address = service.address();
+    let (done, over) = watch::channel(());
+    let watched = async {
+        let mut answers = 0;
+        while !matches!(over.has_changed(), Err(_)) {
+            let answer = service.get("/readyz").send().await.expect("an answer");
+            assert_eq!(answer.status(), 200);
+            answers += 1;
+        }
+        answers
+    };
+    let siege = async {
+        let head = "POST /plans HTTP/1.1\r\nhost: x\r\n";
+        let body = format!("{head}content-type: application/json\r\ncontent-length: 1000\r\n\r\n");
+        // One after the other: who comes when the listener's backlog is full is not even refused.
+        let mut silent = Vec::new();
+        for caller in 0..size(1_000, 10_000) {
+            let mut stream = TcpStream::connect(address).await.expect("connected");
+            // Some have asked before, and then say nothing more.
+            let asks = caller % 2 == 0;
+            if asks {
+                let request = "GET /livez HTTP/1.1\r\nhost: x\r\n\r\n";
+                stream.write_all(request.as_bytes()).await.expect("sent");
+            }
+            silent.push(async move {
+                let text = until_closed(stream).await;
+                assert_eq!(text.contains("200 OK"), asks, "{text}");
+            });
+        }
+        let silent = join_all(silent);
+        let heads = join_all((0..20).map(|_| drip(address, head, b'x')));
+        let bodies = join_all((0..20).map(|_| drip(address, &body, b' ')));
+        let (_, heads, bodies) = tokio::join!(silent, heads, bodies);
+        for answer in heads {
+            assert!(
+                answer.is_empty() || answer.starts_with("HTTP/1.1 4"),
+                "{answer}"
+            );
+        }
+        for answer in bodies {
+            assert!(answer.starts_with("HTTP/1.1 408"), "{answer}");
+        }
+        drop(done);
+    };
+    let (answers, ()) = tokio::join!(watched, siege);
+    assert!(answers > 0);
+}
+
+/// For a connection with an open stream. hyper alone keeps two buffers of 8 KiB for each.
+const MOST_KIB: f64 = 28.0;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_idle_stream_costs_little_memory() {
+    let n_streams = size(1_000, 10_000);
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &["--workers", "1", "--grace", "0"]);
+    let mut endless = crate::support::scenario();
+    endless["planner"]["population"] = 10_000.into();
+    endless["planner"]["iterations"] = 30_000.into();
+    service.submit(&endless).await;
+    let waiting = service.submit(&crate::support::scenario()).await;
+    let open = async || {
+        let mut stream = TcpStream::connect(service.address())
+            .await
+            .expect("connected");
+        let request = format!("GET {waiting}/events HTTP/1.1\r\nhost: x\r\n\r\n");
+        stream.write_all(request.as_bytes()).await.expect("sent");
+        let mut text = String::new();
+        while !text.contains("\nevent: status\n") {
+            let mut some = [0; 2048];
+            let n = stream.read(&mut some).await.expect("an unbroken stream");
+            assert!(n > 0, "{text}");
+            text += std::str::from_utf8(&some[..n]).expect("UTF-8");
+        }
+        stream
+    };
+    // What the first ones cost is the service's, not a stream's.
+    let mut streams = Vec::new();
+    for _ in 0..100 {
+        streams.push(open().await);
+    }
+    let before = service.rss_kib();
+    for _ in 0..n_streams {
+        streams.push(open().await);
+    }
+    let each = (service.rss_kib().saturating_sub(before)) as f64 / n_streams as f64;
+    println!("{each:.1} KiB for each of {n_streams} idle streams");
+    assert!(each <= MOST_KIB, "{each:.1} KiB for each stream");
+}

@@ -1,0 +1,82 @@
+//! kill -9 again and again while plans come in: what was accepted is done, once, and what was done stays.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use bytes::Bytes;
+use tokio::time::Instant;
+
+use super::{Dice, size};
+use crate::support::process::Service;
+use crate::support::scenario;
+use crate::support::sse::{Stream, events};
+
+/// A kill comes so many milliseconds after the start at the latest.
+const LIFE_MS: usize = 400;
+
+/// What the caller knows.
+#[derive(Default)]
+struct Known {
+    accepted: Vec<String>,
+    finished: BTreeMap<String, Bytes>,
+}
+
+impl Known {
+    /// Post plans until there are `enough`, then look for results.
+    async fn grow(&mut self, service: &Service, enough: usize) {
+        while self.accepted.len() < enough {
+            let mut scenario = scenario();
+            scenario["planner"]["population"] = 50.into();
+            scenario["planner"]["iterations"] = 100.into();
+            scenario["planner"]["seed"] = self.accepted.len().into();
+            self.accepted.push(service.submit(&scenario).await);
+        }
+        for address in &self.accepted {
+            if self.finished.contains_key(address) {
+                continue;
+            }
+            let request = service.get(&format!("{address}/result"));
+            let answer = request.send().await.expect("an answer");
+            if answer.status() == 200 {
+                let result = answer.bytes().await.expect("a whole body");
+                self.finished.insert(address.clone(), result);
+            }
+        }
+        std::future::pending().await
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn kills_at_random_points_lose_nothing_and_repeat_nothing() {
+    let (n_kills, n_plans) = size((10, 60), (100, 200));
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let mut dice = Dice::new(1);
+    let mut known = Known::default();
+    for kill in 1..=n_kills {
+        let service = Service::start(directory.path(), &["--workers", "2"]);
+        // The point is random; whatever happens then is cut, a request on its way included.
+        let point = Instant::now() + Duration::from_millis(dice.below(LIFE_MS) as u64);
+        let enough = n_plans * kill / n_kills;
+        let _ = tokio::time::timeout_at(point, known.grow(&service, enough)).await;
+        service.kill();
+    }
+    let (accepted, finished) = (known.accepted, known.finished);
+    assert!(!accepted.is_empty());
+
+    let service = Service::start(directory.path(), &["--workers", "2"]);
+    for address in &accepted {
+        let ended = service.ended(address).await;
+        assert_eq!(ended["status"], "succeeded", "{address}");
+        let request = service.get(&format!("{address}/events?rate=0"));
+        let told = events(&Stream::open(request).await.rest().await);
+        let ends = told.iter().filter(|(_, name)| name == "end").count();
+        assert_eq!(ends, 1, "{address}");
+        assert_eq!(told.last().expect("events").1, "end", "{address}");
+        let ids: Vec<u64> = told.iter().map(|(id, _)| *id).collect();
+        assert_eq!(ids, (1..=ids.len() as u64).collect::<Vec<_>>(), "{address}");
+    }
+    for (address, before) in finished {
+        let after = service.bytes(&format!("{address}/result")).await;
+        assert_eq!(after, before, "{address}");
+    }
+}

@@ -1,0 +1,48 @@
+//! Trying to break the service: kills, races, cut and stalled readers, slow and lying callers, masses.
+//!
+//! `NOCTULE_SIEGE=full` runs each at the size of docs/RELIABILITY.md, otherwise at one that fits CI.
+
+mod bodies;
+mod connections;
+mod hostile;
+mod kill;
+mod masses;
+mod queue;
+mod races;
+mod streams;
+
+use std::time::Duration;
+
+/// A hanging test fails after this.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// How much to do.
+pub(crate) fn size<T>(in_ci: T, full: T) -> T {
+    if std::env::var_os("NOCTULE_SIEGE").is_some_and(|size| size == "full") {
+        full
+    } else {
+        in_ci
+    }
+}
+
+/// Numbers that look random and are the same each time: `SplitMix64`.
+pub(crate) struct Dice(u64);
+
+impl Dice {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// From 0 to `n` - 1.
+    pub(crate) fn below(&mut self, n: usize) -> usize {
+        usize::try_from(self.next() % n as u64).expect("less than n")
+    }
+}

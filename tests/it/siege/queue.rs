@@ -1,0 +1,56 @@
+//! More than the queue takes, and asking at once for what was just accepted.
+
+use axum::http::StatusCode;
+use futures_util::future::join_all;
+use reqwest::Client;
+
+use crate::support::api::Api;
+use crate::support::scenario;
+use crate::support::server::Server;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_thousand_more_than_there_is_room_for_are_a_thousand_refusals() {
+    const QUEUE: usize = 50;
+    let api = Api::with_queue(QUEUE);
+    let mut running = Vec::new();
+    for _ in 0..api.state.capacity.workers {
+        api.submit().await;
+        running.push(api.store.claim().await.expect("it is queued"));
+    }
+    let scenario = scenario();
+    let posts = (0..QUEUE + 1_000).map(|_| api.post("/plans", &scenario));
+    let mut accepted = 0;
+    for answer in join_all(posts).await {
+        if answer.status == StatusCode::ACCEPTED {
+            accepted += 1;
+        } else {
+            answer.expect_problem(503, "queue-full");
+            let seconds: u64 = answer.header("retry-after").parse().expect("seconds");
+            assert!((1..=600).contains(&seconds), "{seconds}");
+        }
+    }
+    assert_eq!(accepted, QUEUE);
+    let stats = api.store.stats().await.expect("the store is open");
+    assert_eq!((stats.queued, stats.running), (QUEUE as u64, 2));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_was_accepted_is_there_at_once() {
+    let api = Api::new();
+    let server = Server::start(&api).await;
+    let client = Client::builder().no_proxy().build().expect("a client");
+    let scenario = scenario();
+    join_all((0..200).map(async |_| {
+        let request = client.post(server.url("/plans")).json(&scenario);
+        let answer = request.send().await.expect("an answer");
+        assert_eq!(answer.status(), 202);
+        let address = answer.headers()["location"]
+            .to_str()
+            .expect("visible ASCII");
+        for path in ["", "/scenario"] {
+            let request = client.get(server.url(&format!("{address}{path}")));
+            assert_eq!(request.send().await.expect("an answer").status(), 200);
+        }
+    }))
+    .await;
+}

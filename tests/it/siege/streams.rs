@@ -1,0 +1,195 @@
+//! Readers of events: cut anywhere, many, and one who does not read.
+
+use futures_util::future::join_all;
+use noctule::job::{Event, Status};
+use reqwest::Client;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::TcpStream;
+
+use super::{Dice, PATIENCE};
+use crate::support::api::Api;
+use crate::support::run;
+use crate::support::server::Server;
+
+/// A plan on a real port, whose run the test plays.
+struct Plan {
+    api: Api,
+    server: Server,
+    address: String,
+    client: Client,
+}
+
+impl Plan {
+    async fn new() -> Self {
+        let api = Api::new();
+        Self {
+            server: Server::start(&api).await,
+            address: api.submit().await,
+            client: Client::builder().no_proxy().build().expect("a client"),
+            api,
+        }
+    }
+
+    /// Run it, in batches of some events, until `n` iterations are told.
+    async fn run(&self, n: usize) {
+        let lease = self.api.store.claim().await.expect("it is queued");
+        for first in (0..n).step_by(20) {
+            let told = (first..n.min(first + 20)).flat_map(|iteration| {
+                let elapsed_ms = iteration as f64 * 10.0;
+                let better = iteration.is_multiple_of(3);
+                better
+                    .then(|| run::incumbent(iteration, elapsed_ms))
+                    .into_iter()
+                    .chain([run::convergence(iteration, elapsed_ms)])
+            });
+            let told: Vec<Event> = told.collect();
+            self.api
+                .store
+                .append(&lease, told)
+                .await
+                .expect("the lease holds");
+        }
+        run::finish(&*self.api.store, &lease, Status::Succeeded).await;
+    }
+
+    /// Read after event `after` until the end or until `bytes` have come, and let go of the connection.
+    async fn read(&self, query: &str, after: u64, bytes: usize) -> Vec<Told> {
+        let request = self
+            .client
+            .get(self.server.url(&format!("{}/events{query}", self.address)))
+            .header("last-event-id", after);
+        let mut answer = request.send().await.expect("an answer");
+        assert_eq!(answer.status(), 200);
+        let mut text = Vec::new();
+        while text.len() < bytes
+            && let Some(chunk) = answer.chunk().await.expect("an unbroken stream")
+        {
+            text.extend_from_slice(&chunk);
+        }
+        text.truncate(bytes);
+        told(&text)
+    }
+}
+
+/// An event, by its id and name.
+type Told = (u64, String);
+
+/// The whole events of a stream that may have been cut anywhere.
+fn told(text: &[u8]) -> Vec<Told> {
+    let whole = text
+        .windows(2)
+        .rposition(|pair| pair == b"\n\n")
+        .map_or(0, |end| end + 1);
+    let text = std::str::from_utf8(&text[..whole]).expect("UTF-8");
+    let mut told = Vec::new();
+    for block in text.split("\n\n") {
+        if let Some((id, rest)) = block
+            .trim_start()
+            .strip_prefix("id: ")
+            .and_then(|rest| rest.split_once('\n'))
+        {
+            let name = rest
+                .lines()
+                .next()
+                .and_then(|line| line.strip_prefix("event: "));
+            told.push((
+                id.parse().expect("a number"),
+                name.expect("a name").to_owned(),
+            ));
+        }
+    }
+    told
+}
+
+/// What `cuts` connections, each cut at a random byte, and a last one tell together.
+async fn read_with_cuts(plan: &Plan, query: &str, cuts: usize, dice: &mut Dice) -> Vec<Told> {
+    let mut all: Vec<Told> = Vec::new();
+    for cut in 0..=cuts {
+        let bytes = if cut < cuts {
+            dice.below(900)
+        } else {
+            usize::MAX
+        };
+        let after = all.last().map_or(0, |(id, _)| *id);
+        if all.last().is_some_and(|(_, name)| name == "end") {
+            break;
+        }
+        all.extend(plan.read(query, after, bytes).await);
+    }
+    all
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_hundred_cuts_anywhere_lose_nothing_and_repeat_nothing() {
+    let plan = Plan::new().await;
+    let mut dice = Dice::new(7);
+    let (live, ()) = tokio::join!(
+        read_with_cuts(&plan, "?rate=0", 100, &mut dice),
+        plan.run(600)
+    );
+    let ids: Vec<u64> = live.iter().map(|(id, _)| *id).collect();
+    assert_eq!(ids, (1..=ids.len() as u64).collect::<Vec<_>>());
+    assert_eq!(live.iter().filter(|(_, name)| name == "end").count(), 1);
+    assert_eq!(live, plan.read("?rate=0", 0, usize::MAX).await);
+
+    // Of a thinned stream the same events, wherever it is cut.
+    let whole = plan.read("?rate=20", 0, usize::MAX).await;
+    assert!(whole.len() < live.len() / 2, "{} events", whole.len());
+    for _ in 0..10 {
+        assert_eq!(
+            read_with_cuts(&plan, "?rate=20", 10, &mut dice).await,
+            whole
+        );
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn five_hundred_readers_see_every_incumbent_and_one_end() {
+    let plan = Plan::new().await;
+    let readers = join_all((0..500).map(|_| plan.read("?rate=0", 0, usize::MAX)));
+    let all = tokio::time::timeout(PATIENCE, async { tokio::join!(readers, plan.run(60)).0 });
+    for told in all.await.expect("in time") {
+        let count = |wanted: &str| told.iter().filter(|(_, name)| name == wanted).count();
+        assert_eq!(
+            (count("incumbent"), count("convergence"), count("end")),
+            (20, 60, 1)
+        );
+        assert!(told.is_sorted_by(|a, b| a.0 < b.0));
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_reader_who_does_not_read_costs_the_others_nothing() {
+    let plan = Plan::new().await;
+    let mut stalled = TcpStream::connect(plan.server.address)
+        .await
+        .expect("connected");
+    let request = format!(
+        "GET {}/events?rate=0 HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n",
+        plan.address
+    );
+    stalled.write_all(request.as_bytes()).await.expect("sent");
+
+    // More than the buffers of a connection hold.
+    let all = tokio::time::timeout(PATIENCE, async {
+        tokio::join!(plan.read("?rate=0", 0, usize::MAX), plan.run(20_000)).0
+    });
+    let others = all
+        .await
+        .expect("nobody waits for the one who does not read");
+    assert_eq!(others.last().map(|(_, name)| name.as_str()), Some("end"));
+
+    let mut text = Vec::new();
+    let rest = tokio::time::timeout(PATIENCE, stalled.read_to_end(&mut text));
+    rest.await.expect("in time").expect("an unbroken stream");
+    let text = String::from_utf8(text).expect("UTF-8");
+    assert_eq!(
+        text.matches("\nevent: end\n").count(),
+        1,
+        "the reader gets everything after all"
+    );
+    assert_eq!(
+        text.matches("\nevent: incumbent\n").count(),
+        20_000_usize.div_ceil(3)
+    );
+}

@@ -2,7 +2,10 @@
 # manager, no root. Run it with a read-only root file system; all it writes goes to /data:
 #
 #     docker build -t noctule .
-#     docker run --read-only -p 8080:8080 -v noctule:/data noctule
+#     docker run --read-only -p 127.0.0.1:8080:8080 -v noctule:/data noctule
+#
+# Who may use it is decided by where its port is published, as above on this machine alone; for others,
+# give it keys: docker run -v ./keys.toml:/keys.toml:ro -e NOCTULE_KEYS_FILE=/keys.toml -p 8080:8080 ...
 
 FROM rust:1-slim-bookworm AS builder
 WORKDIR /build
@@ -19,6 +22,7 @@ RUN mkdir src benches \
 COPY src src
 COPY openapi.yaml ./
 COPY docs/PROBLEMS.md docs/
+COPY scenarios scenarios
 # Cargo goes by times of change; those of the copied files may lie before the build above.
 RUN touch src/lib.rs src/main.rs \
     && cargo build --release --locked \
@@ -41,4 +45,5 @@ EXPOSE 8080
 STOPSIGNAL SIGTERM
 HEALTHCHECK --interval=10s --timeout=5s --start-period=10s CMD ["noctule", "healthcheck"]
 ENTRYPOINT ["noctule"]
-CMD ["serve", "--listen", "0.0.0.0:8080", "--data-dir", "/data"]
+# A container's own loopback is reached by nobody; with keys the switch changes nothing.
+CMD ["serve", "--listen", "0.0.0.0:8080", "--allow-anonymous", "--data-dir", "/data"]

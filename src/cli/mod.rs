@@ -1,7 +1,9 @@
-//! The command line: serve, plan, bench, store, healthcheck.
+//! The command line: serve, plan, bench, key, store, healthcheck.
 
+mod access;
 mod bench;
 mod healthcheck;
+mod key;
 mod plan;
 mod serve;
 mod store;
@@ -27,6 +29,9 @@ enum Command {
     /// Measure the algorithms: against each other, against the best known routes, against the clock
     #[command(subcommand)]
     Bench(bench::Command),
+    /// Make keys for those who may use a service
+    #[command(subcommand)]
+    Key(key::Command),
     /// Copy the stored plans, or look for damage among them
     #[command(subcommand)]
     Store(store::Command),
@@ -66,6 +71,7 @@ pub fn run() -> ExitCode {
         Command::Serve(flags) => serve::run(&flags).map(|()| exit::DONE),
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Bench(command) => bench::run(&command),
+        Command::Key(command) => key::run(&command).map(|()| exit::DONE),
         Command::Store(command) => store::run(command),
         Command::Healthcheck(arguments) => healthcheck::run(&arguments).map(|()| exit::DONE),
     };

@@ -5,15 +5,16 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use tokio::net::{TcpListener, TcpSocket};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::watch;
 use tokio::time::Instant;
 
-use super::exit;
+use super::{access, exit};
 use crate::config::{self, Config, Flags};
-use crate::http::{self, AppState, Capacity, InFlight, Phase};
+use crate::http::webhook::{self, Secret, Sender};
+use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase};
 use crate::job::Failure;
 use crate::planner;
 use crate::scenario::json::{self, Rules};
@@ -35,7 +36,7 @@ const LAST_ANSWERS: Duration = Duration::from_secs(5);
 /// Serve until a signal, or print the configuration.
 pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
     let loaded = config::load(flags, |name| std::env::var_os(name))
-        .map_err(|faults| anyhow::anyhow!("wrong configuration\n  {}", faults.join("\n  ")))?;
+        .map_err(|faults| anyhow!("wrong configuration\n  {}", faults.join("\n  ")))?;
     if flags.print_config {
         return Ok(loaded.write_toml(&mut std::io::stdout().lock())?);
     }
@@ -57,6 +58,10 @@ pub(super) fn start(config: &Config) -> anyhow::Result<()> {
 
 async fn serve(config: &Config) -> anyhow::Result<()> {
     let mut signals = Signals::new()?;
+    let access = access::open(config)?;
+    let cors =
+        Origins::read(&config.cors_origins).map_err(|fault| anyhow!("cors_origins: {fault}"))?;
+    let webhooks = webhooks(&config.webhook)?;
     let listener =
         listen(config.listen).with_context(|| format!("cannot listen on {}", config.listen))?;
     let instruments = Arc::new(Instruments::default());
@@ -73,6 +78,9 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     };
     let pool = Pool::start(store.clone(), settings, engine());
     let sweeper = Sweeper::start(store.clone(), store::wall_clock());
+    let sender = webhooks
+        .clone()
+        .map(|settings| Sender::start(store.clone(), settings));
     let (phase, watched) = watch::channel(Phase::Serving);
     let router = http::router(AppState {
         store: store.clone(),
@@ -84,9 +92,13 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         in_flight: InFlight::default(),
         clock_jump_ms: sweeper.clock_jump_ms(),
         body_timeout: config.http.body_timeout,
+        access: access.clone(),
+        webhooks: webhooks.clone(),
+        cors,
         phase: watched.clone(),
         instruments: instruments.clone(),
     });
+    access::reload_on_hangup(config, access)?;
     announce(&listener)?;
     let times = Times::within(config.grace);
     let settings = http::server::Settings {
@@ -115,7 +127,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     if let Ok(ended) = tokio::time::timeout_at(signalled + times.answers, server).await {
         ended.context("the server broke")?;
     }
-    drop(sweeper);
+    drop((sweeper, sender));
     store.close().await;
     tracing::info!(
         duration_ms = signalled.elapsed().as_secs_f64() * 1e3,
@@ -174,6 +186,20 @@ async fn open_store(config: &Config) -> anyhow::Result<Arc<dyn Store>> {
         Ok(Arc::new(store))
     });
     Ok(Arc::new(Reopening::start(open).await))
+}
+
+/// How ends of plans are told; `None` when nobody is.
+fn webhooks(config: &config::Webhook) -> anyhow::Result<Option<webhook::Settings>> {
+    let Some(path) = &config.secret_file else {
+        return Ok(None);
+    };
+    let place = || format!("the webhook secret of {}", path.display());
+    let text = std::fs::read_to_string(path).with_context(place)?;
+    let secret = Secret::read(&text).map_err(|allowed| anyhow!("{} {allowed}", place()))?;
+    Ok(Some(webhook::Settings {
+        secret,
+        allow_private: config.allow_private,
+    }))
 }
 
 /// Of a setting, 0 is no limit.

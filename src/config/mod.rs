@@ -1,6 +1,6 @@
 //! What the operator sets, as plain structs that are handed down in parts.
 //!
-//! A setting is a field here with its default, and a row in [`settings`]; its flag, its variable and
+//! A setting is a field here with its default, and a row in `settings`; its flag, its variable and
 //! its key in the file follow from the row. Where several give it, the flag counts, then the
 //! variable, then the file. Deliberately absent: what a setting does.
 
@@ -34,6 +34,12 @@ pub struct Config {
     pub queue: usize,
     /// Time from a signal to the exit.
     pub grace: Duration,
+    /// The keys of those who may use the service; `None` when it is for everybody who reaches it.
+    pub keys_file: Option<PathBuf>,
+    /// Whether it may be reached from other machines without keys.
+    pub allow_anonymous: bool,
+    /// Origins of pages from elsewhere that may use it.
+    pub cors_origins: Vec<String>,
     /// What is logged.
     pub log: Filter,
     /// How log lines are written.
@@ -44,6 +50,8 @@ pub struct Config {
     pub otlp_headers: Headers,
     /// Of connections and requests.
     pub http: Http,
+    /// Of the ends of plans, told to addresses that callers name.
+    pub webhook: Webhook,
     /// How long plans are kept.
     pub retention: Retention,
     /// Upper limits on a scenario.
@@ -59,6 +67,19 @@ pub struct Http {
     pub body_timeout: Duration,
     /// Connections open at once; more wait in the listener's backlog.
     pub max_connections: usize,
+    /// Event streams open at once.
+    pub streams: usize,
+    /// Event streams open at once of the owner of a key.
+    pub streams_per_key: usize,
+}
+
+/// Of the ends of plans, told to addresses that callers name.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Webhook {
+    /// Holds the secret that is shared with receivers; `None` tells nobody.
+    pub secret_file: Option<PathBuf>,
+    /// Whether receivers may be elsewhere than on the public internet, and without TLS.
+    pub allow_private: bool,
 }
 
 /// How long ended plans are kept: until the first of these limits; 0 is none.
@@ -83,11 +104,15 @@ impl Default for Config {
             workers: std::thread::available_parallelism().map_or(1, Into::into),
             queue: 1000,
             grace: Duration::from_secs(10),
+            keys_file: None,
+            allow_anonymous: false,
+            cors_origins: Vec::new(),
             log: Filter::default(),
             log_format: LogFormat::Text,
             otlp_endpoint: None,
             otlp_headers: Headers::default(),
             http: Http::default(),
+            webhook: Webhook::default(),
             retention: Retention::default(),
             limits: Limits::default(),
         }
@@ -100,6 +125,8 @@ impl Default for Http {
             head_timeout: Duration::from_secs(30),
             body_timeout: Duration::from_secs(30),
             max_connections: 20_000,
+            streams: 10_000,
+            streams_per_key: 1_000,
         }
     }
 }

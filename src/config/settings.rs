@@ -9,7 +9,7 @@ use super::value::{Given, Value};
 
 /// Every setting, in the order in which they are shown.
 pub(super) fn all() -> Vec<Setting> {
-    [service(), http(), retention(), limits()]
+    [service(), http(), webhook(), retention(), limits()]
         .into_iter()
         .flatten()
         .collect()
@@ -52,6 +52,27 @@ fn service() -> Vec<Setting> {
             "Time from a signal to the exit: what runs may finish in it, the rest goes back to the queue",
             Duration::ZERO..=Duration::from_secs(3600),
             |c| &mut c.grace,
+        ),
+        row(
+            "keys_file",
+            "FILE",
+            "Keys of those who may use the service, see noctule key new; NOCTULE_KEYS may hold them instead",
+            ..,
+            |c| &mut c.keys_file,
+        ),
+        row(
+            "allow_anonymous",
+            "BOOL",
+            "Let the service be reached from other machines though it has no keys",
+            ..,
+            |c| &mut c.allow_anonymous,
+        ),
+        row(
+            "cors_origins",
+            "ORIGINS",
+            "Origins of pages from elsewhere that may use the service, such as https://plans.example",
+            ..,
+            |c| &mut c.cors_origins,
         ),
         row(
             "log",
@@ -110,6 +131,39 @@ fn http() -> Vec<Setting> {
             "Connections open at once; more wait in the listener's backlog",
             1..=1_000_000,
             |c| &mut c.http.max_connections,
+        ),
+        row(
+            "http.streams",
+            "N",
+            "Event streams open at once; more are refused with 429 too-many-streams",
+            1..=1_000_000,
+            |c| &mut c.http.streams,
+        ),
+        row(
+            "http.streams_per_key",
+            "N",
+            "Event streams open at once of the owner of a key",
+            1..=1_000_000,
+            |c| &mut c.http.streams_per_key,
+        ),
+    ]
+}
+
+fn webhook() -> Vec<Setting> {
+    vec![
+        row(
+            "webhook.secret_file",
+            "FILE",
+            "Holds the secret, whsec_..., that signs webhooks; without one there are none",
+            ..,
+            |c| &mut c.webhook.secret_file,
+        ),
+        row(
+            "webhook.allow_private",
+            "BOOL",
+            "Let webhooks go to private addresses too, and without TLS",
+            ..,
+            |c| &mut c.webhook.allow_private,
         ),
     ]
 }

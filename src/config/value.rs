@@ -283,6 +283,9 @@ impl Value for Vec<String> {
     }
 
     fn to_toml(&self) -> Option<String> {
+        if self.is_empty() {
+            return None;
+        }
         let items: Vec<String> = self.iter().map(|item| quoted(item)).collect();
         Some(format!("[{}]", items.join(", ")))
     }

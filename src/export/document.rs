@@ -21,8 +21,11 @@ pub struct ResultDocument {
     pub scenario_sha256: String,
     /// Whether the waypoints meet every constraint.
     pub feasible: bool,
-    /// `iterations`, `converged`, `time-limit` or `cancelled`.
-    pub stop_reason: String,
+    /// `iterations`, `converged`, `time-limit` or `cancelled`; `None` before the end.
+    pub stop_reason: Option<String>,
+    /// False before the end, left out afterwards.
+    #[serde(rename = "final", default, skip_serializing_if = "Option::is_none")]
+    pub is_final: Option<bool>,
     /// Weighted terms and their sum.
     pub cost: Cost,
     /// Only with the paper's quadrature: the same route by the exact integral.
@@ -204,7 +207,8 @@ impl ResultDocument {
             engine_version: env!("CARGO_PKG_VERSION").to_owned(),
             scenario_sha256: origin.scenario_sha256,
             feasible: outcome.feasible,
-            stop_reason: outcome.stop_reason.name().to_owned(),
+            stop_reason: Some(outcome.stop_reason.name().to_owned()),
+            is_final: None,
             cost: outcome.cost.into(),
             cost_integral: outcome.cost_integral.map(Into::into),
             bound: Bound {
@@ -246,6 +250,12 @@ impl From<Point3> for Position {
             y: point.y,
             z: point.z,
         }
+    }
+}
+
+impl From<Position> for Point3 {
+    fn from(position: Position) -> Self {
+        Self::new(position.x, position.y, position.z)
     }
 }
 

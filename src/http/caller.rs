@@ -1,11 +1,10 @@
 //! Who asks, and what is theirs to see.
 
-use std::convert::Infallible;
-
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 
 use super::AppState;
+use super::auth::{Digest, Key, Scope, Unauthorized};
 use super::problem::Problem;
 use crate::job::{Owner, Plan, PlanId};
 use crate::store::{Store, StoreError};
@@ -19,6 +18,8 @@ pub(super) struct Caller {
     pub(super) sees_all: bool,
     /// Active plans that this caller may have.
     pub(super) quota: Option<u64>,
+    /// The sum of that key.
+    pub(super) key: Option<Digest>,
 }
 
 impl Caller {
@@ -27,7 +28,18 @@ impl Caller {
         owner: None,
         sees_all: true,
         quota: None,
+        key: None,
     };
+
+    /// Who has this key.
+    pub(super) fn of(key: &Key) -> Self {
+        Self {
+            owner: Some(key.owner.clone()),
+            sees_all: key.may(Scope::Admin),
+            quota: key.active_plans,
+            key: Some(key.digest()),
+        }
+    }
 
     /// The record of a plan that is this caller's to see; that of another is not there.
     pub(super) async fn plan(&self, store: &dyn Store, id: PlanId) -> Result<Plan, Problem> {
@@ -47,10 +59,14 @@ impl Caller {
 }
 
 impl FromRequestParts<AppState> for Caller {
-    type Rejection = Infallible;
+    type Rejection = Problem;
 
-    async fn from_request_parts(parts: &mut Parts, _: &AppState) -> Result<Self, Infallible> {
-        Ok(parts.extensions.get().cloned().unwrap_or(Self::ANYBODY))
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, Problem> {
+        match parts.extensions.get() {
+            Some(caller) => Ok(Self::clone(caller)),
+            None if state.access.is_guarded() => Err(Problem::Unauthorized(Unauthorized::Nothing)),
+            None => Ok(Self::ANYBODY),
+        }
     }
 }
 
@@ -64,6 +80,7 @@ mod tests {
             owner: Some(name.to_owned()),
             sees_all: false,
             quota: None,
+            key: None,
         };
         let (alice, bob) = ("alice".to_owned(), "bob".to_owned());
         assert!(named("alice").may_see(Some(&alice)));

@@ -7,8 +7,9 @@ use axum::response::{IntoResponse, Response};
 use super::caller::Caller;
 use super::params::{self, Id, Params};
 use super::problem::Problem;
-use super::{AppState, accept, off_thread, retry};
+use super::{AppState, accept, off_thread, partial, retry};
 use crate::export::{self, Format, ResultInput};
+use crate::job::PlanId;
 
 /// `GET /plans/{id}/scenario`.
 pub(super) async fn scenario(
@@ -31,9 +32,16 @@ pub(super) async fn result(
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let params = Params::read(&uri, &["format"])?;
+    let params = Params::read(&uri, &["format", "partial"])?;
+    let partial = params.parse("partial", "true or false")?.unwrap_or(false);
     let plan = caller.plan(&*state.store, id).await?;
     let format = choose_format(&params, &headers)?;
+    if partial
+        && !plan.status.is_final()
+        && let Some(so_far) = partial::result(&state, &plan).await?
+    {
+        return written(&state, id, format, so_far).await;
+    }
     if !plan.status.is_final() {
         let retry_after_s = retry::for_end(&plan, &state.store.stats().await?, state.capacity);
         return Err(Problem::NotReady {
@@ -49,13 +57,23 @@ pub(super) async fn result(
             failure: plan.error,
         });
     };
+    written(&state, id, format, stored).await
+}
+
+/// A result in the format that was asked for.
+async fn written(
+    state: &AppState,
+    id: PlanId,
+    format: &Format,
+    result: String,
+) -> Result<Response, Problem> {
     let document = match format.write {
-        None => stored,
+        None => result,
         Some(write) => {
             let scenario = state.store.scenario(id).await?;
             off_thread::run(move || {
                 write(&ResultInput {
-                    result: &stored,
+                    result: &result,
                     scenario: &scenario,
                 })
             })

@@ -10,6 +10,7 @@ use std::convert::Infallible;
 use std::sync::Arc;
 use tracing::{Instrument as _, Span};
 
+use super::auth::{Access, Digest, Permit};
 use super::caller::Caller;
 use super::feed::{Feed, Told};
 use super::params::{self, Id, Params};
@@ -36,7 +37,7 @@ pub(super) async fn follow(
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let params = Params::read(&uri, &["rate", "last_event_id"])?;
+    let params = Params::read(&uri, &["rate", "last_event_id", "ticket"])?;
     let rate_hz = read_rate(&params)?;
     let after = read_last_event_id(&params, &headers)?;
     let media_type =
@@ -52,11 +53,18 @@ pub(super) async fn follow(
             return Ok(StatusCode::NO_CONTENT.into_response());
         }
     }
+    let permit = state
+        .access
+        .open_stream(caller.owner.as_ref())
+        .map_err(Problem::TooManyStreams)?;
     let feed = Feed::new(state.store.clone(), state.phase.clone(), id, after, rate_hz);
     let stream = Stream {
         feed,
         store: state.store,
+        _permit: permit,
         _counted: state.instruments.metrics.stream(),
+        access: state.access,
+        key: caller.key,
         span: Span::current(),
     };
     Ok(streamed(stream, Wire::of(media_type)))
@@ -87,11 +95,14 @@ fn read_last_event_id(params: &Params, headers: &HeaderMap) -> Result<u64, Probl
         .map_err(|_| params::refused(LAST_EVENT_ID.as_str(), &header, ALLOWED))
 }
 
-/// What one open stream holds on to.
+/// What one open stream holds on to, whether anybody reads it or not.
 struct Stream {
     feed: Feed,
     store: Arc<dyn Store>,
+    _permit: Permit,
     _counted: Held,
+    access: Access,
+    key: Option<Digest>,
     /// The request's: its lines are written after its answer has begun.
     span: Span,
 }
@@ -121,7 +132,12 @@ fn streamed(stream: Stream, wire: Wire) -> Response {
 impl Stream {
     /// What is sent next; `None` at the end.
     async fn next(&mut self, wire: Wire) -> Option<String> {
-        Some(match self.feed.next().await? {
+        let told = tokio::select! {
+            told = self.feed.next() => told?,
+            // A key that is taken away takes its streams along.
+            () = self.access.withdrawn(self.key) => return None,
+        };
+        Some(match told {
             Told::Events(events) => self.written(events, wire).await,
             Told::Gap { from, to } => {
                 let mut text = String::new();
@@ -133,12 +149,18 @@ impl Stream {
         })
     }
 
+    /// As the record tells, which is shorter than the result.
+    async fn has_result(&self) -> bool {
+        let plan = self.store.get(self.feed.plan_id()).await;
+        plan.is_ok_and(|plan| plan.stop_reason.is_some())
+    }
+
     async fn written(&self, events: Vec<NumberedEvent>, wire: Wire) -> String {
         let plan = self.feed.plan_id();
         let mut text = String::new();
         for event in events {
             let ends = matches!(event.event, Event::End(_));
-            let has_result = ends && matches!(self.store.result(plan).await, Ok(Some(_)));
+            let has_result = ends && self.has_result().await;
             wire.write(Outgoing::new(plan, event, has_result), &mut text);
         }
         text

@@ -4,7 +4,9 @@
 //! the worker's threads, and storage, which sits behind [`Store`].
 
 mod accept;
+pub mod auth;
 mod body;
+mod browser;
 mod caller;
 mod documents;
 mod events;
@@ -14,6 +16,7 @@ mod metrics;
 mod off_thread;
 mod pages;
 mod params;
+mod partial;
 mod phase;
 mod plans;
 mod prefer;
@@ -25,7 +28,9 @@ mod service;
 mod sse;
 mod status;
 mod throttle;
+mod tickets;
 mod warm_start;
+pub mod webhook;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -33,18 +38,21 @@ use std::time::Duration;
 use axum::Router;
 use axum::handler::Handler;
 use axum::http::Uri;
+use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::{self, MethodRouter};
 use tokio::sync::watch;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::CompressionLayer;
 use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
 
+pub use browser::Origins;
 pub use idempotency::InFlight;
 pub use phase::Phase;
 
 use crate::scenario::json::Rules;
 use crate::store::Store;
 use crate::telemetry::Instruments;
+use auth::{Access, Needs};
 use problem::Problem;
 
 /// What every handler can reach.
@@ -62,6 +70,12 @@ pub struct AppState {
     pub body_timeout: Duration,
     /// By how much the wall clock has jumped, milliseconds, while nothing expires for it.
     pub clock_jump_ms: watch::Receiver<Option<i64>>,
+    /// Who may do what.
+    pub access: Access,
+    /// How ends of plans are told; `None` when they are not.
+    pub webhooks: Option<webhook::Settings>,
+    /// Pages from elsewhere that may use this service.
+    pub cors: Origins,
     /// Where the service stands between its start and its end.
     pub phase: watch::Receiver<Phase>,
     /// What is reported to the operator.
@@ -83,6 +97,8 @@ pub struct Route {
     pub method: &'static str,
     /// With `{id}` for a plan's id.
     pub path: &'static str,
+    /// Of its caller.
+    pub needs: Needs,
     handler: MethodRouter<AppState>,
 }
 
@@ -98,6 +114,7 @@ pub fn routes() -> Vec<Route> {
         get("/plans/{id}/result", documents::result),
         get("/plans/{id}/scenario", documents::scenario),
         get("/plans/{id}/events", events::follow),
+        post("/plans/{id}/tickets", tickets::issue),
         get("/algorithms", service::algorithms),
         get("/limits", service::limits),
         get("/version", service::version),
@@ -113,15 +130,17 @@ pub fn routes() -> Vec<Route> {
 
 /// The service: every route, every refusal a problem, every answer with its request's id.
 pub fn router(state: AppState) -> Router {
+    let (access, cors) = (state.access.clone(), state.cors.clone());
     let router = routes()
         .into_iter()
         .fold(Router::new(), |router, route| {
-            router.route(route.path, route.handler)
+            let gate = from_fn_with_state((access.clone(), route.needs), auth::gate);
+            router.route(route.path, route.handler.route_layer(gate))
         })
         .method_not_allowed_fallback(async || Problem::MethodNotAllowed)
         .fallback(async |uri: Uri| Problem::NoSuchResource(uri.path().to_owned()))
         .with_state(state.clone());
-    wrap(router, state.instruments)
+    wrap(router, &cors, state.instruments)
 }
 
 /// Streams are not: what is told must leave at once.
@@ -133,14 +152,13 @@ fn worth_compressing() -> impl Predicate {
 }
 
 /// What goes round every handler.
-fn wrap(router: Router, instruments: Arc<Instruments>) -> Router {
+fn wrap(router: Router, cors: &Origins, instruments: Arc<Instruments>) -> Router {
     router
+        .layer(from_fn(auth::refuse_keys_in_urls))
         .layer(CompressionLayer::new().compress_when(worth_compressing()))
         .layer(CatchPanicLayer::custom(problem::after_panic))
-        .layer(axum::middleware::from_fn_with_state(
-            instruments,
-            request_id::assign,
-        ))
+        .layer(cors.layer())
+        .layer(from_fn_with_state(instruments, request_id::assign))
 }
 
 fn get<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
@@ -159,6 +177,7 @@ fn row(method: &'static str, path: &'static str, handler: MethodRouter<AppState>
     Route {
         method,
         path,
+        needs: Needs::of(method, path),
         handler,
     }
 }
@@ -181,7 +200,7 @@ mod tests {
         let request = Request::get("/")
             .header("x-request-id", "caller-1")
             .body(Body::empty());
-        let answer = wrap(broken, Arc::default())
+        let answer = wrap(broken, &Origins::default(), Arc::default())
             .oneshot(request.expect("a request"))
             .await
             .expect("an answer");

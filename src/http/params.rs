@@ -8,6 +8,7 @@ use axum::http::Uri;
 use axum::http::request::Parts;
 use uuid::Uuid;
 
+use super::auth::holds_a_key;
 use super::problem::Problem;
 use crate::job::PlanId;
 use crate::telemetry::spans;
@@ -67,6 +68,38 @@ fn unknown(name: &str, known: &[&str]) -> String {
     } else {
         format!("{name} is unknown, must be one of {}", known.join(", "))
     }
+}
+
+/// Names of parameters that elsewhere are for credentials.
+const CREDENTIALS: [&str; 7] = [
+    "access_token",
+    "api-key",
+    "api_key",
+    "apikey",
+    "authorization",
+    "key",
+    "token",
+];
+
+/// Whether a key stands in the address, or what is meant to be one.
+pub(super) fn brings_a_key(uri: &Uri) -> bool {
+    let pairs = Query::<Vec<(String, String)>>::try_from_uri(uri);
+    let in_query = pairs.is_ok_and(|Query(pairs)| {
+        pairs.iter().any(|(name, value)| {
+            CREDENTIALS.contains(&name.to_ascii_lowercase().as_str())
+                || holds_a_key(name)
+                || holds_a_key(value)
+        })
+    });
+    in_query || holds_a_key(uri.path()) || uri.query().is_some_and(holds_a_key)
+}
+
+/// The ticket of the query, and the plan of the path, which is that of `/plans/{id}/events`.
+pub(super) fn ticket_of(uri: &Uri) -> Option<(String, Option<PlanId>)> {
+    let Query(pairs) = Query::<Vec<(String, String)>>::try_from_uri(uri).ok()?;
+    let (_, ticket) = pairs.into_iter().find(|(name, _)| name == "ticket")?;
+    let id = uri.path().split('/').nth(2)?;
+    Some((ticket, Uuid::try_parse(id).ok()))
 }
 
 /// The `{id}` of the path. What cannot be an id names no plan.

@@ -22,7 +22,7 @@ use super::phase::stopping;
 use super::prefer::{PREFERENCE_APPLIED, Wait};
 use super::problem::Problem;
 use super::status::{StatusDocument, etag, location};
-use super::{AppState, Phase, body, off_thread, retry, warm_start};
+use super::{AppState, Phase, body, off_thread, retry, warm_start, webhook};
 use crate::job::{self, Plan, PlanId, Status, Submission};
 use crate::scenario::json;
 use crate::store::{ListQuery, StoreError, Submitted};
@@ -49,10 +49,12 @@ pub(super) async fn submit(
     if !validate_only {
         refuse_when_draining(&state).await?;
     }
+    let webhook = webhook::asked(state.webhooks.as_ref(), &headers)?;
     let once = state.in_flight.begin(&caller, &headers)?;
     let bytes = body::read_json(&state, &headers, body).await?;
     let idempotency = once.as_ref().map(|once| once.with(&bytes));
     let submission = Submission {
+        webhook,
         idempotency,
         ..accept(&state, &caller, bytes).await?
     };
@@ -181,6 +183,7 @@ async fn accept(state: &AppState, caller: &Caller, document: Bytes) -> Result<Su
         created_ms: now_ms(),
         owner,
         quota,
+        webhook: None,
         idempotency: None,
     };
     if short {
@@ -410,6 +413,6 @@ async fn wait_for(
 }
 
 /// Milliseconds since 1970.
-fn now_ms() -> i64 {
+pub(super) fn now_ms() -> i64 {
     Timestamp::now().as_millisecond()
 }

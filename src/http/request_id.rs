@@ -13,6 +13,7 @@ use tracing::{Instrument, Span};
 use uuid::Uuid;
 
 use super::problem::Problem;
+use super::{auth, browser};
 use crate::telemetry::traceparent::{self, TraceParent};
 use crate::telemetry::{Instruments, spans};
 
@@ -30,7 +31,7 @@ pub(super) async fn assign(
 ) -> Response {
     let id = of_caller(request.headers()).unwrap_or_else(|| Uuid::now_v7().to_string());
     let method = request.method().clone();
-    let path = request.uri().path().to_owned();
+    let path = printable(request.uri().path()).to_owned();
     let caller = traceparent_of(request.headers());
     let (span, origin) = spans::of_request(id.clone(), caller);
     request.extensions_mut().insert(origin);
@@ -56,13 +57,21 @@ pub(super) async fn assign(
     .await
 }
 
+/// The path as it may be written down.
+fn printable(path: &str) -> &str {
+    if auth::holds_a_key(path) {
+        "(with a key in it)"
+    } else {
+        path
+    }
+}
+
 /// The caller's own id, if it can stand as it is in a log line and in a URI reference.
 fn of_caller(headers: &HeaderMap) -> Option<String> {
     let id = headers.get(X_REQUEST_ID)?.to_str().ok()?;
     let sane = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~=;+/@,".contains(&byte);
-    (1..=MAX_LENGTH)
-        .contains(&id.len())
-        .then(|| id.bytes().all(sane).then(|| id.to_owned()))?
+    let sane_length = (1..=MAX_LENGTH).contains(&id.len()) && !auth::holds_a_key(id);
+    sane_length.then(|| id.bytes().all(sane).then(|| id.to_owned()))?
 }
 
 /// One that cannot be read is as none.
@@ -94,10 +103,7 @@ fn write_problem(response: &mut Response, problem: &Problem, id: &str, method: &
 fn dress(headers: &mut HeaderMap, id: &str) {
     let id = HeaderValue::from_str(id).expect("an id is visible ASCII");
     headers.insert(X_REQUEST_ID, id);
-    headers.insert(
-        header::X_CONTENT_TYPE_OPTIONS,
-        HeaderValue::from_static("nosniff"),
-    );
+    browser::secure(headers);
     headers
         .entry(header::CACHE_CONTROL)
         .or_insert(HeaderValue::from_static("no-store"));

@@ -66,12 +66,15 @@ struct LimitsDocument {
     page: usize,
     wait_s: u64,
     event_rate_hz: f64,
+    streams: usize,
+    streams_per_key: usize,
 }
 
 /// `GET /limits`.
 pub(super) async fn limits(State(state): State<AppState>, uri: Uri) -> Result<Response, Problem> {
     Params::read(&uri, &[])?;
     let limits = state.rules.limits;
+    let access = state.access.settings();
     let document = LimitsDocument {
         body_bytes: limits.body_bytes,
         threats: limits.threats,
@@ -88,6 +91,8 @@ pub(super) async fn limits(State(state): State<AppState>, uri: Uri) -> Result<Re
         page: plans::MAX_PAGE,
         wait_s: prefer::MAX_WAIT_S,
         event_rate_hz: *events::RATES_HZ.end(),
+        streams: access.streams,
+        streams_per_key: access.streams_per_key,
     };
     Ok(Json(document).into_response())
 }

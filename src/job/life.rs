@@ -117,6 +117,13 @@ impl Plan {
         self.revision += 1;
     }
 
+    /// How long it waited for its (last) run, milliseconds. The clock may have been set back meanwhile.
+    #[must_use]
+    pub fn queued_ms(&self) -> f64 {
+        let started_ms = self.started_ms.unwrap_or(self.created_ms);
+        (started_ms - self.created_ms).max(0) as f64
+    }
+
     fn become_status(&mut self, next: Status) -> Result<(), Refused> {
         if !self.status.may_become(next) {
             return Err(Refused {
@@ -146,6 +153,7 @@ mod tests {
             created_ms: 1_000,
             owner: None,
             quota: None,
+            webhook: None,
             idempotency: None,
         };
         Plan::accepted(&submission, 3)

@@ -29,6 +29,8 @@ pub struct Submission {
     pub owner: Option<Owner>,
     /// Active plans that its owner may have, this one included; `None` for any number.
     pub quota: Option<u64>,
+    /// Where its end is to be told.
+    pub webhook: Option<String>,
     /// Tells a repeated request from a new one.
     pub idempotency: Option<Idempotency>,
 }

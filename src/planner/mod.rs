@@ -99,10 +99,10 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
         let lower = seeding::lower_bound_until(scenario, &is_over);
         log.lower = Some(lower);
         let stop_reason = search(&model, &mut log);
-        return deliver(&model, log, lower, stop_reason);
+        return measured(&model, log.route, log.convergence, lower, stop_reason);
     }
     let (stop_reason, lower) = beside::bounded(scenario, || search(&model, &mut log));
-    deliver(&model, log, lower, stop_reason)
+    measured(&model, log.route, log.convergence, lower, stop_reason)
 }
 
 fn search(model: &Model, log: &mut Log) -> StopReason {
@@ -143,10 +143,24 @@ fn why_stop(scenario: &Scenario, stop: &dyn Stop) -> Option<StopReason> {
     (stop.elapsed_ms() >= limit as f64).then_some(StopReason::TimeLimit)
 }
 
-/// Price, smooth and certify the best route.
-fn deliver(model: &Model, log: Log, lower: f64, stop_reason: StopReason) -> Outcome {
-    let mut convergence = log.convergence;
-    let route = starts::spread(model, log.route);
+/// What a run whose best route so far is `route` would deliver if it were cancelled now; its curve
+/// and its count of evaluations are not known here.
+#[must_use]
+pub fn so_far(scenario: &Scenario, route: Vec<Point3>) -> Outcome {
+    let lower = seeding::lower_bound(scenario);
+    let model = Model::new(scenario);
+    measured(&model, route, Vec::new(), lower, StopReason::Cancelled)
+}
+
+/// Price, smooth and certify a route.
+fn measured(
+    model: &Model,
+    route: Vec<Point3>,
+    mut convergence: Vec<ConvergencePoint>,
+    lower: f64,
+    stop_reason: StopReason,
+) -> Outcome {
+    let route = starts::spread(model, route);
     let evaluations = convergence.last().map_or(0, |last| last.evaluations);
     let quadrature = model.scenario.planner.quadrature;
     let cost = model.figures(&route, quadrature);

@@ -6,7 +6,7 @@ use std::time::Instant;
 use async_trait::async_trait;
 use tokio::sync::watch;
 
-use super::{Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted};
+use super::{Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Webhook};
 use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Submission};
 use crate::telemetry::Instruments;
@@ -109,6 +109,16 @@ impl Store for MeasuredStore {
 
     async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError> {
         self.measured("sweep", self.store.sweep(now_ms)).await
+    }
+
+    async fn due_webhooks(&self, now_ms: i64, limit: usize) -> Result<Vec<Webhook>, StoreError> {
+        let due = self.store.due_webhooks(now_ms, limit);
+        self.measured("due_webhooks", due).await
+    }
+
+    async fn webhook_tried(&self, id: PlanId, next_ms: Option<i64>) -> Result<(), StoreError> {
+        let tried = self.store.webhook_tried(id, next_ms);
+        self.measured("webhook_tried", tried).await
     }
 
     fn changes(&self, id: PlanId) -> watch::Receiver<u64> {

@@ -120,6 +120,15 @@ pub trait Store: Send + Sync + 'static {
     /// [`TOMBSTONE_MS`]. What has expired of tombstones and idempotency keys goes too.
     async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError>;
 
+    /// Webhooks of ended plans that are due, the longest due first, at most `limit`. A submission's
+    /// webhook is due as soon as its plan has ended: it is kept in the same step as the submission
+    /// and made due in the same step as the end. It goes with its plan.
+    async fn due_webhooks(&self, now_ms: i64, limit: usize) -> Result<Vec<Webhook>, StoreError>;
+
+    /// A plan's webhook has been tried; it is due again at `next_ms`, or done with. One that is no
+    /// longer there is no error.
+    async fn webhook_tried(&self, id: PlanId, next_ms: Option<i64>) -> Result<(), StoreError>;
+
     /// Counts for the queue's head-room and `Retry-After`.
     async fn stats(&self) -> Result<Stats, StoreError>;
 
@@ -205,6 +214,17 @@ pub struct EventPage {
     pub forgotten: u64,
     /// In order.
     pub events: Vec<NumberedEvent>,
+}
+
+/// The end of a plan, to be told.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Webhook {
+    /// As it ended.
+    pub plan: Plan,
+    /// Where to.
+    pub url: String,
+    /// How often that has been tried.
+    pub tries: u32,
 }
 
 /// What remains of a removed plan.

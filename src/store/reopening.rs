@@ -10,7 +10,9 @@ use async_trait::async_trait;
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
-use super::{Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Trouble};
+use super::{
+    Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Trouble, Webhook,
+};
 use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Submission};
 
@@ -204,6 +206,16 @@ impl Store for Reopening {
     async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError> {
         let store = self.store()?;
         self.heed(&store, store.sweep(now_ms).await)
+    }
+
+    async fn due_webhooks(&self, now_ms: i64, limit: usize) -> Result<Vec<Webhook>, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.due_webhooks(now_ms, limit).await)
+    }
+
+    async fn webhook_tried(&self, id: PlanId, next_ms: Option<i64>) -> Result<(), StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.webhook_tried(id, next_ms).await)
     }
 
     async fn stats(&self) -> Result<Stats, StoreError> {

@@ -17,7 +17,7 @@ use super::traceparent::TraceParent;
 /// Round a request. With it, what a plan that it brings comes from.
 #[must_use]
 pub fn of_request(request_id: String, caller: Option<TraceParent>) -> (Span, Origin) {
-    let span = tracing::error_span!("request", request_id = %request_id, trace_id = Empty, plan_id = Empty);
+    let span = tracing::error_span!("request", request_id = %request_id, trace_id = Empty, plan_id = Empty, key = Empty);
     let traceparent = join(&span, caller);
     let origin = Origin {
         request_id,
@@ -36,6 +36,11 @@ pub fn of_run(plan: Uuid, origin: Option<&Origin>) -> Span {
     }
     join(&span, caller);
     span
+}
+
+/// The current request came with the key of this name.
+pub fn name_key(name: &str) {
+    Span::current().record("key", name);
 }
 
 /// The current request is about this plan.

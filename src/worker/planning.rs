@@ -107,15 +107,13 @@ fn plan_to_its_end(engine: &Engine, plan: &Plan, scenario: &str, reports: Report
 }
 
 fn ending(outcome: &Outcome, plan: &Plan, scenario: &str, run_ms: f64) -> Ending {
-    let started_ms = plan.started_ms.unwrap_or(plan.created_ms);
     let origin = Origin {
         plan_id: Some(plan.id),
         algorithm: plan.algorithm.clone(),
         seed: plan.seed,
         scenario_sha256: sha256_hex(scenario.as_bytes()),
         timing: Timing {
-            // The wall clock may have been set back between the two.
-            queued_ms: (started_ms - plan.created_ms).max(0) as f64,
+            queued_ms: plan.queued_ms(),
             run_ms,
         },
     };

@@ -516,3 +516,43 @@ async fn bodies_may_come_and_go_as_gzip() {
     let told = api.get_with(&events, &[("accept-encoding", "gzip")]).await;
     assert!(!told.headers.contains_key("content-encoding"));
 }
+
+#[tokio::test]
+async fn the_best_route_so_far_is_measured_like_a_result() {
+    let api = Api::new();
+    let address = api.submit().await;
+    let partial = format!("{address}/result?partial=true");
+    api.get(&partial).await.expect_problem(409, "not-ready");
+    let lease = api.store.claim().await.expect("a queued plan");
+    api.get(&partial).await.expect_problem(409, "not-ready");
+
+    let told = vec![
+        run::convergence(0, 0.1),
+        run::incumbent(0, 0.1),
+        run::convergence(1, 0.2),
+    ];
+    api.store.append(&lease, told).await.expect("held");
+    let so_far = api.get(&partial).await.json();
+    assert_eq!(so_far["final"], false);
+    assert_eq!(so_far["stop_reason"], Value::Null);
+    assert_eq!(so_far["plan_id"], lease.plan.id.to_string());
+    assert_eq!(so_far["waypoints"].as_array().expect("a route").len(), 3);
+    assert_eq!(so_far["convergence"].as_array().expect("a curve").len(), 2);
+    assert_eq!(so_far["evaluations"], 40);
+    assert!(so_far["cost"]["total"].as_f64().expect("a figure") > 0.0);
+    assert!(so_far["bound"]["lower"].as_f64().expect("a figure") > 0.0);
+    let drawing = api.get(&format!("{partial}&format=svg")).await;
+    assert_eq!(drawing.header("content-type"), "image/svg+xml");
+    // Who does not ask for it waits.
+    let whole = api.get(&format!("{address}/result")).await;
+    whole.expect_problem(409, "not-ready");
+    let query = format!("{address}/result?partial=maybe");
+    api.get(&query)
+        .await
+        .expect_problem(400, "invalid-parameter");
+
+    run::finish(&*api.store, &lease, Status::Succeeded).await;
+    let ended = api.get(&partial).await;
+    let stored = api.get(&format!("{address}/result")).await;
+    assert_eq!(ended.body, stored.body);
+}

@@ -1,9 +1,12 @@
 //! The integration tests: one binary, one module a subject.
 
+mod access;
 mod algorithms;
 mod api;
+mod auth;
 mod bench;
 mod bound;
+mod browser;
 mod cli;
 mod config;
 mod crash;
@@ -24,4 +27,5 @@ mod store_trouble;
 mod support;
 mod svg;
 mod warm_start;
+mod webhook;
 mod worker;

@@ -75,6 +75,14 @@ fn references(node: &Value, found: &mut BTreeSet<String>) {
             if let Some(Value::String(reference)) = members.get("$ref") {
                 found.insert(reference.clone());
             }
+            // Schemes are named where the others are referred to.
+            let schemes = members.get("security").and_then(Value::as_array);
+            for scheme in schemes.into_iter().flatten().filter_map(Value::as_object) {
+                let scheme = scheme
+                    .keys()
+                    .map(|name| format!("#/components/securitySchemes/{name}"));
+                found.extend(scheme);
+            }
             members
                 .values()
                 .for_each(|member| references(member, found));

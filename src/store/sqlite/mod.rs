@@ -13,6 +13,7 @@ mod row;
 mod schema;
 mod transaction;
 pub mod upkeep;
+mod webhooks;
 mod writer;
 
 use std::fs::{DirBuilder, File, TryLockError};
@@ -30,7 +31,7 @@ use self::records::Records;
 use self::writer::Writer;
 use super::{
     Clock, Ending, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError, Submitted,
-    Trouble,
+    Trouble, Webhook,
 };
 use crate::export::document::Incumbent;
 use crate::job::state::Refused;
@@ -238,6 +239,18 @@ impl Store for SqliteStore {
             .await
     }
 
+    async fn due_webhooks(&self, now_ms: i64, limit: usize) -> Result<Vec<Webhook>, StoreError> {
+        self.readers
+            .read(move |connection| webhooks::due(connection, now_ms, limit))
+            .await
+    }
+
+    async fn webhook_tried(&self, id: PlanId, next_ms: Option<i64>) -> Result<(), StoreError> {
+        self.writer
+            .change(move |tx| webhooks::tried(tx, id, next_ms))
+            .await
+    }
+
     async fn stats(&self) -> Result<Stats, StoreError> {
         if let Some(stats) = self.records.stats() {
             return Ok(stats);
@@ -368,6 +381,7 @@ mod tests {
             created_ms: 1_000,
             owner: None,
             quota: None,
+            webhook: None,
             idempotency: None,
         }
     }

@@ -8,7 +8,7 @@ use tokio::sync::watch;
 use super::read::missing;
 use super::row::PlanRow;
 use super::transaction::{Effect, Transaction};
-use super::{idempotency, removal};
+use super::{idempotency, removal, webhooks};
 use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Status, Submission};
 use crate::store::{Ending, Lease, StoreError, Submitted, Tombstone};
@@ -43,6 +43,7 @@ pub(super) fn submit(
         .prepare_cached("INSERT INTO scenarios (plan_seq, document) VALUES (?1, ?2)")?
         .execute(params![row.seq, submission.scenario])?;
     idempotency::remember(tx, submission)?;
+    webhooks::keep(tx, row.seq, submission)?;
     tx.queued += 1;
     tell_status(tx, &mut row)?;
     row.update(tx.connection)?;
@@ -279,5 +280,6 @@ fn tell_end(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreErro
     row.plan.expires_ms = expires_ms.map(|(end, age)| end.saturating_add(age));
     let status = Event::Status(Box::new(row.plan.clone()));
     let end = Event::End(row.plan.status);
+    webhooks::make_due(tx, row)?;
     tx.tell(row, &[status, end])
 }

@@ -119,6 +119,7 @@ mod tests {
             owner: None,
             quota: None,
             idempotency: None,
+            webhook: None,
         };
         Plan {
             status,

@@ -99,6 +99,15 @@ CREATE TABLE idempotency_keys (            -- for a day
 ) STRICT, WITHOUT ROWID;
 CREATE INDEX idempotency_keys_by_age ON idempotency_keys (seen_ms);
 ",
+    "
+CREATE TABLE webhooks (                    -- until they have been told or given up
+    plan_seq INTEGER PRIMARY KEY REFERENCES plans (seq) ON DELETE CASCADE,
+    url TEXT NOT NULL,
+    tries INTEGER NOT NULL,
+    due_ms INTEGER                         -- NULL until the plan has ended
+) STRICT;
+CREATE INDEX webhooks_due ON webhooks (due_ms) WHERE due_ms IS NOT NULL;
+",
 ];
 
 /// Bring the file up to this version; refuse those of a newer one.

@@ -8,3 +8,4 @@ mod model;
 mod queue;
 mod reading;
 mod repetition;
+mod telling;

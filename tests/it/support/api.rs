@@ -8,7 +8,9 @@ use axum::body::Body;
 use axum::http::{HeaderMap, Method, Request, StatusCode};
 use bytes::Bytes;
 use http_body_util::BodyExt as _;
-use noctule::http::{self, AppState, Capacity, InFlight, Phase};
+use noctule::http::auth::{Access, Keys, Settings};
+use noctule::http::webhook;
+use noctule::http::{self, AppState, Capacity, InFlight, Origins, Phase};
 use noctule::planner;
 use noctule::scenario::json::Rules;
 use noctule::scenario::limits::Limits;
@@ -54,12 +56,42 @@ impl Api {
 
     /// Over a store with these options.
     pub(crate) fn with_store(options: Options) -> Self {
+        Self::made(options, Access::new(None, Settings::default()), &[])
+    }
+
+    /// For holders of keys alone.
+    pub(crate) fn with_keys(keys: &str) -> Self {
+        Self::with_access(keys, Settings::default())
+    }
+
+    /// The same with other settings.
+    pub(crate) fn with_access(keys: &str, settings: Settings) -> Self {
+        let keys = Keys::read(keys).expect("keys");
+        Self::made(Options::new(1000), Access::new(Some(keys), settings), &[])
+    }
+
+    /// For pages of these origins.
+    pub(crate) fn with_origins(origins: &[&str]) -> Self {
+        let access = Access::new(None, Settings::default());
+        Self::made(Options::new(1000), access, origins)
+    }
+
+    /// Which tells ends of plans.
+    pub(crate) fn with_webhooks(settings: webhook::Settings) -> Self {
+        let mut api = Self::new();
+        api.state.webhooks = Some(settings);
+        api.router = http::router(api.state.clone());
+        api
+    }
+
+    fn made(options: Options, access: Access, origins: &[&str]) -> Self {
         let queue = usize::try_from(options.queue_limit).expect("a small number");
         let directory = tempfile::tempdir().expect("a temporary directory");
         let instruments = Arc::new(Instruments::default());
         let store = SqliteStore::open(directory.path(), options).expect("a fresh store");
         let store = Arc::new(MeasuredStore::new(Arc::new(store), instruments.clone()));
         let clock = watch::channel(None);
+        let origins: Vec<String> = origins.iter().map(ToString::to_string).collect();
         let (phase, watched) = watch::channel(Phase::Serving);
         let state = AppState {
             store: store.clone(),
@@ -74,6 +106,9 @@ impl Api {
             in_flight: InFlight::default(),
             clock_jump_ms: clock.1,
             body_timeout: Duration::from_secs(30),
+            access,
+            webhooks: None,
+            cors: Origins::read(&origins).expect("origins"),
             phase: watched,
             instruments,
         };

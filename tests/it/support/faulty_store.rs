@@ -6,7 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use async_trait::async_trait;
 use noctule::export::document::Incumbent;
 use noctule::job::{Event, Plan, PlanId, Submission};
-use noctule::store::{Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted};
+use noctule::store::{
+    Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Webhook,
+};
 use tokio::sync::watch;
 
 pub(crate) struct FaultyStore {
@@ -95,6 +97,14 @@ impl Store for FaultyStore {
 
     async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError> {
         self.sound.sweep(now_ms).await
+    }
+
+    async fn due_webhooks(&self, now_ms: i64, limit: usize) -> Result<Vec<Webhook>, StoreError> {
+        self.sound.due_webhooks(now_ms, limit).await
+    }
+
+    async fn webhook_tried(&self, id: PlanId, next_ms: Option<i64>) -> Result<(), StoreError> {
+        self.sound.webhook_tried(id, next_ms).await
     }
 
     async fn stats(&self) -> Result<Stats, StoreError> {

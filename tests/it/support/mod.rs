@@ -5,6 +5,7 @@ pub(crate) mod collector;
 pub(crate) mod description;
 pub(crate) mod engines;
 pub(crate) mod faulty_store;
+pub(crate) mod keys;
 pub(crate) mod openmetrics;
 pub(crate) mod plans;
 pub(crate) mod process;

@@ -17,6 +17,7 @@ pub(crate) fn submission() -> Submission {
         created_ms: 1_000,
         owner: None,
         quota: None,
+        webhook: None,
         idempotency: None,
     }
 }

@@ -9,6 +9,9 @@ use std::time::Duration;
 use reqwest::{Client, RequestBuilder, Response};
 use serde_json::Value;
 
+/// A free port of this machine alone.
+const LOOPBACK: &str = "127.0.0.1:0";
+
 /// More than anything here takes.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -82,23 +85,45 @@ impl Service {
         arguments: &[&str],
         log: impl Into<Stdio>,
     ) -> Self {
-        Self::start_as(noctule(), data_dir, arguments, log)
+        Self::start_as(noctule(), LOOPBACK, data_dir, arguments, log)
+    }
+
+    /// The same with environment variables.
+    pub(crate) fn start_with(
+        variables: &[(&str, &str)],
+        data_dir: &Path,
+        arguments: &[&str],
+    ) -> Self {
+        let mut command = noctule();
+        command.envs(variables.iter().copied());
+        Self::start_as(command, LOOPBACK, data_dir, arguments, Stdio::null())
+    }
+
+    /// The same on another address.
+    pub(crate) fn start_on(
+        listen: &str,
+        data_dir: &Path,
+        arguments: &[&str],
+        log: impl Into<Stdio>,
+    ) -> Self {
+        Self::start_as(noctule(), listen, data_dir, arguments, log)
     }
 
     /// With `data_dir` on a disk of its own, mounted with such options as `size=3m`.
     pub(crate) fn start_on_a_small_disk(data_dir: &Path, options: &str) -> Self {
         let command = on_a_small_disk(data_dir, options);
-        Self::start_as(command, data_dir, &[], Stdio::null())
+        Self::start_as(command, LOOPBACK, data_dir, &[], Stdio::null())
     }
 
     fn start_as(
         mut command: Command,
+        listen: &str,
         data_dir: &Path,
         arguments: &[&str],
         log: impl Into<Stdio>,
     ) -> Self {
         let mut child = command
-            .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
+            .args(["serve", "--listen", listen, "--data-dir"])
             .arg(data_dir)
             .args(arguments)
             .stdin(Stdio::null())
@@ -125,6 +150,10 @@ impl Service {
 
     pub(crate) fn url(&self, path: &str) -> String {
         format!("{}{path}", self.url)
+    }
+
+    pub(crate) fn client(&self) -> &Client {
+        &self.client
     }
 
     /// Where it listens.

@@ -91,7 +91,8 @@ pub(crate) fn result(plan: PlanId, stop_reason: &str) -> ResultDocument {
         engine_version: "0.1.0".to_owned(),
         scenario_sha256: "0".repeat(64),
         feasible: true,
-        stop_reason: stop_reason.to_owned(),
+        stop_reason: Some(stop_reason.to_owned()),
+        is_final: None,
         cost: Cost {
             total: 580.0,
             fuel: 500.0,

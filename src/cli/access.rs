@@ -1,0 +1,78 @@
+//! The keys of a service: read at its start, and again at SIGHUP; and no service for strangers by accident.
+
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use tokio::signal::unix::{SignalKind, signal};
+
+use crate::config::Config;
+use crate::http::auth::{Access, Keys, Settings};
+
+/// Keys themselves, in the form of the file.
+const VARIABLE: &str = "NOCTULE_KEYS";
+
+/// Who may use the service.
+///
+/// # Errors
+/// When the keys cannot be read, and when there are none though other machines reach the service.
+pub(super) fn open(config: &Config) -> anyhow::Result<Access> {
+    let of_environment = match std::env::var(VARIABLE) {
+        Ok(text) => Some(text).filter(|text| !text.trim().is_empty()),
+        Err(std::env::VarError::NotPresent) => None,
+        Err(error) => return Err(error).context(VARIABLE),
+    };
+    let keys = match (&config.keys_file, of_environment) {
+        (Some(_), Some(_)) => bail!("there are keys in both keys_file and {VARIABLE}; give one"),
+        (Some(path), None) => Some(read(path)?),
+        (None, Some(text)) => Some(Keys::read(&text).context(VARIABLE)?),
+        (None, None) => None,
+    };
+    match &keys {
+        Some(keys) => tracing::info!(keys = keys.len(), "the service is for holders of keys"),
+        None if config.listen.ip().is_loopback() => {}
+        None if config.allow_anonymous => {
+            tracing::warn!("the service is for everybody who reaches it: it has no keys");
+        }
+        None => bail!(
+            "{} can be reached from other machines, and there are no keys: name some with \
+             --keys-file (noctule key new makes them), or say --allow-anonymous",
+            config.listen
+        ),
+    }
+    let settings = Settings {
+        streams: config.http.streams,
+        streams_per_key: config.http.streams_per_key,
+        ..Settings::default()
+    };
+    Ok(Access::new(keys, settings))
+}
+
+/// Read the file of keys again whenever SIGHUP comes. One that is wrong changes nothing.
+pub(super) fn reload_on_hangup(config: &Config, access: Access) -> std::io::Result<()> {
+    let mut hangups = signal(SignalKind::hangup())?;
+    let path = config.keys_file.clone();
+    tokio::spawn(async move {
+        while hangups.recv().await.is_some() {
+            let Some(path) = &path else {
+                tracing::info!("SIGHUP, but there is no keys_file to read again");
+                continue;
+            };
+            match read(path) {
+                Ok(keys) => {
+                    tracing::info!(keys = keys.len(), "the keys have been read again");
+                    access.replace(keys);
+                }
+                Err(error) => {
+                    tracing::error!("{error:#}; the keys stay as they were");
+                }
+            }
+        }
+    });
+    Ok(())
+}
+
+fn read(path: &Path) -> anyhow::Result<Keys> {
+    let place = || format!("cannot take the keys of {}", path.display());
+    let text = std::fs::read_to_string(path).with_context(place)?;
+    Keys::read(&text).with_context(place)
+}

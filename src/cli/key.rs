@@ -1,0 +1,99 @@
+//! `noctule key new`: a key, told once, and what the service is to know of it.
+
+use std::io::Write as _;
+
+use anyhow::anyhow;
+use clap::{Args, Subcommand};
+use jiff::Timestamp;
+
+use crate::export::sha256_hex;
+use crate::http::auth::{Keys, Scope, fresh_key};
+
+#[derive(Subcommand)]
+pub(super) enum Command {
+    /// Print a new key on stderr, where alone it is told, and its entry for the file of keys on stdout
+    New(Arguments),
+}
+
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// What people call it; the owner of its plans unless another is named
+    #[arg(long)]
+    name: String,
+
+    /// What it may do: read (look at own plans), plan (submit, cancel and delete too), metrics, admin (everything)
+    #[arg(long, value_delimiter = ',', default_value = "plan", value_parser = scope)]
+    scopes: Vec<Scope>,
+
+    /// Whose plans are its own; keys that replace each other have the same owner
+    #[arg(long)]
+    owner: Option<String>,
+
+    /// From when on it is none, such as 2027-01-31T00:00:00Z [default: never]
+    #[arg(long, value_name = "TIME")]
+    expires: Option<Timestamp>,
+
+    /// Queued and running plans at once [default: any number]
+    #[arg(long, value_name = "N")]
+    active_plans: Option<u64>,
+
+    /// Requests a second [default: any number]
+    #[arg(long, value_name = "RATE")]
+    requests_per_second: Option<f64>,
+
+    /// Requests at once, where there is a rate [default: those of a second]
+    #[arg(long, value_name = "N")]
+    burst: Option<u32>,
+}
+
+fn scope(name: &str) -> Result<Scope, String> {
+    let names = || Scope::ALL.map(Scope::name).join(", ");
+    Scope::from_name(name).ok_or_else(|| format!("must be some of {}", names()))
+}
+
+pub(super) fn run(command: &Command) -> anyhow::Result<()> {
+    let Command::New(arguments) = command;
+    let key = fresh_key()?;
+    let entry = entry(arguments, &key);
+    Keys::read(&entry).map_err(|error| anyhow!("no such key can be: {error}"))?;
+    // Apart from each other, so that `>> keys.toml` takes what belongs there and the key stays outside.
+    eprintln!(
+        "the key, for its holder alone; it is kept nowhere and cannot be shown again:\n{key}"
+    );
+    std::io::stdout().write_all(entry.as_bytes())?;
+    Ok(())
+}
+
+fn entry(arguments: &Arguments, key: &str) -> String {
+    let text = |text: &str| toml::Value::from(text);
+    let scopes: Vec<toml::Value> = arguments
+        .scopes
+        .iter()
+        .map(|scope| text(scope.name()))
+        .collect();
+    let fields = [
+        ("name", Some(text(&arguments.name))),
+        ("sha256", Some(text(&sha256_hex(key.as_bytes())))),
+        ("scopes", Some(scopes.into())),
+        ("owner", arguments.owner.as_deref().map(text)),
+        (
+            "expires",
+            arguments.expires.map(|time| text(&time.to_string())),
+        ),
+        ("active_plans", arguments.active_plans.map(whole)),
+        (
+            "requests_per_second",
+            arguments.requests_per_second.map(Into::into),
+        ),
+        ("burst", arguments.burst.map(Into::into)),
+    ];
+    let lines = fields
+        .into_iter()
+        .filter_map(|(name, value)| Some(format!("{name} = {}\n", value?)));
+    format!("[[key]]\n{}", lines.collect::<String>())
+}
+
+/// TOML knows no whole numbers above those of 63 bits.
+fn whole(number: u64) -> toml::Value {
+    i64::try_from(number).unwrap_or(i64::MAX).into()
+}

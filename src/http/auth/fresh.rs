@@ -1,0 +1,36 @@
+//! Secrets that nobody can guess.
+
+use std::fmt::Write as _;
+
+use super::keys::PREFIX;
+
+/// A new key.
+///
+/// # Errors
+/// When the operating system has no randomness.
+pub fn key() -> Result<String, getrandom::Error> {
+    Ok(format!("{PREFIX}{}", random_hex()?))
+}
+
+/// 256 random bits.
+pub(super) fn random_hex() -> Result<String, getrandom::Error> {
+    let mut bytes = [0_u8; 32];
+    getrandom::fill(&mut bytes)?;
+    Ok(bytes.iter().fold(String::new(), |mut text, byte| {
+        write!(text, "{byte:02x}").expect("writing to a string cannot fail");
+        text
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_known_by_their_form() {
+        let (one, other) = (key().expect("random"), key().expect("random"));
+        assert_ne!(one, other);
+        assert_eq!(one.len(), PREFIX.len() + 64);
+        assert!(super::super::keys::holds_a_key(&one));
+    }
+}

@@ -1,0 +1,307 @@
+//! Who asks, and whether they may.
+//!
+//! One gate before each route that is not for everybody: it takes the caller's key or ticket, and
+//! leaves a `Caller` in the request. Whose plan is whose is decided there and in the store, not
+//! here. Deliberately absent: names of people, passwords, sessions, any key in readable form.
+
+mod fresh;
+mod key_file;
+mod keys;
+mod rate;
+mod scope;
+mod streams;
+mod ticket;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, Uri, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use jiff::Timestamp;
+use tokio::sync::watch;
+use tokio::time::Instant;
+
+pub use fresh::key as fresh_key;
+pub use keys::{Key, Keys, KeysError};
+pub use rate::Rate;
+pub use scope::{Needs, Scope};
+
+pub(super) use keys::{Digest, holds_a_key};
+pub(super) use streams::{Permit, TooMany};
+
+use super::caller::Caller;
+use super::params::ticket_of;
+use super::problem::Problem;
+use crate::job::{Owner, PlanId};
+use crate::telemetry::spans;
+use rate::{Buckets, Taken};
+use streams::Streams;
+use ticket::{Holder, Tickets};
+
+/// How often a stream looks whether its key has expired.
+const EXPIRY_LOOK: Duration = Duration::from_secs(60);
+
+/// The keys in force, and what their holders have.
+#[derive(Debug, Clone)]
+pub struct Access(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    keys: watch::Sender<Option<Arc<Keys>>>,
+    buckets: Buckets,
+    tickets: Tickets,
+    streams: Arc<Streams>,
+    settings: Settings,
+}
+
+/// How much callers may have beside what their keys say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// Event streams open at once.
+    pub streams: usize,
+    /// Event streams of one key's owner.
+    pub streams_per_key: usize,
+    /// How long a ticket opens streams.
+    pub ticket_life: Duration,
+}
+
+/// Why a caller is not let in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unauthorized {
+    /// Neither a key nor a ticket came.
+    Nothing,
+    /// What came is no key.
+    NoKey,
+    /// It was one.
+    Expired,
+    /// What came is no ticket for this plan.
+    NoTicket,
+}
+
+impl Unauthorized {
+    /// For people.
+    pub(super) fn detail(self) -> &'static str {
+        match self {
+            Self::Nothing => "no key was sent; send one as Authorization: Bearer",
+            Self::NoKey => "what was sent is no key of this service",
+            Self::Expired => "the key has expired; ask the operator for a new one",
+            Self::NoTicket => {
+                "what was sent is no ticket for this plan, or its time is over; POST /plans/{id}/tickets gives one"
+            }
+        }
+    }
+}
+
+impl Access {
+    /// With these keys; without any, everybody may do everything.
+    #[must_use]
+    pub fn new(keys: Option<Keys>, settings: Settings) -> Self {
+        Self(Arc::new(Inner {
+            keys: watch::Sender::new(keys.map(Arc::new)),
+            buckets: Buckets::default(),
+            tickets: Tickets::default(),
+            streams: Streams::new(settings.streams, settings.streams_per_key),
+            settings,
+        }))
+    }
+
+    /// From now on these keys are in force. What others have opened ends.
+    pub fn replace(&self, keys: Keys) {
+        self.0.buckets.keep(&keys.names());
+        self.0.keys.send_replace(Some(Arc::new(keys)));
+    }
+
+    /// Whether there are keys.
+    #[must_use]
+    pub fn is_guarded(&self) -> bool {
+        self.0.keys.borrow().is_some()
+    }
+
+    /// What callers may have.
+    #[must_use]
+    pub fn settings(&self) -> Settings {
+        self.0.settings
+    }
+
+    /// A ticket for the plan's events, and until when it is one.
+    pub(super) fn ticket(
+        &self,
+        plan: PlanId,
+        caller: &Caller,
+    ) -> Result<(String, Timestamp), Problem> {
+        let life = self.0.settings.ticket_life;
+        let ticket = self.0.tickets.issue(plan, caller.key, Instant::now(), life);
+        let ticket = ticket.map_err(|error| {
+            tracing::error!(%error, "no randomness for a ticket");
+            Problem::Internal
+        })?;
+        let until = Timestamp::now().checked_add(life).unwrap_or(Timestamp::MAX);
+        Ok((ticket, until))
+    }
+
+    /// Leave to have one more stream open.
+    pub(super) fn open_stream(&self, owner: Option<&Owner>) -> Result<Permit, TooMany> {
+        self.0.streams.open(owner.cloned())
+    }
+
+    /// Until the key is none any more; for who has none, for ever.
+    pub(super) async fn withdrawn(&self, key: Option<Digest>) {
+        let Some(key) = key else {
+            return std::future::pending().await;
+        };
+        let mut keys = self.0.keys.subscribe();
+        loop {
+            let now = Timestamp::now();
+            let holds = keys.borrow_and_update().as_ref().is_some_and(|keys| {
+                let key = keys.with_digest(&key);
+                key.is_some_and(|key| !key.has_expired(now) && key.may(Scope::Read))
+            });
+            if !holds {
+                return;
+            }
+            tokio::select! {
+                _ = keys.changed() => {}
+                () = tokio::time::sleep(EXPIRY_LOOK) => {}
+            }
+        }
+    }
+
+    /// The caller, and what is left of their rate; for everybody where there are no keys.
+    fn admit(&self, needs: Needs, uri: &Uri, headers: &HeaderMap) -> Result<Admitted, Refused> {
+        let keys = self.0.keys.borrow().clone();
+        let asked = match needs {
+            Needs::Nothing => return Ok(Admitted::default()),
+            Needs::Scope(scope) => scope,
+            Needs::Ticket => Scope::Read,
+        };
+        let ticket = match needs {
+            Needs::Ticket if !headers.contains_key(header::AUTHORIZATION) => ticket_of(uri),
+            _ => None,
+        };
+        let holder = match ticket {
+            Some((ticket, plan)) => {
+                let holder =
+                    plan.and_then(|plan| self.0.tickets.holder(&ticket, plan, Instant::now()));
+                Some(holder.ok_or(Unauthorized::NoTicket)?)
+            }
+            None => None,
+        };
+        let Some(keys) = keys else {
+            return Ok(Admitted::default());
+        };
+        let key = match holder {
+            None => keys.find(secret(headers)?).ok_or(Unauthorized::NoKey)?,
+            // Of a key that has been withdrawn since.
+            Some(Holder(holder)) => holder
+                .and_then(|holder| keys.with_digest(&holder))
+                .ok_or(Unauthorized::NoTicket)?,
+        };
+        if key.has_expired(Timestamp::now()) {
+            return Err(Unauthorized::Expired.into());
+        }
+        spans::name_key(&key.name);
+        let taken = key
+            .rate
+            .map(|rate| self.0.buckets.take(&key.name, rate, Instant::now()));
+        if let Some(taken) = taken.filter(|taken| !taken.granted) {
+            let retry_after_s = taken.retry_after_s();
+            return Err(Refused {
+                problem: Problem::RateLimited { retry_after_s },
+                taken: Some(taken),
+            });
+        }
+        if !key.may(asked) {
+            return Err(Refused {
+                problem: Problem::Forbidden(asked),
+                taken,
+            });
+        }
+        Ok(Admitted {
+            caller: Some(Caller::of(key)),
+            taken,
+        })
+    }
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            streams: 10_000,
+            streams_per_key: 1_000,
+            ticket_life: Duration::from_secs(600),
+        }
+    }
+}
+
+/// A request that may go on.
+#[derive(Default)]
+struct Admitted {
+    /// `None` where it does not matter who asks.
+    caller: Option<Caller>,
+    taken: Option<Taken>,
+}
+
+/// A request that may not.
+struct Refused {
+    problem: Problem,
+    taken: Option<Taken>,
+}
+
+impl From<Unauthorized> for Refused {
+    fn from(why: Unauthorized) -> Self {
+        Self {
+            problem: Problem::Unauthorized(why),
+            taken: None,
+        }
+    }
+}
+
+/// What follows `Bearer` in the one header that there is.
+fn secret(headers: &HeaderMap) -> Result<&[u8], Unauthorized> {
+    let mut values = headers.get_all(header::AUTHORIZATION).iter();
+    let Some(value) = values.next() else {
+        return Err(Unauthorized::Nothing);
+    };
+    let value = value.as_bytes();
+    let (scheme, secret) = value.split_at(value.len().min(7));
+    if values.next().is_none() && scheme.eq_ignore_ascii_case(b"bearer ") {
+        Ok(secret.trim_ascii())
+    } else {
+        Err(Unauthorized::NoKey)
+    }
+}
+
+/// The layer before one route.
+pub(super) async fn gate(
+    State((access, needs)): State<(Access, Needs)>,
+    mut request: Request,
+    next: Next,
+) -> Response {
+    let (mut response, taken) = match access.admit(needs, request.uri(), request.headers()) {
+        Ok(Admitted { caller, taken }) => {
+            if let Some(caller) = caller {
+                request.extensions_mut().insert(caller);
+            }
+            (next.run(request).await, taken)
+        }
+        Err(Refused { problem, taken }) => (problem.into_response(), taken),
+    };
+    if let Some(taken) = taken {
+        taken.write(response.headers_mut());
+    }
+    response
+}
+
+/// The layer before all routes: an address is written down by proxies, browsers and logs, so a key
+/// in one has been given away.
+pub(super) async fn refuse_keys_in_urls(request: Request, next: Next) -> Response {
+    if super::params::brings_a_key(request.uri()) {
+        tracing::warn!(
+            "a key came in a URL and may have been written down on its way; withdraw it"
+        );
+        return Problem::KeyInUrl.into_response();
+    }
+    next.run(request).await
+}

@@ -1,0 +1,107 @@
+//! What a key may do, and what each route asks for.
+
+/// What a key may do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scope {
+    /// Look at one's own plans, and follow them.
+    Read,
+    /// Submit, cancel and delete plans as well.
+    Plan,
+    /// Read the metrics.
+    Metrics,
+    /// Everything, with everybody's plans.
+    Admin,
+}
+
+impl Scope {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Read, Self::Plan, Self::Metrics, Self::Admin];
+
+    /// As it is written in the file of keys.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Read => "read",
+            Self::Plan => "plan",
+            Self::Metrics => "metrics",
+            Self::Admin => "admin",
+        }
+    }
+
+    /// The one of that name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|scope| scope.name() == name)
+    }
+
+    /// Whether who has this may do what `other` says.
+    #[must_use]
+    pub fn includes(self, other: Self) -> bool {
+        self == other || self == Self::Admin || (self, other) == (Self::Plan, Self::Read)
+    }
+}
+
+/// What a route asks of its caller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Needs {
+    /// No key.
+    Nothing,
+    /// A key with this scope.
+    Scope(Scope),
+    /// A key with [`Scope::Read`], or a ticket for the plan.
+    Ticket,
+}
+
+impl Needs {
+    /// Of the route with this method and path. What is not named here asks for more rather than less.
+    pub(in crate::http) fn of(method: &str, path: &str) -> Self {
+        match (method, path) {
+            (
+                "GET",
+                "/" | "/algorithms" | "/docs" | "/limits" | "/livez" | "/openapi.json"
+                | "/openapi.yaml" | "/problems/{slug}" | "/readyz" | "/version",
+            ) => Self::Nothing,
+            ("GET", "/metrics") => Self::Scope(Scope::Metrics),
+            ("GET", "/plans/{id}/events") => Self::Ticket,
+            ("GET", _) | ("POST", "/plans/{id}/tickets") => Self::Scope(Scope::Read),
+            (_, path) if path.starts_with("/plans") => Self::Scope(Scope::Plan),
+            _ => Self::Scope(Scope::Admin),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn admin_may_all_and_plan_may_read() {
+        for (has, asked, may) in [
+            (Scope::Read, Scope::Read, true),
+            (Scope::Read, Scope::Plan, false),
+            (Scope::Plan, Scope::Read, true),
+            (Scope::Plan, Scope::Metrics, false),
+            (Scope::Plan, Scope::Admin, false),
+            (Scope::Metrics, Scope::Read, false),
+            (Scope::Admin, Scope::Metrics, true),
+            (Scope::Admin, Scope::Plan, true),
+        ] {
+            assert_eq!(has.includes(asked), may, "{has:?} for {asked:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_named_asks_for_more() {
+        for (method, path, needs) in [
+            ("GET", "/livez", Needs::Nothing),
+            ("GET", "/plans", Needs::Scope(Scope::Read)),
+            ("GET", "/something/new", Needs::Scope(Scope::Read)),
+            ("POST", "/plans", Needs::Scope(Scope::Plan)),
+            ("DELETE", "/plans/{id}", Needs::Scope(Scope::Plan)),
+            ("PUT", "/terrains/{name}", Needs::Scope(Scope::Admin)),
+            ("POST", "/livez", Needs::Scope(Scope::Admin)),
+        ] {
+            assert_eq!(Needs::of(method, path), needs, "{method} {path}");
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! What browsers are told about an answer: which pages may read it, and what it may do.
+
+use std::time::Duration;
+
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, Uri, header};
+use tower::layer::util::Identity;
+use tower::util::{Either, option_layer};
+use tower_http::cors::{AllowOrigin, CorsLayer};
+
+const CROSS_ORIGIN_RESOURCE_POLICY: HeaderName =
+    HeaderName::from_static("cross-origin-resource-policy");
+
+/// What only data needs, when somebody opens it as a page.
+const CSP_OF_DATA: HeaderValue =
+    HeaderValue::from_static("default-src 'none'; frame-ancestors 'none'");
+
+/// What a drawing needs: nothing but itself, styles among it.
+const CSP_OF_SVG: HeaderValue = HeaderValue::from_static(
+    "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; sandbox",
+);
+
+/// How long a browser may remember what it was told before a request.
+const PREFLIGHT_AGE: Duration = Duration::from_secs(600);
+
+/// Headers of answers that pages elsewhere may read, beside those that every page may.
+const EXPOSED: [HeaderName; 11] = [
+    header::ETAG,
+    header::LINK,
+    header::LOCATION,
+    header::RETRY_AFTER,
+    header::WWW_AUTHENTICATE,
+    header::ACCEPT_ENCODING,
+    HeaderName::from_static("idempotency-replayed"),
+    HeaderName::from_static("preference-applied"),
+    HeaderName::from_static("ratelimit"),
+    HeaderName::from_static("ratelimit-policy"),
+    HeaderName::from_static("x-request-id"),
+];
+
+/// Headers that pages elsewhere may send.
+const ALLOWED: [HeaderName; 11] = [
+    header::ACCEPT,
+    header::AUTHORIZATION,
+    header::CONTENT_ENCODING,
+    header::CONTENT_TYPE,
+    header::IF_NONE_MATCH,
+    HeaderName::from_static("idempotency-key"),
+    HeaderName::from_static("last-event-id"),
+    HeaderName::from_static("noctule-webhook"),
+    HeaderName::from_static("prefer"),
+    HeaderName::from_static("traceparent"),
+    HeaderName::from_static("x-request-id"),
+];
+
+/// Pages from elsewhere that may use this service, by their exact origins.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Origins(Vec<HeaderValue>);
+
+impl Origins {
+    /// # Errors
+    /// The first that is no origin: a scheme, a host and a port that is not the scheme's own.
+    pub fn read(origins: &[String]) -> Result<Self, String> {
+        let read = |origin: &String| {
+            let refused =
+                || format!("{origin:?} is no origin, must be such as https://plans.example:8443");
+            if !is_origin(origin) {
+                return Err(refused());
+            }
+            HeaderValue::from_str(origin).map_err(|_| refused())
+        };
+        origins.iter().map(read).collect::<Result<_, _>>().map(Self)
+    }
+
+    /// Answers preflights, and tells the pages' browsers that they may read. Nothing where nobody may.
+    pub(super) fn layer(&self) -> Either<CorsLayer, Identity> {
+        let layer = CorsLayer::new()
+            .allow_origin(AllowOrigin::list(self.0.clone()))
+            .allow_methods([Method::GET, Method::POST, Method::PUT, Method::DELETE])
+            .allow_headers(ALLOWED)
+            .expose_headers(EXPOSED)
+            .max_age(PREFLIGHT_AGE);
+        option_layer((!self.0.is_empty()).then_some(layer))
+    }
+}
+
+/// As a browser writes it: in lower case, without a path, without the scheme's own port.
+fn is_origin(text: &str) -> bool {
+    let Ok(uri) = text.parse::<Uri>() else {
+        return false;
+    };
+    let (Some(scheme), Some(authority)) = (uri.scheme_str(), uri.authority()) else {
+        return false;
+    };
+    let own_port = matches!(
+        (scheme, authority.port_u16()),
+        ("http", Some(80)) | ("https", Some(443))
+    );
+    matches!(scheme, "http" | "https")
+        && !own_port
+        && !authority.as_str().contains(['@', '*'])
+        && !text.bytes().any(|byte| byte.is_ascii_uppercase())
+        && text == format!("{scheme}://{authority}")
+}
+
+/// Headers of every answer.
+pub(super) fn secure(headers: &mut HeaderMap) {
+    headers.insert(
+        header::X_CONTENT_TYPE_OPTIONS,
+        HeaderValue::from_static("nosniff"),
+    );
+    headers.insert(
+        header::REFERRER_POLICY,
+        HeaderValue::from_static("no-referrer"),
+    );
+    let readers = if headers.contains_key(header::ACCESS_CONTROL_ALLOW_ORIGIN) {
+        "cross-origin"
+    } else {
+        "same-origin"
+    };
+    headers.insert(
+        CROSS_ORIGIN_RESOURCE_POLICY,
+        HeaderValue::from_static(readers),
+    );
+    let drawn = headers
+        .get(header::CONTENT_TYPE)
+        .is_some_and(|media_type| media_type.as_bytes().starts_with(b"image/svg+xml"));
+    headers
+        .entry(header::CONTENT_SECURITY_POLICY)
+        .or_insert(if drawn { CSP_OF_SVG } else { CSP_OF_DATA });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_exact_origins_are_taken() {
+        for (text, taken) in [
+            ("https://plans.example", true),
+            ("http://localhost:5173", true),
+            ("http://[::1]:3000", true),
+            ("*", false),
+            ("null", false),
+            ("https://*.example", false),
+            ("https://plans.example/", false),
+            ("https://plans.example/app", false),
+            ("https://Plans.example", false),
+            ("https://plans.example:443", false),
+            ("https://user@plans.example", false),
+            ("plans.example", false),
+            ("ftp://plans.example", false),
+            ("", false),
+        ] {
+            let read = Origins::read(&[text.to_owned()]);
+            assert_eq!(read.is_ok(), taken, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_page_keeps_a_policy_of_its_own() {
+        let mut headers = HeaderMap::new();
+        let own = HeaderValue::from_static("default-src 'self'");
+        headers.insert(header::CONTENT_SECURITY_POLICY, own.clone());
+        secure(&mut headers);
+        assert_eq!(headers[header::CONTENT_SECURITY_POLICY], own);
+    }
+}

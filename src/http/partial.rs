@@ -1,0 +1,80 @@
+//! `GET /plans/{id}/result?partial=true` before the end: the best route so far, measured as a
+//! result is, as if the plan were cancelled now.
+
+use super::plans::now_ms;
+use super::problem::Problem;
+use super::{AppState, off_thread};
+use crate::export::document::{Convergence, Incumbent, Origin, ResultDocument, Timing};
+use crate::export::sha256_hex;
+use crate::geometry::Point3;
+use crate::job::{Event, Plan};
+use crate::planner;
+use crate::scenario::json::{self, Rules};
+use crate::scenario::limits::Limits;
+
+/// Points of the curve in it, the newest.
+const CURVE: usize = 10_000;
+
+/// The document, or `None` when the run has not told of a route yet.
+pub(super) async fn result(state: &AppState, plan: &Plan) -> Result<Option<String>, Problem> {
+    let Some(best) = state.store.incumbent(plan.id).await? else {
+        return Ok(None);
+    };
+    let curve = curve(state, plan).await?;
+    let scenario = state.store.scenario(plan.id).await?;
+    let run_ms = plan.started_ms.map_or(0, |began| now_ms() - began);
+    let origin = Origin {
+        plan_id: Some(plan.id),
+        algorithm: plan.algorithm.clone(),
+        seed: plan.seed,
+        scenario_sha256: sha256_hex(scenario.as_bytes()),
+        timing: Timing {
+            queued_ms: plan.queued_ms(),
+            run_ms: run_ms.max(0) as f64,
+        },
+    };
+    let rules = Rules {
+        limits: Limits::NONE,
+        algorithms: state.rules.algorithms.clone(),
+    };
+    off_thread::run(move || measure(&scenario, &rules, best, curve, origin).map(Some)).await?
+}
+
+/// The curve of the present run; an earlier one that was broken off is not part of it.
+async fn curve(state: &AppState, plan: &Plan) -> Result<Vec<Convergence>, Problem> {
+    let page = state.store.events(plan.id, 0, usize::MAX).await?;
+    let mut curve: Vec<Convergence> = Vec::new();
+    for told in page.events {
+        match told.event {
+            Event::Convergence(point) => curve.push(point),
+            Event::Status(plan) if plan.started_ms.is_none() => curve.clear(),
+            _ => {}
+        }
+    }
+    let excess = curve.len().saturating_sub(CURVE);
+    curve.drain(..excess);
+    Ok(curve)
+}
+
+fn measure(
+    scenario: &str,
+    rules: &Rules,
+    best: Incumbent,
+    curve: Vec<Convergence>,
+    origin: Origin,
+) -> Result<String, Problem> {
+    let scenario = json::read(scenario.as_bytes(), rules, 0).map_err(|refusal| {
+        tracing::error!(%refusal, "an accepted document cannot be read");
+        Problem::Internal
+    })?;
+    let route = best.waypoints.into_iter().map(Point3::from);
+    let outcome = planner::so_far(&scenario, route.collect());
+    let document = ResultDocument {
+        stop_reason: None,
+        is_final: Some(false),
+        evaluations: curve.last().map_or(0, |last| last.evaluations),
+        convergence: curve,
+        ..ResultDocument::new(&outcome, origin)
+    };
+    Ok(document.to_json())
+}

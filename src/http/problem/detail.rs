@@ -1,0 +1,130 @@
+//! What a problem says to people.
+
+use super::Problem;
+use crate::http::auth::TooMany;
+use crate::store::{Tombstone, Trouble};
+
+impl Problem {
+    /// For people: what happened this time, and what would help.
+    #[expect(clippy::too_many_lines, reason = "one table")]
+    pub(super) fn detail(&self) -> String {
+        match self {
+            Self::InvalidJson {
+                line,
+                column,
+                pointer,
+                detail,
+            } if pointer.is_empty() => {
+                format!("line {line}, column {column}: {detail}")
+            }
+            Self::InvalidJson {
+                line,
+                column,
+                pointer,
+                detail,
+            } => {
+                format!("line {line}, column {column}, at {pointer}: {detail}")
+            }
+            Self::BodyIncomplete => "the connection ended before the body did".to_owned(),
+            Self::BodyNotGzip(detail) => format!("content-encoding is gzip, but: {detail}"),
+            Self::InvalidParameter { detail, .. } => detail.clone(),
+            Self::KeyInUrl => {
+                "URLs are written down on their way: send the key as Authorization: Bearer, and replace this one".to_owned()
+            }
+            Self::Unauthorized(why) => why.detail().to_owned(),
+            Self::Forbidden(scope) => format!("the key has not the scope {}", scope.name()),
+            Self::RateLimited { retry_after_s } => {
+                format!("the key has asked more often than it may; try again in {retry_after_s} s")
+            }
+            Self::TooManyStreams(TooMany { limit, most }) => {
+                format!("{most} event streams are open, the limit {limit} of GET /limits; close one, or wait")
+            }
+            Self::NoSuchResource(path) => {
+                format!("nothing is at {path}; GET /docs lists what is")
+            }
+            Self::NoSuchPlan(id) => format!("there is no plan {id}"),
+            Self::MethodNotAllowed => {
+                "the header Allow lists the methods of this resource".to_owned()
+            }
+            Self::NotAcceptable { asked, available } => {
+                format!("asked for {asked}; available: {}", available.join(", "))
+            }
+            Self::BodyTooSlow(limit) => {
+                format!("the body was not complete after {} s", limit.as_secs_f64())
+            }
+            Self::NotReady { id, status, .. } => format!(
+                "plan {id} is {}; GET /plans/{id} with Prefer: wait=30 waits for it",
+                status.name()
+            ),
+            Self::NoResult {
+                id,
+                failure: Some(failure),
+                ..
+            } => format!("plan {id} failed: {}", failure.detail),
+            Self::NoResult {
+                id,
+                status,
+                failure: None,
+            } => {
+                format!("plan {id} was {} before it had a route", status.name())
+            }
+            Self::Gone(Tombstone { id, expired, .. }) if *expired => {
+                format!("plan {id} was kept as long as the service keeps plans, and removed")
+            }
+            Self::Gone(Tombstone { id, .. }) => format!("plan {id} was deleted"),
+            Self::IdempotencyInFlight => {
+                "a request with this Idempotency-Key has not been answered yet; try again for its answer".to_owned()
+            }
+            Self::IdempotencyKeyReused => {
+                "a request with this Idempotency-Key had another body; take a new key for a new request".to_owned()
+            }
+            Self::QuotaReached { active, retry_after_s } => {
+                format!("{active} plans of this key are queued or running, its quota; try again in {retry_after_s} s")
+            }
+            Self::BodyTooLarge(limit) => {
+                format!(
+                    "the body is longer than {limit} bytes, the limit body_bytes of GET /limits"
+                )
+            }
+            Self::UnsupportedMediaType(found) => unsupported_media_type(found.as_deref()),
+            Self::UnsupportedCoding(found) => {
+                format!("content-encoding is {found}; send the body as it is, or as gzip")
+            }
+            Self::InvalidScenario(faults) if faults.len() == 1 => "1 fault; see errors".to_owned(),
+            Self::InvalidScenario(faults) => format!("{} faults; see errors", faults.len()),
+            Self::Internal => {
+                "a defect of the service; its log has more under this request's id".to_owned()
+            }
+            Self::Draining { retry_after_s } => {
+                format!("no new plans are taken; try again in {retry_after_s} s")
+            }
+            Self::QueueFull {
+                queued,
+                retry_after_s,
+            } => {
+                format!("{queued} plans wait, the limit; try again in {retry_after_s} s")
+            }
+            Self::StoreUnavailable(trouble) => {
+                let why = match trouble {
+                    Some(Trouble::Full) => "the disk of the store is full",
+                    Some(Trouble::ReadOnly) => "the data directory cannot be written",
+                    Some(Trouble::Damaged) => "the store's file is damaged",
+                    Some(Trouble::Newer) => "the store was written by a newer version",
+                    Some(Trouble::Other) => "the store does not answer",
+                    None => "another process uses the data directory",
+                };
+                format!("{why}; plans are taken again when that is mended, the service's log says more")
+            }
+        }
+    }
+}
+
+fn unsupported_media_type(found: Option<&str>) -> String {
+    match found {
+        None => "no content-type was sent; send application/json".to_owned(),
+        Some(found) if found.starts_with("application/x-www-form-urlencoded") => format!(
+            "content-type is {found}, which curl -d sends by itself; add -H 'content-type: application/json'"
+        ),
+        Some(found) => format!("content-type is {found}; send application/json in UTF-8"),
+    }
+}

@@ -1,0 +1,84 @@
+//! Problem documents, RFC 9457.
+
+use axum::http::StatusCode;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::Problem;
+use crate::http::auth::TooMany;
+use crate::job::Failure;
+use crate::scenario::json::Fault;
+
+impl Problem {
+    /// The problem document; `instance` is the request's id.
+    pub(in crate::http) fn document(&self, instance: &str) -> String {
+        let (status, slug, title) = self.kind();
+        let document = Document {
+            r#type: format!("/problems/{slug}"),
+            title,
+            status: status.as_u16(),
+            detail: self.detail(),
+            instance,
+            more: self.more(),
+        };
+        serde_json::to_string(&document).expect("every map key is a string")
+    }
+
+    /// The members that only this kind of problem has.
+    fn more(&self) -> Value {
+        match self {
+            Self::InvalidScenario(faults) => {
+                json!({"errors": faults.iter().map(error).collect::<Vec<_>>()})
+            }
+            Self::InvalidJson {
+                line,
+                column,
+                pointer,
+                ..
+            } => {
+                json!({"line": line, "column": column, "pointer": pointer})
+            }
+            Self::InvalidParameter { name, .. } => json!({"parameter": name}),
+            Self::NotAcceptable { available, .. } => json!({"available": available}),
+            Self::Forbidden(scope) => json!({"scope": scope.name()}),
+            Self::TooManyStreams(TooMany { limit, .. }) => json!({"limit": limit}),
+            _ => json!({}),
+        }
+    }
+}
+
+/// A problem document, in the order in which people read it.
+#[derive(Serialize)]
+struct Document<'a> {
+    r#type: String,
+    title: &'static str,
+    status: u16,
+    detail: String,
+    instance: &'a str,
+    #[serde(flatten)]
+    more: Value,
+}
+
+fn error(fault: &Fault) -> Value {
+    json!({"pointer": fault.pointer, "code": fault.code, "detail": fault.detail})
+}
+
+/// What stands in a status document for a failed plan: a problem without an instance.
+#[derive(Debug, Serialize)]
+pub(in crate::http) struct FailureDocument {
+    r#type: String,
+    title: &'static str,
+    status: u16,
+    detail: String,
+}
+
+impl From<Failure> for FailureDocument {
+    fn from(failure: Failure) -> Self {
+        Self {
+            r#type: format!("/problems/{}", failure.kind),
+            title: "The plan failed",
+            status: StatusCode::INTERNAL_SERVER_ERROR.as_u16(),
+            detail: failure.detail,
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Which status, type and title for which error: the one table.
+
+use axum::http::StatusCode;
+
+use super::Problem;
+
+/// What a kind of problem is called: status, the last part of `type`, title.
+pub(super) type Kind = (StatusCode, &'static str, &'static str);
+
+impl Problem {
+    /// The one table from error to status. Slugs are stable; `docs/PROBLEMS.md` has a section for each.
+    #[expect(clippy::too_many_lines, reason = "one table")]
+    pub(super) fn kind(&self) -> Kind {
+        match self {
+            Self::InvalidJson { .. } => (
+                StatusCode::BAD_REQUEST,
+                "invalid-json",
+                "The body is not JSON",
+            ),
+            Self::BodyIncomplete => (
+                StatusCode::BAD_REQUEST,
+                "incomplete-body",
+                "The body broke off",
+            ),
+            Self::BodyNotGzip(_) => (
+                StatusCode::BAD_REQUEST,
+                "invalid-gzip",
+                "The body is not gzip",
+            ),
+            Self::InvalidParameter { .. } => (
+                StatusCode::BAD_REQUEST,
+                "invalid-parameter",
+                "Invalid parameter",
+            ),
+            Self::KeyInUrl => (
+                StatusCode::BAD_REQUEST,
+                "key-in-url",
+                "Keys do not belong in URLs",
+            ),
+            Self::Unauthorized(_) => (StatusCode::UNAUTHORIZED, "unauthorized", "A key is needed"),
+            Self::Forbidden(_) => (
+                StatusCode::FORBIDDEN,
+                "forbidden",
+                "The key may not do this",
+            ),
+            Self::NoSuchResource(_) | Self::NoSuchPlan(_) => {
+                (StatusCode::NOT_FOUND, "not-found", "No such resource")
+            }
+            Self::MethodNotAllowed => (
+                StatusCode::METHOD_NOT_ALLOWED,
+                "method-not-allowed",
+                "Method not allowed",
+            ),
+            Self::NotAcceptable { .. } => (
+                StatusCode::NOT_ACCEPTABLE,
+                "not-acceptable",
+                "No acceptable format",
+            ),
+            Self::BodyTooSlow(_) => (
+                StatusCode::REQUEST_TIMEOUT,
+                "request-timeout",
+                "The body came too slowly",
+            ),
+            Self::NotReady { .. } => (StatusCode::CONFLICT, "not-ready", "The plan has not ended"),
+            Self::NoResult { .. } => (StatusCode::CONFLICT, "no-result", "The plan has no result"),
+            Self::IdempotencyInFlight => (
+                StatusCode::CONFLICT,
+                "idempotency-in-flight",
+                "The same request is being answered",
+            ),
+            Self::Gone(_) => (StatusCode::GONE, "gone", "The plan was removed"),
+            Self::BodyTooLarge(_) => (
+                StatusCode::PAYLOAD_TOO_LARGE,
+                "body-too-large",
+                "The body is too large",
+            ),
+            Self::UnsupportedMediaType(_) | Self::UnsupportedCoding(_) => (
+                StatusCode::UNSUPPORTED_MEDIA_TYPE,
+                "unsupported-media-type",
+                "Unsupported media type",
+            ),
+            Self::InvalidScenario(_) => (
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "invalid-scenario",
+                "The scenario cannot be planned",
+            ),
+            Self::IdempotencyKeyReused => (
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "idempotency-key-reused",
+                "The idempotency key was used before",
+            ),
+            Self::QuotaReached { .. } => (
+                StatusCode::TOO_MANY_REQUESTS,
+                "quota-reached",
+                "The quota of active plans is reached",
+            ),
+            Self::RateLimited { .. } => (
+                StatusCode::TOO_MANY_REQUESTS,
+                "rate-limited",
+                "Too many requests",
+            ),
+            Self::TooManyStreams(_) => (
+                StatusCode::TOO_MANY_REQUESTS,
+                "too-many-streams",
+                "Too many event streams",
+            ),
+            Self::Internal => (
+                StatusCode::INTERNAL_SERVER_ERROR,
+                "internal",
+                "Internal error",
+            ),
+            Self::Draining { .. } => (
+                StatusCode::SERVICE_UNAVAILABLE,
+                "draining",
+                "The service is shutting down",
+            ),
+            Self::QueueFull { .. } => (
+                StatusCode::SERVICE_UNAVAILABLE,
+                "queue-full",
+                "The queue is full",
+            ),
+            Self::StoreUnavailable(_) => (
+                StatusCode::SERVICE_UNAVAILABLE,
+                "store-unavailable",
+                "The store is unavailable",
+            ),
+        }
+    }
+}

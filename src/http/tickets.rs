@@ -1,0 +1,38 @@
+//! `POST /plans/{id}/tickets`: leave to follow one plan for some minutes, in a form that fits a URL.
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::{StatusCode, Uri};
+use serde::Serialize;
+
+use super::AppState;
+use super::caller::Caller;
+use super::params::{Id, Params};
+use super::problem::Problem;
+use super::status::location;
+
+/// The ticket, until when it opens streams, and where.
+#[derive(Serialize)]
+pub(super) struct TicketDocument {
+    ticket: String,
+    expires_at: String,
+    events: String,
+}
+
+/// `POST /plans/{id}/tickets`.
+pub(super) async fn issue(
+    State(state): State<AppState>,
+    caller: Caller,
+    Id(id): Id,
+    uri: Uri,
+) -> Result<(StatusCode, Json<TicketDocument>), Problem> {
+    Params::read(&uri, &[])?;
+    caller.plan(&*state.store, id).await?;
+    let (ticket, until) = state.access.ticket(id, &caller)?;
+    let document = TicketDocument {
+        events: format!("{}/events?ticket={ticket}", location(id)),
+        expires_at: format!("{until:.3}"),
+        ticket,
+    };
+    Ok((StatusCode::CREATED, Json(document)))
+}

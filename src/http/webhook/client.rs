@@ -1,0 +1,139 @@
+//! One request to a receiver: to an address that was looked at, without redirects, within a time.
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::http::{HeaderMap, HeaderValue, Method, Request, StatusCode, header};
+use bytes::Bytes;
+use http_body_util::Full;
+use hyper::client::conn::http1;
+use hyper_util::rt::TokioIo;
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::net::TcpStream;
+use tokio_rustls::TlsConnector;
+use tokio_rustls::rustls::pki_types::ServerName;
+use tokio_rustls::rustls::{ClientConfig, RootCertStore, crypto::ring};
+
+use super::address::{Target, is_public};
+
+/// For the whole of it: name, connection, request and the head of the answer.
+const TIMEOUT: Duration = Duration::from_secs(15);
+
+/// Sends webhooks.
+#[derive(Clone)]
+pub(super) struct Client {
+    tls: TlsConnector,
+    private: bool,
+}
+
+impl Client {
+    /// Trusting whom the machine trusts; `private` receivers are those not on the public internet.
+    pub(super) fn new(private: bool) -> Self {
+        let mut roots = RootCertStore::empty();
+        let found = rustls_native_certs::load_native_certs();
+        for error in &found.errors {
+            tracing::warn!(%error, "a certificate authority of this machine cannot be read");
+        }
+        let (added, _) = roots.add_parsable_certificates(found.certs);
+        if added == 0 {
+            tracing::warn!("this machine trusts no certificate authority: no webhook gets through");
+        }
+        let config = ClientConfig::builder_with_provider(Arc::new(ring::default_provider()))
+            .with_safe_default_protocol_versions()
+            .expect("ring has the default versions")
+            .with_root_certificates(roots)
+            .with_no_client_auth();
+        Self {
+            tls: Arc::new(config).into(),
+            private,
+        }
+    }
+
+    /// The status of the answer to `body`.
+    pub(super) async fn post(
+        &self,
+        target: &Target,
+        headers: HeaderMap,
+        body: String,
+    ) -> io::Result<StatusCode> {
+        let sent = tokio::time::timeout(TIMEOUT, self.exchange(target, headers, body)).await;
+        sent.unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()))
+    }
+
+    async fn exchange(
+        &self,
+        target: &Target,
+        headers: HeaderMap,
+        body: String,
+    ) -> io::Result<StatusCode> {
+        let request = request(target, headers, body)?;
+        let stream = self.connect(target).await?;
+        if !target.tls {
+            return send(stream, request).await;
+        }
+        let name = ServerName::try_from(target.host.clone()).map_err(io::Error::other)?;
+        send(self.tls.connect(name, stream).await?, request).await
+    }
+
+    /// To the very address that was looked at: a name that answers otherwise the next time leads nowhere.
+    async fn connect(&self, target: &Target) -> io::Result<TcpStream> {
+        let found = tokio::net::lookup_host((target.host.as_str(), target.port)).await?;
+        let allowed: Vec<SocketAddr> = found
+            .filter(|address| self.private || is_public(address.ip()))
+            .collect();
+        if allowed.is_empty() {
+            return Err(io::Error::other("the host has no public address"));
+        }
+        let stream = TcpStream::connect(&allowed[..]).await?;
+        stream.set_nodelay(true)?;
+        Ok(stream)
+    }
+}
+
+fn request(
+    target: &Target,
+    mut headers: HeaderMap,
+    body: String,
+) -> io::Result<Request<Full<Bytes>>> {
+    let authority = target
+        .uri
+        .authority()
+        .map_or("", |authority| authority.as_str());
+    let host = HeaderValue::from_str(authority).map_err(io::Error::other)?;
+    headers.insert(header::HOST, host);
+    headers.insert(
+        header::USER_AGENT,
+        HeaderValue::from_static(concat!("noctule/", env!("CARGO_PKG_VERSION"))),
+    );
+    let path = target
+        .uri
+        .path_and_query()
+        .map_or("/", |path| path.as_str());
+    let mut request = Request::new(Full::new(Bytes::from(body)));
+    *request.method_mut() = Method::POST;
+    *request.uri_mut() = path.parse().map_err(io::Error::other)?;
+    *request.headers_mut() = headers;
+    Ok(request)
+}
+
+/// Send it, and hang up once the head of the answer has come.
+async fn send(
+    stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
+    request: Request<Full<Bytes>>,
+) -> io::Result<StatusCode> {
+    let (mut sender, connection) = http1::handshake(TokioIo::new(stream))
+        .await
+        .map_err(io::Error::other)?;
+    let answer = sender.send_request(request);
+    tokio::pin!(connection, answer);
+    tokio::select! {
+        answer = &mut answer => answer.map(|answer| answer.status()).map_err(io::Error::other),
+        ended = &mut connection => match ended {
+            // The answer is there when the connection has ended well.
+            Ok(()) => answer.await.map(|answer| answer.status()).map_err(io::Error::other),
+            Err(error) => Err(io::Error::other(error)),
+        },
+    }
+}

@@ -1,0 +1,219 @@
+//! Webhooks: a plan's end, told to an address that its caller named.
+//!
+//! The store keeps what is to be told from the plan's acceptance until it has been told, so that a
+//! restart forgets nothing; a receiver may hear of an end twice and knows it by its id.
+
+mod address;
+mod client;
+mod retry;
+mod secret;
+
+use std::collections::HashSet;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use jiff::Timestamp;
+use serde::Serialize;
+use tokio::task::{JoinHandle, JoinSet};
+use tokio::time::MissedTickBehavior;
+
+pub use secret::Secret;
+
+use super::params;
+use super::problem::Problem;
+use super::status::StatusDocument;
+use crate::job::PlanId;
+use crate::store::{Store, StoreError, Webhook};
+use address::Target;
+use client::Client;
+
+const NOCTULE_WEBHOOK: HeaderName = HeaderName::from_static("noctule-webhook");
+const WEBHOOK_ID: HeaderName = HeaderName::from_static("webhook-id");
+const WEBHOOK_TIMESTAMP: HeaderName = HeaderName::from_static("webhook-timestamp");
+const WEBHOOK_SIGNATURE: HeaderName = HeaderName::from_static("webhook-signature");
+
+/// How often the store is asked what is due.
+const LOOK: Duration = Duration::from_millis(500);
+
+/// Webhooks on their way at once.
+const AT_ONCE: usize = 64;
+
+/// How webhooks are sent.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Settings {
+    /// Shared with receivers.
+    pub secret: Secret,
+    /// Whether receivers may be elsewhere than on the public internet, and without TLS.
+    pub allow_private: bool,
+}
+
+/// Where the caller wants to be told of the end.
+///
+/// # Errors
+/// An invalid parameter when it is no address to which webhooks go, or when there are none.
+pub(super) fn asked(
+    settings: Option<&Settings>,
+    headers: &HeaderMap,
+) -> Result<Option<String>, Problem> {
+    let mut values = headers.get_all(NOCTULE_WEBHOOK).iter();
+    let Some(value) = values.next() else {
+        return Ok(None);
+    };
+    let text = String::from_utf8_lossy(value.as_bytes()).into_owned();
+    let refused = |allowed| params::refused(NOCTULE_WEBHOOK.as_str(), &text, allowed);
+    let Some(settings) = settings else {
+        return Err(refused("left out: this service sends no webhooks"));
+    };
+    if values.next().is_some() || Target::read(&text, settings.allow_private).is_none() {
+        return Err(refused(Target::ALLOWED));
+    }
+    Ok(Some(text))
+}
+
+/// Sends what is due, until it is dropped.
+pub struct Sender(JoinHandle<()>);
+
+impl Sender {
+    /// Send what `store` has to tell.
+    #[must_use]
+    pub fn start(store: Arc<dyn Store>, settings: Settings) -> Self {
+        let client = Client::new(settings.allow_private);
+        let delivery = Arc::new(Delivery {
+            store,
+            settings,
+            client,
+        });
+        Self(tokio::spawn(deliver_all(delivery)))
+    }
+}
+
+impl Drop for Sender {
+    fn drop(&mut self) {
+        self.0.abort();
+    }
+}
+
+struct Delivery {
+    store: Arc<dyn Store>,
+    settings: Settings,
+    client: Client,
+}
+
+async fn deliver_all(delivery: Arc<Delivery>) {
+    let mut looks = tokio::time::interval(LOOK);
+    looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut on_their_way = HashSet::new();
+    let mut tasks = JoinSet::new();
+    loop {
+        tokio::select! {
+            _ = looks.tick() => {}
+            Some(done) = tasks.join_next() => {
+                if let Ok(id) = done {
+                    on_their_way.remove(&id);
+                }
+                continue;
+            }
+        }
+        let now_ms = Timestamp::now().as_millisecond();
+        let due = match delivery.store.due_webhooks(now_ms, AT_ONCE).await {
+            Ok(due) => due,
+            Err(error) => {
+                tracing::debug!(%error, "the store does not say which webhooks are due");
+                continue;
+            }
+        };
+        for webhook in due {
+            if tasks.len() < AT_ONCE && on_their_way.insert(webhook.plan.id) {
+                let delivery = delivery.clone();
+                tasks.spawn(async move { delivery.deliver(webhook).await });
+            }
+        }
+    }
+}
+
+impl Delivery {
+    /// Try once, and write down what came of it.
+    async fn deliver(&self, webhook: Webhook) -> PlanId {
+        let (id, tries) = (webhook.plan.id, webhook.tries + 1);
+        let next_ms = match self.try_once(webhook).await {
+            Ok(status) if status.is_success() => {
+                tracing::info!(plan = %id, tries, "the webhook got through");
+                None
+            }
+            Ok(StatusCode::GONE) => {
+                tracing::info!(plan = %id, tries, "the webhook's receiver is gone");
+                None
+            }
+            Ok(status) => again(id, tries, &format!("the answer is {status}")),
+            Err(error) => again(id, tries, &error.to_string()),
+        };
+        match self.store.webhook_tried(id, next_ms).await {
+            // Of a plan that has been deleted meanwhile nobody wants to hear.
+            Ok(()) | Err(StoreError::NotFound(_) | StoreError::Gone(_)) => {}
+            Err(error) => tracing::warn!(plan = %id, %error, "a webhook will be sent once more"),
+        }
+        id
+    }
+
+    async fn try_once(&self, webhook: Webhook) -> std::io::Result<StatusCode> {
+        let target = Target::read(&webhook.url, self.settings.allow_private)
+            .ok_or_else(|| std::io::Error::other("the address is no longer allowed"))?;
+        let id = webhook.plan.id.to_string();
+        let body = Message::of(webhook).to_json();
+        let timestamp_s = Timestamp::now().as_second();
+        let signature = self.settings.secret.sign(&id, timestamp_s, &body);
+        let mut headers = HeaderMap::new();
+        headers.insert(
+            header::CONTENT_TYPE,
+            HeaderValue::from_static("application/json"),
+        );
+        for (name, value) in [
+            (WEBHOOK_ID, id),
+            (WEBHOOK_TIMESTAMP, timestamp_s.to_string()),
+            (WEBHOOK_SIGNATURE, signature),
+        ] {
+            let value = HeaderValue::from_str(&value).expect("visible ASCII");
+            headers.insert(name, value);
+        }
+        self.client.post(&target, headers, body).await
+    }
+}
+
+/// When to try again. The address stays out of the log: it may hold the receiver's own secret.
+fn again(id: PlanId, tries: u32, why: &str) -> Option<i64> {
+    let jitter = f64::from(getrandom::u32().unwrap_or(u32::MAX / 2)) / f64::from(u32::MAX);
+    if let Some(pause_ms) = retry::pause_ms(tries, jitter) {
+        let pause_s = pause_ms / 1000;
+        tracing::warn!(plan = %id, tries, pause_s, why, "a webhook did not get through");
+        Some(Timestamp::now().as_millisecond() + pause_ms)
+    } else {
+        tracing::error!(plan = %id, tries, why, "a webhook did not get through and is given up");
+        None
+    }
+}
+
+/// What is told.
+#[derive(Serialize)]
+struct Message {
+    r#type: &'static str,
+    /// Of the end.
+    timestamp: String,
+    data: StatusDocument,
+}
+
+impl Message {
+    fn of(webhook: Webhook) -> Self {
+        let ended_ms = webhook.plan.finished_ms.unwrap_or_default();
+        let ended = Timestamp::from_millisecond(ended_ms).unwrap_or(Timestamp::UNIX_EPOCH);
+        Self {
+            r#type: "plan.ended",
+            timestamp: format!("{ended:.3}"),
+            data: webhook.plan.into(),
+        }
+    }
+
+    fn to_json(&self) -> String {
+        serde_json::to_string(self).expect("every map key is a string")
+    }
+}

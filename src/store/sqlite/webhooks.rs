@@ -1,0 +1,80 @@
+//! Ends of plans that are to be told: kept with the plan, due with its end.
+
+use rusqlite::{Connection, params};
+
+use super::row::PlanRow;
+use super::transaction::Transaction;
+use crate::job::{PlanId, Submission};
+use crate::store::{StoreError, Webhook};
+
+/// Keep where the end of an accepted plan is to be told.
+pub(super) fn keep(
+    tx: &Transaction<'_>,
+    seq: i64,
+    submission: &Submission,
+) -> Result<(), StoreError> {
+    if let Some(url) = &submission.webhook {
+        tx.connection
+            .prepare_cached("INSERT INTO webhooks (plan_seq, url, tries) VALUES (?1, ?2, 0)")?
+            .execute(params![seq, url])?;
+    }
+    Ok(())
+}
+
+/// The plan has just ended.
+pub(super) fn make_due(tx: &Transaction<'_>, row: &PlanRow) -> Result<(), StoreError> {
+    tx.connection
+        .prepare_cached("UPDATE webhooks SET due_ms = ?2 WHERE plan_seq = ?1")?
+        .execute(params![row.seq, row.plan.finished_ms])?;
+    Ok(())
+}
+
+/// See [`Store::due_webhooks`](crate::store::Store::due_webhooks).
+pub(super) fn due(
+    connection: &Connection,
+    now_ms: i64,
+    limit: usize,
+) -> Result<Vec<Webhook>, StoreError> {
+    let limit = i64::try_from(limit).unwrap_or(i64::MAX);
+    let mut statement = connection.prepare_cached(
+        "SELECT id, url, tries FROM webhooks JOIN plans ON seq = plan_seq \
+         WHERE due_ms <= ?1 ORDER BY due_ms LIMIT ?2",
+    )?;
+    let rows = statement.query_map([now_ms, limit], |row| {
+        Ok((row.get(0)?, row.get(1)?, row.get(2)?))
+    })?;
+    let mut due = Vec::new();
+    for row in rows {
+        let (id, url, tries): (String, String, u32) = row?;
+        let id = PlanId::parse_str(&id)
+            .map_err(|error| StoreError::unavailable(format!("plan id {id:?}: {error}")))?;
+        if let Some(row) = PlanRow::load(connection, id)? {
+            let plan = row.plan;
+            due.push(Webhook { plan, url, tries });
+        }
+    }
+    Ok(due)
+}
+
+/// See [`Store::webhook_tried`](crate::store::Store::webhook_tried).
+pub(super) fn tried(
+    tx: &Transaction<'_>,
+    id: PlanId,
+    next_ms: Option<i64>,
+) -> Result<(), StoreError> {
+    const OF_PLAN: &str = "plan_seq = (SELECT seq FROM plans WHERE id = ?1)";
+    let id = id.to_string();
+    match next_ms {
+        Some(next_ms) => tx
+            .connection
+            .prepare_cached(&format!(
+                "UPDATE webhooks SET due_ms = ?2, tries = tries + 1 WHERE {OF_PLAN}"
+            ))?
+            .execute(params![id, next_ms])?,
+        None => tx
+            .connection
+            .prepare_cached(&format!("DELETE FROM webhooks WHERE {OF_PLAN}"))?
+            .execute([id])?,
+    };
+    Ok(())
+}

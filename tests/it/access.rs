@@ -1,0 +1,260 @@
+//! Keys of the real service: made, read, read again; and no service for strangers by accident.
+
+use std::fs;
+use std::path::Path;
+
+use reqwest::StatusCode;
+
+use crate::support::process::{Service, run, run_with};
+use crate::support::scenario;
+
+/// A new key, and its entry.
+fn new_key(arguments: &[&str]) -> (String, String) {
+    let made = run(&[&["key", "new"], arguments].concat(), "");
+    let told = String::from_utf8(made.stderr).expect("UTF-8");
+    assert_eq!(made.status.code(), Some(0), "{told}");
+    let key = told.lines().last().expect("a line").to_owned();
+    (key, String::from_utf8(made.stdout).expect("UTF-8"))
+}
+
+/// What listing plans with a key is answered with.
+async fn lists(service: &Service, key: &str) -> StatusCode {
+    let request = service.get("/plans").bearer_auth(key);
+    request.send().await.expect("an answer").status()
+}
+
+/// The log, once it has `part` in it.
+async fn log_with(path: &Path, part: &str) -> String {
+    for _ in 0..600 {
+        let log = fs::read_to_string(path).expect("a log");
+        if log.contains(part) {
+            return log;
+        }
+        tokio::time::sleep(std::time::Duration::from_millis(100)).await;
+    }
+    panic!(
+        "{part:?} is not logged: {}",
+        fs::read_to_string(path).expect("a log")
+    );
+}
+
+#[test]
+fn a_new_key_is_told_once_and_its_entry_can_be_appended() {
+    let (key, entry) = new_key(&[
+        "--name",
+        "a \"b\"",
+        "--scopes",
+        "read,metrics",
+        "--owner",
+        "o",
+    ]);
+    assert!(key.starts_with("noctule_") && key.len() == 72, "{key}");
+    assert!(!entry.contains(&key));
+    let more = [
+        "--name",
+        "b",
+        "--expires",
+        "2027-01-31T00:00:00Z",
+        "--requests-per-second",
+        "2",
+    ];
+    let (other, second) = new_key(&more);
+    assert_ne!(key, other);
+    let entries: toml::Table = toml::from_str(&(entry + &second)).expect("TOML");
+    let entries = entries["key"].as_array().expect("two");
+    assert_eq!(entries[0]["name"].as_str(), Some("a \"b\""));
+    assert_eq!(
+        entries[0]["sha256"].as_str(),
+        Some(noctule::export::sha256_hex(key.as_bytes()).as_str())
+    );
+    assert_eq!(entries[1]["expires"].as_str(), Some("2027-01-31T00:00:00Z"));
+
+    for arguments in [
+        &["--name", ""][..],
+        &["--name", "a", "--scopes", "write"],
+        &["--name", "a", "--burst", "2"],
+        &["--name", "a", "--expires", "soon"],
+    ] {
+        let refused = run(&[&["key", "new"], arguments].concat(), "");
+        assert_eq!(refused.status.code(), Some(1), "{arguments:?}");
+        assert!(refused.stdout.is_empty(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_service_without_keys_does_not_listen_to_strangers() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let data_dir = directory.path().join("data");
+    let data_dir = data_dir.to_str().expect("UTF-8");
+    let broken = directory.path().join("broken.toml");
+    fs::write(&broken, "[[key]]\nname = \"alice\"").expect("written");
+    let broken = broken.to_str().expect("UTF-8");
+    let serve = ["serve", "--listen", "0.0.0.0:0", "--data-dir", data_dir];
+    let (_, entry) = new_key(&["--name", "a"]);
+    for (variables, arguments, expected) in [
+        (&[][..], &[][..], "--allow-anonymous"),
+        (
+            &[],
+            &["--keys-file", "/nowhere/keys.toml"],
+            "/nowhere/keys.toml",
+        ),
+        (&[], &["--keys-file", broken], "key \"alice\""),
+        (&[("NOCTULE_KEYS", "[[key]]")], &[], "key 1 of the file"),
+        (
+            &[("NOCTULE_KEYS", entry.as_str())],
+            &["--keys-file", broken],
+            "give one",
+        ),
+        (
+            &[],
+            &["--allow-anonymous", "--cors-origins", "https://a.example,*"],
+            "\"*\" is no origin",
+        ),
+    ] {
+        let refused = run_with(variables, &[&serve[..], arguments].concat(), "");
+        let told = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(1), "{told}");
+        assert!(told.contains(expected), "{arguments:?}: {told}");
+        assert!(refused.stdout.is_empty());
+    }
+    assert!(
+        !Path::new(data_dir).exists(),
+        "refused before anything is made"
+    );
+}
+
+#[tokio::test]
+async fn with_leave_or_keys_it_listens_everywhere() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let path = |name: &str| directory.path().join(name);
+    let (key, entry) = new_key(&["--name", "a"]);
+    fs::write(path("keys.toml"), entry).expect("written");
+    let keys = path("keys.toml");
+    let keys = ["--keys-file", keys.to_str().expect("UTF-8")];
+    for (arguments, anonymous) in [
+        (&["--allow-anonymous"][..], StatusCode::OK),
+        (&keys, StatusCode::UNAUTHORIZED),
+        (
+            &[keys[0], keys[1], "--allow-anonymous"],
+            StatusCode::UNAUTHORIZED,
+        ),
+    ] {
+        let service = Service::start_on(
+            "0.0.0.0:0",
+            &path("data"),
+            arguments,
+            fs::File::create(path("log")).expect("a file"),
+        );
+        let listed = service.get("/plans").send().await.expect("an answer");
+        assert_eq!(listed.status(), anonymous, "{arguments:?}");
+        assert_eq!(lists(&service, &key).await, StatusCode::OK);
+        assert_eq!(service.bytes("/readyz").await, r#"{"status":"ok"}"#);
+    }
+}
+
+#[tokio::test]
+async fn a_hangup_reads_the_keys_again_and_a_fault_changes_nothing() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let path = |name: &str| directory.path().join(name);
+    let (old, old_entry) = new_key(&["--name", "old", "--owner", "alice"]);
+    let (new, new_entry) = new_key(&["--name", "new", "--owner", "alice"]);
+    fs::write(path("keys.toml"), &old_entry).expect("written");
+    let keys = path("keys.toml");
+    let arguments = [
+        "--workers",
+        "1",
+        "--keys-file",
+        keys.to_str().expect("UTF-8"),
+    ];
+    let service = Service::start_on(
+        "127.0.0.1:0",
+        &path("data"),
+        &arguments,
+        fs::File::create(path("log")).expect("a file"),
+    );
+    let request = service
+        .client()
+        .post(service.url("/plans"))
+        .json(&scenario());
+    let accepted = request.bearer_auth(&old).send().await.expect("an answer");
+    assert_eq!(accepted.status(), 202);
+    let plan = accepted.headers()["location"]
+        .to_str()
+        .expect("text")
+        .to_owned();
+    assert_eq!(lists(&service, &new).await, StatusCode::UNAUTHORIZED);
+
+    fs::write(path("keys.toml"), "[[key]]\nname = \"old\"\n").expect("written");
+    service.signal("HUP");
+    let log = log_with(&path("log"), "the keys stay as they were").await;
+    assert!(
+        log.contains("key \\\"old\\\"") || log.contains("key \"old\""),
+        "{log}"
+    );
+    assert_eq!(lists(&service, &old).await, StatusCode::OK);
+
+    fs::write(path("keys.toml"), &new_entry).expect("written");
+    service.signal("HUP");
+    log_with(&path("log"), "the keys have been read again").await;
+    assert_eq!(lists(&service, &old).await, StatusCode::UNAUTHORIZED);
+    // The new key is of the same owner.
+    let status = service
+        .get(&plan)
+        .bearer_auth(&new)
+        .send()
+        .await
+        .expect("an answer");
+    assert_eq!(status.status(), StatusCode::OK);
+}
+
+#[tokio::test]
+async fn neither_keys_nor_tickets_are_logged() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let path = |name: &str| directory.path().join(name);
+    let (key, entry) = new_key(&["--name", "alice"]);
+    fs::write(path("keys.toml"), &entry).expect("written");
+    let keys = path("keys.toml");
+    let arguments = [
+        "--log",
+        "trace",
+        "--keys-file",
+        keys.to_str().expect("UTF-8"),
+    ];
+    let service = Service::start_on(
+        "127.0.0.1:0",
+        &path("data"),
+        &arguments,
+        fs::File::create(path("log")).expect("a file"),
+    );
+    let request = service
+        .client()
+        .post(service.url("/plans"))
+        .json(&scenario());
+    let accepted = request.bearer_auth(&key).send().await.expect("an answer");
+    let plan = accepted.headers()["location"]
+        .to_str()
+        .expect("text")
+        .to_owned();
+    let request = service
+        .client()
+        .post(service.url(&format!("{plan}/tickets")));
+    let issued = request.bearer_auth(&key).send().await.expect("an answer");
+    let ticket: serde_json::Value = issued.json().await.expect("JSON");
+    let events = ticket["events"].as_str().expect("text");
+    service.bytes(events).await;
+    for uri in [
+        format!("/plans?key={key}"),
+        format!("/plans/{key}"),
+        format!("/plans/%20{key}?x"),
+    ] {
+        let refused = service.get(&uri).header("x-request-id", &key).send().await;
+        assert_eq!(refused.expect("an answer").status(), 400);
+    }
+    let log = log_with(&path("log"), "a key came in a URL").await;
+    assert!(log.contains("alice"), "the key's name is there: {log}");
+    let ticket = ticket["ticket"].as_str().expect("text");
+    let sum = noctule::export::sha256_hex(key.as_bytes());
+    for secret in [&key["noctule_".len()..], ticket, &sum] {
+        assert!(!log.contains(secret), "{log}");
+    }
+}

@@ -1,0 +1,494 @@
+//! Who may do what: keys, scopes, whose plan is whose, tickets, rates, streams.
+
+use axum::body::Body;
+use axum::http::{Method, Request, StatusCode};
+use http_body_util::BodyExt as _;
+use noctule::http::auth::{Keys, Needs, Scope, Settings};
+use serde_json::Value;
+use tower::ServiceExt as _;
+
+use crate::support::api::{Answer, Api};
+use crate::support::description::DESCRIPTION;
+use crate::support::keys::{bearer, entry, post, send};
+use crate::support::{run, scenario};
+
+/// Alice and Bob may plan, Rita may read Alice's, Max may see the metrics, Ada may do everything.
+fn house() -> String {
+    [
+        entry("alice", "of alice", "plan", ""),
+        entry("bob", "of bob", "plan", ""),
+        entry("rita", "of rita", "read", "owner = \"alice\""),
+        entry("max", "of max", "metrics", ""),
+        entry("ada", "of ada", "admin", ""),
+        entry("eve", "of eve", "plan", "expires = 2020-01-01T00:00:00Z"),
+    ]
+    .concat()
+}
+
+/// The address of a plan that is the key's.
+async fn submit(api: &Api, secret: &str) -> String {
+    let answer = post(api, secret).await;
+    assert_eq!(answer.status, 202, "{answer:?}");
+    answer.header("location").to_owned()
+}
+
+const NOBODY: &str = "01936f2c-7d1a-7c55-9a53-27b1b44c1a10";
+
+/// Everything that can be asked of a plan.
+const OF_A_PLAN: [&str; 9] = [
+    "GET {plan}",
+    "HEAD {plan}",
+    "GET {plan}/result",
+    "GET {plan}/result?format=svg",
+    "GET {plan}/scenario",
+    "GET {plan}/events",
+    "POST {plan}/tickets",
+    "POST {plan}/cancel",
+    "DELETE {plan}",
+];
+
+/// What an answer says, but for what differs from request to request.
+fn said(answer: &Answer, id: &str) -> (StatusCode, String, Vec<String>) {
+    let request_id = answer.header("x-request-id");
+    let text = String::from_utf8(answer.body.to_vec()).expect("UTF-8");
+    let mut headers: Vec<String> = answer.headers.keys().map(ToString::to_string).collect();
+    headers.sort();
+    let text = text.replace(request_id, "REQUEST").replace(id, "PLAN");
+    (answer.status, text, headers)
+}
+
+#[tokio::test]
+async fn the_plan_of_another_is_as_one_that_never_was() {
+    let api = Api::with_keys(&house());
+    for ended in [false, true] {
+        let plan = submit(&api, "of alice").await;
+        if ended {
+            run::complete(&*api.store, Vec::new()).await;
+        }
+        let id = plan.strip_prefix("/plans/").expect("an address");
+        for request in OF_A_PLAN {
+            let theirs = send(&api, "of bob", &request.replace("{plan}", &plan)).await;
+            let none = format!("/plans/{NOBODY}");
+            let none = send(&api, "of bob", &request.replace("{plan}", &none)).await;
+            assert_eq!(theirs.status, 404, "{request}");
+            assert_eq!(said(&theirs, id), said(&none, NOBODY), "{request}");
+        }
+        let status = send(&api, "of alice", &format!("GET {plan}")).await.json();
+        assert_eq!(status["cancel_requested"], false, "nothing was done to it");
+
+        // A deleted one is gone for its owner, and was never there for others.
+        assert_eq!(
+            send(&api, "of alice", &format!("DELETE {plan}"))
+                .await
+                .status,
+            204
+        );
+        let gone = send(&api, "of alice", &format!("GET {plan}")).await;
+        gone.expect_problem(410, "gone");
+        for request in OF_A_PLAN {
+            let theirs = send(&api, "of bob", &request.replace("{plan}", &plan)).await;
+            assert_eq!(theirs.status, 404, "{request} of a deleted plan");
+        }
+    }
+}
+
+#[tokio::test]
+async fn nobody_starts_from_the_plan_of_another() {
+    let api = Api::with_keys(&house());
+    let plan = submit(&api, "of alice").await;
+    run::complete(&*api.store, Vec::new()).await;
+    let mut document = scenario();
+    let id = plan.strip_prefix("/plans/").expect("an address");
+    document["planner"]["warm_start"] = serde_json::json!({"plan_id": id});
+    let start = async |secret: &str| {
+        let bearer = bearer(secret);
+        let headers = [
+            ("authorization", bearer.as_str()),
+            ("content-type", "application/json"),
+        ];
+        let body = document.to_string();
+        api.send(Method::POST, "/plans", &headers, body).await
+    };
+    assert_eq!(start("of alice").await.status, 202);
+    assert_eq!(start("of ada").await.status, 202);
+    let refused = start("of bob")
+        .await
+        .expect_problem(422, "invalid-scenario");
+    assert_eq!(refused["errors"][0]["code"], "unknown-plan");
+}
+
+#[tokio::test]
+async fn lists_show_what_is_ones_own() {
+    let api = Api::with_keys(&house());
+    let of_alice = submit(&api, "of alice").await;
+    let of_bob = submit(&api, "of bob").await;
+    for (secret, expected) in [
+        ("of alice", vec![&of_alice]),
+        ("of rita", vec![&of_alice]),
+        ("of bob", vec![&of_bob]),
+        ("of ada", vec![&of_bob, &of_alice]),
+    ] {
+        let listed = send(&api, secret, "GET /plans").await.json();
+        let plans = listed["plans"].as_array().expect("a list").iter();
+        let found: Vec<_> = plans.map(|plan| plan["links"]["self"].as_str()).collect();
+        let expected: Vec<_> = expected
+            .into_iter()
+            .map(|plan| Some(plan.as_str()))
+            .collect();
+        assert_eq!(found, expected, "{secret}");
+    }
+    // The same idempotency key of two owners names two requests; two keys of one owner share it.
+    let once = async |secret: &str| {
+        let bearer = bearer(secret);
+        let headers = [
+            ("authorization", bearer.as_str()),
+            ("content-type", "application/json"),
+            ("idempotency-key", "k"),
+        ];
+        let body = scenario().to_string();
+        let answer = api.send(Method::POST, "/plans", &headers, body).await;
+        answer.header("location").to_owned()
+    };
+    assert_ne!(once("of alice").await, once("of bob").await);
+}
+
+#[tokio::test]
+async fn without_a_good_key_there_is_no_way_in() {
+    const NONE: &str = "Bearer realm=\"noctule\"";
+    const WRONG: &str = "Bearer realm=\"noctule\", error=\"invalid_token\"";
+    let api = Api::with_keys(&house());
+    let plan = submit(&api, "of alice").await;
+    let asked = format!("GET {plan}");
+    let refuse = |answer: &Answer, challenge: &str| {
+        let problem = answer.expect_problem(401, "unauthorized");
+        assert_eq!(answer.header("www-authenticate"), challenge);
+        problem["detail"].as_str().expect("text").to_owned()
+    };
+
+    refuse(&api.get(&plan).await, NONE);
+    // Unknown and malformed ones are told the same.
+    let unknown = refuse(&send(&api, "of nobody", &asked).await, WRONG);
+    for value in [
+        "Bearer",
+        "Bearer ",
+        "Basic b2YgYWxpY2U=",
+        "of alice",
+        "Bearerof alice",
+        "\u{e9}",
+    ] {
+        let answer = api.get_with(&plan, &[("authorization", value)]).await;
+        assert_eq!(refuse(&answer, WRONG), unknown, "{value}");
+    }
+    let twice = [
+        ("authorization", "Bearer of alice"),
+        ("authorization", "Bearer of alice"),
+    ];
+    assert_eq!(refuse(&api.get_with(&plan, &twice).await, WRONG), unknown);
+    // Who held a key once may know that it is over.
+    let expired = refuse(&send(&api, "of eve", &asked).await, WRONG);
+    assert!(expired.contains("expired"), "{expired}");
+    // The scheme's name has no case.
+    let lower = api
+        .get_with(&plan, &[("authorization", "bearer of alice")])
+        .await;
+    assert_eq!(lower.status, 200);
+}
+
+#[tokio::test]
+async fn every_route_asks_for_what_the_description_says() {
+    let api = Api::with_keys(&house());
+    for route in noctule::http::routes() {
+        let place = format!("{} {}", route.method, route.path);
+        let operation = &DESCRIPTION["paths"][route.path][route.method.to_lowercase()];
+        let described = &operation["security"];
+        let key = |scope: Scope| serde_json::json!({"key": [scope.name()]});
+        let expected: Vec<Value> = match route.needs {
+            Needs::Nothing => vec![],
+            Needs::Scope(scope) => vec![key(scope)],
+            Needs::Ticket => vec![key(Scope::Read), serde_json::json!({"ticket": []})],
+        };
+        assert_eq!(described, &Value::from(expected), "{place}");
+
+        let request = place.replace("{id}", NOBODY).replace("{slug}", "not-found");
+        let (method, uri) = request.split_once(' ').expect("a method and a path");
+        let method: Method = method.parse().expect("a method");
+        let anonymous = api.send(method, uri, &[], "").await;
+        let (allowed, refused) = match route.needs {
+            Needs::Nothing => {
+                assert_eq!(anonymous.status, 200, "{place}");
+                continue;
+            }
+            Needs::Scope(Scope::Plan) => ("of alice", "of rita"),
+            Needs::Scope(Scope::Read) | Needs::Ticket => ("of rita", "of max"),
+            Needs::Scope(Scope::Metrics) => ("of max", "of alice"),
+            Needs::Scope(Scope::Admin) => ("of ada", "of alice"),
+        };
+        anonymous.expect_problem(401, "unauthorized");
+        let problem = send(&api, refused, &request)
+            .await
+            .expect_problem(403, "forbidden");
+        let scope = match route.needs {
+            Needs::Scope(scope) => scope,
+            _ => Scope::Read,
+        };
+        assert_eq!(problem["scope"], scope.name());
+        for secret in [allowed, "of ada"] {
+            let status = send(&api, secret, &request).await.status;
+            assert!(![401, 403].contains(&status.as_u16()), "{place} {status}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_key_in_a_url_is_refused_wherever_it_stands() {
+    let key = noctule::http::auth::fresh_key().expect("random");
+    let api = Api::with_keys(&entry("alice", &key, "plan", ""));
+    for uri in [
+        format!("/plans?api_key={key}"),
+        "/plans?access_token=x".to_owned(),
+        "/plans?key=x".to_owned(),
+        format!("/plans?limit={key}"),
+        format!("/plans?{key}"),
+        format!("/plans?limit={}", key.replace('_', "%5F")),
+        format!("/plans/{key}"),
+        format!("/livez?x={key}"),
+        format!("/nowhere/{key}"),
+    ] {
+        let bearer = bearer(&key);
+        let answer = api.get_with(&uri, &[("authorization", &bearer)]).await;
+        answer.expect_problem(400, "key-in-url");
+        assert!(
+            !String::from_utf8_lossy(&answer.body).contains(&key),
+            "{uri}"
+        );
+    }
+    assert_eq!(send(&api, &key, "GET /plans").await.status, 200);
+}
+
+#[tokio::test]
+async fn a_ticket_follows_one_plan_and_nothing_else() {
+    let api = Api::with_keys(&house());
+    let plan = submit(&api, "of alice").await;
+    let other = submit(&api, "of alice").await;
+    let issued = send(&api, "of rita", &format!("POST {plan}/tickets")).await;
+    assert_eq!(issued.status, 201);
+    let ticket = issued.json();
+    let query = format!("?ticket={}", ticket["ticket"].as_str().expect("text"));
+    assert_eq!(ticket["events"], format!("{plan}/events{query}"));
+    assert!(!format!("{issued:?}").contains("of rita"));
+    let until: jiff::Timestamp = ticket["expires_at"]
+        .as_str()
+        .and_then(|time| time.parse().ok())
+        .expect("a time");
+    let seconds = until.duration_since(jiff::Timestamp::now()).as_secs();
+    assert!((590..=600).contains(&seconds), "{seconds}");
+
+    run::complete(&*api.store, Vec::new()).await;
+    for uri in [
+        format!("{plan}/events{query}"),
+        format!("{plan}/events{query}&last_event_id=1"),
+    ] {
+        assert_eq!(api.get(&uri).await.status, 200, "{uri}");
+    }
+    for uri in [
+        format!("{other}/events{query}"),
+        format!("{plan}/events?ticket=x"),
+        format!("{plan}/events?ticket="),
+        format!("/plans/x/events{query}"),
+        format!("{plan}{query}"),
+        format!("{plan}/result{query}"),
+        format!("/plans{query}"),
+    ] {
+        api.get(&uri).await.expect_problem(401, "unauthorized");
+    }
+    // It is worth no more than the key that it came from.
+    let house = house();
+    let without_rita: Vec<&str> = house
+        .split("[[key]]")
+        .filter(|key| !key.contains("rita"))
+        .collect();
+    api.state
+        .access
+        .replace(Keys::read(&without_rita.join("[[key]]")).expect("keys"));
+    let dead = api.get(&format!("{plan}/events{query}")).await;
+    dead.expect_problem(401, "unauthorized");
+}
+
+#[tokio::test]
+async fn a_ticket_runs_out() {
+    let settings = Settings {
+        ticket_life: std::time::Duration::ZERO,
+        ..Settings::default()
+    };
+    let api = Api::with_access(&house(), settings);
+    let plan = submit(&api, "of alice").await;
+    let ticket = send(&api, "of alice", &format!("POST {plan}/tickets"))
+        .await
+        .json();
+    let events = ticket["events"].as_str().expect("text");
+    let problem = api.get(events).await.expect_problem(401, "unauthorized");
+    assert!(problem["detail"].as_str().expect("text").contains("ticket"));
+}
+
+#[tokio::test]
+async fn where_there_are_no_keys_tickets_work_the_same() {
+    let api = Api::new();
+    let plan = api.submit().await;
+    let ticket = api
+        .send(Method::POST, &format!("{plan}/tickets"), &[], "")
+        .await
+        .json();
+    run::complete(&*api.store, Vec::new()).await;
+    let events = ticket["events"].as_str().expect("text");
+    assert_eq!(api.get(events).await.status, 200);
+    let forged = format!("{plan}/events?ticket=x");
+    api.get(&forged).await.expect_problem(401, "unauthorized");
+}
+
+#[tokio::test]
+async fn a_key_has_so_many_active_plans_and_no_more() {
+    let keys = entry("alice", "of alice", "plan", "active_plans = 2")
+        + &entry(
+            "alice new",
+            "of alice too",
+            "plan",
+            "active_plans = 2\nowner = \"alice\"",
+        );
+    let api = Api::with_keys(&(keys + &entry("bob", "of bob", "plan", "")));
+    submit(&api, "of alice").await;
+    submit(&api, "of alice too").await;
+    for secret in ["of alice", "of alice too"] {
+        let refused = post(&api, secret).await;
+        refused.expect_problem(429, "quota-reached");
+        assert!(refused.headers.contains_key("retry-after"));
+    }
+    submit(&api, "of bob").await;
+    run::complete(&*api.store, Vec::new()).await;
+    submit(&api, "of alice").await;
+}
+
+#[tokio::test]
+async fn a_key_asks_no_faster_than_it_may() {
+    let slow = "requests_per_second = 0.01\nburst = 3";
+    let keys = entry("alice", "of alice", "read", slow) + &entry("bob", "of bob", "plan", "");
+    let api = Api::with_keys(&keys);
+    for (request, status, left) in [
+        ("GET /plans", 200, 2),
+        ("GET /nowhere", 404, 2),
+        ("GET /livez", 200, 2),
+        ("GET /plans?limit=x", 400, 1),
+        ("POST /plans", 403, 0),
+    ] {
+        let answer = send(&api, "of alice", request).await;
+        assert_eq!(answer.status, status, "{request}");
+        if request.contains("/plans") {
+            assert_eq!(answer.header("ratelimit-policy"), "\"requests\";q=3;w=300");
+            let fields = answer.header("ratelimit").to_owned();
+            assert!(
+                fields.starts_with(&format!("\"requests\";r={left};t=")),
+                "{fields}"
+            );
+        }
+    }
+    let refused = send(&api, "of alice", "GET /plans").await;
+    refused.expect_problem(429, "rate-limited");
+    let seconds: u64 = refused.header("retry-after").parse().expect("seconds");
+    assert!((90..=100).contains(&seconds), "{seconds}");
+    assert!(
+        refused
+            .header("ratelimit")
+            .starts_with("\"requests\";r=0;t=")
+    );
+    // A reload forgives nothing.
+    api.state.access.replace(Keys::read(&keys).expect("keys"));
+    send(&api, "of alice", "GET /plans")
+        .await
+        .expect_problem(429, "rate-limited");
+    let free = send(&api, "of bob", "GET /plans").await;
+    assert_eq!(free.status, 200);
+    assert!(!free.headers.contains_key("ratelimit"));
+}
+
+/// A stream that is open; its head has come.
+async fn open(api: &Api, plan: &str, secret: Option<&str>) -> axum::http::Response<Body> {
+    let request = Request::get(format!("{plan}/events"));
+    let request = match secret {
+        Some(secret) => request.header("authorization", bearer(secret)),
+        None => request,
+    };
+    let request = request.body(Body::empty()).expect("a request");
+    api.router
+        .clone()
+        .oneshot(request)
+        .await
+        .expect("never fails")
+}
+
+#[tokio::test]
+async fn a_stream_counts_until_its_body_is_dropped() {
+    let settings = Settings {
+        streams: 3,
+        streams_per_key: 2,
+        ..Settings::default()
+    };
+    let api = Api::with_access(&house(), settings);
+    let limits = api.get("/limits").await.json();
+    assert_eq!(
+        (&limits["streams"], &limits["streams_per_key"]),
+        (&3.into(), &2.into())
+    );
+    let plan = submit(&api, "of alice").await;
+    let refused = async |secret: &str| {
+        let answer = send(&api, secret, &format!("GET {plan}/events")).await;
+        assert!(answer.headers.contains_key("retry-after"));
+        answer.expect_problem(429, "too-many-streams")["limit"].clone()
+    };
+    let mut first = open(&api, &plan, Some("of alice")).await;
+    let second = open(&api, &plan, Some("of rita")).await;
+    assert_eq!(
+        (first.status(), second.status()),
+        (StatusCode::OK, StatusCode::OK)
+    );
+    assert_eq!(refused("of rita").await, "streams_per_key");
+    // Reading makes no difference, dropping does.
+    first
+        .body_mut()
+        .frame()
+        .await
+        .expect("a frame")
+        .expect("unbroken");
+    assert_eq!(refused("of alice").await, "streams_per_key");
+    let third = open(&api, &plan, Some("of ada")).await;
+    assert_eq!(refused("of ada").await, "streams");
+    drop(first);
+    let again = open(&api, &plan, Some("of alice")).await;
+    assert_eq!(again.status(), StatusCode::OK);
+    assert_eq!(refused("of ada").await, "streams");
+    drop((second, third, again));
+    // One that reaches its end gives its place back as well.
+    for _ in 0..4 {
+        let followed = open(&api, &plan, Some("of alice")).await;
+        assert_eq!(followed.status(), StatusCode::OK);
+    }
+}
+
+#[tokio::test]
+async fn a_key_that_is_taken_away_takes_its_streams_along() {
+    let api = Api::with_keys(&house());
+    let plan = submit(&api, "of alice").await;
+    let of_rita = open(&api, &plan, Some("of rita")).await.into_body();
+    let of_alice = open(&api, &plan, Some("of alice")).await.into_body();
+    let reading = tokio::spawn(of_rita.collect());
+    api.state
+        .access
+        .replace(Keys::read(&entry("alice", "of alice", "plan", "")).expect("keys"));
+    let read = reading
+        .await
+        .expect("no panic")
+        .expect("a clean end")
+        .to_bytes();
+    assert!(!String::from_utf8_lossy(&read).contains("event: end"));
+    run::complete(&*api.store, Vec::new()).await;
+    let read = of_alice.collect().await.expect("a clean end").to_bytes();
+    assert!(String::from_utf8_lossy(&read).contains("event: end"));
+}

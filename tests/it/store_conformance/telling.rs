@@ -1,0 +1,91 @@
+//! Ends of plans that are to be told.
+
+use noctule::job::{Status, Submission};
+use noctule::store::Webhook;
+
+use crate::support::plans::{ending, failure, kind, submission};
+use crate::support::stores::on_every_backend;
+
+fn with_webhook(url: &str) -> Submission {
+    Submission {
+        webhook: Some(url.to_owned()),
+        ..submission()
+    }
+}
+
+/// Whose end is due by `now_ms`, where to, and after how many tries.
+fn told(due: &[Webhook]) -> Vec<(&str, u32)> {
+    due.iter()
+        .map(|due| (due.url.as_str(), due.tries))
+        .collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_end_is_due_at_once_and_after_a_restart() {
+    on_every_backend(10, async |store| {
+        let first = store.submit(with_webhook("a")).await.unwrap().plan.id;
+        let second = store.submit(with_webhook("b")).await.unwrap().plan.id;
+        store.submit(submission()).await.unwrap();
+        let lease = store.claim().await.unwrap();
+        assert_eq!(store.due_webhooks(i64::MAX, 10).await.unwrap(), []);
+
+        let ended = store
+            .finish(&lease, ending(Status::Succeeded), 12_000)
+            .await
+            .unwrap();
+        assert_eq!(store.due_webhooks(11_999, 10).await.unwrap(), []);
+        let due = store.due_webhooks(12_000, 10).await.unwrap();
+        assert_eq!(told(&due), [("a", 0)]);
+        assert_eq!(due[0].plan, ended);
+
+        // However a plan ends; the longest due comes first.
+        store.request_cancel(second, 11_000).await.unwrap();
+        store.reopen().await;
+        let due = store.due_webhooks(12_000, 10).await.unwrap();
+        assert_eq!(told(&due), [("b", 0), ("a", 0)]);
+        assert_eq!(due[0].plan.status, Status::Cancelled);
+        assert_eq!(
+            told(&store.due_webhooks(12_000, 1).await.unwrap()),
+            [("b", 0)]
+        );
+
+        // The third one's is nobody's to tell.
+        let lease = store.claim().await.unwrap();
+        store.finish(&lease, failure(), 12_000).await.unwrap();
+        assert_eq!(store.due_webhooks(i64::MAX, 10).await.unwrap().len(), 2);
+
+        store.webhook_tried(first, Some(20_000)).await.unwrap();
+        store.webhook_tried(second, None).await.unwrap();
+        store.reopen().await;
+        assert_eq!(store.due_webhooks(19_999, 10).await.unwrap(), []);
+        let due = store.due_webhooks(20_000, 10).await.unwrap();
+        assert_eq!(told(&due), [("a", 1)]);
+        store.webhook_tried(first, None).await.unwrap();
+        store.webhook_tried(first, Some(1)).await.unwrap();
+        assert_eq!(store.due_webhooks(i64::MAX, 10).await.unwrap(), []);
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plan_that_runs_again_ends_once_and_a_deleted_one_tells_nothing() {
+    on_every_backend(10, async |store| {
+        let id = store.submit(with_webhook("a")).await.unwrap().plan.id;
+        let lost = store.claim().await.unwrap();
+        store.reopen().await;
+        let late = store.finish(&lost, ending(Status::Succeeded), 12_000).await;
+        assert_eq!(kind(late), Err("lease lost"));
+        assert_eq!(store.due_webhooks(i64::MAX, 10).await.unwrap(), []);
+        let lease = store.claim().await.unwrap();
+        store
+            .finish(&lease, ending(Status::Succeeded), 13_000)
+            .await
+            .unwrap();
+        let due = store.due_webhooks(i64::MAX, 10).await.unwrap();
+        assert_eq!(told(&due), [("a", 0)]);
+        store.delete(id, 14_000).await.unwrap();
+        assert_eq!(store.due_webhooks(i64::MAX, 10).await.unwrap(), []);
+        store.webhook_tried(id, None).await.unwrap();
+    })
+    .await;
+}

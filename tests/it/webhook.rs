@@ -1,0 +1,375 @@
+//! Webhooks: a plan's end told to a receiver of ours, signed, again until it is heard, and across restarts.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::Bytes;
+use axum::extract::State;
+use axum::http::{HeaderMap, Method, StatusCode, Uri};
+use noctule::export::sha256_hex;
+use noctule::http::webhook::{Secret, Sender, Settings};
+use serde_json::{Value, json};
+use tokio::net::TcpListener;
+use tokio::sync::mpsc;
+
+use crate::support::api::{Answer, Api};
+use crate::support::description::check_schema;
+use crate::support::process::Service;
+use crate::support::run;
+use crate::support::scenario;
+
+const SECRET: &str = "whsec_MDEyMzQ1Njc4OWFiY2RlZjAxMjM0NTY3ODlhYmNkZWY=";
+
+fn settings(allow_private: bool) -> Settings {
+    Settings {
+        secret: Secret::read(SECRET).expect("a secret"),
+        allow_private,
+    }
+}
+
+/// A message that has come.
+struct Message {
+    uri: Uri,
+    headers: HashMap<String, String>,
+    body: String,
+}
+
+/// Answers with these statuses, one after the other, and then with 204; what comes is handed on.
+struct Receiver {
+    url: String,
+    messages: mpsc::UnboundedReceiver<Message>,
+}
+
+type Heard = (
+    mpsc::UnboundedSender<Message>,
+    Arc<std::sync::Mutex<std::vec::IntoIter<u16>>>,
+);
+
+async fn hear(
+    State((messages, statuses)): State<Heard>,
+    uri: Uri,
+    headers: HeaderMap,
+    body: Bytes,
+) -> (StatusCode, [(&'static str, &'static str); 1]) {
+    let headers = headers
+        .iter()
+        .map(|(name, value)| {
+            let value = value.to_str().expect("visible ASCII").to_owned();
+            (name.to_string(), value)
+        })
+        .collect();
+    let body = String::from_utf8(body.to_vec()).expect("UTF-8");
+    // A test that has seen enough listens no more.
+    let _ = messages.send(Message { uri, headers, body });
+    let status = statuses.lock().expect("no panic").next().unwrap_or(204);
+    let status = StatusCode::from_u16(status).expect("a status");
+    (status, [("location", "/elsewhere")])
+}
+
+impl Receiver {
+    async fn new(statuses: &[u16]) -> Self {
+        let (sender, messages) = mpsc::unbounded_channel();
+        let statuses = Arc::new(std::sync::Mutex::new(Vec::from(statuses).into_iter()));
+        let router = Router::new().fallback(hear).with_state((sender, statuses));
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
+        let address = listener.local_addr().expect("bound");
+        tokio::spawn(async move { axum_serve(listener, router).await });
+        Self {
+            url: format!("http://{address}/hook?x=1"),
+            messages,
+        }
+    }
+
+    async fn next(&mut self) -> Message {
+        let next = tokio::time::timeout(Duration::from_secs(60), self.messages.recv()).await;
+        next.expect("in time").expect("the receiver lives")
+    }
+}
+
+/// Our own server, which needs a phase that never changes.
+async fn axum_serve(listener: TcpListener, router: Router) {
+    let (_phase, watched) = tokio::sync::watch::channel(noctule::http::Phase::Serving);
+    let settings = noctule::http::server::Settings {
+        head_timeout: Duration::from_secs(30),
+        max_connections: 10,
+        patience: Duration::ZERO,
+        instruments: Arc::default(),
+    };
+    noctule::http::server::serve(listener, router, watched, settings).await;
+}
+
+/// The signature as its receiver computes it, without any of our code: HMAC (RFC 2104) by hand.
+fn signature(message: &Message) -> String {
+    use base64::Engine as _;
+    let id = &message.headers["webhook-id"];
+    let timestamp = &message.headers["webhook-timestamp"];
+    let signed = format!("{id}.{timestamp}.{}", message.body);
+    let mut key = b"0123456789abcdef0123456789abcdef".to_vec();
+    key.resize(64, 0);
+    let padded = |pad: u8| key.iter().map(|byte| byte ^ pad).collect::<Vec<u8>>();
+    let sum = |bytes: &[u8]| {
+        let digits = sha256_hex(bytes);
+        (0..32)
+            .map(|n| u8::from_str_radix(&digits[2 * n..2 * n + 2], 16).expect("digits"))
+            .collect::<Vec<u8>>()
+    };
+    let inner = sum(&[padded(0x36), signed.into_bytes()].concat());
+    let outer = sum(&[padded(0x5c), inner].concat());
+    let coded = base64::engine::general_purpose::STANDARD.encode(outer);
+    format!("v1,{coded}")
+}
+
+/// Panics unless it is a message about `plan`, well formed and well signed; the plan's document.
+#[track_caller]
+fn check(message: &Message, plan: &str) -> Value {
+    assert_eq!(message.uri, "/hook?x=1");
+    assert_eq!(message.headers["content-type"], "application/json");
+    assert_eq!(format!("/plans/{}", message.headers["webhook-id"]), plan);
+    assert_eq!(message.headers["webhook-signature"], signature(message));
+    let document: Value = serde_json::from_str(&message.body).expect("JSON");
+    let schema = json!({"$ref": "#/components/schemas/Webhook"});
+    check_schema(&schema, &document, "a webhook");
+    assert_eq!(document["timestamp"], document["data"]["finished_at"]);
+    document["data"].clone()
+}
+
+async fn submit(api: &Api, url: &str) -> Answer {
+    let headers = [
+        ("content-type", "application/json"),
+        ("noctule-webhook", url),
+    ];
+    let body = scenario().to_string();
+    api.send(Method::POST, "/plans", &headers, body).await
+}
+
+#[tokio::test]
+async fn an_end_is_told_once_and_signed() {
+    let api = Api::with_webhooks(settings(true));
+    let mut receiver = Receiver::new(&[]).await;
+    let plan = submit(&api, &receiver.url)
+        .await
+        .header("location")
+        .to_owned();
+    let _sender = Sender::start(api.store.clone(), settings(true));
+    run::complete(&*api.store, Vec::new()).await;
+    let told = check(&receiver.next().await, &plan);
+    assert_eq!(told, api.get(&plan).await.json());
+    // Another one's end comes after it, and nothing between.
+    let other = submit(&api, &receiver.url)
+        .await
+        .header("location")
+        .to_owned();
+    api.send(Method::POST, &format!("{other}/cancel"), &[], "")
+        .await;
+    let told = check(&receiver.next().await, &other);
+    assert_eq!(told["status"], "cancelled");
+    api.submit().await;
+    run::complete(&*api.store, Vec::new()).await;
+    assert!(
+        receiver.messages.try_recv().is_err(),
+        "of a plan that asked for none"
+    );
+}
+
+#[tokio::test]
+async fn what_is_not_heard_is_told_again_and_redirects_lead_nowhere() {
+    let api = Api::with_webhooks(settings(true));
+    let mut receiver = Receiver::new(&[307]).await;
+    let plan = submit(&api, &receiver.url)
+        .await
+        .header("location")
+        .to_owned();
+    run::complete(&*api.store, Vec::new()).await;
+    let _sender = Sender::start(api.store.clone(), settings(true));
+    let first = receiver.next().await;
+    check(&first, &plan);
+    let second = receiver.next().await;
+    check(&second, &plan);
+    assert_eq!(first.body, second.body);
+    assert_eq!(first.headers["webhook-id"], second.headers["webhook-id"]);
+    let at = |message: &Message| -> i64 {
+        message.headers["webhook-timestamp"]
+            .parse()
+            .expect("seconds")
+    };
+    assert!(at(&second) - at(&first) >= 3, "after a pause");
+}
+
+#[tokio::test]
+async fn a_receiver_that_is_gone_hears_no_more() {
+    let api = Api::with_webhooks(settings(true));
+    let mut receiver = Receiver::new(&[410]).await;
+    submit(&api, &receiver.url).await;
+    run::complete(&*api.store, Vec::new()).await;
+    let _sender = Sender::start(api.store.clone(), settings(true));
+    receiver.next().await;
+    loop {
+        let due = api
+            .store
+            .due_webhooks(i64::MAX, 10)
+            .await
+            .expect("readable");
+        if due.is_empty() {
+            break;
+        }
+        tokio::task::yield_now().await;
+    }
+}
+
+#[tokio::test]
+async fn private_receivers_are_not_called() {
+    let mut receiver = Receiver::new(&[]).await;
+    // Accepted while it was allowed, under a name that leads here, and due when it no longer is.
+    let api = Api::with_webhooks(settings(true));
+    let port = receiver
+        .url
+        .split([':', '/'])
+        .nth(4)
+        .expect("a port")
+        .to_owned();
+    for url in [receiver.url.clone(), format!("https://localhost:{port}/")] {
+        assert_eq!(submit(&api, &url).await.status, 202, "{url}");
+        run::complete(&*api.store, Vec::new()).await;
+    }
+    let _sender = Sender::start(api.store.clone(), settings(false));
+    loop {
+        let due = api
+            .store
+            .due_webhooks(i64::MAX, 10)
+            .await
+            .expect("readable");
+        if due.len() == 2 && due.iter().all(|webhook| webhook.tries == 1) {
+            break;
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    assert!(receiver.messages.try_recv().is_err());
+}
+
+#[tokio::test]
+async fn addresses_are_looked_at_before_a_plan_is_accepted() {
+    let off = Api::new();
+    let refused = submit(&off, "https://hooks.example/").await;
+    let problem = refused.expect_problem(400, "invalid-parameter");
+    assert_eq!(problem["parameter"], "noctule-webhook");
+    let api = Api::with_webhooks(settings(false));
+    for url in [
+        "http://hooks.example/",
+        "https://127.0.0.1/",
+        "https://[fe80::1]/",
+        "hooks",
+        "",
+    ] {
+        let refused = submit(&api, url).await;
+        refused.expect_problem(400, "invalid-parameter");
+    }
+    assert_eq!(submit(&api, "https://hooks.example/").await.status, 202);
+}
+
+#[tokio::test]
+async fn a_restart_forgets_no_webhook() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let secret = directory.path().join("secret");
+    std::fs::write(&secret, SECRET).expect("written");
+    let arguments = [
+        "--workers",
+        "1",
+        "--webhook-allow-private",
+        "--webhook-secret-file",
+        secret.to_str().expect("UTF-8"),
+    ];
+    let data = directory.path().join("data");
+    let mut receiver = Receiver::new(&[500]).await;
+    let service = Service::start(&data, &arguments);
+    let request = service
+        .client()
+        .post(service.url("/plans"))
+        .json(&scenario());
+    let accepted = request
+        .header("noctule-webhook", &receiver.url)
+        .send()
+        .await;
+    let accepted = accepted.expect("an answer");
+    assert_eq!(accepted.status(), 202);
+    let plan = accepted.headers()["location"]
+        .to_str()
+        .expect("text")
+        .to_owned();
+    check(&receiver.next().await, &plan);
+    service.kill();
+    let service = Service::start(&data, &arguments);
+    let told = check(&receiver.next().await, &plan);
+    assert_eq!(told["status"], "succeeded");
+    drop(service);
+}
+
+#[tokio::test]
+async fn tls_is_spoken_with_whom_the_machine_trusts() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let secret = directory.path().join("secret");
+    std::fs::write(&secret, SECRET).expect("written");
+    let arguments = [
+        "--workers",
+        "1",
+        "--webhook-allow-private",
+        "--webhook-secret-file",
+        secret.to_str().expect("UTF-8"),
+    ];
+    let data = directory.path().join("data");
+    let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
+    let port = listener.local_addr().expect("bound").port();
+    let acceptor = acceptor();
+    let accept = async || {
+        let (stream, _) = listener.accept().await.expect("a connection");
+        acceptor.accept(stream).await
+    };
+
+    // Of an authority that nobody knows.
+    let service = Service::start(&data, &arguments);
+    let request = service
+        .client()
+        .post(service.url("/plans"))
+        .json(&scenario());
+    let url = format!("https://localhost:{port}/hook?x=1");
+    let accepted = request.header("noctule-webhook", url).send().await;
+    let accepted = accepted.expect("an answer");
+    assert_eq!(accepted.status(), 202);
+    let plan = accepted.headers()["location"]
+        .to_str()
+        .expect("text")
+        .to_owned();
+    let refused = accept().await.expect_err("nothing is said to a stranger");
+    assert!(refused.to_string().contains("UnknownCA"), "{refused}");
+    service.kill();
+
+    let authority = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/fixtures/tls/ca.pem");
+    let _service = Service::start_with(&[("SSL_CERT_FILE", authority)], &data, &arguments);
+    let stream = accept().await.expect("a handshake");
+    let (sender, mut messages) = mpsc::unbounded_channel();
+    let statuses = Arc::new(std::sync::Mutex::new(vec![].into_iter()));
+    let router = Router::new().fallback(hear).with_state((sender, statuses));
+    let service = hyper_util::service::TowerToHyperService::new(router);
+    let connection = hyper::server::conn::http1::Builder::new()
+        .serve_connection(hyper_util::rt::TokioIo::new(stream), service);
+    tokio::spawn(async move { connection.await.is_ok() });
+    let message = tokio::time::timeout(Duration::from_secs(60), messages.recv()).await;
+    check(&message.expect("in time").expect("a message"), &plan);
+}
+
+/// Of a receiver called localhost.
+fn acceptor() -> tokio_rustls::TlsAcceptor {
+    use tokio_rustls::rustls::pki_types::pem::PemObject as _;
+    use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
+    use tokio_rustls::rustls::{ServerConfig, crypto::ring};
+
+    let certificate = CertificateDer::from_pem_slice(include_bytes!("fixtures/tls/localhost.pem"));
+    let key = PrivateKeyDer::from_pem_slice(include_bytes!("fixtures/tls/localhost.key"));
+    let config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
+        .with_safe_default_protocol_versions()
+        .expect("ring has the default versions")
+        .with_no_client_auth()
+        .with_single_cert(vec![certificate.expect("PEM")], key.expect("PEM"));
+    Arc::new(config.expect("a certificate and its key")).into()
+}

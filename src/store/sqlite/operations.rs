@@ -46,7 +46,7 @@ pub(super) fn submit(
     webhooks::keep(tx, row.seq, submission)?;
     tx.queued += 1;
     tell_status(tx, &mut row)?;
-    row.update(tx.connection)?;
+    row.update_progress(tx.connection)?;
     Ok(Submitted {
         plan: row.plan,
         replayed: false,
@@ -54,16 +54,16 @@ pub(super) fn submit(
 }
 
 fn within_quota(tx: &Transaction<'_>, submission: &Submission) -> Result<(), StoreError> {
-    let Some(quota) = submission.quota else {
+    let (Some(quota), Some(owner)) = (submission.quota, &submission.owner) else {
         return Ok(());
     };
     let active: i64 = tx
         .connection
         .prepare_cached(
             "SELECT count(*) FROM plans INDEXED BY plans_active \
-             WHERE owner IS ?1 AND status IN ('queued', 'running')",
+             WHERE owner = ?1 AND status IN ('queued', 'running')",
         )?
-        .query_row([&submission.owner], |row| row.get(0))?;
+        .query_row([owner], |row| row.get(0))?;
     let active = active.cast_unsigned();
     if active >= quota {
         return Err(StoreError::QuotaReached { active });
@@ -117,7 +117,7 @@ pub(super) fn append(
         keep_incumbent(tx, &row, best)?;
     }
     tx.tell(&mut row, events)?;
-    row.update(tx.connection)?;
+    row.update_progress(tx.connection)?;
     Ok(())
 }
 

@@ -122,6 +122,32 @@ impl PlanRow {
         Ok(())
     }
 
+    /// Write what changes within a state. No index of active plans has these columns: it is the cheaper part of
+    /// [`PlanRow::update`].
+    pub(super) fn update_progress(&self, connection: &Connection) -> rusqlite::Result<()> {
+        let plan = &self.plan;
+        connection
+            .prepare_cached(
+                "UPDATE plans SET feasible = :feasible, best_cost = :best_cost, \
+                 progress = :progress, iteration = :iteration, evaluations = :evaluations, \
+                 revision = :revision, last_event = :last_event, forgotten = :forgotten, \
+                 bytes = :bytes WHERE seq = :seq",
+            )?
+            .execute(named_params! {
+                ":feasible": plan.feasible,
+                ":best_cost": plan.best_cost,
+                ":progress": plan.progress,
+                ":iteration": plan.iteration.cast_signed(),
+                ":evaluations": plan.evaluations.cast_signed(),
+                ":revision": plan.revision.cast_signed(),
+                ":last_event": self.last_event.cast_signed(),
+                ":forgotten": self.forgotten.cast_signed(),
+                ":bytes": self.bytes.cast_signed(),
+                ":seq": self.seq,
+            })?;
+        Ok(())
+    }
+
     /// Write what may have changed since it was read.
     pub(super) fn update(&self, connection: &Connection) -> rusqlite::Result<()> {
         let plan = &self.plan;

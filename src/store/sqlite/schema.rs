@@ -75,8 +75,8 @@ UPDATE plans SET bytes =
     coalesce((SELECT octet_length(document) FROM scenarios WHERE plan_seq = seq), 0)
     + coalesce((SELECT octet_length(document) FROM results WHERE plan_seq = seq), 0)
     + coalesce((SELECT sum(octet_length(batch)) FROM events WHERE plan_seq = seq), 0);
-CREATE INDEX plans_by_owner ON plans (owner, id);
-CREATE INDEX plans_active ON plans (owner) WHERE status IN ('queued', 'running');
+CREATE INDEX plans_by_owner ON plans (owner, id) WHERE owner IS NOT NULL;
+CREATE INDEX plans_active ON plans (owner) WHERE owner IS NOT NULL AND status IN ('queued', 'running');
 CREATE INDEX plans_ended ON plans (finished_ms, bytes) WHERE finished_ms IS NOT NULL;
 CREATE INDEX plans_expiring ON plans (expires_ms) WHERE expires_ms IS NOT NULL;
 

@@ -19,7 +19,7 @@ pub use sweeper::Sweeper;
 
 use crate::job::Failure;
 use crate::planner::{Observer, Outcome, Stop};
-use crate::store::{Clock, Store};
+use crate::store::{Clock, Lease, Store, StoreError};
 use crate::telemetry::{Instruments, spans};
 
 /// Plans an accepted scenario document, calling back as it goes. A panic of it fails its plan only.
@@ -116,20 +116,24 @@ struct Slot {
 impl Slot {
     async fn serve(self) {
         let mut pause = Pause::default();
+        let mut over = None;
         loop {
-            let claim = tokio::select! {
-                biased;
-                () = reached(self.phase.clone(), Phase::Draining) => return,
-                claim = self.store.claim() => claim,
+            // The end of one run and the claim of the next wait for the disk together.
+            let conclusion = async {
+                if let Some(over) = over.take() {
+                    self.conclude(over).await;
+                }
             };
+            let ((), claim) = tokio::join!(conclusion, self.claim());
             match claim {
-                Ok(lease) => {
+                None => return,
+                Some(Ok(lease)) => {
                     pause = Pause::default();
                     let plan = lease.plan.id;
                     let span = spans::of_run(plan, self.instruments.origins.of(plan).as_ref());
-                    self.run(lease).instrument(span).await;
+                    over = self.run(lease).instrument(span).await;
                 }
-                Err(error) => {
+                Some(Err(error)) => {
                     tracing::warn!(%error, worker = self.number, "no plan could be claimed; trying again");
                     tokio::select! {
                         () = reached(self.phase.clone(), Phase::Draining) => return,
@@ -137,6 +141,15 @@ impl Slot {
                     }
                 }
             }
+        }
+    }
+
+    /// The next plan to run; `None` when no more are to be.
+    async fn claim(&self) -> Option<Result<Lease, StoreError>> {
+        tokio::select! {
+            biased;
+            () = reached(self.phase.clone(), Phase::Draining) => None,
+            claim = self.store.claim() => Some(claim),
         }
     }
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use tokio::sync::{mpsc, watch};
 use tokio::time::Instant;
+use tracing::{Instrument as _, Span};
 
 use super::planning::{self, Reason, Reports, StopFlag};
 use super::{Pause, Phase, Slot, reached};
@@ -25,9 +26,17 @@ const DELAY: Duration = Duration::from_millis(50);
 /// Events of so long are taken at once: waking up for each of them costs more than storing it.
 const GATHERING: Duration = Duration::from_millis(5);
 
+/// A run that is over, but not yet in the store.
+pub(super) struct Over {
+    lease: Lease,
+    /// `None` when its plan goes back to the queue.
+    ending: Option<Ending>,
+    span: Span,
+}
+
 impl Slot {
-    /// Run the plan, store what it tells, and end it or give it back.
-    pub(super) async fn run(&self, lease: Lease) {
+    /// Run the plan and store what it tells; the caller concludes it.
+    pub(super) async fn run(&self, lease: Lease) -> Option<Over> {
         tracing::info!(
             worker = self.number,
             attempt = lease.attempt,
@@ -54,7 +63,8 @@ impl Slot {
                 tracing::error!(%error, "no thread to plan on; the plan goes back to the queue");
                 self.give_back(&lease).await;
                 // Soon there may be one.
-                return Pause::default().wait().await;
+                Pause::default().wait().await;
+                return None;
             }
         };
         let kept = tokio::select! {
@@ -67,10 +77,28 @@ impl Slot {
         let ending = ending
             .await
             .expect("the planning thread answers even when it panics");
-        match ending {
-            Ending::Result { .. } if stop.is_abandoned() => self.give_back(&lease).await,
-            ending => self.finish(&lease, ending).await,
-        }
+        let abandoned = matches!(ending, Ending::Result { .. }) && stop.is_abandoned();
+        Some(Over {
+            lease,
+            ending: (!abandoned).then_some(ending),
+            span: Span::current(),
+        })
+    }
+
+    /// End a plan whose run is over, or give it back.
+    pub(super) async fn conclude(&self, over: Over) {
+        let Over {
+            lease,
+            ending,
+            span,
+        } = over;
+        let conclusion = async {
+            match ending {
+                Some(ending) => self.finish(&lease, ending).await,
+                None => self.give_back(&lease).await,
+            }
+        };
+        conclusion.instrument(span).await;
     }
 
     /// Store events until there are no more, of which `silent` tells by losing its sender; false

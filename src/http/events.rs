@@ -80,19 +80,23 @@ fn read_rate(params: &Params) -> Result<f64, Problem> {
     }
 }
 
+/// Greatest id that may be asked for; many JSON readers keep no greater whole numbers.
+const MAX_EVENT_ID: u64 = (1 << 53) - 1;
+
 /// The header is a reconnecting browser's and newer than the query of the page's own address.
 fn read_last_event_id(params: &Params, headers: &HeaderMap) -> Result<u64, Problem> {
-    const ALLOWED: &str = "the id of an event, a whole number";
-    let header = match headers.get(LAST_EVENT_ID) {
-        Some(value) => String::from_utf8_lossy(value.as_bytes()).into_owned(),
-        None => String::new(),
+    const ALLOWED: &str = "the id of an event, a whole number below 2^53";
+    let header = headers
+        .get(LAST_EVENT_ID)
+        .map(|value| String::from_utf8_lossy(value.as_bytes()).into_owned())
+        .filter(|value| !value.is_empty());
+    let (name, value) = match (&header, params.text("last_event_id")) {
+        (Some(header), _) => ("last-event-id", header.as_str()),
+        (None, Some(query)) => ("last_event_id", query),
+        (None, None) => return Ok(0),
     };
-    if header.is_empty() {
-        return Ok(params.parse("last_event_id", ALLOWED)?.unwrap_or(0));
-    }
-    header
-        .parse()
-        .map_err(|_| params::refused(LAST_EVENT_ID.as_str(), &header, ALLOWED))
+    let id = value.parse().ok().filter(|id| *id <= MAX_EVENT_ID);
+    id.ok_or_else(|| params::refused(name, value, ALLOWED))
 }
 
 /// What one open stream holds on to, whether anybody reads it or not.

@@ -4,8 +4,7 @@
 use super::plans::now_ms;
 use super::problem::Problem;
 use super::{AppState, off_thread};
-use crate::export::document::{Convergence, Incumbent, Origin, ResultDocument, Timing};
-use crate::export::sha256_hex;
+use crate::export::document::{Convergence, Incumbent, Origin, ResultDocument};
 use crate::geometry::Point3;
 use crate::job::{Event, Plan};
 use crate::planner;
@@ -23,16 +22,7 @@ pub(super) async fn result(state: &AppState, plan: &Plan) -> Result<Option<Strin
     let curve = curve(state, plan).await?;
     let scenario = state.store.scenario(plan.id).await?;
     let run_ms = plan.started_ms.map_or(0, |began| now_ms() - began);
-    let origin = Origin {
-        plan_id: Some(plan.id),
-        algorithm: plan.algorithm.clone(),
-        seed: plan.seed,
-        scenario_sha256: sha256_hex(scenario.as_bytes()),
-        timing: Timing {
-            queued_ms: plan.queued_ms(),
-            run_ms: run_ms.max(0) as f64,
-        },
-    };
+    let origin = plan.origin(&scenario, run_ms.max(0) as f64);
     let rules = Rules {
         limits: Limits::NONE,
         algorithms: state.rules.algorithms.clone(),

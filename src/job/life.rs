@@ -2,7 +2,8 @@
 
 use super::state::{Refused, Status};
 use super::{Failure, Plan, Submission};
-use crate::export::document::Convergence;
+use crate::export::document::{Convergence, Origin, Timing};
+use crate::export::sha256_hex;
 
 impl Plan {
     /// The record of a plan that has just been accepted as number `queue_position` in the queue.
@@ -117,11 +118,21 @@ impl Plan {
         self.revision += 1;
     }
 
-    /// How long it waited for its (last) run, milliseconds. The clock may have been set back meanwhile.
+    /// What the result of its run says of its origin; `scenario` is the accepted document.
     #[must_use]
-    pub fn queued_ms(&self) -> f64 {
+    pub fn origin(&self, scenario: &str, run_ms: f64) -> Origin {
         let started_ms = self.started_ms.unwrap_or(self.created_ms);
-        (started_ms - self.created_ms).max(0) as f64
+        Origin {
+            plan_id: Some(self.id),
+            algorithm: self.algorithm.clone(),
+            seed: self.seed,
+            scenario_sha256: sha256_hex(scenario.as_bytes()),
+            timing: Timing {
+                // The wall clock may have been set back between the two.
+                queued_ms: (started_ms - self.created_ms).max(0) as f64,
+                run_ms,
+            },
+        }
     }
 
     fn become_status(&mut self, next: Status) -> Result<(), Refused> {

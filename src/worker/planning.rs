@@ -10,8 +10,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tracing::Span;
 
 use super::Engine;
-use crate::export::document::{Origin, ResultDocument, Timing};
-use crate::export::sha256_hex;
+use crate::export::document::ResultDocument;
 use crate::job::{Event, Failure, Plan, Status};
 use crate::planner::{ConvergencePoint, Incumbent, Observer, Outcome, Stop, StopReason};
 use crate::store::{Ending, Lease};
@@ -107,16 +106,6 @@ fn plan_to_its_end(engine: &Engine, plan: &Plan, scenario: &str, reports: Report
 }
 
 fn ending(outcome: &Outcome, plan: &Plan, scenario: &str, run_ms: f64) -> Ending {
-    let origin = Origin {
-        plan_id: Some(plan.id),
-        algorithm: plan.algorithm.clone(),
-        seed: plan.seed,
-        scenario_sha256: sha256_hex(scenario.as_bytes()),
-        timing: Timing {
-            queued_ms: plan.queued_ms(),
-            run_ms,
-        },
-    };
     Ending::Result {
         status: match outcome.stop_reason {
             StopReason::Cancelled => Status::Cancelled,
@@ -132,7 +121,7 @@ fn ending(outcome: &Outcome, plan: &Plan, scenario: &str, run_ms: f64) -> Ending
             .convergence
             .last()
             .map_or(0, |last| last.iteration as u64),
-        document: ResultDocument::new(outcome, origin).to_json(),
+        document: ResultDocument::new(outcome, plan.origin(scenario, run_ms)).to_json(),
     }
 }
 

@@ -27,10 +27,7 @@ fn document(name: &str) -> Vec<u8> {
 }
 
 fn rules() -> Rules {
-    Rules {
-        limits: Limits::default(),
-        algorithms: planner::algorithm_rules(),
-    }
+    planner::rules(Limits::default())
 }
 
 fn scenario(name: &str) -> Scenario {

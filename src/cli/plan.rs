@@ -18,7 +18,7 @@ use crate::export::sha256_hex;
 use crate::export::{self, Format, ResultInput};
 use crate::job::draw_seed;
 use crate::planner::{self, ConvergencePoint, Incumbent, Observer, Outcome, Stop};
-use crate::scenario::json::{self, Fault, Refusal, Rules};
+use crate::scenario::json::{self, Fault, Refusal};
 use crate::scenario::limits::Limits;
 use crate::scenario::{Scenario, WarmStart};
 
@@ -49,10 +49,7 @@ impl Arguments {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let text = read(&arguments.file)
         .with_context(|| format!("cannot read {}", arguments.file.display()))?;
-    let rules = Rules {
-        limits: Limits::default(),
-        algorithms: planner::algorithm_rules(),
-    };
+    let rules = planner::rules(Limits::default());
     let scenario = match json::read(&text, &rules, draw_seed()).and_then(without_a_store) {
         Ok(scenario) => scenario,
         Err(refusal) => {

@@ -18,7 +18,6 @@ use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase};
 use crate::job::Failure;
 use crate::planner;
 use crate::scenario::json::{self, Rules};
-use crate::scenario::limits::Limits;
 use crate::store::measured::MeasuredStore;
 use crate::store::reopening::{Open, Reopening};
 use crate::store::sqlite::SqliteStore;
@@ -67,16 +66,13 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let instruments = Arc::new(Instruments::default());
     let store = open_store(config).await?;
     let store: Arc<dyn Store> = Arc::new(MeasuredStore::new(store, instruments.clone()));
-    let rules = Arc::new(Rules {
-        limits: config.limits,
-        algorithms: planner::algorithm_rules(),
-    });
+    let rules = Arc::new(planner::rules(config.limits));
     let settings = worker::Settings {
         workers: config.workers,
         clock: store::wall_clock(),
         instruments: instruments.clone(),
     };
-    let pool = Pool::start(store.clone(), settings, engine());
+    let pool = Pool::start(store.clone(), settings, engine(rules.clone()));
     let sweeper = Sweeper::start(store.clone(), store::wall_clock());
     let sender = webhooks
         .clone()
@@ -137,14 +133,9 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
 }
 
 /// What the pool runs: the accepted document, read again, and planned.
-fn engine() -> Engine {
-    let rules = Rules {
-        limits: Limits::NONE,
-        algorithms: planner::algorithm_rules(),
-    };
+fn engine(rules: Arc<Rules>) -> Engine {
     Arc::new(move |document, observer, stop| {
-        // The document names its seed; none is drawn.
-        let scenario = json::read(document.as_bytes(), &rules, 0).map_err(|refusal| Failure {
+        let scenario = json::read_accepted(document, &rules).map_err(|refusal| Failure {
             kind: "invalid-scenario".to_owned(),
             detail: format!(
                 "this version of the service cannot read the accepted document: {refusal}"

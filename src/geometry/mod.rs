@@ -3,6 +3,7 @@
 //! Deliberately absent: anything that knows what a threat, a terrain or a vehicle is.
 
 pub mod bspline;
+pub mod geodesy;
 pub mod lane;
 mod quadratic;
 mod rect;

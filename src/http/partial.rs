@@ -9,7 +9,6 @@ use crate::geometry::Point3;
 use crate::job::{Event, Plan};
 use crate::planner;
 use crate::scenario::json::{self, Rules};
-use crate::scenario::limits::Limits;
 
 /// Points of the curve in it, the newest.
 const CURVE: usize = 10_000;
@@ -23,10 +22,7 @@ pub(super) async fn result(state: &AppState, plan: &Plan) -> Result<Option<Strin
     let scenario = state.store.scenario(plan.id).await?;
     let run_ms = plan.started_ms.map_or(0, |began| now_ms() - began);
     let origin = plan.origin(&scenario, run_ms.max(0) as f64);
-    let rules = Rules {
-        limits: Limits::NONE,
-        algorithms: state.rules.algorithms.clone(),
-    };
+    let rules = state.rules.clone();
     off_thread::run(move || measure(&scenario, &rules, best, curve, origin).map(Some)).await?
 }
 
@@ -53,7 +49,7 @@ fn measure(
     curve: Vec<Convergence>,
     origin: Origin,
 ) -> Result<String, Problem> {
-    let scenario = json::read(scenario.as_bytes(), rules, 0).map_err(|refusal| {
+    let scenario = json::read_accepted(scenario, rules).map_err(|refusal| {
         tracing::error!(%refusal, "an accepted document cannot be read");
         Problem::Internal
     })?;

@@ -12,6 +12,7 @@ mod objective;
 mod outcome;
 mod polish;
 mod price;
+mod rules;
 mod search;
 mod smoothing;
 mod starts;
@@ -20,13 +21,13 @@ pub use outcome::{
     Bound, Clearance, ConvergencePoint, Incumbent, Leg, Measures, Outcome, Path, StopReason,
     Violation,
 };
+pub use rules::rules;
 
 pub use crate::cost::CostFigures;
 
 use crate::cost::Model;
 use crate::geometry::Point3;
-use crate::optimizer::{self, Algorithm, Objective};
-use crate::scenario::json::{AlgorithmRule, ParameterRule};
+use crate::optimizer::Objective;
 use crate::scenario::{Quadrature, Scenario};
 use crate::seeding;
 use log::Log;
@@ -66,21 +67,6 @@ impl Stop for Nobody {
     fn elapsed_ms(&self) -> f64 {
         0.0
     }
-}
-
-/// The algorithms that a scenario may name, as the reader of scenarios wants them.
-#[must_use]
-pub fn algorithm_rules() -> Vec<AlgorithmRule> {
-    let rule = |parameter: &optimizer::Parameter| ParameterRule {
-        name: parameter.name,
-        min: parameter.min,
-        max: parameter.max,
-    };
-    let rules = |algorithm: &Algorithm| AlgorithmRule {
-        name: algorithm.name,
-        parameters: algorithm.parameters.iter().map(rule).collect(),
-    };
-    optimizer::ALL.iter().map(rules).collect()
 }
 
 /// Plan a route for `scenario`.

@@ -1,7 +1,8 @@
 //! The search algorithms that a request may name: listed everywhere, and planning as they should.
 
+use noctule::optimizer;
 use noctule::planner::{self, Nobody, Outcome};
-use noctule::scenario::json::{self, COMMON, CommonParameter, Rules, Takes};
+use noctule::scenario::json::{self, COMMON, CommonParameter, Takes};
 use noctule::scenario::limits::Limits;
 use serde_json::Value;
 
@@ -9,8 +10,8 @@ use crate::support::api::Api;
 use crate::support::description::DESCRIPTION;
 
 fn names() -> Vec<&'static str> {
-    let rules = planner::algorithm_rules();
-    rules.iter().map(|rule| rule.name).collect()
+    let algorithms = optimizer::ALL.iter();
+    algorithms.map(|algorithm| algorithm.name).collect()
 }
 
 /// Plan the shipped `paper-1`, plainly: from a random start, without polishing.
@@ -25,10 +26,7 @@ fn plan(algorithm: &str, seed: u64, [waypoints, population, iterations]: [u64; 3
     planner["iterations"] = iterations.into();
     planner["seeding"] = "random".into();
     planner["polish"] = false.into();
-    let rules = Rules {
-        limits: Limits::default(),
-        algorithms: planner::algorithm_rules(),
-    };
+    let rules = planner::rules(Limits::default());
     let scenario = json::read(document.to_string().as_bytes(), &rules, 1).expect("no fault");
     planner::plan(&scenario, &mut Nobody, &Nobody)
 }
@@ -128,10 +126,7 @@ async fn every_algorithm_is_listed_with_its_source() {
 /// and is its default when absent.
 #[test]
 fn every_algorithm_takes_the_common_parameters() {
-    let rules = Rules {
-        limits: Limits::default(),
-        algorithms: planner::algorithm_rules(),
-    };
+    let rules = planner::rules(Limits::default());
     let accepted = |parameters: Value, algorithm: &str| {
         let text = include_str!("../../scenarios/paper-1.json");
         let mut document: Value = serde_json::from_str(text).expect("JSON");

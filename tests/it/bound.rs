@@ -114,10 +114,7 @@ fn drawn() -> impl Strategy<Value = Drawn> {
 }
 
 fn rules() -> Rules {
-    Rules {
-        limits: Limits::default(),
-        algorithms: planner::algorithm_rules(),
-    }
+    planner::rules(Limits::default())
 }
 
 /// `None` where no route can exist, or a ring is none.

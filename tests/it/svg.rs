@@ -6,7 +6,7 @@ use std::fs;
 use noctule::export::document::{Path, Position, ResultDocument, Violation};
 use noctule::export::{self, ResultInput};
 use noctule::planner;
-use noctule::scenario::json::{self, Rules};
+use noctule::scenario::json;
 use noctule::scenario::limits::Limits;
 use roxmltree::Document;
 use serde_json::{Value, json};
@@ -19,10 +19,7 @@ use crate::support::{process, run, scenario};
 const ALARM: &str = "#d0021b";
 
 fn accepted(document: &Value) -> String {
-    let rules = Rules {
-        limits: Limits::default(),
-        algorithms: planner::algorithm_rules(),
-    };
+    let rules = planner::rules(Limits::default());
     let scenario =
         json::read(document.to_string().as_bytes(), &rules, 7).expect("a valid scenario");
     json::write(&scenario)

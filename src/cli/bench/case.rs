@@ -108,10 +108,7 @@ fn from_file(file: &Path) -> anyhow::Result<Case> {
 }
 
 fn rules() -> Rules {
-    Rules {
-        limits: Limits::default(),
-        algorithms: planner::algorithm_rules(),
-    }
+    planner::rules(Limits::default())
 }
 
 impl Case {

@@ -13,7 +13,7 @@ use super::report::{Drawing, Report};
 use super::summary::{Summary, median};
 use super::table::{Cell, Table};
 use super::trial::{self, Trial};
-use crate::planner;
+use crate::optimizer;
 
 #[derive(Args)]
 pub(in crate::cli) struct Arguments {
@@ -166,10 +166,9 @@ fn run_seeds(
 
 /// The setting under every algorithm, [`REFERENCE`] first.
 fn by_algorithm(base: &Setting) -> Vec<Setting> {
-    let rules = planner::algorithm_rules();
-    let others = rules
+    let others = optimizer::ALL
         .iter()
-        .map(|rule| rule.name)
+        .map(|algorithm| algorithm.name)
         .filter(|name| *name != REFERENCE);
     std::iter::once(REFERENCE)
         .chain(others)

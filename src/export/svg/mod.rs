@@ -23,7 +23,7 @@ use super::document::{Position, ResultDocument};
 use crate::geometry::{Point3, Rect};
 use crate::planner;
 use crate::scenario::Scenario;
-use crate::scenario::json::{self, Rules};
+use crate::scenario::json;
 use crate::scenario::limits::Limits;
 
 /// Of the sheet, pixels.
@@ -85,24 +85,7 @@ pub(super) fn write(input: &ResultInput) -> String {
 
 impl Drawing {
     fn read(input: &ResultInput) -> Self {
-        // Limits are for those who hand in; what was accepted once stays readable when an
-        // operator lowers them.
-        let rules = Rules {
-            limits: Limits {
-                body_bytes: usize::MAX,
-                threats: usize::MAX,
-                polygon_vertices: usize::MAX,
-                terrain_nodes: usize::MAX,
-                peaks: usize::MAX,
-                waypoints: usize::MAX,
-                population: usize::MAX,
-                iterations: usize::MAX,
-                work: u64::MAX,
-                path_samples: usize::MAX,
-            },
-            algorithms: planner::algorithm_rules(),
-        };
-        let scenario = json::read(input.scenario.as_bytes(), &rules, 0)
+        let scenario = json::read_accepted(input.scenario, &planner::rules(Limits::NONE))
             .expect("an accepted document is written so that it can be read again");
         let result: ResultDocument =
             serde_json::from_str(input.result).expect("a stored result is a result document");

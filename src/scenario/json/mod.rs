@@ -73,6 +73,20 @@ pub fn read(text: &[u8], rules: &Rules, drawn_seed: u64) -> Result<Scenario, Ref
     }
 }
 
+/// Read a document that was accepted before: limits are for those who hand in, and what holds now
+/// does not take back what once was allowed.
+///
+/// # Errors
+/// As [`read`]; only where the document comes from another version of this program.
+pub fn read_accepted(document: &str, rules: &Rules) -> Result<Scenario, Refusal> {
+    let rules = Rules {
+        limits: Limits::NONE,
+        ..rules.clone()
+    };
+    // It names its seed; none is drawn.
+    read(document.as_bytes(), &rules, 0)
+}
+
 /// Write the accepted document, defaults filled in, as one line of JSON. Reading it again gives an
 /// equal scenario; equal scenarios give the same bytes.
 #[must_use]

@@ -2,7 +2,7 @@
 
 use futures_util::stream::{self, StreamExt as _};
 use noctule::planner;
-use noctule::scenario::json::{self, Rules};
+use noctule::scenario::json;
 use noctule::scenario::limits::Limits;
 use serde_json::Value;
 
@@ -130,10 +130,7 @@ fn spoilt(dice: &mut Dice) -> Vec<u8> {
 
 #[test]
 fn spoilt_documents_are_read_or_refused() {
-    let rules = Rules {
-        limits: Limits::default(),
-        algorithms: planner::algorithm_rules(),
-    };
+    let rules = planner::rules(Limits::default());
     let mut dice = Dice::new(3);
     let mut read = 0_usize;
     for _ in 0..size(20_000, 1_000_000) {

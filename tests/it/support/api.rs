@@ -12,7 +12,6 @@ use noctule::http::auth::{Access, Keys, Settings};
 use noctule::http::webhook;
 use noctule::http::{self, AppState, Capacity, InFlight, Origins, Phase};
 use noctule::planner;
-use noctule::scenario::json::Rules;
 use noctule::scenario::limits::Limits;
 use noctule::store::measured::MeasuredStore;
 use noctule::store::sqlite::SqliteStore;
@@ -95,13 +94,10 @@ impl Api {
         let (phase, watched) = watch::channel(Phase::Serving);
         let state = AppState {
             store: store.clone(),
-            rules: Arc::new(Rules {
-                limits: Limits {
-                    body_bytes: 4096,
-                    ..Limits::default()
-                },
-                algorithms: planner::algorithm_rules(),
-            }),
+            rules: Arc::new(planner::rules(Limits {
+                body_bytes: 4096,
+                ..Limits::default()
+            })),
             capacity: Capacity { workers: 2, queue },
             in_flight: InFlight::default(),
             clock_jump_ms: clock.1,

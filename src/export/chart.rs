@@ -1,18 +1,13 @@
 //! Where a plan lies on the earth: local metres as degrees, and one datum's altitude as another's.
 
+use std::sync::Arc;
+
 use crate::geometry::Point3;
-use crate::geometry::geodesy::{LatLon, TangentPlane};
-use crate::scenario::Scenario;
+use crate::scenario::frame::{Frame, Wgs84};
 
 /// Of a scenario in degrees.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Chart {
-    plane: TangentPlane,
-    /// Of mean sea level above the ellipsoid, metres, one figure for the whole scenario.
-    undulation_m: f64,
-    /// Whether the scenario's altitudes are above mean sea level, else above the ellipsoid.
-    above_sea: bool,
-}
+pub(super) struct Chart(Arc<Wgs84>);
 
 /// A point on the earth as the formats want it, rounded to [`DEGREES`] and millimetres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,42 +27,37 @@ const DEGREES: f64 = 1e9;
 
 impl Chart {
     /// `None` in a local frame.
-    pub(super) fn of(_: &Scenario) -> Option<Self> {
-        None
+    pub(super) fn of(frame: &Frame) -> Option<Self> {
+        match frame {
+            Frame::Local => None,
+            Frame::Wgs84(wgs84) => Some(Self(wgs84.clone())),
+        }
     }
 
-    /// Of a point in the scenario's frame.
+    /// Of a point of the local plane.
     pub(super) fn fix(&self, point: Point3) -> Fix {
-        let LatLon { lat, lon } = self.plane.geodetic(point.xy());
+        let place = self.0.place(point.xy());
         Fix {
-            lat: rounded(lat, DEGREES),
-            lon: rounded(lon, DEGREES),
-            msl_m: rounded(self.msl_m(point.z), 1e3),
-            ellipsoid_m: rounded(self.ellipsoid_m(point.z), 1e3),
+            lat: rounded(place.lat, DEGREES),
+            lon: rounded(place.lon, DEGREES),
+            msl_m: rounded(self.0.above_sea(point.z), 1e3),
+            ellipsoid_m: rounded(self.0.above_ellipsoid(point.z), 1e3),
         }
     }
 
     /// A height of the scenario's frame above mean sea level, metres.
     pub(super) fn msl_m(&self, z: f64) -> f64 {
-        if self.above_sea {
-            z
-        } else {
-            z - self.undulation_m
-        }
+        rounded(self.0.above_sea(z), 1e3)
     }
 
     /// A height of the scenario's frame above the ellipsoid, metres.
     pub(super) fn ellipsoid_m(&self, z: f64) -> f64 {
-        if self.above_sea {
-            z + self.undulation_m
-        } else {
-            z
-        }
+        rounded(self.0.above_ellipsoid(z), 1e3)
     }
 
-    /// Of mean sea level above the ellipsoid, metres.
+    /// Of mean sea level above the ellipsoid, metres; one figure for the whole scenario.
     pub(super) fn undulation_m(&self) -> f64 {
-        self.undulation_m
+        rounded(self.0.undulation_m, 1e3)
     }
 }
 

@@ -129,8 +129,8 @@ fn volume(chart: &Chart, index: usize, threat: &Threat, shown: (f64, f64)) -> Va
                 .collect();
             packet["polygon"] = json!({
                 "positions": {"cartographicDegrees": corners},
-                "height": rounded(chart.ellipsoid_m(base), 1e3),
-                "extrudedHeight": rounded(chart.ellipsoid_m(top), 1e3),
+                "height": chart.ellipsoid_m(base),
+                "extrudedHeight": chart.ellipsoid_m(top),
                 "material": look,
             });
         }

@@ -5,20 +5,18 @@ use super::document::{Position, ResultDocument};
 use super::{ExportError, ResultInput};
 use crate::geometry::Point3;
 use crate::planner;
-use crate::scenario::Scenario;
-use crate::scenario::json;
+use crate::scenario::{Frame, Scenario, json};
 use crate::scenario::limits::Limits;
 
 /// A plan: what was asked for and what came out.
-pub struct Delivery<'a> {
-    pub(super) input: ResultInput<'a>,
+pub struct Delivery {
     pub(super) scenario: Scenario,
     pub(super) result: ResultDocument,
-    /// Of the scenario's frame, local metres.
+    /// On the local plane.
     pub(super) waypoints: Vec<Point3>,
-    /// Samples of the smoothed path, local metres; `None` when infeasible.
+    /// Samples of the smoothed path, on the local plane; `None` when infeasible.
     pub(super) path: Option<Vec<Point3>>,
-    /// Where the local metres lie on the earth; `None` in a local frame.
+    /// Where the local plane lies on the earth; `None` in a local frame.
     pub(super) chart: Option<Chart>,
 }
 
@@ -33,23 +31,24 @@ pub(super) struct Passage {
     pub(super) fuel: f64,
 }
 
-impl<'a> Delivery<'a> {
+impl Delivery {
     /// Read both documents.
     ///
     /// # Errors
     /// [`ExportError::Damaged`] when one cannot be read, or has a route without extent.
-    pub fn read(input: &ResultInput<'a>) -> Result<Self, ExportError> {
+    pub fn read(input: &ResultInput) -> Result<Self, ExportError> {
         let scenario = json::read_accepted(input.scenario, &planner::rules(Limits::NONE))
             .map_err(|refusal| ExportError::Damaged(format!("the scenario: {refusal}")))?;
         let result: ResultDocument = serde_json::from_str(input.result)
             .map_err(|error| ExportError::Damaged(format!("the result: {error}")))?;
-        let waypoints = points(&result.waypoints)?;
-        let path = result.path.as_ref().map(|path| points(&path.points));
+        let frame = &scenario.frame;
+        let waypoints = points(&result.waypoints, frame)?;
+        let path = result.path.as_ref();
+        let path = path.map(|path| points(&path.points, frame)).transpose()?;
         Ok(Self {
-            input: *input,
             waypoints,
-            path: path.transpose()?,
-            chart: Chart::of(&scenario),
+            path,
+            chart: Chart::of(frame),
             scenario,
             result,
         })
@@ -128,12 +127,16 @@ impl<'a> Delivery<'a> {
     }
 }
 
-fn points(positions: &[Position]) -> Result<Vec<Point3>, ExportError> {
+fn points(positions: &[Position], frame: &Frame) -> Result<Vec<Point3>, ExportError> {
     if positions.len() < 2 {
         let count = positions.len();
         return Err(ExportError::Damaged(format!(
             "the result: a route of {count} points, must have two or more"
         )));
     }
-    Ok(positions.iter().copied().map(Point3::from).collect())
+    let points = positions.iter().map(|position| position.within(frame));
+    let points: Option<Vec<Point3>> = points.collect();
+    points.ok_or_else(|| {
+        ExportError::Damaged("the result: in another frame than its scenario".to_owned())
+    })
 }

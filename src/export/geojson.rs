@@ -84,7 +84,7 @@ fn violations<'d>(delivery: &'d Delivery, index: usize) -> impl Iterator<Item = 
 fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Feature {
     let ring = outline::ring(delivery.chart(), threat, 0.0);
     let ring: Vec<_> = ring.iter().map(|fix| vec![fix.lon, fix.lat]).collect();
-    let height = |z: Option<f64>| z.map(|z| rounded(delivery.chart().ellipsoid_m(z), 1e3));
+    let height = |z: Option<f64>| z.map(|z| delivery.chart().ellipsoid_m(z));
     let mut properties = json!({
         "role": "threat",
         "name": outline::name(threat, index),

@@ -99,7 +99,7 @@ fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Placemark {
     let ring = outline::ring(delivery.chart(), threat, top);
     let mut coords: Vec<Coord> = ring.into_iter().map(coord).collect();
     coords.push(coords[0]);
-    let height = |z: f64| rounded(delivery.chart().msl_m(z), 1e3).to_string();
+    let height = |z: f64| delivery.chart().msl_m(z).to_string();
     let mut data = Vec::new();
     match &threat.shape {
         Shape::Cylinder(cylinder) => {

@@ -74,7 +74,7 @@ pub const ALL: &[Format] = &[
         geodetic: false,
         flown: false,
         options: &[],
-        write: Some(|delivery, _| Ok(svg::write(&delivery.input))),
+        write: Some(svg::write),
     },
     Format {
         name: "csv",

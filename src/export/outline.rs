@@ -18,17 +18,6 @@ pub(super) fn ring(chart: &Chart, threat: &Threat, z: f64) -> Vec<Fix> {
     corners.into_iter().map(fix).collect()
 }
 
-/// Where the threat is labelled: the middle of a circle or of a polygon's box.
-pub(super) fn middle(threat: &Threat) -> Point2 {
-    match &threat.shape {
-        Shape::Cylinder(cylinder) => cylinder.center,
-        Shape::Polygon(_) => {
-            let extent = threat.extent();
-            nalgebra::center(&extent.min, &extent.max)
-        }
-    }
-}
-
 /// What the `index`th threat is called.
 pub(super) fn name(threat: &Threat, index: usize) -> String {
     threat

@@ -59,7 +59,7 @@ fn refuse_other_systems(document: &Value) -> Result<(), ImportError> {
 }
 
 fn feature(draft: &mut Draft, at: &str, value: JsonValue) {
-    let feature = match Feature::try_from(value) {
+    let feature = match serde_json::from_value::<Feature>(value) {
         Ok(feature) => feature,
         Err(error) => return draft.leave(at, error.to_string()),
     };

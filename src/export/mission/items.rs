@@ -115,7 +115,7 @@ pub(super) fn mission(delivery: &Delivery, options: &Options) -> Result<Mission,
 }
 
 struct Scribe<'d> {
-    delivery: &'d Delivery<'d>,
+    delivery: &'d Delivery,
     chart: &'d Chart,
     options: &'d Options,
     /// Local metres.

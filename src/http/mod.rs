@@ -23,6 +23,7 @@ mod prefer;
 mod problem;
 mod request_id;
 mod retry;
+mod scenarios;
 pub mod server;
 mod service;
 mod sse;
@@ -115,6 +116,7 @@ pub fn routes() -> Vec<Route> {
         get("/plans/{id}/scenario", documents::scenario),
         get("/plans/{id}/events", events::follow),
         post("/plans/{id}/tickets", tickets::issue),
+        post("/scenarios:convert", scenarios::convert),
         get("/algorithms", service::algorithms),
         get("/limits", service::limits),
         get("/version", service::version),

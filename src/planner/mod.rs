@@ -25,6 +25,8 @@ pub use outcome::{
 };
 pub use rules::rules;
 
+pub use smoothing::binds as binds_paths;
+
 pub use crate::cost::CostFigures;
 
 use crate::cost::Model;

@@ -100,6 +100,9 @@ enum WireTerrain<'a> {
         #[serde(serialize_with = "figures")]
         elevations: &'a [f64],
     },
+    Dataset {
+        name: &'a str,
+    },
 }
 
 #[derive(Serialize)]
@@ -272,6 +275,7 @@ impl<'a> From<&'a Terrain> for WireTerrain<'a> {
                 rows: grid.rows,
                 elevations: &grid.elevations,
             },
+            Terrain::Dem(dem) => Self::Dataset { name: dem.name() },
         }
     }
 }

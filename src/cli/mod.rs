@@ -1,4 +1,4 @@
-//! The command line: serve, plan, bench, key, store, healthcheck.
+//! The command line: serve, plan, bench, key, store, terrain, healthcheck.
 
 mod access;
 mod bench;
@@ -7,6 +7,7 @@ mod key;
 mod plan;
 mod serve;
 mod store;
+mod terrain;
 
 use std::process::ExitCode;
 
@@ -35,6 +36,9 @@ enum Command {
     /// Copy the stored plans, or look for damage among them
     #[command(subcommand)]
     Store(store::Command),
+    /// Look into a file of elevations
+    #[command(subcommand)]
+    Terrain(terrain::Command),
     /// Ask a running service whether it is ready; for containers
     Healthcheck(healthcheck::Arguments),
 }
@@ -73,6 +77,7 @@ pub fn run() -> ExitCode {
         Command::Bench(command) => bench::run(&command),
         Command::Key(command) => key::run(&command).map(|()| exit::DONE),
         Command::Store(command) => store::run(command),
+        Command::Terrain(command) => terrain::run(&command),
         Command::Healthcheck(arguments) => healthcheck::run(&arguments).map(|()| exit::DONE),
     };
     done.unwrap_or_else(|error| {

@@ -152,13 +152,16 @@ impl<'s> Model<'s> {
 mod tests {
     use super::*;
     use crate::geometry::{Point2, Rect};
-    use crate::scenario::{AltitudeBand, PlannerSettings, Seeding, Smoothing, Vehicle, Weights};
+    use crate::scenario::{
+        AltitudeBand, Frame, PlannerSettings, Seeding, Smoothing, Vehicle, Weights,
+    };
     use crate::terrain::{Flat, Terrain};
     use crate::threat::{Cylinder, Shape, Threat};
 
     /// A disc of 10 m with a soft zone of 10 m more at (50, 0), between 0 and 80 m.
     fn scenario() -> Scenario {
         Scenario {
+            frame: Frame::Local,
             name: None,
             start: Point3::new(0.0, 0.0, 20.0),
             target: Point3::new(100.0, 0.0, 20.0),

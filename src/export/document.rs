@@ -4,7 +4,9 @@ use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 use crate::geometry::Point3;
+use crate::geometry::geodesy::LatLon;
 use crate::planner::{self, ConvergencePoint, CostFigures, Measures, Outcome};
+use crate::scenario::frame::{Datum, Frame, Geodetic, Wgs84};
 
 /// The document of `GET /plans/{id}/result` and of `noctule plan`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,6 +35,9 @@ pub struct ResultDocument {
     pub cost_integral: Option<Cost>,
     /// Proven lower bound.
     pub bound: Bound,
+    /// Left out in the local frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame: Option<FrameDocument>,
     /// Start, free waypoints, target.
     pub waypoints: Vec<Position>,
     /// One fewer than the waypoints.
@@ -51,13 +56,39 @@ pub struct ResultDocument {
 
 /// A point in the request's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Position {
-    /// East, metres.
-    pub x: f64,
-    /// North, metres.
-    pub y: f64,
-    /// Up, metres.
-    pub z: f64,
+#[serde(untagged)]
+pub enum Position {
+    /// Metres of the local plane.
+    Local {
+        /// East.
+        x: f64,
+        /// North.
+        y: f64,
+        /// Up.
+        z: f64,
+    },
+    /// Degrees on the WGS 84 ellipsoid.
+    Geodetic {
+        /// Latitude, degrees north.
+        lat: f64,
+        /// Longitude, degrees east.
+        lon: f64,
+        /// Metres above the request's datum.
+        alt: f64,
+    },
+}
+
+/// How a geodetic request was laid onto the plane that was planned in.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FrameDocument {
+    /// `wgs84`.
+    pub kind: String,
+    /// `msl` or `ellipsoid`.
+    pub altitude_datum: String,
+    /// Where the plane touches; its altitude is that of all lengths.
+    pub origin: Position,
+    /// Height of mean sea level above the ellipsoid there, metres.
+    pub undulation: f64,
 }
 
 /// Weighted terms of Eq. 1 and their sum.
@@ -215,9 +246,13 @@ impl ResultDocument {
                 lower: outcome.bound.lower,
                 gap: outcome.bound.gap,
             },
-            waypoints: positions(&outcome.waypoints),
+            frame: outcome.frame.wgs84().map(Into::into),
+            waypoints: positions(&outcome.waypoints, &outcome.frame),
             legs: outcome.legs.iter().copied().map(Into::into).collect(),
-            path: outcome.path.as_ref().map(Into::into),
+            path: outcome
+                .path
+                .as_ref()
+                .map(|path| Path::of(path, &outcome.frame)),
             checks: Checks {
                 waypoints: (&outcome.waypoint_checks).into(),
                 path: outcome.path_checks.as_ref().map(Into::into),
@@ -239,23 +274,65 @@ impl ResultDocument {
     }
 }
 
-fn positions(points: &[Point3]) -> Vec<Position> {
-    points.iter().copied().map(Into::into).collect()
+fn positions(points: &[Point3], frame: &Frame) -> Vec<Position> {
+    let position = |point: &Point3| Position::of(*point, frame);
+    points.iter().map(position).collect()
 }
 
-impl From<Point3> for Position {
-    fn from(point: Point3) -> Self {
-        Self {
-            x: point.x,
-            y: point.y,
-            z: point.z,
+impl Position {
+    /// `point` of the local plane in the coordinates of `frame`.
+    #[must_use]
+    pub fn of(point: Point3, frame: &Frame) -> Self {
+        match frame {
+            Frame::Local => Self::Local {
+                x: point.x,
+                y: point.y,
+                z: point.z,
+            },
+            Frame::Wgs84(wgs84) => wgs84.geodetic(point).into(),
+        }
+    }
+
+    /// The point of the local plane of `frame`; `None` when it is of another frame.
+    #[must_use]
+    pub fn within(self, frame: &Frame) -> Option<Point3> {
+        match (self, frame) {
+            (Self::Local { x, y, z }, Frame::Local) => Some(Point3::new(x, y, z)),
+            (Self::Geodetic { lat, lon, alt }, Frame::Wgs84(wgs84)) => {
+                let place = LatLon { lat, lon };
+                Some(wgs84.local(Geodetic { place, alt }))
+            }
+            _ => None,
         }
     }
 }
 
-impl From<Position> for Point3 {
-    fn from(position: Position) -> Self {
-        Self::new(position.x, position.y, position.z)
+impl From<Geodetic> for Position {
+    fn from(geodetic: Geodetic) -> Self {
+        Self::Geodetic {
+            lat: geodetic.place.lat,
+            lon: geodetic.place.lon,
+            alt: geodetic.alt,
+        }
+    }
+}
+
+impl From<&Wgs84> for FrameDocument {
+    fn from(wgs84: &Wgs84) -> Self {
+        let height = wgs84.plane.height_m();
+        Self {
+            kind: "wgs84".to_owned(),
+            altitude_datum: wgs84.datum.name().to_owned(),
+            origin: Geodetic {
+                place: wgs84.plane.origin(),
+                alt: match wgs84.datum {
+                    Datum::Msl => height - wgs84.undulation_m,
+                    Datum::Ellipsoid => height,
+                },
+            }
+            .into(),
+            undulation: wgs84.undulation_m,
+        }
     }
 }
 
@@ -280,14 +357,14 @@ impl From<planner::Leg> for Leg {
     }
 }
 
-impl From<&planner::Path> for Path {
-    fn from(path: &planner::Path) -> Self {
+impl Path {
+    fn of(path: &planner::Path, frame: &Frame) -> Self {
         Self {
-            points: positions(&path.points),
+            points: positions(&path.points, frame),
             length: path.length,
             degree: path.degree,
             knots: path.knots.clone(),
-            control_points: positions(&path.control_points),
+            control_points: positions(&path.control_points, frame),
             duration_s: path.duration_s,
         }
     }
@@ -348,7 +425,7 @@ impl From<&planner::Incumbent> for Incumbent {
             elapsed_ms: incumbent.elapsed_ms,
             cost: incumbent.cost,
             feasible: incumbent.feasible,
-            waypoints: positions(&incumbent.waypoints),
+            waypoints: positions(&incumbent.waypoints, &incumbent.frame),
         }
     }
 }

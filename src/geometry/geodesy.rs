@@ -21,6 +21,65 @@ pub struct LatLon {
     pub lon: f64,
 }
 
+/// All between two parallels and two meridians. Its west is `min.lon` and its east `max.lon`, which
+/// is the smaller one where it lies across the antimeridian.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LatLonBox {
+    /// South-west corner.
+    pub min: LatLon,
+    /// North-east corner.
+    pub max: LatLon,
+}
+
+impl LatLon {
+    /// Metres to another place over a ball of the earth's mean radius: good to half a percent.
+    #[must_use]
+    pub fn distance_m(self, other: Self) -> f64 {
+        const MEAN_RADIUS_M: f64 = 6_371_008.8;
+        let (lat, other_lat) = (self.lat.to_radians(), other.lat.to_radians());
+        let half = |angle: f64| libm::sin(angle / 2.0).powi(2);
+        let lon = (other.lon - self.lon).to_radians();
+        let chord = half(other_lat - lat) + libm::cos(lat) * libm::cos(other_lat) * half(lon);
+        2.0 * MEAN_RADIUS_M * libm::asin(chord.sqrt().min(1.0))
+    }
+}
+
+impl LatLonBox {
+    /// Degrees from west to east, above 0 and at most 360.
+    #[must_use]
+    pub fn width(&self) -> f64 {
+        let width = self.max.lon - self.min.lon;
+        if width > 0.0 { width } else { width + 360.0 }
+    }
+
+    /// The place in its middle, by degrees.
+    #[must_use]
+    pub fn middle(&self) -> LatLon {
+        LatLon {
+            lat: f64::midpoint(self.min.lat, self.max.lat),
+            lon: wrapped(self.min.lon + self.width() / 2.0),
+        }
+    }
+
+    /// Whether `place` lies inside or on the edge.
+    #[must_use]
+    pub fn contains(&self, place: LatLon) -> bool {
+        let east = place.lon - self.min.lon;
+        let east = if east < 0.0 { east + 360.0 } else { east };
+        (self.min.lat..=self.max.lat).contains(&place.lat) && east <= self.width()
+    }
+}
+
+/// A longitude brought into -180..=180 degrees.
+#[must_use]
+pub fn wrapped(lon: f64) -> f64 {
+    if (-180.0..=180.0).contains(&lon) {
+        lon
+    } else {
+        lon - 360.0 * (lon / 360.0).round()
+    }
+}
+
 /// Rounds of [`TangentPlane::geodetic`]: each leaves the square of the plane's tilt, a 4000th at 100 km, of the error.
 const ROUNDS: usize = 6;
 

@@ -5,7 +5,6 @@ use super::plans::now_ms;
 use super::problem::Problem;
 use super::{AppState, off_thread};
 use crate::export::document::{Convergence, Incumbent, Origin, ResultDocument};
-use crate::geometry::Point3;
 use crate::job::{Event, Plan};
 use crate::planner;
 use crate::scenario::json::{self, Rules};
@@ -53,8 +52,12 @@ fn measure(
         tracing::error!(%refusal, "an accepted document cannot be read");
         Problem::Internal
     })?;
-    let route = best.waypoints.into_iter().map(Point3::from);
-    let outcome = planner::so_far(&scenario, route.collect());
+    let route = best.waypoints.into_iter();
+    let route = route.map(|position| position.within(&scenario.frame));
+    let route = route
+        .collect::<Option<_>>()
+        .expect("an incumbent is told in the frame of its scenario");
+    let outcome = planner::so_far(&scenario, route);
     let document = ResultDocument {
         stop_reason: None,
         is_final: Some(false),

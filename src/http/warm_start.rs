@@ -6,22 +6,37 @@ use serde::Deserialize;
 use super::AppState;
 use super::caller::Caller;
 use super::problem::Problem;
+use crate::export::document::{FrameDocument, Position};
 use crate::geometry::Point3;
 use crate::job::PlanId;
+use crate::scenario::frame::{Datum, Frame};
 use crate::scenario::json::Fault;
 use crate::scenario::{Scenario, WarmStart};
 
 /// The part of a result document that counts here.
 #[derive(Deserialize)]
 struct Route {
-    waypoints: Vec<Waypoint>,
+    frame: Option<FrameDocument>,
+    waypoints: Vec<Position>,
 }
 
-#[derive(Deserialize)]
-struct Waypoint {
-    x: f64,
-    y: f64,
-    z: f64,
+impl Route {
+    /// Its waypoints in the local plane of `frame`; `None` when they are of another kind of frame.
+    fn within(&self, frame: &Frame) -> Option<Vec<Point3>> {
+        let points = self.waypoints.iter();
+        let points: Option<Vec<_>> = points.map(|position| position.within(frame)).collect();
+        let Some(wgs84) = frame.wgs84() else {
+            return points;
+        };
+        let datum = &self.frame.as_ref()?.altitude_datum;
+        let lift = match (datum.as_str(), wgs84.datum) {
+            ("msl", Datum::Ellipsoid) => wgs84.undulation_m,
+            ("ellipsoid", Datum::Msl) => -wgs84.undulation_m,
+            _ => 0.0,
+        };
+        let lifted = |point: Point3| Point3::new(point.x, point.y, point.z + lift);
+        Some(points?.into_iter().map(lifted).collect())
+    }
 }
 
 /// Put the waypoints of the plan that `scenario` starts from into it.
@@ -53,8 +68,8 @@ pub(super) async fn resolve(
         tracing::error!(warm_start_plan_id = %plan, %error, "a stored result cannot be read");
         Problem::Internal
     })?;
-    let points = route.waypoints.iter();
-    let points = points.map(|point| Point3::new(point.x, point.y, point.z));
-    scenario.planner.warm_start = Some(WarmStart::Waypoints(points.collect()));
+    let points = route.within(&scenario.frame);
+    let points = points.ok_or_else(|| unknown("that plan's route is in another frame"))?;
+    scenario.planner.warm_start = Some(WarmStart::Waypoints(points));
     Ok(())
 }

@@ -97,6 +97,7 @@ impl<'o> Log<'o> {
         let last = self.told.as_ref();
         if last != Some(&self.route) {
             self.observer.incumbent(&Incumbent {
+                frame: self.model.scenario.frame.clone(),
                 iteration,
                 elapsed_ms,
                 cost: best.cost,

@@ -159,6 +159,7 @@ fn measured(
     }
     let path = feasible.then(|| smoothing::smooth(model, &route)).flatten();
     Outcome {
+        frame: model.scenario.frame.clone(),
         feasible,
         stop_reason,
         cost,
@@ -186,7 +187,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Point2, Rect};
     use crate::scenario::{
-        AltitudeBand, PlannerSettings, Seeding, Smoothing, Vehicle, WarmStart, Weights,
+        AltitudeBand, Frame, PlannerSettings, Seeding, Smoothing, Vehicle, WarmStart, Weights,
     };
     use crate::terrain::{Flat, Terrain};
     use crate::threat::{Cylinder, Shape, Threat};
@@ -204,6 +205,7 @@ mod tests {
             top: None,
         };
         Scenario {
+            frame: Frame::Local,
             name: None,
             start: Point3::new(200.0, 100.0, 0.0),
             target: Point3::new(800.0, 800.0, 150.0),

@@ -2,10 +2,13 @@
 
 use crate::cost::CostFigures;
 use crate::geometry::Point3;
+use crate::scenario::Frame;
 
 /// The end of a run: the best route, its price, its certificate and how it was found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
+    /// What the request's coordinates mean; all here are in the local plane.
+    pub frame: Frame,
     /// Whether the waypoints meet every constraint.
     pub feasible: bool,
     /// Why the search ended.
@@ -161,6 +164,8 @@ pub struct ConvergencePoint {
 /// A new best route.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Incumbent {
+    /// What the request's coordinates mean; those here are in the local plane.
+    pub frame: Frame,
     /// When it was found.
     pub iteration: usize,
     /// Since the run began, milliseconds.

@@ -3,6 +3,7 @@
 //! [`json`] reads the wire document and reports every fault at once; [`limits`] holds what the
 //! operator allows. Deliberately absent: HTTP, defaults that depend on a clock or a machine.
 
+pub mod frame;
 pub mod json;
 pub mod limits;
 
@@ -11,6 +12,7 @@ use std::collections::BTreeMap;
 use crate::geometry::{Point3, Rect};
 use crate::terrain::Terrain;
 use crate::threat::Threat;
+pub use frame::Frame;
 
 /// A planning request, validated: every field is finite and within its range, the start and the
 /// target are clear of threats, above ground and inside the area.
@@ -18,6 +20,8 @@ use crate::threat::Threat;
 pub struct Scenario {
     /// The caller's own name for it.
     pub name: Option<String>,
+    /// What the coordinates of the request mean; all below are in the local plane.
+    pub frame: Frame,
     /// Where the route begins; `z` is the height in the frame, not above ground.
     pub start: Point3,
     /// Where the route ends.

@@ -44,7 +44,7 @@ fn result() -> ResultDocument {
             (520.0, 340.0, 82.0),
             (800.0, 800.0, 150.0),
         ]
-        .map(|(x, y, z)| Position { x, y, z })
+        .map(|(x, y, z)| Position::Local { x, y, z })
         .to_vec(),
         length: 950.0,
         degree: 3,

@@ -23,8 +23,8 @@ use super::document::{Position, ResultDocument};
 use crate::geometry::{Point3, Rect};
 use crate::planner;
 use crate::scenario::Scenario;
-use crate::scenario::json;
 use crate::scenario::limits::Limits;
+use crate::scenario::{Frame, json};
 
 /// Of the sheet, pixels.
 const WIDTH: f64 = 900.0;
@@ -89,10 +89,12 @@ impl Drawing {
             .expect("an accepted document is written so that it can be read again");
         let result: ResultDocument =
             serde_json::from_str(input.result).expect("a stored result is a result document");
+        let frame = &scenario.frame;
+        let path = result.path.as_ref();
         Self {
+            waypoints: points(&result.waypoints, frame),
+            path: path.map(|path| points(&path.points, frame)),
             scenario,
-            waypoints: points(&result.waypoints),
-            path: result.path.as_ref().map(|path| points(&path.points)),
             result,
         }
     }
@@ -150,8 +152,11 @@ impl Drawing {
     }
 }
 
-fn points(positions: &[Position]) -> Vec<Point3> {
-    let point = |position: &Position| Point3::new(position.x, position.y, position.z);
+fn points(positions: &[Position], frame: &Frame) -> Vec<Point3> {
+    let point = |position: &Position| {
+        let point = position.within(frame);
+        point.expect("a result speaks in the frame of its scenario")
+    };
     positions.iter().map(point).collect()
 }
 

@@ -6,12 +6,13 @@ use crate::terrain::Terrain;
 use crate::threat::Threat;
 
 use super::Rules;
+use super::chart::Chart;
 use super::ends;
 use super::fault::Faults;
 use super::fields::Fields;
 use super::path::Path;
 use super::planner::planner;
-use super::point::{area, point3};
+use super::point::area;
 use super::terrain;
 use super::threats::threats;
 use super::tree::Node;
@@ -51,7 +52,7 @@ pub(super) fn document(
     }
     .fields(FIELDS, faults)?;
     let name = fields.or("name", None, faults, name);
-    let local = is_local(&fields, faults);
+    let chart = Chart::of(&fields, faults);
     let altitude = fields.required("altitude", faults, vehicle::altitude);
     let draft = fields.or("vehicle", vehicle::DEFAULT, faults, vehicle::vehicle);
     let weights = fields.or(
@@ -60,14 +61,12 @@ pub(super) fn document(
         faults,
         vehicle::weights,
     );
+    // Points of a frame that cannot be told are not faults of their own.
+    let chart = chart?;
     let planner = section(&fields, "planner", &Node::Object(Box::default()), |at| {
-        planner(at, rules, drawn_seed, faults)
+        planner(at, &chart, rules, drawn_seed, faults)
     });
-    // Points of another frame are not faults of their own.
-    if !local {
-        return None;
-    }
-    let place = place(&fields, rules, faults);
+    let place = place(&fields, &chart, rules, faults);
     let (place, planner) = (place?, planner?);
     let distance = (place.target - place.start).norm();
     check_samples(
@@ -78,6 +77,7 @@ pub(super) fn document(
     );
     Some(Scenario {
         name: name?,
+        frame: chart.finish(),
         start: place.start,
         target: place.target,
         area: place.area,
@@ -104,21 +104,6 @@ fn section<T>(
     })
 }
 
-/// Whether the document speaks of the local frame, as far as can be told.
-fn is_local(fields: &Fields<'_>, faults: &mut Faults) -> bool {
-    let frame = fields.or("frame", Some("local"), faults, |at, faults| {
-        at.choice(&["local"], &["wgs84"], faults).map(Some)
-    });
-    if frame.is_some() && fields.has("altitude_datum") {
-        faults.add(
-            &Path::Key(fields.path, "altitude_datum"),
-            "not-applicable",
-            || "altitude_datum is given, must be left out where frame is local",
-        );
-    }
-    frame.is_some()
-}
-
 /// Everything that has coordinates.
 struct Place {
     start: Point3,
@@ -128,17 +113,20 @@ struct Place {
     terrain: Terrain,
 }
 
-fn place(fields: &Fields<'_>, rules: &Rules, faults: &mut Faults) -> Option<Place> {
-    let start = fields.required("start", faults, point3);
-    let target = fields.required("target", faults, point3);
-    let given_area = fields.or("area", None, faults, |at, faults| {
-        area(at, faults).map(Some)
-    });
+fn place(fields: &Fields<'_>, chart: &Chart, rules: &Rules, faults: &mut Faults) -> Option<Place> {
+    let start = fields.required("start", faults, |at, faults| chart.point3(at, faults));
+    let target = fields.required("target", faults, |at, faults| chart.point3(at, faults));
+    let given_area = match chart.area(start, target) {
+        Some(area) => Some(Some(area)),
+        None => fields.or("area", None, faults, |at, faults| {
+            area(at, faults).map(Some)
+        }),
+    };
     let threats = fields.or("threats", Vec::new(), faults, |at, faults| {
-        threats(at, &rules.limits, faults)
+        threats(at, chart, &rules.limits, faults)
     });
     let ground = fields.or("terrain", terrain::DEFAULT, faults, |at, faults| {
-        terrain::terrain(at, &rules.limits, faults)
+        terrain::terrain(at, chart, &rules.limits, faults)
     });
     if let (Some(start), Some(target)) = (start, target) {
         ends::check_apart(start, target, faults);
@@ -147,18 +135,18 @@ fn place(fields: &Fields<'_>, rules: &Rules, faults: &mut Faults) -> Option<Plac
         let Some(end) = end else { continue };
         let in_area = given_area
             .flatten()
-            .is_none_or(|area| ends::check_area(name, end, area, faults));
+            .is_none_or(|area| ends::check_area(name, end, area, chart, faults));
         if let Some(terrain) = &ground
             && in_area
         {
-            ends::check_ground(name, end, terrain, faults);
+            ends::check_ground(name, end, terrain, chart, faults);
         }
         if let Some(threats) = &threats {
             ends::check_threats(name, end, threats, faults);
         }
     }
     let given_area = match (given_area, &ground) {
-        (Some(Some(area)), Some(terrain)) => covered(area, terrain, faults).map(Some),
+        (Some(Some(area)), Some(terrain)) => covered(area, terrain, chart, faults).map(Some),
         (given_area, _) => given_area,
     };
     let (start, target, terrain) = (start?, target?, ground?);
@@ -174,25 +162,25 @@ fn place(fields: &Fields<'_>, rules: &Rules, faults: &mut Faults) -> Option<Plac
 }
 
 /// The given area, which a terrain grid must cover.
-fn covered(area: Rect, terrain: &Terrain, faults: &mut Faults) -> Option<Rect> {
+fn covered(area: Rect, terrain: &Terrain, chart: &Chart, faults: &mut Faults) -> Option<Rect> {
     let Terrain::Grid(grid) = terrain else {
         return Some(area);
     };
     let ground = grid.extent();
     if ground.excess(area.min).max(ground.excess(area.max)) > OVERHANG_M {
-        faults.add(&Path::Key(&Path::Root, "area"), "area-outside-terrain", || {
-            format!(
-                "area runs from ({}, {}) to ({}, {}), must lie in the terrain grid, from ({}, {}) to ({}, {})",
-                figure(area.min.x),
-                figure(area.min.y),
-                figure(area.max.x),
-                figure(area.max.y),
-                figure(ground.min.x),
-                figure(ground.min.y),
-                figure(ground.max.x),
-                figure(ground.max.y)
-            )
-        });
+        faults.add(
+            &Path::Key(&Path::Root, "area"),
+            "area-outside-terrain",
+            || {
+                format!(
+                    "area runs from {} to {}, must lie in the terrain grid, from {} to {}",
+                    chart.say(area.min),
+                    chart.say(area.max),
+                    chart.say(ground.min),
+                    chart.say(ground.max)
+                )
+            },
+        );
         return None;
     }
     Some(Rect {

@@ -5,6 +5,7 @@ use crate::geometry::{Point3, Rect};
 use crate::terrain::Terrain;
 use crate::threat::{Shape, Threat};
 
+use super::chart::Chart;
 use super::fault::Faults;
 use super::path::Path;
 use super::value::{figure, metres, quote};
@@ -40,7 +41,13 @@ pub(super) fn check_apart(start: Point3, target: Point3, faults: &mut Faults) {
 }
 
 /// The start or the target beside the ground: `name` is its field.
-pub(super) fn check_ground(name: &str, end: Point3, terrain: &Terrain, faults: &mut Faults) {
+pub(super) fn check_ground(
+    name: &str,
+    end: Point3,
+    terrain: &Terrain,
+    chart: &Chart,
+    faults: &mut Faults,
+) {
     let path = Path::Key(&Path::Root, name);
     if let Some(extent) = terrain.extent().filter(|extent| !extent.contains(end.xy())) {
         return outside(
@@ -49,6 +56,7 @@ pub(super) fn check_ground(name: &str, end: Point3, terrain: &Terrain, faults: &
             "the terrain grid",
             end,
             extent,
+            chart,
             faults,
         );
     }
@@ -56,7 +64,8 @@ pub(super) fn check_ground(name: &str, end: Point3, terrain: &Terrain, faults: &
     if ground - end.z > SUNK_M {
         faults.add(&path, "below-ground", || {
             format!(
-                "{name} has z {}, must be at most 0.1 m below the ground, which is at {}",
+                "{name} has {} {}, must be at most 0.1 m below the ground, which is at {}",
+                chart.height(),
                 figure(end.z),
                 metres(ground)
             )
@@ -65,11 +74,17 @@ pub(super) fn check_ground(name: &str, end: Point3, terrain: &Terrain, faults: &
 }
 
 /// The start or the target must lie in the area; whether it does.
-pub(super) fn check_area(name: &str, end: Point3, area: Rect, faults: &mut Faults) -> bool {
-    let contained = area.contains(end.xy());
+pub(super) fn check_area(
+    name: &str,
+    end: Point3,
+    area: Rect,
+    chart: &Chart,
+    faults: &mut Faults,
+) -> bool {
+    let contained = chart.is_in_area(end.xy(), area);
     if !contained {
         let path = Path::Key(&Path::Root, name);
-        outside(&path, "outside-area", "the area", end, area, faults);
+        outside(&path, "outside-area", "the area", end, area, chart, faults);
     }
     contained
 }
@@ -128,18 +143,16 @@ fn outside(
     what: &str,
     end: Point3,
     rect: Rect,
+    chart: &Chart,
     faults: &mut Faults,
 ) {
     faults.add(path, code, || {
         format!(
-            "{} is at ({}, {}), must lie in {what}, from ({}, {}) to ({}, {})",
+            "{} is at {}, must lie in {what}, from {} to {}",
             path.label(),
-            figure(end.x),
-            figure(end.y),
-            figure(rect.min.x),
-            figure(rect.min.y),
-            figure(rect.max.x),
-            figure(rect.max.y)
+            chart.say(end.xy()),
+            chart.say(rect.min),
+            chart.say(rect.max)
         )
     });
 }

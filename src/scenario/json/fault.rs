@@ -70,6 +70,15 @@ pub const CODES: &[(&str, &str)] = &[
         "area-outside-terrain",
         "the terrain grid does not cover the area",
     ),
+    (
+        "area-too-wide",
+        "the area in degrees is wider than a local plane fits the earth",
+    ),
+    ("near-pole", "the area in degrees comes too near to a pole"),
+    (
+        "too-far",
+        "a place in degrees is too far from the area to be laid onto its plane",
+    ),
     ("empty-altitude-band", "the altitude band is empty"),
     (
         "below-ground",

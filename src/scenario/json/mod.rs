@@ -7,6 +7,7 @@
 //! what a careless client makes of NaN. Deliberately absent: the size of the body, which is
 //! checked before the text is here.
 
+mod chart;
 mod document;
 mod ends;
 mod fault;
@@ -17,6 +18,7 @@ mod planner;
 mod point;
 mod ranges;
 mod ring;
+mod sketch;
 mod terrain;
 mod threats;
 mod tree;

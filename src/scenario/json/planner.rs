@@ -3,11 +3,11 @@
 use crate::geometry::Point3;
 use crate::scenario::{PlannerSettings, Seeding, Smoothing, WarmStart};
 
+use super::chart::Chart;
 use super::fault::Faults;
 use super::fields::nearest;
 use super::parameters::{Parameters, parameters};
 use super::path::Path;
-use super::point::point3;
 use super::ranges::{DEGREE, MIN_POPULATION, SEED, SPACING, TIME_LIMIT_MS};
 use super::tree::Node;
 use super::value::{At, quote};
@@ -39,6 +39,7 @@ const FIELDS: &[&str] = &[
 /// How to search; an absent `planner` is an empty one.
 pub(super) fn planner(
     at: At<'_>,
+    chart: &Chart,
     rules: &Rules,
     drawn_seed: u64,
     faults: &mut Faults,
@@ -102,7 +103,7 @@ pub(super) fn planner(
     )]
     let polish = fields.or("polish", true, faults, |at, faults| at.boolean(faults));
     let warm_start = fields.or("warm_start", None, faults, |at, faults| {
-        warm_start(at, limits.waypoints, faults)
+        warm_start(at, chart, limits.waypoints, faults)
     });
     let smoothing = fields.or("smoothing", DEFAULT_SMOOTHING, faults, smoothing);
     let parameters = fields.or("parameters", Parameters::default(), faults, |at, faults| {
@@ -161,7 +162,12 @@ fn algorithm<'r>(at: At<'_>, rules: &'r Rules, faults: &mut Faults) -> Option<&'
     clippy::option_option,
     reason = "the outer one tells whether it could be read"
 )]
-fn warm_start(at: At<'_>, limit: usize, faults: &mut Faults) -> Option<Option<WarmStart>> {
+fn warm_start(
+    at: At<'_>,
+    chart: &Chart,
+    limit: usize,
+    faults: &mut Faults,
+) -> Option<Option<WarmStart>> {
     if *at.node == Node::Null {
         return Some(None);
     }
@@ -170,7 +176,7 @@ fn warm_start(at: At<'_>, limit: usize, faults: &mut Faults) -> Option<Option<Wa
         at.text(faults).map(|id| Some(id.to_owned()))
     });
     let waypoints = fields.or("waypoints", None, faults, |at, faults| {
-        waypoints(at, limit, faults).map(Some)
+        waypoints(at, chart, limit, faults).map(Some)
     });
     match (plan?, waypoints?) {
         (Some(id), None) => Some(Some(WarmStart::Plan(id))),
@@ -195,7 +201,7 @@ fn warm_start(at: At<'_>, limit: usize, faults: &mut Faults) -> Option<Option<Wa
 }
 
 /// Points of a route; start and target may be among them.
-fn waypoints(at: At<'_>, limit: usize, faults: &mut Faults) -> Option<Vec<Point3>> {
+fn waypoints(at: At<'_>, chart: &Chart, limit: usize, faults: &mut Faults) -> Option<Vec<Point3>> {
     let count = at.len(faults)?;
     // With start and target.
     let most = limit.saturating_add(2);
@@ -207,7 +213,9 @@ fn waypoints(at: At<'_>, limit: usize, faults: &mut Faults) -> Option<Vec<Point3
         });
         return None;
     }
-    at.items(faults, point3).into_iter().collect()
+    at.items(faults, |at, faults| chart.point3(at, faults))
+        .into_iter()
+        .collect()
 }
 
 fn smoothing(at: At<'_>, faults: &mut Faults) -> Option<Smoothing> {

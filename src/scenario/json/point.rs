@@ -1,24 +1,10 @@
-//! Points of the local frame and the area.
+//! Pairs of numbers, and the area of the local frame.
 
-use crate::geometry::{Point2, Point3, Rect};
+use crate::geometry::{Point2, Rect};
 
 use super::fault::Faults;
-use super::ranges::{AREA, COORDINATE, Range};
+use super::ranges::{AREA, Range};
 use super::value::{At, figure};
-
-/// `{"x", "y", "z"}`, metres.
-pub(super) fn point3(at: At<'_>, faults: &mut Faults) -> Option<Point3> {
-    let fields = at.fields(&["x", "y", "z"], faults)?;
-    let x = fields.number("x", COORDINATE, faults);
-    let y = fields.number("y", COORDINATE, faults);
-    let z = fields.number("z", COORDINATE, faults);
-    Some(Point3::new(x?, y?, z?))
-}
-
-/// `{"x", "y"}`, metres.
-pub(super) fn point2(at: At<'_>, faults: &mut Faults) -> Option<Point2> {
-    pair(at, COORDINATE, faults)
-}
 
 /// `{"x", "y"}`, each within `range`.
 pub(super) fn pair(at: At<'_>, range: Range, faults: &mut Faults) -> Option<Point2> {

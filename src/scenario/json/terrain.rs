@@ -3,10 +3,11 @@
 use crate::scenario::limits::Limits;
 use crate::terrain::{Flat, Grid, Peak, Peaks, Terrain};
 
+use super::chart::Chart;
 use super::fault::Faults;
 use super::fields::Fields;
 use super::path::Path;
-use super::point::{pair, point2};
+use super::point::pair;
 use super::ranges::{CELL, COORDINATE, MIN_NODES, SPREAD};
 use super::value::At;
 
@@ -18,7 +19,12 @@ const GRID: &[&str] = &["kind", "origin", "cell", "columns", "rows", "elevations
 pub(super) const DEFAULT: Terrain = Terrain::Flat(Flat { elevation: 0.0 });
 
 /// Terrain of any kind.
-pub(super) fn terrain(at: At<'_>, limits: &Limits, faults: &mut Faults) -> Option<Terrain> {
+pub(super) fn terrain(
+    at: At<'_>,
+    chart: &Chart,
+    limits: &Limits,
+    faults: &mut Faults,
+) -> Option<Terrain> {
     match at.variant(
         &[("flat", FLAT), ("peaks", PEAKS), ("grid", GRID)],
         &["dataset"],
@@ -28,12 +34,17 @@ pub(super) fn terrain(at: At<'_>, limits: &Limits, faults: &mut Faults) -> Optio
             let elevation = fields.number_or("elevation", 0.0, COORDINATE, faults)?;
             Some(Terrain::Flat(Flat { elevation }))
         }
-        ("peaks", fields) => peaks(&fields, limits, faults).map(Terrain::Peaks),
-        (_, fields) => grid(&fields, limits, faults).map(Terrain::Grid),
+        ("peaks", fields) => peaks(&fields, chart, limits, faults).map(Terrain::Peaks),
+        (_, fields) => grid(&fields, chart, limits, faults).map(Terrain::Grid),
     }
 }
 
-fn peaks(fields: &Fields<'_>, limits: &Limits, faults: &mut Faults) -> Option<Peaks> {
+fn peaks(
+    fields: &Fields<'_>,
+    chart: &Chart,
+    limits: &Limits,
+    faults: &mut Faults,
+) -> Option<Peaks> {
     let base = fields.number_or("base", 0.0, COORDINATE, faults);
     let peaks = fields.required("peaks", faults, |at, faults| {
         let len = at.len(faults)?;
@@ -46,7 +57,7 @@ fn peaks(fields: &Fields<'_>, limits: &Limits, faults: &mut Faults) -> Option<Pe
             });
             return None;
         }
-        at.items(faults, peak)
+        at.items(faults, |at, faults| peak(at, chart, faults))
             .into_iter()
             .collect::<Option<Vec<_>>>()
     });
@@ -56,9 +67,9 @@ fn peaks(fields: &Fields<'_>, limits: &Limits, faults: &mut Faults) -> Option<Pe
     })
 }
 
-fn peak(at: At<'_>, faults: &mut Faults) -> Option<Peak> {
+fn peak(at: At<'_>, chart: &Chart, faults: &mut Faults) -> Option<Peak> {
     let fields = at.fields(&["center", "height", "spread"], faults)?;
-    let center = fields.required("center", faults, point2);
+    let center = fields.required("center", faults, |at, faults| chart.point2(at, faults));
     let height = fields.number("height", COORDINATE, faults);
     let spread = fields.required("spread", faults, |at, faults| pair(at, SPREAD, faults));
     Some(Peak {
@@ -68,9 +79,9 @@ fn peak(at: At<'_>, faults: &mut Faults) -> Option<Peak> {
     })
 }
 
-fn grid(fields: &Fields<'_>, limits: &Limits, faults: &mut Faults) -> Option<Grid> {
+fn grid(fields: &Fields<'_>, chart: &Chart, limits: &Limits, faults: &mut Faults) -> Option<Grid> {
     let nodes = ("terrain_nodes", limits.terrain_nodes);
-    let origin = fields.required("origin", faults, point2);
+    let origin = fields.required("origin", faults, |at, faults| chart.point2(at, faults));
     let cell = fields.number("cell", CELL, faults);
     let columns = fields.required("columns", faults, |at, faults| {
         at.count(MIN_NODES, nodes, faults)

@@ -4,10 +4,10 @@ use crate::geometry::Point2;
 use crate::scenario::limits::Limits;
 use crate::threat::{Cylinder, Polygon, Shape, Threat};
 
+use super::chart::Chart;
 use super::fault::Faults;
 use super::fields::Fields;
 use super::path::Path;
-use super::point::point2;
 use super::ranges::{COORDINATE, MARGIN, RADIUS};
 use super::ring::{self, RingFault};
 use super::tree::Node;
@@ -27,6 +27,7 @@ const POLYGON: &[&str] = &["kind", "name", "vertices", "margin", "base", "top"];
 /// The threats in the order of the document; those that cannot be read are `None`.
 pub(super) fn threats(
     at: At<'_>,
+    chart: &Chart,
     limits: &Limits,
     faults: &mut Faults,
 ) -> Option<Vec<Option<Threat>>> {
@@ -50,7 +51,7 @@ pub(super) fn threats(
             )
         });
     }
-    Some(at.items(faults, |at, faults| threat(at, within, faults)))
+    Some(at.items(faults, |at, faults| threat(at, chart, within, faults)))
 }
 
 /// The vertices of all polygons together, before any is read.
@@ -67,15 +68,15 @@ fn vertex_count(at: At<'_>) -> usize {
 }
 
 /// One threat; with `read_vertices` false there are too many to look at.
-fn threat(at: At<'_>, read_vertices: bool, faults: &mut Faults) -> Option<Threat> {
+fn threat(at: At<'_>, chart: &Chart, read_vertices: bool, faults: &mut Faults) -> Option<Threat> {
     let (kind, fields) =
         at.variant(&[("cylinder", CYLINDER), ("polygon", POLYGON)], &[], faults)?;
     let name = fields.or("name", None, faults, name);
     let base = fields.nullable("base", COORDINATE, faults);
     let top = fields.nullable("top", COORDINATE, faults);
     let shape = match kind {
-        "cylinder" => cylinder(&fields, faults).map(Shape::Cylinder),
-        _ => polygon(&fields, read_vertices, faults).map(Shape::Polygon),
+        "cylinder" => cylinder(&fields, chart, faults).map(Shape::Cylinder),
+        _ => polygon(&fields, chart, read_vertices, faults).map(Shape::Polygon),
     };
     let (base, top) = (base?, top?);
     if let (Some(base), Some(top)) = (base, top)
@@ -98,8 +99,8 @@ fn threat(at: At<'_>, read_vertices: bool, faults: &mut Faults) -> Option<Threat
     })
 }
 
-fn cylinder(fields: &Fields<'_>, faults: &mut Faults) -> Option<Cylinder> {
-    let center = fields.required("center", faults, point2);
+fn cylinder(fields: &Fields<'_>, chart: &Chart, faults: &mut Faults) -> Option<Cylinder> {
+    let center = fields.required("center", faults, |at, faults| chart.point2(at, faults));
     let radius = fields.number("radius", RADIUS, faults);
     let influence = fields.or("influence", None, faults, |at, faults| {
         at.number(RADIUS, faults).map(Some)
@@ -127,12 +128,17 @@ fn cylinder(fields: &Fields<'_>, faults: &mut Faults) -> Option<Cylinder> {
     })
 }
 
-fn polygon(fields: &Fields<'_>, read_vertices: bool, faults: &mut Faults) -> Option<Polygon> {
+fn polygon(
+    fields: &Fields<'_>,
+    chart: &Chart,
+    read_vertices: bool,
+    faults: &mut Faults,
+) -> Option<Polygon> {
     let margin = fields.number_or("margin", 0.0, MARGIN, faults);
     let vertices = fields.required("vertices", faults, |at, faults| {
         at.len(faults)?;
         if read_vertices {
-            vertices(at, faults)
+            vertices(at, chart, faults)
         } else {
             None
         }
@@ -141,9 +147,9 @@ fn polygon(fields: &Fields<'_>, read_vertices: bool, faults: &mut Faults) -> Opt
 }
 
 /// A simple ring without its closing vertex.
-fn vertices(at: At<'_>, faults: &mut Faults) -> Option<Vec<Point2>> {
+fn vertices(at: At<'_>, chart: &Chart, faults: &mut Faults) -> Option<Vec<Point2>> {
     let mut vertices: Vec<Point2> = at
-        .items(faults, point2)
+        .items(faults, |at, faults| chart.point2(at, faults))
         .into_iter()
         .collect::<Option<_>>()?;
     if vertices.len() > 1 && vertices.first() == vertices.last() {

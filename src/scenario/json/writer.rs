@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::{Serialize, Serializer};
 
-use crate::geometry::{Point2, Point3, Rect};
-use crate::scenario::{Quadrature, Scenario, Seeding, WarmStart};
+use crate::geometry::geodesy::LatLon;
+use crate::geometry::{Point2, Point3};
+use crate::scenario::{Frame, PlannerSettings, Quadrature, Scenario, Seeding, WarmStart};
 use crate::terrain::{Peak, Terrain};
 use crate::threat::{Shape, Threat};
 
@@ -31,6 +32,8 @@ impl Serialize for Figure {
 struct Document<'a> {
     name: Option<&'a str>,
     frame: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    altitude_datum: Option<&'static str>,
     start: XYZ,
     target: XYZ,
     area: Area,
@@ -42,18 +45,29 @@ struct Document<'a> {
     planner: WirePlanner<'a>,
 }
 
+/// A point, as its frame has it.
 #[derive(Serialize)]
+#[serde(untagged)]
 #[expect(clippy::upper_case_acronyms, reason = "named for its fields")]
-struct XYZ {
-    x: Figure,
-    y: Figure,
-    z: Figure,
+enum XYZ {
+    Local {
+        x: Figure,
+        y: Figure,
+        z: Figure,
+    },
+    Geodetic {
+        lat: Figure,
+        lon: Figure,
+        alt: Figure,
+    },
 }
 
+/// A place, as its frame has it.
 #[derive(Serialize)]
-struct XY {
-    x: Figure,
-    y: Figure,
+#[serde(untagged)]
+enum XY {
+    Local { x: Figure, y: Figure },
+    Geodetic { lat: Figure, lon: Figure },
 }
 
 #[derive(Serialize)]
@@ -174,14 +188,23 @@ struct WireParameters<'a> {
 impl<'a> From<&'a Scenario> for Document<'a> {
     fn from(scenario: &'a Scenario) -> Self {
         let (vehicle, weights) = (&scenario.vehicle, &scenario.weights);
+        let frame = &scenario.frame;
         Self {
             name: scenario.name.as_deref(),
-            frame: "local",
-            start: scenario.start.into(),
-            target: scenario.target.into(),
-            area: scenario.area.into(),
-            threats: scenario.threats.iter().map(WireThreat::from).collect(),
-            terrain: (&scenario.terrain).into(),
+            frame: match scenario.frame {
+                Frame::Local => "local",
+                Frame::Wgs84(_) => "wgs84",
+            },
+            altitude_datum: scenario.frame.wgs84().map(|wgs84| wgs84.datum.name()),
+            start: XYZ::of(scenario.start, frame),
+            target: XYZ::of(scenario.target, frame),
+            area: Area::of(scenario),
+            threats: scenario
+                .threats
+                .iter()
+                .map(|threat| WireThreat::of(threat, frame))
+                .collect(),
+            terrain: WireTerrain::of(&scenario.terrain, frame),
             altitude: Band {
                 min: Figure(scenario.altitude.min),
                 max: Figure(scenario.altitude.max),
@@ -198,41 +221,71 @@ impl<'a> From<&'a Scenario> for Document<'a> {
                 threat: Figure(weights.threat),
                 altitude: Figure(weights.altitude),
             },
-            planner: WirePlanner::from(&scenario.planner),
+            planner: WirePlanner::of(&scenario.planner, frame),
         }
     }
 }
 
-impl From<Point3> for XYZ {
-    fn from(point: Point3) -> Self {
-        Self {
+impl XYZ {
+    fn of(point: Point3, frame: &Frame) -> Self {
+        match XY::of(point.xy(), frame) {
+            XY::Local { x, y } => Self::Local {
+                x,
+                y,
+                z: Figure(point.z),
+            },
+            XY::Geodetic { lat, lon } => Self::Geodetic {
+                lat,
+                lon,
+                alt: Figure(point.z),
+            },
+        }
+    }
+}
+
+impl XY {
+    fn of(point: Point2, frame: &Frame) -> Self {
+        match frame {
+            Frame::Local => Self::pair(point),
+            Frame::Wgs84(wgs84) => wgs84.place(point).into(),
+        }
+    }
+
+    /// Metres along two axes, whatever the frame.
+    fn pair(point: Point2) -> Self {
+        Self::Local {
             x: Figure(point.x),
             y: Figure(point.y),
-            z: Figure(point.z),
         }
     }
 }
 
-impl From<Point2> for XY {
-    fn from(point: Point2) -> Self {
-        Self {
-            x: Figure(point.x),
-            y: Figure(point.y),
+impl From<LatLon> for XY {
+    fn from(place: LatLon) -> Self {
+        Self::Geodetic {
+            lat: Figure(place.lat),
+            lon: Figure(place.lon),
         }
     }
 }
 
-impl From<Rect> for Area {
-    fn from(rect: Rect) -> Self {
-        Self {
-            min: rect.min.into(),
-            max: rect.max.into(),
+impl Area {
+    fn of(scenario: &Scenario) -> Self {
+        match &scenario.frame {
+            Frame::Local => Self {
+                min: XY::pair(scenario.area.min),
+                max: XY::pair(scenario.area.max),
+            },
+            Frame::Wgs84(wgs84) => Self {
+                min: wgs84.area.min.into(),
+                max: wgs84.area.max.into(),
+            },
         }
     }
 }
 
-impl<'a> From<&'a Threat> for WireThreat<'a> {
-    fn from(threat: &'a Threat) -> Self {
+impl<'a> WireThreat<'a> {
+    fn of(threat: &'a Threat, frame: &Frame) -> Self {
         let (name, base, top) = (
             threat.name.as_deref(),
             threat.base.map(Figure),
@@ -241,7 +294,7 @@ impl<'a> From<&'a Threat> for WireThreat<'a> {
         match &threat.shape {
             Shape::Cylinder(cylinder) => Self::Cylinder {
                 name,
-                center: cylinder.center.into(),
+                center: XY::of(cylinder.center, frame),
                 radius: Figure(cylinder.radius),
                 influence: Figure(cylinder.influence),
                 base,
@@ -249,7 +302,11 @@ impl<'a> From<&'a Threat> for WireThreat<'a> {
             },
             Shape::Polygon(polygon) => Self::Polygon {
                 name,
-                vertices: polygon.vertices().iter().copied().map(XY::from).collect(),
+                vertices: polygon
+                    .vertices()
+                    .iter()
+                    .map(|vertex| XY::of(*vertex, frame))
+                    .collect(),
                 margin: Figure(polygon.margin()),
                 base,
                 top,
@@ -258,18 +315,22 @@ impl<'a> From<&'a Threat> for WireThreat<'a> {
     }
 }
 
-impl<'a> From<&'a Terrain> for WireTerrain<'a> {
-    fn from(terrain: &'a Terrain) -> Self {
+impl<'a> WireTerrain<'a> {
+    fn of(terrain: &'a Terrain, frame: &Frame) -> Self {
         match terrain {
             Terrain::Flat(flat) => Self::Flat {
                 elevation: Figure(flat.elevation),
             },
             Terrain::Peaks(peaks) => Self::Peaks {
                 base: Figure(peaks.base),
-                peaks: peaks.peaks.iter().map(WirePeak::from).collect(),
+                peaks: peaks
+                    .peaks
+                    .iter()
+                    .map(|peak| WirePeak::of(peak, frame))
+                    .collect(),
             },
             Terrain::Grid(grid) => Self::Grid {
-                origin: grid.origin.into(),
+                origin: XY::of(grid.origin, frame),
                 cell: Figure(grid.cell),
                 columns: grid.columns,
                 rows: grid.rows,
@@ -280,29 +341,29 @@ impl<'a> From<&'a Terrain> for WireTerrain<'a> {
     }
 }
 
-impl From<&Peak> for WirePeak {
-    fn from(peak: &Peak) -> Self {
+impl WirePeak {
+    fn of(peak: &Peak, frame: &Frame) -> Self {
         Self {
-            center: peak.center.into(),
+            center: XY::of(peak.center, frame),
             height: Figure(peak.height),
-            spread: peak.spread.into(),
+            spread: XY::pair(peak.spread),
         }
     }
 }
 
-impl<'a> From<&'a WarmStart> for WireWarmStart<'a> {
-    fn from(start: &'a WarmStart) -> Self {
+impl<'a> WireWarmStart<'a> {
+    fn of(start: &'a WarmStart, frame: &Frame) -> Self {
         match start {
             WarmStart::Plan(id) => Self::PlanId(id),
             WarmStart::Waypoints(points) => {
-                Self::Waypoints(points.iter().copied().map(XYZ::from).collect())
+                Self::Waypoints(points.iter().map(|point| XYZ::of(*point, frame)).collect())
             }
         }
     }
 }
 
-impl<'a> From<&'a crate::scenario::PlannerSettings> for WirePlanner<'a> {
-    fn from(planner: &'a crate::scenario::PlannerSettings) -> Self {
+impl<'a> WirePlanner<'a> {
+    fn of(planner: &'a PlannerSettings, frame: &Frame) -> Self {
         let constants = planner
             .parameters
             .iter()
@@ -319,7 +380,10 @@ impl<'a> From<&'a crate::scenario::PlannerSettings> for WirePlanner<'a> {
                 Seeding::Random => "random",
             },
             polish: planner.polish,
-            warm_start: planner.warm_start.as_ref().map(WireWarmStart::from),
+            warm_start: planner
+                .warm_start
+                .as_ref()
+                .map(|start| WireWarmStart::of(start, frame)),
             smoothing: WireSmoothing {
                 degree: planner.smoothing.degree,
                 spacing: Figure(planner.smoothing.spacing),

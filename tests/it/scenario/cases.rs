@@ -263,13 +263,6 @@ const CASES: &[Case] = &[
         "threads is 0, must be >= 1 and <= 256",
     ),
     (
-        r#""frame":"local""#,
-        r#""frame":"wgs84","altitude_datum":"msl""#,
-        "/frame",
-        "not-available",
-        "frame is \"wgs84\", which is not available yet, must be local",
-    ),
-    (
         r#""kind":"grid""#,
         r#""kind":"dataset""#,
         "/terrain/kind",
@@ -471,5 +464,10 @@ pub(crate) fn all_cases() -> Vec<(String, Fault)> {
     let detailed = edited(r#""vertices":["#, &format!(r#""vertices":[{vertices}"#));
     let detail = "the polygons have 20003 vertices together, must have at most 20000 (limit polygon_vertices)";
     cases.push((detailed, fault("/threats", "too-many", detail)));
+    let in_degrees = super::wgs84::cases().into_iter();
+    cases.extend(
+        in_degrees
+            .map(|(document, pointer, code, detail)| (document, fault(pointer, code, detail))),
+    );
     cases
 }

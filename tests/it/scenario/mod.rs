@@ -2,6 +2,7 @@
 
 mod cases;
 mod fuzz;
+mod wgs84;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;

@@ -8,6 +8,7 @@ use noctule::planner::{
     Bound, ConvergencePoint, CostFigures, Incumbent, Leg, Measures, Observer, Outcome, Stop,
     StopReason,
 };
+use noctule::scenario::Frame;
 use noctule::worker::Engine;
 
 /// Wraps a function as an engine.
@@ -74,6 +75,7 @@ pub(crate) fn point(iteration: usize, cost: f64) -> ConvergencePoint {
 
 pub(crate) fn incumbent(iteration: usize, cost: f64) -> Incumbent {
     Incumbent {
+        frame: Frame::Local,
         iteration,
         elapsed_ms: 0.0,
         cost,
@@ -88,6 +90,7 @@ pub(crate) fn outcome(
     convergence: Vec<ConvergencePoint>,
 ) -> Outcome {
     Outcome {
+        frame: Frame::Local,
         feasible: true,
         stop_reason,
         cost: CostFigures {

@@ -85,6 +85,7 @@ pub(crate) fn result(plan: PlanId, stop_reason: &str) -> ResultDocument {
         min_leg: 300.0,
     };
     ResultDocument {
+        frame: None,
         plan_id: Some(plan),
         algorithm: "tms-sba".to_owned(),
         seed: 7,
@@ -139,6 +140,6 @@ fn route() -> Vec<Position> {
         (500.0, 300.0, 80.0),
         (800.0, 800.0, 150.0),
     ]
-    .map(|(x, y, z)| Position { x, y, z })
+    .map(|(x, y, z)| Position::Local { x, y, z })
     .to_vec()
 }

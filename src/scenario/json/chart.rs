@@ -1,0 +1,281 @@
+//! How a document writes places: metres of the local frame, or degrees that are laid onto a plane.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use crate::geometry::geodesy::{LatLon, LatLonBox, TangentPlane, undulation_m};
+use crate::geometry::{Point2, Point3, Rect};
+use crate::scenario::frame::{self, Datum, Frame, Wgs84};
+
+use super::fault::Faults;
+use super::fields::Fields;
+use super::path::Path;
+use super::ranges::{COORDINATE, LATITUDE, LONGITUDE, MAX_REACH_M};
+use super::sketch;
+use super::value::{At, figure};
+
+/// Reads places of one document.
+#[derive(Debug)]
+pub(super) enum Chart {
+    Local,
+    Wgs84(Box<Earth>),
+}
+
+/// The plane of a document in degrees, and the degrees that its places were given in.
+#[derive(Debug)]
+pub(super) struct Earth {
+    datum: Datum,
+    plane: TangentPlane,
+    undulation_m: f64,
+    area: LatLonBox,
+    written: RefCell<BTreeMap<[u64; 2], LatLon>>,
+}
+
+impl Chart {
+    /// The chart that a document asks for; `None` where it cannot be told which.
+    pub(super) fn of(fields: &Fields<'_>, faults: &mut Faults) -> Option<Self> {
+        let frame = fields.or("frame", "local", faults, |at, faults| {
+            let choice = at.choice(&["local", "wgs84"], &[], faults)?;
+            Some(if choice == "wgs84" { "wgs84" } else { "local" })
+        })?;
+        if frame == "local" {
+            if fields.has("altitude_datum") {
+                faults.add(
+                    &Path::Key(fields.path, "altitude_datum"),
+                    "not-applicable",
+                    || "altitude_datum is given, must be left out where frame is local",
+                );
+            }
+            return Some(Self::Local);
+        }
+        let datum = fields.or("altitude_datum", Datum::Msl, faults, |at, faults| {
+            let choice = at.choice(&["msl", "ellipsoid"], &[], faults)?;
+            Some(if choice == "msl" {
+                Datum::Msl
+            } else {
+                Datum::Ellipsoid
+            })
+        })?;
+        let given = fields.or("area", None, faults, |at, faults| {
+            area(at, faults).map(Some)
+        })?;
+        let sketch = sketch::Sketch::of(fields);
+        let area = given.unwrap_or_else(|| sketch.area());
+        Earth::over(area, datum, sketch.mean_alt, faults).map(|earth| Self::Wgs84(Box::new(earth)))
+    }
+
+    /// The frame, with all that was written in it.
+    pub(super) fn finish(self) -> Frame {
+        match self {
+            Self::Local => Frame::Local,
+            Self::Wgs84(earth) => Frame::Wgs84(Arc::new(Wgs84::new(
+                earth.datum,
+                earth.plane,
+                earth.undulation_m,
+                earth.area,
+                earth.written.into_inner(),
+            ))),
+        }
+    }
+
+    /// `{"x", "y", "z"}` or `{"lat", "lon", "alt"}`.
+    pub(super) fn point3(&self, at: At<'_>, faults: &mut Faults) -> Option<Point3> {
+        match self {
+            Self::Local => {
+                let fields = at.fields(&["x", "y", "z"], faults)?;
+                let x = fields.number("x", COORDINATE, faults);
+                let y = fields.number("y", COORDINATE, faults);
+                let z = fields.number("z", COORDINATE, faults);
+                Some(Point3::new(x?, y?, z?))
+            }
+            Self::Wgs84(earth) => {
+                let fields = at.fields(&["lat", "lon", "alt"], faults)?;
+                let place = lat_lon(&fields, faults);
+                let alt = fields.number("alt", COORDINATE, faults);
+                let point = earth.laid(place?, at.path, faults);
+                let (point, alt) = (point?, alt?);
+                Some(Point3::new(point.x, point.y, alt))
+            }
+        }
+    }
+
+    /// `{"x", "y"}` or `{"lat", "lon"}`.
+    pub(super) fn point2(&self, at: At<'_>, faults: &mut Faults) -> Option<Point2> {
+        match self {
+            Self::Local => super::point::pair(at, COORDINATE, faults),
+            Self::Wgs84(earth) => {
+                let fields = at.fields(&["lat", "lon"], faults)?;
+                let place = lat_lon(&fields, faults)?;
+                earth.laid(place, at.path, faults)
+            }
+        }
+    }
+
+    /// Where free waypoints of a document in degrees are kept: the greatest rectangle of the plane in its
+    /// area, and its ends, which may lie where the area bends beyond that. A document of the local
+    /// frame names its area itself.
+    pub(super) fn area(&self, start: Option<Point3>, target: Option<Point3>) -> Option<Rect> {
+        let Self::Wgs84(earth) = self else {
+            return None;
+        };
+        let rect = earth.rect();
+        let ends = [start, target].into_iter().flatten().map(|end| end.xy());
+        let ends = ends.filter(|end| earth.area.contains(earth.place(*end)));
+        Rect::around(ends.chain([rect.min, rect.max]))
+    }
+
+    /// The name of a height in this frame.
+    pub(super) fn height(&self) -> &'static str {
+        match self {
+            Self::Local => "z",
+            Self::Wgs84(_) => "alt",
+        }
+    }
+
+    /// `point` for people, as the document would write it.
+    pub(super) fn say(&self, point: Point2) -> String {
+        match self {
+            Self::Local => format!("({}, {})", figure(point.x), figure(point.y)),
+            Self::Wgs84(earth) => {
+                let place = earth.plane.geodetic(point);
+                format!("lat {:.6}, lon {:.6}", place.lat, place.lon)
+            }
+        }
+    }
+
+    /// Whether the start or the target lies in the area that was asked for, which the plane's
+    /// rectangle is only the greatest part of.
+    pub(super) fn is_in_area(&self, end: Point2, area: Rect) -> bool {
+        match self {
+            Self::Local => area.contains(end),
+            Self::Wgs84(earth) => earth.area.contains(earth.place(end)),
+        }
+    }
+}
+
+impl Earth {
+    /// The plane in the middle of `area`.
+    fn over(area: LatLonBox, datum: Datum, mean_alt: f64, faults: &mut Faults) -> Option<Self> {
+        let path = Path::Key(&Path::Root, "area");
+        let farthest = area.min.lat.abs().max(area.max.lat.abs());
+        if farthest > sketch::MAX_LATITUDE {
+            faults.add(&path, "near-pole", || {
+                format!(
+                    "the area reaches latitude {farthest:.6}, must stay within {} degrees of the equator: \
+                     beyond, degrees of longitude tell too little",
+                    sketch::MAX_LATITUDE
+                )
+            });
+            return None;
+        }
+        let middle = area.middle();
+        let undulation_m = undulation_m(middle);
+        let height_m = match datum {
+            Datum::Msl => mean_alt + undulation_m,
+            Datum::Ellipsoid => mean_alt,
+        };
+        let earth = Self {
+            datum,
+            plane: TangentPlane::at(middle, height_m),
+            undulation_m,
+            area,
+            written: RefCell::default(),
+        };
+        let rect = earth.rect();
+        let (width, height) = (rect.max.x - rect.min.x, rect.max.y - rect.min.y);
+        let widest = width.max(height);
+        if !(width > 0.0 && height > 0.0) || widest > sketch::MAX_WIDTH_M {
+            faults.add(&path, "area-too-wide", || {
+                format!(
+                    "the area is {width:.0} m by {height:.0} m, must be at most {} m either way: \
+                     a plane fits the earth no farther",
+                    sketch::MAX_WIDTH_M
+                )
+            });
+            return None;
+        }
+        Some(earth)
+    }
+
+    /// The greatest rectangle of the plane in the area: parallels and meridians bend in it.
+    pub(super) fn rect(&self) -> Rect {
+        let LatLonBox { min, max } = self.area;
+        let middle = self.plane.origin().lon;
+        let at = |lat: f64, lon: f64| self.plane.local(LatLon { lat, lon });
+        let highest = |values: [f64; 3]| values.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let side = |lon: f64| {
+            [min.lat, max.lat, 0.0_f64.clamp(min.lat, max.lat)].map(|lat| at(lat, lon).x)
+        };
+        let edge = |lat: f64| [min.lon, middle, max.lon].map(|lon| at(lat, lon).y);
+        Rect {
+            min: Point2::new(highest(side(min.lon)), highest(edge(min.lat))),
+            max: Point2::new(
+                -highest(side(max.lon).map(|x| -x)),
+                -highest(edge(max.lat).map(|y| -y)),
+            ),
+        }
+    }
+
+    /// The place that was written for `point`.
+    fn place(&self, point: Point2) -> LatLon {
+        let written = self.written.borrow().get(&frame::key(point)).copied();
+        written.unwrap_or_else(|| self.plane.geodetic(point))
+    }
+
+    /// `place` on the plane, which must be near enough for the plane to mean something.
+    fn laid(&self, place: LatLon, path: &Path<'_>, faults: &mut Faults) -> Option<Point2> {
+        let point = self.plane.local(place);
+        let away = self.plane.origin().distance_m(place);
+        if away > MAX_REACH_M {
+            faults.add(path, "too-far", || {
+                format!(
+                    "{} is {:.0} km from the middle of the area, must be at most {} km",
+                    path.label(),
+                    away / 1e3,
+                    MAX_REACH_M / 1e3
+                )
+            });
+            return None;
+        }
+        self.written.borrow_mut().insert(frame::key(point), place);
+        Some(point)
+    }
+}
+
+fn lat_lon(fields: &Fields<'_>, faults: &mut Faults) -> Option<LatLon> {
+    let lat = fields.number("lat", LATITUDE, faults);
+    let lon = fields.number("lon", LONGITUDE, faults);
+    Some(LatLon {
+        lat: lat?,
+        lon: lon?,
+    })
+}
+
+/// `{"min", "max"}` in degrees. West of it is `min`, also across the antimeridian.
+fn area(at: At<'_>, faults: &mut Faults) -> Option<LatLonBox> {
+    let fields = at.fields(&["min", "max"], faults)?;
+    let corner = |at: At<'_>, faults: &mut Faults| {
+        let fields = at.fields(&["lat", "lon"], faults)?;
+        lat_lon(&fields, faults)
+    };
+    let min = fields.required("min", faults, corner);
+    let max = fields.required("max", faults, corner);
+    let area = LatLonBox {
+        min: min?,
+        max: max?,
+    };
+    if area.min.lat < area.max.lat && area.min.lon.to_bits() != area.max.lon.to_bits() {
+        return Some(area);
+    }
+    faults.add(at.path, "empty-area", || {
+        format!(
+            "area runs from lat {}, lon {} to lat {}, lon {}, must have min < max in lat, and min west of max",
+            figure(area.min.lat),
+            figure(area.min.lon),
+            figure(area.max.lat),
+            figure(area.max.lon)
+        )
+    });
+    None
+}

@@ -1,0 +1,142 @@
+//! A first look over a document in degrees: about where all of it lies, which is what the plane and the
+//! default area come from before any place can be laid onto the plane.
+//!
+//! Whatever cannot be read is passed over here; the readers that follow say so.
+
+use crate::geometry::geodesy::{LatLon, LatLonBox, wrapped};
+
+use super::fields::Fields;
+use super::ranges::{COORDINATE, LATITUDE, LONGITUDE};
+use super::tree::{Node, float};
+
+/// Latitudes beyond are refused, degrees.
+pub(super) const MAX_LATITUDE: f64 = 89.0;
+/// Areas wider are refused, metres.
+pub(super) const MAX_WIDTH_M: f64 = 200e3;
+
+/// A default area keeps clear of [`MAX_WIDTH_M`] by this share of it.
+const FITTING: f64 = 0.99;
+/// The default area reaches at least this far beyond everything, metres.
+const MIN_PADDING_M: f64 = 10.0;
+/// Metres of a degree of latitude, about.
+const DEGREE_M: f64 = 111_320.0;
+/// The default area ends on round figures of this many to a degree, so that it reads well.
+const GRAIN: f64 = 1e6;
+
+/// Where everything is, about.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sketch {
+    /// Between start and target, metres above the datum; 0 where neither can be read.
+    pub(super) mean_alt: f64,
+    /// Longitudes are counted from here, so that the antimeridian is nothing special.
+    reference: f64,
+    south: f64,
+    north: f64,
+    /// Degrees east of the reference.
+    west: f64,
+    east: f64,
+}
+
+impl Sketch {
+    pub(super) fn of(fields: &Fields<'_>) -> Self {
+        let ends = ["start", "target"].map(|name| fields.find(name));
+        let alts: Vec<f64> = ends
+            .iter()
+            .filter_map(|end| number(end.as_ref()?.get("alt")?))
+            .filter(|alt| COORDINATE.contains(*alt))
+            .collect();
+        let mut places: Vec<(LatLon, f64)> = ends
+            .iter()
+            .filter_map(|end| Some((place(end.as_ref()?)?, 0.0)))
+            .collect();
+        for threat in items(fields.find("threats")) {
+            let reach = ["influence", "radius", "margin"]
+                .iter()
+                .find_map(|name| number(threat.get(name)?))
+                .filter(|reach| (0.0..=MAX_WIDTH_M).contains(reach))
+                .unwrap_or(0.0);
+            let centers = threat.get("center").into_iter();
+            let vertices = items(threat.get("vertices")).iter();
+            places.extend(
+                centers
+                    .chain(vertices)
+                    .filter_map(|node| Some((place(node)?, reach))),
+            );
+        }
+        let reference = places.first().map_or(0.0, |(place, _)| place.lon);
+        let mut sketch = Self {
+            mean_alt: alts.iter().sum::<f64>() / alts.len().max(1) as f64,
+            reference,
+            south: f64::INFINITY,
+            north: f64::NEG_INFINITY,
+            west: f64::INFINITY,
+            east: f64::NEG_INFINITY,
+        };
+        for (place, reach_m) in places {
+            sketch.add(place, reach_m);
+        }
+        if sketch.south > sketch.north {
+            sketch.add(LatLon { lat: 0.0, lon: 0.0 }, 0.0);
+        }
+        sketch
+    }
+
+    fn add(&mut self, place: LatLon, reach_m: f64) {
+        let lat_reach = reach_m / DEGREE_M;
+        let lon_reach = lat_reach / shrink(place.lat);
+        let lon = wrapped(place.lon - self.reference);
+        self.south = self.south.min(place.lat - lat_reach);
+        self.north = self.north.max(place.lat + lat_reach);
+        self.west = self.west.min(lon - lon_reach);
+        self.east = self.east.max(lon + lon_reach);
+    }
+
+    /// The area of a document that names none: the box round the start, the target and every threat
+    /// with its soft zone, wider on every side by a quarter of its diagonal and at least by 10 m,
+    /// as far as the widest area allows.
+    pub(super) fn area(&self) -> LatLonBox {
+        let shrink = shrink(f64::midpoint(self.south, self.north));
+        let height = (self.north - self.south) * DEGREE_M;
+        let width = (self.east - self.west) * DEGREE_M * shrink;
+        let room = (FITTING * MAX_WIDTH_M - height.max(width)) / 2.0;
+        let diagonal = (width * width + height * height).sqrt();
+        let padding = (diagonal / 4.0).min(room).max(MIN_PADDING_M) / DEGREE_M;
+        let down = |degrees: f64| (degrees * GRAIN).floor() / GRAIN;
+        let up = |degrees: f64| (degrees * GRAIN).ceil() / GRAIN;
+        LatLonBox {
+            min: LatLon {
+                lat: down(self.south - padding).max(-90.0),
+                lon: wrapped(down(self.reference + self.west - padding / shrink)),
+            },
+            max: LatLon {
+                lat: up(self.north + padding).min(90.0),
+                lon: wrapped(up(self.reference + self.east + padding / shrink)),
+            },
+        }
+    }
+}
+
+/// Metres of a degree of longitude over those of a degree of latitude, about; never nothing.
+fn shrink(lat: f64) -> f64 {
+    libm::cos(lat.to_radians()).max(0.01)
+}
+
+fn items(node: Option<&Node>) -> &[Node] {
+    match node {
+        Some(Node::Array(items)) => items,
+        _ => &[],
+    }
+}
+
+fn place(node: &Node) -> Option<LatLon> {
+    let lat = number(node.get("lat")?)?;
+    let lon = number(node.get("lon")?)?;
+    (LATITUDE.contains(lat) && LONGITUDE.contains(lon)).then_some(LatLon { lat, lon })
+}
+
+fn number(node: &Node) -> Option<f64> {
+    match node {
+        Node::Number(number) => Some(float(number)),
+        _ => None,
+    }
+}

@@ -1,0 +1,263 @@
+//! Documents in degrees: laid onto a plane, written back as they came, refused where no plane fits.
+
+use noctule::geometry::Point2;
+use noctule::scenario::frame::{Datum, Wgs84};
+use noctule::scenario::{Scenario, json};
+use proptest::prelude::*;
+use serde_json::{Value, json};
+
+use super::{faults, read};
+
+/// What is refused only in degrees: the document, the pointer, the code and the detail.
+pub(super) fn cases() -> Vec<(String, &'static str, &'static str, &'static str)> {
+    let mut wide = document();
+    wide["area"] = json!({"min": {"lat": 35.5, "lon": -85.5}, "max": {"lat": 37.5, "lon": -83.0}});
+    let mut cold = document();
+    cold["area"] = json!({"min": {"lat": 36, "lon": -85}, "max": {"lat": 89.4, "lon": -84}});
+    let mut far = document();
+    far["area"] = json!({"min": {"lat": 36.4, "lon": -84.5}, "max": {"lat": 36.8, "lon": -84.0}});
+    far["threats"][0]["center"]["lon"] = (-20).into();
+    vec![
+        (
+            wide.to_string(),
+            "/area",
+            "area-too-wide",
+            "the area is 221061 m by 221204 m, must be at most 200000 m either way: a plane fits the earth no farther",
+        ),
+        (
+            cold.to_string(),
+            "/area",
+            "near-pole",
+            "the area reaches latitude 89.400000, must stay within 89 degrees of the equator: beyond, degrees of \
+             longitude tell too little",
+        ),
+        (
+            far.to_string(),
+            "/threats/0/center",
+            "too-far",
+            "center is 5621 km from the middle of the area, must be at most 500 km",
+        ),
+    ]
+}
+
+/// A flight of 27 km in Tennessee, round a radar and a polygon.
+fn document() -> Value {
+    json!({
+        "frame": "wgs84",
+        "start": {"lat": 36.5, "lon": -84.35, "alt": 420},
+        "target": {"lat": 36.66, "lon": -84.15, "alt": 500},
+        "threats": [
+            {"kind": "cylinder", "center": {"lat": 36.58, "lon": -84.25}, "radius": 2500, "influence": 4000},
+            {"kind": "polygon", "vertices": [
+                {"lat": 36.55, "lon": -84.32}, {"lat": 36.57, "lon": -84.32}, {"lat": 36.57, "lon": -84.29}]}],
+        "terrain": {"kind": "peaks", "base": 300, "peaks": [
+            {"center": {"lat": 36.6, "lon": -84.3}, "height": 80, "spread": {"x": 900, "y": 700}}]},
+        "altitude": {"min": 50, "max": 300},
+        "planner": {"warm_start": {"waypoints": [{"lat": 36.55, "lon": -84.2, "alt": 450}]}}
+    })
+}
+
+fn earth(scenario: &Scenario) -> &Wgs84 {
+    scenario.frame.wgs84().expect("a scenario in degrees")
+}
+
+fn accepted(document: &Value) -> Scenario {
+    read(&document.to_string()).expect("no fault")
+}
+
+#[test]
+fn it_comes_back_as_it_was_written() {
+    let document = document();
+    let scenario = accepted(&document);
+    let text = json::write(&scenario);
+    let written: Value = serde_json::from_str(&text).expect("JSON");
+    for name in ["frame", "start", "target"] {
+        assert_eq!(written[name], document[name], "{name}");
+    }
+    assert_eq!(written["altitude_datum"], "msl");
+    assert_eq!(
+        written["threats"][0]["center"],
+        document["threats"][0]["center"]
+    );
+    assert_eq!(
+        written["threats"][1]["vertices"],
+        document["threats"][1]["vertices"]
+    );
+    assert_eq!(written["terrain"]["peaks"], document["terrain"]["peaks"]);
+    let waypoints = &written["planner"]["warm_start"]["waypoints"];
+    assert_eq!(*waypoints, document["planner"]["warm_start"]["waypoints"]);
+    let again = accepted(&written);
+    assert_eq!(again, scenario);
+    assert_eq!(json::write(&again), text);
+}
+
+#[test]
+fn its_plane_is_in_the_middle_of_its_area() {
+    let mut document = document();
+    document["area"] =
+        json!({"min": {"lat": 36.45, "lon": -84.41}, "max": {"lat": 36.73, "lon": -84.08}});
+    let scenario = accepted(&document);
+    let origin = earth(&scenario).plane.origin();
+    assert!((origin.lat - 36.59).abs() < 1e-12 && (origin.lon + 84.245).abs() < 1e-12);
+    let area = scenario.area;
+    assert!(area.contains(scenario.start.xy()) && area.contains(scenario.target.xy()));
+    // The rectangle lies in the box of degrees, and its edges touch it somewhere.
+    let corners = [
+        (area.min.x, area.min.y),
+        (area.min.x, area.max.y),
+        (area.max.x, area.min.y),
+        (area.max.x, area.max.y),
+    ];
+    for (x, y) in corners {
+        let place = earth(&scenario).plane.geodetic(Point2::new(x, y));
+        assert!(
+            (36.45 - 1e-9..=36.73 + 1e-9).contains(&place.lat),
+            "{place:?}"
+        );
+        assert!(
+            (-84.41 - 1e-9..=-84.08 + 1e-9).contains(&place.lon),
+            "{place:?}"
+        );
+    }
+    let degree = (area.max.y - area.min.y) / 0.28;
+    assert!((110_800.0..111_100.0).contains(&degree), "{degree}");
+}
+
+#[test]
+fn altitudes_are_above_the_datum_that_is_named() {
+    let mut document = document();
+    assert_eq!(earth(&accepted(&document)).datum, Datum::Msl);
+    document["altitude_datum"] = "ellipsoid".into();
+    let scenario = accepted(&document);
+    let earth = earth(&scenario);
+    assert_eq!(earth.datum, Datum::Ellipsoid);
+    assert!((-31.5..-30.0).contains(&earth.undulation_m));
+    assert!((earth.above_sea(100.0) - (100.0 - earth.undulation_m)).abs() < 1e-12);
+    assert!((earth.above_ellipsoid(100.0) - 100.0).abs() < 1e-12);
+}
+
+#[test]
+fn the_antimeridian_is_nothing_special() {
+    let mut document = document();
+    let shifted = |node: &mut Value| {
+        let lon = node["lon"].as_f64().expect("a longitude") + 84.25 + 180.0;
+        node["lon"] = (if lon > 180.0 { lon - 360.0 } else { lon }).into();
+    };
+    let here = accepted(&document);
+    for path in [
+        "/start",
+        "/target",
+        "/threats/0/center",
+        "/threats/1/vertices/0",
+        "/threats/1/vertices/1",
+        "/threats/1/vertices/2",
+        "/terrain/peaks/0/center",
+        "/planner/warm_start/waypoints/0",
+    ] {
+        shifted(document.pointer_mut(path).expect("a place"));
+    }
+    let there = accepted(&document);
+    // The geoid lies elsewhere there, and with it the height at which metres are true.
+    assert!((here.start - there.start).norm() < 0.5);
+    assert!((here.target - there.target).norm() < 0.5);
+    assert!((here.area.min - there.area.min).norm() < 1.0);
+    let area = earth(&there).area;
+    assert!(area.min.lon > 0.0 && area.max.lon < 0.0, "{area:?}");
+    assert_eq!(
+        accepted(&serde_json::from_str(&json::write(&there)).expect("JSON")),
+        there
+    );
+}
+
+/// What is set where, and the one fault it makes.
+#[test]
+fn what_no_plane_fits_is_refused() {
+    let cases = [
+        ("/target/lon", json!(-81.0), "/area", "area-too-wide"),
+        (
+            "/area",
+            json!({"min": {"lat": 30, "lon": -90}, "max": {"lat": 40, "lon": -80}}),
+            "/area",
+            "area-too-wide",
+        ),
+        (
+            "/area",
+            json!({"min": {"lat": 88, "lon": -90}, "max": {"lat": 89.5, "lon": -80}}),
+            "/area",
+            "near-pole",
+        ),
+        (
+            "/area",
+            json!({"min": {"lat": 37, "lon": -84}, "max": {"lat": 36, "lon": -83}}),
+            "/area",
+            "empty-area",
+        ),
+        (
+            "/area",
+            json!({"min": {"lat": 36.4, "lon": -84.4}, "max": {"lat": 36.6, "lon": -84.1}}),
+            "/target",
+            "outside-area",
+        ),
+        (
+            "/area/min",
+            json!({"x": 0, "y": 0}),
+            "/area/min/x",
+            "unknown-field",
+        ),
+        ("/start/lat", json!(91), "/start/lat", "out-of-range"),
+        (
+            "/start",
+            json!({"x": 1, "y": 2, "z": 3}),
+            "/start/x",
+            "unknown-field",
+        ),
+        (
+            "/altitude_datum",
+            json!("agl"),
+            "/altitude_datum",
+            "unknown-value",
+        ),
+        ("/start/alt", json!(290), "/start", "below-ground"),
+    ];
+    for (path, value, pointer, code) in cases {
+        let mut document = document();
+        document["area"] =
+            json!({"min": {"lat": 36.4, "lon": -84.5}, "max": {"lat": 36.8, "lon": -84.0}});
+        if path == "/target/lon" {
+            document.as_object_mut().expect("an object").remove("area");
+        }
+        document["altitude_datum"] = "msl".into();
+        *document.pointer_mut(path).expect("a place") = value;
+        let found = faults(&document.to_string());
+        assert!(
+            found
+                .iter()
+                .any(|fault| fault.pointer == pointer && fault.code == code),
+            "{path}: {found:#?}"
+        );
+    }
+}
+
+proptest! {
+    /// Wherever on the earth: what is accepted reads again to the same bits.
+    #[test]
+    fn what_is_accepted_reads_again(
+        lat in -88.5..88.5f64, lon in -180.0..180.0f64, north in -0.3..0.3f64, east in -0.3..0.3f64,
+        alt in -100.0..4000.0f64, ellipsoid: bool,
+    ) {
+        prop_assume!(north.abs() + east.abs() > 0.01);
+        let lon2 = lon + east;
+        let document = json!({
+            "frame": "wgs84", "altitude_datum": if ellipsoid { "ellipsoid" } else { "msl" },
+            "start": {"lat": lat, "lon": lon, "alt": alt},
+            "target": {"lat": lat + north, "lon": if lon2 > 180.0 { lon2 - 360.0 } else if lon2 < -180.0 { lon2 + 360.0 } else { lon2 }, "alt": alt},
+            "terrain": {"kind": "flat", "elevation": alt - 100.0},
+            "altitude": {"min": 50, "max": 300}, "planner": {"smoothing": {"spacing": 50}}
+        });
+        let scenario = accepted(&document);
+        let text = json::write(&scenario);
+        let again = read(&text).expect("no fault");
+        prop_assert_eq!(json::write(&again), text);
+        prop_assert_eq!(again, scenario);
+    }
+}

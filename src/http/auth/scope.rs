@@ -59,7 +59,8 @@ impl Needs {
             (
                 "GET",
                 "/" | "/algorithms" | "/docs" | "/limits" | "/livez" | "/openapi.json"
-                | "/openapi.yaml" | "/problems/{slug}" | "/readyz" | "/version",
+                | "/openapi.yaml" | "/page/{file}" | "/page/vendor/{file}"
+                | "/problems/{slug}" | "/readyz" | "/scenarios" | "/scenarios/{name}" | "/version",
             ) => Self::Nothing,
             ("GET", "/metrics") => Self::Scope(Scope::Metrics),
             ("GET", "/plans/{id}/events") => Self::Ticket,

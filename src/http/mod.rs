@@ -11,6 +11,7 @@ mod caller;
 mod documents;
 mod events;
 mod feed;
+mod ground;
 mod idempotency;
 mod metrics;
 mod off_thread;
@@ -118,6 +119,7 @@ pub fn routes() -> Vec<Route> {
         get("/plans/{id}/events", events::follow),
         post("/plans/{id}/tickets", tickets::issue),
         post("/scenarios:convert", scenarios::convert),
+        post("/scenarios:ground", ground::sample),
         get("/scenarios", shipped::list),
         get("/scenarios/{name}", shipped::show),
         get("/algorithms", service::algorithms),

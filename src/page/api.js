@@ -18,8 +18,11 @@ export function forgetKey() {
   key = null;
 }
 
+/** Something that a person can understand and do something about. */
+export class Said extends Error {}
+
 /** A refusal: the problem document, or what stood in its place. */
-export class Refused extends Error {
+export class Refused extends Said {
   constructor(status, problem) {
     super(problem?.detail || problem?.title || `the service answered ${status}`);
     this.status = status;

@@ -18,7 +18,7 @@ export class Chart {
     this.node = node;
     this.legend = legend;
     this.pointed = pointed;
-    new ResizeObserver(() => this.#plot?.setSize({ width: node.clientWidth, height: HEIGHT })).observe(node);
+    new ResizeObserver(() => node.clientWidth && this.#plot?.setSize({ width: node.clientWidth, height: HEIGHT })).observe(node);
     onSchemeChange(() => {
       this.#shape = '';
       this.#draw();
@@ -33,6 +33,7 @@ export class Chart {
 
   #draw() {
     const { points, bound, others, color } = this.#shown;
+    this.node.hidden = !points.length && !others.length;
     const colours = palette();
     const series = [
       { label: 'mean', stroke: colours.mean, width: 1, values: curve(points, 'mean_cost') },

@@ -11,6 +11,7 @@ export class Editor {
   #shape = '';
   #page = 0;
   #faults = [];
+  #chosen = '';
   #menu = { scenarios: [], algorithms: [], terrains: [] };
 
   /** `acts` has `load(name)`, `open(file)` and `select(threat)`. */
@@ -20,6 +21,13 @@ export class Editor {
     this.acts = acts;
     this.form = new Form(root, draft);
     draft.addEventListener('change', () => this.show());
+  }
+
+  /** Which shipped scenario the draft began with; '' for none. */
+  from(name) {
+    this.#chosen = name;
+    const choose = by('source');
+    if (choose) choose.value = name;
   }
 
   /** What there is to choose from. */
@@ -115,9 +123,10 @@ export class Editor {
   }
 
   #source() {
-    const choose = el('select', { id: 'source', onchange: () => choose.value && this.acts.load(choose.value) },
+    const choose = el('select', { id: 'source', onchange: () => choose.value && this.acts.load(this.#chosen = choose.value) },
       el('option', { value: '' }, 'Choose…'),
       this.#menu.scenarios.map(({ name, title }) => el('option', { value: name }, title)));
+    choose.value = this.#chosen;
     const file = el('input', { type: 'file', class: 'unseen', id: 'file', accept: '.json,.geojson,.kml,.plan,application/json,application/geo+json,application/vnd.google-earth.kml+xml',
       onchange: () => {
         if (file.files[0]) this.acts.open(file.files[0]);

@@ -18,6 +18,8 @@ export function frameOf(document, before = null) {
   const [first, second] = axes(document);
   const middle = [first, second].map((axis) => {
     const box = [document.area?.min?.[axis], document.area?.max?.[axis]].filter(Number.isFinite);
+    // Across the antimeridian the east is the smaller one.
+    if (axis === 'lon' && box[1] < box[0]) box[1] += 360;
     const ends = box.length === 2 ? box : [document.start?.[axis], document.target?.[axis]].filter(Number.isFinite);
     return ends.length ? ends.reduce((sum, value) => sum + value, 0) / ends.length : 0;
   });

@@ -92,12 +92,15 @@ function fromSamples({ area, columns, rows, elevations }, document, frame) {
   const [first, second] = axes(document);
   // The first index runs west to east, which is x, or the longitude.
   const [across, along] = first === 'lat' ? [second, first] : [first, second];
-  const span = (axis) => area.max[axis] - area.min[axis];
+  // Across the antimeridian the east is the smaller one.
+  const turn = first === 'lat' && area.max.lon < area.min.lon ? 360 : 0;
+  const span = (axis) => area.max[axis] - area.min[axis] + (axis === 'lon' ? turn : 0);
   const known = elevations.filter(Number.isFinite);
   const lowest = known.length ? known.reduce((a, b) => Math.min(a, b)) : 0;
   const filled = elevations.map((z) => z ?? lowest);
   const at = bilinear(columns, rows, filled, (x, y) => {
     const p = frame.from({ x, y, z: 0 });
+    if (turn && p.lon < area.min.lon - 1) p.lon += turn;
     return [((p[across] - area.min[across]) / span(across)) * (columns - 1), ((p[along] - area.min[along]) / span(along)) * (rows - 1)];
   });
   const node = (column, row) => {

@@ -1,6 +1,6 @@
 // A file as a scenario: read here where it is one already, turned into one by the service where it is a map.
 
-import { ask } from './api.js';
+import { Said, ask } from './api.js';
 
 /** The document in a file, and what there is to say about it. */
 export async function readFile(file) {
@@ -11,7 +11,7 @@ export async function readFile(file) {
     try {
       document = JSON.parse(text);
     } catch (error) {
-      throw new Error(`${file.name} is no JSON: ${error.message}`);
+      throw new Said(`${file.name} is no JSON: ${error.message}`);
     }
     if (document?.start || document?.target || document?.threats) return { document, note: null };
   }

@@ -1,6 +1,6 @@
 // The page put together: what is chosen, planned, looked at, compared and taken away.
 
-import { Refused, ask, onKeyNeeded, send } from './api.js';
+import { Refused, Said, ask, onKeyNeeded, send } from './api.js';
 import { Chart } from './chart.js';
 import { by, calmly, el } from './dom.js';
 import { Draft } from './draft.js';
@@ -63,7 +63,7 @@ const stage = new Stage({ world, strip, chart, draft }, {
   },
 });
 const editor = new Editor(by('scenario'), draft, {
-  load: (name) => attempt(async () => begin(await ask(`/scenarios/${encodeURIComponent(name)}`))),
+  load: (name) => attempt(() => load(name)),
   open: (file) => attempt(() => openFile(file)),
   blank: () => begin(EMPTY),
   select: (index) => stage.selected !== index && stage.select(index),
@@ -115,15 +115,22 @@ async function attempt(act) {
     await act();
   } catch (error) {
     if (error.name === 'AbortError') return;
-    tell(error instanceof TypeError ? 'The service cannot be reached.' : error.message);
-    if (!(error instanceof Refused)) console.warn(error);
+    tell(error instanceof TypeError && /fetch/i.test(error.message) ? 'The service cannot be reached.' : error.message);
+    if (!(error instanceof Said)) console.warn(error);
   }
 }
 
 // -- The scenario ----------------------------------------------------------------------------------
 
+async function load(name) {
+  const document_ = await ask(`/scenarios/${encodeURIComponent(name)}`);
+  begin(document_);
+  editor.from(name);
+}
+
 function begin(document_, plan = null) {
   show(plan);
+  editor.from('');
   draft.replace({ ...document_, planner: { ...document_.planner, warm_start: undefined } });
 }
 
@@ -282,7 +289,7 @@ async function compare(id, yes, name) {
     stage.redraw();
     stage.drawSearch();
   } else {
-    if (stage.compared.size === OTHERS) throw new Error(`At most ${OTHERS} plans can be laid over one.`);
+    if (stage.compared.size === OTHERS) throw new Said(`At most ${OTHERS} plans can be laid over one.`);
     const plan = await new Followed(id).open();
     const { algorithm, seed } = plan.status;
     plan.addEventListener('news', () => {
@@ -312,8 +319,8 @@ function remember() {
   if (hash !== location.hash) history.replaceState(null, '', `${location.pathname}${hash}`);
 }
 
-async function recall() {
-  const query = new URLSearchParams(location.hash.slice(1));
+async function recall(hash) {
+  const query = new URLSearchParams(hash.slice(1));
   const id = query.get('plan');
   if (!id) return false;
   await open(id);
@@ -375,7 +382,7 @@ addEventListener('drop', (event) => {
   const [file] = event.dataTransfer.files;
   if (file) attempt(() => openFile(file));
 });
-addEventListener('hashchange', () => attempt(recall));
+addEventListener('hashchange', () => attempt(() => recall(location.hash)));
 
 if (world) {
   stage.tools = new Tools({ bar: by('tools'), hint: by('hint'), world, draft, stage, pointed: (pixel) => stage.pointAt(pixel) });
@@ -389,7 +396,7 @@ if (world) {
   // Low hills under a wide sky look flat; they are drawn higher, and the box says so.
   stage.exaggerate = (ground, ceiling) => {
     const width = Math.max(ground.extent.max.x - ground.extent.min.x, ground.extent.max.y - ground.extent.min.y);
-    const wanted = (0.16 * width) / Math.max(ceiling - ground.least, 1);
+    const wanted = (0.2 * width) / Math.max(ceiling - ground.least, 1);
     const value = wanted < 1.5 ? 1 : wanted < 2.5 ? 2 : wanted < 4 ? 3 : 5;
     times.value = String(value);
     return value;
@@ -411,14 +418,15 @@ Object.defineProperty(globalThis, 'noctule', {
   }),
 });
 
+const asked = location.hash;
 show(null);
 await attempt(async () => {
   const [{ scenarios }, { algorithms }] = await Promise.all([ask('/scenarios'), ask('/algorithms')]);
   editor.menu({ scenarios, algorithms });
-  if (!(await recall().catch((refusal) => {
+  if (!(await recall(asked).catch((refusal) => {
     tell(`That plan cannot be opened: ${refusal.message}`);
     return false;
-  }))) begin(await ask(`/scenarios/${scenarios[0].name}`));
+  }))) await load(scenarios[0].name);
 });
 // Only where the service has datasets, and the caller may see them.
 send('/terrains', { quiet: true }).then((answer) => answer.json()).then(({ terrains }) => editor.menu({ terrains: terrains.map(({ name }) => name) })).catch(() => {});

@@ -3,7 +3,7 @@
 import { Color } from './vendor/three.js';
 
 const NAMES = ['route', 'best', 'mean', 'bound', 'core', 'zone', 'start', 'target', 'fault', 'sky', 'contour', 'edge', 'ink', 'faint', 'line',
-  'ground', 'band', 'raised', 'ramp-0', 'ramp-1', 'ramp-2', 'ramp-3', 'ramp-4', 'other-0', 'other-1', 'other-2', 'other-3', 'other-4'];
+  'ground', 'skirt', 'band', 'raised', 'ramp-0', 'ramp-1', 'ramp-2', 'ramp-3', 'ramp-4', 'other-0', 'other-1', 'other-2', 'other-3', 'other-4'];
 
 /** The colours in force, as CSS has them, by name. */
 export function palette() {

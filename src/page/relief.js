@@ -47,9 +47,32 @@ export class Relief {
     const mesh = new Mesh(geometry, material);
     mesh.name = 'ground';
     this.group.add(mesh);
+    this.#skirt(ground, colours);
     const spacing = step(ground.greatest - ground.least || 1, CONTOURS);
     this.#lines('contours', contours(ground, spacing, false), colours.contour, 0.28);
     this.#lines('index contours', contours(ground, spacing, true), colours.contour, 0.55);
+  }
+
+  /** The sides of the block, down to one level. */
+  #skirt({ mesh: { columns, rows, xs, ys, zs }, least, greatest, extent }, colours) {
+    const bottom = least - Math.max((greatest - least) * 0.12, (extent.max.x - extent.min.x) * 0.012);
+    const edge = [];
+    for (let column = 0; column < columns; column += 1) edge.push(column);
+    for (let row = 1; row < rows; row += 1) edge.push(row * columns + columns - 1);
+    for (let column = columns - 2; column >= 0; column -= 1) edge.push((rows - 1) * columns + column);
+    for (let row = rows - 2; row >= 0; row -= 1) edge.push(row * columns);
+    const positions = new Float32Array(edge.length * 6);
+    const faces = [];
+    edge.forEach((k, at) => {
+      positions.set([xs[k], ys[k], zs[k], xs[k], ys[k], bottom], at * 6);
+      if (at) faces.push(2 * at - 2, 2 * at - 1, 2 * at, 2 * at - 1, 2 * at + 1, 2 * at);
+    });
+    const geometry = new BufferGeometry();
+    geometry.setAttribute('position', new BufferAttribute(positions, 3));
+    geometry.setIndex(faces);
+    const mesh = new Mesh(geometry, new MeshBasicMaterial({ color: colours.skirt, side: DoubleSide }));
+    mesh.name = 'skirt';
+    this.group.add(mesh);
   }
 
   #plain(ground, colours) {

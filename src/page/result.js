@@ -78,7 +78,7 @@ function costs({ cost: terms, bound }, scenario) {
     return part;
   }));
   return el('section', { 'aria-labelledby': 'cost-head' },
-    el('h3', { id: 'cost-head' }, 'Cost ', el('b', {}, cost(terms.total))), bar,
+    el('h3', { id: 'cost-head' }, 'Cost ', el('b', {}, cost(terms.total)), el('span', { class: 'faint' }, ' of the legs between waypoints')), bar,
     el('table', { class: 'plain' }, el('thead', { class: 'unseen' }, el('tr', {}, el('th', {}, 'Term'), el('th', {}, 'Cost'), el('th', {}, 'Share'))), el('tbody', {},
       rows.map(([title, name], k) => el('tr', {}, el('th', { scope: 'row' }, el('i', { class: `swatch term-${k}` }), title, scenario?.weights && el('span', { class: 'faint' }, ` × ${scenario.weights[name] ?? 1}`)),
         el('td', {}, cost(terms[name])), el('td', {}, terms.total > 0 ? share(terms[name] / terms.total) : '–'))),
@@ -86,18 +86,23 @@ function costs({ cost: terms, bound }, scenario) {
 }
 
 function clearances({ checks, path }, scenario) {
-  const held = (path ? checks.path : checks.waypoints).clearance;
-  if (!held.length) return null;
-  const sorted = [...held].sort((a, b) => (a.distance ?? Infinity) - (b.distance ?? Infinity));
-  const row = ({ threat, name, distance }) => {
+  const { waypoints } = checks;
+  if (!waypoints.clearance.length) return null;
+  const far = (one) => one?.distance ?? Infinity;
+  const rows = waypoints.clearance.map((one, at) => ({ ...one, flown: path ? checks.path.clearance[at] : null }))
+    .sort((a, b) => Math.min(far(a), far(a.flown)) - Math.min(far(b), far(b.flown)));
+  const row = ({ threat, name, distance, flown }) => {
     const of = scenario?.threats?.[threat];
     const soft = of ? (of.kind === 'polygon' ? of.margin ?? 0 : (of.influence ?? of.radius) - of.radius) : 0;
-    const state = distance === null ? 'passed over or under' : distance < 0 ? 'entered' : distance < soft ? 'in its soft zone' : 'clear';
-    return el('tr', { class: distance < 0 && distance !== null ? 'bad' : '' }, el('th', { scope: 'row' }, threatName({ name }, threat)), el('td', {}, distance === null ? '–' : metres(distance)), el('td', { class: 'faint' }, state));
+    const least = Math.min(distance ?? Infinity, flown?.distance ?? Infinity);
+    const state = least < 0 ? 'entered' : least < soft - 1e-3 ? 'soft zone' : least === Infinity ? 'over or under' : 'clear';
+    const figure = (value) => (value === null || value === undefined ? '–' : metres(value));
+    return el('tr', { class: least < 0 ? 'bad' : '' }, el('th', { scope: 'row' }, threatName({ name }, threat)),
+      el('td', {}, figure(distance)), path && el('td', {}, figure(flown?.distance)), el('td', { class: 'faint' }, state));
   };
-  const table = (some) => el('table', { class: 'plain' }, el('thead', {}, el('tr', {}, el('th', {}, 'Threat'), el('th', {}, 'Least clearance'), el('th', {}, ''))), el('tbody', {}, some.map(row)));
-  return el('section', { 'aria-labelledby': 'clearance-head' }, el('h3', { id: 'clearance-head' }, 'Clearance'), table(sorted.slice(0, FEW)),
-    sorted.length > FEW && el('details', {}, el('summary', {}, `${sorted.length - FEW} more, farther off`), table(sorted.slice(FEW, 500))));
+  const table = (some) => el('table', { class: 'plain' }, el('thead', {}, el('tr', {}, el('th', {}, 'Threat'), el('th', {}, 'Legs'), path && el('th', {}, 'Path'), el('th', {}, ''))), el('tbody', {}, some.map(row)));
+  return el('section', { 'aria-labelledby': 'clearance-head' }, el('h3', { id: 'clearance-head' }, 'Least clearance'), table(rows.slice(0, FEW)),
+    rows.length > FEW && el('details', {}, el('summary', {}, `${rows.length - FEW} more, farther off`), table(rows.slice(FEW, 500))));
 }
 
 function legs({ legs: all, checks }, acts) {

@@ -9,7 +9,7 @@ import { Relief } from './relief.js';
 import { Curtain, Dots, RouteLine, Trail } from './routes.js';
 import { Volumes } from './volumes.js';
 
-const VIEWS = { oblique: new Vector3(-0.28, -0.86, 0.62), above: new Vector3(0, -0.001, 1) };
+const VIEWS = { oblique: new Vector3(-0.26, -0.8, 0.78), above: new Vector3(0, -0.001, 1) };
 
 export class World {
   #root = new Group();

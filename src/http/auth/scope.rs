@@ -66,7 +66,9 @@ impl Needs {
             ("GET", "/plans/{id}/events") => Self::Ticket,
             ("GET", _) | ("POST", "/plans/{id}/tickets") => Self::Scope(Scope::Read),
             (_, path) if path.starts_with("/plans") => Self::Scope(Scope::Plan),
-            ("POST", "/scenarios:convert") => Self::Scope(Scope::Plan),
+            ("POST", "/scenarios:convert" | "/scenarios:ground") => {
+                Self::Scope(Scope::Plan)
+            },
             _ => Self::Scope(Scope::Admin),
         }
     }

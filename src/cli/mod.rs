@@ -1,4 +1,4 @@
-//! The command line: serve, plan, export, convert, bench, key, store, healthcheck.
+//! The command line: serve, plan, export, convert, bench, key, store, terrain, healthcheck.
 
 mod access;
 mod bench;
@@ -10,6 +10,7 @@ mod key;
 mod plan;
 mod serve;
 mod store;
+mod terrain;
 
 use std::process::ExitCode;
 
@@ -42,6 +43,9 @@ enum Command {
     /// Copy the stored plans, or look for damage among them
     #[command(subcommand)]
     Store(store::Command),
+    /// Look into a file of elevations
+    #[command(subcommand)]
+    Terrain(terrain::Command),
     /// Ask a running service whether it is ready; for containers
     Healthcheck(healthcheck::Arguments),
 }
@@ -82,6 +86,7 @@ pub fn run() -> ExitCode {
         Command::Bench(command) => bench::run(&command),
         Command::Key(command) => key::run(&command).map(|()| exit::DONE),
         Command::Store(command) => store::run(command),
+        Command::Terrain(command) => terrain::run(&command),
         Command::Healthcheck(arguments) => healthcheck::run(&arguments).map(|()| exit::DONE),
     };
     done.unwrap_or_else(|error| {

@@ -5,8 +5,8 @@ use super::document::{Position, ResultDocument};
 use super::{ExportError, ResultInput};
 use crate::geometry::Point3;
 use crate::planner;
-use crate::scenario::{Frame, Scenario, json};
 use crate::scenario::limits::Limits;
+use crate::scenario::{Frame, Scenario, json};
 
 /// A plan: what was asked for and what came out.
 pub struct Delivery {

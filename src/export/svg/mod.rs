@@ -3,6 +3,7 @@
 //! The same documents give the same bytes. Deliberately absent: scripts, styles and anything that
 //! would have to be fetched, so that the file can be opened, printed and mailed as it is.
 
+mod axes;
 mod canvas;
 mod contour;
 mod header;

@@ -12,6 +12,7 @@ mod config;
 mod crash;
 mod determinism;
 mod events;
+mod formats;
 mod idempotency;
 mod layering;
 mod logs;

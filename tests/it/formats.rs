@@ -9,7 +9,7 @@ use noctule::job::Status;
 use noctule::planner;
 use noctule::scenario::json;
 use noctule::scenario::limits::Limits;
-use noctule::store::{Ending, Store};
+use noctule::store::Ending;
 use serde_json::{Value, json};
 
 use crate::support::api::Api;

@@ -78,10 +78,7 @@ fn sampled(scenario: &Scenario, columns: usize, rows: usize) -> GroundDocument {
         Some(wgs84) => (
             Point2::new(wgs84.area.min.lon, wgs84.area.min.lat),
             // East of 180 degrees where the area lies across the antimeridian.
-            Point2::new(
-                wgs84.area.min.lon + wgs84.area.width(),
-                wgs84.area.max.lat,
-            ),
+            Point2::new(wgs84.area.min.lon + wgs84.area.width(), wgs84.area.max.lat),
         ),
     };
     let area = Rect { min, max };
@@ -94,7 +91,10 @@ fn sampled(scenario: &Scenario, columns: usize, rows: usize) -> GroundDocument {
         let y = between(area.min.y, area.max.y, node / columns, rows);
         let point = match wgs84 {
             None => Point2::new(x, y),
-            Some(wgs84) => wgs84.plane.local(LatLon { lat: y, lon: wrapped(x) }),
+            Some(wgs84) => wgs84.plane.local(LatLon {
+                lat: y,
+                lon: wrapped(x),
+            }),
         };
         (scenario.terrain.elevation(point) * 100.0).round() / 100.0
     };

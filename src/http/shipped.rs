@@ -14,10 +14,7 @@ use super::problem::Problem;
 
 /// Name and document, in the order in which they are offered.
 static SHIPPED: [(&str, &str); 5] = [
-    (
-        "jacksboro",
-        include_str!("../../scenarios/jacksboro.json"),
-    ),
+    ("jacksboro", include_str!("../../scenarios/jacksboro.json")),
     ("paper-1", include_str!("../../scenarios/paper-1.json")),
     ("paper-2", include_str!("../../scenarios/paper-2.json")),
     ("paper-3", include_str!("../../scenarios/paper-3.json")),
@@ -43,7 +40,8 @@ struct Entry {
 impl Entry {
     fn of(name: &'static str, text: &str) -> Self {
         let document: Value = serde_json::from_str(text).expect("well-formed, as its test says");
-        let text = |field: &str, default: &str| document[field].as_str().unwrap_or(default).to_owned();
+        let text =
+            |field: &str, default: &str| document[field].as_str().unwrap_or(default).to_owned();
         Self {
             name,
             title: text("name", name),
@@ -56,8 +54,12 @@ impl Entry {
 
 /// `GET /scenarios`.
 pub(super) async fn list(uri: Uri) -> Result<Json<ScenariosDocument>, Problem> {
-    static ENTRIES: LazyLock<Vec<Entry>> =
-        LazyLock::new(|| SHIPPED.iter().map(|(name, text)| Entry::of(name, text)).collect());
+    static ENTRIES: LazyLock<Vec<Entry>> = LazyLock::new(|| {
+        SHIPPED
+            .iter()
+            .map(|(name, text)| Entry::of(name, text))
+            .collect()
+    });
     Params::read(&uri, &[])?;
     Ok(Json(ScenariosDocument {
         scenarios: ENTRIES.clone(),

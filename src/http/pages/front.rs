@@ -132,7 +132,11 @@ pub(in crate::http) async fn file(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     Params::read(&uri, &[])?;
-    serve(&name.map(|Path(name)| name).unwrap_or_default(), &uri, &headers)
+    serve(
+        &name.map(|Path(name)| name).unwrap_or_default(),
+        &uri,
+        &headers,
+    )
 }
 
 /// `GET /page/vendor/{file}`.
@@ -289,7 +293,10 @@ mod tests {
         for file in FILES.iter().filter(|file| file.name.starts_with("vendor/")) {
             let name = file.name.trim_start_matches("vendor/");
             let brotli = file.brotli.expect("compressed ahead of time");
-            for (name, bytes) in [(name.to_owned(), file.bytes), (format!("{name}.br"), brotli)] {
+            for (name, bytes) in [
+                (name.to_owned(), file.bytes),
+                (format!("{name}.br"), brotli),
+            ] {
                 let sum: String = Sha256::digest(bytes)
                     .iter()
                     .map(|byte| format!("{byte:02x}"))
@@ -315,7 +322,10 @@ mod tests {
 
     #[test]
     fn every_script_that_is_imported_is_served() {
-        for file in FILES.iter().filter(|file| !file.name.starts_with("vendor/")) {
+        for file in FILES
+            .iter()
+            .filter(|file| !file.name.starts_with("vendor/"))
+        {
             let text = std::str::from_utf8(file.bytes).expect("text");
             for imported in text.lines().filter_map(|line| line.split_once(" from './")) {
                 let name = imported.1.trim_end_matches(['\'', ';']);

@@ -251,8 +251,16 @@ function figures(plan) {
   const share = end ? 1 : iterations ? iteration / iterations : 0;
   const bar = el('progress', { max: 1, value: share, 'aria-label': 'Progress of the search' });
   by('figures').replaceChildren(
-    el('p', { class: 'big' }, el('b', {}, cost(best ?? null)), el('span', { class: 'faint' }, best === null || best === undefined ? (status?.status === 'queued' ? `waiting${status.queue_position ? `, number ${status.queue_position} in the queue` : ''}` : 'no feasible route yet') : 'cost of the best route')),
+    el('p', { class: `big ${name}` }, el('b', {}, cost(best ?? null)), el('span', { class: 'faint' }, told(plan, best))),
     ...(active ? [bar, el('p', { class: 'faint' }, `Iteration ${iteration} of ${iterations}`, last ? `, ${number(last.feasible_fraction * 100, 0)} % of the swarm feasible` : '')] : []));
+}
+
+/** What the figure beside it is. */
+function told({ status, result: end }, best) {
+  if (end && !end.feasible) return 'cost of a route that must not be flown';
+  if (best !== null && best !== undefined) return 'cost of the best route';
+  if (status?.status !== 'queued') return 'no feasible route yet';
+  return status.queue_position ? `waiting, number ${status.queue_position} in the queue` : 'waiting';
 }
 
 function result(plan) {

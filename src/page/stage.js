@@ -21,6 +21,7 @@ export class Stage {
   /** Plans laid over it, by id: `{plan, color}`. */
   compared = new Map();
   #groundKey = null;
+  #scenery = null;
   #sampled = null;
   #threats = [];
   #trailed = null;
@@ -144,8 +145,12 @@ export class Stage {
       this.ground = groundOf(document, this.frame, this.#sampled?.name === document.terrain?.name ? this.#sampled?.ground : null);
       this.#groundKey = key;
     }
-    this.#threats = threatsOf(document, this.frame, this.ground);
-    if (this.world) {
+    // An incumbent moves nothing but the route.
+    const scenery = [document, this.ground, this.selected, this.world?.colours];
+    const moved = this.#fresh || !this.#scenery || scenery.some((part, at) => part !== this.#scenery[at]);
+    this.#scenery = scenery;
+    if (moved) this.#threats = threatsOf(document, this.frame, this.ground);
+    if (this.world && moved) {
       const ceiling = ceilingOf(document, this.ground);
       if (this.#fresh) this.world.exaggeration = this.exaggerate?.(this.ground, ceiling) ?? 1;
       this.world.show(this.ground, this.#threats, ceiling, this.#fresh);

@@ -7,7 +7,7 @@ function digits(count) {
 }
 
 /** With so many decimals; a dash for nothing. */
-export const number = (value, decimals = 1) => (value === null || value === undefined || !Number.isFinite(value) ? '–' : digits(decimals).format(value).replace(/^-([0.,]+)$/, '$1'));
+export const number = (value, decimals = 1) => (value === null || value === undefined || !Number.isFinite(value) ? '–' : digits(decimals).format(value).replace(/^-([0.,]+)$/, '$1').replace('-', '−'));
 
 /** Metres, as kilometres from ten thousand on. */
 export const metres = (value, decimals = 1) =>

@@ -9,7 +9,7 @@ use noctule::job::Status;
 use noctule::planner;
 use noctule::scenario::json;
 use noctule::scenario::limits::Limits;
-use noctule::store::{Ending, Store};
+use noctule::store::Ending;
 use serde_json::{Value, json};
 
 use crate::support::api::Api;
@@ -376,6 +376,10 @@ fn the_command_line_writes_reads_back_and_exports() {
     assert!(String::from_utf8_lossy(&converted.stderr).contains("assumed /altitude"));
     let read: Value = serde_json::from_str(&text("again.json")).expect("JSON");
     assert_eq!(read["threats"][0]["radius"], 60.0);
+    let local = crate::support::scenario().to_string();
+    let refused = process::run(&["plan", "-", "--format", "kml"], &local);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("kml needs degrees"));
     let refused = process::run(&["convert", "-"], "<kml/>");
     assert_eq!(refused.status.code(), Some(2));
 }

@@ -19,6 +19,7 @@ mod layering;
 mod logs;
 mod metrics;
 mod openapi;
+mod page;
 mod refusals;
 mod scenario;
 mod shutdown;

@@ -9,7 +9,7 @@ use super::exit;
 use super::files::{self, Choice};
 use crate::export::{ExportError, ResultInput, sha256_hex};
 use crate::planner;
-use crate::scenario::json;
+use crate::scenario::json::{self, Rules};
 use crate::scenario::limits::Limits;
 
 #[derive(Args)]
@@ -36,13 +36,14 @@ struct Origin {
 
 /// Write the result, and say by the exit code why it is not.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
-    let chosen = arguments.choice.of(&arguments.out.as_deref().as_slice())?;
+    let chosen = arguments.choice.of(arguments.out.as_deref().as_slice())?;
     let [chosen] = chosen.as_slice() else {
         unreachable!("one file has one format");
     };
     let result = files::read(&arguments.result)?;
     let scenario = files::read(&arguments.scenario)?;
-    let (result, scenario) = match pair(&result, &scenario) {
+    let rules = planner::rules(Limits::NONE);
+    let (result, scenario) = match pair(&result, &scenario, &rules) {
         Ok(pair) => pair,
         Err(refusal) => {
             eprintln!("{}: {refusal}", arguments.result.display());
@@ -52,6 +53,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let input = ResultInput {
         result: &result,
         scenario: &scenario,
+        rules: &rules,
     };
     match chosen.format.write(&input, &chosen.options) {
         Ok(document) => {
@@ -77,13 +79,12 @@ pub(super) fn code(error: &ExportError) -> u8 {
 }
 
 /// Both documents as text, the scenario as it was accepted.
-fn pair(result: &[u8], scenario: &[u8]) -> Result<(String, String), String> {
+fn pair(result: &[u8], scenario: &[u8], rules: &Rules) -> Result<(String, String), String> {
     let result = String::from_utf8(result.to_vec()).map_err(|error| error.to_string())?;
     let origin: Origin =
         serde_json::from_str(&result).map_err(|error| format!("no result document: {error}"))?;
-    let rules = planner::rules(Limits::NONE);
     // One that names no seed was planned with the one that the result tells.
-    let scenario = json::read(scenario, &rules, origin.seed)
+    let scenario = json::read(scenario, rules, origin.seed)
         .map_err(|refusal| format!("its scenario is refused: {refusal}"))?;
     let accepted = json::write(&scenario);
     if sha256_hex(accepted.as_bytes()) == origin.scenario_sha256 {

@@ -4,8 +4,6 @@ use super::chart::Chart;
 use super::document::{Position, ResultDocument};
 use super::{ExportError, ResultInput};
 use crate::geometry::Point3;
-use crate::planner;
-use crate::scenario::limits::Limits;
 use crate::scenario::{Frame, Scenario, json};
 
 /// A plan: what was asked for and what came out.
@@ -37,7 +35,7 @@ impl Delivery {
     /// # Errors
     /// [`ExportError::Damaged`] when one cannot be read, or has a route without extent.
     pub fn read(input: &ResultInput) -> Result<Self, ExportError> {
-        let scenario = json::read_accepted(input.scenario, &planner::rules(Limits::NONE))
+        let scenario = json::read_accepted(input.scenario, input.rules)
             .map_err(|refusal| ExportError::Damaged(format!("the scenario: {refusal}")))?;
         let result: ResultDocument = serde_json::from_str(input.result)
             .map_err(|error| ExportError::Damaged(format!("the result: {error}")))?;

@@ -80,7 +80,12 @@ fn write(
 ) -> Result<String, ExportError> {
     let format = Format::named(format).expect("a format");
     let options = Options::read(format, options.iter().copied())?;
-    format.write(&ResultInput { result, scenario }, &options)
+    let input = ResultInput {
+        result,
+        scenario,
+        rules: &planner::rules(Limits::NONE),
+    };
+    format.write(&input, &options)
 }
 
 #[test]

@@ -80,10 +80,12 @@ async fn written(
         result
     } else {
         let scenario = state.store.scenario(plan.id).await?;
+        let rules = state.rules.clone();
         let write = move || {
             let input = ResultInput {
                 result: &result,
                 scenario: &scenario,
+                rules: &rules,
             };
             format.write(&input, &options)
         };

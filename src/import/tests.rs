@@ -10,10 +10,18 @@ fn geojson(features: &Value) -> Result<Conversion, ImportError> {
     convert(document.to_string().as_bytes(), Syntax::Json)
 }
 
+#[expect(
+    clippy::needless_pass_by_value,
+    reason = "read better where they are called"
+)]
 fn feature(properties: Value, geometry: Value) -> Value {
     json!({"type": "Feature", "properties": properties, "geometry": geometry})
 }
 
+#[expect(
+    clippy::needless_pass_by_value,
+    reason = "reads better where it is called"
+)]
 fn point(name: &str, coordinates: Value) -> Value {
     feature(
         json!({"name": name}),
@@ -194,6 +202,10 @@ fn a_file_without_ends_is_no_scenario() {
     );
     check("{\"type\":\n oops}", "line 2, column 2: expected value");
     check("", "line 1, column 1: EOF while parsing a value");
+    check(
+        "PK\u{3}\u{4}...",
+        "a zip archive, as KMZ is: unpack it and take the doc.kml in it",
+    );
     check("<gpx/>", "the root element is gpx, must be kml");
     check("<kml>", "the root node was opened but never closed");
     check(

@@ -376,6 +376,10 @@ fn the_command_line_writes_reads_back_and_exports() {
     assert!(String::from_utf8_lossy(&converted.stderr).contains("assumed /altitude"));
     let read: Value = serde_json::from_str(&text("again.json")).expect("JSON");
     assert_eq!(read["threats"][0]["radius"], 60.0);
+    let local = crate::support::scenario().to_string();
+    let refused = process::run(&["plan", "-", "--format", "kml"], &local);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("kml needs degrees"));
     let refused = process::run(&["convert", "-"], "<kml/>");
     assert_eq!(refused.status.code(), Some(2));
 }

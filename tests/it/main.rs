@@ -10,6 +10,7 @@ mod browser;
 mod cli;
 mod config;
 mod crash;
+mod dem;
 mod determinism;
 mod events;
 mod formats;

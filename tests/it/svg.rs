@@ -29,6 +29,7 @@ fn draw(scenario: &Value, result: &ResultDocument) -> String {
     let input = ResultInput {
         result: &result.to_json(),
         scenario: &accepted(scenario),
+        rules: &planner::rules(Limits::NONE),
     };
     let svg = Format::named("svg").expect("svg is a format");
     svg.write(&input, &Options::default())

@@ -161,7 +161,7 @@ fn outline(vertices: &[Point2], map: &MapScale) -> String {
 }
 
 fn route(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale) {
-    let waypoints = spots(&drawing.waypoints, map);
+    let waypoints = spots(drawing.waypoints, map);
     if let Some(path) = &drawing.path {
         let data = polyline(&thinned(&spots(path, map)));
         canvas.path(&data, &format!("{CASING} stroke-width=\"6\""));

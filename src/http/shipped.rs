@@ -13,7 +13,11 @@ use super::params::Params;
 use super::problem::Problem;
 
 /// Name and document, in the order in which they are offered.
-static SHIPPED: [(&str, &str); 5] = [
+static SHIPPED: [(&str, &str); 6] = [
+    (
+        "jacksboro-wgs84",
+        include_str!("../../scenarios/jacksboro-wgs84.json"),
+    ),
     ("jacksboro", include_str!("../../scenarios/jacksboro.json")),
     ("paper-1", include_str!("../../scenarios/paper-1.json")),
     ("paper-2", include_str!("../../scenarios/paper-2.json")),

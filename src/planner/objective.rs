@@ -213,6 +213,7 @@ fn steps(scenario: &Scenario) -> usize {
         Terrain::Flat(_) => 1,
         Terrain::Peaks(peaks) => 100 * (1 + peaks.peaks.len()),
         Terrain::Grid(grid) => grid.columns + grid.rows,
+        Terrain::Dem(dem) => dem.raster().lattice.columns + dem.raster().lattice.rows,
     };
     (scenario.planner.waypoints + 1) * (1 + threats + ground)
 }

@@ -1,10 +1,10 @@
 //! Elevations at the nodes of a grid, bilinear between them.
 //!
-//! Along a leg the ground of one cell is a quadratic, so that a leg's least and greatest height
-//! over it is exact.
+//! A leg's least and greatest height above it is exact.
 
 use super::HeightRange;
-use crate::geometry::{Point2, Quadratic, Rect, Segment};
+use super::cells::Cells;
+use crate::geometry::{Point2, Rect, Segment};
 
 /// Elevations at nodes, row-major from south to north; the ground between them is bilinear.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,16 +21,6 @@ pub struct Grid {
     pub elevations: Vec<f64>,
 }
 
-/// The ground of one cell: `z00 + x zx + y zy + x y zxy`, `x` and `y` in cells from its corner.
-struct Patch {
-    column: f64,
-    row: f64,
-    z00: f64,
-    zx: f64,
-    zy: f64,
-    zxy: f64,
-}
-
 impl Grid {
     /// The ground that the grid covers.
     #[must_use]
@@ -44,10 +34,8 @@ impl Grid {
     }
 
     pub(super) fn elevation(&self, point: Point2) -> f64 {
-        let (x, y) = self.onto_grid(self.in_cells(point));
-        let patch = self.patch(x, y);
-        let (x, y) = (x - patch.column, y - patch.row);
-        patch.z00 + x * patch.zx + y * (patch.zy + x * patch.zxy)
+        let (x, y) = self.in_cells(point);
+        self.cells().elevation([x, y])
     }
 
     pub(super) fn height_range(&self, leg: &Segment, (t0, t1): (f64, f64)) -> HeightRange {
@@ -80,31 +68,19 @@ impl Grid {
 
     /// As [`Grid::height_range`], of a part that crosses no edge of the grid.
     fn height_range_straight(&self, leg: &Segment, (t0, t1): (f64, f64)) -> HeightRange {
-        let (from, to) = (leg.at(t0), leg.at(t1));
-        let (x0, y0) = self.onto_grid(self.in_cells(from.xy()));
-        let (x1, y1) = self.onto_grid(self.in_cells(to.xy()));
-        let mut column = Walk::new(x0, x1, self.columns);
-        let mut row = Walk::new(y0, y1, self.rows);
-        let mut range = HeightRange::EMPTY;
-        let mut u = 0.0;
-        // u runs from 0 to 1 over the window; each cell ends at the next grid line in either direction.
-        loop {
-            let next = column.leave.min(row.leave).min(1.0);
-            if next > u || (next >= 1.0 && range == HeightRange::EMPTY) {
-                let patch = self.patch_at(column.cell, row.cell);
-                let height = patch.height_below((x0, y0), (x1, y1), (from.z, to.z));
-                let (min, max) = height.extremes(u, next);
-                range = range.join(HeightRange { min, max });
-                u = next;
-            }
-            if next >= 1.0 {
-                return range;
-            }
-            if column.leave <= row.leave {
-                column.step();
-            } else {
-                row.step();
-            }
+        let place = |t: f64| {
+            let point = leg.at(t);
+            let (x, y) = self.in_cells(point.xy());
+            [x, y, point.z]
+        };
+        self.cells().height_range(place(t0), place(t1))
+    }
+
+    fn cells(&self) -> Cells<'_, f64> {
+        Cells {
+            columns: self.columns,
+            rows: self.rows,
+            elevations: &self.elevations,
         }
     }
 
@@ -113,123 +89,12 @@ impl Grid {
         let offset = (point - self.origin) / self.cell;
         (offset.x, offset.y)
     }
-
-    /// The place on the grid nearest to `(x, y)`, all in cells.
-    fn onto_grid(&self, (x, y): (f64, f64)) -> (f64, f64) {
-        let onto = |value: f64, nodes: usize| value.clamp(0.0, (nodes - 1) as f64);
-        (onto(x, self.columns), onto(y, self.rows))
-    }
-
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "both coordinates lie on the grid, between 0 and the number of nodes"
-    )]
-    fn patch(&self, x: f64, y: f64) -> Patch {
-        self.patch_at(
-            (x as usize).min(self.columns - 2),
-            (y as usize).min(self.rows - 2),
-        )
-    }
-
-    fn patch_at(&self, column: usize, row: usize) -> Patch {
-        let south = row * self.columns + column;
-        let north = south + self.columns;
-        let z = &self.elevations;
-        Patch {
-            column: column as f64,
-            row: row as f64,
-            z00: z[south],
-            zx: z[south + 1] - z[south],
-            zy: z[north] - z[south],
-            zxy: z[north + 1] - z[north] - z[south + 1] + z[south],
-        }
-    }
 }
 
 /// The `t` at which `a + (b - a) t` is `value`; infinite when nowhere.
 fn share_of_way(a: f64, b: f64, value: f64) -> f64 {
     let t = (value - a) / (b - a);
     if t.is_nan() { f64::INFINITY } else { t }
-}
-
-/// The columns, or the rows, that a way from `a` to `b` crosses.
-struct Walk {
-    /// The one where it is.
-    cell: usize,
-    /// The share of the way at which it leaves this for the next; infinite when never.
-    leave: f64,
-    a: f64,
-    /// 1 over the way.
-    inverse: f64,
-    last: usize,
-}
-
-impl Walk {
-    /// Over so many nodes, both ends among them.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the way lies on the grid, between 0 and the number of nodes"
-    )]
-    fn new(a: f64, b: f64, nodes: usize) -> Self {
-        let last = nodes - 2;
-        let cell = (a as usize).min(last);
-        // On a line, a way down begins in the cell before it.
-        let before = b < a && cell > 0 && a <= cell as f64;
-        let mut walk = Self {
-            cell: if before { cell - 1 } else { cell },
-            leave: f64::INFINITY,
-            a,
-            inverse: 1.0 / (b - a),
-            last,
-        };
-        walk.look();
-        walk
-    }
-
-    /// Into the next.
-    fn step(&mut self) {
-        if self.inverse > 0.0 {
-            self.cell += 1;
-        } else {
-            self.cell -= 1;
-        }
-        self.look();
-    }
-
-    /// Where the cell ends; the first and the last have no end.
-    fn look(&mut self) {
-        let line = if self.inverse > 0.0 {
-            self.cell + 1
-        } else {
-            self.cell
-        };
-        let open = self.inverse.is_finite() && 0 < line && line <= self.last;
-        self.leave = if open {
-            (line as f64 - self.a) * self.inverse
-        } else {
-            f64::INFINITY
-        };
-    }
-}
-
-impl Patch {
-    /// Height above this patch's ground along the way from `(x0, y0)` to `(x1, y1)` at `z0` to `z1`.
-    fn height_below(
-        &self,
-        (x0, y0): (f64, f64),
-        (x1, y1): (f64, f64),
-        (z0, z1): (f64, f64),
-    ) -> Quadratic {
-        let (x, y) = (x0 - self.column, y0 - self.row);
-        let (dx, dy) = (x1 - x0, y1 - y0);
-        Quadratic {
-            a: -self.zxy * dx * dy,
-            b: (z1 - z0) - self.zx * dx - self.zy * dy - self.zxy * (x * dy + y * dx),
-            c: z0 - self.z00 - self.zx * x - self.zy * y - self.zxy * x * y,
-        }
-    }
 }
 
 #[cfg(test)]

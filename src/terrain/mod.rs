@@ -2,14 +2,21 @@
 //!
 //! Adding a kind is one file beside `flat.rs` and one variant of [`Terrain`].
 
+mod blocks;
+mod cells;
+pub mod dem;
 mod flat;
 mod grid;
 mod peaks;
 
+pub(crate) use blocks::Blocks;
+pub use dem::Dem;
 pub use flat::Flat;
 pub use grid::Grid;
 pub(crate) use peaks::NEGLIGIBLE;
 pub use peaks::{Peak, Peaks};
+
+use std::sync::Arc;
 
 use crate::geometry::{Point2, Rect, Segment};
 
@@ -22,6 +29,8 @@ pub enum Terrain {
     Peaks(Peaks),
     /// Elevations at the nodes of a grid, bilinear between.
     Grid(Grid),
+    /// Elevations out of a file.
+    Dem(Arc<Dem>),
 }
 
 /// Least and greatest height above ground along a part of a leg, metres.
@@ -60,7 +69,7 @@ impl HeightRange {
 }
 
 impl Terrain {
-    /// Elevation of the ground at `point`, metres in the frame. Beyond a grid's edge, that of the
+    /// Elevation of the ground at `point`, metres in the frame. Beyond the edge of a grid or a file, that of the
     /// edge; no waypoint may lie there.
     #[must_use]
     pub fn elevation(&self, point: Point2) -> f64 {
@@ -68,17 +77,19 @@ impl Terrain {
             Self::Flat(flat) => flat.elevation,
             Self::Peaks(peaks) => peaks.elevation(point),
             Self::Grid(grid) => grid.elevation(point),
+            Self::Dem(dem) => dem.elevation(point),
         }
     }
 
     /// Least and greatest height above ground over the part `window` of `leg`: exact on flat
-    /// ground and grids, to a nanometre over peaks.
+    /// ground and grids, to a nanometre over peaks, to half a millimetre over files.
     #[must_use]
     pub fn height_range(&self, leg: &Segment, window: (f64, f64)) -> HeightRange {
         match self {
             Self::Flat(flat) => flat.height_range(leg, window),
             Self::Peaks(peaks) => peaks.height_range(leg, window),
             Self::Grid(grid) => grid.height_range(leg, window),
+            Self::Dem(dem) => dem.height_range(leg, window),
         }
     }
 
@@ -99,6 +110,7 @@ impl Terrain {
         };
         let range = match self {
             Self::Peaks(peaks) => peaks.height_range_beyond(leg, window, band),
+            Self::Dem(dem) => dem.height_range_beyond(leg, window, band),
             Self::Flat(_) | Self::Grid(_) => self.height_range(leg, window),
         };
         ((floor - range.min).max(0.0), (range.max - ceiling).max(0.0))
@@ -110,6 +122,7 @@ impl Terrain {
         match self {
             Self::Flat(_) | Self::Peaks(_) => None,
             Self::Grid(grid) => Some(grid.extent()),
+            Self::Dem(dem) => Some(dem.extent()),
         }
     }
 
@@ -117,7 +130,8 @@ impl Terrain {
     #[must_use]
     pub fn tolerance(&self) -> f64 {
         match self {
-            Self::Peaks(_) => 1e-3,
+            // Of a file: a tenth of it for chords, the rest for what maps cells onto the plane.
+            Self::Peaks(_) | Self::Dem(_) => 1e-3,
             Self::Flat(_) | Self::Grid(_) => 0.0,
         }
     }

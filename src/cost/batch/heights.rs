@@ -1,5 +1,5 @@
 //! The band and the ground in lanes: most legs are proven to keep within them; the rest are measured,
-//! above peaks in lanes, too, above grids by the scalar code.
+//! above peaks in lanes, too, above grids and files by the scalar code.
 
 use pulp::Simd;
 
@@ -38,6 +38,8 @@ enum Surface {
     Flat(f64),
     Peaks(Massif),
     Grid(Pyramid),
+    /// Which looks at blocks of itself first.
+    Dem,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -91,6 +93,7 @@ impl Heights {
                 Terrain::Flat(flat) => Surface::Flat(flat.elevation),
                 Terrain::Peaks(peaks) => Surface::Peaks(Massif::of(peaks)),
                 Terrain::Grid(grid) => Surface::Grid(Pyramid::of(grid)),
+                Terrain::Dem(_) => Surface::Dem,
             },
         }
     }
@@ -177,11 +180,11 @@ impl Pricer<'_> {
                     })
                 });
             }
-            Surface::Grid(pyramid) => {
+            Surface::Grid(_) | Surface::Dem => {
                 let in_zone = inside.met().row();
                 return none.map(|lane, _| {
                     self.measured(&leg.segment(lane), in_zone[lane], |leg, section| {
-                        self.beyond_grid(pyramid, leg, section)
+                        self.beyond_cells(leg, section)
                     })
                 });
             }
@@ -227,12 +230,14 @@ impl Pricer<'_> {
         terrain.excess(leg, window, section.floor, section.ceiling)
     }
 
-    /// As `beyond`, of a whole section above a grid.
-    fn beyond_grid(&self, pyramid: &Pyramid, leg: &Segment, section: &Section) -> (f64, f64) {
+    /// As `beyond`, of a whole section above the cells of a grid or a file.
+    fn beyond_cells(&self, leg: &Segment, section: &Section) -> (f64, f64) {
         let overlooked = self.heights.overlooked;
         let limits = (section.floor - overlooked, section.ceiling + overlooked);
         let window = (section.t0, section.t1);
-        if pyramid.clears(leg, window, limits) {
+        if let Surface::Grid(pyramid) = &self.heights.surface
+            && pyramid.clears(leg, window, limits)
+        {
             return (0.0, 0.0);
         }
         if self.verdict {
@@ -295,7 +300,7 @@ impl Pricer<'_> {
         match &self.heights.surface {
             Surface::Flat(elevation) => point.x.with(*elevation),
             Surface::Peaks(massif) => massif.elevation(point),
-            Surface::Grid(_) => point.x.map(|lane, _| {
+            Surface::Grid(_) | Surface::Dem => point.x.map(|lane, _| {
                 let below = row.get(part * S::F64_LANES + lane).xy();
                 self.model.scenario.terrain.elevation(below)
             }),
@@ -310,7 +315,7 @@ impl Pricer<'_> {
         let ground = match &self.heights.surface {
             Surface::Flat(elevation) => leg.splat(*elevation),
             Surface::Peaks(_) => panorama.ground(),
-            Surface::Grid(_) => leg.b.z.map(|lane, _| {
+            Surface::Grid(_) | Surface::Dem => leg.b.z.map(|lane, _| {
                 let below = leg.segment(lane).b.xy();
                 self.model.scenario.terrain.elevation(below)
             }),

@@ -173,7 +173,7 @@ fn bends(model: &Model, shapes: &[Vec<Point3>]) -> usize {
         );
     let least = match model.scenario.terrain {
         Terrain::Flat(_) => COARSE,
-        Terrain::Peaks(_) | Terrain::Grid(_) => COARSE_OVER_HILLS,
+        Terrain::Peaks(_) | Terrain::Grid(_) | Terrain::Dem(_) => COARSE_OVER_HILLS,
     };
     priced()
         .filter(|(fitness, _)| {

@@ -79,7 +79,7 @@ fn places(model: &Model) -> Vec<Point3> {
     );
     let count = match scenario.terrain {
         Terrain::Flat(_) => PLACES,
-        Terrain::Peaks(_) | Terrain::Grid(_) => PLACES_OVER_HILLS,
+        Terrain::Peaks(_) | Terrain::Grid(_) | Terrain::Dem(_) => PLACES_OVER_HILLS,
     };
     let step = (std::f64::consts::PI * long * wide / (0.866 * count as f64)).sqrt();
     let middle = nalgebra::center(&start, &target);

@@ -114,6 +114,9 @@ enum WireTerrain<'a> {
         #[serde(serialize_with = "figures")]
         elevations: &'a [f64],
     },
+    Dataset {
+        name: &'a str,
+    },
 }
 
 #[derive(Serialize)]
@@ -333,6 +336,7 @@ impl<'a> WireTerrain<'a> {
                 rows: grid.rows,
                 elevations: &grid.elevations,
             },
+            Terrain::Dem(dem) => Self::Dataset { name: dem.name() },
         }
     }
 }

@@ -196,6 +196,10 @@ impl Heights {
                     None,
                 )
             }
+            Terrain::Dem(dem) => {
+                let [low, high] = dem.elevations();
+                (low, high, None)
+            }
         };
         let band = scenario.altitude;
         let ends = [scenario.start, scenario.target]

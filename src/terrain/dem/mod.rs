@@ -1,0 +1,402 @@
+//! Digital elevation models: files of elevations, and the ground of a scenario cut out of one.
+//!
+//! A [`Dataset`] is a file that has been looked at: its headers, no samples. [`Dataset::survey`] reads
+//! all of it once, strip by strip, as an upload is checked; [`Dataset::ground`] reads the samples under
+//! one scenario. Deliberately absent: names, catalogues, uploads, and guesses: where a file holds no
+//! elevation, there is no ground.
+
+mod ascii_grid;
+mod coverage;
+mod crs;
+mod error;
+mod fit;
+mod geotiff;
+mod ground;
+mod hgt;
+mod lattice;
+mod raster;
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+pub use crs::Crs;
+pub use error::DemError;
+pub use ground::Dem;
+pub use lattice::{Degrees, Lattice};
+pub use raster::Raster;
+use raster::{Span, Visit};
+
+use crate::geometry::Rect;
+use crate::geometry::geodesy::{LatLon, TangentPlane};
+
+/// Most samples of a file, so that what is read of it ends.
+pub const MOST_SAMPLES: u64 = 1 << 30;
+
+/// Most columns, and most rows, so that a row is never large.
+pub const MOST_ALONG: u64 = 1 << 18;
+
+/// A file format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// `GeoTIFF`, cloud-optimised ones among them.
+    GeoTiff,
+    /// ESRI ASCII grid, `.asc`.
+    AsciiGrid,
+    /// SRTM tiles, `.hgt`.
+    Hgt,
+}
+
+/// What is known of a file besides its content.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Declared<'a> {
+    /// Its format; `None` lets the content tell.
+    pub format: Option<Format>,
+    /// Its reference system, such as `EPSG:32616`, for files that name none.
+    pub crs: Option<&'a str>,
+    /// The name to go by where the path is not the file's own; that of an SRTM tile is where it
+    /// belongs, such as `N36W085.hgt`.
+    pub name: Option<&'a str>,
+}
+
+/// The type of the samples in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SampleType {
+    /// 8 bits without sign.
+    U8,
+    /// 8 bits with sign.
+    I8,
+    /// 16 bits without sign.
+    U16,
+    /// 16 bits with sign.
+    I16,
+    /// 32 bits without sign.
+    U32,
+    /// 32 bits with sign.
+    I32,
+    /// Single precision.
+    F32,
+    /// Double precision; read as single, 0.06 mm at 1000 m.
+    F64,
+    /// Decimal text; read as single precision.
+    Text,
+}
+
+/// What a file's headers say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Metadata {
+    /// The file's.
+    pub format: Format,
+    /// Where the samples stand.
+    pub lattice: Lattice,
+    /// The outermost samples, degrees.
+    pub degrees: Degrees,
+    /// Of a sample.
+    pub sample_type: SampleType,
+    /// What a sample holds where nothing is known.
+    pub no_data: Option<f64>,
+}
+
+/// What all samples of a file say together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Survey {
+    /// Lowest elevation, metres; infinite when no sample holds any.
+    pub min: f64,
+    /// Highest, metres; infinite likewise.
+    pub max: f64,
+    /// Samples without data, as a share of all.
+    pub no_data_share: f64,
+}
+
+/// A file whose headers have been read and found right.
+#[derive(Debug, Clone)]
+pub struct Dataset {
+    path: PathBuf,
+    metadata: Metadata,
+    reader: Reader,
+}
+
+/// How to find the samples.
+#[derive(Debug, Clone)]
+enum Reader {
+    GeoTiff(Arc<geotiff::Layout>),
+    AsciiGrid(ascii_grid::Layout),
+    Hgt(hgt::Layout),
+}
+
+impl SampleType {
+    /// Length of a binary sample.
+    fn bytes(self) -> usize {
+        match self {
+            Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 => 2,
+            Self::U32 | Self::I32 | Self::F32 | Self::Text => 4,
+            Self::F64 => 8,
+        }
+    }
+}
+
+/// Look at the headers of the file at `path`.
+///
+/// An ESRI ASCII grid without `crs` is taken to be in EPSG:4326 when its extent fits into degrees.
+///
+/// # Errors
+/// Every [`DemError`] but [`DemError::Outside`], [`DemError::NoData`] and [`DemError::Elevation`].
+pub fn open(path: &Path, declared: Declared<'_>) -> Result<Dataset, DemError> {
+    let len = std::fs::metadata(path)?.len();
+    let format = format(path, len, declared.format)?;
+    let said = declared.crs.map(Crs::parse).transpose()?;
+    let own_name = path
+        .file_name()
+        .and_then(|name| name.to_str())
+        .unwrap_or_default();
+    let (reader, lattice, sample_type, no_data) = match format {
+        Format::GeoTiff => {
+            let headers = geotiff::open(path)?;
+            let crs = agreed(said, headers.crs)?.ok_or(DemError::NoCrs)?;
+            let lattice = Lattice {
+                crs,
+                columns: headers.columns,
+                rows: headers.rows,
+                first: headers.first,
+                step: headers.step,
+            };
+            let reader = Reader::GeoTiff(Arc::new(headers.layout));
+            (reader, lattice, headers.sample, headers.no_data)
+        }
+        Format::AsciiGrid => {
+            let layout = ascii_grid::open(path, len)?;
+            let lattice = layout.lattice(said.clone().unwrap_or_else(Crs::wgs84));
+            let [[west, east], [south, north]] = lattice.extent();
+            let fits = -180.0 <= west && east <= 180.0 && -90.0 <= south && north <= 90.0;
+            if said.is_none() && !fits {
+                return Err(DemError::NoCrs);
+            }
+            let no_data = Some(layout.no_data);
+            (
+                Reader::AsciiGrid(layout),
+                lattice,
+                SampleType::Text,
+                no_data,
+            )
+        }
+        Format::Hgt => {
+            let (layout, lattice) = hgt::open(len, declared.name.unwrap_or(own_name))?;
+            agreed(said, Some(lattice.crs.clone()))?;
+            (
+                Reader::Hgt(layout),
+                lattice,
+                SampleType::I16,
+                Some(hgt::NO_DATA),
+            )
+        }
+    };
+    let degrees = check(format, &lattice)?;
+    Ok(Dataset {
+        path: path.to_owned(),
+        metadata: Metadata {
+            format,
+            lattice,
+            degrees,
+            sample_type,
+            no_data,
+        },
+        reader,
+    })
+}
+
+/// What the content of a file says that it is.
+fn format(path: &Path, len: u64, said: Option<Format>) -> Result<Format, DemError> {
+    let mut beginning = Vec::new();
+    File::open(path)?.take(256).read_to_end(&mut beginning)?;
+    let found = if geotiff::is_tiff(&beginning) {
+        Format::GeoTiff
+    } else if ascii_grid::is_grid(&beginning) {
+        Format::AsciiGrid
+    } else if hgt::is_tile(len) {
+        Format::Hgt
+    } else {
+        return Err(DemError::UnknownFormat);
+    };
+    match said.filter(|said| *said != found) {
+        Some(said) => Err(DemError::OtherFormat { said, found }),
+        None => Ok(found),
+    }
+}
+
+/// The reference system of a file, when its own and the one that is said do not differ.
+fn agreed(said: Option<Crs>, found: Option<Crs>) -> Result<Option<Crs>, DemError> {
+    match (said, found) {
+        (Some(said), Some(found)) if said != found => Err(DemError::OtherCrs {
+            said: said.to_string(),
+            found: found.to_string(),
+        }),
+        (said, found) => Ok(found.or(said)),
+    }
+}
+
+/// That a lattice is of a size that can be read and on the earth; its extent in degrees.
+fn check(format: Format, lattice: &Lattice) -> Result<Degrees, DemError> {
+    let [columns, rows] = [lattice.columns, lattice.rows].map(|count| count as u64);
+    for (what, value, limit) in [
+        ("the number of columns", columns, MOST_ALONG),
+        ("the number of rows", rows, MOST_ALONG),
+        (
+            "the number of samples",
+            columns.saturating_mul(rows),
+            MOST_SAMPLES,
+        ),
+    ] {
+        if value > limit {
+            return Err(DemError::TooLarge { what, value, limit });
+        }
+    }
+    let [[west, east], [south, north]] = lattice.extent();
+    let astray = || {
+        DemError::malformed(
+            format,
+            format!(
+                "it reaches from {west} to {east} east and from {south} to {north} north, which {} does not",
+                lattice.crs
+            ),
+        )
+    };
+    if lattice.crs.is_geographic() && (east - west > 360.0 || west < -360.0 || east > 720.0) {
+        return Err(astray());
+    }
+    lattice.degrees().ok_or_else(astray)
+}
+
+impl Dataset {
+    /// What the headers say.
+    #[must_use]
+    pub fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    /// Read every sample once, in bounded memory; this finds what is cut off or damaged.
+    ///
+    /// # Errors
+    /// [`DemError::Malformed`], [`DemError::Io`], [`DemError::Elevation`].
+    pub fn survey(&self) -> Result<Survey, DemError> {
+        let lattice = &self.metadata.lattice;
+        let (mut min, mut max, mut known) = (f32::INFINITY, f32::NEG_INFINITY, 0_usize);
+        self.read(&lattice.span(), &mut |_, _, samples| {
+            for sample in samples.iter().filter(|sample| !sample.is_nan()) {
+                (min, max) = (min.min(*sample), max.max(*sample));
+                known += 1;
+            }
+            Ok(())
+        })?;
+        Ok(Survey {
+            min: min.into(),
+            max: max.into(),
+            no_data_share: 1.0 - known as f64 / (lattice.columns * lattice.rows) as f64,
+        })
+    }
+
+    /// The elevations at `places`, metres, bilinear; `None` outside the data and beside no-data. Reads the file
+    /// once.
+    ///
+    /// # Errors
+    /// As [`Dataset::survey`].
+    pub fn sample(&self, places: &[LatLon]) -> Result<Vec<Option<f64>>, DemError> {
+        let lattice = &self.metadata.lattice;
+        let cells: Vec<_> = places
+            .iter()
+            .map(|place| lattice.cells(*place).and_then(|cells| lattice.cell(cells)))
+            .collect();
+        let mut nodes = BTreeMap::new();
+        for ([column, row], _) in cells.iter().flatten() {
+            for node in [
+                [*row, *column],
+                [*row, column + 1],
+                [row + 1, *column],
+                [row + 1, column + 1],
+            ] {
+                nodes.insert(node, f32::NAN);
+            }
+        }
+        self.read(&lattice.span(), &mut |row, column, samples| {
+            for ([_, at], node) in nodes.range_mut([row, column]..[row, column + samples.len()]) {
+                *node = samples[at - column];
+            }
+            Ok(())
+        })?;
+        let elevation = |([column, row], [x, y]): ([usize; 2], [f64; 2])| {
+            let at = |row, column| f64::from(nodes[&[row, column]]);
+            let along = |row| at(row, column) + x * (at(row, column + 1) - at(row, column));
+            let (above, below) = (along(row), along(row + 1));
+            let elevation = above + y * (below - above);
+            (!elevation.is_nan()).then_some(elevation)
+        };
+        Ok(cells
+            .into_iter()
+            .map(|cell| cell.and_then(elevation))
+            .collect())
+    }
+
+    /// The largest part of `wanted` (metres on `plane`) that lies over the file's samples, no-data or not;
+    /// `None` where there is none. What an area defaults to.
+    #[must_use]
+    pub fn covered(&self, plane: &TangentPlane, wanted: Rect) -> Option<Rect> {
+        coverage::covered(&self.metadata.lattice, plane, wanted)
+    }
+
+    /// The ground under `area`, metres on `plane`, read from the file; `margin` metres more are taken on each side
+    /// where there are data, for what may leave the area. At most `most_nodes` samples are kept.
+    ///
+    /// # Errors
+    /// [`DemError::Outside`] and [`DemError::NoData`] when not every point of `area` has an elevation,
+    /// [`DemError::TooLarge`], or as [`Dataset::survey`].
+    pub fn ground(
+        &self,
+        plane: &TangentPlane,
+        area: Rect,
+        margin: f64,
+        most_nodes: usize,
+    ) -> Result<Dem, DemError> {
+        let lattice = &self.metadata.lattice;
+        let span = coverage::span(lattice, plane, area, margin)?;
+        let nodes = span.rows.len() * span.columns.len();
+        if nodes > most_nodes {
+            return Err(DemError::TooLarge {
+                what: "the number of samples under the area",
+                value: nodes as u64,
+                limit: most_nodes as u64,
+            });
+        }
+        let mut raster = Raster::new(lattice, &span);
+        self.read(&span, &mut |row, column, samples| {
+            raster.keep(row, column, samples);
+            Ok(())
+        })?;
+        Dem::new(raster, plane, area, margin)
+    }
+
+    /// Read the samples of `span`, and maybe others.
+    fn read(&self, span: &Span, visit: &mut Visit<'_>) -> Result<(), DemError> {
+        let mut checked = |row: usize, column: usize, samples: &[f32]| {
+            raster::check_elevations(row, column, samples)?;
+            visit(row, column, samples)
+        };
+        match &self.reader {
+            Reader::GeoTiff(layout) => layout.read(&self.path, span, &mut checked),
+            Reader::AsciiGrid(layout) => layout.read(&self.path, span, &mut checked),
+            Reader::Hgt(layout) => layout.read(&self.path, span, &mut checked),
+        }
+    }
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::GeoTiff => "GeoTIFF",
+            Self::AsciiGrid => "ESRI ASCII grid",
+            Self::Hgt => "SRTM .hgt",
+        })
+    }
+}

@@ -23,6 +23,9 @@ pub mod planner;
 pub mod export;
 pub mod job;
 
+// Which datasets there are, and where their bytes lie.
+pub mod catalogue;
+
 // Where plans are kept, who runs them, and how the world reaches them.
 pub mod store;
 pub mod worker;

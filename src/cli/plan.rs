@@ -13,6 +13,7 @@ use clap::builder::PossibleValuesParser;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::exit;
+use crate::catalogue::Mounted;
 use crate::export::document::{Origin, ResultDocument, Timing};
 use crate::export::sha256_hex;
 use crate::export::{self, Format, ResultInput};
@@ -29,6 +30,9 @@ pub(super) struct Arguments {
     /// Where the result goes [default: standard output]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Directory of the datasets that the scenario may name
+    #[arg(long, env = "NOCTULE_TERRAIN_DIR", value_name = "DIR")]
+    terrain_dir: Option<PathBuf>,
     /// What the result is written as [default: by the extension of --out, else json]
     #[arg(long, value_parser = PossibleValuesParser::new(export::ALL.iter().map(|format| format.name)))]
     format: Option<String>,
@@ -50,6 +54,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let text = read(&arguments.file)
         .with_context(|| format!("cannot read {}", arguments.file.display()))?;
     let rules = planner::rules(Limits::default());
+    let rules = match &arguments.terrain_dir {
+        Some(directory) => rules.with_datasets(Arc::new(Mounted::open(directory)?)),
+        None => rules,
+    };
     let scenario = match json::read(&text, &rules, draw_seed()).and_then(without_a_store) {
         Ok(scenario) => scenario,
         Err(refusal) => {

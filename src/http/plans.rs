@@ -185,6 +185,7 @@ async fn accept(state: &AppState, caller: &Caller, document: Bytes) -> Result<Su
         quota,
         webhook: None,
         idempotency: None,
+        dataset: None,
     };
     if short {
         Ok(submission())

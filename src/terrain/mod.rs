@@ -4,12 +4,14 @@
 
 mod blocks;
 mod cells;
+mod datasets;
 pub mod dem;
 mod flat;
 mod grid;
 mod peaks;
 
 pub(crate) use blocks::Blocks;
+pub use datasets::{DatasetError, Datasets, Found, NoDatasets, is_dataset_name};
 pub use dem::Dem;
 pub use flat::Flat;
 pub use grid::Grid;

@@ -21,6 +21,7 @@ pub mod planner;
 
 // What people take away, and the life of a plan.
 pub mod export;
+pub mod import;
 pub mod job;
 
 // Which datasets there are, and where their bytes lie.

@@ -54,10 +54,14 @@ impl Directories {
         Ok(opened)
     }
 
-    fn is_mounted(&self, name: &str) -> Result<bool, CatalogueError> {
-        self.mounted
-            .as_ref()
-            .map_or(Ok(false), |mounted| mounted.has(name))
+    /// What is mounted is not to be changed from here.
+    fn check_not_mounted(&self, name: &str) -> Result<(), CatalogueError> {
+        match &self.mounted {
+            Some(mounted) if mounted.has(name)? => Err(CatalogueError::Mounted {
+                name: name.to_owned(),
+            }),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -124,21 +128,23 @@ impl Catalogue for Directories {
         self.uploaded()?.stage(limit)
     }
 
+    fn permit(&self, naming: &Naming) -> Result<(), CatalogueError> {
+        self.check_not_mounted(&naming.name)?;
+        self.uploaded()?.permit(naming)
+    }
+
     fn keep(&self, file: Checked, naming: &Naming) -> Result<Kept, CatalogueError> {
-        if self.is_mounted(&naming.name)? {
-            return Err(CatalogueError::Mounted {
-                name: naming.name.clone(),
-            });
-        }
-        self.uploaded()?.keep(file, naming)
+        self.check_not_mounted(&naming.name)?;
+        self.uploaded()?.keep(&file, naming)
+    }
+
+    fn removable(&self, name: &str, by: &Claim) -> Result<String, CatalogueError> {
+        self.check_not_mounted(name)?;
+        self.uploaded()?.removable(name, by)
     }
 
     fn remove(&self, name: &str, by: &Claim) -> Result<(), CatalogueError> {
-        if self.is_mounted(name)? {
-            return Err(CatalogueError::Mounted {
-                name: name.to_owned(),
-            });
-        }
+        self.check_not_mounted(name)?;
         self.uploaded()?.remove(name, by)
     }
 

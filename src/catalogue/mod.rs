@@ -50,12 +50,24 @@ pub trait Catalogue: Datasets {
     /// [`CatalogueError::Unavailable`].
     fn stage(&self, limit: u64) -> Result<Staged, CatalogueError>;
 
+    /// Whether a file may be kept so, as it stands.
+    ///
+    /// # Errors
+    /// As [`Catalogue::keep`].
+    fn permit(&self, naming: &Naming) -> Result<(), CatalogueError>;
+
     /// Keep a file that has come under a name, durably, wholly or not at all.
     ///
     /// # Errors
     /// [`CatalogueError::Mounted`], [`CatalogueError::Exists`], [`CatalogueError::Changed`],
     /// [`CatalogueError::Owned`], [`CatalogueError::Unavailable`].
     fn keep(&self, file: Checked, naming: &Naming) -> Result<Kept, CatalogueError>;
+
+    /// The sum of what a name stands for that may be taken away.
+    ///
+    /// # Errors
+    /// As [`Catalogue::remove`].
+    fn removable(&self, name: &str, by: &Claim) -> Result<String, CatalogueError>;
 
     /// Take a name away. Its content stays until nothing needs it.
     ///

@@ -187,23 +187,16 @@ impl Uploaded {
         })
     }
 
-    pub(super) fn keep(&self, file: Checked, naming: &Naming) -> Result<Kept, CatalogueError> {
+    pub(super) fn permit(&self, naming: &Naming) -> Result<(), CatalogueError> {
+        self.lock().permit(naming)
+    }
+
+    pub(super) fn keep(&self, file: &Checked, naming: &Naming) -> Result<Kept, CatalogueError> {
         let name = naming.name.clone();
         let mut state = self.lock();
-        let before = state.names.get(&name);
-        match (&naming.expected, before) {
-            (Expected::Nothing, Some(_)) => return Err(CatalogueError::Exists { name }),
-            (Expected::OneOf(_), None) => return Err(CatalogueError::Changed { name }),
-            (Expected::OneOf(sums), Some(before)) if !sums.contains(&before.sha256) => {
-                return Err(CatalogueError::Changed { name });
-            }
-            _ => {}
-        }
-        if before.is_some_and(|before| !naming.by.covers(before.owner.as_ref())) {
-            return Err(CatalogueError::Owned { name });
-        }
-        let before = before.map(|before| before.sha256.clone());
-        self.keep_content(&mut state, &file)?;
+        state.permit(naming)?;
+        let before = state.names.get(&name).map(|before| before.sha256.clone());
+        self.keep_content(&mut state, file)?;
         if before.as_ref() == Some(&file.sha256) {
             return Ok(Kept::Unchanged);
         }
@@ -246,20 +239,18 @@ impl Uploaded {
         Ok(())
     }
 
+    pub(super) fn removable(&self, name: &str, by: &Claim) -> Result<String, CatalogueError> {
+        self.lock().removable(name, by)
+    }
+
     pub(super) fn remove(&self, name: &str, by: &Claim) -> Result<(), CatalogueError> {
         let mut state = self.lock();
-        let name = name.to_owned();
-        let Some(record) = state.names.get(&name).cloned() else {
-            return Err(CatalogueError::Unknown { name });
-        };
-        if !by.covers(record.owner.as_ref()) {
-            return Err(CatalogueError::Owned { name });
-        }
-        let path = self.name(&name);
+        let sha256 = state.removable(name, by)?;
+        let path = self.name(name);
         files::remove(&path)
             .map_err(|error| CatalogueError::unavailable("removed", &path, error))?;
-        state.names.remove(&name);
-        state.asked.insert(record.sha256, Instant::now());
+        state.names.remove(name);
+        state.asked.insert(sha256, Instant::now());
         Ok(())
     }
 
@@ -309,6 +300,38 @@ impl Uploaded {
 }
 
 impl State {
+    /// Whether a name may be given to another content.
+    fn permit(&self, naming: &Naming) -> Result<(), CatalogueError> {
+        let name = naming.name.clone();
+        let before = self.names.get(&name);
+        match (&naming.expected, before) {
+            (Expected::Nothing, Some(_)) => return Err(CatalogueError::Exists { name }),
+            (Expected::OneOf(_), None) => return Err(CatalogueError::Changed { name }),
+            (Expected::OneOf(sums), Some(before))
+                if !sums.iter().any(|sum| *sum == before.sha256 || sum == "*") =>
+            {
+                return Err(CatalogueError::Changed { name });
+            }
+            _ => {}
+        }
+        if before.is_some_and(|before| !naming.by.covers(before.owner.as_ref())) {
+            return Err(CatalogueError::Owned { name });
+        }
+        Ok(())
+    }
+
+    /// The sum of what a name stands for that may be taken away.
+    fn removable(&self, name: &str, by: &Claim) -> Result<String, CatalogueError> {
+        let name = name.to_owned();
+        match self.names.get(&name) {
+            None => Err(CatalogueError::Unknown { name }),
+            Some(record) if !by.covers(record.owner.as_ref()) => {
+                Err(CatalogueError::Owned { name })
+            }
+            Some(record) => Ok(record.sha256.clone()),
+        }
+    }
+
     /// Contents that no name stands for.
     fn unnamed(&self) -> Vec<String> {
         let named: BTreeSet<&String> = self.names.values().map(|name| &name.sha256).collect();

@@ -1,12 +1,17 @@
-//! The command line: serve, plan, bench, key, store, healthcheck.
+//! The command line: serve, plan, export, convert, bench, key, store, terrain, healthcheck.
 
 mod access;
 mod bench;
+mod convert;
+mod export;
+mod files;
+mod ground;
 mod healthcheck;
 mod key;
 mod plan;
 mod serve;
 mod store;
+mod terrain;
 
 use std::process::ExitCode;
 
@@ -26,6 +31,10 @@ enum Command {
     Serve(crate::config::Flags),
     /// Plan one scenario here and now, without a server
     Plan(plan::Arguments),
+    /// Write a result that was kept as JSON in another format
+    Export(export::Arguments),
+    /// Make a scenario of a GeoJSON, a KML or a plan of QGroundControl
+    Convert(convert::Arguments),
     /// Measure the algorithms: against each other, against the best known routes, against the clock
     #[command(subcommand)]
     Bench(bench::Command),
@@ -35,6 +44,9 @@ enum Command {
     /// Copy the stored plans, or look for damage among them
     #[command(subcommand)]
     Store(store::Command),
+    /// Look into a file of elevations
+    #[command(subcommand)]
+    Terrain(terrain::Command),
     /// Ask a running service whether it is ready; for containers
     Healthcheck(healthcheck::Arguments),
 }
@@ -45,9 +57,9 @@ mod exit {
     pub(super) const DONE: u8 = 0;
     /// Anything without a code of its own, a wrong command line included.
     pub(super) const FAILED: u8 = 1;
-    /// A scenario, or a line of routes to price, is refused.
+    /// A scenario, a result, a file to convert or a line of routes to price is refused.
     pub(super) const BAD_INPUT: u8 = 2;
-    /// No feasible route was found.
+    /// No feasible route was found, or is there to export.
     pub(super) const INFEASIBLE: u8 = 3;
 }
 
@@ -70,9 +82,12 @@ pub fn run() -> ExitCode {
     let done = match command {
         Command::Serve(flags) => serve::run(&flags).map(|()| exit::DONE),
         Command::Plan(arguments) => plan::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments),
+        Command::Convert(arguments) => convert::run(&arguments),
         Command::Bench(command) => bench::run(&command),
         Command::Key(command) => key::run(&command).map(|()| exit::DONE),
         Command::Store(command) => store::run(command),
+        Command::Terrain(command) => terrain::run(&command),
         Command::Healthcheck(arguments) => healthcheck::run(&arguments).map(|()| exit::DONE),
     };
     done.unwrap_or_else(|error| {

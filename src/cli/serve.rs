@@ -16,7 +16,7 @@ use super::{access, exit};
 use crate::catalogue::{Catalogue, Directories, Mounted};
 use crate::config::{self, Config, Flags};
 use crate::http::webhook::{self, Secret, Sender};
-use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase};
+use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase, Terrains};
 use crate::job::Failure;
 use crate::planner;
 use crate::scenario::json::{self, Rules};
@@ -85,6 +85,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let router = http::router(AppState {
         store: store.clone(),
         rules,
+        terrains: Terrains::new(catalogue),
         capacity: Capacity {
             workers: config.workers,
             queue: config.queue,

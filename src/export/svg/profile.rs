@@ -118,7 +118,7 @@ fn heights(drawing: &Drawing, stations: &[Station]) -> (f64, f64) {
     let route = drawing
         .course()
         .iter()
-        .chain(&drawing.waypoints)
+        .chain(drawing.waypoints)
         .map(|point| point.z);
     let (min, max) = ground
         .chain(route)

@@ -27,7 +27,15 @@ impl Problem {
             }
             Self::BodyIncomplete => "the connection ended before the body did".to_owned(),
             Self::BodyNotGzip(detail) => format!("content-encoding is gzip, but: {detail}"),
-            Self::InvalidParameter { detail, .. } => detail.clone(),
+            Self::InvalidParameter { detail, .. }
+            | Self::NoGeodeticFrame(detail)
+            | Self::Infeasible(detail)
+            | Self::Unflyable(detail)
+            | Self::InvalidXml(detail)
+            | Self::InvalidTerrain(detail)
+            | Self::NoGround(detail)
+            | Self::PreconditionFailed(detail)
+            | Self::NoScenario { detail, .. } => detail.clone(),
             Self::KeyInUrl => {
                 "URLs are written down on their way: send the key as Authorization: Bearer, and replace this one".to_owned()
             }
@@ -43,6 +51,25 @@ impl Problem {
                 format!("nothing is at {path}; GET /docs lists what is")
             }
             Self::NoSuchPlan(id) => format!("there is no plan {id}"),
+            Self::NoSuchTerrain(name) => {
+                format!("there is no dataset {name:?}; GET /terrains lists what there is")
+            }
+            Self::TerrainInUse { name, plans } => {
+                format!("{plans} plans over {name} are queued or running; it can be deleted when they have ended")
+            }
+            Self::TerrainMounted(name) => {
+                format!("{name} is a file in the directory that the service was started with, which is only read; take another name")
+            }
+            Self::TerrainTooLarge(limit) => {
+                format!("the dataset is longer than {limit} bytes, the limit terrain_bytes of GET /limits")
+            }
+            Self::UploadStalled(limit) => {
+                let limit = limit.as_secs_f64();
+                format!("nothing came for {limit} s, or less than 8 KiB a second on the whole")
+            }
+            Self::TooManyUploads(most) => {
+                format!("{most} datasets are being uploaded, as many as may be; try again in 5 s")
+            }
             Self::MethodNotAllowed => {
                 "the header Allow lists the methods of this resource".to_owned()
             }
@@ -86,7 +113,9 @@ impl Problem {
                     "the body is longer than {limit} bytes, the limit body_bytes of GET /limits"
                 )
             }
-            Self::UnsupportedMediaType(found) => unsupported_media_type(found.as_deref()),
+            Self::UnsupportedMediaType { found, allowed } => {
+                unsupported_media_type(found.as_deref(), allowed)
+            }
             Self::UnsupportedCoding(found) => {
                 format!("content-encoding is {found}; send the body as it is, or as gzip")
             }
@@ -119,12 +148,12 @@ impl Problem {
     }
 }
 
-fn unsupported_media_type(found: Option<&str>) -> String {
+fn unsupported_media_type(found: Option<&str>, allowed: &str) -> String {
     match found {
-        None => "no content-type was sent; send application/json".to_owned(),
+        None => format!("no content-type was sent; send {allowed}"),
         Some(found) if found.starts_with("application/x-www-form-urlencoded") => format!(
             "content-type is {found}, which curl -d sends by itself; add -H 'content-type: application/json'"
         ),
-        Some(found) => format!("content-type is {found}; send application/json in UTF-8"),
+        Some(found) => format!("content-type is {found}; send {allowed} in UTF-8"),
     }
 }

@@ -1,8 +1,14 @@
 //! What goes wrong below, as problems.
 
+use std::io::ErrorKind;
+
 use super::Problem;
+use crate::catalogue::CatalogueError;
+use crate::export::ExportError;
+use crate::http::auth::Scope;
+use crate::import::ImportError;
 use crate::scenario::json::Refusal;
-use crate::store::StoreError;
+use crate::store::{StoreError, Trouble};
 
 impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
@@ -47,7 +53,86 @@ impl From<Refusal> for Problem {
                 pointer,
                 detail,
             },
-            Refusal::Invalid(faults) => Self::InvalidScenario(faults),
+            Refusal::Invalid(faults) => {
+                let mut codes = faults.iter().map(|fault| fault.code);
+                if codes.any(|code| code == "unreachable-datasets") {
+                    return Self::unreachable_datasets(&faults[0].detail);
+                }
+                Self::InvalidScenario(faults)
+            }
+        }
+    }
+}
+
+impl From<ExportError> for Problem {
+    fn from(error: ExportError) -> Self {
+        let detail = error.to_string();
+        match error {
+            ExportError::NoGeodeticFrame { .. } => Self::NoGeodeticFrame(detail),
+            ExportError::Infeasible { .. } => Self::Infeasible(detail),
+            ExportError::Unflyable(detail) => Self::Unflyable(detail),
+            ExportError::Option(fault) => Self::InvalidParameter {
+                name: fault.name,
+                detail: fault.detail,
+            },
+            ExportError::NoGround(_) => Self::NoGround(detail),
+            ExportError::Damaged(_) => {
+                tracing::error!(%error, "a stored plan cannot be read");
+                Self::Internal
+            }
+        }
+    }
+}
+
+impl Problem {
+    /// The caller is not to blame.
+    pub(in crate::http) fn unreachable_datasets(error: &str) -> Self {
+        tracing::error!(error, "the datasets cannot be reached");
+        Self::StoreUnavailable(Some(Trouble::Other))
+    }
+}
+
+impl From<CatalogueError> for Problem {
+    fn from(error: CatalogueError) -> Self {
+        let detail = error.to_string();
+        match error {
+            CatalogueError::Unknown { name } => Self::NoSuchTerrain(name),
+            CatalogueError::Mounted { name } => Self::TerrainMounted(name),
+            CatalogueError::Exists { .. } | CatalogueError::Changed { .. } => {
+                Self::PreconditionFailed(detail)
+            }
+            CatalogueError::Owned { .. } => Self::Forbidden(Scope::Admin),
+            CatalogueError::Unreadable(_) => Self::InvalidTerrain(detail),
+            CatalogueError::TooLarge { limit } => Self::TerrainTooLarge(limit),
+            CatalogueError::Unavailable { error, .. } => {
+                tracing::error!(error = detail, "the datasets cannot be reached");
+                Self::StoreUnavailable(Some(match error.kind() {
+                    ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Trouble::Full,
+                    ErrorKind::ReadOnlyFilesystem | ErrorKind::PermissionDenied => {
+                        Trouble::ReadOnly
+                    }
+                    _ => Trouble::Other,
+                }))
+            }
+        }
+    }
+}
+
+impl From<ImportError> for Problem {
+    fn from(error: ImportError) -> Self {
+        match error {
+            ImportError::NotJson {
+                line,
+                column,
+                detail,
+            } => Self::InvalidJson {
+                line,
+                column,
+                pointer: String::new(),
+                detail,
+            },
+            ImportError::NotXml(detail) => Self::InvalidXml(detail),
+            ImportError::NoScenario { detail, unused } => Self::NoScenario { detail, unused },
         }
     }
 }

@@ -19,6 +19,7 @@ use axum::response::{IntoResponse, Response};
 pub(super) use document::FailureDocument;
 
 use super::auth::{Scope, TooMany, Unauthorized};
+use crate::import::Unused;
 use crate::job::{Failure, PlanId, Status};
 use crate::scenario::json::Fault;
 use crate::store::{Tombstone, Trouble};
@@ -30,6 +31,29 @@ pub(super) enum Problem {
     NoSuchResource(String),
     /// There never was such a plan, or nothing with that name can be one.
     NoSuchPlan(String),
+    /// No dataset is called so.
+    NoSuchTerrain(String),
+    /// The file cannot be used as a dataset; why.
+    InvalidTerrain(String),
+    /// Plans are queued or running over the dataset.
+    TerrainInUse {
+        /// Its name.
+        name: String,
+        /// How many.
+        plans: u64,
+    },
+    /// The dataset is a file of the operator's.
+    TerrainMounted(String),
+    /// The dataset that a plan was made over is not there any more; why.
+    NoGround(String),
+    /// A dataset is not what the request expects; which.
+    PreconditionFailed(String),
+    /// A dataset is too long; the limit in bytes.
+    TerrainTooLarge(u64),
+    /// A dataset came too slowly; how long it may pause.
+    UploadStalled(Duration),
+    /// As many datasets are coming in as may.
+    TooManyUploads(usize),
     /// The plan was removed.
     Gone(Tombstone),
     /// The path exists, the method does not; axum adds `Allow`.
@@ -42,7 +66,12 @@ pub(super) enum Problem {
         available: Vec<&'static str>,
     },
     /// The body is of another kind, or of an unnamed one.
-    UnsupportedMediaType(Option<String>),
+    UnsupportedMediaType {
+        /// What it is said to be.
+        found: Option<String>,
+        /// What it may be.
+        allowed: &'static str,
+    },
     /// The body is compressed or otherwise coded; how.
     UnsupportedCoding(String),
     /// The body is too long; the limit in bytes.
@@ -97,6 +126,21 @@ pub(super) enum Problem {
         /// Why, when it failed.
         failure: Option<Failure>,
     },
+    /// The format needs degrees, the plan has metres; what would help.
+    NoGeodeticFrame(String),
+    /// The format is for flying, the route breaks constraints; what would help.
+    Infeasible(String),
+    /// No mission can be made as the options ask; why.
+    Unflyable(String),
+    /// The body is not XML that is read here; what the reader met.
+    InvalidXml(String),
+    /// The body is well-formed and holds no scenario.
+    NoScenario {
+        /// Why.
+        detail: String,
+        /// What it holds instead.
+        unused: Vec<Unused>,
+    },
     /// As many plans wait as may.
     QueueFull {
         /// How many.
@@ -142,7 +186,7 @@ impl Problem {
             | Self::RateLimited { retry_after_s }
             | Self::Draining { retry_after_s } => Some(*retry_after_s),
             Self::StoreUnavailable(_) | Self::IdempotencyInFlight => Some(1),
-            Self::TooManyStreams(_) => Some(5),
+            Self::TooManyStreams(_) | Self::TooManyUploads(_) => Some(5),
             _ => None,
         }
     }

@@ -161,6 +161,26 @@ pub enum Refusal {
     Invalid(Vec<Fault>),
 }
 
+impl Refusal {
+    /// The fault of a dataset that is not there or cannot be used, when there is one: a document that was
+    /// accepted before can have no other.
+    #[must_use]
+    pub fn lost_ground(&self) -> Option<&Fault> {
+        let Self::Invalid(faults) = self else {
+            return None;
+        };
+        faults.iter().find(|fault| {
+            [
+                "unknown-dataset",
+                "replaced-dataset",
+                "unreadable-dataset",
+                "unreachable-datasets",
+            ]
+            .contains(&fault.code)
+        })
+    }
+}
+
 /// The faults, one a line.
 struct Lines<'a>(&'a [Fault]);
 

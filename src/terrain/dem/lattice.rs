@@ -8,6 +8,9 @@ use crate::geometry::geodesy::{LatLon, TangentPlane};
 /// Points looked at along each edge of a region.
 pub(super) const LOOKS: usize = 32;
 
+/// What lies outside by no more than this, cells, does so by rounding.
+const HAIR: f64 = 1e-9;
+
 /// Nodes, one for each sample, at `first + [column * step[0], row * step[1]]`.
 ///
 /// A node is where its sample holds: the middle of a pixel where pixels are areas, the pixel itself where
@@ -97,10 +100,14 @@ impl Lattice {
     )]
     pub(super) fn cell(&self, cells: [f64; 2]) -> Option<([usize; 2], [f64; 2])> {
         let counts = [self.columns, self.rows];
-        let inside = |axis: usize| (0.0..=(counts[axis] - 1) as f64).contains(&cells[axis]);
+        let inside =
+            |axis: usize| (-HAIR..=(counts[axis] - 1) as f64 + HAIR).contains(&cells[axis]);
         (inside(0) && inside(1)).then(|| {
             let cell = [0, 1].map(|axis| (cells[axis] as usize).min(counts[axis] - 2));
-            (cell, [0, 1].map(|axis| cells[axis] - cell[axis] as f64))
+            (
+                cell,
+                [0, 1].map(|axis| (cells[axis] - cell[axis] as f64).clamp(0.0, 1.0)),
+            )
         })
     }
 

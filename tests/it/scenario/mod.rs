@@ -16,6 +16,7 @@ use noctule::terrain::Terrain;
 use noctule::threat::Shape;
 
 use cases::all_cases;
+pub(crate) use wgs84::IN_DEGREES;
 
 fn rules() -> Rules {
     let parameters = vec![
@@ -30,19 +31,17 @@ fn rules() -> Rules {
             max: 1.0,
         },
     ];
-    Rules {
-        limits: Limits::default(),
-        algorithms: vec![
-            AlgorithmRule {
-                name: "tms-sba",
-                parameters,
-            },
-            AlgorithmRule {
-                name: "sba",
-                parameters: Vec::new(),
-            },
-        ],
-    }
+    let algorithms = vec![
+        AlgorithmRule {
+            name: "tms-sba",
+            parameters,
+        },
+        AlgorithmRule {
+            name: "sba",
+            parameters: Vec::new(),
+        },
+    ];
+    Rules::new(Limits::default(), algorithms)
 }
 
 fn read(text: &str) -> Result<Scenario, Refusal> {

@@ -8,9 +8,10 @@ use axum::body::Body;
 use axum::http::{HeaderMap, Method, Request, StatusCode};
 use bytes::Bytes;
 use http_body_util::BodyExt as _;
+use noctule::catalogue::Directories;
 use noctule::http::auth::{Access, Keys, Settings};
 use noctule::http::webhook;
-use noctule::http::{self, AppState, Capacity, InFlight, Origins, Phase};
+use noctule::http::{self, AppState, Capacity, InFlight, Origins, Phase, Terrains};
 use noctule::planner;
 use noctule::scenario::limits::Limits;
 use noctule::store::measured::MeasuredStore;
@@ -92,12 +93,15 @@ impl Api {
         let clock = watch::channel(None);
         let origins: Vec<String> = origins.iter().map(ToString::to_string).collect();
         let (phase, watched) = watch::channel(Phase::Serving);
+        let catalogue = Arc::new(Directories::new(directory.path().join("terrains"), None));
+        let limits = Limits {
+            body_bytes: 4096,
+            ..Limits::default()
+        };
         let state = AppState {
             store: store.clone(),
-            rules: Arc::new(planner::rules(Limits {
-                body_bytes: 4096,
-                ..Limits::default()
-            })),
+            rules: Arc::new(planner::rules(limits).with_datasets(catalogue.clone())),
+            terrains: Terrains::new(catalogue),
             capacity: Capacity { workers: 2, queue },
             in_flight: InFlight::default(),
             clock_jump_ms: clock.1,

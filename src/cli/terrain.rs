@@ -1,0 +1,153 @@
+//! `noctule terrain`: what a file of elevations holds, and the elevations in it.
+
+use std::fmt::Write as _;
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::{Args, Subcommand};
+use serde_json::{Value, json};
+
+use super::exit;
+use crate::geometry::geodesy::LatLon;
+use crate::terrain::dem::{self, Dataset, Declared, Degrees, Metadata, SampleType};
+
+/// Look into a file of elevations: `GeoTIFF`, ESRI ASCII grid or SRTM .hgt.
+#[derive(Subcommand)]
+pub(super) enum Command {
+    /// Read all of a file and say what it holds, as JSON; exits 1 when it is damaged
+    Info {
+        #[command(flatten)]
+        file: File,
+    },
+    /// Print the elevation at each point, metres: bilinear between the samples of the file; `none` outside
+    /// them and where they hold no data
+    Sample {
+        #[command(flatten)]
+        file: File,
+        /// A point a line, latitude and longitude in degrees; - reads standard input
+        #[arg(long, value_name = "FILE")]
+        points: PathBuf,
+    },
+}
+
+#[derive(Args)]
+pub(super) struct File {
+    /// The file
+    file: PathBuf,
+    /// Its coordinate reference system, where it names none
+    #[arg(long, value_name = "EPSG:CODE")]
+    crs: Option<String>,
+}
+
+impl File {
+    fn open(&self) -> anyhow::Result<Dataset> {
+        let declared = Declared {
+            crs: self.crs.as_deref(),
+            ..Declared::default()
+        };
+        dem::open(&self.file, declared).with_context(|| self.file.display().to_string())
+    }
+}
+
+pub(super) fn run(command: &Command) -> anyhow::Result<u8> {
+    let text = match command {
+        Command::Info { file } => info(&file.open()?)?,
+        Command::Sample { file, points } => sample(&file.open()?, points)?,
+    };
+    io::stdout()
+        .write_all(text.as_bytes())
+        .context("cannot write to standard output")?;
+    Ok(exit::DONE)
+}
+
+fn info(dataset: &Dataset) -> anyhow::Result<String> {
+    let survey = dataset.survey()?;
+    let Metadata {
+        format,
+        lattice,
+        degrees,
+        sample_type,
+        no_data,
+    } = dataset.metadata();
+    let [[west, east], [south, north]] = lattice.extent();
+    let finite = |value: f64| value.is_finite().then_some(value);
+    let text = serde_json::to_string_pretty(&json!({
+        "format": format.to_string(),
+        "crs": lattice.crs.to_string(),
+        "columns": lattice.columns,
+        "rows": lattice.rows,
+        "cell": [lattice.step[0], lattice.step[1].abs()],
+        "extent": [[west, south], [east, north]],
+        "degrees": corners(*degrees),
+        "sample_type": name(*sample_type),
+        "no_data": no_data.and_then(finite),
+        "min": finite(survey.min),
+        "max": finite(survey.max),
+        "no_data_share": survey.no_data_share,
+    }))?;
+    Ok(text + "\n")
+}
+
+fn corners(degrees: Degrees) -> Value {
+    json!({
+        "south": degrees.south, "west": degrees.west, "north": degrees.north, "east": degrees.east,
+    })
+}
+
+fn name(sample_type: SampleType) -> &'static str {
+    match sample_type {
+        SampleType::U8 => "uint8",
+        SampleType::I8 => "int8",
+        SampleType::U16 => "uint16",
+        SampleType::I16 => "int16",
+        SampleType::U32 => "uint32",
+        SampleType::I32 => "int32",
+        SampleType::F32 => "float32",
+        SampleType::F64 => "float64",
+        SampleType::Text => "text",
+    }
+}
+
+fn sample(dataset: &Dataset, points: &Path) -> anyhow::Result<String> {
+    let text = if points == Path::new("-") {
+        let mut text = String::new();
+        io::stdin().read_to_string(&mut text).map(|_| text)
+    } else {
+        std::fs::read_to_string(points)
+    };
+    let text = text.with_context(|| format!("cannot read {}", points.display()))?;
+    let places = text
+        .lines()
+        .enumerate()
+        .map(|(idx, line)| {
+            place(line).with_context(|| {
+                format!(
+                    "line {} is {line:?}, must be a latitude and a longitude",
+                    idx + 1
+                )
+            })
+        })
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let mut text = String::new();
+    for elevation in dataset.sample(&places)? {
+        match elevation {
+            Some(elevation) => writeln!(text, "{elevation}")?,
+            None => writeln!(text, "none")?,
+        }
+    }
+    Ok(text)
+}
+
+fn place(line: &str) -> Option<LatLon> {
+    let mut words = line.split([',', ' ', '\t']).filter(|word| !word.is_empty());
+    let mut degrees = |most: f64| {
+        let value: f64 = words.next()?.parse().ok()?;
+        (value.abs() <= most).then_some(value)
+    };
+    let place = LatLon {
+        lat: degrees(90.0)?,
+        lon: degrees(360.0)?,
+    };
+    words.next().is_none().then_some(place)
+}

@@ -1,0 +1,316 @@
+//! A path as few straight legs: no sample of it farther from them than a tolerance, and no leg that
+//! breaks what the path keeps.
+//!
+//! The corners are samples of the path, or lie beside one on the outside of its bend, where a leg
+//! past a threat has room. Of all chains of legs over a thinned choice of corners the one with the
+//! fewest is taken. Where none holds, the path itself is the answer.
+
+use crate::cost::{Model, turns};
+use crate::geometry::{Point3, Rect};
+use crate::planner;
+use crate::scenario::{Quadrature, Scenario};
+
+/// Share of the tolerance by which corners on the path are chosen, and by which others lie beside it.
+const THINNING: f64 = 0.125;
+const OFFSET: f64 = 0.95;
+
+/// A corner is given up after so many corners in a row that no leg from it reaches.
+const HOPELESS: usize = 16;
+
+/// What is kept while reducing.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shape {
+    /// Metres from the path, in space.
+    pub(super) tolerance_m: f64,
+    /// Legs follow the ground: heights above it, too, keep within the tolerance between corners.
+    pub(super) follows_ground: bool,
+}
+
+/// A place where a leg may end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Corner {
+    /// Of the sample on or beside which it lies.
+    index: usize,
+    point: Point3,
+    /// Height above ground, metres; 0 where nobody asks.
+    agl: f64,
+}
+
+/// The fewest corners that stand for `path`, its ends among them.
+///
+/// `path` must keep the constraints of `scenario` that a path is held to; the legs do, too.
+pub(super) fn reduce(scenario: &Scenario, path: &[Point3], shape: Shape) -> Vec<Point3> {
+    let near = Scenario {
+        threats: Vec::new(),
+        ..scenario.clone()
+    };
+    let near = Scenario {
+        threats: within_reach(scenario, path, 2.0 * shape.tolerance_m),
+        ..near
+    };
+    let reduction = Reduction {
+        model: Model::new(&near),
+        shape,
+        samples: corners_of(&near, path, shape),
+    };
+    let reduced = reduction
+        .fewest(&reduction.choice())
+        .filter(|corners| keeps(&Model::new(scenario), corners));
+    reduced.unwrap_or_else(|| path.to_vec())
+}
+
+/// Whether `route` keeps what a path is held to.
+pub(super) fn keeps(model: &Model, route: &[Point3]) -> bool {
+    let mut kept = true;
+    model.assess(route, Quadrature::Integral, model.tolerance, |breach| {
+        kept &= !planner::binds_paths(&breach);
+    });
+    kept
+}
+
+/// The threats that a leg within `reach` metres of `path` may meet.
+fn within_reach(scenario: &Scenario, path: &[Point3], reach: f64) -> Vec<crate::threat::Threat> {
+    let boxes: Vec<Rect> = (0..path.len())
+        .step_by(64)
+        .filter_map(|first| {
+            let run = &path[first..path.len().min(first + 65)];
+            Some(Rect::around(run.iter().map(Point3::xy))?.grown(reach))
+        })
+        .collect();
+    let meets = |extent: &Rect| boxes.iter().any(|run| overlap(run, extent));
+    let threats = scenario.threats.iter();
+    threats
+        .filter(|threat| meets(&threat.extent()))
+        .cloned()
+        .collect()
+}
+
+fn overlap(one: &Rect, other: &Rect) -> bool {
+    one.min.x <= other.max.x
+        && other.min.x <= one.max.x
+        && one.min.y <= other.max.y
+        && other.min.y <= one.max.y
+}
+
+fn corners_of(scenario: &Scenario, path: &[Point3], shape: Shape) -> Vec<Corner> {
+    path.iter()
+        .enumerate()
+        .map(|(index, &point)| Corner {
+            index,
+            point,
+            agl: agl(scenario, point, shape),
+        })
+        .collect()
+}
+
+fn agl(scenario: &Scenario, point: Point3, shape: Shape) -> f64 {
+    if shape.follows_ground {
+        point.z - scenario.terrain.elevation(point.xy())
+    } else {
+        0.0
+    }
+}
+
+struct Reduction<'s> {
+    model: Model<'s>,
+    shape: Shape,
+    /// Every one of the path.
+    samples: Vec<Corner>,
+}
+
+/// A leg of the graph, with what it takes to fly it last.
+#[derive(Debug, Clone, Copy)]
+struct Leg {
+    to: usize,
+    /// Legs up to its end, itself among them, and the misses of all, for choosing among equals.
+    legs: usize,
+    misses: f64,
+    /// The leg before, as corner and position among that corner's legs.
+    before: Option<(usize, usize)>,
+}
+
+impl Reduction<'_> {
+    /// The corners to choose from, in the order of the path.
+    fn choice(&self) -> Vec<Corner> {
+        let on_path = self.thinned();
+        let mut choice = Vec::new();
+        for (position, &corner) in on_path.iter().enumerate() {
+            choice.push(corner);
+            if let Some(neighbours) = position
+                .checked_sub(1)
+                .and_then(|before| Some((on_path[before], *on_path.get(position + 1)?)))
+            {
+                choice.extend(self.beside(neighbours, corner));
+            }
+        }
+        choice
+    }
+
+    /// Some of the samples, any two in a row a leg that holds to a share of the tolerance.
+    fn thinned(&self) -> Vec<Corner> {
+        let last = self.samples.len() - 1;
+        let tolerance = THINNING * self.shape.tolerance_m;
+        let holds = |from: usize, to: usize| {
+            let (from, to) = (&self.samples[from], &self.samples[to]);
+            self.miss(from, to, tolerance).is_some() && self.is_free(from, to)
+        };
+        let mut kept = vec![self.samples[0]];
+        let mut at = 0;
+        while at < last {
+            // The next sample is always reached: that is a leg of the path itself.
+            let (mut reached, mut step) = (at + 1, 2);
+            while at + step <= last && holds(at, at + step) {
+                reached = at + step;
+                step *= 2;
+            }
+            let mut beyond = (at + step).min(last + 1);
+            while beyond - reached > 1 {
+                let middle = reached.midpoint(beyond);
+                if holds(at, middle) {
+                    reached = middle;
+                } else {
+                    beyond = middle;
+                }
+            }
+            kept.push(self.samples[reached]);
+            at = reached;
+        }
+        kept
+    }
+
+    /// The corner on the outside of the bend at `corner`; none on a straight.
+    fn beside(&self, (before, after): (Corner, Corner), corner: Corner) -> Option<Corner> {
+        let (arriving, leaving) = (
+            (corner.point - before.point).xy(),
+            (after.point - corner.point).xy(),
+        );
+        let inwards = leaving.try_normalize(1e-9)? - arriving.try_normalize(1e-9)?;
+        let outwards = -inwards.try_normalize(1e-6)?;
+        let aside = OFFSET * self.shape.tolerance_m * outwards;
+        let point = corner.point + nalgebra::Vector3::new(aside.x, aside.y, 0.0);
+        let scenario = self.model.scenario;
+        (scenario.area.excess(point.xy()) <= 0.0).then(|| Corner {
+            point,
+            agl: agl(scenario, point, self.shape),
+            ..corner
+        })
+    }
+
+    /// The chain of fewest legs over `choice`, its first and last corner the ends.
+    fn fewest(&self, choice: &[Corner]) -> Option<Vec<Point3>> {
+        let goal = choice.len() - 1;
+        // The legs that end at each corner.
+        let mut arriving: Vec<Vec<Leg>> = vec![Vec::new(); choice.len()];
+        for from in 0..goal {
+            if from > 0 && arriving[from].is_empty() {
+                continue;
+            }
+            let mut hopeless = 0;
+            for to in from + 1..choice.len() {
+                if choice[to].index == choice[from].index {
+                    continue;
+                }
+                let leg = self.leg(choice, &arriving, from, to);
+                if let Some(leg) = leg {
+                    hopeless = 0;
+                    arriving[to].push(leg);
+                } else {
+                    hopeless += 1;
+                    if hopeless > HOPELESS {
+                        break;
+                    }
+                }
+            }
+        }
+        let least = |legs: &[Leg]| {
+            let order = |one: &usize, other: &usize| better(&legs[*one], &legs[*other]);
+            (0..legs.len()).min_by(order)
+        };
+        let mut route = vec![choice[goal].point];
+        let mut next = least(&arriving[goal]).map(|position| (goal, position));
+        next?;
+        while let Some((corner, position)) = next {
+            next = arriving[corner][position].before;
+            let from = next.map_or(0, |(corner, _)| corner);
+            route.push(choice[from].point);
+        }
+        route.reverse();
+        Some(route)
+    }
+
+    /// The leg between two corners, after the best leg to the first from which it can be turned into.
+    fn leg(&self, choice: &[Corner], arriving: &[Vec<Leg>], from: usize, to: usize) -> Option<Leg> {
+        let (a, b) = (&choice[from], &choice[to]);
+        let miss = self.miss(a, b, self.shape.tolerance_m)?;
+        let before = if from == 0 {
+            None
+        } else {
+            let turnable = |leg: &&(usize, &Leg)| {
+                let start = leg.1.before.map_or(0, |(corner, _)| corner);
+                self.turns_into(choice[start].point, a.point, b.point)
+            };
+            let legs = arriving[from].iter().enumerate();
+            let best = legs
+                .collect::<Vec<_>>()
+                .iter()
+                .filter(turnable)
+                .min_by(|one, other| better(one.1, other.1))
+                .copied();
+            Some(best?)
+        };
+        self.is_free(a, b).then(|| Leg {
+            to,
+            legs: 1 + before.map_or(0, |(_, leg)| leg.legs),
+            misses: miss + before.map_or(0.0, |(_, leg)| leg.misses),
+            before: before.map(|(position, leg)| (leg.to, position)),
+        })
+    }
+
+    fn turns_into(&self, before: Point3, corner: Point3, after: Point3) -> bool {
+        let turn = turns(&[before, corner, after]).nth(1).unwrap_or(0.0);
+        let vehicle = &self.model.scenario.vehicle;
+        turn.abs().to_degrees() <= vehicle.max_turn_deg + self.model.tolerance.angle_deg
+    }
+
+    /// Whether the leg by itself keeps what a path is held to.
+    fn is_free(&self, from: &Corner, to: &Corner) -> bool {
+        keeps(&self.model, &[from.point, to.point])
+    }
+
+    /// How far the samples between two corners are from the leg at most; `None` when that is more
+    /// than `tolerance`.
+    fn miss(&self, from: &Corner, to: &Corner, tolerance: f64) -> Option<f64> {
+        let lifted = |corner: &Corner| Point3::new(corner.point.x, corner.point.y, corner.agl);
+        let mut most: f64 = 0.0;
+        let ends = (from.point, to.point);
+        let above_ground = (lifted(from), lifted(to));
+        for sample in &self.samples[from.index..=to.index] {
+            let mut miss = distance(sample.point, ends);
+            if self.shape.follows_ground {
+                miss = miss.max(distance(lifted(sample), above_ground));
+            }
+            if miss > tolerance {
+                return None;
+            }
+            most = most.max(miss);
+        }
+        Some(most)
+    }
+}
+
+fn better(one: &Leg, other: &Leg) -> std::cmp::Ordering {
+    let misses = one.misses.total_cmp(&other.misses);
+    one.legs.cmp(&other.legs).then(misses)
+}
+
+/// From a point to a leg, metres.
+fn distance(point: Point3, (a, b): (Point3, Point3)) -> f64 {
+    let (along, offset) = (b - a, point - a);
+    let squared = along.norm_squared();
+    let share = if squared > 0.0 {
+        (offset.dot(&along) / squared).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    (offset - along * share).norm()
+}

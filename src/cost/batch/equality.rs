@@ -6,11 +6,13 @@ use pulp::Arch;
 
 use super::{LANES, PointRow, Price, Pricer};
 use crate::cost::{Constraint, Model};
+use crate::geometry::geodesy::{LatLon, TangentPlane};
 use crate::geometry::{Point2, Point3, Rect};
 use crate::scenario::json::{self, AlgorithmRule, Rules};
 use crate::scenario::limits::Limits;
 use crate::scenario::{Quadrature, Scenario};
-use crate::terrain::{Flat, Grid, Peak, Peaks, Terrain};
+use crate::terrain::dem::{Crs, Lattice, Raster};
+use crate::terrain::{Dem, Flat, Grid, Peak, Peaks, Terrain};
 use crate::threat::{Cylinder, Polygon, Shape, Threat};
 
 /// A choice after the other out of a case of proptest.
@@ -56,6 +58,9 @@ impl Choices {
                 base: 5.0,
             });
         }
+        if kind > 0.85 {
+            return self.file();
+        }
         let elevations = (0..144).map(|_| self.between(0.0, 80.0));
         Terrain::Grid(Grid {
             elevations: elevations.collect(),
@@ -64,6 +69,44 @@ impl Choices {
             columns: 12,
             rows: 12,
         })
+    }
+
+    /// Elevations in degrees or metres of a map, not parallel to the scenario's axes.
+    fn file(&mut self) -> Terrain {
+        let corner = LatLon {
+            lat: self.between(-70.0, 70.0),
+            lon: 8.0,
+        };
+        let plane = TangentPlane::at(corner, 0.0);
+        let [across, along] = [0, 1].map(|_| self.between(30.0, 150.0));
+        let metre = 1.0 / 111_000.0;
+        let step = [
+            across * metre / libm::cos(corner.lat.to_radians()),
+            -along * metre,
+        ];
+        let [columns, rows] = [across, along].map(|cell| (1200.0 / cell) as usize + 4);
+        let raster = Raster {
+            lattice: Lattice {
+                crs: Crs::wgs84(),
+                columns,
+                rows,
+                first: [
+                    corner.lon - step[0] * (100.0 / across),
+                    corner.lat - step[1] * (1100.0 / along),
+                ],
+                step,
+            },
+            offset: [0, 0],
+            elevations: (0..columns * rows)
+                .map(|idx| ((idx * idx * 37) % 83) as f32)
+                .collect(),
+        };
+        let area = Rect {
+            min: Point2::new(0.0, 0.0),
+            max: Point2::new(1000.0, 1000.0),
+        };
+        let dem = Dem::new(raster, &plane, area, 20.0).expect("the raster is wider than the area");
+        Terrain::Dem(dem.into())
     }
 
     fn threat(&mut self, small: bool) -> Threat {

@@ -52,11 +52,12 @@ struct Part {
 }
 
 impl Dem {
-    /// The ground under `area`, and `margin` metres round it where `raster` reaches.
+    /// The ground under `area` (metres on `plane`), and `margin` metres round it where `raster` reaches.
     ///
     /// # Errors
-    /// [`DemError::Outside`] or [`DemError::NoData`] when not every point of `area` has an elevation.
-    pub(super) fn new(
+    /// [`DemError::Outside`] or [`DemError::NoData`] when not every point of `area` has an elevation,
+    /// [`DemError::UnusableCrs`] when a polynomial does not follow the reference system over it.
+    pub fn new(
         raster: Raster,
         plane: &TangentPlane,
         area: Rect,
@@ -366,3 +367,6 @@ impl std::fmt::Debug for Dem {
             .finish_non_exhaustive()
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -54,7 +54,7 @@ impl Default for Limits {
             body_bytes: 8 * 1024 * 1024,
             threats: 10_000,
             polygon_vertices: 20_000,
-            terrain_nodes: 1_000_000,
+            terrain_nodes: 4_000_000,
             terrain_bytes: 1 << 30,
             peaks: 1_000,
             waypoints: 200,

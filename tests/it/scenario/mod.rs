@@ -1,6 +1,7 @@
 //! Scenario documents: what is accepted, and every fault of what is not.
 
 mod cases;
+mod dataset;
 mod fuzz;
 mod wgs84;
 
@@ -41,7 +42,7 @@ fn rules() -> Rules {
             parameters: Vec::new(),
         },
     ];
-    Rules::new(Limits::default(), algorithms)
+    Rules::new(Limits::default(), algorithms).with_datasets(dataset::datasets())
 }
 
 fn read(text: &str) -> Result<Scenario, Refusal> {

@@ -1,5 +1,6 @@
 //! The service without a socket, over a store of its own. Each answer is held to `openapi.yaml`.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -32,7 +33,8 @@ pub(crate) struct Api {
     pub(crate) router: Router,
     pub(crate) phase: watch::Sender<Phase>,
     pub(crate) clock: watch::Sender<Option<i64>>,
-    _directory: TempDir,
+    uploads: PathBuf,
+    directory: TempDir,
 }
 
 /// An answer, read to its end.
@@ -84,6 +86,24 @@ impl Api {
         api
     }
 
+    /// Whose datasets are kept otherwise: the function is given the directory for uploads.
+    pub(crate) fn with_catalogue(open: impl FnOnce(PathBuf) -> Directories) -> Self {
+        let mut api = Self::new();
+        // A directory of its own: the first one is taken.
+        let catalogue = Arc::new(open(api.directory.path().join("more")));
+        let rules = (*api.state.rules).clone().with_datasets(catalogue.clone());
+        api.state.rules = Arc::new(rules);
+        api.state.terrains = Terrains::new(catalogue);
+        api.uploads = api.directory.path().join("more");
+        api.router = http::router(api.state.clone());
+        api
+    }
+
+    /// The directory of uploads.
+    pub(crate) fn uploads(&self) -> PathBuf {
+        self.uploads.clone()
+    }
+
     fn made(options: Options, access: Access, origins: &[&str]) -> Self {
         let queue = usize::try_from(options.queue_limit).expect("a small number");
         let directory = tempfile::tempdir().expect("a temporary directory");
@@ -93,7 +113,8 @@ impl Api {
         let clock = watch::channel(None);
         let origins: Vec<String> = origins.iter().map(ToString::to_string).collect();
         let (phase, watched) = watch::channel(Phase::Serving);
-        let catalogue = Arc::new(Directories::new(directory.path().join("terrains"), None));
+        let uploads = directory.path().join("terrains");
+        let catalogue = Arc::new(Directories::new(uploads.clone(), None));
         let limits = Limits {
             body_bytes: 4096,
             ..Limits::default()
@@ -118,7 +139,8 @@ impl Api {
             state,
             phase,
             clock: clock.0,
-            _directory: directory,
+            uploads,
+            directory,
         }
     }
 

@@ -38,7 +38,7 @@ struct Origin {
 
 /// Write the result, and say by the exit code why it is not.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
-    let chosen = arguments.choice.of(&arguments.out.as_deref().as_slice())?;
+    let chosen = arguments.choice.of(arguments.out.as_deref().as_slice())?;
     let [chosen] = chosen.as_slice() else {
         unreachable!("one file has one format");
     };
@@ -55,7 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let input = ResultInput {
         result: &result,
         scenario: &scenario,
-        datasets: &rules.datasets,
+        rules: &rules,
     };
     match chosen.format.write(&input, &chosen.options) {
         Ok(document) => {

@@ -13,7 +13,7 @@ use super::files::{self, Choice};
 use super::ground::Ground;
 use super::{exit, export};
 use crate::export::document::{Origin, ResultDocument, Timing};
-use crate::export::{ResultInput, sha256_hex};
+use crate::export::{ExportError, ResultInput, sha256_hex};
 use crate::job::draw_seed;
 use crate::planner::{self, ConvergencePoint, Incumbent, Observer, Outcome, Stop};
 use crate::scenario::json::{self, Fault, Refusal};
@@ -48,6 +48,18 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         }
     };
 
+    // Told before the search, not after it.
+    let degrees = chosen.iter().find(|chosen| chosen.format.geodetic);
+    if let (Some(chosen), None) = (degrees, scenario.frame.wgs84()) {
+        let format = chosen.format.name;
+        eprintln!(
+            "{}: {}",
+            arguments.file.display(),
+            ExportError::NoGeodeticFrame { format }
+        );
+        return Ok(exit::BAD_INPUT);
+    }
+
     let stop = Interrupt::watch()?;
     let mut progress = Progress::new(scenario.planner.iterations);
     let outcome = planner::plan(&scenario, &mut progress, &stop);
@@ -58,7 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let input = ResultInput {
         result: &result,
         scenario: &accepted,
-        datasets: &rules.datasets,
+        rules: &rules,
     };
     let mut code = if outcome.feasible {
         exit::DONE

@@ -1,11 +1,11 @@
 //! The path as a table: a line each sample, for spreadsheets and scripts.
 
 use super::delivery::Passage;
-use super::{Delivery, ExportError, Options};
+use super::{Delivery, Options};
 use crate::geometry::Point3;
 
 /// Write the path of a plan; of one that has none, the waypoints.
-pub(super) fn write(delivery: &Delivery, _: &Options) -> Result<String, ExportError> {
+pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
     let positions: &[&str] = if delivery.chart.is_some() {
         &["lat", "lon", "alt_msl", "alt_ellipsoid"]
     } else {
@@ -33,7 +33,7 @@ pub(super) fn write(delivery: &Delivery, _: &Options) -> Result<String, ExportEr
         record(fields);
     }
     let text = table.into_inner().expect("memory takes what is written");
-    Ok(String::from_utf8(text).expect("numbers and names are UTF-8"))
+    String::from_utf8(text).expect("numbers and names are UTF-8")
 }
 
 fn position(delivery: &Delivery, point: Point3) -> Vec<f64> {

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::chart::{Chart, rounded};
 use super::outline;
-use super::{Delivery, ExportError, Options};
+use super::{Delivery, Options};
 use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};
 
@@ -17,7 +17,7 @@ const BROKEN: [u8; 4] = [208, 2, 27, 255];
 const THREAT: [u8; 4] = [208, 2, 27, 90];
 
 /// Write a plan. What has no path is shown flying its waypoints.
-pub(super) fn write(delivery: &Delivery, options: &Options) -> Result<String, ExportError> {
+pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
     let course = delivery.course();
     let passages = delivery.passages(course);
     let duration_s = passages[passages.len() - 1].time_s;
@@ -74,7 +74,7 @@ pub(super) fn write(delivery: &Delivery, options: &Options) -> Result<String, Ex
     let shown = shown_heights(delivery);
     let threats = delivery.scenario.threats.iter().enumerate();
     packets.extend(threats.map(|(index, threat)| volume(chart, index, threat, shown)));
-    Ok(format!("{}\n", Value::Array(packets)))
+    format!("{}\n", Value::Array(packets))
 }
 
 fn waypoint(delivery: &Delivery, index: usize) -> Value {

@@ -4,8 +4,6 @@ use super::chart::Chart;
 use super::document::{Position, ResultDocument};
 use super::{ExportError, ResultInput};
 use crate::geometry::Point3;
-use crate::planner;
-use crate::scenario::limits::Limits;
 use crate::scenario::{Frame, Scenario, json};
 
 /// A plan: what was asked for and what came out.
@@ -38,14 +36,12 @@ impl Delivery {
     /// [`ExportError::Damaged`] when one cannot be read, or has a route without extent,
     /// [`ExportError::NoGround`] when the dataset is not there any more.
     pub fn read(input: &ResultInput) -> Result<Self, ExportError> {
-        let rules = planner::rules(Limits::NONE).with_datasets(input.datasets.clone());
-        let scenario =
-            json::read_accepted(input.scenario, &rules).map_err(|refusal| {
-                match refusal.lost_ground() {
-                    Some(fault) => ExportError::NoGround(fault.detail.clone()),
-                    None => ExportError::Damaged(format!("the scenario: {refusal}")),
-                }
-            })?;
+        let scenario = json::read_accepted(input.scenario, input.rules).map_err(|refusal| {
+            match refusal.lost_ground() {
+                Some(fault) => ExportError::NoGround(fault.detail.clone()),
+                None => ExportError::Damaged(format!("the scenario: {refusal}")),
+            }
+        })?;
         let result: ResultDocument = serde_json::from_str(input.result)
             .map_err(|error| ExportError::Damaged(format!("the result: {error}")))?;
         let frame = &scenario.frame;

@@ -7,18 +7,18 @@ use serde_json::{Value, json};
 
 use super::chart::{Fix, rounded};
 use super::outline;
-use super::{Delivery, ExportError, Options};
+use super::{Delivery, Options};
 use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};
 
 /// Write a plan; an infeasible one, too, for its violations are best seen on a map.
-pub(super) fn write(delivery: &Delivery, _: &Options) -> Result<String, ExportError> {
+pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
     let path = delivery.path.iter().map(|points| path(delivery, points));
     let waypoints = (0..delivery.waypoints.len()).map(|index| waypoint(delivery, index));
     let threats = delivery.scenario.threats.iter().enumerate();
     let threats = threats.map(|(index, threat)| self::threat(delivery, index, threat));
     let collection = FeatureCollection::new(path.chain(waypoints).chain(threats));
-    Ok(format!("{collection}\n"))
+    format!("{collection}\n")
 }
 
 fn path(delivery: &Delivery, points: &[Point3]) -> Feature {
@@ -66,7 +66,7 @@ fn waypoint(delivery: &Delivery, index: usize) -> Feature {
 }
 
 /// What is broken at a waypoint or on the leg that leads to it.
-fn violations<'d>(delivery: &'d Delivery, index: usize) -> impl Iterator<Item = &'d str> {
+fn violations(delivery: &Delivery, index: usize) -> impl Iterator<Item = &str> {
     let places = [
         format!("waypoint {index}"),
         index

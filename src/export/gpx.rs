@@ -6,11 +6,11 @@ use time::OffsetDateTime;
 
 use super::chart::Chart;
 use super::words::for_xml;
-use super::{Delivery, ExportError, Options};
+use super::{Delivery, Options};
 use crate::geometry::Point3;
 
 /// Write the path of a plan; of one that has none, the waypoints are the track.
-pub(super) fn write(delivery: &Delivery, options: &Options) -> Result<String, ExportError> {
+pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
     let chart = delivery.chart();
     let course = delivery.course();
     let passages = delivery.passages(course);
@@ -30,24 +30,28 @@ pub(super) fn write(delivery: &Delivery, options: &Options) -> Result<String, Ex
         point
     });
     let name = for_xml(delivery.title());
-    let mut metadata = Metadata::default();
-    metadata.name = Some(name.clone());
-    metadata.description = Some(for_xml(&delivery.summary()));
+    let metadata = Metadata {
+        name: Some(name.clone()),
+        description: Some(for_xml(&delivery.summary())),
+        ..Metadata::default()
+    };
     let mut segment = TrackSegment::new();
     segment.points = track.collect();
     let mut track = Track::new();
     track.name = Some(name);
     track.segments = vec![segment];
-    let mut document = Gpx::default();
-    document.version = GpxVersion::Gpx11;
-    document.creator = Some("Noctule".to_owned());
-    document.metadata = Some(metadata);
-    document.waypoints = waypoints.collect();
-    document.tracks = vec![track];
+    let document = Gpx {
+        version: GpxVersion::Gpx11,
+        creator: Some("Noctule".to_owned()),
+        metadata: Some(metadata),
+        waypoints: waypoints.collect(),
+        tracks: vec![track],
+        ..Gpx::default()
+    };
     let mut text = Vec::new();
     gpx::write(&document, &mut text).expect("a document of this version is written to memory");
     text.push(b'\n');
-    Ok(String::from_utf8(text).expect("XML is written as UTF-8"))
+    String::from_utf8(text).expect("XML is written as UTF-8")
 }
 
 fn mark(chart: &Chart, point: Point3) -> Waypoint {

@@ -12,7 +12,7 @@ use kml::{Kml, KmlWriter};
 use super::chart::{Fix, rounded};
 use super::outline;
 use super::words::for_xml;
-use super::{Delivery, ExportError, Options};
+use super::{Delivery, Options};
 use crate::geometry::Point3;
 use crate::threat::{Shape, Threat};
 
@@ -25,7 +25,7 @@ const STYLES: [(&str, &str, &str, &str); 2] = [
 ];
 
 /// Write a plan. What has no path is drawn along its waypoints.
-pub(super) fn write(delivery: &Delivery, _: &Options) -> Result<String, ExportError> {
+pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
     let waypoints = (0..delivery.waypoints.len()).map(|index| waypoint(delivery, index));
     let threats = delivery.scenario.threats.iter().enumerate();
     let threats = threats.map(|(index, threat)| self::threat(delivery, index, threat));
@@ -50,7 +50,7 @@ pub(super) fn write(delivery: &Delivery, _: &Options) -> Result<String, ExportEr
         .write(&document)
         .expect("memory takes what is written");
     bytes.push(b'\n');
-    Ok(String::from_utf8(bytes).expect("XML is written as UTF-8"))
+    String::from_utf8(bytes).expect("XML is written as UTF-8")
 }
 
 fn path(delivery: &Delivery) -> Placemark {

@@ -26,9 +26,7 @@ pub use file_name::file_name;
 pub use options::{Altitude, Firmware, OPTIONS, OptionRule, Options};
 pub use sha256::sha256_hex;
 
-use std::sync::Arc;
-
-use crate::terrain::Datasets;
+use crate::scenario::json::Rules;
 
 /// A format of a result.
 pub struct Format {
@@ -45,11 +43,18 @@ pub struct Format {
     pub flown: bool,
     /// Of [`OPTIONS`], those that it knows.
     pub options: &'static [&'static str],
-    /// `None` is the stored result, byte for byte as it was finished.
-    write: Option<Write>,
+    write: Write,
 }
 
-type Write = fn(&Delivery, &Options) -> Result<String, ExportError>;
+/// How a format is written.
+enum Write {
+    /// It is the stored result, byte for byte as it was finished.
+    Stored,
+    /// Of any plan.
+    Plain(fn(&Delivery, &Options) -> String),
+    /// Of a plan that can be flown as the options ask.
+    Mission(fn(&Delivery, &Options) -> Result<String, ExportError>),
+}
 
 /// What a format is written from.
 #[derive(Debug, Clone, Copy)]
@@ -58,8 +63,8 @@ pub struct ResultInput<'a> {
     pub result: &'a str,
     /// The accepted scenario document.
     pub scenario: &'a str,
-    /// Where the dataset is found that it may name.
-    pub datasets: &'a Arc<dyn Datasets>,
+    /// By which it was accepted; its limits do not count any more.
+    pub rules: &'a Rules,
 }
 
 /// Every format; the first is served to who names none.
@@ -71,7 +76,7 @@ pub const ALL: &[Format] = &[
         geodetic: false,
         flown: false,
         options: &[],
-        write: None,
+        write: Write::Stored,
     },
     Format {
         name: "svg",
@@ -80,7 +85,7 @@ pub const ALL: &[Format] = &[
         geodetic: false,
         flown: false,
         options: &[],
-        write: Some(svg::write),
+        write: Write::Plain(svg::write),
     },
     Format {
         name: "csv",
@@ -89,7 +94,7 @@ pub const ALL: &[Format] = &[
         geodetic: false,
         flown: false,
         options: &[],
-        write: Some(csv::write),
+        write: Write::Plain(csv::write),
     },
     Format {
         name: "geojson",
@@ -98,7 +103,7 @@ pub const ALL: &[Format] = &[
         geodetic: true,
         flown: false,
         options: &[],
-        write: Some(geojson::write),
+        write: Write::Plain(geojson::write),
     },
     Format {
         name: "kml",
@@ -107,7 +112,7 @@ pub const ALL: &[Format] = &[
         geodetic: true,
         flown: true,
         options: &[],
-        write: Some(kml::write),
+        write: Write::Plain(kml::write),
     },
     Format {
         name: "czml",
@@ -116,7 +121,7 @@ pub const ALL: &[Format] = &[
         geodetic: true,
         flown: true,
         options: &["epoch"],
-        write: Some(czml::write),
+        write: Write::Plain(czml::write),
     },
     Format {
         name: "gpx",
@@ -125,7 +130,7 @@ pub const ALL: &[Format] = &[
         geodetic: true,
         flown: true,
         options: &["epoch"],
-        write: Some(gpx::write),
+        write: Write::Plain(gpx::write),
     },
     Format {
         name: "qgc",
@@ -134,7 +139,7 @@ pub const ALL: &[Format] = &[
         geodetic: true,
         flown: true,
         options: mission::OPTIONS,
-        write: Some(mission::qgc::write),
+        write: Write::Mission(mission::qgc::write),
     },
     Format {
         name: "wpl",
@@ -143,7 +148,7 @@ pub const ALL: &[Format] = &[
         geodetic: true,
         flown: true,
         options: mission::OPTIONS,
-        write: Some(mission::wpl::write),
+        write: Write::Mission(mission::wpl::write),
     },
 ];
 
@@ -164,7 +169,7 @@ impl Format {
     /// Whether it is the stored result, byte for byte as it was finished.
     #[must_use]
     pub fn is_stored(&self) -> bool {
-        self.write.is_none()
+        matches!(self.write, Write::Stored)
     }
 
     /// Write a plan.
@@ -175,9 +180,9 @@ impl Format {
     /// [`ExportError::Option`] when they contradict each other; [`ExportError::Damaged`] when the
     /// documents are none that this program wrote, or do not belong together.
     pub fn write(&self, input: &ResultInput, options: &Options) -> Result<String, ExportError> {
-        let Some(write) = self.write else {
+        if self.is_stored() {
             return Ok(input.result.to_owned());
-        };
+        }
         let delivery = Delivery::read(input)?;
         if self.geodetic && delivery.chart.is_none() {
             return Err(ExportError::NoGeodeticFrame { format: self.name });
@@ -185,7 +190,11 @@ impl Format {
         if self.flown && !delivery.result.feasible && !options.allow_infeasible {
             return Err(ExportError::Infeasible { format: self.name });
         }
-        write(&delivery, options)
+        match self.write {
+            Write::Stored => Ok(input.result.to_owned()),
+            Write::Plain(write) => Ok(write(&delivery, options)),
+            Write::Mission(write) => write(&delivery, options),
+        }
     }
 }
 

@@ -29,7 +29,7 @@ pub struct Options {
 pub enum Firmware {
     /// PX4.
     Px4,
-    /// `ArduPilot`.
+    /// ArduPilot.
     ArduPilot,
 }
 

@@ -85,7 +85,7 @@ async fn written(
             let input = ResultInput {
                 result: &result,
                 scenario: &scenario,
-                datasets: &rules.datasets,
+                rules: &rules,
             };
             format.write(&input, &options)
         };

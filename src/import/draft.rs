@@ -246,6 +246,10 @@ fn circle(facts: &Facts, center: Place) -> Result<Value, String> {
     between_heights(shape, facts)
 }
 
+#[expect(
+    clippy::float_cmp,
+    reason = "a ring is closed by its very first corner"
+)]
 fn polygon(facts: &Facts, ring: &[[f64; 2]]) -> Result<Value, String> {
     let open = match ring {
         [first, between @ .., last] if first == last => &ring[..=between.len()],

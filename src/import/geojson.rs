@@ -8,7 +8,7 @@ use super::draft::{Draft, Place};
 use super::facts::Facts;
 use super::{Conversion, ImportError};
 
-/// What an older `GeoJSON` may call the one system that the present one has.
+/// What an older GeoJSON may call the one system that the present one has.
 const WGS84: [&str; 3] = [
     "urn:ogc:def:crs:OGC:1.3:CRS84",
     "urn:ogc:def:crs:OGC::CRS84",

@@ -1,4 +1,4 @@
-//! Files of other programs as scenarios: `GeoJSON`, KML, plans of `QGroundControl`.
+//! Files of other programs as scenarios: GeoJSON, KML, plans of QGroundControl.
 //!
 //! What a file says and a scenario has no place for is listed as unused, and what a scenario needs
 //! and a file does not say as assumed. Nothing here plans or judges a scenario: who hands it in is
@@ -48,7 +48,7 @@ pub struct Unused {
 /// How a file is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Syntax {
-    /// `GeoJSON`, or a plan of `QGroundControl`.
+    /// GeoJSON, or a plan of QGroundControl.
     Json,
     /// KML.
     Xml,
@@ -109,6 +109,10 @@ impl Syntax {
 /// [`ImportError::NoScenario`] when it is and has no start or no target.
 pub fn convert(text: &[u8], syntax: Syntax) -> Result<Conversion, ImportError> {
     let text = without_mark(text);
+    if text.starts_with(b"PK\x03\x04") {
+        let found = "a zip archive, as KMZ is: unpack it and take the doc.kml in it";
+        return Err(ImportError::NotXml(found.to_owned()));
+    }
     match syntax {
         Syntax::Xml => kml::convert(text),
         Syntax::Json => {

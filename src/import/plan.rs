@@ -1,4 +1,4 @@
-//! Plans of `QGroundControl`: the mission's ends as start and target, exclusion fences as threats.
+//! Plans of QGroundControl: the mission's ends as start and target, exclusion fences as threats.
 //! Altitudes are above mean sea level.
 
 use serde_json::{Map, Value};

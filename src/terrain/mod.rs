@@ -2,7 +2,6 @@
 //!
 //! Adding a kind is one file beside `flat.rs` and one variant of [`Terrain`].
 
-mod blocks;
 mod cells;
 mod datasets;
 pub mod dem;
@@ -10,7 +9,6 @@ mod flat;
 mod grid;
 mod peaks;
 
-pub(crate) use blocks::Blocks;
 pub use datasets::{DatasetError, Datasets, Found, NoDatasets, is_dataset_name};
 pub use dem::Dem;
 pub use flat::Flat;

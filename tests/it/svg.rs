@@ -29,7 +29,7 @@ fn draw(scenario: &Value, result: &ResultDocument) -> String {
     let input = ResultInput {
         result: &result.to_json(),
         scenario: &accepted(scenario),
-        datasets: &planner::rules(Limits::default()).datasets,
+        rules: &planner::rules(Limits::NONE),
     };
     let svg = Format::named("svg").expect("svg is a format");
     svg.write(&input, &Options::default())

@@ -1,4 +1,4 @@
-//! A plan of `QGroundControl`: mission, fences and rally points in one JSON document.
+//! A plan of QGroundControl: mission, fences and rally points in one JSON document.
 
 use serde_json::{Value, json};
 

@@ -3,6 +3,7 @@
 //! The same documents give the same bytes. Deliberately absent: scripts, styles and anything that
 //! would have to be fetched, so that the file can be opened, printed and mailed as it is.
 
+mod axes;
 mod canvas;
 mod contour;
 mod header;
@@ -19,7 +20,7 @@ use relief::Relief;
 use scale::MapScale;
 
 use super::document::ResultDocument;
-use super::{Delivery, ExportError, Options};
+use super::{Delivery, Options};
 use crate::geometry::{Point3, Rect};
 use crate::scenario::Scenario;
 
@@ -51,7 +52,7 @@ struct Drawing<'d> {
 }
 
 /// Draw a plan.
-pub(super) fn write(delivery: &Delivery, _: &Options) -> Result<String, ExportError> {
+pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
     let drawing = Drawing {
         scenario: &delivery.scenario,
         result: &delivery.result,
@@ -79,7 +80,7 @@ pub(super) fn write(delivery: &Delivery, _: &Options) -> Result<String, ExportEr
     plan_view::draw(&mut canvas, &drawing, &relief, &map);
     sidebar::draw(&mut canvas, &drawing, &relief, &map.frame);
     profile::draw(&mut canvas, &drawing, profile_frame);
-    Ok(canvas.finish())
+    canvas.finish()
 }
 
 impl Drawing<'_> {

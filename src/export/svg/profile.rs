@@ -252,7 +252,7 @@ fn flown(
         &format!("{line} stroke=\"{color}\" stroke-width=\"2.5\""),
     );
     let marks: Vec<Spot> = if drawing.path.is_some() {
-        let ways = abreast(&drawing.waypoints, stations);
+        let ways = abreast(drawing.waypoints, stations);
         let points = drawing.waypoints.iter().zip(ways);
         points
             .map(|(point, way)| scale.spot(way, point.z))

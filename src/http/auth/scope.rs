@@ -58,8 +58,20 @@ impl Needs {
         match (method, path) {
             (
                 "GET",
-                "/" | "/algorithms" | "/docs" | "/limits" | "/livez" | "/openapi.json"
-                | "/openapi.yaml" | "/problems/{slug}" | "/readyz" | "/version",
+                "/"
+                | "/algorithms"
+                | "/docs"
+                | "/limits"
+                | "/livez"
+                | "/openapi.json"
+                | "/openapi.yaml"
+                | "/page/{file}"
+                | "/page/vendor/{file}"
+                | "/problems/{slug}"
+                | "/readyz"
+                | "/scenarios"
+                | "/scenarios/{name}"
+                | "/version",
             ) => Self::Nothing,
             ("GET", "/metrics") => Self::Scope(Scope::Metrics),
             ("GET", "/plans/{id}/events") => Self::Ticket,
@@ -67,7 +79,7 @@ impl Needs {
             (_, path) if path.starts_with("/plans") => Self::Scope(Scope::Plan),
             // Whose it may not be is told by the handler.
             ("PUT" | "DELETE", "/terrains/{name}") => Self::Scope(Scope::Plan),
-            ("POST", "/scenarios:convert") => Self::Scope(Scope::Plan),
+            ("POST", "/scenarios:convert" | "/scenarios:ground") => Self::Scope(Scope::Plan),
             _ => Self::Scope(Scope::Admin),
         }
     }

@@ -103,11 +103,11 @@ impl<Z: Copy + Into<f64>> Cells<'_, Z> {
 }
 
 /// The columns, or the rows, that a way from `a` to `b` crosses.
-struct Walk {
+pub(super) struct Walk {
     /// The one where it is.
-    cell: usize,
+    pub(super) cell: usize,
     /// The share of the way at which it leaves this for the next; infinite when never.
-    leave: f64,
+    pub(super) leave: f64,
     a: f64,
     /// 1 over the way.
     inverse: f64,
@@ -121,7 +121,8 @@ impl Walk {
         clippy::cast_sign_loss,
         reason = "the way lies on the lattice, between 0 and the number of nodes"
     )]
-    fn new(a: f64, b: f64, nodes: usize) -> Self {
+    #[inline]
+    pub(super) fn new(a: f64, b: f64, nodes: usize) -> Self {
         let last = nodes - 2;
         let cell = (a as usize).min(last);
         // On a line, a way down begins in the cell before it.
@@ -138,7 +139,8 @@ impl Walk {
     }
 
     /// Into the next.
-    fn step(&mut self) {
+    #[inline]
+    pub(super) fn step(&mut self) {
         if self.inverse > 0.0 {
             self.cell += 1;
         } else {
@@ -148,6 +150,7 @@ impl Walk {
     }
 
     /// Where the cell ends; the first and the last have no end.
+    #[inline]
     fn look(&mut self) {
         let line = if self.inverse > 0.0 {
             self.cell + 1

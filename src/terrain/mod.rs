@@ -2,14 +2,12 @@
 //!
 //! Adding a kind is one file beside `flat.rs` and one variant of [`Terrain`].
 
-mod blocks;
 mod cells;
 pub mod dem;
 mod flat;
 mod grid;
 mod peaks;
 
-pub(crate) use blocks::Blocks;
 pub use dem::Dem;
 pub use flat::Flat;
 pub use grid::Grid;

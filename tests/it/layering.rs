@@ -36,7 +36,7 @@ const ROOMS: [(&str, Imports); 17] = [
 ];
 
 /// Libraries that only these rooms may name.
-const LIBRARIES: [(&str, &[&str]); 11] = [
+const LIBRARIES: [(&str, &[&str]); 15] = [
     ("axum", &["http", "cli"]),
     ("hyper", &["http", "cli"]),
     ("hyper_util", &["http", "cli"]),
@@ -48,6 +48,10 @@ const LIBRARIES: [(&str, &[&str]); 11] = [
     ("prometheus_client", &["telemetry"]),
     ("opentelemetry", &["telemetry"]),
     ("anyhow", &["cli"]),
+    ("tiff_reader", &["terrain"]),
+    ("geotiff_core", &["terrain"]),
+    ("proj4rs", &["terrain"]),
+    ("crs_definitions", &["terrain"]),
 ];
 
 #[test]

@@ -3,28 +3,25 @@
 //! The ground is the bilinear surface between the samples in their own reference system, which is what
 //! everybody else samples, too. A straight leg is not quite straight there: it is cut into pieces so short that
 //! each is within a tenth of a millimetre of height of its chord, and along chords least and greatest heights
-//! are exact.
+//! are exact. Most of a leg is proven by planes over blocks of cells to be nowhere least or greatest.
 
 use super::coverage::{self, Gap};
 use super::fit::Fit;
+use super::slabs::Slabs;
 use super::{DemError, Raster};
 use crate::geometry::geodesy::TangentPlane;
 use crate::geometry::{Point2, Point3, Rect, Segment};
 use crate::terrain::HeightRange;
-use crate::terrain::blocks::Blocks;
-use crate::terrain::cells::{Cells, Place};
+use crate::terrain::cells::{Cells, Place, Walk};
 
 /// What a chord may add to or take from a height, metres.
 const CHORD_M: f64 = 1e-4;
 
-/// A chord over more cells than this is cut, so that what is clear of the ground need not be walked.
-const MOST_CELLS: f64 = 8.0;
+/// A way is taken for straight while blocks are looked at if it bends by no more cells than this.
+const BEND_CELLS: f64 = 0.02;
 
 /// Shares of the margin that are tried on each side.
 const MARGINS: [f64; 3] = [1.0, 0.5, 0.25];
-
-/// A hair on either side, cells, for rounding.
-const HAIR: f64 = 1e-6;
 
 /// The ground of a scenario, out of a file of elevations.
 #[derive(Clone, PartialEq)]
@@ -34,20 +31,30 @@ pub struct Dem {
     fit: Fit,
     /// Elevations are known all over it.
     extent: Rect,
-    blocks: Blocks<f32>,
+    slabs: Slabs,
     /// Of the fit, cells a square metre.
     bend: f64,
+    /// Most that the ground rises over one cell along a row, and along a column, together, metres.
+    steepest: f64,
     /// Longest chord, metres.
     chord_m: f64,
 }
 
-/// A part of a way over the ground.
-#[derive(Clone, Copy)]
-struct Part {
-    from: Place,
-    to: Place,
-    /// As points of the plane, while it is longer than one chord, and how often it will be halved.
-    halves: Option<([Point3; 2], u32)>,
+/// A straight way over the plane that is all but straight over the cells.
+struct Way {
+    ends: [Point3; 2],
+    places: [Place; 2],
+    /// What the ground under it may differ by from that under the straight way between `places`, metres.
+    slack: f64,
+}
+
+impl Way {
+    /// On the straight way between the places.
+    #[inline]
+    fn at(&self, share: f64) -> Place {
+        let [from, to] = self.places;
+        std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * share)
+    }
 }
 
 impl Dem {
@@ -87,8 +94,7 @@ impl Dem {
         let extent = widened(area, margin, |rect| {
             coverage::gap(&raster, &fit, bend, rect).is_none()
         });
-        let nodes = [raster.lattice.columns, raster.lattice.rows];
-        let blocks = Blocks::of(nodes, &raster.elevations, 1);
+        let slabs = Slabs::of(&raster);
         // Over d cells of deviation the ground rises by no more than this times d.
         let steepest = steepest(&raster);
         let chord_m = (8.0 * CHORD_M / (bend * steepest).max(1e-30)).sqrt();
@@ -97,8 +103,9 @@ impl Dem {
             raster,
             fit,
             extent,
-            blocks,
+            slabs,
             bend,
+            steepest,
             chord_m,
         })
     }
@@ -197,82 +204,118 @@ impl Dem {
             Point3::new(nearest.x, nearest.y, point.z)
         });
         let places = ends.map(|point| self.place(point));
-        for [column, row, height] in places {
-            let height = height - self.cells().elevation([column, row]);
-            *range = range.join(HeightRange::of(height));
+        if band == HeightRange::EMPTY {
+            // So that there is something to be beyond.
+            for [column, row, height] in places {
+                let height = height - self.cells().elevation([column, row]);
+                *range = range.join(HeightRange::of(height));
+            }
         }
-        let length = (ends[1].xy() - ends[0].xy()).norm();
-        let whole = Part {
-            from: places[0],
-            to: places[1],
-            halves: self.halvings(length).map(|count| (ends, count)),
-        };
-        self.search(whole, band, range);
+        self.search(ends, places, band, range);
     }
 
-    /// How often a way of so many metres is halved until each part is a chord; `None` when it is one.
-    fn halvings(&self, length: f64) -> Option<u32> {
-        let mut count = 0;
-        let mut reach = self.chord_m;
-        while reach < length && count < 40 {
-            reach *= 2.0;
-            count += 1;
-        }
-        (count > 0).then_some(count)
-    }
-
-    /// Branch and bound, from the least and greatest elevations of blocks down to single cells.
-    fn search(&self, part: Part, band: HeightRange, range: &mut HeightRange) {
-        let Part { from, to, halves } = part;
-        let bulge = halves.map_or(0.0, |([a, b], _)| {
-            // Twice what it can be: chords of it are cut elsewhere than the way itself.
-            self.bend * (b.xy() - a.xy()).norm_squared() / 4.0
-        });
-        let ground = self
-            .blocks
-            .below([from[0], from[1]], [to[0], to[1]], bulge + HAIR);
-        let may_dip = from[2].min(to[2]) - ground.max < range.min.min(band.min);
-        let may_rise = from[2].max(to[2]) - ground.min > range.max.max(band.max);
-        if !may_dip && !may_rise {
+    /// Halve the way until it is all but straight over the cells, then look at blocks.
+    fn search(
+        &self,
+        ends: [Point3; 2],
+        places: [Place; 2],
+        band: HeightRange,
+        range: &mut HeightRange,
+    ) {
+        let bend = self.bend * (ends[1].xy() - ends[0].xy()).norm_squared() / 8.0;
+        let [from, to] = places;
+        let cells = (from[0] - to[0]).abs().max((from[1] - to[1]).abs());
+        if bend > BEND_CELLS && cells > 1.0 {
+            let middle = nalgebra::center(&ends[0], &ends[1]);
+            let place = self.place(middle);
+            self.search([ends[0], middle], [from, place], band, range);
+            self.search([middle, ends[1]], [place, to], band, range);
             return;
         }
-        let cells = (from[0] - to[0]).abs().max((from[1] - to[1]).abs());
-        let (middle, rest) = match halves {
-            Some(([a, b], count)) => {
-                let middle = nalgebra::center(&a, &b);
-                let rest = (count > 1).then_some(count - 1);
-                (
-                    self.place(middle),
-                    [[a, middle], [middle, b]].map(|ends| Some((ends, rest?))),
-                )
+        let way = Way {
+            ends,
+            places,
+            // The ground's rise over what it bends, and that of the plane of a block.
+            slack: 2.0 * bend * self.steepest,
+        };
+        self.descend(&way, self.slabs.level(cells), [0.0, 1.0], band, range);
+    }
+
+    /// Look at the blocks of a level under the part `[s0, s1]` of `way`, and more closely at what may
+    /// widen `range` beyond `band`.
+    fn descend(
+        &self,
+        way: &Way,
+        level_idx: usize,
+        [s0, s1]: [f64; 2],
+        band: HeightRange,
+        range: &mut HeightRange,
+    ) {
+        let level = &self.slabs.levels[level_idx];
+        let [from, to] = [way.at(s0), way.at(s1)];
+        let width = level.width as f64;
+        let blocks = 1.0 / width;
+        let mut column = Walk::new(from[0] * blocks, to[0] * blocks, level.columns + 1);
+        let mut row = Walk::new(from[1] * blocks, to[1] * blocks, level.rows + 1);
+        let mut u = 0.0;
+        // u runs from 0 to 1 over the part; each block ends at the next line in either direction.
+        loop {
+            let next = column.leave.min(row.leave).min(1.0);
+            if next > u {
+                let slab = level.slab(column.cell, row.cell);
+                let first = [column.cell as f64 * width, row.cell as f64 * width];
+                let above = |u: f64| {
+                    let [x, y, z]: Place =
+                        std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * u);
+                    z - slab.at([x - first[0], y - first[1]])
+                };
+                let (h0, h1) = (above(u), above(next));
+                let [least, most] = slab.reach();
+                let may_dip = h0.min(h1) - most - way.slack < range.min.min(band.min);
+                let may_rise = h0.max(h1) - least + way.slack > range.max.max(band.max);
+                if may_dip || may_rise {
+                    let part = [u, next].map(|u| s0 + (s1 - s0) * u);
+                    if level_idx == 0 {
+                        *range = range.join(self.exactly(way, part));
+                    } else {
+                        self.descend(way, level_idx - 1, part, band, range);
+                    }
+                }
+                u = next;
             }
-            None if cells > MOST_CELLS => (
-                std::array::from_fn(|axis| 0.5 * (from[axis] + to[axis])),
-                [None; 2],
-            ),
-            None => {
-                *range = range.join(self.cells().height_range(from, to));
+            if next >= 1.0 {
                 return;
             }
+            if column.leave <= row.leave {
+                column.step();
+            } else {
+                row.step();
+            }
+        }
+    }
+
+    /// Least and greatest height over the part `[s0, s1]` of `way`, by chords.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a way over four cells at most has few chords"
+    )]
+    fn exactly(&self, way: &Way, [s0, s1]: [f64; 2]) -> HeightRange {
+        let [a, b] = way.ends;
+        let length = (b.xy() - a.xy()).norm() * (s1 - s0);
+        let chords = (length / self.chord_m).ceil().clamp(1.0, 1e4) as usize;
+        let place = |idx: usize| {
+            let share = s0 + (s1 - s0) * (idx as f64 / chords as f64);
+            self.place(a + (b - a) * share)
         };
-        self.search(
-            Part {
-                from,
-                to: middle,
-                halves: rest[0],
-            },
-            band,
-            range,
-        );
-        self.search(
-            Part {
-                from: middle,
-                to,
-                halves: rest[1],
-            },
-            band,
-            range,
-        );
+        let mut from = place(0);
+        let mut range = HeightRange::EMPTY;
+        for idx in 1..=chords {
+            let to = place(idx);
+            range = range.join(self.cells().height_range(from, to));
+            from = to;
+        }
+        range
     }
 
     fn place(&self, point: Point3) -> Place {

@@ -15,6 +15,7 @@ mod ground;
 mod hgt;
 mod lattice;
 mod raster;
+mod slabs;
 
 use std::collections::BTreeMap;
 use std::fmt;

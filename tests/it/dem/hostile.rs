@@ -1,0 +1,174 @@
+//! Files that are wrong, or mean harm: each is refused for what is wrong, and costs next to nothing.
+
+use std::io::Write;
+use std::process::Command;
+
+use noctule::terrain::dem::{self, Declared, Format};
+
+use super::tiff::{self, Tiff, Value};
+use super::{file, open, tile};
+
+fn deflated(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+    encoder.write_all(bytes).expect("memory");
+    encoder.finish().expect("memory")
+}
+
+/// Wrong files, and what must be said about each.
+fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
+    use Value::{Ascii, Double, Long, Raw, Short};
+    let right = Tiff::right;
+    let whole = right().bytes();
+    let samples = |value: f32| right().holding(value.to_le_bytes().repeat(12)).bytes();
+    let packed = |tiff: Tiff, bytes: &[u8]| {
+        tiff.with(tiff::COMPRESSION, Short(vec![8]))
+            .holding(deflated(bytes))
+    };
+    let square = |side: u32| {
+        right()
+            .with(tiff::WIDTH, Long(vec![side]))
+            .with(tiff::HEIGHT, Long(vec![side]))
+            .with(tiff::ROWS_PER_STRIP, Long(vec![side]))
+    };
+    let looped = Tiff { next: 8, ..right() };
+    let asc = |text: &str| text.as_bytes().to_vec();
+    vec![
+        // Not what they are called, or nothing at all.
+        ("empty.tif", vec![], "none of GeoTIFF"),
+        ("text.tif", asc("There is no elevation in here.\n"), "none of GeoTIFF"),
+        ("short.hgt", tile(1200, 5), "none of GeoTIFF"),
+        ("magic.tif", asc("II*\0"), "not a valid GeoTIFF"),
+        ("magic-big.tif", asc("MM\0+"), "not a valid GeoTIFF"),
+        // Cut off.
+        ("headers-only.tif", whole[..200].to_vec(), "not a valid GeoTIFF"),
+        ("cut.tif", whole[..whole.len() - 4].to_vec(), "lies beyond its end"),
+        ("cut-strip.tif", right().with(tiff::COUNTS, Long(vec![40])).bytes(), "ends after 40 bytes"),
+        ("far-strip.tif", right().with(tiff::OFFSETS, Long(vec![u32::MAX])).bytes(), "lies beyond its end"),
+        ("half-unpacked.tif", packed(right(), &[0; 40]).bytes(), "not a valid GeoTIFF"),
+        ("spoilt.tif", right().with(tiff::COMPRESSION, Short(vec![8])).bytes(), "not a valid GeoTIFF"),
+        // Larger than they are.
+        ("vast.tif", square(1 << 31).bytes(), "at most 1073741824"),
+        ("wide.tif", right().with(tiff::WIDTH, Long(vec![1 << 20])).bytes(), "number of columns"),
+        ("widest.tif", right().with(tiff::WIDTH, Long(vec![1 << 20])).with(tiff::OFFSETS, Long(vec![0])).bytes(), "number of columns"),
+        ("bomb.tif", packed(square(16_384), &vec![0; 1 << 20]).bytes(), "the size in bytes of a packed strip"),
+        ("bomb-within.tif", packed(right(), &vec![0; 20 << 20]).bytes(), "not a valid GeoTIFF"),
+        ("long-tag.tif", right().with(tiff::NO_DATA, Raw(2, u32::MAX, 8)).bytes(), "not a valid GeoTIFF"),
+        ("many-strips.tif", right().with(tiff::OFFSETS, Raw(4, 1 << 30, 8)).bytes(), "not a valid GeoTIFF"),
+        ("loop.tif", looped.bytes(), "not a valid GeoTIFF"),
+        ("empty-strips.tif", right().with(tiff::ROWS_PER_STRIP, Short(vec![0])).bytes(), "not a valid GeoTIFF"),
+        ("no-columns.tif", right().with(tiff::WIDTH, Short(vec![0])).bytes(), "at least 2 x 2"),
+        ("one-column.tif", right().with(tiff::WIDTH, Short(vec![1])).bytes(), "at least 2 x 2"),
+        ("strips-missing.tif", right().with(tiff::ROWS_PER_STRIP, Short(vec![1])).bytes(), "of its 3 strips"),
+        // Not elevations.
+        ("bands.tif", right().with(tiff::BANDS, Short(vec![3])).with(tiff::BITS, Short(vec![32; 3])).bytes(), "3 bands"),
+        ("half.tif", right().with(tiff::BITS, Short(vec![16])).bytes(), "bits per sample: 16"),
+        ("complex.tif", right().with(tiff::SAMPLE_FORMAT, Short(vec![6])).bytes(), "not a valid GeoTIFF"),
+        ("jpeg.tif", right().with(tiff::COMPRESSION, Short(vec![7])).bytes(), "scheme 7"),
+        ("unknown-scheme.tif", right().with(tiff::COMPRESSION, Short(vec![34_925])).bytes(), "not a valid GeoTIFF"),
+        ("infinite.tif", samples(f32::INFINITY), "inf m"),
+        ("undeclared.tif", samples(-32768.0), "is it a no-data value that the file does not declare?"),
+        ("scaled.tif", right().with(tiff::GDAL_METADATA, Ascii("<GDALMetadata><Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.1</Item></GDALMetadata>")).bytes(), "scaled or shifted"),
+        ("feet.tif", right().with(tiff::KEYS, Short(vec![1, 1, 0, 3, 1024, 0, 1, 2, 2048, 0, 1, 4326, 4099, 0, 1, 9002])).bytes(), "EPSG:9002"),
+        ("no-data.tif", right().with(tiff::NO_DATA, Ascii("none")).bytes(), "no-data value is \"none\""),
+        // Nowhere.
+        ("nowhere.tif", right().without(tiff::TIE_POINT).bytes(), "not a GeoTIFF|no georeferenced image"),
+        ("unscaled.tif", right().without(tiff::SCALE).bytes(), "neither one tie point and a pixel scale"),
+        ("flat.tif", right().with(tiff::SCALE, Double(vec![0.0, 0.01, 0.0])).bytes(), "must be wider than 0"),
+        ("lines.tif", right().with(tiff::SCALE, Double(vec![0.01, 0.0, 0.0])).bytes(), "must be wider than 0"),
+        ("mirrored.tif", right().with(tiff::SCALE, Double(vec![-0.01, 0.01, 0.0])).bytes(), "must be wider than 0"),
+        ("unnumbered.tif", right().with(tiff::SCALE, Double(vec![f64::NAN, 0.01, 0.0])).bytes(), "must be wider than 0"),
+        ("rotated.tif", right().with(tiff::TRANSFORMATION, Double(vec![0.01, 0.002, 0.0, 8.0, 0.002, -0.01, 0.0, 45.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])).bytes(), "rotated"),
+        ("beyond.tif", right().with(tiff::TIE_POINT, Double(vec![0.0, 0.0, 0.0, 8.0, 95.0, 0.0])).bytes(), "which EPSG:4326 does not"),
+        ("round.tif", right().with(tiff::SCALE, Double(vec![200.0, 0.01, 0.0])).bytes(), "which EPSG:4326 does not"),
+        ("no-crs.tif", right().without(tiff::KEYS).bytes(), "names no coordinate reference system"),
+        ("own-crs.tif", right().with(tiff::KEYS, tiff::keys(1, 3072, 32_767)).bytes(), "without an EPSG code"),
+        ("unknown-crs.tif", right().with(tiff::KEYS, tiff::keys(1, 3072, 9)).bytes(), "EPSG:9 cannot be used"),
+        ("shifted-crs.tif", right().with(tiff::KEYS, tiff::keys(2, 2048, 4267)).bytes(), "EPSG:4267 cannot be used"),
+        ("mixed-crs.tif", right().with(tiff::KEYS, tiff::keys(1, 3072, 4326)).bytes(), "which it is not"),
+        ("earth-centred.tif", right().with(tiff::KEYS, tiff::keys(3, 2048, 4978)).bytes(), "earth-centred"),
+        ("bad-keys.tif", right().with(tiff::KEYS, Short(vec![9, 1, 0, 0])).bytes(), "geo keys"),
+        // Text.
+        ("header.asc", asc("ncols 3\nnrows 2\n"), "ends in its header"),
+        ("unplaced.asc", asc("ncols 3\nnrows 2\ncellsize 1\n1 2 3 4 5 6"), "neither xllcorner nor xllcenter"),
+        ("placed-twice.asc", asc("ncols 3\nnrows 2\nxllcorner 1\nxllcenter 1\nyllcorner 0\ncellsize 1\n1 2 3 4 5 6"), "both xllcorner and xllcenter"),
+        ("said-twice.asc", asc("ncols 3\nncols 3\n"), "ncols twice"),
+        ("no-cell.asc", asc("ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 0\n1 2 3 4 5 6"), "size of a cell is 0"),
+        ("infinite.asc", asc("ncols 3\nnrows 2\nxllcorner inf\nyllcorner 0\ncellsize 1\n1 2 3 4 5 6"), "must be a number"),
+        ("words.asc", asc("ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\ncolour red\n1 2 3 4 5 6"), "\"colour\" is neither"),
+        ("fraction.asc", asc("ncols 2.5\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3 4 5 6"), "must be a whole number"),
+        ("vast.asc", asc("ncols 2147483648\nnrows 2147483648\nxllcorner 0\nyllcorner 0\ncellsize 1e-9\n1 2 3"), "must be a whole number"),
+        ("large.asc", asc("ncols 200000\nnrows 200000\nxllcorner 0\nyllcorner 0\ncellsize 1e-9\n1 2 3"), "too soon for"),
+        ("cut.asc", asc("ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n100 200 300 400 500"), "ends at row 1, column 2"),
+        ("long.asc", asc("ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3 4 5 6 7"), "more than 3 x 2"),
+        ("not-a-number.asc", asc("ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 three 4 5 6"), "holds \"three\""),
+        ("endless.asc", [asc("ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 "), vec![b'9'; 1 << 20]].concat(), "must hold a number"),
+        // Elevations that are none.
+        ("N10E010.hgt", tile(1201, 20_000), "must be within -12000 to 12000 m"),
+    ]
+}
+
+#[test]
+fn each_is_refused_for_what_is_wrong() {
+    let mut faults = Vec::new();
+    for (name, bytes, expected) in cases() {
+        let (_directory, path) = file(name, &bytes);
+        let refusal = match open(&path).and_then(|dataset| dataset.survey()) {
+            Ok(survey) => format!("{survey:?}"),
+            Err(refusal) => refusal.to_string(),
+        };
+        let said = expected.split('|').any(|part| refusal.contains(part));
+        let own_path = path.to_str().expect("UTF-8");
+        if !said || refusal.len() > 400 || refusal.contains(own_path) {
+            faults.push(format!("{name}: {refusal:?}, expected {expected:?}"));
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// A program that may take 160 MB of addresses, its own code and stacks included, refuses all of them.
+#[test]
+#[cfg(target_os = "linux")]
+fn none_takes_much_memory() {
+    for (name, bytes, _) in cases() {
+        let (_directory, path) = file(name, &bytes);
+        let output = Command::new("sh")
+            .args([
+                "-c",
+                "ulimit -v 160000 && exec \"$0\" terrain info \"$1\"",
+                env!("CARGO_BIN_EXE_noctule"),
+            ])
+            .arg(&path)
+            .output()
+            .expect("a shell");
+        let reason = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{name}: {reason}");
+        assert!(!reason.contains("panicked"), "{name}: {reason}");
+    }
+}
+
+#[test]
+fn a_format_that_is_said_must_be_found() {
+    let (_directory, path) = file("right.tif", &Tiff::right().bytes());
+    let declared = |format, crs| {
+        let declared = Declared {
+            format: Some(format),
+            crs,
+            name: None,
+        };
+        dem::open(&path, declared)
+            .map(|_| ())
+            .map_err(|error| error.to_string())
+    };
+    assert_eq!(declared(Format::GeoTiff, None), Ok(()));
+    assert_eq!(declared(Format::GeoTiff, Some("EPSG:4326")), Ok(()));
+    let refusal = declared(Format::AsciiGrid, None).expect_err("it is no text");
+    assert_eq!(
+        refusal,
+        "the file is said to be ESRI ASCII grid, but it is GeoTIFF"
+    );
+    let refusal = declared(Format::GeoTiff, Some("EPSG:32632")).expect_err("it is in degrees");
+    assert_eq!(
+        refusal,
+        "the file is in EPSG:4326, but `crs` says EPSG:32632"
+    );
+}

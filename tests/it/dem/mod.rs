@@ -1,0 +1,48 @@
+//! Files of elevations: right ones, wrong ones, and those that mean harm.
+
+mod fuzz;
+mod hostile;
+mod right;
+mod tiff;
+
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use noctule::terrain::dem::{self, Dataset, Declared, DemError};
+
+/// A file named `name` with these bytes, in a directory that goes with it.
+fn file(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let path = directory.path().join(name);
+    std::fs::write(&path, bytes).expect("written");
+    (directory, path)
+}
+
+fn open(path: &Path) -> Result<Dataset, DemError> {
+    dem::open(path, Declared::default())
+}
+
+/// An SRTM tile, every sample the same.
+fn tile(side: usize, sample: i16) -> Vec<u8> {
+    sample.to_be_bytes().repeat(side * side)
+}
+
+/// The small files that are kept for tests, by name.
+fn corpus() -> &'static [(String, Vec<u8>)] {
+    static FILES: LazyLock<Vec<(String, Vec<u8>)>> = LazyLock::new(|| {
+        let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/dem/corpus");
+        let entries = std::fs::read_dir(directory).expect("it is there");
+        let paths = entries.map(|entry| entry.expect("it can be listed").path());
+        let mut files: Vec<(String, Vec<u8>)> = paths
+            .map(|path| {
+                let name = path.file_name().expect("a name").to_str();
+                let bytes = std::fs::read(&path).expect("it can be read");
+                (name.expect("UTF-8").to_owned(), bytes)
+            })
+            .collect();
+        files.sort();
+        assert!(files.len() >= 7);
+        files
+    });
+    &FILES
+}

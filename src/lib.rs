@@ -21,6 +21,7 @@ pub mod planner;
 
 // What people take away, and the life of a plan.
 pub mod export;
+pub mod import;
 pub mod job;
 
 // Where plans are kept, who runs them, and how the world reaches them.

@@ -1,7 +1,10 @@
-//! The command line: serve, plan, bench, key, store, terrain, healthcheck.
+//! The command line: serve, plan, export, convert, bench, key, store, terrain, healthcheck.
 
 mod access;
 mod bench;
+mod convert;
+mod export;
+mod files;
 mod healthcheck;
 mod key;
 mod plan;
@@ -27,6 +30,10 @@ enum Command {
     Serve(crate::config::Flags),
     /// Plan one scenario here and now, without a server
     Plan(plan::Arguments),
+    /// Write a result that was kept as JSON in another format
+    Export(export::Arguments),
+    /// Make a scenario of a GeoJSON, a KML or a plan of QGroundControl
+    Convert(convert::Arguments),
     /// Measure the algorithms: against each other, against the best known routes, against the clock
     #[command(subcommand)]
     Bench(bench::Command),
@@ -49,9 +56,9 @@ mod exit {
     pub(super) const DONE: u8 = 0;
     /// Anything without a code of its own, a wrong command line included.
     pub(super) const FAILED: u8 = 1;
-    /// A scenario, or a line of routes to price, is refused.
+    /// A scenario, a result, a file to convert or a line of routes to price is refused.
     pub(super) const BAD_INPUT: u8 = 2;
-    /// No feasible route was found.
+    /// No feasible route was found, or is there to export.
     pub(super) const INFEASIBLE: u8 = 3;
 }
 
@@ -74,6 +81,8 @@ pub fn run() -> ExitCode {
     let done = match command {
         Command::Serve(flags) => serve::run(&flags).map(|()| exit::DONE),
         Command::Plan(arguments) => plan::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments),
+        Command::Convert(arguments) => convert::run(&arguments),
         Command::Bench(command) => bench::run(&command),
         Command::Key(command) => key::run(&command).map(|()| exit::DONE),
         Command::Store(command) => store::run(command),

@@ -1,21 +1,18 @@
 //! `noctule plan`: the service's engine on one scenario, without the service.
 
-use std::fs;
-use std::io::{self, IsTerminal, Read, Write};
+use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use anyhow::Context;
 use clap::Args;
-use clap::builder::PossibleValuesParser;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::exit;
+use super::files::{self, Choice};
+use super::{exit, export};
 use crate::export::document::{Origin, ResultDocument, Timing};
-use crate::export::sha256_hex;
-use crate::export::{self, Format, ResultInput};
+use crate::export::{ExportError, ResultInput, sha256_hex};
 use crate::job::draw_seed;
 use crate::planner::{self, ConvergencePoint, Incumbent, Observer, Outcome, Stop};
 use crate::scenario::json::{self, Fault, Refusal};
@@ -26,29 +23,19 @@ use crate::scenario::{Scenario, WarmStart};
 pub(super) struct Arguments {
     /// Scenario document; - reads standard input
     file: PathBuf,
-    /// Where the result goes [default: standard output]
+    /// Where the result goes, by its extension in one of the formats; more than once, each file is
+    /// written of the one plan [default: standard output]
     #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// What the result is written as [default: by the extension of --out, else json]
-    #[arg(long, value_parser = PossibleValuesParser::new(export::ALL.iter().map(|format| format.name)))]
-    format: Option<String>,
-}
-
-impl Arguments {
-    fn format(&self) -> &'static Format {
-        let extension = || self.out.as_deref()?.extension()?.to_str();
-        let name = self.format.as_deref().or_else(extension);
-        let named = export::ALL
-            .iter()
-            .find(|format| name.is_some_and(|name| format.name.eq_ignore_ascii_case(name)));
-        named.unwrap_or(&export::ALL[0])
-    }
+    out: Vec<PathBuf>,
+    #[command(flatten)]
+    choice: Choice,
 }
 
 /// Plan, write the result, and say by the exit code how it went.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
-    let text = read(&arguments.file)
-        .with_context(|| format!("cannot read {}", arguments.file.display()))?;
+    let outs: Vec<&Path> = arguments.out.iter().map(PathBuf::as_path).collect();
+    let chosen = arguments.choice.of(&outs)?;
+    let text = files::read(&arguments.file)?;
     let rules = planner::rules(Limits::default());
     let scenario = match json::read(&text, &rules, draw_seed()).and_then(without_a_store) {
         Ok(scenario) => scenario,
@@ -58,18 +45,45 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         }
     };
 
+    // Told before the search, not after it.
+    let degrees = chosen.iter().find(|chosen| chosen.format.geodetic);
+    if let (Some(chosen), None) = (degrees, scenario.frame.wgs84()) {
+        let format = chosen.format.name;
+        eprintln!(
+            "{}: {}",
+            arguments.file.display(),
+            ExportError::NoGeodeticFrame { format }
+        );
+        return Ok(exit::BAD_INPUT);
+    }
+
     let stop = Interrupt::watch()?;
     let mut progress = Progress::new(scenario.planner.iterations);
     let outcome = planner::plan(&scenario, &mut progress, &stop);
     progress.finish(&outcome);
 
-    let document = document(&scenario, &outcome, stop.elapsed_ms(), arguments.format());
-    write(arguments.out.as_deref(), &document).context("cannot write the result")?;
-    Ok(if outcome.feasible {
+    let accepted = json::write(&scenario);
+    let result = document(&scenario, &accepted, &outcome, stop.elapsed_ms());
+    let input = ResultInput {
+        result: &result,
+        scenario: &accepted,
+        rules: &rules,
+    };
+    let mut code = if outcome.feasible {
         exit::DONE
     } else {
         exit::INFEASIBLE
-    })
+    };
+    for (position, chosen) in chosen.iter().enumerate() {
+        match chosen.format.write(&input, &chosen.options) {
+            Ok(document) => files::write(outs.get(position).copied(), &document)?,
+            Err(error) => {
+                eprintln!("{}: {error}", arguments.file.display());
+                code = export::code(&error);
+            }
+        }
+    }
+    Ok(code)
 }
 
 /// No plans are kept here that a route could be taken from.
@@ -83,24 +97,7 @@ fn without_a_store(scenario: Scenario) -> Result<Scenario, Refusal> {
     }
 }
 
-fn read(file: &Path) -> io::Result<Vec<u8>> {
-    if file == Path::new("-") {
-        let mut text = Vec::new();
-        io::stdin().lock().read_to_end(&mut text)?;
-        return Ok(text);
-    }
-    fs::read(file)
-}
-
-fn write(out: Option<&Path>, document: &str) -> io::Result<()> {
-    match out {
-        Some(file) => fs::write(file, format!("{document}\n")),
-        None => writeln!(io::stdout().lock(), "{document}"),
-    }
-}
-
-fn document(scenario: &Scenario, outcome: &Outcome, run_ms: f64, format: &Format) -> String {
-    let accepted = json::write(scenario);
+fn document(scenario: &Scenario, accepted: &str, outcome: &Outcome, run_ms: f64) -> String {
     let origin = Origin {
         plan_id: None,
         algorithm: scenario.planner.algorithm.clone(),
@@ -111,14 +108,7 @@ fn document(scenario: &Scenario, outcome: &Outcome, run_ms: f64, format: &Format
             run_ms,
         },
     };
-    let result = ResultDocument::new(outcome, origin).to_json();
-    match format.write {
-        None => result,
-        Some(write) => write(&ResultInput {
-            result: &result,
-            scenario: &accepted,
-        }),
-    }
+    ResultDocument::new(outcome, origin).to_json()
 }
 
 /// The faults that the service would answer with, a line each.

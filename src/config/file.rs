@@ -3,7 +3,7 @@
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::settings::Setting;
+use super::setting::Setting;
 use super::value::Given;
 
 /// A value of the file.

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 
 use super::Config;
-use super::settings::{self, Setting};
+use super::setting::Setting;
+use super::settings;
 
 /// What the command line says.
 #[derive(Debug, Clone, Default)]

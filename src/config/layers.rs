@@ -5,7 +5,8 @@ use std::ffi::OsString;
 use std::fmt;
 use std::path::PathBuf;
 
-use super::settings::{self, Setting};
+use super::setting::Setting;
+use super::settings;
 use super::value::Given;
 use super::{Config, Flags, file};
 

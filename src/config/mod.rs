@@ -4,10 +4,12 @@
 //! its key in the file follow from the row. Where several give it, the flag counts, then the
 //! variable, then the file. Deliberately absent: what a setting does.
 
+mod collector;
 mod file;
 mod flags;
 mod layers;
 mod print;
+mod setting;
 mod settings;
 mod value;
 
@@ -15,9 +17,10 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::time::Duration;
 
+pub use collector::{Endpoint, Headers};
 pub use flags::Flags;
 pub use layers::{Loaded, load};
-pub use value::{Endpoint, Filter, Headers, LogFormat};
+pub use value::{Filter, LogFormat};
 
 use crate::scenario::limits::Limits;
 

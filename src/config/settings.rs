@@ -1,11 +1,9 @@
 //! Which settings there are: one row each.
 
-use std::fmt::Write as _;
-use std::ops::{RangeFrom, RangeFull, RangeInclusive};
+use std::ops::RangeInclusive;
 use std::time::Duration;
 
-use super::Config;
-use super::value::{Given, Value};
+use super::setting::{Setting, row};
 
 /// Every setting, in the order in which they are shown.
 pub(super) fn all() -> Vec<Setting> {
@@ -272,168 +270,13 @@ fn limits() -> Vec<Setting> {
     ]
 }
 
-/// One setting.
-pub(super) struct Setting {
-    /// In the file: `table.key`, or `key` at its top.
-    pub(super) key: &'static str,
-    /// Of its value, in the help.
-    pub(super) placeholder: &'static str,
-    /// One sentence without its full stop.
-    pub(super) help: &'static str,
-    /// A variable that other programs share, which counts when its own is not set.
-    pub(super) shared_variable: Option<&'static str>,
-    place: Box<dyn Place>,
-}
-
-impl Setting {
-    fn or_variable(mut self, name: &'static str) -> Self {
-        self.shared_variable = Some(name);
-        self
-    }
-
-    /// Its table in the file, empty at the top, and its key there.
-    pub(super) fn path(&self) -> (&'static str, &'static str) {
-        self.key.split_once('.').unwrap_or(("", self.key))
-    }
-
-    /// Without the dashes before it.
-    pub(super) fn flag(&self) -> String {
-        self.key.replace(['.', '_'], "-")
-    }
-
-    /// Its environment variable.
-    pub(super) fn variable(&self) -> String {
-        format!("NOCTULE_{}", self.key.replace('.', "_").to_uppercase())
-    }
-
-    /// Put `given` into `config`.
-    ///
-    /// # Errors
-    /// What is allowed, when it is not that.
-    pub(super) fn set(&self, config: &mut Config, given: &Given) -> Result<(), String> {
-        self.place.set(config, given)
-    }
-
-    /// The value in `config`, as TOML; `None` when there is none.
-    pub(super) fn shown(&self, config: &Config) -> Option<String> {
-        self.place.shown(config)
-    }
-
-    /// Whether its value is never shown.
-    pub(super) fn is_secret(&self) -> bool {
-        self.place.is_secret()
-    }
-
-    /// Whether its flag may stand without a value.
-    pub(super) fn is_switch(&self) -> bool {
-        self.place.is_switch()
-    }
-}
-
-fn row<T: Value>(
-    key: &'static str,
-    placeholder: &'static str,
-    help: &'static str,
-    range: impl Into<Range<T>>,
-    field: fn(&mut Config) -> &mut T,
-) -> Setting {
-    let range = range.into();
-    Setting {
-        key,
-        placeholder,
-        help,
-        shared_variable: None,
-        place: Box::new(Field { range, field }),
-    }
-}
-
-/// Where a setting's value goes, whatever its type.
-trait Place {
-    fn set(&self, config: &mut Config, given: &Given) -> Result<(), String>;
-    fn shown(&self, config: &Config) -> Option<String>;
-    fn is_switch(&self) -> bool;
-    fn is_secret(&self) -> bool;
-}
-
-struct Field<T> {
-    range: Range<T>,
-    field: fn(&mut Config) -> &mut T,
-}
-
-impl<T: Value> Place for Field<T> {
-    fn set(&self, config: &mut Config, given: &Given) -> Result<(), String> {
-        let value = T::read(given).filter(|value| self.range.holds(value));
-        *(self.field)(config) = value.ok_or_else(|| self.range.allowed())?;
-        Ok(())
-    }
-
-    fn shown(&self, config: &Config) -> Option<String> {
-        (self.field)(&mut config.clone()).to_toml()
-    }
-
-    fn is_switch(&self) -> bool {
-        T::IS_SWITCH
-    }
-
-    fn is_secret(&self) -> bool {
-        T::IS_SECRET
-    }
-}
-
-/// What a value may be beside what its type says.
-struct Range<T> {
-    least: Option<T>,
-    most: Option<T>,
-}
-
-impl<T: Value> Range<T> {
-    fn holds(&self, value: &T) -> bool {
-        self.least.as_ref().is_none_or(|least| value >= least)
-            && self.most.as_ref().is_none_or(|most| value <= most)
-    }
-
-    fn allowed(&self) -> String {
-        let mut text = T::ALLOWED.to_owned();
-        for (word, bound) in [("from", &self.least), ("to", &self.most)] {
-            if let Some(bound) = bound.as_ref().and_then(Value::to_toml) {
-                write!(text, " {word} {bound}").expect("writing to a string cannot fail");
-            }
-        }
-        text
-    }
-}
-
-impl<T> From<RangeFull> for Range<T> {
-    fn from(RangeFull: RangeFull) -> Self {
-        let (least, most) = (None, None);
-        Self { least, most }
-    }
-}
-
-impl<T> From<RangeFrom<T>> for Range<T> {
-    fn from(range: RangeFrom<T>) -> Self {
-        Self {
-            least: Some(range.start),
-            most: None,
-        }
-    }
-}
-
-impl<T> From<RangeInclusive<T>> for Range<T> {
-    fn from(range: RangeInclusive<T>) -> Self {
-        let (least, most) = range.into_inner();
-        Self {
-            least: Some(least),
-            most: Some(most),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
+    use crate::config::Config;
+    use crate::config::value::Given;
 
     #[test]
     fn each_has_names_of_its_own_and_those_of_a_table_stand_together() {

@@ -1,6 +1,5 @@
 //! What kinds of values settings have: how each is read and written.
 
-use std::fmt;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -40,7 +39,7 @@ impl Given {
     }
 
     /// What stands for a text, in quotes or not.
-    fn text(&self) -> Option<&str> {
+    pub(super) fn text(&self) -> Option<&str> {
         match self {
             Self::Word(text) | Self::Text(text) => Some(text),
             _ => None,
@@ -125,103 +124,6 @@ impl Value for Filter {
     fn to_toml(&self) -> Option<String> {
         Some(quoted(&self.0))
     }
-}
-
-/// The address of a collector that speaks HTTP without encryption.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd)]
-pub struct Endpoint(String);
-
-impl Endpoint {
-    /// Without a slash at its end.
-    #[must_use]
-    pub fn as_str(&self) -> &str {
-        &self.0
-    }
-}
-
-impl Value for Option<Endpoint> {
-    const ALLOWED: &'static str = "an address such as http://127.0.0.1:4318, without encryption";
-
-    fn read(given: &Given) -> Option<Self> {
-        let text = given.text()?.trim_end_matches('/');
-        let (host, _) = split_http(text)?;
-        let (name, port) = host.rsplit_once(':').unwrap_or((host, "80"));
-        let is_sane = |byte: u8| byte.is_ascii_graphic() && !b"@?#".contains(&byte);
-        let sane = !name.is_empty() && text.bytes().all(is_sane) && port.parse::<u16>().is_ok();
-        sane.then(|| Some(Endpoint(text.to_owned())))
-    }
-
-    fn to_toml(&self) -> Option<String> {
-        self.as_ref().map(|endpoint| quoted(&endpoint.0))
-    }
-}
-
-/// Headers of what is sent to somebody else, credentials among them: never shown.
-#[derive(Clone, PartialEq, Eq, PartialOrd, Default)]
-pub struct Headers(Vec<(String, String)>);
-
-impl Headers {
-    /// Names in lower case, with values.
-    pub fn iter(&self) -> impl Iterator<Item = (&str, &str)> {
-        let headers = self.0.iter();
-        headers.map(|(name, value)| (name.as_str(), value.as_str()))
-    }
-}
-
-impl fmt::Debug for Headers {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.debug_list()
-            .entries(self.iter().map(|(name, _)| name))
-            .finish()
-    }
-}
-
-impl Value for Headers {
-    const ALLOWED: &'static str =
-        "name=value between commas, such as authorization=Bearer%20TOKEN, what is special as %XX";
-    const IS_SECRET: bool = true;
-
-    fn read(given: &Given) -> Option<Self> {
-        let entries = given.text()?.split(',').map(str::trim);
-        let headers = entries
-            .filter(|entry| !entry.is_empty())
-            .map(|entry| {
-                let (name, value) = entry.split_once('=')?;
-                let name = name.trim().to_ascii_lowercase();
-                let is_part = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
-                let named = !name.is_empty() && name.bytes().all(is_part);
-                named.then_some((name, decoded(value.trim())?))
-            })
-            .collect::<Option<Vec<_>>>()?;
-        Some(Self(headers))
-    }
-
-    fn to_toml(&self) -> Option<String> {
-        let headers: Vec<String> = self
-            .iter()
-            .map(|(name, value)| format!("{name}={value}"))
-            .collect();
-        (!headers.is_empty()).then(|| quoted(&headers.join(",")))
-    }
-}
-
-/// With what `%XX` stands for, all of it visible ASCII or a space.
-fn decoded(text: &str) -> Option<String> {
-    let mut parts = text.split('%');
-    let mut decoded = parts.next()?.to_owned();
-    for part in parts {
-        let byte = u8::from_str_radix(part.get(..2)?, 16).ok()?;
-        decoded.push(byte.into());
-        decoded.push_str(&part[2..]);
-    }
-    let is_sane = |byte: u8| byte == b' ' || byte.is_ascii_graphic();
-    decoded.bytes().all(is_sane).then_some(decoded)
-}
-
-/// Host with port, and path, of an `http` URL.
-fn split_http(url: &str) -> Option<(&str, &str)> {
-    let rest = url.strip_prefix("http://")?;
-    Some(rest.split_at(rest.find('/').unwrap_or(rest.len())))
 }
 
 impl Value for SocketAddr {
@@ -349,7 +251,7 @@ fn read_seconds(text: &str) -> Option<f64> {
 }
 
 /// As a string of TOML.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     toml::Value::from(text).to_string()
 }
 
@@ -381,54 +283,6 @@ mod tests {
         ] {
             let expected = expected_ms.map(Duration::from_millis);
             assert_eq!(Duration::read(&given), expected, "{given:?}");
-        }
-    }
-
-    #[test]
-    fn an_endpoint_is_an_http_url() {
-        for (text, taken) in [
-            ("http://127.0.0.1:4318", true),
-            ("http://collector:4318/", true),
-            ("http://[::1]:4318/otlp", true),
-            ("http://collector", true),
-            ("https://collector:4318", false),
-            ("collector:4318", false),
-            ("http://", false),
-            ("http://:4318", false),
-            ("http://user@collector", false),
-            ("http://collector:port", false),
-            ("http://a b", false),
-        ] {
-            let read = <Option<Endpoint>>::read(&Given::Word(text.to_owned()));
-            assert_eq!(read.is_some(), taken, "{text}");
-        }
-    }
-
-    #[test]
-    fn headers_are_names_and_values() {
-        let read = |text: &str| {
-            let headers = Headers::read(&Given::Word(text.to_owned()))?;
-            let lines = headers
-                .iter()
-                .map(|(name, value)| format!("{name}: {value}"));
-            Some(lines.collect::<Vec<_>>().join("; "))
-        };
-        for (text, expected) in [
-            (
-                "Authorization=Bearer%20a%3Db",
-                Some("authorization: Bearer a=b"),
-            ),
-            ("a=1, b=x=y,", Some("a: 1; b: x=y")),
-            ("", Some("")),
-            ("a", None),
-            ("=a", None),
-            ("a b=c", None),
-            ("a=%0d%0ab", None),
-            ("a=%4", None),
-            ("a=%zz", None),
-            ("a=\u{e9}", None),
-        ] {
-            assert_eq!(read(text).as_deref(), expected, "{text}");
         }
     }
 

@@ -1,4 +1,4 @@
-//! A JSON body: the right media type, plain or gzip, not too long either way, not too slow.
+//! A body: the right media type, plain or gzip, not too long either way, not too slow.
 
 use std::io::Read as _;
 
@@ -10,20 +10,48 @@ use http_body_util::{BodyExt, LengthLimitError, Limited};
 
 use super::problem::Problem;
 use super::{AppState, off_thread};
+use crate::import::Syntax;
 
-/// The whole body.
+/// The whole body, which must be JSON.
 pub(super) async fn read_json(
     state: &AppState,
     headers: &HeaderMap,
     body: Body,
 ) -> Result<Bytes, Problem> {
-    let (limit, timeout) = (state.rules.limits.body_bytes, state.body_timeout);
     if !is_json(headers) {
-        let found = headers.get(header::CONTENT_TYPE);
-        return Err(Problem::UnsupportedMediaType(found.map(|value| {
-            String::from_utf8_lossy(value.as_bytes()).into_owned()
-        })));
+        return Err(unsupported(headers, "application/json"));
     }
+    read(state, headers, body).await
+}
+
+/// The whole body, and whether it is said to be JSON or XML.
+pub(super) async fn read_json_or_xml(
+    state: &AppState,
+    headers: &HeaderMap,
+    body: Body,
+) -> Result<(Bytes, Syntax), Problem> {
+    let syntax = match essence(headers).as_deref() {
+        Some("application/xml" | "text/xml" | "application/vnd.google-earth.kml+xml") => {
+            Syntax::Xml
+        }
+        _ if is_json(headers) => Syntax::Json,
+        _ => {
+            let allowed =
+                "application/geo+json, application/vnd.google-earth.kml+xml or application/json";
+            return Err(unsupported(headers, allowed));
+        }
+    };
+    Ok((read(state, headers, body).await?, syntax))
+}
+
+fn unsupported(headers: &HeaderMap, allowed: &'static str) -> Problem {
+    let found = headers.get(header::CONTENT_TYPE);
+    let found = found.map(|value| String::from_utf8_lossy(value.as_bytes()).into_owned());
+    Problem::UnsupportedMediaType { found, allowed }
+}
+
+async fn read(state: &AppState, headers: &HeaderMap, body: Body) -> Result<Bytes, Problem> {
+    let (limit, timeout) = (state.rules.limits.body_bytes, state.body_timeout);
     let coding = Coding::of(headers)?;
     if announced_length(headers).is_some_and(|length| length > limit as u64) {
         return Err(Problem::BodyTooLarge(limit));
@@ -94,20 +122,22 @@ fn announced_length(headers: &HeaderMap) -> Option<u64> {
 
 /// `application/json` or `application/*+json`, in UTF-8 or no charset named.
 fn is_json(headers: &HeaderMap) -> bool {
-    let Some(value) = headers
-        .get(header::CONTENT_TYPE)
-        .and_then(|value| value.to_str().ok())
-    else {
-        return false;
-    };
+    essence(headers).is_some_and(|essence| {
+        let subtype = essence.strip_prefix("application/").unwrap_or_default();
+        subtype == "json" || subtype.ends_with("+json")
+    })
+}
+
+/// The media type, lower case; `None` when none is named, or with a charset that is not UTF-8.
+fn essence(headers: &HeaderMap) -> Option<String> {
+    let value = headers.get(header::CONTENT_TYPE)?.to_str().ok()?;
     let mut parts = value.split(';').map(str::trim);
     let essence = parts.next().unwrap_or_default().to_ascii_lowercase();
-    let subtype = essence.strip_prefix("application/").unwrap_or_default();
     let utf8 = parts
         .filter_map(|parameter| parameter.split_once('='))
         .filter(|(name, _)| name.eq_ignore_ascii_case("charset"))
         .all(|(_, charset)| charset.trim_matches('"').eq_ignore_ascii_case("utf-8"));
-    utf8 && (subtype == "json" || subtype.ends_with("+json"))
+    utf8.then_some(essence)
 }
 
 #[cfg(test)]

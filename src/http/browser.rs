@@ -23,7 +23,8 @@ const CSP_OF_SVG: HeaderValue = HeaderValue::from_static(
 const PREFLIGHT_AGE: Duration = Duration::from_secs(600);
 
 /// Headers of answers that pages elsewhere may read, beside those that every page may.
-const EXPOSED: [HeaderName; 11] = [
+const EXPOSED: [HeaderName; 12] = [
+    header::CONTENT_DISPOSITION,
     header::ETAG,
     header::LINK,
     header::LOCATION,

@@ -1,15 +1,18 @@
 //! A plan's documents: what was accepted, and what came out, in the format asked for.
 
 use axum::extract::State;
-use axum::http::{HeaderMap, Uri, header};
+use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 
 use super::caller::Caller;
 use super::params::{self, Id, Params};
 use super::problem::Problem;
 use super::{AppState, accept, off_thread, partial, retry};
-use crate::export::{self, Format, ResultInput};
-use crate::job::PlanId;
+use crate::export::{self, Format, OPTIONS, Options, ResultInput, file_name};
+use crate::job::Plan;
+
+/// Parameters of a result beside the options of its format.
+const PARAMETERS: [&str; 2] = ["format", "partial"];
 
 /// `GET /plans/{id}/scenario`.
 pub(super) async fn scenario(
@@ -32,15 +35,20 @@ pub(super) async fn result(
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let params = Params::read(&uri, &["format", "partial"])?;
+    let options = OPTIONS.iter().map(|rule| rule.name);
+    let known: Vec<_> = PARAMETERS.into_iter().chain(options).collect();
+    let params = Params::read(&uri, &known)?;
     let partial = params.parse("partial", "true or false")?.unwrap_or(false);
     let plan = caller.plan(&*state.store, id).await?;
     let format = choose_format(&params, &headers)?;
+    let given = params.pairs();
+    let options = given.filter(|(name, _)| !PARAMETERS.contains(name));
+    let options = Options::read(format, options).map_err(export::ExportError::from)?;
     if partial
         && !plan.status.is_final()
         && let Some(so_far) = partial::result(&state, &plan).await?
     {
-        return written(&state, id, format, so_far).await;
+        return written(&state, &plan, format, options, so_far).await;
     }
     if !plan.status.is_final() {
         let retry_after_s = retry::for_end(&plan, &state.store.stats().await?, state.capacity);
@@ -57,36 +65,58 @@ pub(super) async fn result(
             failure: plan.error,
         });
     };
-    written(&state, id, format, stored).await
+    written(&state, &plan, format, options, stored).await
 }
 
 /// A result in the format that was asked for.
 async fn written(
     state: &AppState,
-    id: PlanId,
-    format: &Format,
+    plan: &Plan,
+    format: &'static Format,
+    options: Options,
     result: String,
 ) -> Result<Response, Problem> {
-    let document = match format.write {
-        None => result,
-        Some(write) => {
-            let scenario = state.store.scenario(id).await?;
-            off_thread::run(move || {
-                write(&ResultInput {
-                    result: &result,
-                    scenario: &scenario,
-                })
-            })
-            .await?
-        }
+    let document = if format.is_stored() {
+        result
+    } else {
+        let scenario = state.store.scenario(plan.id).await?;
+        let rules = state.rules.clone();
+        let write = move || {
+            let input = ResultInput {
+                result: &result,
+                scenario: &scenario,
+                rules: &rules,
+            };
+            format.write(&input, &options)
+        };
+        off_thread::run(write).await??
     };
-    Ok(([(header::CONTENT_TYPE, format.media_type)], document).into_response())
+    let headers = [
+        (
+            header::CONTENT_TYPE,
+            HeaderValue::from_static(format.media_type),
+        ),
+        (header::CONTENT_DISPOSITION, disposition(plan, format)),
+    ];
+    Ok((headers, document).into_response())
+}
+
+/// What a browser makes of it: it shows what it can show, and keeps the rest under a name.
+fn disposition(plan: &Plan, format: &Format) -> HeaderValue {
+    let name = file_name(plan.name.as_deref(), Some(&plan.id.to_string()), format);
+    let kind = if ["json", "svg"].contains(&format.name) {
+        "inline"
+    } else {
+        "attachment"
+    };
+    HeaderValue::from_str(&format!("{kind}; filename=\"{name}\""))
+        .expect("a file's name is ASCII letters, digits and hyphens")
 }
 
 /// `?format=` decides, else `Accept`.
 fn choose_format(params: &Params, headers: &HeaderMap) -> Result<&'static Format, Problem> {
     if let Some(name) = params.text("format") {
-        let found = export::ALL.iter().find(|format| format.name == name);
+        let found = Format::named(name);
         let names = || {
             let names: Vec<_> = export::ALL.iter().map(|format| format.name).collect();
             format!("one of {}", names.join(", "))

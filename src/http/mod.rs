@@ -11,6 +11,7 @@ mod caller;
 mod documents;
 mod events;
 mod feed;
+mod ground;
 mod idempotency;
 mod metrics;
 mod off_thread;
@@ -23,8 +24,10 @@ mod prefer;
 mod problem;
 mod request_id;
 mod retry;
+mod scenarios;
 pub mod server;
 mod service;
+mod shipped;
 mod sse;
 mod status;
 mod throttle;
@@ -115,6 +118,10 @@ pub fn routes() -> Vec<Route> {
         get("/plans/{id}/scenario", documents::scenario),
         get("/plans/{id}/events", events::follow),
         post("/plans/{id}/tickets", tickets::issue),
+        post("/scenarios:convert", scenarios::convert),
+        post("/scenarios:ground", ground::sample),
+        get("/scenarios", shipped::list),
+        get("/scenarios/{name}", shipped::show),
         get("/algorithms", service::algorithms),
         get("/limits", service::limits),
         get("/version", service::version),
@@ -123,6 +130,9 @@ pub fn routes() -> Vec<Route> {
         get("/metrics", metrics::show),
         get("/openapi.yaml", pages::openapi_yaml),
         get("/openapi.json", pages::openapi_json),
+        get("/", pages::front::front),
+        get("/page/{file}", pages::front::file),
+        get("/page/vendor/{file}", pages::front::vendored),
         get("/docs", pages::docs),
         get("/problems/{slug}", pages::problem),
     ]

@@ -7,7 +7,7 @@
 //! the curve is the polyline of the waypoints, so a feasible route always has a path.
 
 use super::Path;
-use crate::cost::{Constraint, Model, Tolerance};
+use crate::cost::{Breach, Constraint, Model, Tolerance};
 use crate::geometry::Point3;
 use crate::geometry::bspline::BSpline;
 use crate::scenario::Quadrature;
@@ -185,19 +185,23 @@ fn bisect(spline: &BSpline, spacing: f64, start: Sample, end: Sample, samples: &
     }
 }
 
+/// Whether a path is held to what `breach` breaks: its samples are no waypoints, whose legs have a
+/// least length and whose places an area, and its chords may be a hair steeper than the curve.
+#[must_use]
+pub fn binds(breach: &Breach) -> bool {
+    match breach.constraint {
+        Constraint::Threat | Constraint::Altitude | Constraint::Terrain | Constraint::Turn => true,
+        Constraint::Climb => breach.amount > CHORD_CLIMB_SLACK,
+        Constraint::Leg | Constraint::Area => false,
+    }
+}
+
 /// The polynomial pieces at which the polyline of `samples`, or the curve itself, breaks a constraint.
 fn cutting_pieces(model: &Model, spline: &BSpline, samples: &[Sample]) -> Vec<usize> {
     let mut cutting = Vec::new();
     let points: Vec<Point3> = samples.iter().map(|sample| sample.point).collect();
     model.assess(&points, Quadrature::Integral, model.tolerance, |breach| {
-        let counts = match breach.constraint {
-            Constraint::Threat | Constraint::Altitude | Constraint::Terrain | Constraint::Turn => {
-                true
-            }
-            Constraint::Climb => breach.amount > CHORD_CLIMB_SLACK,
-            Constraint::Leg | Constraint::Area => false,
-        };
-        if counts {
+        if binds(&breach) {
             // Leg k ends at sample k + 1; a turn at its start is shaped by the piece before too.
             cutting.push(samples[breach.index + 1].piece);
             if breach.constraint == Constraint::Turn {

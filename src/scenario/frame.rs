@@ -91,17 +91,11 @@ impl Wgs84 {
         }
     }
 
-    /// The place that lies at `point` of the plane: as the request wrote it, else to a tenth of a micrometre.
+    /// The place that lies at `point` of the plane: as the request wrote it, else to a few nanometres.
     #[must_use]
     pub fn place(&self, point: Point2) -> LatLon {
         let written = self.written.get(&key(point)).copied();
-        written.unwrap_or_else(|| {
-            let place = self.plane.geodetic(point);
-            LatLon {
-                lat: rounded(place.lat),
-                lon: rounded(place.lon),
-            }
-        })
+        written.unwrap_or_else(|| self.plane.geodetic(point))
     }
 
     /// `point` of the plane in the request's coordinates.
@@ -142,9 +136,4 @@ impl Wgs84 {
 /// To find again what was written for a point.
 pub(super) fn key(point: Point2) -> [u64; 2] {
     [point.x.to_bits(), point.y.to_bits()]
-}
-
-/// To 1e-12 degrees: digits that mean something.
-fn rounded(degrees: f64) -> f64 {
-    (degrees * 1e12).round() / 1e12
 }

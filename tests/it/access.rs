@@ -23,6 +23,53 @@ async fn lists(service: &Service, key: &str) -> StatusCode {
     request.send().await.expect("an answer").status()
 }
 
+/// A service whose keys, data and log are in one directory.
+struct Guarded {
+    directory: tempfile::TempDir,
+    service: Service,
+}
+
+impl Guarded {
+    /// With `entry` in its key file.
+    fn new(entry: &str, arguments: &[&str]) -> Self {
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let path = |name: &str| directory.path().join(name);
+        fs::write(path("keys.toml"), entry).expect("written");
+        let keys = path("keys.toml");
+        let keys = ["--keys-file", keys.to_str().expect("UTF-8")];
+        let service = Service::start_on(
+            "127.0.0.1:0",
+            &path("data"),
+            &[&keys, arguments].concat(),
+            fs::File::create(path("log")).expect("a file"),
+        );
+        Self { directory, service }
+    }
+
+    /// Write other keys, and have them read.
+    fn exchange_keys(&self, entries: &str) {
+        fs::write(self.directory.path().join("keys.toml"), entries).expect("written");
+        self.service.signal("HUP");
+    }
+
+    /// The address of a plan that was handed in with `key`.
+    async fn submit(&self, key: &str) -> String {
+        let request = self.service.client().post(self.service.url("/plans"));
+        let request = request.json(&scenario()).bearer_auth(key);
+        let accepted = request.send().await.expect("an answer");
+        assert_eq!(accepted.status(), 202);
+        accepted.headers()["location"]
+            .to_str()
+            .expect("text")
+            .to_owned()
+    }
+
+    /// The log, once it has `part` in it.
+    async fn log_with(&self, part: &str) -> String {
+        log_with(&self.directory.path().join("log"), part).await
+    }
+}
+
 /// The log, once it has `part` in it.
 async fn log_with(path: &Path, part: &str) -> String {
     for _ in 0..600 {
@@ -154,49 +201,24 @@ async fn with_leave_or_keys_it_listens_everywhere() {
 
 #[tokio::test]
 async fn a_hangup_reads_the_keys_again_and_a_fault_changes_nothing() {
-    let directory = tempfile::tempdir().expect("a temporary directory");
-    let path = |name: &str| directory.path().join(name);
     let (old, old_entry) = new_key(&["--name", "old", "--owner", "alice"]);
     let (new, new_entry) = new_key(&["--name", "new", "--owner", "alice"]);
-    fs::write(path("keys.toml"), &old_entry).expect("written");
-    let keys = path("keys.toml");
-    let arguments = [
-        "--workers",
-        "1",
-        "--keys-file",
-        keys.to_str().expect("UTF-8"),
-    ];
-    let service = Service::start_on(
-        "127.0.0.1:0",
-        &path("data"),
-        &arguments,
-        fs::File::create(path("log")).expect("a file"),
-    );
-    let request = service
-        .client()
-        .post(service.url("/plans"))
-        .json(&scenario());
-    let accepted = request.bearer_auth(&old).send().await.expect("an answer");
-    assert_eq!(accepted.status(), 202);
-    let plan = accepted.headers()["location"]
-        .to_str()
-        .expect("text")
-        .to_owned();
-    assert_eq!(lists(&service, &new).await, StatusCode::UNAUTHORIZED);
+    let guarded = Guarded::new(&old_entry, &["--workers", "1"]);
+    let service = &guarded.service;
+    let plan = guarded.submit(&old).await;
+    assert_eq!(lists(service, &new).await, StatusCode::UNAUTHORIZED);
 
-    fs::write(path("keys.toml"), "[[key]]\nname = \"old\"\n").expect("written");
-    service.signal("HUP");
-    let log = log_with(&path("log"), "the keys stay as they were").await;
+    guarded.exchange_keys("[[key]]\nname = \"old\"\n");
+    let log = guarded.log_with("the keys stay as they were").await;
     assert!(
         log.contains("key \\\"old\\\"") || log.contains("key \"old\""),
         "{log}"
     );
-    assert_eq!(lists(&service, &old).await, StatusCode::OK);
+    assert_eq!(lists(service, &old).await, StatusCode::OK);
 
-    fs::write(path("keys.toml"), &new_entry).expect("written");
-    service.signal("HUP");
-    log_with(&path("log"), "the keys have been read again").await;
-    assert_eq!(lists(&service, &old).await, StatusCode::UNAUTHORIZED);
+    guarded.exchange_keys(&new_entry);
+    guarded.log_with("the keys have been read again").await;
+    assert_eq!(lists(service, &old).await, StatusCode::UNAUTHORIZED);
     // The new key is of the same owner.
     let status = service
         .get(&plan)
@@ -209,32 +231,10 @@ async fn a_hangup_reads_the_keys_again_and_a_fault_changes_nothing() {
 
 #[tokio::test]
 async fn neither_keys_nor_tickets_are_logged() {
-    let directory = tempfile::tempdir().expect("a temporary directory");
-    let path = |name: &str| directory.path().join(name);
     let (key, entry) = new_key(&["--name", "alice"]);
-    fs::write(path("keys.toml"), &entry).expect("written");
-    let keys = path("keys.toml");
-    let arguments = [
-        "--log",
-        "trace",
-        "--keys-file",
-        keys.to_str().expect("UTF-8"),
-    ];
-    let service = Service::start_on(
-        "127.0.0.1:0",
-        &path("data"),
-        &arguments,
-        fs::File::create(path("log")).expect("a file"),
-    );
-    let request = service
-        .client()
-        .post(service.url("/plans"))
-        .json(&scenario());
-    let accepted = request.bearer_auth(&key).send().await.expect("an answer");
-    let plan = accepted.headers()["location"]
-        .to_str()
-        .expect("text")
-        .to_owned();
+    let guarded = Guarded::new(&entry, &["--log", "trace"]);
+    let service = &guarded.service;
+    let plan = guarded.submit(&key).await;
     let request = service
         .client()
         .post(service.url(&format!("{plan}/tickets")));
@@ -250,7 +250,7 @@ async fn neither_keys_nor_tickets_are_logged() {
         let refused = service.get(&uri).header("x-request-id", &key).send().await;
         assert_eq!(refused.expect("an answer").status(), 400);
     }
-    let log = log_with(&path("log"), "a key came in a URL").await;
+    let log = guarded.log_with("a key came in a URL").await;
     assert!(log.contains("alice"), "the key's name is there: {log}");
     let ticket = ticket["ticket"].as_str().expect("text");
     let sum = noctule::export::sha256_hex(key.as_bytes());

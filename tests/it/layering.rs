@@ -15,7 +15,7 @@ use Imports::{Above, Only};
 /// From the ground up: geometry knows nothing of flying, the optimizers nothing of routes, the engine
 /// nothing of plans on disk, and nobody anything of the command line. Flags and logs stand below the
 /// engine: what may change a result is in the request.
-const ROOMS: [(&str, Imports); 16] = [
+const ROOMS: [(&str, Imports); 17] = [
     ("geometry", Only(&[])),
     ("terrain", Above),
     ("threat", Above),
@@ -25,6 +25,7 @@ const ROOMS: [(&str, Imports); 16] = [
     ("seeding", Above),
     ("planner", Above),
     ("export", Above),
+    ("import", Only(&[])),
     ("job", Above),
     ("config", Only(&["scenario"])),
     ("telemetry", Only(&["config"])),

@@ -51,7 +51,7 @@ const WITHOUT_BODY: &[(&str, u16)] = &[
     ("GET {plan}/events?rate=1001", 400),
     ("GET {plan}/events?rate=NaN", 400),
     ("GET {plan}/events?last_event_id=x", 400),
-    ("GET {plan}/result?format=kml", 400),
+    ("GET {plan}/result?format=kmz", 400),
 ];
 
 /// The same, with a header.

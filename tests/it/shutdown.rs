@@ -172,7 +172,7 @@ async fn a_second_signal_does_not_wait() {
 #[tokio::test]
 async fn open_streams_do_not_hold_up_the_end() {
     let directory = tempfile::tempdir().expect("a temporary directory");
-    let service = Service::start(directory.path(), &["--workers", "1", "--grace", "2"]);
+    let service = Service::start(directory.path(), &["--workers", "1", "--grace", "8"]);
     let address = service.submit(&a_run_of(60_000)).await;
     let mut streams = Vec::new();
     for _ in 0..500 {
@@ -181,6 +181,8 @@ async fn open_streams_do_not_hold_up_the_end() {
     }
     let begun = Instant::now();
     service.signal("TERM");
+    let ready = async || service.get("/readyz").send().await.expect("an answer");
+    while ready().await.status() != 503 {}
     for stream in streams {
         let rest = stream.rest().await;
         assert!(
@@ -191,4 +193,8 @@ async fn open_streams_do_not_hold_up_the_end() {
     }
     assert!(service.exit().await.success());
     assert!(begun.elapsed() < LONG_BEFORE, "{:?}", begun.elapsed());
+    let service = Service::start(directory.path(), &["--workers", "1", "--grace", "0"]);
+    let status: Value = serde_json::from_slice(&service.bytes(&address).await).expect("JSON");
+    let status = status["status"].as_str().expect("text");
+    assert!(["queued", "running"].contains(&status), "{status}");
 }

@@ -4,7 +4,7 @@
 use std::fs;
 
 use noctule::export::document::{Path, Position, ResultDocument, Violation};
-use noctule::export::{self, ResultInput};
+use noctule::export::{Format, Options, ResultInput};
 use noctule::planner;
 use noctule::scenario::json;
 use noctule::scenario::limits::Limits;
@@ -26,12 +26,14 @@ fn accepted(document: &Value) -> String {
 }
 
 fn draw(scenario: &Value, result: &ResultDocument) -> String {
-    let row = export::ALL.iter().find(|format| format.name == "svg");
-    let write = row.and_then(|format| format.write).expect("svg is written");
-    write(&ResultInput {
+    let input = ResultInput {
         result: &result.to_json(),
         scenario: &accepted(scenario),
-    })
+        rules: &planner::rules(Limits::NONE),
+    };
+    let svg = Format::named("svg").expect("svg is a format");
+    svg.write(&input, &Options::default())
+        .expect("every plan can be drawn")
 }
 
 /// A result with a path that cuts the corner of its waypoints.

@@ -1,6 +1,7 @@
 //! Webhooks: a plan's end told to a receiver of ours, signed, again until it is heard, and across restarts.
 
 use std::collections::HashMap;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -268,10 +269,9 @@ async fn addresses_are_looked_at_before_a_plan_is_accepted() {
     assert_eq!(submit(&api, "https://hooks.example/").await.status, 202);
 }
 
-#[tokio::test]
-async fn a_restart_forgets_no_webhook() {
-    let directory = tempfile::tempdir().expect("a temporary directory");
-    let secret = directory.path().join("secret");
+/// A service of its own in `directory`, which tells whom it is asked to.
+fn start(directory: &Path, variables: &[(&str, &str)]) -> Service {
+    let secret = directory.join("secret");
     std::fs::write(&secret, SECRET).expect("written");
     let arguments = [
         "--workers",
@@ -280,26 +280,30 @@ async fn a_restart_forgets_no_webhook() {
         "--webhook-secret-file",
         secret.to_str().expect("UTF-8"),
     ];
-    let data = directory.path().join("data");
-    let mut receiver = Receiver::new(&[500]).await;
-    let service = Service::start(&data, &arguments);
-    let request = service
-        .client()
-        .post(service.url("/plans"))
-        .json(&scenario());
-    let accepted = request
-        .header("noctule-webhook", &receiver.url)
-        .send()
-        .await;
-    let accepted = accepted.expect("an answer");
+    Service::start_with(variables, &directory.join("data"), &arguments)
+}
+
+/// The address of a plan whose end is to be told to `url`.
+async fn submit_to(service: &Service, url: &str) -> String {
+    let request = service.client().post(service.url("/plans"));
+    let request = request.json(&scenario()).header("noctule-webhook", url);
+    let accepted = request.send().await.expect("an answer");
     assert_eq!(accepted.status(), 202);
-    let plan = accepted.headers()["location"]
+    accepted.headers()["location"]
         .to_str()
         .expect("text")
-        .to_owned();
+        .to_owned()
+}
+
+#[tokio::test]
+async fn a_restart_forgets_no_webhook() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let mut receiver = Receiver::new(&[500]).await;
+    let service = start(directory.path(), &[]);
+    let plan = submit_to(&service, &receiver.url).await;
     check(&receiver.next().await, &plan);
     service.kill();
-    let service = Service::start(&data, &arguments);
+    let service = start(directory.path(), &[]);
     let told = check(&receiver.next().await, &plan);
     assert_eq!(told["status"], "succeeded");
     drop(service);
@@ -308,16 +312,6 @@ async fn a_restart_forgets_no_webhook() {
 #[tokio::test]
 async fn tls_is_spoken_with_whom_the_machine_trusts() {
     let directory = tempfile::tempdir().expect("a temporary directory");
-    let secret = directory.path().join("secret");
-    std::fs::write(&secret, SECRET).expect("written");
-    let arguments = [
-        "--workers",
-        "1",
-        "--webhook-allow-private",
-        "--webhook-secret-file",
-        secret.to_str().expect("UTF-8"),
-    ];
-    let data = directory.path().join("data");
     let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
     let port = listener.local_addr().expect("bound").port();
     let acceptor = acceptor();
@@ -327,25 +321,15 @@ async fn tls_is_spoken_with_whom_the_machine_trusts() {
     };
 
     // Of an authority that nobody knows.
-    let service = Service::start(&data, &arguments);
-    let request = service
-        .client()
-        .post(service.url("/plans"))
-        .json(&scenario());
+    let service = start(directory.path(), &[]);
     let url = format!("https://localhost:{port}/hook?x=1");
-    let accepted = request.header("noctule-webhook", url).send().await;
-    let accepted = accepted.expect("an answer");
-    assert_eq!(accepted.status(), 202);
-    let plan = accepted.headers()["location"]
-        .to_str()
-        .expect("text")
-        .to_owned();
+    let plan = submit_to(&service, &url).await;
     let refused = accept().await.expect_err("nothing is said to a stranger");
     assert!(refused.to_string().contains("UnknownCA"), "{refused}");
     service.kill();
 
     let authority = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/fixtures/tls/ca.pem");
-    let _service = Service::start_with(&[("SSL_CERT_FILE", authority)], &data, &arguments);
+    let _service = start(directory.path(), &[("SSL_CERT_FILE", authority)]);
     let stream = accept().await.expect("a handshake");
     let (sender, mut messages) = mpsc::unbounded_channel();
     let statuses = Arc::new(std::sync::Mutex::new(vec![].into_iter()));

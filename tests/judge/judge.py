@@ -3,7 +3,7 @@
     python3 tests/judge/judge.py --scenario SCENARIO.json --result RESULT.json [--result ...]
     python3 tests/judge/judge.py --pair DIR            every NAME.result.json beside its NAME.scenario.json
 
-The scenario is the caller's document or the accepted one, in the local frame. Exit status: 0 everything agrees,
+The scenario is the caller's document or the accepted one, over any terrain but datasets. Exit status: 0 everything agrees,
 1 something disagrees (each is printed with the figure claimed, the one recomputed and the relative difference),
 2 the documents cannot be judged.
 """
@@ -13,6 +13,7 @@ import json
 import sys
 from pathlib import Path
 
+from earth import earth_of
 from report import Report
 from scenario import Unsupported, load, read_scenario
 from verdict import judge
@@ -29,8 +30,8 @@ def main(arguments=None):
     passed = failed = 0
     for batch in batches:
         results = []
-        for scenario, file in batch:
-            report, result = _judge_file(scenario, file)
+        for scenario, file, earth in batch:
+            report, result = _judge_file(scenario, file, earth)
             results.append(result)
             passed, failed = passed + report.passed, failed + (not report.passed)
             _print_report(file, report, options.quiet)
@@ -86,8 +87,8 @@ def _batches(options):
     """Lists of scenario and result file, one for each scenario; the seed makes no other scenario."""
     batches = []
     if options.scenario:
-        scenario = read_scenario(load(options.scenario))
-        batches.append([(scenario, file) for file in options.result])
+        document = load(options.scenario)
+        batches.append([_placed(document, file) for file in options.result])
     by_document = {}
     for directory in options.pair:
         files = sorted(Path(directory).glob("*.result.json"))
@@ -97,11 +98,17 @@ def _batches(options):
             document = load(file.with_name(file.name.removesuffix(".result.json") + ".scenario.json"))
             planner = {**(document.get("planner") or {}), "seed": None}
             key = json.dumps(document | {"planner": planner}, sort_keys=True)
-            by_document.setdefault(key, []).append((read_scenario(document), str(file)))
+            by_document.setdefault(key, []).append(_placed(document, str(file)))
     return batches + list(by_document.values())
 
 
-def _judge_file(scenario, file):
+def _placed(document, file):
+    """The scenario of one result, the result's file, and the plane that both lie on; None in the local frame."""
+    earth = earth_of(document, load(file)) if document.get("frame", "local") != "local" else None
+    return read_scenario(earth.scenario(document) if earth else document), file, earth
+
+
+def _judge_file(scenario, file, earth):
     """The report on one file and its document, None when it could not be read."""
     try:
         result = load(file)
@@ -109,7 +116,10 @@ def _judge_file(scenario, file):
         report = Report()
         report.that(False, f"unreadable: {error}")
         return report, None
-    return judge(scenario, result), result if isinstance(result, dict) else None
+    report = judge(scenario, earth.result(result) if earth else result)
+    for complaint in earth.complaints if earth else ():
+        report.that(False, complaint)
+    return report, result if isinstance(result, dict) else None
 
 
 def _print_report(file, report, quiet):

@@ -3,6 +3,7 @@
 //! The same documents give the same bytes. Deliberately absent: scripts, styles and anything that
 //! would have to be fetched, so that the file can be opened, printed and mailed as it is.
 
+mod axes;
 mod canvas;
 mod contour;
 mod header;
@@ -18,13 +19,10 @@ use canvas::{Area, Canvas};
 use relief::Relief;
 use scale::MapScale;
 
-use super::ResultInput;
-use super::document::{Position, ResultDocument};
+use super::document::ResultDocument;
+use super::{Delivery, Options};
 use crate::geometry::{Point3, Rect};
-use crate::planner;
 use crate::scenario::Scenario;
-use crate::scenario::limits::Limits;
-use crate::scenario::{Frame, json};
 
 /// Of the sheet, pixels.
 const WIDTH: f64 = 900.0;
@@ -45,20 +43,22 @@ const PROFILE_FOOT: f64 = 44.0;
 const ASPECT: (f64, f64) = (0.66, 1.05);
 
 /// What is drawn.
-struct Drawing {
-    scenario: Scenario,
-    result: ResultDocument,
-    waypoints: Vec<Point3>,
+struct Drawing<'d> {
+    scenario: &'d Scenario,
+    result: &'d ResultDocument,
+    waypoints: &'d [Point3],
     /// What is flown; none when infeasible.
-    path: Option<Vec<Point3>>,
+    path: Option<&'d [Point3]>,
 }
 
-/// Draw a stored plan.
-///
-/// # Panics
-/// When the documents are none that this program stored.
-pub(super) fn write(input: &ResultInput) -> String {
-    let drawing = Drawing::read(input);
+/// Draw a plan.
+pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
+    let drawing = Drawing {
+        scenario: &delivery.scenario,
+        result: &delivery.result,
+        waypoints: &delivery.waypoints,
+        path: delivery.path.as_deref(),
+    };
     let map = drawing.map(header::height(&drawing));
     let profile_frame = Area {
         left: LEFT,
@@ -83,29 +83,14 @@ pub(super) fn write(input: &ResultInput) -> String {
     canvas.finish()
 }
 
-impl Drawing {
-    fn read(input: &ResultInput) -> Self {
-        let scenario = json::read_accepted(input.scenario, &planner::rules(Limits::NONE))
-            .expect("an accepted document is written so that it can be read again");
-        let result: ResultDocument =
-            serde_json::from_str(input.result).expect("a stored result is a result document");
-        let frame = &scenario.frame;
-        let path = result.path.as_ref();
-        Self {
-            waypoints: points(&result.waypoints, frame),
-            path: path.map(|path| points(&path.points, frame)),
-            scenario,
-            result,
-        }
-    }
-
+impl Drawing<'_> {
     fn name(&self) -> &str {
         self.scenario.name.as_deref().unwrap_or("unnamed scenario")
     }
 
     /// What the vehicle does, as far as is known: the path, else the waypoints.
     fn course(&self) -> &[Point3] {
-        self.path.as_deref().unwrap_or(&self.waypoints)
+        self.path.unwrap_or(self.waypoints)
     }
 
     fn route_color(&self) -> &'static str {
@@ -150,14 +135,6 @@ impl Drawing {
             },
         }
     }
-}
-
-fn points(positions: &[Position], frame: &Frame) -> Vec<Point3> {
-    let point = |position: &Position| {
-        let point = position.within(frame);
-        point.expect("a result speaks in the frame of its scenario")
-    };
-    positions.iter().map(point).collect()
 }
 
 /// A number for people: three or four figures of it.

@@ -1,11 +1,12 @@
 //! The route seen from above, north up, among ground and threats.
 
 use super::Drawing;
+use super::axes;
 use super::canvas::{Area, Canvas, Font, Spot, polyline, ring};
 use super::labels::Labels;
-use super::palette::{BROKEN, INK, MUTED, RULE, THREAT};
+use super::palette::{BROKEN, INK, RULE, THREAT};
 use super::relief::Relief;
-use super::scale::{MapScale, Steps};
+use super::scale::MapScale;
 use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};
 
@@ -25,7 +26,7 @@ pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, relief: &Relief, map:
         route(canvas, drawing, map);
     });
     canvas.rect(frame, &format!("fill=\"none\" stroke=\"{INK}\""));
-    axes(canvas, map);
+    axes::draw(canvas, drawing, map);
 
     let mut labels = Labels::within(*frame);
     for line in [Some(&drawing.waypoints), drawing.path.as_ref()]
@@ -160,7 +161,7 @@ fn outline(vertices: &[Point2], map: &MapScale) -> String {
 }
 
 fn route(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale) {
-    let waypoints = spots(&drawing.waypoints, map);
+    let waypoints = spots(drawing.waypoints, map);
     if let Some(path) = &drawing.path {
         let data = polyline(&thinned(&spots(path, map)));
         canvas.path(&data, &format!("{CASING} stroke-width=\"6\""));
@@ -250,63 +251,6 @@ pub(super) fn thinned(line: &[Spot]) -> Vec<Spot> {
         kept.push(*spot);
     }
     kept
-}
-
-/// Ticks, their labels, the scale bar and north.
-fn axes(canvas: &mut Canvas, map: &MapScale) {
-    let (frame, view) = (&map.frame, &map.view);
-    let steps = Steps::of((view.max.x - view.min.x).max(view.max.y - view.min.y), 9.0);
-    let line = format!("stroke=\"{INK}\"");
-    let font = Font::new(11.0, MUTED);
-    for x in steps.within(view.min.x, view.max.x) {
-        let (at, _) = map.spot(Point2::new(x, view.min.y));
-        canvas.line_between((at, frame.bottom()), (at, frame.bottom() + 5.0), &line);
-        let place = (at, frame.bottom() + 18.0);
-        canvas.text(place, &font.anchor("middle"), &steps.label(x));
-    }
-    for y in steps.within(view.min.y, view.max.y) {
-        let (_, at) = map.spot(Point2::new(view.min.x, y));
-        canvas.line_between((frame.left - 5.0, at), (frame.left, at), &line);
-        let place = (frame.left - 9.0, at + 4.0);
-        canvas.text(place, &font.anchor("end"), &steps.label(y));
-    }
-    let title = Font::new(11.0, MUTED).anchor("middle");
-    canvas.turned_text(
-        (16.0, frame.top + frame.height / 2.0),
-        -90.0,
-        &title,
-        "north, m",
-    );
-    let foot = frame.bottom() + 36.0;
-    canvas.text((frame.left + frame.width / 2.0, foot), &title, "east, m");
-
-    let bar = Steps::of(view.max.x - view.min.x, 10.0);
-    let length = bar.step * map.pixels_per_metre();
-    let (left, right) = (frame.right() - length, frame.right());
-    let data = [
-        (left, foot - 8.0),
-        (left, foot - 3.0),
-        (right, foot - 3.0),
-        (right, foot - 8.0),
-    ];
-    canvas.path(
-        &polyline(&data),
-        &format!("fill=\"none\" stroke=\"{INK}\" stroke-width=\"1.3\""),
-    );
-    let words = format!("{} m", bar.label(bar.step));
-    canvas.text((left - 6.0, foot), &font.anchor("end"), &words);
-    north(canvas, (frame.left + 4.0, foot - 4.0));
-}
-
-fn north(canvas: &mut Canvas, (x, y): Spot) {
-    let arrow = [
-        (x, y - 9.0),
-        (x + 4.5, y + 5.0),
-        (x, y + 2.0),
-        (x - 4.5, y + 5.0),
-    ];
-    canvas.path(&ring(&arrow), &format!("fill=\"{MUTED}\""));
-    canvas.text((x + 9.0, y + 4.0), &Font::new(11.0, MUTED).bold(), "N");
 }
 
 fn end_names(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale, labels: &mut Labels) {

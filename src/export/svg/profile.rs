@@ -118,7 +118,7 @@ fn heights(drawing: &Drawing, stations: &[Station]) -> (f64, f64) {
     let route = drawing
         .course()
         .iter()
-        .chain(&drawing.waypoints)
+        .chain(drawing.waypoints)
         .map(|point| point.z);
     let (min, max) = ground
         .chain(route)
@@ -252,7 +252,7 @@ fn flown(
         &format!("{line} stroke=\"{color}\" stroke-width=\"2.5\""),
     );
     let marks: Vec<Spot> = if drawing.path.is_some() {
-        let ways = abreast(&drawing.waypoints, stations);
+        let ways = abreast(drawing.waypoints, stations);
         let points = drawing.waypoints.iter().zip(ways);
         points
             .map(|(point, way)| scale.spot(way, point.z))

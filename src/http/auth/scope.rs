@@ -58,13 +58,26 @@ impl Needs {
         match (method, path) {
             (
                 "GET",
-                "/" | "/algorithms" | "/docs" | "/limits" | "/livez" | "/openapi.json"
-                | "/openapi.yaml" | "/problems/{slug}" | "/readyz" | "/version",
+                "/"
+                | "/algorithms"
+                | "/docs"
+                | "/limits"
+                | "/livez"
+                | "/openapi.json"
+                | "/openapi.yaml"
+                | "/page/{file}"
+                | "/page/vendor/{file}"
+                | "/problems/{slug}"
+                | "/readyz"
+                | "/scenarios"
+                | "/scenarios/{name}"
+                | "/version",
             ) => Self::Nothing,
             ("GET", "/metrics") => Self::Scope(Scope::Metrics),
             ("GET", "/plans/{id}/events") => Self::Ticket,
             ("GET", _) | ("POST", "/plans/{id}/tickets") => Self::Scope(Scope::Read),
             (_, path) if path.starts_with("/plans") => Self::Scope(Scope::Plan),
+            ("POST", "/scenarios:convert" | "/scenarios:ground") => Self::Scope(Scope::Plan),
             _ => Self::Scope(Scope::Admin),
         }
     }

@@ -1,8 +1,9 @@
-//! Pages for people: the reference of the interface, and one for each type of problem.
+//! Pages for people: the one to plan with, the reference of the interface, and one for each type of problem.
 //!
-//! They are made once, of the same documents that programs read, and need nothing from elsewhere: no
-//! script, no font, one style sheet within the page, which its policy names by its hash.
+//! The reference and the problems are made once, of the same documents that programs read, and need nothing
+//! from elsewhere: no script, no font, one style sheet within the page, which its policy names by its hash.
 
+pub(super) mod front;
 mod markdown;
 mod reference;
 mod schema;

@@ -27,7 +27,12 @@ impl Problem {
             }
             Self::BodyIncomplete => "the connection ended before the body did".to_owned(),
             Self::BodyNotGzip(detail) => format!("content-encoding is gzip, but: {detail}"),
-            Self::InvalidParameter { detail, .. } => detail.clone(),
+            Self::InvalidParameter { detail, .. }
+            | Self::NoGeodeticFrame(detail)
+            | Self::Infeasible(detail)
+            | Self::Unflyable(detail)
+            | Self::InvalidXml(detail)
+            | Self::NoScenario { detail, .. } => detail.clone(),
             Self::KeyInUrl => {
                 "URLs are written down on their way: send the key as Authorization: Bearer, and replace this one".to_owned()
             }
@@ -86,7 +91,9 @@ impl Problem {
                     "the body is longer than {limit} bytes, the limit body_bytes of GET /limits"
                 )
             }
-            Self::UnsupportedMediaType(found) => unsupported_media_type(found.as_deref()),
+            Self::UnsupportedMediaType { found, allowed } => {
+                unsupported_media_type(found.as_deref(), allowed)
+            }
             Self::UnsupportedCoding(found) => {
                 format!("content-encoding is {found}; send the body as it is, or as gzip")
             }
@@ -119,12 +126,12 @@ impl Problem {
     }
 }
 
-fn unsupported_media_type(found: Option<&str>) -> String {
+fn unsupported_media_type(found: Option<&str>, allowed: &str) -> String {
     match found {
-        None => "no content-type was sent; send application/json".to_owned(),
+        None => format!("no content-type was sent; send {allowed}"),
         Some(found) if found.starts_with("application/x-www-form-urlencoded") => format!(
             "content-type is {found}, which curl -d sends by itself; add -H 'content-type: application/json'"
         ),
-        Some(found) => format!("content-type is {found}; send application/json in UTF-8"),
+        Some(found) => format!("content-type is {found}; send {allowed} in UTF-8"),
     }
 }

@@ -1,6 +1,8 @@
 //! What goes wrong below, as problems.
 
 use super::Problem;
+use crate::export::ExportError;
+use crate::import::ImportError;
 use crate::scenario::json::Refusal;
 use crate::store::StoreError;
 
@@ -48,6 +50,44 @@ impl From<Refusal> for Problem {
                 detail,
             },
             Refusal::Invalid(faults) => Self::InvalidScenario(faults),
+        }
+    }
+}
+
+impl From<ExportError> for Problem {
+    fn from(error: ExportError) -> Self {
+        let detail = error.to_string();
+        match error {
+            ExportError::NoGeodeticFrame { .. } => Self::NoGeodeticFrame(detail),
+            ExportError::Infeasible { .. } => Self::Infeasible(detail),
+            ExportError::Unflyable(detail) => Self::Unflyable(detail),
+            ExportError::Option(fault) => Self::InvalidParameter {
+                name: fault.name,
+                detail: fault.detail,
+            },
+            ExportError::Damaged(_) => {
+                tracing::error!(%error, "a stored plan cannot be read");
+                Self::Internal
+            }
+        }
+    }
+}
+
+impl From<ImportError> for Problem {
+    fn from(error: ImportError) -> Self {
+        match error {
+            ImportError::NotJson {
+                line,
+                column,
+                detail,
+            } => Self::InvalidJson {
+                line,
+                column,
+                pointer: String::new(),
+                detail,
+            },
+            ImportError::NotXml(detail) => Self::InvalidXml(detail),
+            ImportError::NoScenario { detail, unused } => Self::NoScenario { detail, unused },
         }
     }
 }

@@ -62,6 +62,27 @@ impl Problem {
                 "The body came too slowly",
             ),
             Self::NotReady { .. } => (StatusCode::CONFLICT, "not-ready", "The plan has not ended"),
+            Self::NoGeodeticFrame(_) => (
+                StatusCode::CONFLICT,
+                "no-geodetic-frame",
+                "The plan has no degrees",
+            ),
+            Self::Infeasible(_) => (
+                StatusCode::CONFLICT,
+                "infeasible",
+                "The route breaks constraints",
+            ),
+            Self::Unflyable(_) => (StatusCode::CONFLICT, "unflyable", "No mission as asked for"),
+            Self::InvalidXml(_) => (
+                StatusCode::BAD_REQUEST,
+                "invalid-xml",
+                "The body is not XML",
+            ),
+            Self::NoScenario { .. } => (
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "no-scenario",
+                "The file holds no scenario",
+            ),
             Self::NoResult { .. } => (StatusCode::CONFLICT, "no-result", "The plan has no result"),
             Self::IdempotencyInFlight => (
                 StatusCode::CONFLICT,
@@ -74,7 +95,7 @@ impl Problem {
                 "body-too-large",
                 "The body is too large",
             ),
-            Self::UnsupportedMediaType(_) | Self::UnsupportedCoding(_) => (
+            Self::UnsupportedMediaType { .. } | Self::UnsupportedCoding(_) => (
                 StatusCode::UNSUPPORTED_MEDIA_TYPE,
                 "unsupported-media-type",
                 "Unsupported media type",

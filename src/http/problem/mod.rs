@@ -19,6 +19,7 @@ use axum::response::{IntoResponse, Response};
 pub(super) use document::FailureDocument;
 
 use super::auth::{Scope, TooMany, Unauthorized};
+use crate::import::Unused;
 use crate::job::{Failure, PlanId, Status};
 use crate::scenario::json::Fault;
 use crate::store::{Tombstone, Trouble};
@@ -42,7 +43,12 @@ pub(super) enum Problem {
         available: Vec<&'static str>,
     },
     /// The body is of another kind, or of an unnamed one.
-    UnsupportedMediaType(Option<String>),
+    UnsupportedMediaType {
+        /// What it is said to be.
+        found: Option<String>,
+        /// What it may be.
+        allowed: &'static str,
+    },
     /// The body is compressed or otherwise coded; how.
     UnsupportedCoding(String),
     /// The body is too long; the limit in bytes.
@@ -96,6 +102,21 @@ pub(super) enum Problem {
         status: Status,
         /// Why, when it failed.
         failure: Option<Failure>,
+    },
+    /// The format needs degrees, the plan has metres; what would help.
+    NoGeodeticFrame(String),
+    /// The format is for flying, the route breaks constraints; what would help.
+    Infeasible(String),
+    /// No mission can be made as the options ask; why.
+    Unflyable(String),
+    /// The body is not XML that is read here; what the reader met.
+    InvalidXml(String),
+    /// The body is well-formed and holds no scenario.
+    NoScenario {
+        /// Why.
+        detail: String,
+        /// What it holds instead.
+        unused: Vec<Unused>,
     },
     /// As many plans wait as may.
     QueueFull {

@@ -16,6 +16,7 @@ use noctule::terrain::Terrain;
 use noctule::threat::Shape;
 
 use cases::all_cases;
+pub(crate) use wgs84::IN_DEGREES;
 
 fn rules() -> Rules {
     let parameters = vec![

@@ -41,20 +41,18 @@ pub(super) fn cases() -> Vec<(String, &'static str, &'static str, &'static str)>
 }
 
 /// A flight of 27 km in Tennessee, round a radar and a polygon.
+pub(crate) const IN_DEGREES: &str = r#"{
+"frame":"wgs84",
+"start":{"lat":36.5,"lon":-84.35,"alt":420},"target":{"lat":36.66,"lon":-84.15,"alt":500},
+"threats":[
+ {"kind":"cylinder","center":{"lat":36.58,"lon":-84.25},"radius":2500,"influence":4000},
+ {"kind":"polygon","vertices":[{"lat":36.55,"lon":-84.32},{"lat":36.57,"lon":-84.32},{"lat":36.57,"lon":-84.29}]}],
+"terrain":{"kind":"peaks","base":300,"peaks":[{"center":{"lat":36.6,"lon":-84.3},"height":80,"spread":{"x":900,"y":700}}]},
+"altitude":{"min":50,"max":300},
+"planner":{"warm_start":{"waypoints":[{"lat":36.55,"lon":-84.2,"alt":450}]}}}"#;
+
 fn document() -> Value {
-    json!({
-        "frame": "wgs84",
-        "start": {"lat": 36.5, "lon": -84.35, "alt": 420},
-        "target": {"lat": 36.66, "lon": -84.15, "alt": 500},
-        "threats": [
-            {"kind": "cylinder", "center": {"lat": 36.58, "lon": -84.25}, "radius": 2500, "influence": 4000},
-            {"kind": "polygon", "vertices": [
-                {"lat": 36.55, "lon": -84.32}, {"lat": 36.57, "lon": -84.32}, {"lat": 36.57, "lon": -84.29}]}],
-        "terrain": {"kind": "peaks", "base": 300, "peaks": [
-            {"center": {"lat": 36.6, "lon": -84.3}, "height": 80, "spread": {"x": 900, "y": 700}}]},
-        "altitude": {"min": 50, "max": 300},
-        "planner": {"warm_start": {"waypoints": [{"lat": 36.55, "lon": -84.2, "alt": 450}]}}
-    })
+    serde_json::from_str(IN_DEGREES).expect("JSON")
 }
 
 fn earth(scenario: &Scenario) -> &Wgs84 {

@@ -1,12 +1,14 @@
 //! Readers of events: cut anywhere, many, and one who does not read.
 
+use std::time::Duration;
+
 use futures_util::future::join_all;
 use noctule::job::{Event, Status};
 use reqwest::Client;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
-use super::{Dice, PATIENCE};
+use super::{Dice, PATIENCE, size};
 use crate::support::api::Api;
 use crate::support::run;
 use crate::support::server::Server;
@@ -178,6 +180,7 @@ async fn a_reader_who_does_not_read_costs_the_others_nothing() {
         .await
         .expect("nobody waits for the one who does not read");
     assert_eq!(others.last().map(|(_, name)| name.as_str()), Some("end"));
+    tokio::time::sleep(size(Duration::ZERO, Duration::from_secs(60))).await;
 
     let mut text = Vec::new();
     let rest = tokio::time::timeout(PATIENCE, stalled.read_to_end(&mut text));

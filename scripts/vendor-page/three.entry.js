@@ -1,0 +1,10 @@
+// What the page draws with; nothing else of three.js is taken along.
+export {
+  AmbientLight, BufferAttribute, BufferGeometry, CanvasTexture, Color, CylinderGeometry, DirectionalLight, DoubleSide, Group,
+  InstancedMesh, Line, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial,
+  PerspectiveCamera, Points, PointsMaterial, Raycaster, Scene, ShapeUtils, Vector2, Vector3, WebGLRenderer,
+} from 'three';
+export { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+export { Line2 } from 'three/addons/lines/Line2.js';
+export { LineGeometry } from 'three/addons/lines/LineGeometry.js';
+export { LineMaterial } from 'three/addons/lines/LineMaterial.js';

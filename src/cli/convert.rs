@@ -1,0 +1,50 @@
+//! `noctule convert`: files of other programs as scenarios.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::exit;
+use super::files;
+use crate::import::{self, ImportError, Syntax, Unused};
+
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// GeoJSON, KML, or a plan of QGroundControl; - reads standard input
+    file: PathBuf,
+    /// Where the scenario goes [default: standard output]
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Write the scenario; what was assumed and what was not used is told on standard error.
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
+    let text = files::read(&arguments.file)?;
+    let file = arguments.file.display();
+    match import::convert(&text, Syntax::of(&text)) {
+        Ok(conversion) => {
+            for assumed in &conversion.assumed {
+                eprintln!("assumed {}: {}", assumed.pointer, assumed.reason);
+            }
+            tell(&conversion.unused);
+            files::write(
+                arguments.out.as_deref(),
+                &format!("{:#}", conversion.scenario),
+            )?;
+            Ok(exit::DONE)
+        }
+        Err(error) => {
+            if let ImportError::NoScenario { unused, .. } = &error {
+                tell(unused);
+            }
+            eprintln!("{file}: {error}");
+            Ok(exit::BAD_INPUT)
+        }
+    }
+}
+
+fn tell(unused: &[Unused]) {
+    for Unused { place, reason } in unused {
+        eprintln!("not used {place}: {reason}");
+    }
+}

@@ -1,0 +1,94 @@
+//! `noctule export`: a result that was kept as JSON in another format.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Deserialize;
+
+use super::exit;
+use super::files::{self, Choice};
+use crate::export::{ExportError, ResultInput, sha256_hex};
+use crate::planner;
+use crate::scenario::json::{self, Rules};
+use crate::scenario::limits::Limits;
+
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// Result document, as plan and the service write it; - reads standard input
+    result: PathBuf,
+    /// The scenario that it was planned for: the file that plan was given, or the answer of
+    /// GET /plans/{id}/scenario. A result names it by its hash, which is compared
+    #[arg(long, value_name = "FILE")]
+    scenario: PathBuf,
+    /// Where it goes [default: standard output]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    choice: Choice,
+}
+
+/// What a result says of its scenario.
+#[derive(Deserialize)]
+struct Origin {
+    seed: u64,
+    scenario_sha256: String,
+}
+
+/// Write the result, and say by the exit code why it is not.
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
+    let chosen = arguments.choice.of(arguments.out.as_deref().as_slice())?;
+    let [chosen] = chosen.as_slice() else {
+        unreachable!("one file has one format");
+    };
+    let result = files::read(&arguments.result)?;
+    let scenario = files::read(&arguments.scenario)?;
+    let rules = planner::rules(Limits::NONE);
+    let (result, scenario) = match pair(&result, &scenario, &rules) {
+        Ok(pair) => pair,
+        Err(refusal) => {
+            eprintln!("{}: {refusal}", arguments.result.display());
+            return Ok(exit::BAD_INPUT);
+        }
+    };
+    let input = ResultInput {
+        result: &result,
+        scenario: &scenario,
+        rules: &rules,
+    };
+    match chosen.format.write(&input, &chosen.options) {
+        Ok(document) => {
+            files::write(arguments.out.as_deref(), &document)?;
+            Ok(exit::DONE)
+        }
+        Err(error) => {
+            eprintln!("{}: {error}", arguments.result.display());
+            Ok(code(&error))
+        }
+    }
+}
+
+/// The exit code of a plan that is not written.
+pub(super) fn code(error: &ExportError) -> u8 {
+    match error {
+        ExportError::Infeasible { .. } => exit::INFEASIBLE,
+        ExportError::Option(_) => exit::FAILED,
+        ExportError::NoGeodeticFrame { .. }
+        | ExportError::Unflyable(_)
+        | ExportError::Damaged(_) => exit::BAD_INPUT,
+    }
+}
+
+/// Both documents as text, the scenario as it was accepted.
+fn pair(result: &[u8], scenario: &[u8], rules: &Rules) -> Result<(String, String), String> {
+    let result = String::from_utf8(result.to_vec()).map_err(|error| error.to_string())?;
+    let origin: Origin =
+        serde_json::from_str(&result).map_err(|error| format!("no result document: {error}"))?;
+    // One that names no seed was planned with the one that the result tells.
+    let scenario = json::read(scenario, rules, origin.seed)
+        .map_err(|refusal| format!("its scenario is refused: {refusal}"))?;
+    let accepted = json::write(&scenario);
+    if sha256_hex(accepted.as_bytes()) == origin.scenario_sha256 {
+        return Ok((result, accepted));
+    }
+    Err("the scenario is not the one that it was planned for".to_owned())
+}

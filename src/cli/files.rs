@@ -1,0 +1,106 @@
+//! Files that commands read and write, and the formats of results among them.
+
+use std::fs;
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+
+use crate::export::{self, Format, OPTIONS, Options};
+
+/// What a result is written as.
+#[derive(Args)]
+pub(super) struct Choice {
+    /// What the result is written as [default: by the extension of --out, else json]
+    #[arg(long, value_parser = PossibleValuesParser::new(export::ALL.iter().map(|format| format.name)))]
+    format: Option<String>,
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = option, help = help())]
+    options: Vec<(String, String)>,
+}
+
+/// A format with its options.
+pub(super) struct Chosen {
+    pub(super) format: &'static Format,
+    pub(super) options: Options,
+}
+
+fn option(text: &str) -> Result<(String, String), String> {
+    let (name, value) = text
+        .split_once('=')
+        .ok_or_else(|| format!("{text} is no NAME=VALUE"))?;
+    Ok((name.to_owned(), value.to_owned()))
+}
+
+fn help() -> String {
+    let rows = OPTIONS
+        .iter()
+        .map(|rule| format!("{}: {}, {}", rule.name, rule.allowed, rule.meaning));
+    let rows: Vec<_> = rows.collect();
+    format!("An option of the format, once each:\n{}", rows.join("\n"))
+}
+
+impl Choice {
+    /// The format of each of `outs`, or of standard output when there are none.
+    pub(super) fn of(&self, outs: &[&Path]) -> anyhow::Result<Vec<Chosen>> {
+        let formats: Vec<&'static Format> = match (&self.format, outs) {
+            (Some(_), [_, _, ..]) => {
+                bail!(
+                    "--format names one format, --out more files: each is written by its extension"
+                )
+            }
+            (Some(name), _) => vec![Format::named(name).expect("clap lets only names through")],
+            (None, []) => vec![&export::ALL[0]],
+            (None, outs) => outs.iter().map(|out| by_extension(out)).collect(),
+        };
+        let known = |format: &Format, name: &str| format.options.contains(&name);
+        let mut chosen = Vec::new();
+        for &format in &formats {
+            // An option is for those of several formats that know it.
+            let given = self.options.iter().filter(|(name, _)| {
+                known(format, name) || !formats.iter().any(|format| known(format, name))
+            });
+            let given = given.map(|(name, value)| (name.as_str(), value.as_str()));
+            chosen.push(Chosen {
+                format,
+                options: Options::read(format, given).context("--set")?,
+            });
+        }
+        Ok(chosen)
+    }
+}
+
+fn by_extension(out: &Path) -> &'static Format {
+    let extension = out.extension().and_then(|extension| extension.to_str());
+    let named = |extension: &str| {
+        Format::of_extension(extension).or_else(|| Format::named(&extension.to_ascii_lowercase()))
+    };
+    extension.and_then(named).unwrap_or(&export::ALL[0])
+}
+
+/// The bytes of a file; `-` is standard input.
+pub(super) fn read(file: &Path) -> anyhow::Result<Vec<u8>> {
+    let read = || {
+        if file == Path::new("-") {
+            let mut text = Vec::new();
+            io::stdin().lock().read_to_end(&mut text)?;
+            return Ok(text);
+        }
+        fs::read(file)
+    };
+    read().with_context(|| format!("cannot read {}", file.display()))
+}
+
+/// Write a document as lines; `None` is standard output.
+pub(super) fn write(out: Option<&Path>, document: &str) -> anyhow::Result<()> {
+    let document = document.strip_suffix('\n').unwrap_or(document);
+    let written = match out {
+        Some(file) => fs::write(file, format!("{document}\n")),
+        None => writeln!(io::stdout().lock(), "{document}"),
+    };
+    written.with_context(|| match out {
+        Some(file) => format!("cannot write {}", file.display()),
+        None => "cannot write to standard output".to_owned(),
+    })
+}

@@ -1,0 +1,140 @@
+//! The stored documents, read: what the formats are written from.
+
+use super::chart::Chart;
+use super::document::{Position, ResultDocument};
+use super::{ExportError, ResultInput};
+use crate::geometry::Point3;
+use crate::scenario::{Frame, Scenario, json};
+
+/// A plan: what was asked for and what came out.
+pub struct Delivery {
+    pub(super) scenario: Scenario,
+    pub(super) result: ResultDocument,
+    /// On the local plane.
+    pub(super) waypoints: Vec<Point3>,
+    /// Samples of the smoothed path, on the local plane; `None` when infeasible.
+    pub(super) path: Option<Vec<Point3>>,
+    /// Where the local plane lies on the earth; `None` in a local frame.
+    pub(super) chart: Option<Chart>,
+}
+
+/// How far the vehicle has come at a point of its way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Passage {
+    /// Flown so far, metres.
+    pub(super) distance_m: f64,
+    /// Since the start, seconds, at cruise speed.
+    pub(super) time_s: f64,
+    /// Used so far, in the unit of `fuel_per_km`.
+    pub(super) fuel: f64,
+}
+
+impl Delivery {
+    /// Read both documents.
+    ///
+    /// # Errors
+    /// [`ExportError::Damaged`] when one cannot be read, or has a route without extent.
+    pub fn read(input: &ResultInput) -> Result<Self, ExportError> {
+        let scenario = json::read_accepted(input.scenario, input.rules)
+            .map_err(|refusal| ExportError::Damaged(format!("the scenario: {refusal}")))?;
+        let result: ResultDocument = serde_json::from_str(input.result)
+            .map_err(|error| ExportError::Damaged(format!("the result: {error}")))?;
+        let frame = &scenario.frame;
+        let waypoints = points(&result.waypoints, frame)?;
+        let path = result.path.as_ref();
+        let path = path.map(|path| points(&path.points, frame)).transpose()?;
+        Ok(Self {
+            waypoints,
+            path,
+            chart: Chart::of(frame),
+            scenario,
+            result,
+        })
+    }
+
+    /// What the vehicle does, as far as is known: the path, else the waypoints.
+    pub(super) fn course(&self) -> &[Point3] {
+        self.path.as_deref().unwrap_or(&self.waypoints)
+    }
+
+    /// Where the plan lies on the earth.
+    ///
+    /// # Panics
+    /// In a local frame, which no format of degrees is asked to write.
+    pub(super) fn chart(&self) -> &Chart {
+        self.chart
+            .as_ref()
+            .expect("a format of degrees is asked for degrees alone")
+    }
+
+    /// `start`, `P1` and so on, `target`.
+    pub(super) fn waypoint_name(&self, index: usize) -> String {
+        match index {
+            0 => "start".to_owned(),
+            index if index + 1 == self.waypoints.len() => "target".to_owned(),
+            index => format!("P{index}"),
+        }
+    }
+
+    /// What the plan is called, for people.
+    pub(super) fn title(&self) -> &str {
+        self.scenario.name.as_deref().unwrap_or("Noctule plan")
+    }
+
+    /// Height of `point` above the ground, metres.
+    pub(super) fn agl(&self, point: Point3) -> f64 {
+        point.z - self.scenario.terrain.elevation(point.xy())
+    }
+
+    /// The way along `points`, one each.
+    pub(super) fn passages(&self, points: &[Point3]) -> Vec<Passage> {
+        let vehicle = &self.scenario.vehicle;
+        let mut distance_m = 0.0;
+        let mut before = points.first().copied();
+        points
+            .iter()
+            .map(|&point| {
+                distance_m += before.map_or(0.0, |before| (point - before).norm());
+                before = Some(point);
+                Passage {
+                    distance_m,
+                    time_s: distance_m / vehicle.cruise_speed,
+                    fuel: distance_m / 1000.0 * vehicle.fuel_per_km,
+                }
+            })
+            .collect()
+    }
+
+    /// What is said of the plan in a sentence or two.
+    pub(super) fn summary(&self) -> String {
+        let last = self.passages(self.course());
+        let last = last.last().expect("a course has points");
+        let feasible = if self.result.feasible {
+            "feasible"
+        } else {
+            "INFEASIBLE: this route breaks constraints"
+        };
+        format!(
+            "{feasible}; {:.0} m in {:.0} s; planned by noctule {} ({}, seed {})",
+            last.distance_m,
+            last.time_s,
+            self.result.engine_version,
+            self.result.algorithm,
+            self.result.seed
+        )
+    }
+}
+
+fn points(positions: &[Position], frame: &Frame) -> Result<Vec<Point3>, ExportError> {
+    if positions.len() < 2 {
+        let count = positions.len();
+        return Err(ExportError::Damaged(format!(
+            "the result: a route of {count} points, must have two or more"
+        )));
+    }
+    let points = positions.iter().map(|position| position.within(frame));
+    let points: Option<Vec<Point3>> = points.collect();
+    points.ok_or_else(|| {
+        ExportError::Damaged("the result: in another frame than its scenario".to_owned())
+    })
+}

@@ -1,0 +1,50 @@
+//! What a downloaded plan is called.
+
+use super::Format;
+
+/// Letters of a scenario's name in a file's.
+const LONGEST: usize = 60;
+
+/// A name for a file of a plan: the scenario's own, as far as every system can hold it, what tells
+/// the plan from its likes, and the format's extension.
+#[must_use]
+pub fn file_name(scenario: Option<&str>, plan: Option<&str>, format: &Format) -> String {
+    let name = slug(scenario.unwrap_or_default());
+    let name = if name.is_empty() { "plan" } else { &name };
+    // The end of an id is its random part.
+    let tail = plan.map(|id| format!("-{}", id.get(id.len().saturating_sub(8)..).unwrap_or(id)));
+    format!("{name}{}.{}", tail.unwrap_or_default(), format.extension)
+}
+
+/// Lower-case ASCII letters and digits, hyphens between.
+fn slug(name: &str) -> String {
+    let words: Vec<String> = name
+        .split(|letter: char| !letter.is_ascii_alphanumeric())
+        .filter(|word| !word.is_empty())
+        .map(str::to_ascii_lowercase)
+        .collect();
+    let mut slug = words.join("-");
+    slug.truncate(LONGEST);
+    slug.trim_end_matches('-').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_safe_everywhere() {
+        let kml = Format::named("kml").expect("a format");
+        let id = Some("01936f2c-7d1a-7c55-9a53-27b1b44c1a10");
+        for (name, id, expected) in [
+            (Some("Ridge run, 2"), id, "ridge-run-2-b44c1a10.kml"),
+            (Some("../../etc/passwd\r\n\""), None, "etc-passwd.kml"),
+            (Some("Übung ☂"), id, "bung-b44c1a10.kml"),
+            (Some("☂"), None, "plan.kml"),
+            (None, id, "plan-b44c1a10.kml"),
+        ] {
+            assert_eq!(file_name(name, id, kml), expected);
+        }
+        assert_eq!(file_name(Some(&"ab ".repeat(50)), None, kml).len(), 60 + 3);
+    }
+}

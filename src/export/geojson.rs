@@ -1,0 +1,132 @@
+//! RFC 7946: path, waypoints and threats as features; heights above the ellipsoid.
+
+mod antimeridian;
+
+use geojson::{Feature, FeatureCollection, GeometryValue, JsonObject};
+use serde_json::{Value, json};
+
+use super::chart::{Fix, rounded};
+use super::outline;
+use super::{Delivery, Options};
+use crate::geometry::{Point2, Point3};
+use crate::threat::{Shape, Threat};
+
+/// Write a plan; an infeasible one, too, for its violations are best seen on a map.
+pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
+    let path = delivery.path.iter().map(|points| path(delivery, points));
+    let waypoints = (0..delivery.waypoints.len()).map(|index| waypoint(delivery, index));
+    let threats = delivery.scenario.threats.iter().enumerate();
+    let threats = threats.map(|(index, threat)| self::threat(delivery, index, threat));
+    let collection = FeatureCollection::new(path.chain(waypoints).chain(threats));
+    format!("{collection}\n")
+}
+
+fn path(delivery: &Delivery, points: &[Point3]) -> Feature {
+    let result = &delivery.result;
+    let last = delivery.passages(points);
+    let last = last.last().expect("a path has points");
+    let line: Vec<_> = points
+        .iter()
+        .map(|&point| position(delivery, point))
+        .collect();
+    feature(
+        antimeridian::line(&line),
+        json!({
+            "role": "path",
+            "name": delivery.scenario.name,
+            "plan_id": result.plan_id,
+            "feasible": result.feasible,
+            "cost": result.cost.total,
+            "length_m": rounded(last.distance_m, 1e3),
+            "duration_s": rounded(last.time_s, 1e3),
+            "fuel": rounded(last.fuel, 1e3),
+            "cruise_speed": delivery.scenario.vehicle.cruise_speed,
+        }),
+    )
+}
+
+fn waypoint(delivery: &Delivery, index: usize) -> Feature {
+    let point = delivery.waypoints[index];
+    let leg = index
+        .checked_sub(1)
+        .and_then(|leg| delivery.result.legs.get(leg));
+    let broken: Vec<&str> = violations(delivery, index).collect();
+    feature(
+        GeometryValue::new_point(position(delivery, point)),
+        json!({
+            "role": "waypoint",
+            "name": delivery.waypoint_name(index),
+            "index": index,
+            "alt_msl": delivery.chart().fix(point).msl_m,
+            "agl": rounded(delivery.agl(point), 1e3),
+            "leg_length_m": leg.map(|leg| rounded(leg.length, 1e3)),
+            "violations": broken,
+        }),
+    )
+}
+
+/// What is broken at a waypoint or on the leg that leads to it.
+fn violations(delivery: &Delivery, index: usize) -> impl Iterator<Item = &str> {
+    let places = [
+        format!("waypoint {index}"),
+        index
+            .checked_sub(1)
+            .map_or_else(String::new, |leg| format!("leg {leg}")),
+    ];
+    let violations = delivery.result.checks.violations.iter();
+    violations
+        .filter(move |violation| places.contains(&violation.place))
+        .map(|violation| violation.message.as_str())
+}
+
+/// A circle is a ring, and says its middle and radius as properties, by which a reader of scenarios
+/// makes it a circle again.
+fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Feature {
+    let ring = outline::ring(delivery.chart(), threat, 0.0);
+    let ring: Vec<_> = ring.iter().map(|fix| vec![fix.lon, fix.lat]).collect();
+    let height = |z: Option<f64>| z.map(|z| delivery.chart().ellipsoid_m(z));
+    let mut properties = json!({
+        "role": "threat",
+        "name": outline::name(threat, index),
+        "index": index,
+        "base": height(threat.base),
+        "top": height(threat.top),
+    });
+    match &threat.shape {
+        Shape::Cylinder(cylinder) => {
+            let middle = flat(delivery, cylinder.center);
+            properties["kind"] = "cylinder".into();
+            properties["center"] = json!([middle.lon, middle.lat]);
+            properties["radius"] = cylinder.radius.into();
+            properties["influence"] = cylinder.influence.into();
+        }
+        Shape::Polygon(polygon) => {
+            properties["kind"] = "polygon".into();
+            properties["margin"] = polygon.margin().into();
+        }
+    }
+    feature(antimeridian::ring(&ring), properties)
+}
+
+fn flat(delivery: &Delivery, point: Point2) -> Fix {
+    delivery.chart().fix(Point3::new(point.x, point.y, 0.0))
+}
+
+fn position(delivery: &Delivery, point: Point3) -> Vec<f64> {
+    let fix = delivery.chart().fix(point);
+    vec![fix.lon, fix.lat, fix.ellipsoid_m]
+}
+
+fn feature(geometry: GeometryValue, properties: Value) -> Feature {
+    let Value::Object(properties) = properties else {
+        unreachable!("properties are written as an object");
+    };
+    let properties: JsonObject = properties.into_iter().collect();
+    Feature {
+        bbox: None,
+        geometry: Some(geometry.into()),
+        id: None,
+        properties: Some(properties),
+        foreign_members: None,
+    }
+}

@@ -1,0 +1,152 @@
+//! A plan of QGroundControl: mission, fences and rally points in one JSON document.
+
+use serde_json::{Value, json};
+
+use super::items::{Item, Mission, Place, mission};
+use crate::export::chart::Chart;
+use crate::export::{Altitude, Delivery, ExportError, Firmware, Options, outline};
+use crate::geometry::{Point3, Segment};
+use crate::threat::{Shape, Threat};
+
+/// Of MAVLink's `MAV_AUTOPILOT`.
+const PX4: u8 = 12;
+const ARDUPILOT: u8 = 3;
+
+/// A rotorcraft of four, of MAVLink's `MAV_TYPE`: it can fly all that is planned here.
+const QUADROTOR: u8 = 2;
+
+/// Write the mission of a plan, and its threats as fences.
+pub(in crate::export) fn write(
+    delivery: &Delivery,
+    options: &Options,
+) -> Result<String, ExportError> {
+    let chart = delivery.chart();
+    let mission = mission(delivery, options)?;
+    let mode = altitude_mode(options);
+    let items = mission.items.iter().enumerate();
+    let items: Vec<Value> = items
+        .map(|(index, item)| simple(index, item, mode))
+        .collect();
+    let Place {
+        lat, lon, msl_m, ..
+    } = mission.home;
+    let speed = delivery.scenario.vehicle.cruise_speed;
+    let (fence, left_out) = fence(delivery, chart, &mission);
+    let document = json!({
+        "fileType": "Plan",
+        "version": 1,
+        "groundStation": "Noctule",
+        "mission": {
+            "version": 2,
+            "firmwareType": match options.firmware {
+                Firmware::Px4 => PX4,
+                Firmware::ArduPilot => ARDUPILOT,
+            },
+            "vehicleType": QUADROTOR,
+            "globalPlanAltitudeMode": mode,
+            "cruiseSpeed": speed,
+            "hoverSpeed": speed,
+            "plannedHomePosition": [lat, lon, msl_m],
+            "items": items,
+        },
+        "geoFence": fence,
+        "rallyPoints": {"version": 2, "points": []},
+        "noctule": {
+            "plan_id": delivery.result.plan_id,
+            "feasible": delivery.result.feasible,
+            "summary": delivery.summary(),
+            "threats_without_fence": left_out,
+        },
+    });
+    Ok(format!("{document:#}\n"))
+}
+
+/// As the ground station counts them.
+fn altitude_mode(options: &Options) -> u8 {
+    match (options.altitude, options.firmware) {
+        (Altitude::Relative, _) => 1,
+        (Altitude::Absolute, _) => 2,
+        (Altitude::Terrain, Firmware::Px4) => 3,
+        (Altitude::Terrain, Firmware::ArduPilot) => 4,
+    }
+}
+
+fn simple(index: usize, item: &Item, mode: u8) -> Value {
+    let [one, two, three, four] = item.params;
+    let mut document = json!({
+        "type": "SimpleItem",
+        "autoContinue": true,
+        "command": item.command,
+        "doJumpId": index + 1,
+        "frame": item.frame,
+        "params": [one, two, three, four, 0, 0, 0],
+    });
+    if let Some(place) = item.place {
+        document["params"] = json!([
+            one,
+            two,
+            three,
+            four,
+            place.lat,
+            place.lon,
+            place.altitude_m
+        ]);
+        // What a person would type in this mode, and what it comes to.
+        let typed = if mode == 3 {
+            place.agl_m
+        } else {
+            place.altitude_m
+        };
+        document["Altitude"] = typed.into();
+        document["AltitudeMode"] = mode.into();
+        document["AMSLAltAboveTerrain"] = (mode >= 3).then_some(place.msl_m).into();
+    }
+    document
+}
+
+/// The threats as fences, and those that cannot be: a fence has no height, so that one above or
+/// below which the mission passes would stop it.
+fn fence(delivery: &Delivery, chart: &Chart, mission: &Mission) -> (Value, Vec<Value>) {
+    let (mut circles, mut polygons, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
+    for (index, threat) in delivery.scenario.threats.iter().enumerate() {
+        if is_passed_at_another_height(threat, &mission.route) {
+            left_out.push(json!({"threat": index, "name": threat.name}));
+            continue;
+        }
+        match &threat.shape {
+            Shape::Cylinder(cylinder) => {
+                let at = chart.fix(Point3::new(cylinder.center.x, cylinder.center.y, 0.0));
+                circles.push(json!({
+                    "version": 1,
+                    "inclusion": false,
+                    "circle": {"center": [at.lat, at.lon], "radius": cylinder.radius},
+                }));
+            }
+            Shape::Polygon(_) => {
+                let ring = outline::ring(chart, threat, 0.0);
+                let corners: Vec<_> = ring.iter().map(|corner| [corner.lat, corner.lon]).collect();
+                polygons.push(json!({"version": 1, "inclusion": false, "polygon": corners}));
+            }
+        }
+    }
+    let fence = json!({"version": 2, "circles": circles, "polygons": polygons});
+    (fence, left_out)
+}
+
+fn is_passed_at_another_height(threat: &Threat, route: &[Point3]) -> bool {
+    if threat.base.is_none() && threat.top.is_none() {
+        return false;
+    }
+    let everywhere = Threat {
+        base: None,
+        top: None,
+        ..threat.clone()
+    };
+    route.windows(2).any(|ends| {
+        let leg = Segment {
+            a: ends[0],
+            b: ends[1],
+        };
+        everywhere.clearance(&leg).is_some_and(|clear| clear < 0.0)
+    })
+}

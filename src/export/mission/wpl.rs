@@ -1,0 +1,48 @@
+//! `QGC WPL 110`: a mission as lines of text, read by nearly every ground station. It holds no fences.
+
+use std::fmt::Write as _;
+
+use super::items::{FRAME_GLOBAL, Item, mission};
+use crate::export::{Altitude, Delivery, ExportError, Firmware, OptionFault, Options};
+
+/// Write the mission of a plan.
+pub(in crate::export) fn write(
+    delivery: &Delivery,
+    options: &Options,
+) -> Result<String, ExportError> {
+    if options.altitude == Altitude::Terrain && options.firmware == Firmware::Px4 {
+        return Err(ExportError::Option(OptionFault {
+            name: "altitude".to_owned(),
+            detail: "altitude is \"terrain\", must be relative or absolute for px4, which knows no other frame"
+                .to_owned(),
+        }));
+    }
+    let mission = mission(delivery, options)?;
+    let home = Item {
+        command: 16,
+        frame: FRAME_GLOBAL,
+        params: [Some(0.0); 4],
+        place: Some(mission.home),
+    };
+    // ArduPilot keeps home as the first item, PX4 elsewhere.
+    let home = (options.firmware == Firmware::ArduPilot).then_some(home);
+    let mut text = "QGC WPL 110\n".to_owned();
+    for (index, item) in home.iter().chain(&mission.items).enumerate() {
+        line(&mut text, index, item);
+    }
+    Ok(text)
+}
+
+fn line(text: &mut String, index: usize, item: &Item) {
+    let Item { command, frame, .. } = item;
+    let current = u8::from(index == 0);
+    let _ = write!(text, "{index}\t{current}\t{frame}\t{command}");
+    for param in item.params {
+        let _ = write!(text, "\t{}", param.unwrap_or(0.0));
+    }
+    let place = item
+        .place
+        .map(|place| (place.lat, place.lon, place.altitude_m));
+    let (lat, lon, altitude_m) = place.unwrap_or_default();
+    let _ = writeln!(text, "\t{lat:.7}\t{lon:.7}\t{altitude_m:.3}\t1");
+}

@@ -1,0 +1,310 @@
+//! What a caller may choose about a format: one table, read from a query or a command line alike.
+
+use jiff::{SignedDuration, Timestamp, Unit};
+
+use super::error::OptionFault;
+use super::{ALL, Format};
+
+/// What a caller may choose about a format.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// Who flies a mission.
+    pub firmware: Firmware,
+    /// What altitudes of a mission are measured from.
+    pub altitude: Altitude,
+    /// How far a mission may leave the path, metres.
+    pub tolerance_m: f64,
+    /// Height of the take-off above the ground at the start, metres; 0 is none.
+    pub takeoff_m: f64,
+    /// Whether a mission ends on the ground below the target.
+    pub landing: bool,
+    /// When the vehicle is at the start.
+    pub epoch: Timestamp,
+    /// Whether a route that breaks constraints is written too.
+    pub allow_infeasible: bool,
+}
+
+/// Who flies a mission.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Firmware {
+    /// PX4.
+    Px4,
+    /// ArduPilot.
+    ArduPilot,
+}
+
+/// What altitudes of a mission are measured from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Altitude {
+    /// The ground below the start, where the vehicle is armed.
+    Relative,
+    /// Mean sea level.
+    Absolute,
+    /// The ground below each item.
+    Terrain,
+}
+
+/// Of a plan that says nothing else: no result knows when it will be flown.
+const EPOCH: Timestamp = Timestamp::constant(946_684_800, 0);
+
+/// Instants that an epoch may be: every reader of the formats can hold them and what follows.
+const EPOCHS: (Timestamp, Timestamp) = (
+    Timestamp::constant(0, 0),
+    Timestamp::constant(7_258_118_400, 0),
+);
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            firmware: Firmware::Px4,
+            altitude: Altitude::Relative,
+            tolerance_m: 1.0,
+            takeoff_m: 10.0,
+            landing: false,
+            epoch: EPOCH,
+            allow_infeasible: false,
+        }
+    }
+}
+
+/// One row of the table of options.
+pub struct OptionRule {
+    /// As in a query.
+    pub name: &'static str,
+    /// What its value may be, for people.
+    pub allowed: &'static str,
+    /// What it does.
+    pub meaning: &'static str,
+    set: fn(&mut Options, &str) -> Option<()>,
+}
+
+/// Every option of every format.
+pub const OPTIONS: &[OptionRule] = &[
+    OptionRule {
+        name: "allow_infeasible",
+        allowed: "true or false",
+        meaning: "write a route that breaks constraints in a format for flying, too [default: false]",
+        set: |options, value| set(&mut options.allow_infeasible, value.parse().ok()),
+    },
+    OptionRule {
+        name: "altitude",
+        allowed: "relative, absolute or terrain",
+        meaning: "what altitudes are measured from: the ground at the start, mean sea level, or the ground below [default: relative]",
+        set: |options, value| {
+            let altitude = match value {
+                "relative" => Some(Altitude::Relative),
+                "absolute" => Some(Altitude::Absolute),
+                "terrain" => Some(Altitude::Terrain),
+                _ => None,
+            };
+            set(&mut options.altitude, altitude)
+        },
+    },
+    OptionRule {
+        name: "epoch",
+        allowed: "an RFC 3339 instant from 1970 to 2199",
+        meaning: "when the vehicle is at the start [default: 2000-01-01T00:00:00Z]",
+        set: |options, value| set(&mut options.epoch, epoch(value)),
+    },
+    OptionRule {
+        name: "firmware",
+        allowed: "px4 or ardupilot",
+        meaning: "who flies the mission [default: px4]",
+        set: |options, value| {
+            let firmware = match value {
+                "px4" => Some(Firmware::Px4),
+                "ardupilot" => Some(Firmware::ArduPilot),
+                _ => None,
+            };
+            set(&mut options.firmware, firmware)
+        },
+    },
+    OptionRule {
+        name: "landing",
+        allowed: "true or false",
+        meaning: "end on the ground below the target [default: false]",
+        set: |options, value| set(&mut options.landing, value.parse().ok()),
+    },
+    OptionRule {
+        name: "takeoff",
+        allowed: "metres from 0 to 1000",
+        meaning: "climb straight up to this height above the ground first; 0 for a vehicle that is in the air [default: 10]",
+        set: |options, value| set(&mut options.takeoff_m, metres(value, 0.0..=1000.0)),
+    },
+    OptionRule {
+        name: "tolerance",
+        allowed: "metres from 0.01 to 1000",
+        meaning: "how far the mission may leave the path [default: 1]",
+        set: |options, value| set(&mut options.tolerance_m, metres(value, 0.01..=1000.0)),
+    },
+];
+
+/// Known to every format: it permits, and changes nothing where there is nothing to permit.
+const ALWAYS: &str = "allow_infeasible";
+
+fn set<T>(field: &mut T, value: Option<T>) -> Option<()> {
+    *field = value?;
+    Some(())
+}
+
+fn metres(value: &str, range: std::ops::RangeInclusive<f64>) -> Option<f64> {
+    value.parse().ok().filter(|metres| range.contains(metres))
+}
+
+fn epoch(value: &str) -> Option<Timestamp> {
+    let (first, end) = EPOCHS;
+    value
+        .parse()
+        .ok()
+        .filter(|instant| (first..end).contains(instant))
+}
+
+impl Options {
+    /// The options of `format` by what a caller gave; what is not given is as by default.
+    ///
+    /// # Errors
+    /// The first that there is not, that `format` does not know, or that cannot have its value.
+    pub fn read<'a>(
+        format: &Format,
+        given: impl IntoIterator<Item = (&'a str, &'a str)>,
+    ) -> Result<Self, OptionFault> {
+        let mut options = Self::default();
+        for (name, value) in given {
+            let fault = |detail| OptionFault {
+                name: name.to_owned(),
+                detail,
+            };
+            let rule = OPTIONS
+                .iter()
+                .find(|rule| rule.name == name)
+                .ok_or_else(|| fault(unknown(name)))?;
+            if name != ALWAYS && !format.options.contains(&name) {
+                return Err(fault(foreign(name, format)));
+            }
+            (rule.set)(&mut options, value)
+                .ok_or_else(|| fault(format!("{name} is {value:?}, must be {}", rule.allowed)))?;
+        }
+        Ok(options)
+    }
+
+    /// The instant `time_s` seconds after the epoch, to a millisecond.
+    pub(super) fn instant(&self, time_s: f64) -> Timestamp {
+        // Beyond what instants there are, and far within what a duration can be.
+        let millis = (time_s.min(1e12) * 1e3).round();
+        let since = SignedDuration::from_secs_f64(millis / 1e3);
+        let rounded = self
+            .epoch
+            .saturating_add(since)
+            .ok()
+            .and_then(|instant| instant.round(Unit::Millisecond).ok());
+        rounded.unwrap_or(Timestamp::MAX)
+    }
+}
+
+fn unknown(name: &str) -> String {
+    let names: Vec<_> = OPTIONS.iter().map(|rule| rule.name).collect();
+    format!("{name} is no option, must be one of {}", names.join(", "))
+}
+
+fn foreign(name: &str, format: &Format) -> String {
+    let known: Vec<_> = ALL
+        .iter()
+        .filter(|format| format.options.contains(&name))
+        .map(|format| format.name)
+        .collect();
+    format!(
+        "{name} is no option of {}, only of {}",
+        format.name,
+        known.join(", ")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(format: &str, given: &[(&str, &str)], expected: Result<Options, &str>) {
+        let format = Format::named(format).expect("a format");
+        let read = Options::read(format, given.iter().copied());
+        let read = read.map_err(|fault| fault.detail);
+        assert_eq!(read, expected.map_err(str::to_owned), "{given:?}");
+    }
+
+    #[test]
+    fn reads_what_the_format_knows_and_refuses_the_rest() {
+        check("gpx", &[], Ok(Options::default()));
+        check(
+            "qgc",
+            &[
+                ("firmware", "ardupilot"),
+                ("altitude", "terrain"),
+                ("tolerance", "2.5"),
+                ("takeoff", "0"),
+                ("landing", "true"),
+                ("allow_infeasible", "true"),
+            ],
+            Ok(Options {
+                firmware: Firmware::ArduPilot,
+                altitude: Altitude::Terrain,
+                tolerance_m: 2.5,
+                takeoff_m: 0.0,
+                landing: true,
+                epoch: EPOCH,
+                allow_infeasible: true,
+            }),
+        );
+        check(
+            "json",
+            &[("allow_infeasible", "true")],
+            Ok(Options {
+                allow_infeasible: true,
+                ..Options::default()
+            }),
+        );
+        for (format, name, value, detail) in [
+            (
+                "qgc",
+                "firmware",
+                "inav",
+                "firmware is \"inav\", must be px4 or ardupilot",
+            ),
+            (
+                "qgc",
+                "tolerance",
+                "0",
+                "tolerance is \"0\", must be metres from 0.01 to 1000",
+            ),
+            (
+                "qgc",
+                "tolerance",
+                "NaN",
+                "tolerance is \"NaN\", must be metres from 0.01 to 1000",
+            ),
+            (
+                "gpx",
+                "firmware",
+                "px4",
+                "firmware is no option of gpx, only of qgc, wpl",
+            ),
+            (
+                "czml",
+                "epoch",
+                "2300-01-01T00:00:00Z",
+                "epoch is \"2300-01-01T00:00:00Z\", must be an RFC 3339 instant from 1970 to 2199",
+            ),
+        ] {
+            check(format, &[(name, value)], Err(detail));
+        }
+    }
+
+    #[test]
+    fn every_option_belongs_to_a_format() {
+        for rule in OPTIONS {
+            let known = ALL.iter().any(|format| format.options.contains(&rule.name));
+            assert!(known || rule.name == ALWAYS, "{}", rule.name);
+        }
+        for name in ALL.iter().flat_map(|format| format.options) {
+            assert!(OPTIONS.iter().any(|rule| rule.name == *name), "{name}");
+        }
+    }
+}

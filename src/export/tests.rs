@@ -1,0 +1,316 @@
+//! Every format of one plan, and what is refused.
+
+use serde_json::{Value, json};
+use uuid::Uuid;
+
+use super::document::{Origin, Position, ResultDocument, Timing};
+use super::*;
+use crate::planner;
+use crate::scenario::limits::Limits;
+use crate::scenario::{Frame, Scenario, json};
+
+/// A scenario as the service would accept it.
+pub(super) fn accepted(document: &Value) -> Scenario {
+    json::read(
+        document.to_string().as_bytes(),
+        &planner::rules(Limits::NONE),
+        7,
+    )
+    .expect("a valid scenario")
+}
+
+/// A kilometre and a half over flat ground near Zurich, past a radar and over a low polygon.
+fn scenario() -> Value {
+    json!({
+        "name": "Höhe <1> & \"zwei\"",
+        "frame": "wgs84",
+        "start": {"lat": 47.3977, "lon": 8.5456, "alt": 494},
+        "target": {"lat": 47.4050, "lon": 8.5623, "alt": 540},
+        "threats": [
+            {"kind": "cylinder", "name": "radar", "center": {"lat": 47.4005, "lon": 8.5560},
+             "radius": 150, "influence": 250},
+            {"kind": "polygon", "vertices": [
+                {"lat": 47.4020, "lon": 8.5500}, {"lat": 47.4035, "lon": 8.5500}, {"lat": 47.4035, "lon": 8.5520}],
+             "margin": 20, "top": 510}],
+        "terrain": {"kind": "flat", "elevation": 488},
+        "altitude": {"min": 5, "max": 80},
+        "vehicle": {"cruise_speed": 15, "fuel_per_km": 2},
+        "planner": {"waypoints": 2, "smoothing": {"degree": 2, "spacing": 200}},
+    })
+}
+
+/// The documents of a plan whose waypoints are `through`: degrees north and east and altitudes, or metres.
+fn plan(document: &Value, through: &[(f64, f64, f64)]) -> (String, String) {
+    let scenario = accepted(document);
+    let mut route = vec![scenario.start];
+    for &(x, y, z) in through {
+        let (lat, lon, alt) = (x, y, z);
+        let position = match scenario.frame {
+            Frame::Local => Position::Local { x, y, z },
+            Frame::Wgs84(_) => Position::Geodetic { lat, lon, alt },
+        };
+        route.push(position.within(&scenario.frame).expect("of this frame"));
+    }
+    route.push(scenario.target);
+    let outcome = planner::so_far(&scenario, route);
+    let accepted = json::write(&scenario);
+    let origin = Origin {
+        plan_id: Some(Uuid::nil()),
+        algorithm: "tms-sba".to_owned(),
+        seed: 7,
+        scenario_sha256: sha256_hex(accepted.as_bytes()),
+        timing: Timing {
+            queued_ms: 0.0,
+            run_ms: 0.0,
+        },
+    };
+    let result = ResultDocument::new(&outcome, origin);
+    (result.to_json(), accepted)
+}
+
+const AROUND: [(f64, f64, f64); 2] = [(47.4005, 8.5520, 540.0), (47.4030, 8.5555, 540.0)];
+
+/// Through the middle of the radar.
+const THROUGH: [(f64, f64, f64); 1] = [(47.4005, 8.5560, 540.0)];
+
+fn write(
+    (result, scenario): &(String, String),
+    format: &str,
+    options: &[(&str, &str)],
+) -> Result<String, ExportError> {
+    let format = Format::named(format).expect("a format");
+    let options = Options::read(format, options.iter().copied())?;
+    let input = ResultInput {
+        result,
+        scenario,
+        rules: &planner::rules(Limits::NONE),
+    };
+    format.write(&input, &options)
+}
+
+#[test]
+fn each_format_of_a_plan() {
+    let plan = plan(&scenario(), &AROUND);
+    let ardupilot: &[(&str, &str)] = &[
+        ("firmware", "ardupilot"),
+        ("altitude", "terrain"),
+        ("takeoff", "0"),
+    ];
+    let landing: &[(&str, &str)] = &[("landing", "true"), ("altitude", "absolute")];
+    for (name, format, options) in [
+        ("csv", "csv", &[][..]),
+        ("geojson", "geojson", &[]),
+        ("kml", "kml", &[]),
+        ("czml", "czml", &[("epoch", "2026-03-01T08:00:00+01:00")]),
+        ("gpx", "gpx", &[]),
+        ("qgc", "qgc", &[]),
+        ("qgc_ardupilot_terrain", "qgc", ardupilot),
+        ("qgc_px4_terrain", "qgc", &[("altitude", "terrain")]),
+        ("wpl", "wpl", landing),
+        ("wpl_ardupilot_terrain", "wpl", ardupilot),
+    ] {
+        let text = write(&plan, format, options).expect("a plan that can be written");
+        // The version is in it, and is not what is compared.
+        let text = text.replace(
+            concat!("noctule ", env!("CARGO_PKG_VERSION")),
+            "noctule VERSION",
+        );
+        // A line each, where the format has none of its own.
+        let text = match format {
+            "geojson" => text.replace("{\"type\":\"Feature\"", "\n{\"type\":\"Feature\""),
+            "czml" => text.replace("{\"id\":", "\n{\"id\":"),
+            _ => text,
+        };
+        insta::assert_snapshot!(name, text);
+    }
+}
+
+#[test]
+fn the_result_itself_is_not_touched() {
+    let plan = plan(&scenario(), &AROUND);
+    assert_eq!(write(&plan, "json", &[]).as_ref(), Ok(&plan.0));
+}
+
+#[test]
+fn the_same_altitudes_come_out_of_either_datum() {
+    let above_sea = scenario();
+    let undulation = accepted(&above_sea)
+        .frame
+        .wgs84()
+        .expect("degrees")
+        .undulation_m;
+    let mut above_ellipsoid = above_sea.clone();
+    above_ellipsoid["altitude_datum"] = "ellipsoid".into();
+    for pointer in [
+        "/start/alt",
+        "/target/alt",
+        "/terrain/elevation",
+        "/threats/1/top",
+    ] {
+        let height = above_ellipsoid.pointer_mut(pointer).expect("a height");
+        *height = (height.as_f64().expect("a number") + undulation).into();
+    }
+    let around = AROUND.map(|(lat, lon, alt)| (lat, lon, alt + undulation));
+    let (one, other) = (plan(&above_sea, &AROUND), plan(&above_ellipsoid, &around));
+    for format in ["geojson", "kml", "czml", "gpx", "qgc", "wpl", "csv"] {
+        let numbers = |text: String| -> Vec<f64> {
+            let words =
+                text.split(|letter: char| !(letter.is_ascii_digit() || "+-.e".contains(letter)));
+            words.filter_map(|word| word.parse().ok()).collect()
+        };
+        let options: &[(&str, &str)] = if format == "wpl" {
+            &[("altitude", "absolute")]
+        } else {
+            &[]
+        };
+        let one = numbers(write(&one, format, options).expect("a plan"));
+        let other = numbers(write(&other, format, options).expect("a plan"));
+        assert_eq!(one.len(), other.len(), "{format}");
+        for (one, other) in one.into_iter().zip(other) {
+            assert!((one - other).abs() < 2e-3, "{format}: {one} {other}");
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_written_is_refused() {
+    let check =
+        |plan: &(String, String), format: &str, options: &[(&str, &str)], expected: &str| {
+            let refused = write(plan, format, options).expect_err(format);
+            assert_eq!(refused.to_string(), expected, "{format} {options:?}");
+        };
+    let through = plan(&scenario(), &THROUGH);
+    for format in ["kml", "czml", "gpx", "qgc", "wpl"] {
+        let refused = format!(
+            "the plan has no feasible route and {format} is for flying: allow_infeasible=true writes it all the same"
+        );
+        check(&through, format, &[], &refused);
+        let written = write(&through, format, &[("allow_infeasible", "true")]);
+        assert!(!written.expect("the caller insists").is_empty());
+    }
+    let seen = write(&through, "geojson", &[]).expect("violations are for looking at");
+    assert!(seen.contains("enters threat 0 (radar) by"), "{seen}");
+    assert!(
+        write(&through, "csv", &[])
+            .is_ok_and(|text| text.contains("waypoint,1,47.4005,8.556,540,"))
+    );
+
+    let local = json!({
+        "start": {"x": 0, "y": 0, "z": 10}, "target": {"x": 500, "y": 0, "z": 20},
+        "altitude": {"min": 0, "max": 50},
+    });
+    let local = plan(&local, &[(250.0, 0.0, 20.0)]);
+    for format in ALL.iter().filter(|format| format.geodetic) {
+        let refused = write(&local, format.name, &[]);
+        let expected = ExportError::NoGeodeticFrame {
+            format: format.name,
+        };
+        assert_eq!(refused, Err(expected));
+    }
+    assert!(write(&local, "csv", &[]).is_ok_and(|text| text.starts_with("kind,index,x,y,z,agl,")));
+
+    let around = plan(&scenario(), &AROUND);
+    check(
+        &around,
+        "wpl",
+        &[("altitude", "terrain")],
+        "altitude is \"terrain\", must be relative or absolute for px4, which knows no other frame",
+    );
+    let other = (around.0.clone(), local.1.clone());
+    check(
+        &other,
+        "kml",
+        &[],
+        "the result: in another frame than its scenario",
+    );
+    let cut = (around.0[..200].to_owned(), around.1.clone());
+    assert!(matches!(
+        write(&cut, "gpx", &[]),
+        Err(ExportError::Damaged(_))
+    ));
+}
+
+#[test]
+fn a_mission_neither_climbs_nor_lands_through_a_threat() {
+    let mut above = scenario();
+    above["threats"][1] =
+        json!({"kind": "cylinder", "center": above["start"].clone(), "radius": 20, "base": 496});
+    above["threats"][1]["center"]
+        .as_object_mut()
+        .expect("a point")
+        .remove("alt");
+    let mut low = scenario();
+    low["start"]["alt"] = 520.into();
+    low["threats"][1] = json!({"kind": "cylinder", "center": above["threats"][1]["center"], "radius": 20, "top": 495});
+    for document in [above, low] {
+        let plan = plan(&document, &AROUND);
+        let refused = write(&plan, "qgc", &[("takeoff", "10")]);
+        assert!(
+            matches!(refused, Err(ExportError::Unflyable(_))),
+            "{refused:?}"
+        );
+        assert!(write(&plan, "qgc", &[("takeoff", "0")]).is_ok());
+    }
+    let mut tower = scenario();
+    let mut center = tower["target"].clone();
+    center.as_object_mut().expect("a point").remove("alt");
+    tower["threats"][1] = json!({"kind": "cylinder", "center": center, "radius": 5, "top": 500});
+    let plan = plan(&tower, &AROUND);
+    assert!(write(&plan, "wpl", &[]).is_ok());
+    let refused = write(&plan, "wpl", &[("landing", "true")]);
+    assert!(
+        matches!(refused, Err(ExportError::Unflyable(_))),
+        "{refused:?}"
+    );
+}
+
+#[test]
+fn words_of_callers_stay_words() {
+    let mut document = scenario();
+    document["name"] = "a\u{0}\u{b}</name><Document>&amp;]]>\u{202e}\n\"".into();
+    document["threats"][0]["name"] = "\u{1}<!-- x".into();
+    let plan = plan(&document, &AROUND);
+    for format in ["kml", "gpx"] {
+        let text = write(&plan, format, &[]).expect("a plan");
+        let document = roxmltree::Document::parse(&text).expect("well-formed");
+        assert!(document.descendants().any(|node| {
+            node.text()
+                .is_some_and(|text| text.contains("</name><Document>&amp;"))
+        }));
+    }
+    for format in ["geojson", "czml", "qgc"] {
+        let text = write(&plan, format, &[]).expect("a plan");
+        serde_json::from_str::<Value>(&text).expect("JSON");
+    }
+}
+
+#[test]
+fn across_the_date_line_a_line_is_cut() {
+    let document = json!({
+        "frame": "wgs84",
+        "start": {"lat": -16.80, "lon": 179.99, "alt": 30},
+        "target": {"lat": -16.80, "lon": -179.99, "alt": 30},
+        "threats": [{"kind": "cylinder", "center": {"lat": -16.79, "lon": 180}, "radius": 500}],
+        "altitude": {"min": 10, "max": 100},
+        "planner": {"smoothing": {"degree": 1, "spacing": 700}},
+    });
+    let plan = plan(&document, &[(-16.80, 179.998, 40.0)]);
+    let text = write(&plan, "geojson", &[]).expect("a plan");
+    let read: Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!(read["features"][0]["geometry"]["type"], "MultiLineString");
+    let threat = read["features"]
+        .as_array()
+        .expect("features")
+        .last()
+        .expect("a threat");
+    assert_eq!(threat["geometry"]["type"], "MultiPolygon");
+    let pieces = &read["features"][0]["geometry"]["coordinates"];
+    let first = pieces[0]
+        .as_array()
+        .expect("a line")
+        .last()
+        .expect("its end");
+    assert_eq!(first[0], 180.0);
+    assert_eq!(pieces[1][0][0], -180.0);
+    assert_eq!(first[1], pieces[1][0][1]);
+}

@@ -1,0 +1,120 @@
+//! `POST /scenarios:ground`: the ground under a scenario at the nodes of a small grid, to be drawn.
+
+use std::ops::RangeInclusive;
+
+use axum::Json;
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::{HeaderMap, Uri};
+use serde::Serialize;
+
+use super::params::{self, Params};
+use super::problem::Problem;
+use super::{AppState, body, off_thread};
+use crate::geometry::geodesy::{LatLon, wrapped};
+use crate::geometry::{Point2, Rect};
+use crate::scenario::Scenario;
+use crate::scenario::json;
+
+/// Nodes from west to east, and from south to north.
+const NODES: RangeInclusive<usize> = 2..=401;
+
+/// Where nobody says how many.
+const SOME_NODES: usize = 101;
+
+/// Elevations over the area of a scenario.
+#[derive(Serialize)]
+pub(super) struct GroundDocument {
+    /// In the coordinates of the request; the first node is at `min`, the last at `max`.
+    area: Area,
+    columns: usize,
+    rows: usize,
+    /// Metres, to a centimetre; row by row from south to north, each from west to east.
+    elevations: Vec<f64>,
+}
+
+#[derive(Serialize)]
+struct Area {
+    min: Place,
+    max: Place,
+}
+
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Place {
+    Local { x: f64, y: f64 },
+    Geodetic { lat: f64, lon: f64 },
+}
+
+/// `POST /scenarios:ground`.
+pub(super) async fn sample(
+    State(state): State<AppState>,
+    uri: Uri,
+    headers: HeaderMap,
+    body: Body,
+) -> Result<Json<GroundDocument>, Problem> {
+    let params = Params::read(&uri, &["columns", "rows"])?;
+    let (columns, rows) = (nodes(&params, "columns")?, nodes(&params, "rows")?);
+    let text = body::read_json(&state, &headers, body).await?;
+    let rules = state.rules.clone();
+    let read = move || json::read(&text, &rules, 0).map(|read| sampled(&read, columns, rows));
+    Ok(Json(off_thread::run(read).await??))
+}
+
+fn nodes(params: &Params, name: &str) -> Result<usize, Problem> {
+    let allowed = format!("a whole number from {} to {}", NODES.start(), NODES.end());
+    let count = params.parse(name, &allowed)?.unwrap_or(SOME_NODES);
+    if NODES.contains(&count) {
+        return Ok(count);
+    }
+    Err(params::refused(name, &count.to_string(), &allowed))
+}
+
+fn sampled(scenario: &Scenario, columns: usize, rows: usize) -> GroundDocument {
+    let wgs84 = scenario.frame.wgs84();
+    // Degrees are sampled in degrees: what the caller draws over knows nothing of our plane.
+    let (min, max) = match wgs84 {
+        None => (scenario.area.min, scenario.area.max),
+        Some(wgs84) => (
+            Point2::new(wgs84.area.min.lon, wgs84.area.min.lat),
+            // East of 180 degrees where the area lies across the antimeridian.
+            Point2::new(wgs84.area.min.lon + wgs84.area.width(), wgs84.area.max.lat),
+        ),
+    };
+    let area = Rect { min, max };
+    let between = |from: f64, to: f64, at: usize, count: usize| {
+        let share = at as f64 / (count - 1) as f64;
+        from * (1.0 - share) + to * share
+    };
+    let elevation = |node: usize| {
+        let x = between(area.min.x, area.max.x, node % columns, columns);
+        let y = between(area.min.y, area.max.y, node / columns, rows);
+        let point = match wgs84 {
+            None => Point2::new(x, y),
+            Some(wgs84) => wgs84.plane.local(LatLon {
+                lat: y,
+                lon: wrapped(x),
+            }),
+        };
+        (scenario.terrain.elevation(point) * 100.0).round() / 100.0
+    };
+    let place = |point: Point2| match wgs84 {
+        None => Place::Local {
+            x: point.x,
+            y: point.y,
+        },
+        Some(_) => Place::Geodetic {
+            lat: point.y,
+            lon: wrapped(point.x),
+        },
+    };
+    GroundDocument {
+        area: Area {
+            min: place(area.min),
+            max: place(area.max),
+        },
+        columns,
+        rows,
+        elevations: (0..columns * rows).map(elevation).collect(),
+    }
+}

@@ -1,0 +1,352 @@
+//! The page at `/` and the files that it is made of: all within the program, as they lie in `src/page`.
+//!
+//! What is vendored comes compressed by brotli ahead of time; everything is also kept as gzip, made when
+//! it is first asked for. A browser asks again each time and is told that nothing has changed.
+
+use std::io::Write as _;
+use std::sync::LazyLock;
+
+use axum::extract::Path;
+use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
+use axum::response::{IntoResponse, Response};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use sha2::{Digest as _, Sha256};
+
+use crate::http::params::Params;
+use crate::http::problem::Problem;
+
+/// Scripts and styles of its own, requests to where it comes from, pictures that it makes itself.
+const POLICY: HeaderValue = HeaderValue::from_static(
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; \
+     img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+);
+
+/// It may be kept, and is asked about each time.
+const CACHING: HeaderValue = HeaderValue::from_static("no-cache");
+
+/// A file of the page.
+struct File {
+    /// Its path below `src/page`.
+    name: &'static str,
+    bytes: &'static [u8],
+    brotli: Option<&'static [u8]>,
+    gzip: LazyLock<Vec<u8>>,
+    /// Of the plain bytes.
+    hash: LazyLock<String>,
+}
+
+/// How the bytes are coded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Coding {
+    Plain,
+    Gzip,
+    Brotli,
+}
+
+macro_rules! file {
+    ($name:literal) => {
+        file!($name, None)
+    };
+    ($name:literal, compressed) => {
+        file!(
+            $name,
+            Some(include_bytes!(concat!("../../page/", $name, ".br")).as_slice())
+        )
+    };
+    ($name:literal, $brotli:expr) => {
+        File {
+            name: $name,
+            bytes: include_bytes!(concat!("../../page/", $name)),
+            brotli: $brotli,
+            gzip: LazyLock::new(|| gzip(include_bytes!(concat!("../../page/", $name)))),
+            hash: LazyLock::new(|| hash(include_bytes!(concat!("../../page/", $name)))),
+        }
+    };
+}
+
+/// Every file there is.
+static FILES: [File; 34] = [
+    file!("index.html"),
+    file!("page.css"),
+    file!("mark.svg"),
+    file!("api.js"),
+    file!("chart.js"),
+    file!("describe.js"),
+    file!("dom.js"),
+    file!("draft.js"),
+    file!("editor.js"),
+    file!("followed.js"),
+    file!("form.js"),
+    file!("format.js"),
+    file!("frame.js"),
+    file!("ground.js"),
+    file!("import.js"),
+    file!("labels.js"),
+    file!("main.js"),
+    file!("palette.js"),
+    file!("plans.js"),
+    file!("relief.js"),
+    file!("result.js"),
+    file!("routes.js"),
+    file!("save.js"),
+    file!("scene.js"),
+    file!("stage.js"),
+    file!("stream.js"),
+    file!("strip.js"),
+    file!("tools.js"),
+    file!("volumes.js"),
+    file!("way.js"),
+    file!("words.js"),
+    file!("vendor/three.js", compressed),
+    file!("vendor/uplot.js", compressed),
+    file!("vendor/uplot.css", compressed),
+];
+
+fn hash(bytes: &[u8]) -> String {
+    let digest = Sha256::digest(bytes);
+    digest[..12]
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect()
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    encoder
+        .write_all(bytes)
+        .and_then(|()| encoder.finish())
+        .expect("writing to memory cannot fail")
+}
+
+/// `GET /`.
+pub(in crate::http) async fn front(uri: Uri, headers: HeaderMap) -> Result<Response, Problem> {
+    Params::read(&uri, &[])?;
+    serve("index.html", &uri, &headers)
+}
+
+/// `GET /page/{file}`.
+pub(in crate::http) async fn file(
+    uri: Uri,
+    name: Option<Path<String>>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    Params::read(&uri, &[])?;
+    serve(
+        &name.map(|Path(name)| name).unwrap_or_default(),
+        &uri,
+        &headers,
+    )
+}
+
+/// `GET /page/vendor/{file}`.
+pub(in crate::http) async fn vendored(
+    uri: Uri,
+    name: Option<Path<String>>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    Params::read(&uri, &[])?;
+    let name = name.map(|Path(name)| name).unwrap_or_default();
+    serve(&format!("vendor/{name}"), &uri, &headers)
+}
+
+fn serve(name: &str, uri: &Uri, headers: &HeaderMap) -> Result<Response, Problem> {
+    let Some(file) = FILES.iter().find(|file| file.name == name) else {
+        return Err(Problem::NoSuchResource(uri.path().to_owned()));
+    };
+    let (coding, bytes) = file.coded(headers);
+    let tag = coding.tag(&file.hash);
+    let common = [
+        (header::ETAG, tag.clone()),
+        (header::CACHE_CONTROL, CACHING),
+        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::VARY, HeaderValue::from_static("accept-encoding")),
+    ];
+    if is_known(headers, &tag) {
+        return Ok((StatusCode::NOT_MODIFIED, common).into_response());
+    }
+    let mut response = (common, bytes).into_response();
+    let answered = response.headers_mut();
+    answered.insert(header::CONTENT_TYPE, file.media_type());
+    if let Some(name) = coding.name() {
+        answered.insert(header::CONTENT_ENCODING, HeaderValue::from_static(name));
+    }
+    Ok(response)
+}
+
+impl File {
+    /// The shortest of what the caller takes.
+    fn coded(&'static self, headers: &HeaderMap) -> (Coding, &'static [u8]) {
+        if let Some(brotli) = self.brotli
+            && takes(headers, "br")
+        {
+            return (Coding::Brotli, brotli);
+        }
+        if takes(headers, "gzip") {
+            return (Coding::Gzip, &self.gzip);
+        }
+        (Coding::Plain, self.bytes)
+    }
+
+    fn media_type(&self) -> HeaderValue {
+        let extension = self.name.rsplit('.').next().unwrap_or_default();
+        HeaderValue::from_static(match extension {
+            "html" => "text/html; charset=utf-8",
+            "css" => "text/css; charset=utf-8",
+            "js" => "text/javascript; charset=utf-8",
+            "svg" => "image/svg+xml",
+            _ => unreachable!("a file of the page is one of these, as its test says"),
+        })
+    }
+}
+
+impl Coding {
+    /// As in `Content-Encoding`.
+    fn name(self) -> Option<&'static str> {
+        match self {
+            Self::Plain => None,
+            Self::Gzip => Some("gzip"),
+            Self::Brotli => Some("br"),
+        }
+    }
+
+    /// The entity tag of what has this hash, coded so.
+    fn tag(self, hash: &str) -> HeaderValue {
+        let tag = match self.name() {
+            None => format!("\"{hash}\""),
+            Some(name) => format!("\"{hash}-{name}\""),
+        };
+        HeaderValue::from_str(&tag).expect("visible ASCII")
+    }
+}
+
+/// Whether `Accept-Encoding` names the coding, and not to refuse it.
+fn takes(headers: &HeaderMap, coding: &str) -> bool {
+    let lists = headers.get_all(header::ACCEPT_ENCODING).iter();
+    lists
+        .filter_map(|list| list.to_str().ok())
+        .flat_map(|list| list.split(','))
+        .any(|offer| {
+            let mut parts = offer.split(';').map(str::trim);
+            let named = parts
+                .next()
+                .is_some_and(|name| name.eq_ignore_ascii_case(coding));
+            let refused = parts
+                .filter_map(|part| part.strip_prefix("q="))
+                .any(|weight| weight.parse().is_ok_and(|weight: f64| weight <= 0.0));
+            named && !refused
+        })
+}
+
+/// Whether `If-None-Match` names the tag.
+fn is_known(headers: &HeaderMap, tag: &HeaderValue) -> bool {
+    let tag = tag.to_str().expect("visible ASCII");
+    let lists = headers.get_all(header::IF_NONE_MATCH).iter();
+    lists
+        .filter_map(|list| list.to_str().ok())
+        .flat_map(|list| list.split(','))
+        .map(|known| known.trim().trim_start_matches("W/"))
+        .any(|known| known == tag || known == "*")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::{BTreeMap, BTreeSet};
+    use std::fs;
+    use std::path::Path;
+
+    use super::*;
+
+    fn directory() -> std::path::PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("src/page")
+    }
+
+    #[test]
+    fn the_table_lists_the_files_that_are_there() {
+        let mut there = BTreeSet::new();
+        for (below, prefix) in [("", ""), ("vendor", "vendor/")] {
+            for entry in fs::read_dir(directory().join(below)).expect("it is there") {
+                let name = entry.expect("listed").file_name();
+                let name = name.to_str().expect("ASCII");
+                let served = [".html", ".css", ".js", ".svg"]
+                    .iter()
+                    .any(|end| name.ends_with(end));
+                if served {
+                    there.insert(format!("{prefix}{name}"));
+                }
+            }
+        }
+        let listed = FILES.iter().map(|file| file.name.to_owned()).collect();
+        assert_eq!(there, listed);
+    }
+
+    /// What was bundled is what is served: nobody has written into it since.
+    #[test]
+    fn what_is_vendored_has_the_hashes_that_were_recorded() {
+        let sums = fs::read_to_string(directory().join("vendor/SHA256SUMS")).expect("it is there");
+        let sums: BTreeMap<&str, &str> = sums
+            .lines()
+            .map(|line| line.split_once("  ").expect("a hash and a name"))
+            .map(|(sum, name)| (name, sum))
+            .collect();
+        let mut checked = 0;
+        for file in FILES.iter().filter(|file| file.name.starts_with("vendor/")) {
+            let name = file.name.trim_start_matches("vendor/");
+            let brotli = file.brotli.expect("compressed ahead of time");
+            for (name, bytes) in [
+                (name.to_owned(), file.bytes),
+                (format!("{name}.br"), brotli),
+            ] {
+                let sum: String = Sha256::digest(bytes)
+                    .iter()
+                    .map(|byte| format!("{byte:02x}"))
+                    .collect();
+                assert_eq!(sums[name.as_str()], sum, "{name}");
+                checked += 1;
+            }
+        }
+        assert_eq!(checked, sums.len());
+        for library in ["three", "uplot"] {
+            let licence = directory().join(format!("vendor/{library}.LICENSE"));
+            let licence = fs::read_to_string(licence).expect("it is there");
+            assert!(licence.contains("MIT"), "{library}");
+        }
+    }
+
+    #[test]
+    fn the_page_is_small_on_the_wire() {
+        let wire = |file: &File| file.brotli.map_or_else(|| file.gzip.len(), <[u8]>::len);
+        let whole: usize = FILES.iter().map(wire).sum();
+        assert!(whole <= 250_000, "{whole} bytes");
+    }
+
+    #[test]
+    fn every_script_that_is_imported_is_served() {
+        for file in FILES
+            .iter()
+            .filter(|file| !file.name.starts_with("vendor/"))
+        {
+            let text = std::str::from_utf8(file.bytes).expect("text");
+            for imported in text.lines().filter_map(|line| line.split_once(" from './")) {
+                let name = imported.1.trim_end_matches(['\'', ';']);
+                assert!(FILES.iter().any(|file| file.name == name), "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_coding_is_taken_when_it_is_offered() {
+        for (offer, br, gz) in [
+            ("gzip, deflate, br, zstd", true, true),
+            ("gzip;q=0.5, br;q=0", false, true),
+            ("BR;q=1.0", true, false),
+            ("identity", false, false),
+            ("", false, false),
+        ] {
+            let mut headers = HeaderMap::new();
+            headers.insert(header::ACCEPT_ENCODING, HeaderValue::from_static(offer));
+            assert_eq!(takes(&headers, "br"), br, "{offer}");
+            assert_eq!(takes(&headers, "gzip"), gz, "{offer}");
+        }
+    }
+}

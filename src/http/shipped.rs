@@ -1,0 +1,107 @@
+//! Scenarios that come with the program, to begin with.
+
+use std::sync::LazyLock;
+
+use axum::Json;
+use axum::extract::Path;
+use axum::http::{Uri, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use serde_json::Value;
+
+use super::params::Params;
+use super::problem::Problem;
+
+/// Name and document, in the order in which they are offered.
+static SHIPPED: [(&str, &str); 5] = [
+    ("jacksboro", include_str!("../../scenarios/jacksboro.json")),
+    ("paper-1", include_str!("../../scenarios/paper-1.json")),
+    ("paper-2", include_str!("../../scenarios/paper-2.json")),
+    ("paper-3", include_str!("../../scenarios/paper-3.json")),
+    ("paper-4", include_str!("../../scenarios/paper-4.json")),
+];
+
+/// What is offered.
+#[derive(Clone, Serialize)]
+pub(super) struct ScenariosDocument {
+    scenarios: Vec<Entry>,
+}
+
+/// One of them, so far as one must know it to choose.
+#[derive(Clone, Serialize)]
+struct Entry {
+    name: &'static str,
+    title: String,
+    frame: String,
+    threats: usize,
+    href: String,
+}
+
+impl Entry {
+    fn of(name: &'static str, text: &str) -> Self {
+        let document: Value = serde_json::from_str(text).expect("well-formed, as its test says");
+        let text =
+            |field: &str, default: &str| document[field].as_str().unwrap_or(default).to_owned();
+        Self {
+            name,
+            title: text("name", name),
+            frame: text("frame", "local"),
+            threats: document["threats"].as_array().map_or(0, Vec::len),
+            href: format!("/scenarios/{name}"),
+        }
+    }
+}
+
+/// `GET /scenarios`.
+pub(super) async fn list(uri: Uri) -> Result<Json<ScenariosDocument>, Problem> {
+    static ENTRIES: LazyLock<Vec<Entry>> = LazyLock::new(|| {
+        SHIPPED
+            .iter()
+            .map(|(name, text)| Entry::of(name, text))
+            .collect()
+    });
+    Params::read(&uri, &[])?;
+    Ok(Json(ScenariosDocument {
+        scenarios: ENTRIES.clone(),
+    }))
+}
+
+/// `GET /scenarios/{name}`: a document as it may be posted.
+pub(super) async fn show(uri: Uri, name: Option<Path<String>>) -> Result<Response, Problem> {
+    Params::read(&uri, &[])?;
+    let wanted = name.map(|Path(name)| name).unwrap_or_default();
+    let Some((_, text)) = SHIPPED.iter().find(|(name, _)| *name == wanted) else {
+        return Err(Problem::NoSuchResource(uri.path().to_owned()));
+    };
+    Ok(([(header::CONTENT_TYPE, "application/json")], *text).into_response())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::fs;
+    use std::path::Path;
+
+    use super::*;
+    use crate::planner;
+    use crate::scenario::json;
+    use crate::scenario::limits::Limits;
+
+    #[test]
+    fn every_shipped_scenario_is_served_and_can_be_planned() {
+        let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+        let files = fs::read_dir(directory).expect("it is there");
+        let there: BTreeSet<String> = files
+            .map(|entry| entry.expect("listed").file_name())
+            .filter_map(|name| Some(name.to_str()?.strip_suffix(".json")?.to_owned()))
+            .collect();
+        let served = SHIPPED.iter().map(|(name, _)| (*name).to_owned()).collect();
+        assert_eq!(there, served);
+        let rules = planner::rules(Limits::default());
+        for (name, text) in SHIPPED {
+            let read = json::read(text.as_bytes(), &rules, 0);
+            assert!(read.is_ok(), "{name}");
+            assert!(!Entry::of(name, text).title.is_empty(), "{name}");
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! A scenario document in the making.
+
+use serde_json::{Value, json};
+
+use super::facts::Facts;
+use super::{Assumed, Conversion, ImportError, Unused};
+
+/// Entries of a list of unused things; the last one counts the rest.
+const MOST_UNUSED: usize = 1000;
+
+/// Names of facts of a threat.
+const OF_A_THREAT: [&str; 8] = [
+    "base",
+    "center",
+    "influence",
+    "kind",
+    "margin",
+    "name",
+    "radius",
+    "top",
+];
+
+/// The usual ceiling for unmanned aircraft, metres above ground.
+const CEILING_M: f64 = 120.0;
+
+/// A place on the earth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Place {
+    pub(super) lat: f64,
+    pub(super) lon: f64,
+}
+
+/// What a file has said so far.
+#[derive(Debug)]
+pub(super) struct Draft {
+    /// Of the scenario.
+    pub(super) name: Option<String>,
+    /// `msl` or `ellipsoid`.
+    datum: &'static str,
+    start: Option<(Place, f64)>,
+    target: Option<(Place, f64)>,
+    threats: Vec<Value>,
+    /// Metres a second.
+    pub(super) cruise_speed: Option<f64>,
+    /// Of the ground, metres, where the file knows.
+    pub(super) elevation: Option<f64>,
+    assumed: Vec<Assumed>,
+    unused: Vec<Unused>,
+    more_unused: usize,
+}
+
+impl Place {
+    /// Degrees east and north.
+    pub(super) fn new(lon: f64, lat: f64) -> Result<Self, String> {
+        if !(-180.0..=180.0).contains(&lon) {
+            return Err(format!("longitude is {lon}, must be from -180 to 180"));
+        }
+        if !(-90.0..=90.0).contains(&lat) {
+            return Err(format!("latitude is {lat}, must be from -90 to 90"));
+        }
+        Ok(Self { lat, lon })
+    }
+
+    fn json(self) -> Value {
+        json!({"lat": self.lat, "lon": self.lon})
+    }
+}
+
+impl Draft {
+    pub(super) fn new(datum: &'static str) -> Self {
+        Self {
+            name: None,
+            datum,
+            start: None,
+            target: None,
+            threats: Vec::new(),
+            cruise_speed: None,
+            elevation: None,
+            assumed: Vec::new(),
+            unused: Vec::new(),
+            more_unused: 0,
+        }
+    }
+
+    /// List a part of the file that is not used.
+    pub(super) fn leave(&mut self, place: impl Into<String>, reason: impl Into<String>) {
+        if self.unused.len() < MOST_UNUSED {
+            self.unused.push(Unused {
+                place: place.into(),
+                reason: reason.into(),
+            });
+        } else {
+            self.more_unused += 1;
+        }
+    }
+
+    /// List a part of the document that the file does not say.
+    pub(super) fn assume(&mut self, pointer: &str, reason: impl Into<String>) {
+        self.assumed.push(Assumed {
+            pointer: pointer.to_owned(),
+            reason: reason.into(),
+        });
+    }
+
+    /// Where the route begins or ends; the first that says so counts.
+    pub(super) fn end(&mut self, end: &str, at: &str, place: Place, alt: f64) {
+        let slot = if end == "start" {
+            &mut self.start
+        } else {
+            &mut self.target
+        };
+        if slot.is_some() {
+            self.leave(at, format!("another point is the {end} already"));
+        } else {
+            *slot = Some((place, alt));
+        }
+    }
+
+    /// A point with what is said of it: an end, or the middle of a circle. `alt` is `None` where the
+    /// file gives no height.
+    pub(super) fn point(&mut self, at: &str, facts: &Facts, place: Place, alt: Option<f64>) {
+        if let Some(end) = facts.end() {
+            self.leave_beside(at, facts, &["name"]);
+            if alt.is_none() {
+                let pointer = format!("/{end}/alt");
+                self.assume(
+                    &pointer,
+                    format!("0: the {end} has no altitude in the file"),
+                );
+            }
+            return self.end(end, at, place, alt.unwrap_or(0.0));
+        }
+        match facts.number("radius") {
+            Ok(Some(_)) => self.circle(at, facts, place),
+            Ok(None) if facts.is_of_a_route() => {
+                self.leave(at, "a waypoint of a route: a plan finds its own");
+            }
+            Ok(None) => {
+                let why = "a point that is not named start or target and has no radius";
+                self.leave(at, why);
+            }
+            Err(reason) => self.leave(at, reason),
+        }
+    }
+
+    /// A circle of the radius that is said of it.
+    pub(super) fn circle(&mut self, at: &str, facts: &Facts, center: Place) {
+        match circle(facts, center) {
+            Ok(threat) => self.threat(at, facts, threat),
+            Err(reason) => self.leave(at, reason),
+        }
+    }
+
+    /// The outer ring of a polygon, closed or not.
+    pub(super) fn polygon(&mut self, at: &str, facts: &Facts, ring: &[[f64; 2]]) {
+        match polygon(facts, ring) {
+            Ok(threat) => self.threat(at, facts, threat),
+            Err(reason) => self.leave(at, reason),
+        }
+    }
+
+    fn threat(&mut self, at: &str, facts: &Facts, threat: Value) {
+        self.leave_beside(at, facts, &OF_A_THREAT);
+        self.threats.push(threat);
+    }
+
+    fn leave_beside(&mut self, at: &str, facts: &Facts, used: &[&str]) {
+        let beside = facts.beside(used);
+        if !beside.is_empty() {
+            self.leave(at, format!("said and not used: {}", beside.join(", ")));
+        }
+    }
+
+    /// The document.
+    pub(super) fn finish(mut self) -> Result<Conversion, ImportError> {
+        if self.more_unused > 0 {
+            self.unused.push(Unused {
+                place: String::new(),
+                reason: format!("{} more are not listed", self.more_unused),
+            });
+        }
+        let (Some(start), Some(target)) = (self.start, self.target) else {
+            let missing: Vec<_> = [("start", self.start), ("target", self.target)]
+                .into_iter()
+                .filter(|(_, end)| end.is_none())
+                .map(|(name, _)| format!("no {name}"))
+                .collect();
+            let detail = format!(
+                "{} in the file: a point of that name makes one",
+                missing.join(" and ")
+            );
+            let unused = self.unused;
+            return Err(ImportError::NoScenario { detail, unused });
+        };
+        let elevation = self.elevation.unwrap_or(f64::INFINITY);
+        let elevation = elevation.min(start.1).min(target.1);
+        self.assume(
+            "/altitude",
+            format!("0 to {CEILING_M} m above ground: the file has no band"),
+        );
+        self.assume(
+            "/terrain",
+            format!("flat ground at {elevation} m: the file has none"),
+        );
+        let end =
+            |(place, alt): (Place, f64)| json!({"lat": place.lat, "lon": place.lon, "alt": alt});
+        let mut scenario = json!({
+            "name": self.name,
+            "frame": "wgs84",
+            "altitude_datum": self.datum,
+            "start": end(start),
+            "target": end(target),
+            "threats": self.threats,
+            "terrain": {"kind": "flat", "elevation": elevation},
+            "altitude": {"min": 0.0, "max": CEILING_M},
+        });
+        if let Some(speed) = self.cruise_speed {
+            scenario["vehicle"] = json!({"cruise_speed": speed});
+        }
+        Ok(Conversion {
+            scenario,
+            assumed: self.assumed,
+            unused: self.unused,
+        })
+    }
+}
+
+fn circle(facts: &Facts, center: Place) -> Result<Value, String> {
+    let radius = facts.number("radius")?.unwrap_or_default();
+    if radius <= 0.0 {
+        return Err(format!("radius is {radius}, must be > 0"));
+    }
+    let influence = facts.number("influence")?.unwrap_or(radius);
+    if influence < radius {
+        return Err(format!(
+            "influence is {influence}, must be >= the radius, {radius}"
+        ));
+    }
+    let shape = json!({
+        "kind": "cylinder",
+        "name": facts.name(),
+        "center": center.json(),
+        "radius": radius,
+        "influence": influence,
+    });
+    between_heights(shape, facts)
+}
+
+#[expect(
+    clippy::float_cmp,
+    reason = "a ring is closed by its very first corner"
+)]
+fn polygon(facts: &Facts, ring: &[[f64; 2]]) -> Result<Value, String> {
+    let open = match ring {
+        [first, between @ .., last] if first == last => &ring[..=between.len()],
+        _ => ring,
+    };
+    if open.len() < 3 {
+        let count = open.len();
+        return Err(format!(
+            "a polygon of {count} corners, must have three or more"
+        ));
+    }
+    let corners: Result<Vec<Value>, String> = open
+        .iter()
+        .map(|[lon, lat]| Place::new(*lon, *lat).map(Place::json))
+        .collect();
+    let margin = facts.number("margin")?.unwrap_or(0.0);
+    if margin < 0.0 {
+        return Err(format!("margin is {margin}, must be >= 0"));
+    }
+    let shape = json!({
+        "kind": "polygon",
+        "name": facts.name(),
+        "vertices": corners?,
+        "margin": margin,
+    });
+    between_heights(shape, facts)
+}
+
+fn between_heights(mut shape: Value, facts: &Facts) -> Result<Value, String> {
+    let (base, top) = (facts.number("base")?, facts.number("top")?);
+    if let (Some(base), Some(top)) = (base, top)
+        && base >= top
+    {
+        return Err(format!("base is {base}, must be < the top, {top}"));
+    }
+    shape["base"] = base.into();
+    shape["top"] = top.into();
+    Ok(shape)
+}

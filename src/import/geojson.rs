@@ -1,0 +1,125 @@
+//! RFC 7946: points named start and target, points with a radius and polygons as threats. Heights are
+//! above the ellipsoid, as it says.
+
+use geojson::{Feature, GeometryValue, JsonValue, Position};
+use serde_json::Value;
+
+use super::draft::{Draft, Place};
+use super::facts::Facts;
+use super::{Conversion, ImportError};
+
+/// What an older GeoJSON may call the one system that the present one has.
+const WGS84: [&str; 3] = [
+    "urn:ogc:def:crs:OGC:1.3:CRS84",
+    "urn:ogc:def:crs:OGC::CRS84",
+    "EPSG:4326",
+];
+
+/// Make a scenario of a feature collection, or of a feature.
+pub(super) fn convert(mut document: Value) -> Result<Conversion, ImportError> {
+    refuse_other_systems(&document)?;
+    let mut draft = Draft::new("ellipsoid");
+    draft.name = document["name"].as_str().map(str::to_owned);
+    match document["type"].as_str() {
+        Some("FeatureCollection") => {
+            let Value::Array(features) = document["features"].take() else {
+                return Err(ImportError::no_scenario(
+                    "a FeatureCollection has features, a list; this one has none",
+                ));
+            };
+            for (index, value) in features.into_iter().enumerate() {
+                feature(&mut draft, &format!("/features/{index}"), value);
+            }
+        }
+        Some("Feature") => feature(&mut draft, "", document),
+        found => {
+            return Err(ImportError::no_scenario(format!(
+                "type is {}, must be FeatureCollection; a plan of QGroundControl has fileType Plan",
+                found.unwrap_or("missing")
+            )));
+        }
+    }
+    draft.finish()
+}
+
+fn refuse_other_systems(document: &Value) -> Result<(), ImportError> {
+    match document.get("crs") {
+        None | Some(Value::Null) => Ok(()),
+        Some(crs) => {
+            let name = crs["properties"]["name"].as_str();
+            if name.is_some_and(|name| WGS84.contains(&name)) {
+                return Ok(());
+            }
+            Err(ImportError::no_scenario(format!(
+                "crs is {}, must be longitude and latitude of WGS 84",
+                name.unwrap_or("none that is known here")
+            )))
+        }
+    }
+}
+
+fn feature(draft: &mut Draft, at: &str, value: JsonValue) {
+    let feature = match serde_json::from_value::<Feature>(value) {
+        Ok(feature) => feature,
+        Err(error) => return draft.leave(at, error.to_string()),
+    };
+    let facts = Facts(feature.properties.unwrap_or_default());
+    match feature.geometry {
+        None => draft.leave(at, "a feature without geometry"),
+        Some(shape) => geometry(draft, at, &facts, &shape.value),
+    }
+}
+
+fn geometry(draft: &mut Draft, at: &str, facts: &Facts, value: &GeometryValue) {
+    // A circle that is drawn as a ring says so.
+    if let (GeometryValue::Polygon { .. } | GeometryValue::MultiPolygon { .. }, Some([lon, lat])) =
+        (value, facts.center())
+        && let Ok(Some(_)) = facts.number("radius")
+    {
+        return match Place::new(lon, lat) {
+            Ok(center) => draft.circle(at, facts, center),
+            Err(reason) => draft.leave(at, reason),
+        };
+    }
+    match value {
+        GeometryValue::Point { coordinates } => point(draft, at, facts, coordinates),
+        GeometryValue::Polygon { coordinates } => polygon(draft, at, facts, coordinates),
+        GeometryValue::MultiPolygon { coordinates } => {
+            for (index, rings) in coordinates.iter().enumerate() {
+                let at = format!("{at}/geometry/coordinates/{index}");
+                polygon(draft, &at, facts, rings);
+            }
+        }
+        GeometryValue::GeometryCollection { geometries } => {
+            for (index, inner) in geometries.iter().enumerate() {
+                let at = format!("{at}/geometry/geometries/{index}");
+                geometry(draft, &at, facts, &inner.value);
+            }
+        }
+        GeometryValue::LineString { .. } | GeometryValue::MultiLineString { .. } => {
+            draft.leave(at, "a line: points and polygons make a scenario");
+        }
+        GeometryValue::MultiPoint { .. } => {
+            draft.leave(at, "many points in one: each must be a feature of its own");
+        }
+    }
+}
+
+fn point(draft: &mut Draft, at: &str, facts: &Facts, position: &Position) {
+    match Place::new(position[0], position[1]) {
+        Ok(place) => draft.point(at, facts, place, position.as_slice().get(2).copied()),
+        Err(reason) => draft.leave(at, reason),
+    }
+}
+
+fn polygon(draft: &mut Draft, at: &str, facts: &Facts, rings: &[Vec<Position>]) {
+    let Some((outer, holes)) = rings.split_first() else {
+        return draft.leave(at, "a polygon without a ring");
+    };
+    for index in 0..holes.len() {
+        let hole = format!("{at}: hole {index}");
+        draft.leave(hole, "the hole of a polygon: all of it is kept clear of");
+    }
+    let ring: Vec<[f64; 2]> = outer.iter().map(|corner| [corner[0], corner[1]]).collect();
+    draft.polygon(at, facts, &ring);
+}

@@ -1,0 +1,211 @@
+//! KML: placemarks named start and target, polygons and points with a radius as threats. Heights are
+//! above mean sea level.
+//!
+//! A document type, by which XML grows without bound, is refused; nothing that is linked is fetched.
+
+use roxmltree::{Document, Node, ParsingOptions};
+use serde_json::Value;
+
+use super::draft::{Draft, Place};
+use super::facts::Facts;
+use super::{Conversion, ImportError};
+
+/// Elements, texts and comments; a text of the greatest size has no more than its letters allow.
+const MOST_NODES: u32 = 2_000_000;
+
+/// Levels of geometries within geometries.
+const DEEPEST: usize = 16;
+
+/// What a document may hold beside placemarks, and no scenario has.
+const NOT_READ: [&str; 6] = [
+    "GroundOverlay",
+    "Model",
+    "NetworkLink",
+    "PhotoOverlay",
+    "ScreenOverlay",
+    "Tour",
+];
+
+/// Make a scenario of a KML document.
+pub(super) fn convert(text: &[u8]) -> Result<Conversion, ImportError> {
+    let text = std::str::from_utf8(text)
+        .map_err(|error| ImportError::NotXml(format!("the file is not UTF-8: {error}")))?;
+    let options = ParsingOptions {
+        allow_dtd: false,
+        nodes_limit: MOST_NODES,
+        ..ParsingOptions::default()
+    };
+    let document = Document::parse_with_options(text, options)
+        .map_err(|error| ImportError::NotXml(error.to_string()))?;
+    let root = document.root_element();
+    if root.tag_name().name() != "kml" {
+        let found = root.tag_name().name();
+        return Err(ImportError::no_scenario(format!(
+            "the root element is {found}, must be kml"
+        )));
+    }
+    let mut draft = Draft::new("msl");
+    draft.name = root
+        .children()
+        .find(|node| is(node, "Document"))
+        .and_then(|node| text_of(&node, "name"));
+    for node in root.descendants() {
+        if is(&node, "Placemark") {
+            placemark(&mut draft, &node);
+        } else if let Some(name) = NOT_READ.iter().find(|name| is(&node, name)) {
+            draft.leave(line(&node), format!("a {name}, which is not read"));
+        }
+    }
+    draft.finish()
+}
+
+fn placemark(draft: &mut Draft, node: &Node) {
+    let facts = facts(node);
+    let at = format!("{}: {}", line(node), facts.name().unwrap_or("Placemark"));
+    let mut shapes = node.children().filter(is_shape).peekable();
+    if shapes.peek().is_none() {
+        draft.leave(&at, "a placemark without geometry");
+    }
+    for shape in shapes {
+        geometry(draft, &at, &facts, &shape, 0);
+    }
+}
+
+fn is_shape(node: &Node) -> bool {
+    const SHAPES: [&str; 7] = [
+        "LineString",
+        "LinearRing",
+        "MultiGeometry",
+        "MultiTrack",
+        "Point",
+        "Polygon",
+        "Track",
+    ];
+    SHAPES.iter().any(|name| is(node, name))
+}
+
+fn geometry(draft: &mut Draft, at: &str, facts: &Facts, node: &Node, depth: usize) {
+    if let Some([lon, lat]) = facts.center()
+        && is(node, "Polygon")
+        && let Ok(Some(_)) = facts.number("radius")
+    {
+        return match Place::new(lon, lat) {
+            Ok(center) => draft.circle(at, facts, center),
+            Err(reason) => draft.leave(at, reason),
+        };
+    }
+    match node.tag_name().name() {
+        "Point" => point(draft, at, facts, node),
+        "Polygon" => polygon(draft, at, facts, node),
+        "MultiGeometry" if depth < DEEPEST => {
+            for inner in node.children().filter(is_shape) {
+                geometry(draft, at, facts, &inner, depth + 1);
+            }
+        }
+        "MultiGeometry" => draft.leave(at, "geometries nested deeper than 16 levels"),
+        _ => draft.leave(at, "a line: points and polygons make a scenario"),
+    }
+}
+
+fn point(draft: &mut Draft, at: &str, facts: &Facts, node: &Node) {
+    let place = match coordinates(node).as_deref() {
+        Ok([[lon, lat, alt]]) => Place::new(*lon, *lat).map(|place| (place, *alt)),
+        Ok(many) => Err(format!("a point of {} coordinates", many.len())),
+        Err(reason) => Err(reason.clone()),
+    };
+    let (place, alt) = match place {
+        Ok(place) => place,
+        Err(reason) => return draft.leave(at, reason),
+    };
+    let mode = text_of(node, "altitudeMode").unwrap_or_else(|| "clampToGround".to_owned());
+    if let Some(end) = facts.end()
+        && mode != "absolute"
+    {
+        let height = if mode == "relativeToGround" { alt } else { 0.0 };
+        draft.assume(
+            &format!("/{end}/alt"),
+            format!("{height}, the height above ground: the altitude mode is {mode}, and the ground is not known"),
+        );
+        return draft.point(at, facts, place, Some(height));
+    }
+    draft.point(at, facts, place, Some(alt));
+}
+
+fn polygon(draft: &mut Draft, at: &str, facts: &Facts, node: &Node) {
+    let boundary = |name| node.children().find(move |child| is(child, name));
+    for hole in node.children().filter(|child| is(child, "innerBoundaryIs")) {
+        let why = "the hole of a polygon: all of it is kept clear of";
+        draft.leave(line(&hole), why);
+    }
+    let ring = boundary("outerBoundaryIs")
+        .and_then(|outer| outer.children().find(|child| is(child, "LinearRing")));
+    let corners = ring.map_or_else(
+        || Err("a polygon without a ring".to_owned()),
+        |ring| coordinates(&ring),
+    );
+    match corners {
+        Ok(corners) => {
+            let flat: Vec<[f64; 2]> = corners.iter().map(|[lon, lat, _]| [*lon, *lat]).collect();
+            draft.polygon(at, facts, &flat);
+        }
+        Err(reason) => draft.leave(at, reason),
+    }
+}
+
+/// Longitude, latitude and altitude, 0 when left out.
+fn coordinates(node: &Node) -> Result<Vec<[f64; 3]>, String> {
+    let text = text_of(node, "coordinates").ok_or("no coordinates")?;
+    let tuple = |tuple: &str| {
+        let numbers: Result<Vec<f64>, _> = tuple.split(',').map(str::parse).collect();
+        let numbers = numbers
+            .ok()
+            .filter(|numbers| numbers.iter().all(|n| n.is_finite()));
+        match numbers.as_deref() {
+            Some([lon, lat]) => Ok([*lon, *lat, 0.0]),
+            Some([lon, lat, alt]) => Ok([*lon, *lat, *alt]),
+            _ => Err(format!(
+                "coordinates are {:?}, must be longitude,latitude,altitude",
+                tuple.chars().take(60).collect::<String>()
+            )),
+        }
+    };
+    text.split_whitespace().map(tuple).collect()
+}
+
+/// Name and extended data.
+fn facts(placemark: &Node) -> Facts {
+    let mut facts = Facts::default();
+    let extended = placemark.children().filter(|node| is(node, "ExtendedData"));
+    for node in extended.flat_map(|extended| extended.descendants()) {
+        let value = if is(&node, "Data") {
+            text_of(&node, "value")
+        } else if is(&node, "SimpleData") {
+            node.text().map(str::to_owned)
+        } else {
+            continue;
+        };
+        if let (Some(name), Some(value)) = (node.attribute("name"), value) {
+            facts.0.insert(name.to_owned(), Value::String(value));
+        }
+    }
+    if let Some(name) = text_of(placemark, "name") {
+        facts.0.insert("name".to_owned(), Value::String(name));
+    }
+    facts
+}
+
+fn is(node: &Node, name: &str) -> bool {
+    node.is_element() && node.tag_name().name() == name
+}
+
+/// The text of a child, trimmed.
+fn text_of(node: &Node, name: &str) -> Option<String> {
+    let child = node.children().find(|child| is(child, name))?;
+    let text: String = child.children().filter_map(|part| part.text()).collect();
+    Some(text.trim().to_owned())
+}
+
+fn line(node: &Node) -> String {
+    let row = node.document().text_pos_at(node.range().start).row;
+    format!("line {row}")
+}

@@ -1,0 +1,207 @@
+//! Plans of QGroundControl: the mission's ends as start and target, exclusion fences as threats.
+//! Altitudes are above mean sea level.
+
+use serde_json::{Map, Value};
+
+use super::draft::{Draft, Place};
+use super::facts::Facts;
+use super::{Conversion, ImportError};
+
+/// Commands of MAVLink's `MAV_CMD` that are somewhere: waypoints and their kin, then those that
+/// leave the ground and those that come back to it.
+const WAYPOINTS: [u64; 6] = [16, 17, 18, 19, 31, 82];
+const TAKEOFFS: [u64; 2] = [22, 84];
+const LANDINGS: [u64; 2] = [21, 85];
+const CHANGE_SPEED: u64 = 178;
+
+/// Of MAVLink's `MAV_TYPE`: it flies at its cruise speed, all else at its hover speed.
+const FIXED_WING: u64 = 1;
+
+/// An item that is somewhere.
+#[derive(Debug, Clone)]
+struct Stop {
+    at: String,
+    place: Place,
+    alt: f64,
+    /// On the ground, at its start or its end.
+    on_ground: bool,
+}
+
+/// Make a scenario of a plan.
+pub(super) fn convert(document: &Value) -> Result<Conversion, ImportError> {
+    let mission = &document["mission"];
+    let Some(items) = mission["items"].as_array() else {
+        return Err(ImportError::no_scenario(
+            "a plan has mission.items, a list; this one has none",
+        ));
+    };
+    let mut draft = Draft::new("msl");
+    let home = home(mission);
+    match home {
+        Some((_, alt)) => draft.elevation = Some(alt),
+        None => draft.assume(
+            "/start/alt",
+            "the home of the mission is taken to be at 0 m",
+        ),
+    }
+    draft.cruise_speed = speed(mission);
+    let stops = stops(&mut draft, items, home);
+    ends(&mut draft, home, &stops);
+    fences(&mut draft, &document["geoFence"]);
+    let rally = document["rallyPoints"]["points"].as_array();
+    for index in 0..rally.map_or(0, Vec::len) {
+        let at = format!("/rallyPoints/points/{index}");
+        draft.leave(at, "a rally point, which no scenario has");
+    }
+    draft.finish()
+}
+
+fn home(mission: &Value) -> Option<(Place, f64)> {
+    let home = mission["plannedHomePosition"].as_array()?;
+    let number = |index: usize| home.get(index)?.as_f64();
+    let place = Place::new(number(1)?, number(0)?).ok()?;
+    Some((place, number(2).unwrap_or(0.0)))
+}
+
+fn speed(mission: &Value) -> Option<f64> {
+    let name = if mission["vehicleType"] == FIXED_WING {
+        "cruiseSpeed"
+    } else {
+        "hoverSpeed"
+    };
+    mission[name].as_f64().filter(|speed| *speed > 0.0)
+}
+
+fn stops(draft: &mut Draft, items: &[Value], home: Option<(Place, f64)>) -> Vec<Stop> {
+    let mut stops = Vec::new();
+    for (index, item) in items.iter().enumerate() {
+        let at = format!("/mission/items/{index}");
+        if item["type"] != "SimpleItem" {
+            let kind = item["complexItemType"].as_str().unwrap_or("unknown");
+            draft.leave(at, format!("a complex item ({kind}), which is not read"));
+            continue;
+        }
+        let command = item["command"].as_u64().unwrap_or_default();
+        let moves = [&WAYPOINTS[..], &TAKEOFFS, &LANDINGS];
+        if moves.iter().any(|commands| commands.contains(&command)) {
+            match stop(&at, item, command, home) {
+                Ok(stop) => stops.push(stop),
+                Err(reason) => draft.leave(at, reason),
+            }
+        } else if command == CHANGE_SPEED && draft_speed(draft, item) {
+        } else {
+            draft.leave(at, format!("command {command}, which no scenario has"));
+        }
+    }
+    stops
+}
+
+/// Whether the item sets the speed of the mission.
+fn draft_speed(draft: &mut Draft, item: &Value) -> bool {
+    let speed = item["params"][1].as_f64().filter(|speed| *speed > 0.0);
+    if speed.is_some() {
+        draft.cruise_speed = speed;
+    }
+    speed.is_some()
+}
+
+fn stop(at: &str, item: &Value, command: u64, home: Option<(Place, f64)>) -> Result<Stop, String> {
+    let param = |index: usize| item["params"][index].as_f64();
+    let home_alt = home.map_or(0.0, |(_, alt)| alt);
+    let on_ground = TAKEOFFS.contains(&command) || LANDINGS.contains(&command);
+    let somewhere = param(4).zip(param(5)).filter(|place| *place != (0.0, 0.0));
+    let place = match (somewhere, home) {
+        (Some((lat, lon)), _) => Place::new(lon, lat)?,
+        // An autopilot takes off and lands where it is when the item does not say.
+        (None, Some((place, _))) if on_ground => place,
+        (None, _) => return Err("an item without a place".to_owned()),
+    };
+    let height = param(6).unwrap_or(0.0);
+    let alt = match item["frame"].as_u64() {
+        _ if on_ground => home_alt,
+        Some(0 | 5) => height,
+        Some(3 | 6) => home_alt + height,
+        Some(10 | 11) => return Err(
+            "an altitude above terrain, which is not known here: as an end it must be relative or absolute"
+                .to_owned(),
+        ),
+        _ => return Err(format!("frame is {}, must be 0, 3, 5 or 6", item["frame"])),
+    };
+    Ok(Stop {
+        at: at.to_owned(),
+        place,
+        alt,
+        on_ground,
+    })
+}
+
+/// The mission's first and last stop; with one alone, the way leads there from home.
+fn ends(draft: &mut Draft, home: Option<(Place, f64)>, stops: &[Stop]) {
+    let set = |draft: &mut Draft, end: &str, stop: &Stop| {
+        if stop.on_ground && home.is_some() {
+            let pointer = format!("/{end}/alt");
+            draft.assume(&pointer, format!("{}, on the ground as home is", stop.alt));
+        }
+        draft.end(end, &stop.at, stop.place, stop.alt);
+    };
+    match (stops, home) {
+        ([], _) => {}
+        ([only], Some((place, alt))) => {
+            draft.end("start", "/mission/plannedHomePosition", place, alt);
+            set(draft, "target", only);
+        }
+        ([only], None) => set(draft, "target", only),
+        ([first, between @ .., last], _) => {
+            set(draft, "start", first);
+            set(draft, "target", last);
+            for stop in between {
+                draft.leave(&stop.at, "a stop on the way: a plan finds its own");
+            }
+        }
+    }
+}
+
+fn fences(draft: &mut Draft, fence: &Value) {
+    let list = |name: &str| fence[name].as_array().cloned().unwrap_or_default();
+    for (index, circle) in list("circles").iter().enumerate() {
+        let at = format!("/geoFence/circles/{index}");
+        if excludes(draft, &at, circle) {
+            let shape = &circle["circle"];
+            let center = &shape["center"];
+            let facts = Facts(Map::from_iter([(
+                "radius".to_owned(),
+                shape["radius"].clone(),
+            )]));
+            let numbers = center[1].as_f64().zip(center[0].as_f64());
+            let place = numbers.ok_or_else(|| "a circle without center".to_owned());
+            match place.and_then(|(lon, lat)| Place::new(lon, lat)) {
+                Ok(place) => draft.circle(&at, &facts, place),
+                Err(reason) => draft.leave(&at, reason),
+            }
+        }
+    }
+    for (index, polygon) in list("polygons").iter().enumerate() {
+        let at = format!("/geoFence/polygons/{index}");
+        if excludes(draft, &at, polygon) {
+            let corners = polygon["polygon"].as_array().cloned().unwrap_or_default();
+            let corner = |corner: &Value| Some([corner[1].as_f64()?, corner[0].as_f64()?]);
+            let ring: Option<Vec<[f64; 2]>> = corners.iter().map(corner).collect();
+            match ring {
+                Some(ring) => draft.polygon(&at, &Facts::default(), &ring),
+                None => draft.leave(&at, "a corner that is not latitude and longitude"),
+            }
+        }
+    }
+}
+
+/// Whether a fence keeps the vehicle out; one that keeps it in is listed.
+fn excludes(draft: &mut Draft, at: &str, fence: &Value) -> bool {
+    let excludes = fence["inclusion"] == false;
+    if !excludes {
+        draft.leave(
+            at,
+            "a fence to stay within, where a scenario has a box, its area",
+        );
+    }
+    excludes
+}

@@ -1,0 +1,76 @@
+// What the service is asked, and what its refusals say. The key lives here, in memory, and nowhere else.
+
+let key = null;
+let keyAsker = async () => null;
+let asking = null;
+let declined = false;
+
+/** `ask(why)` is called when the service wants a key, and promises one or null. */
+export function onKeyNeeded(ask) {
+  keyAsker = ask;
+}
+
+/** Whether a key is in use. */
+export const hasKey = () => key !== null;
+
+/** Forgets the key. */
+export function forgetKey() {
+  key = null;
+}
+
+/** Something that a person can understand and do something about. */
+export class Said extends Error {}
+
+/** A refusal: the problem document, or what stood in its place. */
+export class Refused extends Said {
+  constructor(status, problem) {
+    super(problem?.detail || problem?.title || `the service answered ${status}`);
+    this.status = status;
+    this.problem = problem ?? {};
+  }
+}
+
+/**
+ * The answer to a request; throws `Refused` for one that is none, and asks for a key where one is needed. What is
+ * done on the `quiet` does not ask again after a no.
+ */
+export async function send(path, { method = 'GET', body, type = 'application/json', headers = {}, signal, quiet = false } = {}) {
+  for (;;) {
+    const used = key;
+    const answer = await fetch(path, {
+      method,
+      signal,
+      body: body === undefined || typeof body === 'string' || body instanceof Blob ? body : JSON.stringify(body),
+      headers: {
+        ...(body === undefined ? {} : { 'content-type': type }),
+        ...(used ? { authorization: `Bearer ${used}` } : {}),
+        ...headers,
+      },
+    });
+    if (answer.ok) return answer;
+    const problem = await answer.json().catch(() => null);
+    if (answer.status !== 401) throw new Refused(answer.status, problem);
+    // Another request may have brought one meanwhile; else one dialogue for all that wait.
+    if (key === used) {
+      if (quiet && declined) throw new Refused(answer.status, problem);
+      asking ??= keyAsker(used ? problem?.detail : null).finally(() => { asking = null; });
+      const given = await asking;
+      declined = !given;
+      if (!given) throw new Refused(answer.status, problem);
+      key = given;
+    }
+  }
+}
+
+/** The same, as JSON. */
+export async function ask(path, options) {
+  return (await send(path, options)).json();
+}
+
+/** The address of a plan's events: with a ticket where a key is in use, for an EventSource sends no headers. */
+export async function eventsAddress(id, after, rateHz) {
+  const query = new URLSearchParams({ rate: String(rateHz) });
+  if (after) query.set('last_event_id', String(after));
+  if (key) query.set('ticket', (await ask(`/plans/${id}/tickets`, { method: 'POST' })).ticket);
+  return `/plans/${id}/events?${query}`;
+}

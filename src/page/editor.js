@@ -1,0 +1,251 @@
+// The scenario as a form: everything that the scene shows, and what it cannot show, as fields and buttons.
+
+import { by, el } from './dom.js';
+import { Form } from './form.js';
+import { axes, isGeodetic } from './frame.js';
+import { threatName } from './words.js';
+
+const PAGE = 20;
+
+export class Editor {
+  #shape = '';
+  #page = 0;
+  #faults = [];
+  #chosen = '';
+  #menu = { scenarios: [], algorithms: [], terrains: [] };
+
+  /** `acts` has `load(name)`, `open(file)` and `select(threat)`. */
+  constructor(root, draft, acts) {
+    this.root = root;
+    this.draft = draft;
+    this.acts = acts;
+    this.form = new Form(root, draft);
+    draft.addEventListener('change', () => this.show());
+  }
+
+  /** Which shipped scenario the draft began with; '' for none. */
+  from(name) {
+    this.#chosen = name;
+    const choose = by('source');
+    if (choose) choose.value = name;
+  }
+
+  /** What there is to choose from. */
+  menu(menu) {
+    this.#menu = { ...this.#menu, ...menu };
+    this.#shape = '';
+    this.show();
+  }
+
+  show(defaults) {
+    const document = this.draft.document;
+    if (!document) return;
+    const shape = JSON.stringify([
+      document.frame, document.terrain?.kind, document.terrain?.peaks?.length, this.#page,
+      (document.threats ?? []).map((threat) => [threat.kind, threat.vertices?.length]),
+    ]);
+    if (shape !== this.#shape) {
+      this.#shape = shape;
+      this.#build(document);
+    }
+    this.form.sync(defaults);
+    this.#title(document);
+  }
+
+  /** The service's faults; none where the document is right. */
+  mark(faults) {
+    this.#faults = faults;
+    this.form.mark(faults);
+    const list = this.root.querySelector('.faults');
+    if (!list) return;
+    list.hidden = !faults.length;
+    list.replaceChildren(
+      el('h3', {}, faults.length === 1 ? 'One thing to mend' : `${faults.length} things to mend`),
+      el('ul', {}, faults.slice(0, 12).map((fault) =>
+        el('li', {}, el('button', { type: 'button', class: 'link', onclick: () => this.goTo(fault.pointer) }, fault.detail)))),
+    );
+  }
+
+  /** Brings the field of a pointer into sight, and the pencil to it. */
+  goTo(pointer) {
+    const threat = pointer.match(/^\/threats\/(\d+)/);
+    if (threat) this.#turnTo(Number(threat[1]));
+    const input = this.form.fieldOf(pointer)?.input;
+    if (!input) return;
+    for (let node = input; node; node = node.parentElement) if (node.tagName === 'DETAILS') node.open = true;
+    input.focus();
+    input.scrollIntoView({ block: 'center' });
+  }
+
+  /** Shows which threat is in hand. */
+  select(index) {
+    if (index !== null) this.#turnTo(index);
+    for (const card of this.root.querySelectorAll('.threat')) card.classList.toggle('chosen', Number(card.dataset.index) === index);
+    this.root.querySelector('.threat.chosen')?.scrollIntoView({ block: 'nearest' });
+  }
+
+  #turnTo(index) {
+    const page = Math.floor(index / PAGE);
+    if (page === this.#page) return;
+    this.#page = page;
+    this.show();
+  }
+
+  #title(document) {
+    const note = this.root.querySelector('.frame-note');
+    if (note) note.textContent = isGeodetic(document) ? `WGS 84, altitudes above ${document.altitude_datum === 'ellipsoid' ? 'the ellipsoid' : 'mean sea level'}` : 'metres, x east, y north, z up';
+  }
+
+  #build(document) {
+    const open = new Set([...this.root.querySelectorAll('details[open]')].map((details) => details.dataset.part));
+    if (!this.root.childElementCount) open.add('limits');
+    this.form.forget(this.root);
+    const section = (part, title, ...content) => el('details', { class: 'part', data: { part }, open: open.has(part) }, el('summary', {}, title), ...content);
+    this.root.replaceChildren(
+      this.#source(),
+      el('div', { class: 'faults', role: 'group', 'aria-label': 'Faults', hidden: true }),
+      this.form.text('/name', 'Name'),
+      this.#ends(document),
+      this.#threats(document),
+      section('limits', 'Altitude band', el('div', { class: 'grid two' },
+        this.form.number('/altitude/min', 'Lowest above ground', 'm'), this.form.number('/altitude/max', 'Highest above ground', 'm'))),
+      section('ground', 'Ground', ...this.#ground(document)),
+      section('vehicle', 'Aircraft', el('div', { class: 'grid two' },
+        this.form.number('/vehicle/max_turn_deg', 'Sharpest turn', '°'), this.form.number('/vehicle/max_climb_deg', 'Steepest climb', '°'),
+        this.form.number('/vehicle/min_leg', 'Shortest leg', 'm'), this.form.number('/vehicle/cruise_speed', 'Cruise speed', 'm/s'),
+        this.form.number('/vehicle/fuel_per_km', 'Fuel per km'))),
+      section('weights', 'What counts', el('div', { class: 'grid three' },
+        this.form.number('/weights/fuel', 'Fuel'), this.form.number('/weights/threat', 'Threats'), this.form.number('/weights/altitude', 'Altitude'))),
+      section('planner', 'Search', ...this.#planner()),
+      section('area', 'Area', this.#area(document)),
+    );
+    this.mark(this.#faults);
+  }
+
+  #source() {
+    const choose = el('select', { id: 'source', onchange: () => choose.value && this.acts.load(this.#chosen = choose.value) },
+      el('option', { value: '' }, 'Choose…'),
+      this.#menu.scenarios.map(({ name, title }) => el('option', { value: name }, title)));
+    choose.value = this.#chosen;
+    const file = el('input', { type: 'file', class: 'unseen', id: 'file', accept: '.json,.geojson,.kml,.plan,application/json,application/geo+json,application/vnd.google-earth.kml+xml',
+      onchange: () => {
+        if (file.files[0]) this.acts.open(file.files[0]);
+        file.value = '';
+      } });
+    return el('div', { class: 'source' },
+      el('label', { class: 'field' }, el('span', { class: 'name' }, 'Start from'), choose),
+      el('label', { class: 'button', for: 'file' }, 'Open file…'), file,
+      el('button', { type: 'button', onclick: () => this.acts.blank() }, 'Empty'));
+  }
+
+  #ends(document) {
+    const names = isGeodetic(document) ? ['Latitude °', 'Longitude °', 'Altitude m'] : ['East x m', 'North y m', 'Height z m'];
+    const row = (end, title) => el('fieldset', {}, el('legend', {}, el('i', { class: `swatch ${end}` }), title), el('div', { class: 'grid three' },
+      axes(document).map((axis, k) => this.form.number(`/${end}/${axis}`, ...label(names[k])))));
+    return el('section', { 'aria-label': 'Start and target' }, row('start', 'Start'), row('target', 'Target'), el('p', { class: 'faint frame-note' }));
+  }
+
+  #threats(document) {
+    const threats = document.threats ?? [];
+    const pages = Math.max(1, Math.ceil(threats.length / PAGE));
+    this.#page = Math.min(this.#page, pages - 1);
+    const first = this.#page * PAGE;
+    const turn = (by_) => el('button', { type: 'button', disabled: by_ < 0 ? this.#page === 0 : this.#page + 1 >= pages, onclick: () => {
+      this.#page += by_;
+      this.show();
+    } }, by_ < 0 ? 'Earlier' : 'Later');
+    return el('section', { class: 'threats', 'aria-labelledby': 'threats-head' },
+      el('h3', { id: 'threats-head' }, 'Threats ', el('span', { class: 'faint' }, String(threats.length))),
+      el('ol', { class: 'cards', start: first }, threats.slice(first, first + PAGE).map((threat, k) => this.#threat(document, threat, first + k))),
+      pages > 1 && el('p', { class: 'row' }, turn(-1), el('span', { class: 'faint' }, `${first}–${Math.min(first + PAGE, threats.length) - 1}`), turn(1)),
+      el('p', { class: 'row' },
+        el('button', { type: 'button', id: 'add-cylinder', onclick: () => this.acts.add('cylinder') }, 'Add a cylinder'),
+        el('button', { type: 'button', id: 'add-polygon', onclick: () => this.acts.add('polygon') }, 'Add a polygon')));
+  }
+
+  #threat(document, threat, index) {
+    const pointer = `/threats/${index}`;
+    const [first, second] = axes(document);
+    const names = isGeodetic(document) ? ['Latitude °', 'Longitude °'] : ['East x m', 'North y m'];
+    const limits = [this.form.number(`${pointer}/base`, 'Base', 'm', { empty: null }), this.form.number(`${pointer}/top`, 'Top', 'm', { empty: null })];
+    const remove = el('button', { type: 'button', class: 'quiet', 'aria-label': `Remove ${threatName(threat, index)}`, title: 'Remove', onclick: () => {
+      this.draft.set(pointer, undefined);
+      by('threats-head')?.scrollIntoView({ block: 'nearest' });
+    } }, '✕');
+    const body = threat.kind === 'polygon'
+      ? [
+        el('div', { class: 'grid three' }, this.form.number(`${pointer}/margin`, 'Soft margin', 'm'), ...limits),
+        el('details', { class: 'inner', data: { part: `vertices ${index}` } }, el('summary', {}, `${threat.vertices?.length ?? 0} corners`),
+          (threat.vertices ?? []).map((_, k) => el('div', { class: 'grid pair' },
+            this.form.number(`${pointer}/vertices/${k}/${first}`, `${k}: ${label(names[0])[0]}`, label(names[0])[1]),
+            this.form.number(`${pointer}/vertices/${k}/${second}`, ...label(names[1])),
+            el('button', { type: 'button', class: 'quiet', 'aria-label': `Remove corner ${k}`, onclick: () => this.draft.set(`${pointer}/vertices/${k}`, undefined) }, '✕'))),
+          el('button', { type: 'button', onclick: () => this.acts.addCorner(index) }, 'Add a corner')),
+      ]
+      : [el('div', { class: 'grid three' },
+        this.form.number(`${pointer}/center/${first}`, ...label(names[0])), this.form.number(`${pointer}/center/${second}`, ...label(names[1])), limits[0],
+        this.form.number(`${pointer}/radius`, 'Core radius', 'm'), this.form.number(`${pointer}/influence`, 'Soft radius', 'm'), limits[1])];
+    return el('li', { class: 'threat', data: { index }, value: index, onfocusin: () => this.acts.select(index) },
+      el('div', { class: 'head' }, this.form.text(`${pointer}/name`, `${index}. ${threat.kind === 'polygon' ? 'Polygon' : 'Cylinder'}`, { empty: null }), remove), ...body);
+  }
+
+  #ground(document) {
+    const terrain = document.terrain ?? { kind: 'flat' };
+    const kinds = [['flat', 'Flat'], ['peaks', 'Mountains, analytic'], ...(terrain.kind === 'grid' ? [['grid', 'Grid of elevations']] : []), ['dataset', 'Dataset of the service']];
+    const made = {
+      flat: () => ({ kind: 'flat', elevation: 0 }),
+      peaks: () => ({ kind: 'peaks', base: 0, peaks: [] }),
+      dataset: () => ({ kind: 'dataset', name: this.#menu.terrains[0] ?? '' }),
+      grid: () => terrain,
+    };
+    const kind = this.form.choice('/terrain', 'Kind', kinds, { fallback: 'flat', shown: (value) => value?.kind, chosen: (value) => made[value]() });
+    const parts = {
+      flat: () => [this.form.number('/terrain/elevation', 'Elevation', 'm')],
+      grid: () => [el('p', { class: 'faint' }, `${terrain.columns} × ${terrain.rows} nodes, ${terrain.cell} m apart`)],
+      dataset: () => [this.#menu.terrains.length
+        ? this.form.choice('/terrain/name', 'Dataset', this.#menu.terrains.map((name) => [name, name]), {})
+        : this.form.text('/terrain/name', 'Dataset')],
+      peaks: () => [this.form.number('/terrain/base', 'Base', 'm'), ...(terrain.peaks ?? []).map((_, k) => this.#peak(document, k)),
+        el('button', { type: 'button', onclick: () => this.acts.addPeak() }, 'Add a mountain')],
+    };
+    return [kind, ...(parts[terrain.kind]?.() ?? [])];
+  }
+
+  #peak(document, k) {
+    const pointer = `/terrain/peaks/${k}`;
+    const [first, second] = axes(document);
+    return el('fieldset', { class: 'peak' }, el('legend', {}, `Mountain ${k} `,
+      el('button', { type: 'button', class: 'quiet', 'aria-label': `Remove mountain ${k}`, onclick: () => this.draft.set(pointer, undefined) }, '✕')),
+    el('div', { class: 'grid three' },
+      this.form.number(`${pointer}/center/${first}`, first), this.form.number(`${pointer}/center/${second}`, second), this.form.number(`${pointer}/height`, 'Height', 'm'),
+      this.form.number(`${pointer}/spread/x`, 'Spread east', 'm'), this.form.number(`${pointer}/spread/y`, 'Spread north', 'm')));
+  }
+
+  #planner() {
+    const algorithms = this.#menu.algorithms.map(({ name, title }) => [name, `${name}: ${title}`]);
+    return [
+      this.form.choice('/planner/algorithm', 'Algorithm', algorithms.length ? algorithms : [['tms-sba', 'tms-sba']], { fallback: 'tms-sba' }),
+      el('div', { class: 'grid three' },
+        this.form.number('/planner/waypoints', 'Waypoints'), this.form.number('/planner/population', 'Population'), this.form.number('/planner/iterations', 'Iterations'),
+        this.form.number('/planner/seed', 'Seed', '', {}), this.form.number('/planner/time_limit_ms', 'Time limit', 'ms', { empty: null }),
+        this.form.number('/planner/parameters/gap', 'Enough gap')),
+      this.form.choice('/planner/seeding', 'First population', [['tangent', 'Along tangents of the threats'], ['random', 'Random, as published']], { fallback: 'tangent' }),
+      this.form.tick('/planner/polish', 'Polish the best route', true),
+    ];
+  }
+
+  #area(document) {
+    const [first, second] = axes(document);
+    const names = isGeodetic(document) ? ['South', 'West', 'North', 'East'] : ['West x', 'South y', 'East x', 'North y'];
+    return el('div', {}, el('p', { class: 'faint' }, 'Waypoints stay inside. Left open, a generous box.'), el('div', { class: 'grid two' },
+      this.form.number(`/area/min/${first}`, names[0]), this.form.number(`/area/min/${second}`, names[1]),
+      this.form.number(`/area/max/${first}`, names[2]), this.form.number(`/area/max/${second}`, names[3])));
+  }
+}
+
+/** `Latitude °` as name and unit. */
+function label(text) {
+  const cut = text.lastIndexOf(' ');
+  return [text.slice(0, cut), text.slice(cut + 1)];
+}
+

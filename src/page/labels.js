@@ -1,0 +1,33 @@
+// Names in the scene: text of the page laid over the canvas, so that it is sharp and takes the page's colours.
+
+import { el } from './dom.js';
+
+const MOST = 30;
+
+export class Labels {
+  #items = [];
+
+  constructor(layer) {
+    this.layer = layer;
+  }
+
+  /** `[{place, text, kind}]`; those that there is no room for are left out, the last ones first. */
+  set(items) {
+    this.#items = items.slice(0, MOST).map(({ place, text, kind }) => ({ place, node: el('span', { class: kind }, text) }));
+    this.layer.replaceChildren(...this.#items.map((item) => item.node));
+  }
+
+  /** Puts each where `onScreen` says, and hides those that would cover another. */
+  place(onScreen) {
+    const taken = [];
+    for (const { place, node } of this.#items) {
+      const at = onScreen(place);
+      const wide = (node.textContent.length * 6.4) / 2 + 6;
+      const free = at && taken.every((other) => Math.abs(other.x - at.x) > other.wide + wide || Math.abs(other.y - at.y) > 17);
+      node.hidden = !free;
+      if (!free) continue;
+      taken.push({ ...at, wide });
+      node.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px) translate(-50%, -100%)`;
+    }
+  }
+}

@@ -1,0 +1,440 @@
+// The page put together: what is chosen, planned, looked at, compared and taken away.
+
+import { Refused, Said, ask, onKeyNeeded, send } from './api.js';
+import { Chart } from './chart.js';
+import { by, calmly, el } from './dom.js';
+import { Draft } from './draft.js';
+import { Editor } from './editor.js';
+import { Followed } from './followed.js';
+import { axes, isGeodetic, written } from './frame.js';
+import { readFile } from './import.js';
+import { OTHERS, palette } from './palette.js';
+import { Plans } from './plans.js';
+import { showResult } from './result.js';
+import { fileName, saveBlob, saveFrom } from './save.js';
+import { World } from './scene.js';
+import { Stage } from './stage.js';
+import { Strip } from './strip.js';
+import { Tools } from './tools.js';
+import { cost, metres, number } from './words.js';
+
+const VALIDATE_MS = 300;
+const EMPTY = {
+  name: 'untitled', frame: 'local', start: { x: 100, y: 100, z: 50 }, target: { x: 900, y: 900, z: 50 },
+  area: { min: { x: 0, y: 0 }, max: { x: 1000, y: 1000 } }, threats: [], terrain: { kind: 'flat', elevation: 0 }, altitude: { min: 20, max: 120 },
+};
+
+const draft = new Draft();
+const notice = by('notice');
+let busy = false;
+
+// -- The key ---------------------------------------------------------------------------------------
+
+onKeyNeeded((why) => new Promise((given) => {
+  const dialog = by('key');
+  by('key-why').textContent = why ?? 'Plans belong to the holder of a key.';
+  by('key-field').value = '';
+  dialog.returnValue = '';
+  dialog.addEventListener('close', () => given(dialog.returnValue === 'use' ? by('key-field').value.trim() : null), { once: true });
+  dialog.showModal();
+}));
+
+// -- The parts -------------------------------------------------------------------------------------
+
+let world = null;
+try {
+  world = new World(by('canvas'), by('labels'));
+} catch {
+  by('scene').classList.add('blind');
+  by('canvas').setAttribute('aria-label', 'This browser draws no 3-D scene; tables and strip have everything.');
+  by('hint').textContent = 'This browser has no WebGL, so there is no scene. The form, the strip and the tables have everything.';
+  by('hint').hidden = false;
+}
+const strip = new Strip(by('strip'), (distance) => stage.mark(distance));
+const chart = new Chart(by('chart'), by('legend'), (iteration) => stage.scrub(iteration));
+const stage = new Stage({ world, strip, chart, draft }, {
+  selected: (index) => editor.select(index),
+  legMarked: (k) => {
+    for (const row of document.querySelectorAll('.legs tr.marked')) row.classList.remove('marked');
+    if (k !== null) document.querySelector(`.legs tr[data-leg="${k}"]`)?.classList.add('marked');
+  },
+  marked: (place) => {
+    by('strip-at').textContent = place ? `${metres(place.distance, 0)}: ${number(place.z, 0)} m, ${number(place.z - place.ground, 0)} m above ground` : '';
+  },
+});
+const editor = new Editor(by('scenario'), draft, {
+  load: (name) => attempt(() => load(name)),
+  open: (file) => attempt(() => openFile(file)),
+  blank: () => begin(EMPTY),
+  select: (index) => stage.selected !== index && stage.select(index),
+  add: (kind) => {
+    const { x, y } = stage.middle();
+    const { min, max } = stage.ground.extent;
+    const size = (max.x - min.x) / 16;
+    stage.addThreat(kind, kind === 'polygon' ? [{ x: x - size, y: y - size }, { x: x + size, y: y - size }, { x, y: y + size }] : [{ x, y }]);
+  },
+  addCorner: (index) => {
+    const pointer = `/threats/${index}/vertices`;
+    const { vertices } = draft.document.threats[index];
+    const [a, b] = [vertices[0], vertices.at(-1)];
+    const [first, second] = axes(draft.document);
+    draft.set(pointer, [...vertices, { [first]: (a[first] + b[first]) / 2, [second]: (a[second] + b[second]) / 2 }]);
+  },
+  addPeak: () => {
+    const { peaks = [] } = draft.document.terrain;
+    const { x, y } = stage.middle();
+    const [first, second] = axes(draft.document);
+    const center = written(draft.document, stage.frame.from({ x, y, z: 0 }));
+    draft.set('/terrain/peaks', [...peaks, { center: { [first]: center[first], [second]: center[second] }, height: 100, spread: { x: 100, y: 100 } }]);
+  },
+});
+const plans = new Plans(by('plans'), {
+  open: (status) => attempt(() => open(status.id)),
+  compare: (status, yes) => attempt(() => compare(status.id, yes, status.name)),
+  removed: (id) => {
+    stage.compared.get(id)?.plan.close();
+    if (stage.compared.delete(id)) stage.redraw();
+    remember();
+  },
+}, () => ({ shown: stage.plan?.id ?? null, compared: new Map([...stage.compared].map(([id, other]) => [id, other.color])) }));
+
+// -- Saying ----------------------------------------------------------------------------------------
+
+function say(text) { by('said').textContent = text; }
+
+function tell(text, kind = 'bad') {
+  notice.hidden = !text;
+  notice.className = `notice ${kind}`;
+  notice.replaceChildren(text, el('button', { type: 'button', class: 'quiet', 'aria-label': 'Dismiss', onclick: () => tell('') }, '✕'));
+  if (text) say(text);
+}
+
+async function attempt(act) {
+  try {
+    tell('');
+    await act();
+  } catch (error) {
+    if (error.name === 'AbortError') return;
+    tell(error instanceof TypeError && /fetch/i.test(error.message) ? 'The service cannot be reached.' : error.message);
+    if (!(error instanceof Said)) console.warn(error);
+  }
+}
+
+// -- The scenario ----------------------------------------------------------------------------------
+
+async function load(name) {
+  const document_ = await ask(`/scenarios/${encodeURIComponent(name)}`);
+  begin(document_);
+  editor.from(name);
+}
+
+function begin(document_, plan = null) {
+  show(plan);
+  editor.from('');
+  draft.replace({ ...document_, planner: { ...document_.planner, warm_start: undefined } });
+}
+
+async function openFile(file) {
+  const { document: read, note } = await readFile(file);
+  begin(read);
+  if (note) tell(note, 'note');
+}
+
+let checking = null;
+const check = calmly(VALIDATE_MS, async () => {
+  checking?.abort();
+  checking = new AbortController();
+  const { signal } = checking;
+  try {
+    const { scenario } = await ask('/plans?validate_only=true', { method: 'POST', body: draft.document, signal, quiet: true });
+    editor.mark([]);
+    editor.show(scenario);
+    by('plan').removeAttribute('aria-describedby');
+    await stage.sample(draft.document);
+  } catch (refusal) {
+    if (refusal.problem?.errors) editor.mark(refusal.problem.errors);
+    else if (refusal instanceof Refused && refusal.status !== 401) tell(refusal.message);
+  }
+});
+
+draft.addEventListener('change', () => {
+  by('undo').disabled = !draft.canUndo;
+  by('redo').disabled = !draft.canRedo;
+  by('title').textContent = draft.document.name ?? '';
+  document.title = draft.document.name ? `${draft.document.name} · Noctule` : 'Noctule';
+  check();
+});
+
+// -- Planning --------------------------------------------------------------------------------------
+
+async function submit(warm) {
+  if (busy) return;
+  busy = true;
+  by('plan').disabled = by('replan').disabled = true;
+  try {
+    const planner = { ...draft.document.planner, ...(warm ? { warm_start: { plan_id: stage.plan.id } } : {}) };
+    const before = stage.plan;
+    const status = await ask('/plans', { method: 'POST', body: { ...draft.document, planner } });
+    if (warm && before) lay(before, `before: ${before.status.name ?? before.id.slice(0, 8)}`);
+    const plan = new Followed(status.id, status);
+    show(plan);
+    await plan.open();
+    if (!by('plans').hidden) plans.look();
+  } catch (error) {
+    if (error.problem?.errors) {
+      turn('scenario');
+      editor.mark(error.problem.errors);
+      editor.goTo(error.problem.errors[0].pointer);
+    }
+    throw error;
+  } finally {
+    busy = false;
+    by('plan').disabled = by('replan').disabled = false;
+  }
+}
+
+/** Puts a plan in front, or none. */
+function show(plan) {
+  const before = stage.plan;
+  if (before && before !== plan && !stage.compared.has(before.id)) before.close();
+  if (plan && stage.compared.delete(plan.id)) plans.mark();
+  stage.front(plan);
+  plan?.addEventListener('news', ({ detail }) => plan === stage.plan && heard(plan, detail));
+  if (plan) for (const what of ['status', 'search']) heard(plan, what);
+  else {
+    by('state').hidden = true;
+    by('cancel').hidden = by('replan').hidden = true;
+    by('figures').replaceChildren(el('p', { class: 'faint' }, 'Press Plan, and watch the swarm look for a route.'));
+    showResult(by('result'), {}, {});
+  }
+  remember();
+}
+
+function heard(plan, what) {
+  if (what === 'incumbent') stage.redraw();
+  if (what === 'search' || what === 'end') stage.drawSearch();
+  if (what === 'end') {
+    stage.world?.past(null);
+    stage.redraw();
+    say(verdict(plan));
+  }
+  if (what === 'end' || what === 'status') result(plan);
+  if (what === 'connection') {
+    if (plan.connected) tell('');
+    else tell(plan.lostBecause ?? 'The connection is lost. It is being resumed; nothing will be missed.', 'note');
+    if (plan.connected) say('Connected again.');
+  }
+  figures(plan);
+}
+
+function verdict(plan) {
+  if (!plan.result) return `The plan has ${plan.status.status}.`;
+  const { feasible, cost: price, bound } = plan.result;
+  return feasible ? `A route was found: cost ${cost(price.total)}${bound.gap === null ? '' : `, proven gap ${number(bound.gap * 100, 2)} per cent`}.` : 'No feasible route was found.';
+}
+
+function figures(plan) {
+  const { status, latest, result: end } = plan;
+  const state = by('state');
+  const active = ['queued', 'running'].includes(status?.status);
+  const name = end && !end.feasible ? 'infeasible' : status?.status ?? 'opening';
+  state.hidden = false;
+  state.className = `state ${name}`;
+  state.textContent = plan.connected ? name : 'reconnecting';
+  by('cancel').hidden = !active;
+  by('cancel').disabled = Boolean(status?.cancel_requested);
+  by('replan').hidden = !end;
+  const last = plan.points.at(-1);
+  const best = end?.cost.total ?? last?.best_cost ?? (latest?.feasible ? latest.cost : null) ?? status?.best_cost;
+  const iterations = status?.iterations ?? 0;
+  const iteration = Math.min(last?.iteration ?? status?.iteration ?? 0, iterations);
+  const share = end ? 1 : iterations ? iteration / iterations : 0;
+  const bar = el('progress', { max: 1, value: share, 'aria-label': 'Progress of the search' });
+  by('figures').replaceChildren(
+    el('p', { class: `big ${name}` }, el('b', {}, cost(best ?? null)), el('span', { class: 'faint' }, told(plan, best))),
+    ...(active ? [bar, el('p', { class: 'faint' }, `Iteration ${iteration} of ${iterations}`, last ? `, ${number(last.feasible_fraction * 100, 0)} % of the swarm feasible` : '')] : []));
+}
+
+/** What the figure beside it is. */
+function told({ status, result: end }, best) {
+  if (end && !end.feasible) return 'cost of a route that must not be flown';
+  if (best !== null && best !== undefined) return 'cost of the best route';
+  if (status?.status !== 'queued') return 'no feasible route yet';
+  return status.queue_position ? `waiting, number ${status.queue_position} in the queue` : 'waiting';
+}
+
+function result(plan) {
+  showResult(by('result'), { result: plan.result, scenario: plan.scenario, status: plan.ended ? plan.status : null, refusal: plan.refusal, geodetic: isGeodetic(plan.scenario) }, {
+    markLeg: (k) => stage.markLeg(k),
+    place: (violation) => stage.place(violation),
+    save: (format) => attempt(() => saveFrom(`/plans/${plan.id}/result?format=${format.name}`, fileName(plan.scenario.name, format.file))),
+    saveScenario: () => attempt(() => saveFrom(`/plans/${plan.id}/scenario`, fileName(plan.scenario.name, 'json'))),
+    savePicture: () => attempt(async () => saveBlob(await world.picture(), fileName(plan.scenario.name, 'png'))),
+    copyLink: () => attempt(async () => {
+      remember();
+      await navigator.clipboard.writeText(location.href);
+      tell('The link is in the clipboard. It opens this plan.', 'note');
+    }),
+  });
+}
+
+// -- Comparing -------------------------------------------------------------------------------------
+
+function lay(plan, name) {
+  const colours = palette();
+  const taken = new Set([...stage.compared.values()].map((other) => other.slot));
+  const slot = [...Array(OTHERS).keys()].find((at) => !taken.has(at)) ?? 0;
+  stage.compared.set(plan.id, { plan, name, slot, color: colours[`other-${slot}`] });
+  stage.redraw();
+  stage.drawSearch();
+  remember();
+}
+
+async function compare(id, yes, name) {
+  if (!yes) {
+    stage.compared.get(id)?.plan.close();
+    stage.compared.delete(id);
+    stage.redraw();
+    stage.drawSearch();
+  } else {
+    if (stage.compared.size === OTHERS) throw new Said(`At most ${OTHERS} plans can be laid over one.`);
+    const plan = await new Followed(id).open();
+    const { algorithm, seed } = plan.status;
+    plan.addEventListener('news', () => {
+      stage.redraw();
+      stage.drawSearch();
+    });
+    lay(plan, name && name === stage.plan?.status?.name ? `${algorithm}, seed ${seed}` : name || `${algorithm}, seed ${seed}`);
+  }
+  plans.mark();
+  remember();
+}
+
+async function open(id) {
+  const plan = stage.compared.get(id)?.plan ?? new Followed(id);
+  if (!plan.scenario) await plan.open();
+  begin(plan.scenario, plan);
+  plans.mark();
+}
+
+// -- The address -----------------------------------------------------------------------------------
+
+function remember() {
+  const query = new URLSearchParams();
+  if (stage.plan) query.set('plan', stage.plan.id);
+  if (stage.compared.size) query.set('with', [...stage.compared.keys()].join(' '));
+  const hash = query.size ? `#${query}` : '';
+  if (hash !== location.hash) history.replaceState(null, '', `${location.pathname}${hash}`);
+}
+
+async function recall(hash) {
+  const query = new URLSearchParams(hash.slice(1));
+  const id = query.get('plan');
+  if (!id) return false;
+  await open(id);
+  for (const other of query.get('with')?.split(' ') ?? []) await compare(other, true);
+  return true;
+}
+
+// -- Buttons, tabs, keys, files --------------------------------------------------------------------
+
+by('plan').addEventListener('click', () => attempt(() => submit(false)));
+by('replan').addEventListener('click', () => attempt(() => submit(true)));
+by('cancel').addEventListener('click', () => attempt(() => stage.plan.cancel()));
+by('undo').addEventListener('click', () => draft.undo());
+by('redo').addEventListener('click', () => draft.redo());
+
+function turn(name) {
+  for (const tab of document.querySelectorAll('[role=tab]')) {
+    const on = tab.id === `tab-${name}`;
+    tab.setAttribute('aria-selected', String(on));
+    tab.tabIndex = on ? 0 : -1;
+    by(tab.getAttribute('aria-controls')).hidden = !on;
+  }
+  if (name === 'plans') plans.look();
+}
+for (const tab of document.querySelectorAll('[role=tab]')) {
+  tab.addEventListener('click', () => turn(tab.id.slice(4)));
+  tab.addEventListener('keydown', (event) => {
+    if (!['ArrowLeft', 'ArrowRight'].includes(event.key)) return;
+    const other = [...document.querySelectorAll('[role=tab]')].find((one) => one !== tab);
+    turn(other.id.slice(4));
+    other.focus();
+  });
+}
+
+addEventListener('keydown', (event) => {
+  if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== 'z') return;
+  // In a field the browser's own undo takes back letters.
+  if (event.target.matches?.('input[type=text], input[type=password]') && document.activeElement === event.target && event.target.value !== event.target.defaultValue) return;
+  event.preventDefault();
+  if (event.shiftKey) draft.redo();
+  else draft.undo();
+});
+
+let dragged = 0;
+addEventListener('dragenter', (event) => {
+  if (!event.dataTransfer?.types.includes('Files')) return;
+  dragged += 1;
+  by('drop').hidden = false;
+});
+addEventListener('dragleave', () => {
+  dragged = Math.max(0, dragged - 1);
+  by('drop').hidden = dragged === 0;
+});
+addEventListener('dragover', (event) => event.preventDefault());
+addEventListener('drop', (event) => {
+  event.preventDefault();
+  dragged = 0;
+  by('drop').hidden = true;
+  const [file] = event.dataTransfer.files;
+  if (file) attempt(() => openFile(file));
+});
+addEventListener('hashchange', () => attempt(() => recall(location.hash)));
+
+if (world) {
+  stage.tools = new Tools({ bar: by('tools'), hint: by('hint'), world, draft, stage, pointed: (pixel) => stage.pointAt(pixel) });
+  const times = el('select', { id: 'exaggeration', 'aria-label': 'Heights are drawn', title: 'Heights', onchange: () => { world.exaggeration = Number(times.value); } },
+    [1, 2, 3, 5].map((value) => el('option', { value }, `heights × ${value}`)));
+  by('camera').append(times,
+    el('button', { type: 'button', onclick: () => world.look('oblique') }, 'Oblique'),
+    el('button', { type: 'button', onclick: () => world.look('above') }, 'Above'),
+    el('button', { type: 'button', 'aria-label': 'Nearer', onclick: () => world.zoom(0.8) }, '+'),
+    el('button', { type: 'button', 'aria-label': 'Farther', onclick: () => world.zoom(1.25) }, '−'));
+  // Low hills under a wide sky look flat; they are drawn higher, and the box says so.
+  stage.exaggerate = (ground, ceiling) => {
+    const width = Math.max(ground.extent.max.x - ground.extent.min.x, ground.extent.max.y - ground.extent.min.y);
+    const wanted = (0.2 * width) / Math.max(ceiling - ground.least, 1);
+    const value = wanted < 1.5 ? 1 : wanted < 2.5 ? 2 : wanted < 4 ? 3 : 5;
+    times.value = String(value);
+    return value;
+  };
+}
+
+// What is shown, for tests and for the curious: to look at, not to change.
+Object.defineProperty(globalThis, 'noctule', {
+  value: Object.freeze({
+    scene: () => world?.inventory() ?? null,
+    onScreen: (place) => world?.onScreen(place) ?? null,
+    toMetres: (position) => stage.frame.to(position),
+    groundAt: (x, y) => stage.ground.at(x, y),
+    routeAt: (share) => {
+      const way = stage.plan && stage.wayOf(stage.plan);
+      return way ? way.at(way.length * share) : null;
+    },
+    document: () => structuredClone(draft.document),
+  }),
+});
+
+const asked = location.hash;
+show(null);
+await attempt(async () => {
+  const [{ scenarios }, { algorithms }] = await Promise.all([ask('/scenarios'), ask('/algorithms')]);
+  editor.menu({ scenarios, algorithms });
+  if (!(await recall(asked).catch((refusal) => {
+    tell(`That plan cannot be opened: ${refusal.message}`);
+    return false;
+  }))) await load(scenarios[0].name);
+});
+// Only where the service has datasets, and the caller may see them.
+send('/terrains', { quiet: true }).then((answer) => answer.json()).then(({ terrains }) => editor.menu({ terrains: terrains.map(({ name }) => name) })).catch(() => {});

@@ -1,0 +1,24 @@
+// Files handed to the person in front.
+
+import { send } from './api.js';
+
+/** A file of this name, with these bytes. */
+export function saveBlob(blob, name) {
+  const address = URL.createObjectURL(blob);
+  const link = document.createElement('a');
+  link.href = address;
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(address), 10000);
+}
+
+/** What the service answers, as a file: by a request of ours, for a link could not bring a key. */
+export async function saveFrom(path, name) {
+  saveBlob(await (await send(path)).blob(), name);
+}
+
+/** A scenario's name as that of a file. */
+export function fileName(name, extension) {
+  const plain = (name ?? '').toLowerCase().normalize('NFKD').replace(/[^a-z0-9]+/g, '-').replace(/^-+|-+$/g, '').slice(0, 60);
+  return `${plain || 'plan'}.${extension}`;
+}

@@ -1,0 +1,165 @@
+// The altitude strip: ground and band along the route, its waypoints, and the path.
+
+import { eachFrame } from './dom.js';
+import { onSchemeChange, palette } from './palette.js';
+import { metres, number, step } from './words.js';
+
+const SAMPLES = 400;
+const EDGE = { left: 46, right: 12, top: 10, bottom: 20 };
+
+export class Strip {
+  #shown = null;
+  #marked = null;
+  #draw = eachFrame(() => this.#paint());
+
+  /** `pointed(distance)` is told where along the route the pointer is; null where it is not. */
+  constructor(canvas, pointed) {
+    this.canvas = canvas;
+    canvas.addEventListener('pointermove', (event) => {
+      const scales = this.#scales();
+      if (!scales) return;
+      const share = (event.offsetX - EDGE.left) / scales.wide;
+      pointed(share >= 0 && share <= 1 ? share * this.#shown.length : null);
+    });
+    canvas.addEventListener('pointerleave', () => pointed(null));
+    new ResizeObserver(() => this.#draw()).observe(canvas);
+    onSchemeChange(() => this.#draw());
+  }
+
+  /** `route` is a `Way`; `dots` the waypoints on it; `band` heights above ground, or null; `others` ways with a color. */
+  show(shown) {
+    if (!shown) {
+      this.#shown = null;
+      this.canvas.setAttribute('aria-label', 'No route yet');
+    } else {
+      const { route, ground } = shown;
+      const along = Array.from({ length: SAMPLES + 1 }, (_, k) => (route.length * k) / SAMPLES);
+      const profile = along.map((s) => {
+        const { x, y } = route.at(s);
+        return { s, z: ground.at(x, y) };
+      });
+      this.#shown = { ...shown, profile, length: Math.max(route.length, 1e-9) };
+      const [low, high] = [Math.min(...profile.map((p) => p.z)), Math.max(...profile.map((p) => p.z))];
+      this.canvas.setAttribute('aria-label', `Altitude along ${metres(route.length)}: ground from ${number(low, 0)} to ${number(high, 0)} m, route from ${number(route.least, 0)} to ${number(route.greatest, 0)} m`);
+    }
+    this.#draw();
+  }
+
+  /** Marks a distance along the route. */
+  mark(distance) {
+    this.#marked = distance;
+    this.#draw();
+  }
+
+  #scales() {
+    if (!this.#shown) return null;
+    const { profile, route, band, others, length } = this.#shown;
+    const heights = [route.least, route.greatest, ...others.flatMap((other) => [other.way.least, other.way.greatest])];
+    let [low, high] = [Infinity, -Infinity];
+    for (const { z } of profile) {
+      low = Math.min(low, z);
+      high = Math.max(high, z + (band ? Math.min(band.max, 4 * (route.greatest - route.least) + band.min + 50) : 0));
+    }
+    low = Math.min(low, ...heights);
+    high = Math.max(high, ...heights);
+    const room = Math.max((high - low) * 0.06, 1);
+    [low, high] = [low - room, high + room];
+    const [wide, tall] = [this.canvas.clientWidth - EDGE.left - EDGE.right, this.canvas.clientHeight - EDGE.top - EDGE.bottom];
+    return { low, high, wide, tall, x: (s) => EDGE.left + (s / length) * wide, y: (z) => EDGE.top + tall * (1 - (z - low) / (high - low)) };
+  }
+
+  #paint() {
+    const { canvas } = this;
+    const ratio = devicePixelRatio;
+    const [width, height] = [Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)];
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+    const pen = canvas.getContext('2d');
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.clearRect(0, 0, canvas.clientWidth, canvas.clientHeight);
+    const scales = this.#scales();
+    const colours = palette();
+    pen.font = '11px ui-sans-serif, system-ui, sans-serif';
+    if (!scales || scales.wide < 40) {
+      pen.fillStyle = colours.faint;
+      pen.fillText('The profile of the route appears here once there is one.', EDGE.left, canvas.clientHeight / 2);
+      return;
+    }
+    this.#axes(pen, scales, colours);
+    const { profile, route, band, dots, others, color, faults } = this.#shown;
+    pen.save();
+    pen.beginPath();
+    pen.rect(EDGE.left, EDGE.top - 6, scales.wide, scales.tall + 6);
+    pen.clip();
+    if (band) {
+      trace(pen, profile.map(({ s, z }) => [scales.x(s), scales.y(z + band.max)]));
+      for (const { s, z } of [...profile].reverse()) pen.lineTo(scales.x(s), scales.y(z + band.min));
+      fill(pen, colours.band);
+    }
+    trace(pen, profile.map(({ s, z }) => [scales.x(s), scales.y(z)]));
+    pen.lineTo(scales.x(profile.at(-1).s), scales.y(scales.low));
+    pen.lineTo(scales.x(0), scales.y(scales.low));
+    fill(pen, colours.ground);
+    for (const other of others) {
+      const fit = route.length / other.way.length;
+      trace(pen, other.way.points.map(({ z }, k) => [scales.x(other.way.flown[k] * fit), scales.y(z)]));
+      stroke(pen, other.color, 1.5);
+    }
+    trace(pen, route.points.map(({ z }, k) => [scales.x(route.flown[k]), scales.y(z)]));
+    stroke(pen, color, 2);
+    pen.restore();
+    for (const { s, z } of dots) dot(pen, scales.x(s), scales.y(z), 3, '#fff', color);
+    for (const { s, z } of faults) dot(pen, scales.x(s), scales.y(z), 6, colours.fault, '#fff');
+    if (this.#marked !== null) {
+      const { z } = route.at(this.#marked);
+      trace(pen, [[scales.x(this.#marked), EDGE.top], [scales.x(this.#marked), EDGE.top + scales.tall]]);
+      stroke(pen, colours.faint, 1);
+      dot(pen, scales.x(this.#marked), scales.y(z), 5, color, colours.ink);
+    }
+  }
+
+  #axes(pen, { low, high, wide, tall, x, y }, colours) {
+    pen.fillStyle = colours.faint;
+    pen.textAlign = 'right';
+    pen.textBaseline = 'middle';
+    const rise = step(high - low, 4);
+    for (let z = Math.ceil(low / rise) * rise; z <= high; z += rise) {
+      trace(pen, [[EDGE.left, y(z)], [EDGE.left + wide, y(z)]]);
+      stroke(pen, colours.line, 1);
+      pen.fillText(number(z, 0), EDGE.left - 6, y(z));
+    }
+    pen.textAlign = 'center';
+    pen.textBaseline = 'top';
+    const { length } = this.#shown;
+    const far = length >= 10000;
+    const way = step(length, Math.max(3, wide / 110));
+    for (let s = 0; s <= length; s += way) {
+      pen.fillText(far ? `${+(s / 1000).toFixed(2)} km` : `${number(s, 0)} m`, Math.max(x(s), EDGE.left + 8), EDGE.top + tall + 5);
+    }
+  }
+}
+
+function trace(pen, points) {
+  pen.beginPath();
+  points.forEach(([x, y], k) => (k ? pen.lineTo(x, y) : pen.moveTo(x, y)));
+}
+
+function stroke(pen, color, width) {
+  pen.strokeStyle = color;
+  pen.lineWidth = width;
+  pen.lineJoin = 'round';
+  pen.stroke();
+}
+
+function fill(pen, color) {
+  pen.closePath();
+  pen.fillStyle = color;
+  pen.fill();
+}
+
+function dot(pen, x, y, radius, color, rim) {
+  pen.beginPath();
+  pen.arc(x, y, radius, 0, 7);
+  pen.fillStyle = color;
+  pen.fill();
+  stroke(pen, rim, 1.5);
+}

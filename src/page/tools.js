@@ -1,0 +1,184 @@
+// Drawing in the scene: placing with a click, moving and sizing by dragging. All of it is in the form, too.
+
+import { el } from './dom.js';
+import { axes, written } from './frame.js';
+
+const NEAR_PX = 13;
+const STILL_PX = 5;
+const TOOLS = [
+  ['look', 'Look', 'Drag to turn, wheel to zoom. Drag start, target and the dots of a chosen threat to move them.'],
+  ['start', 'Start', 'Click on the ground to place the start.'],
+  ['target', 'Target', 'Click on the ground to place the target.'],
+  ['cylinder', 'Cylinder', 'Click on the ground to place a round threat; drag its dots for its radii.'],
+  ['polygon', 'Polygon', 'Click the corners one after another; Enter or a click on the first one closes it, Escape gives up.'],
+];
+
+export class Tools {
+  #tool = 'look';
+  #down = null;
+  #drag = null;
+  #corners = [];
+  #drags = 0;
+  #buttons = new Map();
+
+  /** `stage` has `frame`, `ground` and `selected`, and `select(index)`; `pointed(place)` hears where the pointer is. */
+  constructor({ bar, hint, world, draft, stage, pointed }) {
+    Object.assign(this, { hint, world, draft, stage, pointed });
+    for (const [name, title, help] of TOOLS) {
+      const button = el('button', { type: 'button', data: { tool: name }, 'aria-pressed': String(name === 'look'), title: help, onclick: () => this.use(name) }, title);
+      this.#buttons.set(name, button);
+      bar.append(button);
+    }
+    const { canvas } = world;
+    canvas.addEventListener('pointerdown', (event) => this.#pressed(event), { capture: true });
+    canvas.addEventListener('pointermove', (event) => this.#moved(event));
+    canvas.addEventListener('pointerup', (event) => this.#released(event));
+    canvas.addEventListener('pointercancel', () => this.#drop());
+    canvas.addEventListener('pointerleave', () => pointed(null));
+    addEventListener('keydown', (event) => {
+      if (event.key === 'Escape') this.use('look');
+      if (event.key === 'Enter' && this.#tool === 'polygon' && !event.target.closest?.('button, input, select')) this.#close();
+    });
+  }
+
+  use(tool) {
+    this.#tool = tool;
+    this.#corners = [];
+    for (const [name, button] of this.#buttons) button.setAttribute('aria-pressed', String(name === tool));
+    this.hint.textContent = TOOLS.find(([name]) => name === tool)[2];
+    this.hint.hidden = tool === 'look';
+    this.world.canvas.dataset.tool = tool;
+    this.show();
+  }
+
+  /** Draws what can be dragged. */
+  show() {
+    this.world.handles([...this.#handles().map((handle) => handle.place), ...this.#corners]);
+  }
+
+  /** Dots of the threat that is chosen: its middle and its radii, or its corners. */
+  #handles() {
+    const { draft, stage } = this;
+    const threat = draft.document?.threats?.[stage.selected];
+    if (!threat || !stage.ground) return [];
+    const pointer = `/threats/${stage.selected}`;
+    const onGround = ({ x, y }) => ({ x, y, z: stage.ground.at(x, y) });
+    const [first, second] = axes(draft.document);
+    const known = (place) => Number.isFinite(place?.[first]) && Number.isFinite(place?.[second]);
+    if (threat.kind === 'polygon') {
+      return (threat.vertices ?? []).flatMap((vertex, k) => (known(vertex)
+        ? [{ place: onGround(stage.frame.to(vertex)), move: (to) => this.#put(`${pointer}/vertices/${k}`, to) }] : []));
+    }
+    if (!known(threat.center)) return [];
+    const middle = stage.frame.to(threat.center);
+    const size = (name) => (to) => {
+      const metres = Math.max(1, Math.round(Math.hypot(to.x - middle.x, to.y - middle.y)));
+      this.draft.edit((document) => ({
+        ...document,
+        threats: document.threats.map((one, k) => {
+          if (k !== stage.selected) return one;
+          const influence = one.influence ?? one.radius;
+          return name === 'radius' ? { ...one, radius: metres, influence: Math.max(metres, influence) } : { ...one, influence: Math.max(metres, one.radius) };
+        }),
+      }), this.#gesture());
+    };
+    const influence = threat.influence ?? threat.radius;
+    return [
+      { place: onGround(middle), move: (to) => this.#put(`${pointer}/center`, to) },
+      { place: onGround({ x: middle.x + threat.radius, y: middle.y }), move: size('radius') },
+      { place: onGround({ x: middle.x - influence * 0.7071, y: middle.y - influence * 0.7071 }), move: size('influence') },
+    ];
+  }
+
+  #ends() {
+    const { draft, stage } = this;
+    return ['start', 'target'].flatMap((end) => {
+      const position = draft.document?.[end];
+      if (!axes(draft.document).every((axis) => Number.isFinite(position?.[axis]))) return [];
+      const place = stage.frame.to(position);
+      const above = place.z - stage.ground.at(place.x, place.y);
+      return [{ place, move: (to) => this.#put(`/${end}`, { ...to, z: stage.ground.at(to.x, to.y) + above }, true) }];
+    });
+  }
+
+  #gesture() { return `drag ${this.#drags}`; }
+
+  #put(pointer, { x, y, z }, high = false) {
+    const position = this.stage.frame.from({ x, y, z });
+    const [, , third] = axes(this.draft.document);
+    if (!high) delete position[third];
+    this.draft.set(pointer, written(this.draft.document, position), this.#gesture());
+  }
+
+  #pressed(event) {
+    if (event.button !== 0) return;
+    this.#down = { x: event.offsetX, y: event.offsetY };
+    if (this.#tool !== 'look') return;
+    const near = [...this.#handles(), ...this.#ends()].map((handle) => {
+      const at = this.world.onScreen(handle.place);
+      return { handle, off: at ? Math.hypot(at.x - event.offsetX, at.y - event.offsetY) : Infinity };
+    }).filter(({ off }) => off <= NEAR_PX).sort((a, b) => a.off - b.off)[0];
+    if (!near) return;
+    const from = this.world.onGround(event.offsetX, event.offsetY);
+    if (!from) return;
+    this.#drags += 1;
+    const { place, move } = near.handle;
+    this.#drag = { move, dx: place.x - from.x, dy: place.y - from.y };
+    this.world.controls.enabled = false;
+    this.world.canvas.setPointerCapture(event.pointerId);
+  }
+
+  #moved(event) {
+    if (this.#drag) {
+      const at = this.world.onGround(event.offsetX, event.offsetY);
+      if (at) this.#drag.move({ x: at.x + this.#drag.dx, y: at.y + this.#drag.dy });
+      return;
+    }
+    if (!event.buttons) this.pointed({ x: event.offsetX, y: event.offsetY });
+  }
+
+  #released(event) {
+    if (this.#drag) {
+      this.#drop();
+      return;
+    }
+    const still = this.#down && Math.hypot(event.offsetX - this.#down.x, event.offsetY - this.#down.y) <= STILL_PX;
+    this.#down = null;
+    if (still) this.#clicked(event.offsetX, event.offsetY);
+  }
+
+  #drop() {
+    this.#drag = null;
+    this.#down = null;
+    this.world.controls.enabled = true;
+    this.draft.rest();
+  }
+
+  #clicked(px, py) {
+    if (this.#tool === 'look') {
+      this.stage.select(this.world.threatAt(px, py));
+      return;
+    }
+    const place = this.world.onGround(px, py);
+    if (!place) return;
+    this.#drags += 1;
+    if (this.#tool === 'polygon') {
+      const first = this.#corners[0] && this.world.onScreen(this.#corners[0]);
+      if (first && Math.hypot(first.x - px, first.y - py) <= NEAR_PX) this.#close();
+      else {
+        this.#corners.push(place);
+        this.show();
+      }
+      return;
+    }
+    if (this.#tool === 'cylinder') this.stage.addThreat('cylinder', [place]);
+    else this.#put(`/${this.#tool}`, { ...place, z: place.z + this.stage.heightAbove(this.#tool) }, true);
+    this.draft.rest();
+    this.use('look');
+  }
+
+  #close() {
+    if (this.#corners.length >= 3) this.stage.addThreat('polygon', this.#corners);
+    this.use('look');
+  }
+}

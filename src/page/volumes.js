@@ -1,0 +1,179 @@
+// Threats in the scene: a core that is never entered and a soft zone that costs, from base to top.
+
+import {
+  BufferAttribute, BufferGeometry, CylinderGeometry, DoubleSide, Group, InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, Mesh,
+  MeshBasicMaterial, MeshLambertMaterial, ShapeUtils, Vector2,
+} from './vendor/three.js';
+
+const ROUND = 40;
+const ARC = Math.PI / 10;
+
+/** Draws threats, given in metres of the frame, into a group. */
+export class Volumes {
+  group = new Group();
+  #cylinder = new CylinderGeometry(1, 1, 1, ROUND, 1, false).rotateX(Math.PI / 2).translate(0, 0, 0.5);
+
+  /** `threats` as `threatsOf` gives them. */
+  draw(threats, ground, colours) {
+    this.clear();
+    const round = threats.filter((threat) => threat.center);
+    if (round.length) {
+      this.#cylinders('cores', round, (threat) => threat.radius, solid(colours.core));
+      this.#cylinders('zones', round.filter((threat) => threat.influence > threat.radius), (threat) => threat.influence, soft(colours.zone));
+    }
+    for (const threat of threats.filter((one) => one.ring)) {
+      this.#prism('cores', threat, threat.ring, solid(colours.core));
+      if (threat.margin > 0) this.#prism('zones', threat, widened(threat.ring, threat.margin), soft(colours.zone));
+    }
+    this.#footprints(threats, ground, colours);
+  }
+
+  clear() {
+    for (const child of [...this.group.children]) {
+      if (child.geometry !== this.#cylinder) child.geometry.dispose();
+      child.material.dispose();
+      child.dispose?.();
+      this.group.remove(child);
+    }
+  }
+
+  #cylinders(name, threats, radius, material) {
+    if (!threats.length) {
+      material.dispose();
+      return;
+    }
+    const mesh = new InstancedMesh(this.#cylinder, material, threats.length);
+    const matrix = new Matrix4();
+    threats.forEach((threat, at) => {
+      const r = radius(threat);
+      matrix.makeScale(r, r, threat.high - threat.low).setPosition(threat.center.x, threat.center.y, threat.low);
+      mesh.setMatrixAt(at, matrix);
+    });
+    mesh.name = name;
+    mesh.frustumCulled = false;
+    mesh.renderOrder = name === 'cores' ? 2 : 3;
+    this.group.add(mesh);
+  }
+
+  #prism(name, threat, ring, material) {
+    const corners = ring.map(({ x, y }) => new Vector2(x, y));
+    if (ShapeUtils.isClockWise(corners)) corners.reverse();
+    const positions = [];
+    corners.forEach((a, at) => {
+      const b = corners[(at + 1) % corners.length];
+      positions.push(a.x, a.y, threat.low, b.x, b.y, threat.low, b.x, b.y, threat.high, a.x, a.y, threat.low, b.x, b.y, threat.high, a.x, a.y, threat.high);
+    });
+    for (const face of ShapeUtils.triangulateShape(corners, [])) {
+      for (const corner of face) positions.push(corners[corner].x, corners[corner].y, threat.high);
+    }
+    const geometry = new BufferGeometry();
+    geometry.setAttribute('position', new BufferAttribute(new Float32Array(positions), 3));
+    geometry.computeVertexNormals();
+    const mesh = new Mesh(geometry, material);
+    mesh.name = name;
+    mesh.renderOrder = name === 'cores' ? 2 : 3;
+    this.group.add(mesh);
+  }
+
+  /** The outlines on the ground, and those of the cores at their tops. */
+  #footprints(threats, ground, colours) {
+    const [cores, zones] = [[], []];
+    for (const threat of threats) {
+      const ring = threat.ring ?? circle(threat.center, threat.radius);
+      const lift = (ground.extent.max.x - ground.extent.min.x) / 2000;
+      outline(cores, ring, ({ x, y }) => ground.at(x, y) + lift);
+      outline(cores, ring, () => threat.high);
+      if (threat.low > ground.least) outline(cores, ring, () => threat.low);
+      const wide = threat.ring ? (threat.margin > 0 ? widened(threat.ring, threat.margin) : null) : threat.influence > threat.radius && circle(threat.center, threat.influence);
+      if (wide) outline(zones, wide, ({ x, y }) => ground.at(x, y) + lift);
+    }
+    for (const [name, coordinates, color, opacity] of [['core outlines', cores, colours.core, 0.9], ['zone outlines', zones, colours.zone, 0.75]]) {
+      if (!coordinates.length) continue;
+      const geometry = new BufferGeometry();
+      geometry.setAttribute('position', new BufferAttribute(new Float32Array(coordinates), 3));
+      const lines = new LineSegments(geometry, new LineBasicMaterial({ color, transparent: true, opacity, depthWrite: false }));
+      lines.name = name;
+      lines.renderOrder = 4;
+      this.group.add(lines);
+    }
+  }
+}
+
+const solid = (color) => new MeshLambertMaterial({ color, transparent: true, opacity: 0.62, depthWrite: false, side: DoubleSide });
+const soft = (color) => new MeshBasicMaterial({ color, transparent: true, opacity: 0.13, depthWrite: false });
+
+/** Threats of a document in metres of the frame, with `low` and `high` where they have no limit of their own. */
+export function threatsOf(document, frame, ground) {
+  const ceiling = ceilingOf(document, ground);
+  const drawn = [];
+  (document.threats ?? []).forEach((threat, index) => {
+    const base = Number.isFinite(threat.base) ? threat.base : ground.least;
+    const top = Number.isFinite(threat.top) ? threat.top : ceiling;
+    const common = { index, name: threat.name, low: base, high: Math.max(top, base + 1e-3) };
+    if (threat.kind === 'polygon') {
+      const ring = (threat.vertices ?? []).filter(isPlace).map(frame.to);
+      if (ring.length >= 3) drawn.push({ ...common, ring, margin: threat.margin ?? 0, center: null });
+    } else if (isPlace(threat.center) && threat.radius > 0) {
+      drawn.push({ ...common, center: frame.to(threat.center), radius: threat.radius, influence: threat.influence ?? threat.radius });
+    }
+  });
+  return drawn;
+}
+
+/** Up to where a threat without a top is drawn. */
+export function ceilingOf(document, ground) {
+  const band = document.altitude?.max;
+  const ends = [document.start, document.target].map((end) => end?.z ?? end?.alt).filter(Number.isFinite);
+  return Math.max(ground.greatest + (Number.isFinite(band) ? band : 100), ...ends) + 0.02 * (ground.greatest - ground.least);
+}
+
+const isPlace = (place) => ['x', 'lat'].some((axis) => Number.isFinite(place?.[axis])) && ['y', 'lon'].some((axis) => Number.isFinite(place?.[axis]));
+
+/** A circle as a ring of places. */
+export function circle(center, radius, sides = 64) {
+  return Array.from({ length: sides }, (_, at) => {
+    const angle = (2 * Math.PI * at) / sides;
+    return { x: center.x + radius * Math.cos(angle), y: center.y + radius * Math.sin(angle) };
+  });
+}
+
+/** The ring moved outwards by `margin`, with round corners. */
+export function widened(ring, margin) {
+  const points = ShapeUtils.isClockWise(ring.map(({ x, y }) => new Vector2(x, y))) ? [...ring].reverse() : ring;
+  const wide = [];
+  points.forEach((b, at) => {
+    const a = points[(at + points.length - 1) % points.length];
+    const c = points[(at + 1) % points.length];
+    // Headings of the outward normals: the ring runs counter-clockwise, so they point to its right.
+    const before = Math.atan2(-(b.x - a.x), b.y - a.y);
+    const after = Math.atan2(-(c.x - b.x), c.y - b.y);
+    let turn = after - before;
+    while (turn <= -Math.PI) turn += 2 * Math.PI;
+    while (turn > Math.PI) turn -= 2 * Math.PI;
+    if (turn < 0) {
+      const half = before + turn / 2;
+      const reach = margin / Math.max(Math.cos(turn / 2), 0.2);
+      wide.push({ x: b.x + reach * Math.cos(half), y: b.y + reach * Math.sin(half) });
+      return;
+    }
+    const steps = Math.max(1, Math.ceil(turn / ARC));
+    for (let k = 0; k <= steps; k += 1) {
+      const angle = before + (turn * k) / steps;
+      wide.push({ x: b.x + margin * Math.cos(angle), y: b.y + margin * Math.sin(angle) });
+    }
+  });
+  return wide;
+}
+
+/** The ring as pieces, its long sides cut so that they follow what `height` says. */
+function outline(into, ring, height) {
+  ring.forEach((a, at) => {
+    const b = ring[(at + 1) % ring.length];
+    const cuts = ring.length < 20 ? 12 : 1;
+    for (let k = 0; k < cuts; k += 1) {
+      const place = (t) => ({ x: a.x + (b.x - a.x) * t, y: a.y + (b.y - a.y) * t });
+      const [p, q] = [place(k / cuts), place((k + 1) / cuts)];
+      into.push(p.x, p.y, height(p), q.x, q.y, height(q));
+    }
+  });
+}

@@ -1,0 +1,44 @@
+// A route as a way: how far along it each of its places lies, over ground.
+
+export class Way {
+  constructor(points) {
+    this.points = points;
+    this.flown = [0];
+    for (let k = 1; k < points.length; k += 1) {
+      this.flown.push(this.flown[k - 1] + Math.hypot(points[k].x - points[k - 1].x, points[k].y - points[k - 1].y));
+    }
+    this.length = this.flown.at(-1) ?? 0;
+    const heights = points.map((p) => p.z);
+    this.least = heights.reduce((a, b) => Math.min(a, b), Infinity);
+    this.greatest = heights.reduce((a, b) => Math.max(a, b), -Infinity);
+  }
+
+  /** The place so far along it. */
+  at(distance) {
+    const { points, flown } = this;
+    let [low, high] = [0, points.length - 1];
+    while (high - low > 1) {
+      const half = (low + high) >> 1;
+      if (flown[half] <= distance) low = half;
+      else high = half;
+    }
+    const [a, b] = [points[low], points[high]];
+    const leg = flown[high] - flown[low];
+    const t = leg > 0 ? Math.min(Math.max((distance - flown[low]) / leg, 0), 1) : 0;
+    return { x: a.x + (b.x - a.x) * t, y: a.y + (b.y - a.y) * t, z: a.z + (b.z - a.z) * t };
+  }
+
+  /** How far along it lies what is nearest to a place, and how far off that is. */
+  nearest({ x, y }) {
+    let [best, off] = [0, Infinity];
+    for (let k = 0; k + 1 < this.points.length; k += 1) {
+      const [a, b] = [this.points[k], this.points[k + 1]];
+      const [dx, dy] = [b.x - a.x, b.y - a.y];
+      const square = dx * dx + dy * dy;
+      const t = square > 0 ? Math.min(Math.max(((x - a.x) * dx + (y - a.y) * dy) / square, 0), 1) : 0;
+      const gap = Math.hypot(a.x + dx * t - x, a.y + dy * t - y);
+      if (gap < off) [best, off] = [this.flown[k] + t * Math.sqrt(square), gap];
+    }
+    return { distance: best, off };
+  }
+}

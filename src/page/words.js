@@ -1,0 +1,49 @@
+// Numbers and states as people read them.
+
+const plain = new Map();
+function digits(count) {
+  if (!plain.has(count)) plain.set(count, new Intl.NumberFormat('en', { maximumFractionDigits: count, minimumFractionDigits: count }));
+  return plain.get(count);
+}
+
+/** With so many decimals; a dash for nothing. */
+export const number = (value, decimals = 1) => (value === null || value === undefined || !Number.isFinite(value) ? '–' : digits(decimals).format(value).replace(/^-([0.,]+)$/, '$1').replace('-', '−'));
+
+/** Metres, as kilometres from ten thousand on. */
+export const metres = (value, decimals = 1) =>
+  value !== null && Math.abs(value) >= 10000 ? `${number(value / 1000, 2)} km` : `${number(value, decimals)} m`;
+
+/** A cost: four or five significant figures. */
+export const cost = (value) => number(value, value >= 1e5 ? 0 : value >= 1000 ? 1 : 2);
+
+/** A share in per cent. */
+export const share = (value) => (value === null || value === undefined ? '–' : `${number(value * 100, value < 0.1 ? 2 : 1)} %`);
+
+/** Seconds as minutes and seconds. */
+export function duration(seconds) {
+  if (seconds === null || seconds === undefined) return '–';
+  if (seconds < 100) return `${number(seconds, 1)} s`;
+  const whole = Math.round(seconds);
+  const hours = Math.floor(whole / 3600);
+  const minutes = Math.floor((whole % 3600) / 60);
+  const rest = String(whole % 60).padStart(2, '0');
+  return hours ? `${hours} h ${String(minutes).padStart(2, '0')} min` : `${minutes}:${rest} min`;
+}
+
+/** How long ago, or the day. */
+export function moment(text) {
+  const then = new Date(text);
+  const day = then.toDateString() === new Date().toDateString();
+  return day ? then.toLocaleTimeString('en-GB') : then.toLocaleDateString('en-GB', { day: 'numeric', month: 'short', hour: '2-digit', minute: '2-digit' });
+}
+
+/** A round step that divides `span` into about `parts`. */
+export function step(span, parts) {
+  const raw = span / parts;
+  const power = 10 ** Math.floor(Math.log10(raw));
+  const lead = raw / power;
+  return (lead < 1.5 ? 1 : lead < 3.5 ? 2 : lead < 7.5 ? 5 : 10) * power;
+}
+
+/** A threat's name, or its number. */
+export const threatName = (threat, at) => threat?.name || `threat ${at}`;

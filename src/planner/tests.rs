@@ -1,0 +1,274 @@
+use super::*;
+use crate::geometry::{Point2, Rect};
+use crate::scenario::{
+    AltitudeBand, Frame, PlannerSettings, Seeding, Smoothing, Vehicle, WarmStart, Weights,
+};
+use crate::terrain::{Flat, Terrain};
+use crate::threat::{Cylinder, Shape, Threat};
+
+/// Three radars on flat ground, as in the first scenario of the paper.
+pub(super) fn scenario() -> Scenario {
+    let radar = |x, y, radius| Threat {
+        name: Some(format!("radar at {x}, {y}")),
+        shape: Shape::Cylinder(Cylinder {
+            center: Point2::new(x, y),
+            radius,
+            influence: radius + 30.0,
+        }),
+        base: None,
+        top: None,
+    };
+    Scenario {
+        frame: Frame::Local,
+        name: None,
+        start: Point3::new(200.0, 100.0, 0.0),
+        target: Point3::new(800.0, 800.0, 150.0),
+        area: Rect {
+            min: Point2::new(0.0, 0.0),
+            max: Point2::new(1000.0, 1000.0),
+        },
+        threats: vec![
+            radar(350.0, 250.0, 60.0),
+            radar(500.0, 480.0, 70.0),
+            radar(680.0, 620.0, 60.0),
+        ],
+        terrain: Terrain::Flat(Flat { elevation: 0.0 }),
+        altitude: AltitudeBand {
+            min: 0.0,
+            max: 200.0,
+        },
+        vehicle: Vehicle {
+            max_turn_deg: 60.0,
+            max_climb_deg: 45.0,
+            min_leg: 8.4,
+            cruise_speed: 15.0,
+            fuel_per_km: 1000.0,
+        },
+        weights: Weights {
+            fuel: 0.5,
+            threat: 1.0,
+            altitude: 1.0,
+        },
+        planner: PlannerSettings {
+            algorithm: "tms-sba".to_owned(),
+            waypoints: 10,
+            population: 60,
+            iterations: 60,
+            seed: 7,
+            time_limit_ms: None,
+            seeding: Seeding::Random,
+            polish: false,
+            warm_start: None,
+            smoothing: Smoothing {
+                degree: 3,
+                spacing: 5.0,
+            },
+            quadrature: Quadrature::Integral,
+            gap: 0.0,
+            threads: 1,
+            parameters: std::collections::BTreeMap::new(),
+        },
+    }
+}
+
+#[derive(Default)]
+struct Diary {
+    points: Vec<ConvergencePoint>,
+    incumbents: Vec<Incumbent>,
+}
+
+impl Observer for Diary {
+    fn iteration(&mut self, point: &ConvergencePoint) {
+        self.points.push(*point);
+    }
+    fn incumbent(&mut self, incumbent: &Incumbent) {
+        self.incumbents.push(incumbent.clone());
+    }
+}
+
+/// A clock that only moves when looked at, and a stop after so many looks.
+struct Looks {
+    count: std::cell::Cell<u32>,
+    stop_after: u32,
+}
+
+impl Looks {
+    fn until(stop_after: u32) -> Self {
+        Self {
+            count: std::cell::Cell::new(0),
+            stop_after,
+        }
+    }
+}
+
+impl Stop for Looks {
+    fn requested(&self) -> bool {
+        self.count.set(self.count.get() + 1);
+        self.count.get() > self.stop_after
+    }
+    fn elapsed_ms(&self) -> f64 {
+        f64::from(self.count.get())
+    }
+}
+
+#[test]
+fn a_run_delivers_a_feasible_route_and_tells_its_story() {
+    let mut diary = Diary::default();
+    let outcome = plan(&scenario(), &mut diary, &Looks::until(u32::MAX));
+    assert!(outcome.feasible && outcome.violations.is_empty());
+    assert_eq!(outcome.stop_reason, StopReason::Iterations);
+    assert_eq!(outcome.convergence, diary.points);
+    assert_eq!(outcome.convergence.len(), 61);
+    let last = diary
+        .incumbents
+        .last()
+        .expect("the first evaluation is an incumbent");
+    assert_eq!(last.waypoints, outcome.waypoints);
+    assert_eq!(last.cost.to_bits(), outcome.cost.total.to_bits());
+    let mut before = f64::INFINITY;
+    for point in &outcome.convergence {
+        assert!(point.best_cost.unwrap_or(f64::INFINITY) <= before);
+        before = point.best_cost.unwrap_or(f64::INFINITY);
+    }
+    assert!(outcome.bound.lower <= outcome.cost.total);
+    let path = outcome.path.expect("a feasible route has a path");
+    let checks = outcome.path_checks.expect("and the path its certificate");
+    assert!(
+        checks
+            .clearance
+            .iter()
+            .all(|clearance| clearance.distance.expect("unbounded threats") >= -1e-6)
+    );
+    assert!(path.points.len() > 100);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bits_and_another_does_not() {
+    let run = |seed| {
+        let mut scenario = scenario();
+        scenario.planner.seed = seed;
+        plan(&scenario, &mut Diary::default(), &Looks::until(u32::MAX))
+    };
+    assert_eq!(run(1), run(1));
+    assert_ne!(run(1).waypoints, run(2).waypoints);
+}
+
+/// A radar pops up beside the route: from the known one, a tenth of the work does as well.
+#[test]
+fn a_warm_start_needs_a_tenth_of_the_evaluations() {
+    let mut scenario = scenario();
+    scenario.planner.seeding = Seeding::Tangent;
+    scenario.planner.polish = true;
+    scenario.planner.population = 200;
+    scenario.planner.iterations = 200;
+    let never = Looks::until(u32::MAX);
+    let before = plan(&scenario, &mut Diary::default(), &never);
+    let middle = before.waypoints[6];
+    let mut popped_up = scenario.threats[0].clone();
+    popped_up.shape = Shape::Cylinder(Cylinder {
+        center: Point2::new(middle.x + 10.0, middle.y - 10.0),
+        radius: 15.0,
+        influence: 30.0,
+    });
+    scenario.threats.push(popped_up);
+    let cold = plan(&scenario, &mut Diary::default(), &never);
+    scenario.planner.population = 10;
+    scenario.planner.iterations = 20;
+    scenario.planner.warm_start = Some(WarmStart::Waypoints(before.waypoints));
+    let warm = plan(&scenario, &mut Diary::default(), &never);
+    assert!(cold.feasible && warm.feasible);
+    assert!(
+        warm.cost.total <= 1.002 * cold.cost.total,
+        "{:?} {:?}",
+        warm.cost,
+        cold.cost
+    );
+    assert!(
+        warm.evaluations * 8 <= cold.evaluations,
+        "{} {}",
+        warm.evaluations,
+        cold.evaluations
+    );
+}
+
+#[test]
+fn a_stop_keeps_the_best_so_far() {
+    let outcome = plan(&scenario(), &mut Diary::default(), &Looks::until(5));
+    assert_eq!(outcome.stop_reason, StopReason::Cancelled);
+    assert_eq!(outcome.convergence.len(), 6);
+    let longer = plan(&scenario(), &mut Diary::default(), &Looks::until(u32::MAX));
+    assert_eq!(outcome.convergence[..], longer.convergence[..6]);
+}
+
+#[test]
+fn a_time_limit_ends_the_run() {
+    let mut scenario = scenario();
+    scenario.planner.time_limit_ms = Some(10);
+    let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(u32::MAX));
+    assert_eq!(outcome.stop_reason, StopReason::TimeLimit);
+    assert_eq!(outcome.convergence.len(), 10);
+}
+
+/// Routes that each take long to price: a stop does not wait for the whole population.
+#[test]
+fn a_stop_within_an_iteration_is_heard() {
+    let mut scenario = scenario();
+    let far = scenario.threats[0].clone();
+    scenario.threats.extend((0..20_000).map(|_| far.clone()));
+    // Every fourth route or so is a look; the first population takes 60 routes.
+    let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(5));
+    assert_eq!(outcome.stop_reason, StopReason::Cancelled);
+    assert_eq!(outcome.convergence.len(), 1);
+    assert!(
+        (1..60).contains(&outcome.evaluations),
+        "{}",
+        outcome.evaluations
+    );
+    assert!(outcome.convergence[0].mean_cost.is_finite());
+    let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(40));
+    assert_eq!(outcome.convergence.len(), 2);
+    assert_eq!(outcome.evaluations, outcome.convergence[1].evaluations);
+    assert!(
+        outcome
+            .convergence
+            .iter()
+            .all(|point| point.mean_cost.is_finite())
+    );
+}
+
+#[test]
+fn an_impossible_scenario_ends_with_its_violations() {
+    let mut scenario = scenario();
+    // A wall across the whole area.
+    scenario.threats[1].shape = Shape::Polygon(crate::threat::Polygon::new(
+        vec![
+            Point2::new(-100.0, 400.0),
+            Point2::new(1100.0, 400.0),
+            Point2::new(1100.0, 450.0),
+            Point2::new(-100.0, 450.0),
+        ],
+        0.0,
+    ));
+    let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(u32::MAX));
+    assert!(!outcome.feasible && outcome.path.is_none() && outcome.path_checks.is_none());
+    assert!(
+        outcome
+            .violations
+            .iter()
+            .any(|violation| violation.kind == "threat")
+    );
+    assert_eq!(outcome.bound.gap, None);
+}
+
+#[test]
+fn the_papers_quadrature_reports_both_figures() {
+    let mut scenario = scenario();
+    scenario.planner.quadrature = Quadrature::Paper;
+    let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(u32::MAX));
+    let exact = outcome
+        .cost_integral
+        .expect("the integral is reported beside the samples");
+    assert_eq!(exact.fuel.to_bits(), outcome.cost.fuel.to_bits());
+    let last = outcome.convergence.last().expect("there is a curve");
+    assert_eq!(last.best_cost, Some(outcome.cost.total));
+}

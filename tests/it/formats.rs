@@ -1,0 +1,385 @@
+//! Formats over HTTP and from the command line: what is chosen, what is named, what is refused.
+
+use std::fs;
+
+use axum::http::Method;
+use noctule::export::document::{Origin, Position, ResultDocument, Timing};
+use noctule::export::{ALL, sha256_hex};
+use noctule::job::Status;
+use noctule::planner;
+use noctule::scenario::json;
+use noctule::scenario::limits::Limits;
+use noctule::store::Ending;
+use serde_json::{Value, json};
+
+use crate::support::api::Api;
+use crate::support::process;
+
+/// A kilometre over a meadow near Zurich, past a mast.
+fn scenario() -> Value {
+    json!({
+        "name": "Meadow, east",
+        "frame": "wgs84",
+        "start": {"lat": 47.3977, "lon": 8.5456, "alt": 500},
+        "target": {"lat": 47.4012, "lon": 8.5556, "alt": 520},
+        "threats": [{"kind": "cylinder", "name": "mast", "center": {"lat": 47.4010, "lon": 8.5500}, "radius": 60}],
+        "terrain": {"kind": "flat", "elevation": 488},
+        "altitude": {"min": 5, "max": 80},
+        "planner": {"waypoints": 1, "population": 10, "iterations": 2, "seed": 1},
+    })
+}
+
+/// Submit the scenario and end its plan with a route by way of one place; the plan's address.
+async fn ended(api: &Api, scenario: &Value, lat: f64, lon: f64) -> String {
+    let answer = api.post("/plans", scenario).await;
+    assert_eq!(answer.status, 202, "{answer:?}");
+    let lease = api.store.claim().await.expect("a queued plan");
+    let stored = api.store.scenario(lease.plan.id).await.expect("a scenario");
+    let read = json::read_accepted(&stored, &planner::rules(Limits::NONE)).expect("accepted");
+    let between = Position::Geodetic {
+        lat,
+        lon,
+        alt: 520.0,
+    };
+    let between = between.within(&read.frame).expect("degrees");
+    let outcome = planner::so_far(&read, vec![read.start, between, read.target]);
+    let origin = Origin {
+        plan_id: Some(lease.plan.id),
+        algorithm: "tms-sba".to_owned(),
+        seed: 1,
+        scenario_sha256: sha256_hex(stored.as_bytes()),
+        timing: Timing {
+            queued_ms: 0.0,
+            run_ms: 0.0,
+        },
+    };
+    let ending = Ending::Result {
+        status: Status::Succeeded,
+        stop_reason: "iterations".to_owned(),
+        feasible: outcome.feasible,
+        best_cost: None,
+        evaluations: 1,
+        iteration: 1,
+        document: ResultDocument::new(&outcome, origin).to_json(),
+    };
+    let at_ms = lease.plan.created_ms + 50;
+    api.store
+        .finish(&lease, ending, at_ms)
+        .await
+        .expect("the lease holds");
+    format!("/plans/{}", lease.plan.id)
+}
+
+async fn feasible(api: &Api) -> String {
+    ended(api, &scenario(), 47.3985, 8.5510).await
+}
+
+#[tokio::test]
+async fn every_format_by_name_and_by_media_type() {
+    let api = Api::new();
+    let plan = feasible(&api).await;
+    let tail = &plan[plan.len() - 8..];
+    for format in ALL {
+        let answer = api
+            .get(&format!("{plan}/result?format={}", format.name))
+            .await;
+        assert_eq!(answer.status, 200, "{}: {answer:?}", format.name);
+        assert_eq!(answer.header("content-type"), format.media_type);
+        let kind = if ["json", "svg"].contains(&format.name) {
+            "inline"
+        } else {
+            "attachment"
+        };
+        let named = format!(
+            "{kind}; filename=\"meadow-east-{tail}.{}\"",
+            format.extension
+        );
+        assert_eq!(answer.header("content-disposition"), named);
+        let accept = [("accept", format.media_type)];
+        let by_type = api.get_with(&format!("{plan}/result"), &accept).await;
+        assert_eq!(by_type.body, answer.body, "{}", format.name);
+    }
+    let browser = "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8";
+    let answer = api
+        .get_with(&format!("{plan}/result"), &[("accept", browser)])
+        .await;
+    assert_eq!(answer.header("content-type"), "application/json");
+}
+
+#[tokio::test]
+async fn options_are_heard_or_refused() {
+    let api = Api::new();
+    let plan = feasible(&api).await;
+    let uri = |query: &str| format!("{plan}/result?{query}");
+    let read = api
+        .get(&uri(
+            "format=qgc&firmware=ardupilot&altitude=terrain&takeoff=0&landing=true&tolerance=5",
+        ))
+        .await
+        .json();
+    assert_eq!(read["mission"]["firmwareType"], 3);
+    let items = read["mission"]["items"].as_array().expect("items");
+    let commands: Vec<_> = items.iter().map(|item| item["command"].as_u64()).collect();
+    assert_eq!(commands[0], Some(178));
+    assert_eq!(commands[commands.len() - 1], Some(21));
+    assert_eq!(items[1]["frame"], 10);
+    let scene = api
+        .get(&uri("format=czml&epoch=2026-03-01T07:00:00Z"))
+        .await
+        .json();
+    assert_eq!(scene[0]["clock"]["currentTime"], "2026-03-01T07:00:00Z");
+    for (query, parameter) in [
+        ("format=qgc&firmware=inav", "firmware"),
+        ("format=qgc&tolerance=0", "tolerance"),
+        ("format=qgc&takeoff=-1", "takeoff"),
+        ("format=qgc&takeoff=NaN", "takeoff"),
+        ("format=wpl&altitude=terrain", "altitude"),
+        ("format=gpx&landing=true", "landing"),
+        ("format=gpx&epoch=tomorrow", "epoch"),
+        ("landing=true", "landing"),
+        ("format=kml&colour=red", "colour"),
+        ("format=kmz", "format"),
+        ("format=kml&allow_infeasible=maybe", "allow_infeasible"),
+    ] {
+        let problem = api
+            .get(&uri(query))
+            .await
+            .expect_problem(400, "invalid-parameter");
+        assert_eq!(problem["parameter"], parameter, "{query}");
+    }
+}
+
+#[tokio::test]
+async fn a_route_that_breaks_constraints_is_not_for_flying() {
+    let api = Api::new();
+    // Straight through the mast.
+    let plan = ended(&api, &scenario(), 47.4010, 8.5500).await;
+    for format in ALL {
+        let uri = format!("{plan}/result?format={}", format.name);
+        let answer = api.get(&uri).await;
+        if format.flown {
+            answer.expect_problem(409, "infeasible");
+        } else {
+            assert_eq!(answer.status, 200, "{}", format.name);
+        }
+        let answer = api.get(&format!("{uri}&allow_infeasible=true")).await;
+        assert_eq!(answer.status, 200, "{}", format.name);
+    }
+}
+
+#[tokio::test]
+async fn metres_lie_nowhere_on_the_earth() {
+    let api = Api::new();
+    api.submit().await;
+    let lease = crate::support::run::complete(&*api.store, Vec::new()).await;
+    for format in ALL {
+        let answer = api
+            .get(&format!(
+                "/plans/{}/result?format={}",
+                lease.plan.id, format.name
+            ))
+            .await;
+        if format.geodetic {
+            answer.expect_problem(409, "no-geodetic-frame");
+        } else {
+            assert_eq!(answer.status, 200, "{}", format.name);
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_threat_below_the_start_is_in_the_way_of_a_take_off() {
+    let api = Api::new();
+    let mut low = scenario();
+    low["threats"][0] = json!({
+        "kind": "cylinder", "center": {"lat": 47.3977, "lon": 8.5456}, "radius": 20, "top": 495,
+    });
+    let plan = ended(&api, &low, 47.3985, 8.5510).await;
+    let answer = api.get(&format!("{plan}/result?format=wpl")).await;
+    answer.expect_problem(409, "unflyable");
+    let answer = api
+        .get(&format!("{plan}/result?format=wpl&takeoff=0"))
+        .await;
+    assert_eq!(answer.status, 200);
+}
+
+/// What is exported comes back as a scenario that is accepted, its ends and threats where they were.
+#[tokio::test]
+async fn exports_become_scenarios_again() {
+    let api = Api::new();
+    let plan = feasible(&api).await;
+    for (format, media_type) in [
+        ("geojson", "application/geo+json"),
+        ("kml", "application/vnd.google-earth.kml+xml; charset=utf-8"),
+        ("qgc", "application/json"),
+    ] {
+        let file = api.get(&format!("{plan}/result?format={format}")).await;
+        let headers = [("content-type", media_type)];
+        // The body of a request may be 4096 bytes here; the path is not needed.
+        let text = String::from_utf8(file.body.to_vec()).expect("UTF-8");
+        let text = without_path(format, &text);
+        let answer = api
+            .send(Method::POST, "/scenarios:convert", &headers, text)
+            .await;
+        assert_eq!(answer.status, 200, "{format}: {answer:?}");
+        let scenario = &answer.json()["scenario"];
+        let degrees = |value: &Value| value.as_f64().expect("a number");
+        for end in ["start", "target"] {
+            let (found, expected) = (&scenario[end], &self::scenario()[end]);
+            assert!((degrees(&found["lat"]) - degrees(&expected["lat"])).abs() < 1e-8);
+            assert!((degrees(&found["lon"]) - degrees(&expected["lon"])).abs() < 1e-8);
+        }
+        assert_eq!(scenario["threats"][0]["kind"], "cylinder", "{format}");
+        assert_eq!(scenario["threats"][0]["radius"], 60.0);
+        let accepted = api.post("/plans?validate_only=true", scenario).await;
+        assert_eq!(accepted.status, 200, "{format}: {accepted:?}");
+    }
+}
+
+/// The file with the long lines of its path and rings cut short.
+fn without_path(format: &str, text: &str) -> String {
+    match format {
+        "geojson" => {
+            let mut read: Value = serde_json::from_str(text).expect("JSON");
+            let features = read["features"].as_array_mut().expect("features");
+            features.retain(|feature| feature["geometry"]["type"] != "LineString");
+            for feature in features {
+                if feature["geometry"]["type"] == "Polygon" {
+                    let ring = feature["geometry"]["coordinates"][0].as_array_mut();
+                    ring.expect("a ring").truncate(4);
+                }
+            }
+            read.to_string()
+        }
+        "kml" => {
+            let (before, after) = text.split_once("<LineString>").expect("a path");
+            let (_, after) = after.split_once("</LineString>").expect("its end");
+            let (start, ring) = after.rsplit_once("<coordinates>").expect("a ring");
+            let (ring, end) = ring.split_once("</coordinates>").expect("its end");
+            let ring: Vec<_> = ring.lines().take(4).collect();
+            format!(
+                "{before}{start}<coordinates>{}</coordinates>{end}",
+                ring.join("\n")
+            )
+        }
+        _ => text.to_owned(),
+    }
+}
+
+#[tokio::test]
+async fn what_is_no_file_of_a_scenario_is_refused() {
+    let api = Api::new();
+    for (media_type, body, status, slug) in [
+        ("application/geo+json", "{", 400, "invalid-json"),
+        (
+            "application/json",
+            r#"{"type": "FeatureCollection", "features": []}"#,
+            422,
+            "no-scenario",
+        ),
+        (
+            "application/json",
+            r#"{"fileType": "Plan"}"#,
+            422,
+            "no-scenario",
+        ),
+        ("application/xml", "<kml><Document>", 400, "invalid-xml"),
+        ("text/xml", "<!DOCTYPE kml><kml/>", 400, "invalid-xml"),
+        (
+            "application/vnd.google-earth.kml+xml",
+            "<kml/>",
+            422,
+            "no-scenario",
+        ),
+        (
+            "application/vnd.google-earth.kmz",
+            "PK",
+            415,
+            "unsupported-media-type",
+        ),
+        ("text/plain", "QGC WPL 110", 415, "unsupported-media-type"),
+        (
+            "application/xml; charset=latin1",
+            "<kml/>",
+            415,
+            "unsupported-media-type",
+        ),
+    ] {
+        let headers = [("content-type", media_type)];
+        let answer = api
+            .send(Method::POST, "/scenarios:convert", &headers, body)
+            .await;
+        answer.expect_problem(status, slug);
+    }
+    let long = "x".repeat(5000);
+    let headers = [("content-type", "application/json")];
+    let answer = api
+        .send(Method::POST, "/scenarios:convert", &headers, long)
+        .await;
+    answer.expect_problem(413, "body-too-large");
+    let answer = api.post("/scenarios:convert?into=kml", &json!({})).await;
+    answer.expect_problem(400, "invalid-parameter");
+}
+
+#[test]
+fn the_command_line_writes_reads_back_and_exports() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let path = |name: &str| {
+        let path = directory.path().join(name);
+        path.to_str().expect("UTF-8").to_owned()
+    };
+    fs::write(path("flight.json"), scenario().to_string()).expect("written");
+    let outs = ["result.json", "a.KML", "a.plan", "a.waypoints", "a.geojson"].map(path);
+    let mut arguments = vec!["plan".to_owned(), path("flight.json")];
+    arguments.extend(
+        outs.iter()
+            .flat_map(|out| ["--out".to_owned(), out.clone()]),
+    );
+    arguments.extend(["--set".to_owned(), "landing=true".to_owned()]);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let planned = process::run(&arguments, "");
+    assert_eq!(planned.status.code(), Some(0), "{planned:?}");
+    assert!(planned.stdout.is_empty());
+    let text = |name: &str| fs::read_to_string(path(name)).expect("written");
+    assert!(text("a.KML").starts_with("<?xml"));
+    assert!(text("a.plan").contains("\"fileType\": \"Plan\""));
+
+    // The scenario names its seed; another one is not that of the result.
+    let export = |scenario: &str, more: &[&str]| {
+        let (result, scenario) = (path("result.json"), path(scenario));
+        let arguments = ["export", &result, "--scenario", &scenario];
+        process::run(&[&arguments[..], more].concat(), "")
+    };
+    let again = export("flight.json", &["--format", "wpl", "--set", "landing=true"]);
+    assert_eq!(again.status.code(), Some(0), "{again:?}");
+    assert_eq!(String::from_utf8_lossy(&again.stdout), text("a.waypoints"));
+    let mut other = scenario();
+    other["altitude"]["max"] = 90.into();
+    fs::write(path("other.json"), other.to_string()).expect("written");
+    let refused = export("other.json", &["--format", "wpl"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        String::from_utf8_lossy(&refused.stderr).contains("not the one that it was planned for")
+    );
+    let refused = export("flight.json", &["--format", "kml", "--set", "landing=true"]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(
+        String::from_utf8_lossy(&refused.stderr)
+            .contains("landing is no option of kml, only of qgc, wpl")
+    );
+
+    let converted = process::run(
+        &["convert", &path("a.geojson"), "-o", &path("again.json")],
+        "",
+    );
+    assert_eq!(converted.status.code(), Some(0), "{converted:?}");
+    assert!(String::from_utf8_lossy(&converted.stderr).contains("assumed /altitude"));
+    let read: Value = serde_json::from_str(&text("again.json")).expect("JSON");
+    assert_eq!(read["threats"][0]["radius"], 60.0);
+    let local = crate::support::scenario().to_string();
+    let refused = process::run(&["plan", "-", "--format", "kml"], &local);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("kml needs degrees"));
+    let refused = process::run(&["convert", "-"], "<kml/>");
+    assert_eq!(refused.status.code(), Some(2));
+}

@@ -1,0 +1,110 @@
+"""Scenarios in degrees: laid onto the plane that the definitions are stated in, independently of the service.
+
+The plane touches the ellipsoid's normal in the middle of the area, at the mean altitude of start and target; a place is
+laid onto it from that height, whatever the altitude of what stands there, and z is the altitude above the datum.
+"""
+
+import math
+from dataclasses import dataclass
+
+# WGS 84, defining parameters.
+AXIS = 6378137.0
+FLATTENING = 1.0 / 298.257223563
+ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
+# Points along each side of an area, of which the greatest rectangle inside is found.
+SIDE = 64
+
+
+@dataclass
+class Earth:
+    """The plane of one scenario."""
+
+    lat: float
+    lon: float
+    height: float  # above the ellipsoid, metres
+    complaints: list  # where the result's frame is not the one that follows from the scenario
+
+    def local(self, lat, lon):
+        """East and north of the origin, metres."""
+        origin = _centred(self.lat, self.lon, self.height)
+        dx, dy, dz = (a - b for a, b in zip(_centred(lat, lon, self.height), origin))
+        sin_lat, cos_lat = math.sin(math.radians(self.lat)), math.cos(math.radians(self.lat))
+        sin_lon, cos_lon = math.sin(math.radians(self.lon)), math.cos(math.radians(self.lon))
+        east = -sin_lon * dx + cos_lon * dy
+        north = -sin_lat * cos_lon * dx - sin_lat * sin_lon * dy + cos_lat * dz
+        return east, north
+
+    def flat(self, document):
+        """The document with every place and point in it on the plane."""
+        if isinstance(document, list):
+            return [self.flat(item) for item in document]
+        if not isinstance(document, dict):
+            return document
+        if "lat" in document and "lon" in document:
+            x, y = self.local(document["lat"], document["lon"])
+            return {"x": x, "y": y} | ({"z": document["alt"]} if "alt" in document else {})
+        return {key: self.flat(value) for key, value in document.items()}
+
+    def scenario(self, document):
+        """A scenario document in the local frame."""
+        flat = self.flat({key: value for key, value in document.items() if key not in ("area", "altitude_datum")})
+        flat["frame"] = "local"
+        if document.get("area") is not None:
+            flat["area"] = self._rectangle(document["area"], flat["start"], flat["target"])
+        return flat
+
+    def result(self, document):
+        """A result document in the local frame."""
+        return self.flat({key: value for key, value in document.items() if key != "frame"})
+
+    def _rectangle(self, area, start, target):
+        """The greatest rectangle in an area of degrees, and its ends, which may lie where the area bends beyond."""
+        (south, west), (north, east) = ((area[corner]["lat"], area[corner]["lon"]) for corner in ("min", "max"))
+        width = (east - west) % 360.0
+        steps = [step / SIDE for step in range(SIDE + 1)]
+        lats = [south + step * (north - south) for step in steps]
+        lons = [west + step * width for step in steps]
+        ends = (start, target)
+        x_min = max(self.local(lat, west)[0] for lat in lats)
+        x_max = min(self.local(lat, east)[0] for lat in lats)
+        y_min = max(self.local(south, lon)[1] for lon in lons)
+        y_max = min(self.local(north, lon)[1] for lon in lons)
+        return {
+            "min": {"x": min(x_min, *(end["x"] for end in ends)), "y": min(y_min, *(end["y"] for end in ends))},
+            "max": {"x": max(x_max, *(end["x"] for end in ends)), "y": max(y_max, *(end["y"] for end in ends))},
+        }
+
+
+def earth_of(document, result):
+    """The plane of a scenario in degrees and its result; None in the local frame."""
+    if document.get("frame", "local") == "local":
+        return None
+    frame, complaints = result["frame"], []
+    datum = document.get("altitude_datum", "msl")
+    origin, undulation = frame["origin"], frame["undulation"]
+    if (frame["kind"], frame["altitude_datum"]) != ("wgs84", datum):
+        complaints.append(f"frame: {frame['kind']} above {frame['altitude_datum']}, expected wgs84 above {datum}")
+    mean = (document["start"]["alt"] + document["target"]["alt"]) / 2.0
+    if abs(origin["alt"] - mean) > 1e-6:
+        complaints.append(f"frame.origin.alt: {origin['alt']!r}, start and target have {mean!r} in the mean")
+    area = document.get("area")
+    if area is not None:
+        lat = (area["min"]["lat"] + area["max"]["lat"]) / 2.0
+        lon = area["min"]["lon"] + ((area["max"]["lon"] - area["min"]["lon"]) % 360.0) / 2.0
+        away = math.remainder(origin["lon"] - lon, 360.0)
+        if max(abs(origin["lat"] - lat), abs(away)) > 1e-9:
+            complaints.append(f"frame.origin: {origin!r}, the middle of the area is {lat!r}, {lon!r}")
+    # EGM96 lies between 107 m below the ellipsoid and 86 m above it.
+    if not -108.0 < undulation < 87.0:
+        complaints.append(f"frame.undulation: {undulation!r} is nowhere on the earth")
+    height = origin["alt"] + (undulation if datum == "msl" else 0.0)
+    return Earth(origin["lat"], origin["lon"], height, complaints)
+
+
+def _centred(lat, lon, height):
+    """Earth-centred metres of a place."""
+    sin_lat, cos_lat = math.sin(math.radians(lat)), math.cos(math.radians(lat))
+    normal = AXIS / math.sqrt(1.0 - ECCENTRICITY_SQUARED * sin_lat * sin_lat)
+    across = (normal + height) * cos_lat
+    up = (normal * (1.0 - ECCENTRICITY_SQUARED) + height) * sin_lat
+    return across * math.cos(math.radians(lon)), across * math.sin(math.radians(lon)), up

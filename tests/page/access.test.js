@@ -1,0 +1,135 @@
+// The page is for everybody: those with a key, those without eyes, mice, wide screens.
+
+import assert from 'node:assert/strict';
+import { spawnSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { SMALL, WALLED, browser, drawn, made, open, plan, scene, service } from './support.js';
+
+const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+
+let site;
+let chrome;
+before(async () => { [site, chrome] = await Promise.all([service(), browser()]); });
+after(async () => {
+  await chrome?.close();
+  await site?.stop();
+});
+
+/** What axe-core finds that is serious. */
+async function serious(page) {
+  // By the debugger, which the page's policy does not bind.
+  await page.evaluate(AXE);
+  const { violations } = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ['violations'] }));
+  return violations.filter(({ impact }) => ['serious', 'critical'].includes(impact))
+    .map(({ id, nodes }) => `${id}: ${nodes.slice(0, 3).map(({ html, failureSummary }) => `${html} ${failureSummary}`).join(' | ')}`);
+}
+
+for (const colorScheme of ['light', 'dark']) {
+  test(`axe finds nothing serious, ${colorScheme}`, async () => {
+    const page = await open(chrome, `${site.url}#plan=${await made(site.url, SMALL)}`, { colorScheme });
+    await page.waitForSelector('.verdict.good');
+    await page.evaluate(() => { for (const part of document.querySelectorAll('details')) part.open = true; });
+    assert.deepEqual(await serious(page), []);
+    await page.click('#tab-plans');
+    await page.waitForSelector('.plans tbody tr');
+    assert.deepEqual(await serious(page), []);
+    await page.done();
+    const broken = await open(chrome, `${site.url}#plan=${await made(site.url, WALLED)}`, { colorScheme });
+    await broken.waitForSelector('.verdict.bad');
+    assert.deepEqual(await serious(broken), []);
+    await broken.done();
+  });
+}
+
+test('it works at 390 pixels, and axe finds nothing serious there', async () => {
+  const page = await open(chrome, site.url, { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
+  await drawn(page, 6);
+  assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= 390), 'nothing is wider than the screen');
+  await page.selectOption('#source', 'paper-1');
+  await drawn(page, 3);
+  await plan(page);
+  assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= 390));
+  assert.deepEqual(await serious(page), []);
+  await page.done();
+});
+
+test('the keyboard alone leads from a scenario to a read result', async () => {
+  const page = await open(chrome, site.url, { reducedMotion: 'reduce' });
+  await drawn(page, 6);
+  const reach = async (test_) => {
+    for (let presses = 0; presses < 400; presses += 1) {
+      await page.keyboard.press('Tab');
+      if (await page.evaluate(test_)) return;
+    }
+    assert.fail(`not reached: ${test_}`);
+  };
+  await reach(() => document.activeElement.id === 'source');
+  await page.keyboard.press('p');
+  await drawn(page, 3);
+  await reach(() => document.activeElement.id === 'add-cylinder');
+  await page.keyboard.press('Enter');
+  await drawn(page, 4);
+  await page.keyboard.press('Control+z');
+  await drawn(page, 3);
+  await reach(() => document.activeElement.id === 'plan');
+  await page.keyboard.press('Enter');
+  await page.waitForSelector('.verdict.good');
+  await reach(() => document.activeElement.dataset.leg === '1');
+  assert.equal((await scene(page)).mark, 1, 'a leg in focus is marked in the scene');
+  await page.done();
+});
+
+test('a service with keys is asked with one, kept in memory, and followed with tickets', async () => {
+  const directory = mkdtempSync(join(tmpdir(), 'noctule-keys-'));
+  const made_ = spawnSync(process.env.NOCTULE_BIN, ['key', 'new', '--name', 'planner', '--scopes', 'plan'], { encoding: 'utf8', cwd: directory });
+  writeFileSync(join(directory, 'keys.toml'), made_.stdout);
+  const key = made_.stderr.trim().split('\n').at(-1);
+  const guarded = await service('--keys-file', join(directory, 'keys.toml'));
+  const asked = [];
+  const page = await open(chrome, 'about:blank');
+  page.on('request', (request) => asked.push(request.url()));
+  await page.goto(guarded.url);
+  await page.waitForSelector('#key[open]');
+  await page.fill('#key-field', 'noctule_wrong');
+  await page.click('#key button.main');
+  await page.waitForFunction(() => /no key of this service/.test(document.getElementById('key-why').textContent));
+  assert.deepEqual(await serious(page), []);
+  await page.fill('#key-field', key);
+  await page.click('#key button.main');
+  await drawn(page, 6);
+  await page.selectOption('#source', 'paper-1');
+  await drawn(page, 3);
+  await plan(page);
+  await page.click('#tab-plans');
+  await page.waitForSelector('.plans tbody tr');
+  assert.ok(asked.some((url) => url.includes('/events?') && url.includes('ticket=')), 'a ticket opened the stream');
+  assert.ok(!asked.some((url) => url.includes(key)), 'the key was in no address');
+  assert.deepEqual(await page.evaluate(() => [localStorage.length, sessionStorage.length, document.cookie]), [0, 0, '']);
+  // Forgotten with the page: it is asked for again.
+  await page.reload();
+  await page.waitForSelector('#key[open]');
+  await page.done();
+  await guarded.stop();
+  rmSync(directory, { recursive: true, force: true });
+});
+
+test('without WebGL the form, the strip and the tables have everything', async () => {
+  const page = await open(chrome, 'about:blank');
+  page.allowed = /WebGL/;
+  await page.addInitScript(() => {
+    const real = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...rest) { return kind.startsWith('webgl') ? null : real.call(this, kind, ...rest); };
+  });
+  await page.goto(site.url);
+  await page.waitForFunction(() => /Jacksboro/.test(document.title));
+  await page.selectOption('#source', 'paper-1');
+  await page.waitForFunction(() => /paper-1/.test(document.title));
+  await plan(page);
+  assert.equal(await page.locator('.verdict.good').count(), 1);
+  assert.match(await page.textContent('#hint'), /no WebGL/);
+  await page.done();
+});

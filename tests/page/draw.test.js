@@ -1,0 +1,136 @@
+// A scenario is chosen, opened, dropped, drawn and mended.
+
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { after, before, test } from 'node:test';
+import { SMALL, browser, document_, drawn, drop, fill, groundPoint, open, scene, service } from './support.js';
+
+let site;
+let chrome;
+before(async () => { [site, chrome] = await Promise.all([service(), browser()]); });
+after(async () => {
+  await chrome?.close();
+  await site?.stop();
+});
+
+test('a shipped scenario is there at once, and another is one choice away', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, 6);
+  assert.match(await page.title(), /Jacksboro.*Noctule/);
+  assert.equal((await scene(page)).ground.kind, 'mesh');
+  await page.selectOption('#source', 'paper-4');
+  await drawn(page, 5);
+  assert.deepEqual((await scene(page)).ground.kind, 'mesh');
+  assert.match(await page.getAttribute('#canvas', 'aria-label'), /Ground 1,000 m by 1,000 m, from 0 to \d+ m; 5 threats; start and target; no route yet/);
+  await page.selectOption('#source', 'paper-1');
+  await drawn(page, 3);
+  assert.equal((await scene(page)).ground.kind, 'plane');
+  await page.done();
+});
+
+test('files are opened and dropped: a scenario, GeoJSON, KML', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, 6);
+  await page.setInputFiles('#file', { name: 'mine.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(SMALL)) });
+  await drawn(page, 1);
+  assert.equal((await document_(page)).name, 'small');
+  const place = (name, lon, lat, alt) => ({ type: 'Feature', properties: { name, role: name }, geometry: { type: 'Point', coordinates: [lon, lat, alt] } });
+  const no_fly = { type: 'Feature', properties: { name: 'town' }, geometry: { type: 'Polygon', coordinates: [[[-84.2, 36.5], [-84.19, 36.5], [-84.19, 36.51], [-84.2, 36.5]]] } };
+  const map = { type: 'FeatureCollection', features: [place('start', -84.23, 36.48, 400), place('target', -84.16, 36.53, 400), no_fly] };
+  await drop(page, 'map.geojson', JSON.stringify(map), 'application/geo+json');
+  await page.waitForFunction(() => globalThis.noctule.document().frame === 'wgs84');
+  await drawn(page, 1);
+  const kml = readFileSync(new URL('./map.kml', import.meta.url), 'utf8');
+  await drop(page, 'map.kml', kml, '');
+  await page.waitForFunction(() => globalThis.noctule.document().start?.lat === 36.49);
+  await drawn(page, 1);
+  await drop(page, 'broken.json', '{"start": ', 'application/json');
+  await page.waitForSelector('#notice:not([hidden])');
+  assert.match(await page.textContent('#notice'), /broken\.json is no JSON/);
+  await page.done();
+});
+
+test('a scenario is drawn by hand, taken back and done again', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, 6);
+  await page.click('text=Empty');
+  await drawn(page, 0);
+  const click = async (x, y) => {
+    const at = await groundPoint(page, x, y);
+    await page.mouse.click(at.x, at.y);
+  };
+  const toDocument = (p) => p + 500;
+  // The frame's middle is that of the area: 500, 500.
+  await page.click('[data-tool=start]');
+  await click(-300, -250);
+  let now = await document_(page);
+  assert.ok(Math.abs(now.start.x - toDocument(-300)) < 5 && Math.abs(now.start.y - toDocument(-250)) < 5, JSON.stringify(now.start));
+  assert.equal(now.start.z, 50, 'as high above ground as before');
+  await page.click('[data-tool=cylinder]');
+  await click(0, 0);
+  await drawn(page, 1);
+  now = await document_(page);
+  const { radius } = now.threats[0];
+  assert.equal((await scene(page)).handles, 3);
+  // Its core's dot lies to the east.
+  const dot = await groundPoint(page, radius, 0);
+  const to = await groundPoint(page, radius + 60, 0);
+  await page.mouse.move(dot.x, dot.y);
+  await page.mouse.down();
+  for (const t of [0.3, 0.6, 1]) await page.mouse.move(dot.x + (to.x - dot.x) * t, dot.y + (to.y - dot.y) * t);
+  await page.mouse.up();
+  const wider = (await document_(page)).threats[0];
+  assert.ok(Math.abs(wider.radius - radius - 60) < 6, `${wider.radius}`);
+  // Dragged as a whole by its middle.
+  const [middle, away] = [await groundPoint(page, 0, 0), await groundPoint(page, 120, 90)];
+  await page.mouse.move(middle.x, middle.y);
+  await page.mouse.down();
+  await page.mouse.move((middle.x + away.x) / 2, (middle.y + away.y) / 2);
+  await page.mouse.move(away.x, away.y);
+  await page.mouse.up();
+  const moved = (await document_(page)).threats[0];
+  assert.ok(Math.abs(moved.center.x - toDocument(120)) < 6 && Math.abs(moved.center.y - toDocument(90)) < 6, JSON.stringify(moved.center));
+  assert.equal(await page.inputValue('[data-pointer="/threats/0/center/x"]'), String(moved.center.x), 'the form says the same');
+  await page.click('[data-tool=polygon]');
+  for (const [x, y] of [[-400, 200], [-250, 200], [-250, 350]]) await click(x, y);
+  await page.keyboard.press('Enter');
+  await drawn(page, 2);
+  assert.equal((await document_(page)).threats[1].vertices.length, 3);
+  // Polygon, drag, drag: one step each.
+  await page.click('#undo');
+  await drawn(page, 1);
+  await page.click('#undo');
+  assert.deepEqual((await document_(page)).threats[0].center, now.threats[0].center);
+  await page.click('#undo');
+  assert.equal((await document_(page)).threats[0].radius, radius);
+  await page.click('#redo');
+  await page.click('#redo');
+  await page.keyboard.press('Control+Shift+z');
+  await drawn(page, 2);
+  assert.deepEqual((await document_(page)).threats[0], moved);
+  await page.done();
+});
+
+test('faults stand where they are, in the words of the service', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, 6);
+  await page.selectOption('#source', 'paper-1');
+  await drawn(page, 3);
+  await fill(page, '/threats/0/radius', '-3');
+  const field = page.locator('[data-pointer="/threats/0/radius"]');
+  await page.waitForSelector('[data-pointer="/threats/0/radius"][aria-invalid=true]');
+  const said = await page.textContent(`#${await field.getAttribute('aria-describedby')}`);
+  assert.match(said, /^radius is -3, must be > 0/);
+  assert.match(await page.textContent('.faults'), /One thing to mend.*radius is -3/s);
+  await fill(page, '/altitude/max', 'high');
+  await page.waitForSelector('[data-pointer="/altitude/max"][aria-invalid=true]');
+  assert.match(await page.textContent('.faults h3'), /2 things to mend/);
+  // Planning nonetheless leads to the first of them.
+  await page.click('#plan');
+  await page.waitForFunction(() => document.activeElement?.dataset.pointer?.startsWith('/'));
+  await fill(page, '/threats/0/radius', '60');
+  await fill(page, '/altitude/max', '200');
+  await page.waitForSelector('.faults', { state: 'hidden' });
+  assert.equal(await page.locator('[aria-invalid]').count(), 0);
+  await page.done();
+});

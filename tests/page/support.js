@@ -1,0 +1,202 @@
+// A service, a browser, and a person's hands and eyes.
+
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { mkdtempSync, rmSync } from 'node:fs';
+import net from 'node:net';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { chromium } from 'playwright-core';
+
+const CHROMIUM = process.env.CHROMIUM_BIN ?? '/usr/bin/chromium';
+const ARGUMENTS = [
+  '--no-sandbox', '--enable-unsafe-swiftshader', '--disable-quic', '--no-first-run', '--disable-background-networking',
+  '--disable-component-update', '--disable-sync',
+];
+
+/** What the browser itself notes about answers that the page expects: refusals are shown in the page. */
+const EXPECTED = /Failed to load resource: the server responded with a status of (401|404|409|422)|GPU stall due to ReadPixels/;
+
+/** Starts the program on a port of its own. Returns `{url, stop}`. */
+export async function service(...settings) {
+  const directory = mkdtempSync(join(tmpdir(), 'noctule-page-'));
+  const process_ = spawn(process.env.NOCTULE_BIN, ['serve', '--listen', '127.0.0.1:0', '--data-dir', directory, '--grace', '1', ...settings], {
+    stdio: ['ignore', 'pipe', 'pipe'], cwd: directory, env: { ...process.env, NOCTULE_BIN: undefined },
+  });
+  let log = '';
+  process_.stderr.on('data', (text) => { log += text; });
+  const url = await new Promise((done, failed) => {
+    let said = '';
+    process_.stdout.on('data', (text) => {
+      said += text;
+      const [, found] = said.match(/listening on (\S+)\n/) ?? [];
+      if (found) done(found);
+    });
+    process_.on('exit', () => failed(new Error(`the service ended:\n${log}`)));
+  });
+  const stop = async () => {
+    const gone = new Promise((done) => { process_.on('exit', done); });
+    process_.kill('SIGKILL');
+    await gone;
+    rmSync(directory, { recursive: true, force: true });
+  };
+  return { url, stop };
+}
+
+/** A wire to the service that can be cut: `{url, cut, mend, stop}`. */
+export async function wire(url) {
+  const { port } = new URL(url);
+  const sockets = new Set();
+  let whole = true;
+  const server = net.createServer((near) => {
+    if (!whole) {
+      near.destroy();
+      return;
+    }
+    const far = net.connect(Number(port), '127.0.0.1');
+    for (const [a, b] of [[near, far], [far, near]]) {
+      sockets.add(a);
+      a.pipe(b);
+      a.on('error', () => {});
+      a.on('close', () => {
+        sockets.delete(a);
+        b.destroy();
+      });
+    }
+  });
+  await new Promise((done) => { server.listen(0, '127.0.0.1', done); });
+  const cut = () => {
+    whole = false;
+    for (const socket of sockets) socket.destroy();
+  };
+  return { url: `http://127.0.0.1:${server.address().port}`, cut, mend: () => { whole = true; }, stop: () => { cut(); server.close(); } };
+}
+
+/** A browser with an empty profile. */
+export const browser = () => chromium.launch({ executablePath: CHROMIUM, args: ARGUMENTS });
+
+/** The page, opened; its console is watched, and `done` says that nothing was wrong in it. */
+export async function open(chrome, url, settings = {}) {
+  const context = await chrome.newContext({ viewport: { width: 1440, height: 900 }, acceptDownloads: true, ...settings });
+  await context.grantPermissions(['clipboard-read', 'clipboard-write']).catch(() => {});
+  const page = await context.newPage();
+  const wrong = [];
+  page.on('console', (message) => {
+    if (['error', 'warning'].includes(message.type()) && !EXPECTED.test(message.text()) && !page.allowed?.test(message.text())) wrong.push(message.text());
+  });
+  page.on('pageerror', (error) => wrong.push(error.stack));
+  page.setDefaultTimeout(30000);
+  await page.goto(url);
+  const done = async () => {
+    await context.close();
+    assert.deepEqual(wrong, [], 'the console is free of errors');
+  };
+  return Object.assign(page, { done });
+}
+
+/** Waits until a scenario is drawn. */
+export const drawn = (page, threats) => page.waitForFunction((count) => {
+  const scene = globalThis.noctule?.scene();
+  return scene && scene.ends === 2 && (count === undefined ? scene.frames.count > 1 : scene.threats === count);
+}, threats);
+
+export const scene = (page) => page.evaluate(() => globalThis.noctule.scene());
+export const document_ = (page) => page.evaluate(() => globalThis.noctule.document());
+
+/** Chooses a shipped scenario, with some of its values changed. */
+export async function choose(page, name, values = {}) {
+  const drawnBefore = (await scene(page)).frames.count;
+  await page.selectOption('#source', name);
+  await page.waitForFunction((before) => globalThis.noctule.scene().frames.count > before, drawnBefore);
+  for (const [pointer, value] of Object.entries(values)) await fill(page, pointer, value);
+}
+
+/** Types into the field of a pointer, opening what it is in. */
+export async function fill(page, pointer, value) {
+  const field = page.locator(`[data-pointer="${pointer}"]`);
+  await field.evaluate((node) => { for (let at = node; at; at = at.parentElement) if (at.tagName === 'DETAILS') at.open = true; });
+  await field.fill(String(value));
+}
+
+/** Plans, and waits for the verdict. */
+export async function plan(page, button = '#plan') {
+  await page.evaluate(() => document.querySelector('.verdict')?.classList.add('old'));
+  await page.click(button);
+  await page.waitForSelector('.verdict:not(.old)', { timeout: 60000 });
+  return page.evaluate(() => new URLSearchParams(location.hash.slice(1)).get('plan'));
+}
+
+/** How many pixels of a CSS box on the screen have a colour, give or take. */
+export async function pixels(page, color, clip) {
+  const picture = (await page.screenshot({ clip })).toString('base64');
+  const eye = await page.context().newPage();
+  try {
+    return await eye.evaluate(async ([data, wanted]) => {
+      const image = new Image();
+      image.src = `data:image/png;base64,${data}`;
+      await image.decode();
+      const canvas = new OffscreenCanvas(image.width, image.height);
+      const pen = canvas.getContext('2d');
+      pen.drawImage(image, 0, 0);
+      const seen = pen.getImageData(0, 0, image.width, image.height).data;
+      const want = [1, 3, 5].map((at) => parseInt(wanted.slice(at, at + 2), 16));
+      let count = 0;
+      for (let at = 0; at < seen.length; at += 4) if (want.every((value, k) => Math.abs(seen[at + k] - value) <= 12)) count += 1;
+      return count;
+    }, [picture, color]);
+  } finally {
+    await eye.close();
+  }
+}
+
+/** A colour of the style sheet. */
+export const color = (page, name) => page.evaluate((variable) => getComputedStyle(document.documentElement).getPropertyValue(`--${variable}`).trim(), name);
+
+/** A box of `size` pixels round a place of the scene, on the screen. */
+export async function around(page, place, size = 14) {
+  const box = await page.locator('#canvas').boundingBox();
+  const at = await page.evaluate((p) => globalThis.noctule.onScreen(p), place);
+  assert.ok(at, 'the place is before the camera');
+  return { x: box.x + at.x - size / 2, y: box.y + at.y - size / 2, width: size, height: size };
+}
+
+/** Where a place on the ground is on the screen. */
+export async function groundPoint(page, x, y) {
+  const z = await page.evaluate(([a, b]) => globalThis.noctule.groundAt(a, b), [x, y]);
+  const { x: px, y: py, width } = await around(page, { x, y, z });
+  return { x: px + width / 2, y: py + width / 2 };
+}
+
+/** Drops a file onto the page. */
+export async function drop(page, name, text, type) {
+  const transfer = await page.evaluateHandle(([file, content, kind]) => {
+    const data = new DataTransfer();
+    data.items.add(new File([content], file, { type: kind }));
+    return data;
+  }, [name, text, type]);
+  await page.dispatchEvent('body', 'dragenter', { dataTransfer: transfer });
+  await page.dispatchEvent('body', 'drop', { dataTransfer: transfer });
+}
+
+/** What the interface answers. */
+export const ask = async (url, path, options) => (await fetch(new URL(path, url), options)).json();
+
+/** Makes a plan by the interface, and waits for its end. */
+export async function made(url, document) {
+  const status = await ask(url, '/plans', { method: 'POST', headers: { 'content-type': 'application/json', prefer: 'wait=30' }, body: JSON.stringify(document) });
+  assert.equal(status.status, 'succeeded', JSON.stringify(status));
+  return status.id;
+}
+
+/** Small and soon planned. */
+export const SMALL = {
+  name: 'small', start: { x: 100, y: 100, z: 50 }, target: { x: 900, y: 900, z: 50 }, area: { min: { x: 0, y: 0 }, max: { x: 1000, y: 1000 } },
+  threats: [{ kind: 'cylinder', name: 'radar', center: { x: 500, y: 500 }, radius: 100, influence: 160 }],
+  altitude: { min: 20, max: 120 }, planner: { population: 30, iterations: 20, waypoints: 6, seed: 1 },
+};
+
+/** No way leads past it. */
+export const WALLED = {
+  ...SMALL, name: 'walled',
+  threats: [{ kind: 'polygon', name: 'wall', vertices: [{ x: -500, y: 450 }, { x: 1500, y: 450 }, { x: 1500, y: 550 }, { x: -500, y: 550 }] }],
+};

@@ -1,0 +1,129 @@
+// A search is watched, its end read; what is pointed at in one place is marked in the others.
+
+import assert from 'node:assert/strict';
+import { after, before, test } from 'node:test';
+import { SMALL, WALLED, around, ask, browser, choose, color, drawn, made, open, pixels, plan, scene, service, wire } from './support.js';
+
+let site;
+let chrome;
+before(async () => { [site, chrome] = await Promise.all([service(), browser()]); });
+after(async () => {
+  await chrome?.close();
+  await site?.stop();
+});
+
+/** A search that lasts until it is told to end. */
+const LONG = { '/planner/iterations': 20000, '/planner/population': 100, '/planner/waypoints': 8 };
+
+test('the swarm is seen converging, and cancelling keeps the best', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, 6);
+  await choose(page, 'paper-4', LONG);
+  await page.click('#plan');
+  await page.waitForFunction(() => globalThis.noctule.scene().trail >= 2, null, { timeout: 60000 });
+  const live = await scene(page);
+  assert.equal(live.routes.find((route) => route.name === 'route').points, 10);
+  assert.match(await page.textContent('#state'), /running/);
+  assert.match(await page.textContent('#figures'), /Iteration \d+ of 20000/);
+  assert.match(await page.textContent('#legend'), /best.*mean/s);
+  await page.click('#cancel');
+  await page.waitForSelector('.verdict.good');
+  assert.match(await page.textContent('.verdict'), /Cancelled; the best so far was kept/);
+  assert.match(await page.textContent('#said'), /A route was found: cost/);
+  await page.done();
+});
+
+test('the route is drawn where it is, and a place in it is one place everywhere', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, 6);
+  await choose(page, 'paper-1');
+  const id = await plan(page);
+  const result = await ask(site.url, `/plans/${id}/result`);
+  const there = await scene(page);
+  assert.equal(there.routes[0].points, result.path.points.length);
+  assert.equal(there.waypoints, result.waypoints.length - 2);
+  assert.equal(there.trail, 0);
+  const route = await color(page, 'route');
+  // From above, so that no threat stands before it.
+  await page.click('text=Above');
+  await page.waitForTimeout(300);
+  for (const share of [0.21, 0.47, 0.83]) {
+    const place = await page.evaluate((t) => globalThis.noctule.routeAt(t), share);
+    assert.ok(await pixels(page, route, await around(page, place)) >= 8, `the route's colour at ${share} of it`);
+  }
+  const nowhere = await page.evaluate(() => ({ x: -350, y: 350, z: 0 }));
+  assert.equal(await pixels(page, route, await around(page, nowhere)), 0);
+  // Where the strip is pointed at, scene and table are marked.
+  const strip = await page.locator('#strip').boundingBox();
+  await page.mouse.move(strip.x + strip.width * 0.5, strip.y + strip.height * 0.5);
+  await page.waitForFunction(() => globalThis.noctule.scene().mark === 1);
+  assert.equal(await page.locator('.legs tr.marked').count(), 1);
+  assert.match(await page.textContent('#strip-at'), /m above ground/);
+  // And a leg of the table in the strip and the scene.
+  await page.locator('.legs tr[data-leg="2"]').hover();
+  await page.waitForSelector('.legs tr[data-leg="2"].marked');
+  assert.equal((await scene(page)).mark, 1);
+  // And the route in the scene.
+  const spot = await around(page, await page.evaluate(() => globalThis.noctule.routeAt(0.1)));
+  await page.mouse.move(spot.x + 7, spot.y + 7);
+  await page.waitForSelector('.legs tr[data-leg="0"].marked');
+  // The chart shows the best as it was then.
+  await page.locator('#chart .u-over').hover({ position: { x: 4, y: 40 } });
+  await page.waitForFunction(() => globalThis.noctule.scene().routes.some((one) => one.name === 'then'));
+  await page.done();
+});
+
+test('a lost connection says so, and is taken up again without a loss', async () => {
+  const line = await wire(site.url);
+  const page = await open(chrome, line.url);
+  page.allowed = /ERR_|Failed to load resource/;
+  await drawn(page, 6);
+  await choose(page, 'paper-4', LONG);
+  await page.click('#plan');
+  await page.waitForFunction(() => globalThis.noctule.scene().trail >= 1, null, { timeout: 60000 });
+  line.cut();
+  await page.waitForSelector('#notice:not([hidden])');
+  assert.match(await page.textContent('#notice'), /The connection is lost. It is being resumed/);
+  assert.equal(await page.textContent('#state'), 'reconnecting');
+  line.mend();
+  await page.waitForSelector('#notice', { state: 'hidden' });
+  assert.equal(await page.textContent('#state'), 'running');
+  await page.click('#cancel');
+  await page.waitForSelector('.verdict.good');
+  await page.done();
+  line.stop();
+});
+
+test('the result is read: cost, gap, clearances, legs, as the interface has them', async () => {
+  const id = await made(site.url, SMALL);
+  const result = await ask(site.url, `/plans/${id}/result`);
+  const page = await open(chrome, `${site.url}#plan=${id}`);
+  await page.waitForSelector('.verdict.good');
+  const figure = (value, digits) => value.toLocaleString('en', { minimumFractionDigits: digits, maximumFractionDigits: digits });
+  assert.ok((await page.textContent('#result')).includes(figure(result.cost.total, result.cost.total < 1000 ? 2 : 1)));
+  assert.ok((await page.textContent('.facts')).includes(`${figure(result.bound.gap * 100, 2)} %`));
+  assert.ok((await page.textContent('.facts')).includes(figure(result.path.length, 1)));
+  assert.equal(await page.locator('.legs tbody tr').count(), result.legs.length);
+  assert.match(await page.textContent('#result'), /radar/);
+  assert.match(await page.getAttribute('#canvas', 'aria-label'), /a route that holds/);
+  await page.done();
+});
+
+test('a route that breaks something cannot be mistaken, and its faults have places', async () => {
+  const id = await made(site.url, WALLED);
+  const page = await open(chrome, `${site.url}#plan=${id}`);
+  await page.waitForSelector('.verdict.bad');
+  assert.match(await page.textContent('.verdict h2'), /No feasible route found/);
+  assert.match(await page.textContent('.violations'), /leg \d+ enters threat 0 \(wall\) by/);
+  assert.equal(await page.textContent('#state'), 'infeasible');
+  assert.match(await page.getAttribute('#canvas', 'aria-label'), /NOT feasible/);
+  const fault = await color(page, 'fault');
+  const marked = await scene(page);
+  assert.ok(marked.faults >= 1);
+  assert.equal(marked.routes[0].color, fault);
+  const box = await page.locator('#canvas').boundingBox();
+  assert.ok(await pixels(page, fault, box) > 100, 'the route and its faults are drawn in the colour of faults');
+  await page.locator('.violations button').first().click();
+  await page.waitForFunction(() => globalThis.noctule.scene().faults === 1 && globalThis.noctule.scene().mark === 1);
+  await page.done();
+});

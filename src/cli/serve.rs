@@ -2,6 +2,7 @@
 
 use std::io::Write as _;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,9 +13,10 @@ use tokio::sync::watch;
 use tokio::time::Instant;
 
 use super::{access, exit};
+use crate::catalogue::{Catalogue, Directories, Mounted};
 use crate::config::{self, Config, Flags};
 use crate::http::webhook::{self, Secret, Sender};
-use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase};
+use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase, Terrains};
 use crate::job::Failure;
 use crate::planner;
 use crate::scenario::json::{self, Rules};
@@ -66,14 +68,16 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let instruments = Arc::new(Instruments::default());
     let store = open_store(config).await?;
     let store: Arc<dyn Store> = Arc::new(MeasuredStore::new(store, instruments.clone()));
-    let rules = Arc::new(planner::rules(config.limits));
+    let catalogue = catalogue(config)?;
+    let rules = planner::rules(config.limits).with_datasets(catalogue.clone());
+    let rules = Arc::new(rules);
     let settings = worker::Settings {
         workers: config.workers,
         clock: store::wall_clock(),
         instruments: instruments.clone(),
     };
     let pool = Pool::start(store.clone(), settings, engine(rules.clone()));
-    let sweeper = Sweeper::start(store.clone(), store::wall_clock());
+    let sweeper = Sweeper::start(store.clone(), catalogue.clone(), store::wall_clock());
     let sender = webhooks
         .clone()
         .map(|settings| Sender::start(store.clone(), settings));
@@ -81,6 +85,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let router = http::router(AppState {
         store: store.clone(),
         rules,
+        terrains: Terrains::new(catalogue),
         capacity: Capacity {
             workers: config.workers,
             queue: config.queue,
@@ -156,11 +161,21 @@ async fn drain(pool: Pool, times: &Times) {
     }
 }
 
+fn data_dir(config: &Config) -> anyhow::Result<PathBuf> {
+    let data_dir = config.data_dir.clone();
+    data_dir.context("the user has no home; name a directory with --data-dir")
+}
+
+/// The datasets of the data directory, and those of the operator's own.
+fn catalogue(config: &Config) -> anyhow::Result<Arc<dyn Catalogue>> {
+    let mounted = config.terrain_dir.as_deref().map(Mounted::open);
+    let mounted = mounted.transpose().context("terrain_dir")?;
+    let uploads = data_dir(config)?.join("terrains");
+    Ok(Arc::new(Directories::new(uploads, mounted)))
+}
+
 async fn open_store(config: &Config) -> anyhow::Result<Arc<dyn Store>> {
-    let data_dir = config
-        .data_dir
-        .clone()
-        .context("the user has no home; name a directory with --data-dir")?;
+    let data_dir = data_dir(config)?;
     let options = store::Options {
         retention: retention(config.retention),
         events_kept: config.retention.events,

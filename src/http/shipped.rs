@@ -83,7 +83,9 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::scenario::json::Rules;
+    use crate::planner;
+    use crate::scenario::json;
+    use crate::scenario::limits::Limits;
 
     #[test]
     fn every_shipped_scenario_is_served_and_can_be_planned() {
@@ -95,8 +97,9 @@ mod tests {
             .collect();
         let served = SHIPPED.iter().map(|(name, _)| (*name).to_owned()).collect();
         assert_eq!(there, served);
+        let rules = planner::rules(Limits::default());
         for (name, text) in SHIPPED {
-            let read = crate::scenario::json::read(text.as_bytes(), &Rules::default(), 0);
+            let read = json::read(text.as_bytes(), &rules, 0);
             assert!(read.is_ok(), "{name}");
             assert!(!Entry::of(name, text).title.is_empty(), "{name}");
         }

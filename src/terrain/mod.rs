@@ -130,7 +130,7 @@ impl Terrain {
     #[must_use]
     pub fn tolerance(&self) -> f64 {
         match self {
-            // Of a file: a tenth of it for chords, the rest for what maps cells onto the plane.
+            // Of a file: a quarter of it for chords, the rest for what maps cells onto the plane.
             Self::Peaks(_) | Self::Dem(_) => 1e-3,
             Self::Flat(_) | Self::Grid(_) => 0.0,
         }

@@ -2,20 +2,21 @@
 //!
 //! The ground is the bilinear surface between the samples in their own reference system, which is what
 //! everybody else samples, too. A straight leg is not quite straight there: it is cut into pieces so short that
-//! each is within a tenth of a millimetre of height of its chord, and along chords least and greatest heights
+//! each is within a quarter of a millimetre of height of its chord, and along chords least and greatest heights
 //! are exact. Most of a leg is proven by planes over blocks of cells to be nowhere least or greatest.
 
 use super::coverage::{self, Gap};
 use super::fit::Fit;
 use super::slabs::Slabs;
+use super::way::Way;
 use super::{DemError, Raster};
 use crate::geometry::geodesy::TangentPlane;
 use crate::geometry::{Point2, Point3, Rect, Segment};
 use crate::terrain::HeightRange;
-use crate::terrain::cells::{Cells, Place, Walk};
+use crate::terrain::cells::{Cells, Place};
 
 /// What a chord may add to or take from a height, metres.
-const CHORD_M: f64 = 1e-4;
+const CHORD_M: f64 = 2.5e-4;
 
 /// A way is taken for straight while blocks are looked at if it bends by no more cells than this.
 const BEND_CELLS: f64 = 0.02;
@@ -39,23 +40,6 @@ pub struct Dem {
     steepest: f64,
     /// Longest chord, metres.
     chord_m: f64,
-}
-
-/// A straight way over the plane that is all but straight over the cells.
-struct Way {
-    ends: [Point3; 2],
-    places: [Place; 2],
-    /// What the ground under it may differ by from that under the straight way between `places`, metres.
-    slack: f64,
-}
-
-impl Way {
-    /// On the straight way between the places.
-    #[inline]
-    fn at(&self, share: f64) -> Place {
-        let [from, to] = self.places;
-        std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * share)
-    }
 }
 
 impl Dem {
@@ -268,7 +252,7 @@ impl Dem {
     }
 
     /// Look at the blocks of a level under the part `[s0, s1]` of `way`, and more closely at what may
-    /// widen `range` beyond `band`.
+    /// widen `range` beyond `band`: where it may do so most first, as little else may then be left.
     fn descend(
         &self,
         way: &Way,
@@ -278,46 +262,35 @@ impl Dem {
         range: &mut HeightRange,
     ) {
         let level = &self.slabs.levels[level_idx];
-        let [from, to] = [way.at(s0), way.at(s1)];
-        let width = level.width as f64;
-        let blocks = 1.0 / width;
-        let mut column = Walk::new(from[0] * blocks, to[0] * blocks, level.columns + 1);
-        let mut row = Walk::new(from[1] * blocks, to[1] * blocks, level.rows + 1);
-        let mut u = 0.0;
-        // u runs from 0 to 1 over the part; each block ends at the next line in either direction.
-        loop {
-            let next = column.leave.min(row.leave).min(1.0);
-            if next > u {
-                let slab = level.slab(column.cell, row.cell);
-                let first = [column.cell as f64 * width, row.cell as f64 * width];
-                let above = |u: f64| {
-                    let [x, y, z]: Place =
-                        std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * u);
-                    z - slab.at([x - first[0], y - first[1]])
-                };
-                let (h0, h1) = (above(u), above(next));
-                let [least, most] = slab.reach();
-                let may_dip = h0.min(h1) - most - way.slack < range.min.min(band.min);
-                let may_rise = h0.max(h1) - least + way.slack > range.max.max(band.max);
-                if may_dip || may_rise {
-                    let part = [u, next].map(|u| s0 + (s1 - s0) * u);
-                    if level_idx == 0 {
-                        *range = range.join(self.exactly(way, part));
-                    } else {
-                        self.descend(way, level_idx - 1, part, band, range);
-                    }
-                }
-                u = next;
-            }
-            if next >= 1.0 {
-                return;
-            }
-            if column.leave <= row.leave {
-                column.step();
+        let beyond = |range: &HeightRange, heights: HeightRange| {
+            let dip = range.min.min(band.min) - heights.min;
+            let rise = heights.max - range.max.max(band.max);
+            dip.max(rise)
+        };
+        let closer = |[u0, u1]: [f64; 2], range: &mut HeightRange| {
+            let part = [u0, u1].map(|u| s0 + (s1 - s0) * u);
+            if level_idx == 0 {
+                *range = range.join(self.exactly(way, part));
             } else {
-                row.step();
+                self.descend(way, level_idx - 1, part, band, range);
             }
-        }
+        };
+        let (mut most, mut worst) = (0.0, None);
+        way.blocks(level, [s0, s1], |part, heights| {
+            let amount = beyond(range, heights);
+            if amount > most {
+                (most, worst) = (amount, Some(part));
+            }
+        });
+        let Some(worst) = worst else {
+            return;
+        };
+        closer(worst, range);
+        way.blocks(level, [s0, s1], |part, heights| {
+            if beyond(range, heights) > 0.0 && part[0].to_bits() != worst[0].to_bits() {
+                closer(part, range);
+            }
+        });
     }
 
     /// Least and greatest height over the part `[s0, s1]` of `way`, by chords.

@@ -16,6 +16,7 @@ mod hgt;
 mod lattice;
 mod raster;
 mod slabs;
+mod way;
 
 use std::collections::BTreeMap;
 use std::fmt;

@@ -2,7 +2,9 @@
 
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
 import { after, before, test } from 'node:test';
+import { fileURLToPath } from 'node:url';
 import { SMALL, browser, document_, drawn, drop, fill, groundPoint, open, scene, service } from './support.js';
 
 let site;
@@ -133,4 +135,25 @@ test('faults stand where they are, in the words of the service', async () => {
   await page.waitForSelector('.faults', { state: 'hidden' });
   assert.equal(await page.locator('[aria-invalid]').count(), 0);
   await page.done();
+});
+
+test('the ground of a dataset is drawn as the service has it', async () => {
+  const directory = fileURLToPath(new URL('../../scenarios', import.meta.url));
+  const mapped = await service('--terrain-dir', join(directory, 'terrain'));
+  const page = await open(chrome, mapped.url);
+  await drawn(page, 6);
+  await page.setInputFiles('#file', join(directory, 'jacksboro-wgs84.json'));
+  await page.waitForFunction(() => globalThis.noctule.document().terrain.kind === 'dataset');
+  await page.waitForFunction(() => globalThis.noctule.scene().ground.columns === 201);
+  const text = readFileSync(join(directory, 'jacksboro-wgs84.json'), 'utf8');
+  const { start } = JSON.parse(text);
+  const ground = await page.evaluate((p) => {
+    const { x, y } = globalThis.noctule.toMetres(p);
+    return globalThis.noctule.groundAt(x, y);
+  }, start);
+  assert.ok(ground > 300 && ground < start.alt + 1, `the ground at the start, ${ground} m, is below it`);
+  await page.evaluate(() => { for (const part of document.querySelectorAll('details')) part.open = true; });
+  assert.equal(await page.inputValue('[data-pointer="/terrain/name"]'), 'jacksboro', 'and can be chosen');
+  await page.done();
+  await mapped.stop();
 });

@@ -13,13 +13,13 @@ use tokio::sync::watch;
 use tokio::time::Instant;
 
 use super::{access, exit};
-use crate::catalogue::{Catalogue, Directories, Mounted};
+use crate::catalogue::{self, Catalogue, Directories, Mounted};
 use crate::config::{self, Config, Flags};
 use crate::http::webhook::{self, Secret, Sender};
 use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase, Terrains};
 use crate::job::Failure;
 use crate::planner;
-use crate::scenario::json::{self, Rules};
+use crate::scenario::json::{self, Refusal, Rules};
 use crate::store::measured::MeasuredStore;
 use crate::store::reopening::{Open, Reopening};
 use crate::store::sqlite::SqliteStore;
@@ -140,14 +140,30 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
 /// What the pool runs: the accepted document, read again, and planned.
 fn engine(rules: Arc<Rules>) -> Engine {
     Arc::new(move |document, observer, stop| {
-        let scenario = json::read_accepted(document, &rules).map_err(|refusal| Failure {
-            kind: "invalid-scenario".to_owned(),
-            detail: format!(
-                "this version of the service cannot read the accepted document: {refusal}"
-            ),
-        })?;
+        let scenario = json::read_accepted(document, &rules).map_err(|refusal| unread(&refusal))?;
         Ok(planner::plan(&scenario, observer, stop))
     })
+}
+
+/// Why a document is not read that was once.
+fn unread(refusal: &Refusal) -> Failure {
+    let (kind, detail) = match refusal.lost_ground() {
+        Some(fault) => (
+            "no-ground",
+            format!(
+                "the ground that it was accepted over is gone: {}",
+                fault.detail
+            ),
+        ),
+        None => (
+            "invalid-scenario",
+            format!("this version of the service cannot read the accepted document: {refusal}"),
+        ),
+    };
+    Failure {
+        kind: kind.to_owned(),
+        detail,
+    }
 }
 
 /// Let runs finish, then give them back; without those that do not heed their stop in time, which
@@ -171,7 +187,12 @@ fn catalogue(config: &Config) -> anyhow::Result<Arc<dyn Catalogue>> {
     let mounted = config.terrain_dir.as_deref().map(Mounted::open);
     let mounted = mounted.transpose().context("terrain_dir")?;
     let uploads = data_dir(config)?.join("terrains");
-    Ok(Arc::new(Directories::new(uploads, mounted)))
+    let is_new = !uploads.exists();
+    let catalogue = Directories::new(uploads, mounted);
+    if is_new && let Err(error) = catalogue::lay_down(&catalogue, store::wall_clock()()) {
+        tracing::warn!(%error, "the dataset that comes with the program cannot be kept");
+    }
+    Ok(Arc::new(catalogue))
 }
 
 async fn open_store(config: &Config) -> anyhow::Result<Arc<dyn Store>> {

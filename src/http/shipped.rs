@@ -15,8 +15,8 @@ use super::problem::Problem;
 /// Name and document, in the order in which they are offered.
 static SHIPPED: [(&str, &str); 6] = [
     (
-        "jacksboro-flight",
-        include_str!("../../scenarios/jacksboro-flight.json"),
+        "jacksboro-wgs84",
+        include_str!("../../scenarios/jacksboro-wgs84.json"),
     ),
     ("jacksboro", include_str!("../../scenarios/jacksboro.json")),
     ("paper-1", include_str!("../../scenarios/paper-1.json")),
@@ -85,8 +85,10 @@ mod tests {
     use std::collections::BTreeSet;
     use std::fs;
     use std::path::Path;
+    use std::sync::Arc;
 
     use super::*;
+    use crate::catalogue::Mounted;
     use crate::planner;
     use crate::scenario::json;
     use crate::scenario::limits::Limits;
@@ -109,7 +111,9 @@ mod tests {
             .collect();
         let served = SHIPPED.iter().map(|(name, _)| (*name).to_owned()).collect();
         assert_eq!(there, served);
-        let rules = planner::rules(Limits::default());
+        let ground = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/terrain");
+        let ground = Mounted::open(&ground).expect("it is there");
+        let rules = planner::rules(Limits::default()).with_datasets(Arc::new(ground));
         for (name, text) in SHIPPED {
             let read = json::read(text.as_bytes(), &rules, 0);
             assert!(read.is_ok(), "{name}");

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
-import { SMALL, ask, browser, color, document_, drawn, fill, made, open, pixels, plan, scene, service } from './support.js';
+import { SMALL, ask, browser, color, FIRST, document_, drawn, fill, made, open, pixels, plan, scene, service } from './support.js';
 
 let site;
 let chrome;
@@ -54,7 +54,7 @@ test('the list has states, a filter and pages, and lets go', async () => {
   const other = await service();
   for (let n = 0; n < 23; n += 1) await made(other.url, { ...SMALL, name: `plan ${n}`, planner: { ...SMALL.planner, iterations: 1, population: 10 } });
   const page = await open(chrome, other.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   await page.click('#tab-plans');
   await page.waitForSelector('.plans tbody tr');
   assert.equal(await page.locator('.plans tbody tr').count(), 20);
@@ -107,7 +107,7 @@ test('a plan is taken away: formats, scenario, picture, link', async () => {
 
 test('a map becomes a flight plan, in every format that flies', async () => {
   const page = await open(chrome, site.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   await page.setInputFiles('#file', fileURLToPath(new URL('./map.kml', import.meta.url)));
   await page.waitForFunction(() => globalThis.noctule.document().frame === 'wgs84');
   assert.match(await page.textContent('#notice'), /Taken for granted/);
@@ -133,7 +133,7 @@ test('a map becomes a flight plan, in every format that flies', async () => {
 test('from opening the page to a flight plan over Jacksboro takes five actions or fewer', async () => {
   let actions = 1;
   const page = await open(chrome, site.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   const { scenarios } = await ask(site.url, '/scenarios');
   const flown = scenarios.find(({ name, frame }) => frame === 'wgs84' && name.startsWith('jacksboro'));
   if (scenarios[0] !== flown) {

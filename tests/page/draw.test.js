@@ -5,7 +5,7 @@ import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
-import { SMALL, browser, document_, drawn, drop, fill, groundPoint, open, scene, service } from './support.js';
+import { SMALL, browser, FIRST, document_, drawn, drop, fill, groundPoint, open, scene, service } from './support.js';
 
 let site;
 let chrome;
@@ -17,7 +17,7 @@ after(async () => {
 
 test('a shipped scenario is there at once, and another is one choice away', async () => {
   const page = await open(chrome, site.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   assert.match(await page.title(), /Jacksboro.*Noctule/);
   assert.equal((await scene(page)).ground.kind, 'mesh');
   await page.selectOption('#source', 'paper-4');
@@ -32,7 +32,7 @@ test('a shipped scenario is there at once, and another is one choice away', asyn
 
 test('files are opened and dropped: a scenario, GeoJSON, KML', async () => {
   const page = await open(chrome, site.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   await page.setInputFiles('#file', { name: 'mine.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(SMALL)) });
   await drawn(page, 1);
   assert.equal((await document_(page)).name, 'small');
@@ -54,7 +54,7 @@ test('files are opened and dropped: a scenario, GeoJSON, KML', async () => {
 
 test('a scenario is drawn by hand, taken back and done again', async () => {
   const page = await open(chrome, site.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   await page.click('text=Empty');
   await drawn(page, 0);
   const click = async (x, y) => {
@@ -115,7 +115,7 @@ test('a scenario is drawn by hand, taken back and done again', async () => {
 
 test('faults stand where they are, in the words of the service', async () => {
   const page = await open(chrome, site.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   await page.selectOption('#source', 'paper-1');
   await drawn(page, 3);
   await fill(page, '/threats/0/radius', '-3');
@@ -141,7 +141,7 @@ test('the ground of a dataset is drawn as the service has it', async () => {
   const directory = fileURLToPath(new URL('../../scenarios', import.meta.url));
   const mapped = await service('--terrain-dir', join(directory, 'terrain'));
   const page = await open(chrome, mapped.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   await page.setInputFiles('#file', join(directory, 'jacksboro-wgs84.json'));
   await page.waitForFunction(() => globalThis.noctule.document().terrain.kind === 'dataset');
   await page.waitForFunction(() => globalThis.noctule.scene().ground.columns === 201);

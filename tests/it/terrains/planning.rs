@@ -118,6 +118,7 @@ async fn a_plan_whose_ground_went_while_it_waited_fails_and_says_why() {
     assert_eq!(status["status"], "failed", "{status}");
     let detail = status["error"]["detail"].as_str().expect("text");
     assert!(detail.contains("no longer kept"), "{detail}");
+    assert_eq!(status["error"]["type"], "/problems/no-ground");
     // What needs the ground says so, too; the stored result does not.
     service.bytes(&format!("{done}/result")).await;
     let answer = service

@@ -24,6 +24,9 @@ pub mod export;
 pub mod import;
 pub mod job;
 
+// Which datasets there are, and where their bytes lie.
+pub mod catalogue;
+
 // Where plans are kept, who runs them, and how the world reaches them.
 pub mod store;
 pub mod worker;

@@ -1,7 +1,7 @@
 // What the page draws with; nothing else of three.js is taken along.
 export {
-  AmbientLight, BufferAttribute, BufferGeometry, CanvasTexture, Color, CylinderGeometry, DirectionalLight, DoubleSide, Group,
-  InstancedMesh, Line, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial,
+  BufferAttribute, BufferGeometry, CanvasTexture, Color, DoubleSide, Group,
+  InstancedMesh, Line, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial,
   PerspectiveCamera, Points, PointsMaterial, Raycaster, Scene, ShapeUtils, Vector2, Vector3, WebGLRenderer,
 } from 'three';
 export { OrbitControls } from 'three/addons/controls/OrbitControls.js';

@@ -7,8 +7,8 @@ use serde::Deserialize;
 
 use super::exit;
 use super::files::{self, Choice};
+use super::ground::Ground;
 use crate::export::{ExportError, ResultInput, sha256_hex};
-use crate::planner;
 use crate::scenario::json::{self, Rules};
 use crate::scenario::limits::Limits;
 
@@ -25,6 +25,8 @@ pub(super) struct Arguments {
     out: Option<PathBuf>,
     #[command(flatten)]
     choice: Choice,
+    #[command(flatten)]
+    ground: Ground,
 }
 
 /// What a result says of its scenario.
@@ -42,7 +44,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     };
     let result = files::read(&arguments.result)?;
     let scenario = files::read(&arguments.scenario)?;
-    let rules = planner::rules(Limits::NONE);
+    let rules = arguments.ground.rules(Limits::NONE)?;
     let (result, scenario) = match pair(&result, &scenario, &rules) {
         Ok(pair) => pair,
         Err(refusal) => {
@@ -74,6 +76,7 @@ pub(super) fn code(error: &ExportError) -> u8 {
         ExportError::Option(_) => exit::FAILED,
         ExportError::NoGeodeticFrame { .. }
         | ExportError::Unflyable(_)
+        | ExportError::NoGround(_)
         | ExportError::Damaged(_) => exit::BAD_INPUT,
     }
 }

@@ -5,6 +5,7 @@ mod bench;
 mod convert;
 mod export;
 mod files;
+mod ground;
 mod healthcheck;
 mod key;
 mod plan;

@@ -10,6 +10,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::files::{self, Choice};
+use super::ground::Ground;
 use super::{exit, export};
 use crate::export::document::{Origin, ResultDocument, Timing};
 use crate::export::{ExportError, ResultInput, sha256_hex};
@@ -29,6 +30,8 @@ pub(super) struct Arguments {
     out: Vec<PathBuf>,
     #[command(flatten)]
     choice: Choice,
+    #[command(flatten)]
+    ground: Ground,
 }
 
 /// Plan, write the result, and say by the exit code how it went.
@@ -36,7 +39,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let outs: Vec<&Path> = arguments.out.iter().map(PathBuf::as_path).collect();
     let chosen = arguments.choice.of(&outs)?;
     let text = files::read(&arguments.file)?;
-    let rules = planner::rules(Limits::default());
+    let rules = arguments.ground.rules(Limits::default())?;
     let scenario = match json::read(&text, &rules, draw_seed()).and_then(without_a_store) {
         Ok(scenario) => scenario,
         Err(refusal) => {

@@ -2,6 +2,7 @@
 
 use std::io::Write as _;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,12 +13,13 @@ use tokio::sync::watch;
 use tokio::time::Instant;
 
 use super::{access, exit};
+use crate::catalogue::{self, Catalogue, Directories, Mounted};
 use crate::config::{self, Config, Flags};
 use crate::http::webhook::{self, Secret, Sender};
-use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase};
+use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase, Terrains};
 use crate::job::Failure;
 use crate::planner;
-use crate::scenario::json::{self, Rules};
+use crate::scenario::json::{self, Refusal, Rules};
 use crate::store::measured::MeasuredStore;
 use crate::store::reopening::{Open, Reopening};
 use crate::store::sqlite::SqliteStore;
@@ -66,14 +68,16 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let instruments = Arc::new(Instruments::default());
     let store = open_store(config).await?;
     let store: Arc<dyn Store> = Arc::new(MeasuredStore::new(store, instruments.clone()));
-    let rules = Arc::new(planner::rules(config.limits));
+    let catalogue = catalogue(config)?;
+    let rules = planner::rules(config.limits).with_datasets(catalogue.clone());
+    let rules = Arc::new(rules);
     let settings = worker::Settings {
         workers: config.workers,
         clock: store::wall_clock(),
         instruments: instruments.clone(),
     };
     let pool = Pool::start(store.clone(), settings, engine(rules.clone()));
-    let sweeper = Sweeper::start(store.clone(), store::wall_clock());
+    let sweeper = Sweeper::start(store.clone(), catalogue.clone(), store::wall_clock());
     let sender = webhooks
         .clone()
         .map(|settings| Sender::start(store.clone(), settings));
@@ -81,6 +85,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let router = http::router(AppState {
         store: store.clone(),
         rules,
+        terrains: Terrains::new(catalogue),
         capacity: Capacity {
             workers: config.workers,
             queue: config.queue,
@@ -135,14 +140,30 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
 /// What the pool runs: the accepted document, read again, and planned.
 fn engine(rules: Arc<Rules>) -> Engine {
     Arc::new(move |document, observer, stop| {
-        let scenario = json::read_accepted(document, &rules).map_err(|refusal| Failure {
-            kind: "invalid-scenario".to_owned(),
-            detail: format!(
-                "this version of the service cannot read the accepted document: {refusal}"
-            ),
-        })?;
+        let scenario = json::read_accepted(document, &rules).map_err(|refusal| unread(&refusal))?;
         Ok(planner::plan(&scenario, observer, stop))
     })
+}
+
+/// Why a document is not read that was once.
+fn unread(refusal: &Refusal) -> Failure {
+    let (kind, detail) = match refusal.lost_ground() {
+        Some(fault) => (
+            "no-ground",
+            format!(
+                "the ground that it was accepted over is gone: {}",
+                fault.detail
+            ),
+        ),
+        None => (
+            "invalid-scenario",
+            format!("this version of the service cannot read the accepted document: {refusal}"),
+        ),
+    };
+    Failure {
+        kind: kind.to_owned(),
+        detail,
+    }
 }
 
 /// Let runs finish, then give them back; without those that do not heed their stop in time, which
@@ -156,11 +177,26 @@ async fn drain(pool: Pool, times: &Times) {
     }
 }
 
+fn data_dir(config: &Config) -> anyhow::Result<PathBuf> {
+    let data_dir = config.data_dir.clone();
+    data_dir.context("the user has no home; name a directory with --data-dir")
+}
+
+/// The datasets of the data directory, and those of the operator's own.
+fn catalogue(config: &Config) -> anyhow::Result<Arc<dyn Catalogue>> {
+    let mounted = config.terrain_dir.as_deref().map(Mounted::open);
+    let mounted = mounted.transpose().context("terrain_dir")?;
+    let uploads = data_dir(config)?.join("terrains");
+    let is_new = !uploads.exists();
+    let catalogue = Directories::new(uploads, mounted);
+    if is_new && let Err(error) = catalogue::lay_down(&catalogue, store::wall_clock()()) {
+        tracing::warn!(%error, "the dataset that comes with the program cannot be kept");
+    }
+    Ok(Arc::new(catalogue))
+}
+
 async fn open_store(config: &Config) -> anyhow::Result<Arc<dyn Store>> {
-    let data_dir = config
-        .data_dir
-        .clone()
-        .context("the user has no home; name a directory with --data-dir")?;
+    let data_dir = data_dir(config)?;
     let options = store::Options {
         retention: retention(config.retention),
         events_kept: config.retention.events,

@@ -31,6 +31,8 @@ pub struct Config {
     pub listen: SocketAddr,
     /// Directory for the plans; `None` when none is named and the user has no home.
     pub data_dir: Option<PathBuf>,
+    /// Directory of the operator's own datasets; `None` has none.
+    pub terrain_dir: Option<PathBuf>,
     /// Plans run at the same time.
     pub workers: usize,
     /// Plans that may wait.
@@ -104,6 +106,7 @@ impl Default for Config {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
             data_dir: directories::ProjectDirs::from("", "", "noctule")
                 .map(|directories| directories.data_dir().to_owned()),
+            terrain_dir: None,
             workers: std::thread::available_parallelism().map_or(1, Into::into),
             queue: 1000,
             grace: Duration::from_secs(10),

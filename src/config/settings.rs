@@ -31,6 +31,13 @@ fn service() -> Vec<Setting> {
             |c| &mut c.data_dir,
         ),
         row(
+            "terrain_dir",
+            "DIR",
+            "Directory of datasets that scenarios may name; it is only read",
+            ..,
+            |c| &mut c.terrain_dir,
+        ),
+        row(
             "workers",
             "N",
             "Plans run at the same time",
@@ -221,9 +228,16 @@ fn limits() -> Vec<Setting> {
         row(
             "limits.terrain_nodes",
             "N",
-            "Nodes of a terrain grid",
+            "Nodes of a terrain grid, or of a dataset under an area",
             4..,
             |c| &mut c.limits.terrain_nodes,
+        ),
+        row(
+            "limits.terrain_bytes",
+            "BYTES",
+            "Length of an uploaded dataset",
+            1..,
+            |c| &mut c.limits.terrain_bytes,
         ),
         row(
             "limits.peaks",

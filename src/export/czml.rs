@@ -64,8 +64,8 @@ pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
             "point": {"pixelSize": 10, "color": {"rgba": color}},
             "path": {
                 "width": 3,
-                "leadTime": duration_s,
-                "trailTime": duration_s,
+                "leadTime": rounded(duration_s, 1e3),
+                "trailTime": rounded(duration_s, 1e3),
                 "material": {"solidColor": {"color": {"rgba": color}}},
             },
         }),

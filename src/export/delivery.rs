@@ -33,10 +33,15 @@ impl Delivery {
     /// Read both documents.
     ///
     /// # Errors
-    /// [`ExportError::Damaged`] when one cannot be read, or has a route without extent.
+    /// [`ExportError::Damaged`] when one cannot be read, or has a route without extent,
+    /// [`ExportError::NoGround`] when the dataset is not there any more.
     pub fn read(input: &ResultInput) -> Result<Self, ExportError> {
-        let scenario = json::read_accepted(input.scenario, input.rules)
-            .map_err(|refusal| ExportError::Damaged(format!("the scenario: {refusal}")))?;
+        let scenario = json::read_accepted(input.scenario, input.rules).map_err(|refusal| {
+            match refusal.lost_ground() {
+                Some(fault) => ExportError::NoGround(fault.detail.clone()),
+                None => ExportError::Damaged(format!("the scenario: {refusal}")),
+            }
+        })?;
         let result: ResultDocument = serde_json::from_str(input.result)
             .map_err(|error| ExportError::Damaged(format!("the result: {error}")))?;
         let frame = &scenario.frame;

@@ -27,6 +27,9 @@ pub enum ExportError {
     /// An option is unknown, unknown to the format, or has a value that it cannot have.
     #[error(transparent)]
     Option(#[from] OptionFault),
+    /// The dataset that it was planned over is not there any more.
+    #[error("the ground that it was planned over is not there: {0}")]
+    NoGround(String),
     /// The documents are none that this program wrote, or do not belong together.
     #[error("{0}")]
     Damaged(String),

@@ -88,13 +88,13 @@ fn unpack(packed: &[u8], limit: usize) -> Result<Bytes, Problem> {
 
 /// How a body is coded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Coding {
+pub(super) enum Coding {
     Plain,
     Gzip,
 }
 
 impl Coding {
-    fn of(headers: &HeaderMap) -> Result<Self, Problem> {
+    pub(super) fn of(headers: &HeaderMap) -> Result<Self, Problem> {
         let codings: Vec<String> = headers
             .get_all(header::CONTENT_ENCODING)
             .iter()
@@ -111,7 +111,7 @@ impl Coding {
     }
 }
 
-fn announced_length(headers: &HeaderMap) -> Option<u64> {
+pub(super) fn announced_length(headers: &HeaderMap) -> Option<u64> {
     headers
         .get(header::CONTENT_LENGTH)?
         .to_str()

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::params::{self, Params};
 use super::problem::Problem;
-use super::{AppState, body, off_thread};
+use super::{AppState, body};
 use crate::geometry::geodesy::{LatLon, wrapped};
 use crate::geometry::{Point2, Rect};
 use crate::scenario::Scenario;
@@ -58,7 +58,7 @@ pub(super) async fn sample(
     let text = body::read_json(&state, &headers, body).await?;
     let rules = state.rules.clone();
     let read = move || json::read(&text, &rules, 0).map(|read| sampled(&read, columns, rows));
-    Ok(Json(off_thread::run(read).await??))
+    Ok(Json(state.terrains.read(read).await??))
 }
 
 fn nodes(params: &Params, name: &str) -> Result<usize, Problem> {

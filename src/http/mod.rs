@@ -30,6 +30,7 @@ mod service;
 mod shipped;
 mod sse;
 mod status;
+mod terrains;
 mod throttle;
 mod tickets;
 mod warm_start;
@@ -51,6 +52,7 @@ use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove
 pub use browser::Origins;
 pub use idempotency::InFlight;
 pub use phase::Phase;
+pub use terrains::Terrains;
 
 use crate::scenario::json::Rules;
 use crate::store::Store;
@@ -65,6 +67,8 @@ pub struct AppState {
     pub store: Arc<dyn Store>,
     /// What a scenario is held to.
     pub rules: Arc<Rules>,
+    /// The datasets that scenarios may name; those of `rules`, too.
+    pub terrains: Terrains,
     /// How much may be done at once.
     pub capacity: Capacity,
     /// Idempotency keys that are being worked on.
@@ -98,7 +102,7 @@ pub struct Capacity {
 pub struct Route {
     /// Of the request.
     pub method: &'static str,
-    /// With `{id}` for a plan's id.
+    /// With `{id}` for a plan's id and `{name}` for a dataset's name.
     pub path: &'static str,
     /// Of its caller.
     pub needs: Needs,
@@ -119,6 +123,11 @@ pub fn routes() -> Vec<Route> {
         get("/plans/{id}/events", events::follow),
         post("/plans/{id}/tickets", tickets::issue),
         post("/scenarios:convert", scenarios::convert),
+        get("/terrains", terrains::list),
+        get("/terrains/{name}", terrains::show),
+        put("/terrains/{name}", terrains::put),
+        delete("/terrains/{name}", terrains::delete),
+        get("/terrains/{name}/elevations", terrains::elevations),
         post("/scenarios:ground", ground::sample),
         get("/scenarios", shipped::list),
         get("/scenarios/{name}", shipped::show),
@@ -177,6 +186,10 @@ fn get<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> R
 
 fn post<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
     row("POST", path, routing::post(handler))
+}
+
+fn put<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
+    row("PUT", path, routing::put(handler))
 }
 
 fn delete<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {

@@ -27,6 +27,7 @@ use crate::job::{self, Plan, PlanId, Status, Submission};
 use crate::scenario::json;
 use crate::store::{ListQuery, StoreError, Submitted};
 use crate::telemetry::{Origin, spans};
+use crate::terrain::Terrain;
 
 /// Plans on a page of the list, unless asked otherwise.
 const DEFAULT_PAGE: usize = 50;
@@ -161,12 +162,29 @@ async fn refuse_when_draining(state: &AppState) -> Result<(), Problem> {
 /// Length of a document, bytes, that is read in less time than it takes to hand it to another thread.
 const SHORT: usize = 4_096;
 
+/// What stands for the dataset of a scenario.
+fn dataset(terrain: &Terrain) -> Option<String> {
+    match terrain {
+        Terrain::Dem(dem) => Some(dem.sha256().to_owned()),
+        _ => None,
+    }
+}
+
+/// Whether reading a document may read files: a name can be hidden in escapes.
+fn may_name_a_dataset(document: &[u8]) -> bool {
+    let word = b"dataset";
+    document.contains(&b'\\') || document.windows(word.len()).any(|part| part == word)
+}
+
 /// Read a document into a submission, off the threads that answer unless it is short.
 async fn accept(state: &AppState, caller: &Caller, document: Bytes) -> Result<Submission, Problem> {
     let rules = state.rules.clone();
     let short = document.len() <= SHORT;
+    let reads_files = may_name_a_dataset(&document);
     let read = move || json::read(&document, &rules, job::draw_seed());
-    let mut scenario = if short {
+    let mut scenario = if reads_files {
+        state.terrains.read(read).await?
+    } else if short {
         read()
     } else {
         off_thread::run(read).await?
@@ -185,6 +203,7 @@ async fn accept(state: &AppState, caller: &Caller, document: Bytes) -> Result<Su
         quota,
         webhook: None,
         idempotency: None,
+        dataset: dataset(&scenario.terrain),
     };
     if short {
         Ok(submission())
@@ -329,10 +348,10 @@ async fn shown(state: &AppState, plan: Plan) -> Result<Response, Problem> {
 }
 
 /// The entity tags of `If-None-Match`.
-struct KnownTags(Vec<String>);
+pub(super) struct KnownTags(Vec<String>);
 
 impl KnownTags {
-    fn of(headers: &HeaderMap) -> Option<Self> {
+    pub(super) fn of(headers: &HeaderMap) -> Option<Self> {
         let values = headers.get_all(header::IF_NONE_MATCH).iter();
         let tags: Vec<String> = values
             .filter_map(|value| value.to_str().ok())
@@ -343,7 +362,7 @@ impl KnownTags {
     }
 
     /// Weak comparison, RFC 9110 section 8.8.3.2.
-    fn contain(&self, tag: &HeaderValue) -> bool {
+    pub(super) fn contain(&self, tag: &HeaderValue) -> bool {
         let opaque = |tag: &str| tag.strip_prefix("W/").unwrap_or(tag).to_owned();
         let tag = opaque(tag.to_str().unwrap_or_default());
         self.0

@@ -166,6 +166,7 @@ mod tests {
             quota: None,
             webhook: None,
             idempotency: None,
+            dataset: None,
         };
         Plan::accepted(&submission, 3)
     }

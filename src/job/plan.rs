@@ -33,6 +33,8 @@ pub struct Submission {
     pub webhook: Option<String>,
     /// Tells a repeated request from a new one.
     pub idempotency: Option<Idempotency>,
+    /// What stands for the dataset that it is planned over.
+    pub dataset: Option<String>,
 }
 
 /// The name of the key that a plan was handed in with.

@@ -1,9 +1,10 @@
 // How high the ground is, in the metres of a frame; and the part of it that a scenario is about.
 
 import { axes } from './frame.js';
+import { drawnBySoftware } from './graphics.js';
 
 /** Nodes of drawn ground along its longer side, at most. */
-const FINEST = 301;
+const FINEST = drawnBySoftware() ? 121 : 301;
 const PEAKS_NODES = 161;
 
 /**

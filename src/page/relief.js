@@ -1,10 +1,12 @@
 // The ground in the scene: a shaded mesh with its contours, or a ruled plane where it is flat.
 
 import { BufferAttribute, BufferGeometry, Color, DoubleSide, Group, LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial } from './vendor/three.js';
+import { drawnBySoftware } from './graphics.js';
 import { ramp } from './palette.js';
 import { step } from './words.js';
 
 const CONTOURS = 14;
+const MOST_PIECES = drawnBySoftware() ? 12000 : 60000;
 // From the north-west and above, as maps have it.
 const SUN = [-0.5, 0.6, 0.62];
 
@@ -48,9 +50,15 @@ export class Relief {
     mesh.name = 'ground';
     this.group.add(mesh);
     this.#skirt(ground, colours);
-    const spacing = step(ground.greatest - ground.least || 1, CONTOURS);
-    this.#lines('contours', contours(ground, spacing, false), colours.contour, 0.28);
-    this.#lines('index contours', contours(ground, spacing, true), colours.contour, 0.55);
+    // Rough ground has so many lines that they hide it: they stand farther apart there.
+    let spacing = step(ground.greatest - ground.least || 1, CONTOURS);
+    let lines = contours(ground, spacing);
+    while (lines.minor.length + lines.major.length > MOST_PIECES * 6) {
+      spacing *= 2;
+      lines = contours(ground, spacing);
+    }
+    this.#lines('contours', lines.minor, colours.contour, 0.28);
+    this.#lines('index contours', lines.major, colours.contour, 0.55);
   }
 
   /** The sides of the block, down to one level. */
@@ -128,11 +136,11 @@ function shades(ground, colours) {
   return out;
 }
 
-/** Pieces of lines of equal height, by marching squares over the triangles of the mesh; `main` picks every fifth height. */
-function contours(ground, spacing, main) {
+/** Pieces of lines of equal height over the triangles of the mesh: `major` ones at every fifth height. */
+function contours(ground, spacing) {
   const { columns, rows, xs, ys, zs } = ground.mesh;
-  const pieces = [];
-  const cut = (a, b, level) => {
+  const [minor, major] = [[], []];
+  const cut = (pieces, a, b, level) => {
     const t = (level - zs[a]) / (zs[b] - zs[a]);
     pieces.push(xs[a] + t * (xs[b] - xs[a]), ys[a] + t * (ys[b] - ys[a]), level);
   };
@@ -140,10 +148,10 @@ function contours(ground, spacing, main) {
     const low = Math.min(zs[a], zs[b], zs[c]);
     const high = Math.max(zs[a], zs[b], zs[c]);
     for (let n = Math.ceil(low / spacing); n * spacing < high; n += 1) {
-      if ((n % 5 === 0) !== main) continue;
+      const pieces = n % 5 === 0 ? major : minor;
       const level = n * spacing;
       for (const [p, q] of [[a, b], [b, c], [c, a]]) {
-        if (zs[p] < level !== zs[q] < level) cut(p, q, level);
+        if (zs[p] < level !== zs[q] < level) cut(pieces, p, q, level);
       }
       // Two of the three sides are cut, or none: never an odd end.
     }
@@ -155,5 +163,5 @@ function contours(ground, spacing, main) {
       triangle(k + 1, k + columns + 1, k + columns);
     }
   }
-  return pieces;
+  return { minor, major };
 }

@@ -1,8 +1,9 @@
 // The scene: ground, threats, ends and routes, seen by one camera; drawn when something has changed, and only then.
 
 import {
-  AmbientLight, Color, DirectionalLight, Group, OrbitControls, PerspectiveCamera, Raycaster, Scene, Vector2, Vector3, WebGLRenderer,
+  Color, Group, OrbitControls, PerspectiveCamera, Raycaster, Scene, Vector2, Vector3, WebGLRenderer,
 } from './vendor/three.js';
+import { drawnBySoftware } from './graphics.js';
 import { Labels } from './labels.js';
 import { onSchemeChange, palette } from './palette.js';
 import { Relief } from './relief.js';
@@ -10,6 +11,9 @@ import { Curtain, Dots, RouteLine, Trail } from './routes.js';
 import { Volumes } from './volumes.js';
 
 const VIEWS = { oblique: new Vector3(-0.26, -0.8, 0.78), above: new Vector3(0, -0.001, 1) };
+
+/** Of the pixels of the screen, where the processor draws and much changes. */
+const COARSE = 0.6;
 
 export class World {
   #root = new Group();
@@ -30,23 +34,22 @@ export class World {
   #frames = { count: 0, ms: 0 };
   #show = null;
   #view = 'oblique';
+  #ratio = Math.min(devicePixelRatio, drawnBySoftware() ? 1 : 2);
 
   /** Throws where the browser has no WebGL. */
   constructor(canvas, labels) {
     this.canvas = canvas;
     this.labels = new Labels(labels);
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer = new WebGLRenderer({ canvas, antialias: !drawnBySoftware(), powerPreference: 'high-performance' });
+    this.renderer.setPixelRatio(this.#ratio);
     this.#camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.#camera, canvas);
     this.controls.maxPolarAngle = Math.PI / 2 - 0.02;
     this.controls.zoomToCursor = true;
     this.controls.enableDamping = !matchMedia('(prefers-reduced-motion: reduce)').matches;
     this.controls.addEventListener('change', () => this.wake());
-    const sun = new DirectionalLight(0xffffff, 2.2);
-    sun.position.set(-0.5, 0.6, 0.9);
     this.#root.add(this.#relief.group, this.#volumes.group, this.#trail.group, this.#curtain.mesh, this.#waypoints.group, this.#mark.group, this.#faults.group, this.#handles.group, this.#ends.start.group, this.#ends.target.group);
-    this.#scene.add(this.#root, sun, new AmbientLight(0xffffff, 1.4));
+    this.#scene.add(this.#root);
     new ResizeObserver(() => this.#resize()).observe(canvas.parentElement);
     onSchemeChange(() => {
       this.colours = palette();
@@ -61,6 +64,15 @@ export class World {
   set exaggeration(times) {
     this.#root.scale.z = times;
     this.wake();
+  }
+
+  /** Whether much is drawn in a short time: where that is hard, it is drawn coarser meanwhile. */
+  set hurried(yes) {
+    const ratio = yes && drawnBySoftware() ? COARSE : this.#ratio;
+    if (this.renderer.getPixelRatio() === ratio) return;
+    this.renderer.setPixelRatio(ratio);
+    // At once, for a canvas of another size is empty.
+    this.#render();
   }
 
   get ground() { return this.#show?.ground ?? null; }

@@ -1,17 +1,21 @@
 // Threats in the scene: a core that is never entered and a soft zone that costs, from base to top.
 
 import {
-  BufferAttribute, BufferGeometry, CylinderGeometry, DoubleSide, Group, InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, Mesh,
-  MeshBasicMaterial, MeshLambertMaterial, ShapeUtils, Vector2,
+  BufferAttribute, BufferGeometry, Group, InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, ShapeUtils, Vector2,
 } from './vendor/three.js';
 
-const ROUND = 40;
+const ROUND = 48;
+/** From so many threats on, they are drawn with fewer sides. */
+const MANY = 60;
+// Where the light comes from, seen from above.
+const SUN = Math.PI * 0.75;
 const ARC = Math.PI / 10;
 
 /** Draws threats, given in metres of the frame, into a group. */
 export class Volumes {
   group = new Group();
-  #cylinder = new CylinderGeometry(1, 1, 1, ROUND, 1, false).rotateX(Math.PI / 2).translate(0, 0, 0.5);
+  #fine = prism(circle({ x: 0, y: 0 }, 1, ROUND), 0, 1);
+  #coarse = prism(circle({ x: 0, y: 0 }, 1, ROUND / 2), 0, 1);
 
   /** `threats` as `threatsOf` gives them. */
   draw(threats, ground, colours) {
@@ -30,7 +34,7 @@ export class Volumes {
 
   clear() {
     for (const child of [...this.group.children]) {
-      if (child.geometry !== this.#cylinder) child.geometry.dispose();
+      if (child.geometry !== this.#fine && child.geometry !== this.#coarse) child.geometry.dispose();
       child.material.dispose();
       child.dispose?.();
       this.group.remove(child);
@@ -42,7 +46,7 @@ export class Volumes {
       material.dispose();
       return;
     }
-    const mesh = new InstancedMesh(this.#cylinder, material, threats.length);
+    const mesh = new InstancedMesh(threats.length > MANY ? this.#coarse : this.#fine, material, threats.length);
     const matrix = new Matrix4();
     threats.forEach((threat, at) => {
       const r = radius(threat);
@@ -56,19 +60,7 @@ export class Volumes {
   }
 
   #prism(name, threat, ring, material) {
-    const corners = ring.map(({ x, y }) => new Vector2(x, y));
-    if (ShapeUtils.isClockWise(corners)) corners.reverse();
-    const positions = [];
-    corners.forEach((a, at) => {
-      const b = corners[(at + 1) % corners.length];
-      positions.push(a.x, a.y, threat.low, b.x, b.y, threat.low, b.x, b.y, threat.high, a.x, a.y, threat.low, b.x, b.y, threat.high, a.x, a.y, threat.high);
-    });
-    for (const face of ShapeUtils.triangulateShape(corners, [])) {
-      for (const corner of face) positions.push(corners[corner].x, corners[corner].y, threat.high);
-    }
-    const geometry = new BufferGeometry();
-    geometry.setAttribute('position', new BufferAttribute(new Float32Array(positions), 3));
-    geometry.computeVertexNormals();
+    const geometry = prism(ring, threat.low, threat.high);
     const mesh = new Mesh(geometry, material);
     mesh.name = name;
     mesh.renderOrder = name === 'cores' ? 2 : 3;
@@ -78,13 +70,15 @@ export class Volumes {
   /** The outlines on the ground, and those of the cores at their tops. */
   #footprints(threats, ground, colours) {
     const [cores, zones] = [[], []];
+    const many = threats.length > MANY;
+    const sides = many ? 20 : 64;
     for (const threat of threats) {
-      const ring = threat.ring ?? circle(threat.center, threat.radius);
+      const ring = threat.ring ?? circle(threat.center, threat.radius, sides);
       const lift = (ground.extent.max.x - ground.extent.min.x) / 2000;
       outline(cores, ring, ({ x, y }) => ground.at(x, y) + lift);
-      outline(cores, ring, () => threat.high);
+      if (!many) outline(cores, ring, () => threat.high);
       if (threat.low > ground.least) outline(cores, ring, () => threat.low);
-      const wide = threat.ring ? (threat.margin > 0 ? widened(threat.ring, threat.margin) : null) : threat.influence > threat.radius && circle(threat.center, threat.influence);
+      const wide = threat.ring ? (threat.margin > 0 ? widened(threat.ring, threat.margin) : null) : threat.influence > threat.radius && circle(threat.center, threat.influence, sides);
       if (wide) outline(zones, wide, ({ x, y }) => ground.at(x, y) + lift);
     }
     for (const [name, coordinates, color, opacity] of [['core outlines', cores, colours.core, 0.9], ['zone outlines', zones, colours.zone, 0.75]]) {
@@ -99,8 +93,33 @@ export class Volumes {
   }
 }
 
-const solid = (color) => new MeshLambertMaterial({ color, transparent: true, opacity: 0.62, depthWrite: false, side: DoubleSide });
-const soft = (color) => new MeshBasicMaterial({ color, transparent: true, opacity: 0.13, depthWrite: false });
+const solid = (color) => new MeshBasicMaterial({ color, vertexColors: true, transparent: true, opacity: 0.66, depthWrite: false });
+const soft = (color) => new MeshBasicMaterial({ color, transparent: true, opacity: 0.16, depthWrite: false });
+
+/** Walls and a lid over a ring, seen from outside, lighter where the sun is. */
+function prism(ring, low, high) {
+  const corners = ring.map(({ x, y }) => new Vector2(x, y));
+  if (ShapeUtils.isClockWise(corners)) corners.reverse();
+  const [positions, colors] = [[], []];
+  const shade = (light) => colors.push(light, light, light);
+  corners.forEach((a, at) => {
+    const b = corners[(at + 1) % corners.length];
+    positions.push(a.x, a.y, low, b.x, b.y, low, b.x, b.y, high, a.x, a.y, low, b.x, b.y, high, a.x, a.y, high);
+    // The outward normal is to the right of a wall that runs counter-clockwise.
+    const light = 0.72 + 0.2 * Math.cos(Math.atan2(a.x - b.x, b.y - a.y) - SUN);
+    for (let corner = 0; corner < 6; corner += 1) shade(light);
+  });
+  for (const face of ShapeUtils.triangulateShape(corners, [])) {
+    for (const corner of face) {
+      positions.push(corners[corner].x, corners[corner].y, high);
+      shade(1.1);
+    }
+  }
+  const geometry = new BufferGeometry();
+  geometry.setAttribute('position', new BufferAttribute(new Float32Array(positions), 3));
+  geometry.setAttribute('color', new BufferAttribute(new Float32Array(colors), 3));
+  return geometry;
+}
 
 /** Threats of a document in metres of the frame, with `low` and `high` where they have no limit of their own. */
 export function threatsOf(document, frame, ground) {

@@ -16,8 +16,5 @@ pub fn rules(limits: Limits) -> Rules {
         name: algorithm.name,
         parameters: algorithm.parameters.iter().map(rule).collect(),
     };
-    Rules {
-        limits,
-        algorithms: optimizer::ALL.iter().map(rules).collect(),
-    }
+    Rules::new(limits, optimizer::ALL.iter().map(rules).collect())
 }

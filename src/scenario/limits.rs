@@ -12,8 +12,10 @@ pub struct Limits {
     pub threats: usize,
     /// Vertices of all polygons together.
     pub polygon_vertices: usize,
-    /// Nodes of a terrain grid.
+    /// Nodes of a terrain grid, or of a dataset under an area.
     pub terrain_nodes: usize,
+    /// Bytes of an uploaded dataset; checked as it comes.
+    pub terrain_bytes: u64,
     /// Peaks of an analytic terrain.
     pub peaks: usize,
     /// Free waypoints, N.
@@ -36,6 +38,7 @@ impl Limits {
         threats: usize::MAX,
         polygon_vertices: usize::MAX,
         terrain_nodes: usize::MAX,
+        terrain_bytes: u64::MAX,
         peaks: usize::MAX,
         waypoints: usize::MAX,
         population: usize::MAX,
@@ -51,7 +54,8 @@ impl Default for Limits {
             body_bytes: 8 * 1024 * 1024,
             threats: 10_000,
             polygon_vertices: 20_000,
-            terrain_nodes: 1_000_000,
+            terrain_nodes: 4_000_000,
+            terrain_bytes: 1 << 30,
             peaks: 1_000,
             waypoints: 200,
             population: 10_000,

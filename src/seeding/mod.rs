@@ -23,13 +23,11 @@ mod tests {
     use crate::scenario::limits::Limits;
 
     pub(super) fn read(document: &str) -> Scenario {
-        let rules = Rules {
-            limits: Limits::default(),
-            algorithms: vec![AlgorithmRule {
-                name: "tms-sba",
-                parameters: Vec::new(),
-            }],
+        let algorithm = AlgorithmRule {
+            name: "tms-sba",
+            parameters: Vec::new(),
         };
+        let rules = Rules::new(Limits::default(), vec![algorithm]);
         json::read(document.as_bytes(), &rules, 1).unwrap_or_else(|fault| panic!("{fault:?}"))
     }
 

@@ -6,7 +6,9 @@ use std::time::Instant;
 use async_trait::async_trait;
 use tokio::sync::watch;
 
-use super::{Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Webhook};
+use super::{
+    DatasetUse, Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Webhook,
+};
 use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Submission};
 use crate::telemetry::Instruments;
@@ -123,6 +125,11 @@ impl Store for MeasuredStore {
 
     fn changes(&self, id: PlanId) -> watch::Receiver<u64> {
         self.store.changes(id)
+    }
+
+    async fn datasets_in_use(&self) -> Result<Vec<DatasetUse>, StoreError> {
+        let uses = self.store.datasets_in_use();
+        self.measured("datasets_in_use", uses).await
     }
 
     async fn stats(&self) -> Result<Stats, StoreError> {

@@ -129,6 +129,9 @@ pub trait Store: Send + Sync + 'static {
     /// longer there is no error.
     async fn webhook_tried(&self, id: PlanId, next_ms: Option<i64>) -> Result<(), StoreError>;
 
+    /// The datasets that plans are planned over, whoever's the plans are, in the order of their sums.
+    async fn datasets_in_use(&self) -> Result<Vec<DatasetUse>, StoreError>;
+
     /// Counts for the queue's head-room and `Retry-After`.
     async fn stats(&self) -> Result<Stats, StoreError>;
 
@@ -225,6 +228,17 @@ pub struct Webhook {
     pub url: String,
     /// How often that has been tried.
     pub tries: u32,
+}
+
+/// How many plans are planned over a dataset.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DatasetUse {
+    /// As in [`Submission::dataset`].
+    pub sha256: String,
+    /// Plans that are queued or running.
+    pub active: u64,
+    /// All that are kept.
+    pub plans: u64,
 }
 
 /// What remains of a removed plan.

@@ -11,7 +11,8 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
 use super::{
-    Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Trouble, Webhook,
+    DatasetUse, Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Trouble,
+    Webhook,
 };
 use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Submission};
@@ -216,6 +217,11 @@ impl Store for Reopening {
     async fn webhook_tried(&self, id: PlanId, next_ms: Option<i64>) -> Result<(), StoreError> {
         let store = self.store()?;
         self.heed(&store, store.webhook_tried(id, next_ms).await)
+    }
+
+    async fn datasets_in_use(&self) -> Result<Vec<DatasetUse>, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.datasets_in_use().await)
     }
 
     async fn stats(&self) -> Result<Stats, StoreError> {

@@ -3,11 +3,13 @@
 //! Adding a kind is one file beside `flat.rs` and one variant of [`Terrain`].
 
 mod cells;
+mod datasets;
 pub mod dem;
 mod flat;
 mod grid;
 mod peaks;
 
+pub use datasets::{DatasetError, Datasets, Found, NoDatasets, is_dataset_name};
 pub use dem::Dem;
 pub use flat::Flat;
 pub use grid::Grid;

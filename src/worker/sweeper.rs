@@ -1,5 +1,8 @@
-//! Removes plans whose time has come, by a clock that is not believed when it jumps.
+//! Removes plans whose time has come, by a clock that is not believed when it jumps, and datasets that
+//! nothing refers to any more.
 
+use std::collections::BTreeSet;
+use std::error::Error;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -7,6 +10,7 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::Instant;
 
+use crate::catalogue::Catalogue;
 use crate::store::{Clock, SWEEP, Store};
 
 /// Between two sweeps.
@@ -30,10 +34,10 @@ impl Sweeper {
     /// # Panics
     /// Outside a tokio runtime.
     #[must_use]
-    pub fn start(store: Arc<dyn Store>, clock: Clock) -> Self {
+    pub fn start(store: Arc<dyn Store>, catalogue: Arc<dyn Catalogue>, clock: Clock) -> Self {
         let (told, jump_ms) = watch::channel(None);
         Self {
-            task: tokio::spawn(sweep(store, clock, told)),
+            task: tokio::spawn(sweep(store, catalogue, clock, told)),
             jump_ms,
         }
     }
@@ -51,7 +55,12 @@ impl Drop for Sweeper {
     }
 }
 
-async fn sweep(store: Arc<dyn Store>, clock: Clock, told: watch::Sender<Option<i64>>) {
+async fn sweep(
+    store: Arc<dyn Store>,
+    catalogue: Arc<dyn Catalogue>,
+    clock: Clock,
+    told: watch::Sender<Option<i64>>,
+) {
     let began = Instant::now();
     let mut judge = Judge::new(clock());
     let mut sound = true;
@@ -79,7 +88,26 @@ async fn sweep(store: Arc<dyn Store>, clock: Clock, told: watch::Sender<Option<i
             }
             break;
         }
+        if let Err(error) = sweep_datasets(&*store, &catalogue).await {
+            tracing::debug!(%error, "datasets were not swept; trying again");
+        }
     }
+}
+
+/// Content that no name stands for goes with the last plan over it.
+async fn sweep_datasets(
+    store: &dyn Store,
+    catalogue: &Arc<dyn Catalogue>,
+) -> Result<(), Box<dyn Error + Send + Sync>> {
+    let asked = catalogue.clone();
+    if !tokio::task::spawn_blocking(move || asked.has_unnamed()).await? {
+        return Ok(());
+    }
+    let uses = store.datasets_in_use().await?;
+    let used: BTreeSet<String> = uses.into_iter().map(|used| used.sha256).collect();
+    let asked = catalogue.clone();
+    tokio::task::spawn_blocking(move || asked.sweep(&used)).await??;
+    Ok(())
 }
 
 /// Compares the wall clock with the time that has passed.

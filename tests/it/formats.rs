@@ -3,7 +3,7 @@
 use std::fs;
 
 use axum::http::Method;
-use noctule::export::document::{Origin, Position, ResultDocument, Timing};
+use noctule::export::document::{Convergence, Origin, Position, ResultDocument, Timing};
 use noctule::export::{ALL, sha256_hex};
 use noctule::job::Status;
 use noctule::planner;
@@ -60,7 +60,20 @@ async fn ended(api: &Api, scenario: &Value, lat: f64, lon: f64) -> String {
         best_cost: None,
         evaluations: 1,
         iteration: 1,
-        document: ResultDocument::new(&outcome, origin).to_json(),
+        document: ResultDocument {
+            evaluations: 1,
+            convergence: vec![Convergence {
+                iteration: 0,
+                evaluations: 1,
+                elapsed_ms: 0.0,
+                best_cost: None,
+                best_violation: 0.0,
+                mean_cost: 0.0,
+                feasible_fraction: 0.0,
+            }],
+            ..ResultDocument::new(&outcome, origin)
+        }
+        .to_json(),
     };
     let at_ms = lease.plan.created_ms + 50;
     api.store

@@ -15,7 +15,7 @@ use Imports::{Above, Only};
 /// From the ground up: geometry knows nothing of flying, the optimizers nothing of routes, the engine
 /// nothing of plans on disk, and nobody anything of the command line. Flags and logs stand below the
 /// engine: what may change a result is in the request.
-const ROOMS: [(&str, Imports); 17] = [
+const ROOMS: [(&str, Imports); 18] = [
     ("geometry", Only(&[])),
     ("terrain", Above),
     ("threat", Above),
@@ -29,6 +29,7 @@ const ROOMS: [(&str, Imports); 17] = [
     ("job", Above),
     ("config", Only(&["scenario"])),
     ("telemetry", Only(&["config"])),
+    ("catalogue", Above),
     ("store", Above),
     ("worker", Above),
     ("http", Above),

@@ -29,6 +29,7 @@ mod store_sqlite;
 mod store_trouble;
 mod support;
 mod svg;
+mod terrains;
 mod warm_start;
 mod webhook;
 mod worker;

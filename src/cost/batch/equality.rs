@@ -142,13 +142,11 @@ impl Choices {
 
     /// From the reader, for what does not matter here, and then at random.
     fn scenario(&mut self) -> Scenario {
-        let rules = Rules {
-            limits: Limits::default(),
-            algorithms: vec![AlgorithmRule {
-                name: "any",
-                parameters: Vec::new(),
-            }],
+        let algorithm = AlgorithmRule {
+            name: "any",
+            parameters: Vec::new(),
         };
+        let rules = Rules::new(Limits::default(), vec![algorithm]);
         let document =
             br#"{"frame":"local","start":{"x":0,"y":0,"z":0},"target":{"x":9,"y":0,"z":0},
             "altitude":{"min":0,"max":9},"area":{"min":{"x":0,"y":0},"max":{"x":1000,"y":1000}},"planner":{"algorithm":"any"}}"#;

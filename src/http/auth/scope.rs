@@ -77,6 +77,8 @@ impl Needs {
             ("GET", "/plans/{id}/events") => Self::Ticket,
             ("GET", _) | ("POST", "/plans/{id}/tickets") => Self::Scope(Scope::Read),
             (_, path) if path.starts_with("/plans") => Self::Scope(Scope::Plan),
+            // Whose it may not be is told by the handler.
+            ("PUT" | "DELETE", "/terrains/{name}") => Self::Scope(Scope::Plan),
             ("POST", "/scenarios:convert" | "/scenarios:ground") => Self::Scope(Scope::Plan),
             _ => Self::Scope(Scope::Admin),
         }
@@ -111,7 +113,8 @@ mod tests {
             ("GET", "/something/new", Needs::Scope(Scope::Read)),
             ("POST", "/plans", Needs::Scope(Scope::Plan)),
             ("DELETE", "/plans/{id}", Needs::Scope(Scope::Plan)),
-            ("PUT", "/terrains/{name}", Needs::Scope(Scope::Admin)),
+            ("PUT", "/terrains/{name}", Needs::Scope(Scope::Plan)),
+            ("PUT", "/something/new", Needs::Scope(Scope::Admin)),
             ("POST", "/livez", Needs::Scope(Scope::Admin)),
         ] {
             assert_eq!(Needs::of(method, path), needs, "{method} {path}");

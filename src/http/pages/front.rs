@@ -66,7 +66,7 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 34] = [
+static FILES: [File; 35] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
@@ -80,6 +80,7 @@ static FILES: [File; 34] = [
     file!("form.js"),
     file!("format.js"),
     file!("frame.js"),
+    file!("graphics.js"),
     file!("ground.js"),
     file!("import.js"),
     file!("labels.js"),

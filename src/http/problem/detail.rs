@@ -32,6 +32,9 @@ impl Problem {
             | Self::Infeasible(detail)
             | Self::Unflyable(detail)
             | Self::InvalidXml(detail)
+            | Self::InvalidTerrain(detail)
+            | Self::NoGround(detail)
+            | Self::PreconditionFailed(detail)
             | Self::NoScenario { detail, .. } => detail.clone(),
             Self::KeyInUrl => {
                 "URLs are written down on their way: send the key as Authorization: Bearer, and replace this one".to_owned()
@@ -48,6 +51,25 @@ impl Problem {
                 format!("nothing is at {path}; GET /docs lists what is")
             }
             Self::NoSuchPlan(id) => format!("there is no plan {id}"),
+            Self::NoSuchTerrain(name) => {
+                format!("there is no dataset {name:?}; GET /terrains lists what there is")
+            }
+            Self::TerrainInUse { name, plans } => {
+                format!("{plans} plans over {name} are queued or running; it can be deleted when they have ended")
+            }
+            Self::TerrainMounted(name) => {
+                format!("{name} is a file in the directory that the service was started with, which is only read; take another name")
+            }
+            Self::TerrainTooLarge(limit) => {
+                format!("the dataset is longer than {limit} bytes, the limit terrain_bytes of GET /limits")
+            }
+            Self::UploadStalled(limit) => {
+                let limit = limit.as_secs_f64();
+                format!("nothing came for {limit} s, or less than 8 KiB a second on the whole")
+            }
+            Self::TooManyUploads(most) => {
+                format!("{most} datasets are being uploaded, as many as may be; try again in 5 s")
+            }
             Self::MethodNotAllowed => {
                 "the header Allow lists the methods of this resource".to_owned()
             }

@@ -38,6 +38,7 @@ impl Problem {
             } => {
                 json!({"line": line, "column": column, "pointer": pointer})
             }
+            Self::TerrainInUse { plans, .. } => json!({"plans": plans}),
             Self::NoScenario { unused, .. } => json!({"unused": unused}),
             Self::InvalidParameter { name, .. } => json!({"parameter": name}),
             Self::NotAcceptable { available, .. } => json!({"available": available}),

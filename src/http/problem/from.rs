@@ -1,10 +1,14 @@
 //! What goes wrong below, as problems.
 
+use std::io::ErrorKind;
+
 use super::Problem;
+use crate::catalogue::CatalogueError;
 use crate::export::ExportError;
+use crate::http::auth::Scope;
 use crate::import::ImportError;
 use crate::scenario::json::Refusal;
-use crate::store::StoreError;
+use crate::store::{StoreError, Trouble};
 
 impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
@@ -49,7 +53,13 @@ impl From<Refusal> for Problem {
                 pointer,
                 detail,
             },
-            Refusal::Invalid(faults) => Self::InvalidScenario(faults),
+            Refusal::Invalid(faults) => {
+                let mut codes = faults.iter().map(|fault| fault.code);
+                if codes.any(|code| code == "unreachable-datasets") {
+                    return Self::unreachable_datasets(&faults[0].detail);
+                }
+                Self::InvalidScenario(faults)
+            }
         }
     }
 }
@@ -65,9 +75,44 @@ impl From<ExportError> for Problem {
                 name: fault.name,
                 detail: fault.detail,
             },
+            ExportError::NoGround(_) => Self::NoGround(detail),
             ExportError::Damaged(_) => {
                 tracing::error!(%error, "a stored plan cannot be read");
                 Self::Internal
+            }
+        }
+    }
+}
+
+impl Problem {
+    /// The caller is not to blame.
+    pub(in crate::http) fn unreachable_datasets(error: &str) -> Self {
+        tracing::error!(error, "the datasets cannot be reached");
+        Self::StoreUnavailable(Some(Trouble::Other))
+    }
+}
+
+impl From<CatalogueError> for Problem {
+    fn from(error: CatalogueError) -> Self {
+        let detail = error.to_string();
+        match error {
+            CatalogueError::Unknown { name } => Self::NoSuchTerrain(name),
+            CatalogueError::Mounted { name } => Self::TerrainMounted(name),
+            CatalogueError::Exists { .. } | CatalogueError::Changed { .. } => {
+                Self::PreconditionFailed(detail)
+            }
+            CatalogueError::Owned { .. } => Self::Forbidden(Scope::Admin),
+            CatalogueError::Unreadable(_) => Self::InvalidTerrain(detail),
+            CatalogueError::TooLarge { limit } => Self::TerrainTooLarge(limit),
+            CatalogueError::Unavailable { error, .. } => {
+                tracing::error!(error = detail, "the datasets cannot be reached");
+                Self::StoreUnavailable(Some(match error.kind() {
+                    ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Trouble::Full,
+                    ErrorKind::ReadOnlyFilesystem | ErrorKind::PermissionDenied => {
+                        Trouble::ReadOnly
+                    }
+                    _ => Trouble::Other,
+                }))
             }
         }
     }

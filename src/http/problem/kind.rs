@@ -43,7 +43,7 @@ impl Problem {
                 "forbidden",
                 "The key may not do this",
             ),
-            Self::NoSuchResource(_) | Self::NoSuchPlan(_) => {
+            Self::NoSuchResource(_) | Self::NoSuchPlan(_) | Self::NoSuchTerrain(_) => {
                 (StatusCode::NOT_FOUND, "not-found", "No such resource")
             }
             Self::MethodNotAllowed => (
@@ -56,7 +56,7 @@ impl Problem {
                 "not-acceptable",
                 "No acceptable format",
             ),
-            Self::BodyTooSlow(_) => (
+            Self::BodyTooSlow(_) | Self::UploadStalled(_) => (
                 StatusCode::REQUEST_TIMEOUT,
                 "request-timeout",
                 "The body came too slowly",
@@ -83,6 +83,36 @@ impl Problem {
                 "no-scenario",
                 "The file holds no scenario",
             ),
+            Self::TerrainInUse { .. } => (
+                StatusCode::CONFLICT,
+                "terrain-in-use",
+                "Plans need the dataset",
+            ),
+            Self::TerrainMounted(_) => (
+                StatusCode::CONFLICT,
+                "terrain-mounted",
+                "The dataset is the operator's",
+            ),
+            Self::NoGround(_) => (
+                StatusCode::CONFLICT,
+                "no-ground",
+                "The plan's ground is gone",
+            ),
+            Self::PreconditionFailed(_) => (
+                StatusCode::PRECONDITION_FAILED,
+                "precondition-failed",
+                "The dataset is not as expected",
+            ),
+            Self::InvalidTerrain(_) => (
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "invalid-terrain",
+                "The file cannot be used as terrain",
+            ),
+            Self::TooManyUploads(_) => (
+                StatusCode::SERVICE_UNAVAILABLE,
+                "too-many-uploads",
+                "Too many uploads",
+            ),
             Self::NoResult { .. } => (StatusCode::CONFLICT, "no-result", "The plan has no result"),
             Self::IdempotencyInFlight => (
                 StatusCode::CONFLICT,
@@ -90,7 +120,7 @@ impl Problem {
                 "The same request is being answered",
             ),
             Self::Gone(_) => (StatusCode::GONE, "gone", "The plan was removed"),
-            Self::BodyTooLarge(_) => (
+            Self::BodyTooLarge(_) | Self::TerrainTooLarge(_) => (
                 StatusCode::PAYLOAD_TOO_LARGE,
                 "body-too-large",
                 "The body is too large",

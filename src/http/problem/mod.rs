@@ -31,6 +31,29 @@ pub(super) enum Problem {
     NoSuchResource(String),
     /// There never was such a plan, or nothing with that name can be one.
     NoSuchPlan(String),
+    /// No dataset is called so.
+    NoSuchTerrain(String),
+    /// The file cannot be used as a dataset; why.
+    InvalidTerrain(String),
+    /// Plans are queued or running over the dataset.
+    TerrainInUse {
+        /// Its name.
+        name: String,
+        /// How many.
+        plans: u64,
+    },
+    /// The dataset is a file of the operator's.
+    TerrainMounted(String),
+    /// The dataset that a plan was made over is not there any more; why.
+    NoGround(String),
+    /// A dataset is not what the request expects; which.
+    PreconditionFailed(String),
+    /// A dataset is too long; the limit in bytes.
+    TerrainTooLarge(u64),
+    /// A dataset came too slowly; how long it may pause.
+    UploadStalled(Duration),
+    /// As many datasets are coming in as may.
+    TooManyUploads(usize),
     /// The plan was removed.
     Gone(Tombstone),
     /// The path exists, the method does not; axum adds `Allow`.
@@ -163,7 +186,7 @@ impl Problem {
             | Self::RateLimited { retry_after_s }
             | Self::Draining { retry_after_s } => Some(*retry_after_s),
             Self::StoreUnavailable(_) | Self::IdempotencyInFlight => Some(1),
-            Self::TooManyStreams(_) => Some(5),
+            Self::TooManyStreams(_) | Self::TooManyUploads(_) => Some(5),
             _ => None,
         }
     }

@@ -8,6 +8,7 @@ use crate::geometry::geodesy::{LatLon, LatLonBox, TangentPlane, undulation_m};
 use crate::geometry::{Point2, Point3, Rect};
 use crate::scenario::frame::{self, Datum, Frame, Wgs84};
 
+use super::dataset::Named;
 use super::fault::Faults;
 use super::fields::Fields;
 use super::path::Path;
@@ -34,9 +35,13 @@ pub(super) struct Earth {
 
 impl Chart {
     /// The chart that a document asks for; `None` where it cannot be told which.
-    pub(super) fn of(fields: &Fields<'_>, faults: &mut Faults) -> Option<Self> {
+    pub(super) fn of(
+        fields: &Fields<'_>,
+        dataset: Option<&Named<'_>>,
+        faults: &mut Faults,
+    ) -> Option<Self> {
         let frame = fields.or("frame", "local", faults, |at, faults| {
-            let choice = at.choice(&["local", "wgs84"], &[], faults)?;
+            let choice = at.choice(&["local", "wgs84"], faults)?;
             Some(if choice == "wgs84" { "wgs84" } else { "local" })
         })?;
         if frame == "local" {
@@ -50,7 +55,7 @@ impl Chart {
             return Some(Self::Local);
         }
         let datum = fields.or("altitude_datum", Datum::Msl, faults, |at, faults| {
-            let choice = at.choice(&["msl", "ellipsoid"], &[], faults)?;
+            let choice = at.choice(&["msl", "ellipsoid"], faults)?;
             Some(if choice == "msl" {
                 Datum::Msl
             } else {
@@ -61,8 +66,13 @@ impl Chart {
             area(at, faults).map(Some)
         })?;
         let sketch = sketch::Sketch::of(fields);
-        let area = given.unwrap_or_else(|| sketch.area());
-        Earth::over(area, datum, sketch.mean_alt, faults).map(|earth| Self::Wgs84(Box::new(earth)))
+        let earth = |area| Earth::over(area, datum, sketch.mean_alt);
+        let area = given.unwrap_or_else(|| match dataset {
+            Some(dataset) => dataset.within(sketch.area(), &sketch.ends, earth),
+            None => sketch.area(),
+        });
+        let earth = earth(area);
+        earth.check(faults).then(|| Self::Wgs84(Box::new(earth)))
     }
 
     /// The frame, with all that was written in it.
@@ -156,7 +166,25 @@ impl Chart {
 
 impl Earth {
     /// The plane in the middle of `area`.
-    fn over(area: LatLonBox, datum: Datum, mean_alt: f64, faults: &mut Faults) -> Option<Self> {
+    fn over(area: LatLonBox, datum: Datum, mean_alt: f64) -> Self {
+        let middle = area.middle();
+        let undulation_m = undulation_m(middle);
+        let height_m = match datum {
+            Datum::Msl => mean_alt + undulation_m,
+            Datum::Ellipsoid => mean_alt,
+        };
+        Self {
+            datum,
+            plane: TangentPlane::at(middle, height_m),
+            undulation_m,
+            area,
+            written: RefCell::default(),
+        }
+    }
+
+    /// That the plane fits the earth all over the area; whether it does.
+    fn check(&self, faults: &mut Faults) -> bool {
+        let area = self.area;
         let path = Path::Key(&Path::Root, "area");
         let farthest = area.min.lat.abs().max(area.max.lat.abs());
         if farthest > sketch::MAX_LATITUDE {
@@ -167,22 +195,9 @@ impl Earth {
                     sketch::MAX_LATITUDE
                 )
             });
-            return None;
+            return false;
         }
-        let middle = area.middle();
-        let undulation_m = undulation_m(middle);
-        let height_m = match datum {
-            Datum::Msl => mean_alt + undulation_m,
-            Datum::Ellipsoid => mean_alt,
-        };
-        let earth = Self {
-            datum,
-            plane: TangentPlane::at(middle, height_m),
-            undulation_m,
-            area,
-            written: RefCell::default(),
-        };
-        let rect = earth.rect();
+        let rect = self.rect();
         let (width, height) = (rect.max.x - rect.min.x, rect.max.y - rect.min.y);
         let widest = width.max(height);
         if !(width > 0.0 && height > 0.0) || widest > sketch::MAX_WIDTH_M {
@@ -193,9 +208,22 @@ impl Earth {
                     sketch::MAX_WIDTH_M
                 )
             });
-            return None;
+            return false;
         }
-        Some(earth)
+        true
+    }
+
+    /// The plane that is planned on.
+    pub(super) fn plane(&self) -> &TangentPlane {
+        &self.plane
+    }
+
+    /// Altitude of mean sea level, metres: what elevations of a dataset are above.
+    pub(super) fn sea_level_m(&self) -> f64 {
+        match self.datum {
+            Datum::Msl => 0.0,
+            Datum::Ellipsoid => self.undulation_m,
+        }
     }
 
     /// The greatest rectangle of the plane in the area: parallels and meridians bend in it.
@@ -218,7 +246,7 @@ impl Earth {
     }
 
     /// The place that was written for `point`.
-    fn place(&self, point: Point2) -> LatLon {
+    pub(super) fn place(&self, point: Point2) -> LatLon {
         let written = self.written.borrow().get(&frame::key(point)).copied();
         written.unwrap_or_else(|| self.plane.geodetic(point))
     }

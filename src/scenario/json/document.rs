@@ -7,6 +7,7 @@ use crate::threat::Threat;
 
 use super::Rules;
 use super::chart::Chart;
+use super::dataset::{Named, Site};
 use super::ends;
 use super::fault::Faults;
 use super::fields::Fields;
@@ -52,7 +53,8 @@ pub(super) fn document(
     }
     .fields(FIELDS, faults)?;
     let name = fields.or("name", None, faults, name);
-    let chart = Chart::of(&fields, faults);
+    let dataset = Named::of(&fields, &*rules.datasets);
+    let chart = Chart::of(&fields, dataset.as_ref(), faults);
     let altitude = fields.required("altitude", faults, vehicle::altitude);
     let draft = fields.or("vehicle", vehicle::DEFAULT, faults, vehicle::vehicle);
     let weights = fields.or(
@@ -66,7 +68,7 @@ pub(super) fn document(
     let planner = section(&fields, "planner", &Node::Object(Box::default()), |at| {
         planner(at, &chart, rules, drawn_seed, faults)
     });
-    let place = place(&fields, &chart, rules, faults);
+    let place = place(&fields, dataset.as_ref(), &chart, rules, faults);
     let (place, planner) = (place?, planner?);
     let distance = (place.target - place.start).norm();
     check_samples(
@@ -113,7 +115,13 @@ struct Place {
     terrain: Terrain,
 }
 
-fn place(fields: &Fields<'_>, chart: &Chart, rules: &Rules, faults: &mut Faults) -> Option<Place> {
+fn place(
+    fields: &Fields<'_>,
+    dataset: Option<&Named<'_>>,
+    chart: &Chart,
+    rules: &Rules,
+    faults: &mut Faults,
+) -> Option<Place> {
     let start = fields.required("start", faults, |at, faults| chart.point3(at, faults));
     let target = fields.required("target", faults, |at, faults| chart.point3(at, faults));
     let given_area = match chart.area(start, target) {
@@ -125,9 +133,23 @@ fn place(fields: &Fields<'_>, chart: &Chart, rules: &Rules, faults: &mut Faults)
     let threats = fields.or("threats", Vec::new(), faults, |at, faults| {
         threats(at, chart, &rules.limits, faults)
     });
-    let ground = fields.or("terrain", terrain::DEFAULT, faults, |at, faults| {
-        terrain::terrain(at, chart, &rules.limits, faults)
+    let site = Site {
+        named: dataset,
+        datasets: &*rules.datasets,
+        chart,
+        limits: &rules.limits,
+        area: given_area.flatten(),
+        area_is_given: fields.has("area"),
+        ends: [("start", start), ("target", target)],
+    };
+    let ground = fields.or("terrain", (terrain::DEFAULT, None), faults, |at, faults| {
+        terrain::terrain(at, &site, faults)
     });
+    let (ground, cut_area) = ground.unzip();
+    let given_area = match cut_area.flatten() {
+        Some(area) => Some(Some(area)),
+        None => given_area,
+    };
     if let (Some(start), Some(target)) = (start, target) {
         ends::check_apart(start, target, faults);
     }

@@ -49,16 +49,12 @@ pub(super) fn check_ground(
     faults: &mut Faults,
 ) {
     let path = Path::Key(&Path::Root, name);
+    let what = match terrain {
+        Terrain::Dem(_) => "the dataset",
+        _ => "the terrain grid",
+    };
     if let Some(extent) = terrain.extent().filter(|extent| !extent.contains(end.xy())) {
-        return outside(
-            &path,
-            "outside-terrain",
-            "the terrain grid",
-            end,
-            extent,
-            chart,
-            faults,
-        );
+        return outside(&path, "outside-terrain", what, end, extent, chart, faults);
     }
     let ground = terrain.elevation(end.xy());
     if ground - end.z > SUNK_M {

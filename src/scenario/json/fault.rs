@@ -43,10 +43,6 @@ pub const CODES: &[(&str, &str)] = &[
         "the text is none of the values the field takes",
     ),
     (
-        "not-available",
-        "a known value that this release does not offer",
-    ),
-    (
         "not-applicable",
         "the field has no meaning beside the others",
     ),
@@ -68,7 +64,21 @@ pub const CODES: &[(&str, &str)] = &[
     ("empty-area", "the area has no width or no height"),
     (
         "area-outside-terrain",
-        "the terrain grid does not cover the area",
+        "the terrain grid or the dataset does not cover the area",
+    ),
+    (
+        "no-elevation",
+        "the dataset has a hole in the area, or below the start or the target",
+    ),
+    ("unknown-dataset", "no dataset has this name"),
+    (
+        "replaced-dataset",
+        "the content that was asked for is no longer kept",
+    ),
+    ("unreadable-dataset", "the dataset cannot be used here"),
+    (
+        "unreachable-datasets",
+        "the service cannot reach its datasets now",
     ),
     (
         "area-too-wide",
@@ -92,7 +102,7 @@ pub const CODES: &[(&str, &str)] = &[
     ),
     (
         "outside-terrain",
-        "the start or the target lies outside the terrain grid",
+        "the start or the target lies outside the terrain grid or the dataset",
     ),
     ("target-is-start", "the target is the start"),
     (
@@ -149,6 +159,26 @@ pub enum Refusal {
     /// more that counts the rest.
     #[error("{}", Lines(.0))]
     Invalid(Vec<Fault>),
+}
+
+impl Refusal {
+    /// The fault of a dataset that is not there or cannot be used, when there is one: a document that was
+    /// accepted before can have no other.
+    #[must_use]
+    pub fn lost_ground(&self) -> Option<&Fault> {
+        let Self::Invalid(faults) = self else {
+            return None;
+        };
+        faults.iter().find(|fault| {
+            [
+                "unknown-dataset",
+                "replaced-dataset",
+                "unreadable-dataset",
+                "unreachable-datasets",
+            ]
+            .contains(&fault.code)
+        })
+    }
 }
 
 /// The faults, one a line.

@@ -47,7 +47,6 @@ impl<'a> At<'a> {
     pub(super) fn variant<'k>(
         self,
         kinds: &[(&'k str, &'static [&'static str])],
-        later: &[&str],
         faults: &mut Faults,
     ) -> Option<(&'k str, Fields<'a>)> {
         if !matches!(self.node, Node::Object(_)) {
@@ -61,7 +60,7 @@ impl<'a> At<'a> {
             });
             return None;
         };
-        let kind = At { node, path: &path }.choice(&names, later, faults)?;
+        let kind = At { node, path: &path }.choice(&names, faults)?;
         let (_, allowed) = kinds.iter().find(|(name, _)| *name == kind)?;
         Some((kind, self.fields(allowed, faults)?))
     }

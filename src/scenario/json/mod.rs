@@ -8,6 +8,7 @@
 //! checked before the text is here.
 
 mod chart;
+mod dataset;
 mod document;
 mod ends;
 mod fault;
@@ -29,8 +30,11 @@ mod writer;
 pub use fault::{CODES, Fault, MAX_LISTED, Refusal};
 pub use parameters::{COMMON, CommonParameter, Takes};
 
+use std::sync::Arc;
+
 use super::Scenario;
 use super::limits::Limits;
+use crate::terrain::{Datasets, NoDatasets};
 
 /// A search algorithm that a document may name.
 #[derive(Debug, Clone)]
@@ -59,6 +63,26 @@ pub struct Rules {
     pub limits: Limits,
     /// The table of algorithms; the first one is the default.
     pub algorithms: Vec<AlgorithmRule>,
+    /// Where datasets are found.
+    pub datasets: Arc<dyn Datasets>,
+}
+
+impl Rules {
+    /// Where there are no datasets.
+    #[must_use]
+    pub fn new(limits: Limits, algorithms: Vec<AlgorithmRule>) -> Self {
+        Self {
+            limits,
+            algorithms,
+            datasets: Arc::new(NoDatasets),
+        }
+    }
+
+    /// The same with `datasets`.
+    #[must_use]
+    pub fn with_datasets(self, datasets: Arc<dyn Datasets>) -> Self {
+        Self { datasets, ..self }
+    }
 }
 
 /// Read a scenario document; `drawn_seed` (modulo 2^53) is used where it names none.

@@ -131,7 +131,7 @@ pub(super) fn parameters(
         let at = At { node, path: &path };
         sound &= match allowed[slot] {
             "quadrature" => at
-                .choice(QUADRATURES, &[], faults)
+                .choice(QUADRATURES, faults)
                 .map(|choice| {
                     if choice == "paper" {
                         parameters.quadrature = Quadrature::Paper;

@@ -24,8 +24,10 @@ const DEGREE_M: f64 = 111_320.0;
 const GRAIN: f64 = 1e6;
 
 /// Where everything is, about.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Sketch {
+    /// The start and the target, as far as they can be read.
+    pub(super) ends: Vec<LatLon>,
     /// Between start and target, metres above the datum; 0 where neither can be read.
     pub(super) mean_alt: f64,
     /// Longitudes are counted from here, so that the antimeridian is nothing special.
@@ -63,8 +65,10 @@ impl Sketch {
                     .filter_map(|node| Some((place(node)?, reach))),
             );
         }
+        let ends: Vec<LatLon> = ends.into_iter().filter_map(|end| place(end?)).collect();
         let reference = places.first().map_or(0.0, |(place, _)| place.lon);
         let mut sketch = Self {
+            ends,
             mean_alt: alts.iter().sum::<f64>() / alts.len().max(1) as f64,
             reference,
             south: f64::INFINITY,

@@ -1,9 +1,11 @@
-//! `terrain`: flat, peaks and grid.
+//! `terrain`: flat, peaks, grid and dataset.
 
+use crate::geometry::Rect;
 use crate::scenario::limits::Limits;
 use crate::terrain::{Flat, Grid, Peak, Peaks, Terrain};
 
 use super::chart::Chart;
+use super::dataset::{self, Site};
 use super::fault::Faults;
 use super::fields::Fields;
 use super::path::Path;
@@ -18,25 +20,32 @@ const GRID: &[&str] = &["kind", "origin", "cell", "columns", "rows", "elevations
 /// The terrain of a document that names none.
 pub(super) const DEFAULT: Terrain = Terrain::Flat(Flat { elevation: 0.0 });
 
-/// Terrain of any kind.
+/// Terrain of any kind, and the area as far as a dataset cuts it.
 pub(super) fn terrain(
     at: At<'_>,
-    chart: &Chart,
-    limits: &Limits,
+    site: &Site<'_>,
     faults: &mut Faults,
-) -> Option<Terrain> {
-    match at.variant(
-        &[("flat", FLAT), ("peaks", PEAKS), ("grid", GRID)],
-        &["dataset"],
-        faults,
-    )? {
+) -> Option<(Terrain, Option<Rect>)> {
+    let kinds = [
+        ("flat", FLAT),
+        ("peaks", PEAKS),
+        ("grid", GRID),
+        ("dataset", dataset::FIELDS),
+    ];
+    let (chart, limits) = (site.chart, site.limits);
+    let terrain = match at.variant(&kinds, faults)? {
         ("flat", fields) => {
             let elevation = fields.number_or("elevation", 0.0, COORDINATE, faults)?;
-            Some(Terrain::Flat(Flat { elevation }))
+            Terrain::Flat(Flat { elevation })
         }
-        ("peaks", fields) => peaks(&fields, chart, limits, faults).map(Terrain::Peaks),
-        (_, fields) => grid(&fields, chart, limits, faults).map(Terrain::Grid),
-    }
+        ("peaks", fields) => Terrain::Peaks(peaks(&fields, chart, limits, faults)?),
+        ("grid", fields) => Terrain::Grid(grid(&fields, chart, limits, faults)?),
+        (_, fields) => {
+            let (terrain, area) = dataset::ground(&fields, site, faults)?;
+            return Some((terrain, Some(area)));
+        }
+    };
+    Some((terrain, None))
 }
 
 fn peaks(

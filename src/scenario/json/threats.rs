@@ -69,8 +69,7 @@ fn vertex_count(at: At<'_>) -> usize {
 
 /// One threat; with `read_vertices` false there are too many to look at.
 fn threat(at: At<'_>, chart: &Chart, read_vertices: bool, faults: &mut Faults) -> Option<Threat> {
-    let (kind, fields) =
-        at.variant(&[("cylinder", CYLINDER), ("polygon", POLYGON)], &[], faults)?;
+    let (kind, fields) = at.variant(&[("cylinder", CYLINDER), ("polygon", POLYGON)], faults)?;
     let name = fields.or("name", None, faults, name);
     let base = fields.nullable("base", COORDINATE, faults);
     let top = fields.nullable("top", COORDINATE, faults);

@@ -116,35 +116,20 @@ impl<'a> At<'a> {
         }
     }
 
-    /// One of `choices`; a text out of `later` is known but not offered by this release.
-    pub(super) fn choice<'c>(
-        self,
-        choices: &[&'c str],
-        later: &[&str],
-        faults: &mut Faults,
-    ) -> Option<&'c str> {
+    /// One of `choices`.
+    pub(super) fn choice<'c>(self, choices: &[&'c str], faults: &mut Faults) -> Option<&'c str> {
         let text = self.text(faults)?;
         if let Some(choice) = choices.iter().find(|choice| **choice == text) {
             return Some(choice);
         }
-        let code = if later.contains(&text) {
-            "not-available"
-        } else {
-            "unknown-value"
-        };
-        faults.add(self.path, code, || {
+        faults.add(self.path, "unknown-value", || {
             let allowed = if choices.len() == 1 {
                 "must be"
             } else {
                 "must be one of"
             };
-            let refused = if code == "not-available" {
-                ", which is not available yet"
-            } else {
-                ""
-            };
             format!(
-                "{} is {}{refused}, {allowed} {}",
+                "{} is {}, {allowed} {}",
                 self.path.label(),
                 show(self.node),
                 choices.join(", ")

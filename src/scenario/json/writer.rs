@@ -116,6 +116,7 @@ enum WireTerrain<'a> {
     },
     Dataset {
         name: &'a str,
+        sha256: &'a str,
     },
 }
 
@@ -336,7 +337,10 @@ impl<'a> WireTerrain<'a> {
                 rows: grid.rows,
                 elevations: &grid.elevations,
             },
-            Terrain::Dem(dem) => Self::Dataset { name: dem.name() },
+            Terrain::Dem(dem) => Self::Dataset {
+                name: dem.name(),
+                sha256: dem.sha256(),
+            },
         }
     }
 }

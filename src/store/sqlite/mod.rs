@@ -30,8 +30,8 @@ use self::read::Readers;
 use self::records::Records;
 use self::writer::Writer;
 use super::{
-    Clock, Ending, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError, Submitted,
-    Trouble, Webhook,
+    Clock, DatasetUse, Ending, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError,
+    Submitted, Trouble, Webhook,
 };
 use crate::export::document::Incumbent;
 use crate::job::state::Refused;
@@ -251,6 +251,10 @@ impl Store for SqliteStore {
             .await
     }
 
+    async fn datasets_in_use(&self) -> Result<Vec<DatasetUse>, StoreError> {
+        self.readers.read(read::datasets_in_use).await
+    }
+
     async fn stats(&self) -> Result<Stats, StoreError> {
         if let Some(stats) = self.records.stats() {
             return Ok(stats);
@@ -383,6 +387,7 @@ mod tests {
             quota: None,
             webhook: None,
             idempotency: None,
+            dataset: None,
         }
     }
 

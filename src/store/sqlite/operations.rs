@@ -42,6 +42,11 @@ pub(super) fn submit(
     tx.connection
         .prepare_cached("INSERT INTO scenarios (plan_seq, document) VALUES (?1, ?2)")?
         .execute(params![row.seq, submission.scenario])?;
+    if let Some(dataset) = &submission.dataset {
+        tx.connection
+            .prepare_cached("UPDATE plans SET dataset = ?1 WHERE seq = ?2")?
+            .execute(params![dataset, row.seq])?;
+    }
     idempotency::remember(tx, submission)?;
     webhooks::keep(tx, row.seq, submission)?;
     tx.queued += 1;

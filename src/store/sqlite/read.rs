@@ -11,7 +11,7 @@ use super::row::{COLUMNS, PlanRow};
 use super::{BUSY_TIMEOUT, closed};
 use crate::export::document::Incumbent;
 use crate::job::{Event, NumberedEvent, Plan, PlanId, Status};
-use crate::store::{EventPage, ListQuery, Stats, StoreError, TOMBSTONE_MS, Tombstone};
+use crate::store::{DatasetUse, EventPage, ListQuery, Stats, StoreError, TOMBSTONE_MS, Tombstone};
 
 /// Reads at the same time; more wait.
 const CONNECTIONS: u32 = 8;
@@ -231,6 +231,23 @@ pub(super) fn events(
         forgotten: forgotten.cast_unsigned(),
         events,
     })
+}
+
+/// See [`Store::datasets_in_use`](crate::store::Store::datasets_in_use).
+pub(super) fn datasets_in_use(connection: &Connection) -> Result<Vec<DatasetUse>, StoreError> {
+    let mut statement = connection.prepare_cached(
+        "SELECT dataset, sum(status IN ('queued', 'running')), count(*) \
+         FROM plans INDEXED BY plans_by_dataset WHERE dataset IS NOT NULL \
+         GROUP BY dataset ORDER BY dataset",
+    )?;
+    let uses = statement.query_map([], |row| {
+        Ok(DatasetUse {
+            sha256: row.get(0)?,
+            active: row.get::<_, i64>(1)?.cast_unsigned(),
+            plans: row.get::<_, i64>(2)?.cast_unsigned(),
+        })
+    })?;
+    Ok(uses.collect::<Result<_, _>>()?)
 }
 
 pub(super) fn stats(connection: &Connection) -> Result<Stats, StoreError> {

@@ -119,6 +119,7 @@ mod tests {
             owner: None,
             quota: None,
             idempotency: None,
+            dataset: None,
             webhook: None,
         };
         Plan {

@@ -108,6 +108,10 @@ CREATE TABLE webhooks (                    -- until they have been told or given
 ) STRICT;
 CREATE INDEX webhooks_due ON webhooks (due_ms) WHERE due_ms IS NOT NULL;
 ",
+    "
+ALTER TABLE plans ADD COLUMN dataset TEXT; -- what stands for the dataset that it is planned over
+CREATE INDEX plans_by_dataset ON plans (dataset, status) WHERE dataset IS NOT NULL;
+",
 ];
 
 /// Bring the file up to this version; refuse those of a newer one.

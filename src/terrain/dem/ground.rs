@@ -28,6 +28,7 @@ const MARGINS: [f64; 3] = [1.0, 0.5, 0.25];
 #[derive(Clone, PartialEq)]
 pub struct Dem {
     name: String,
+    sha256: String,
     raster: Raster,
     fit: Fit,
     /// Elevations are known all over it.
@@ -84,6 +85,7 @@ impl Dem {
         let chord_m = (8.0 * CHORD_M / (bend * steepest).max(1e-30)).sqrt();
         Ok(Self {
             name: String::new(),
+            sha256: String::new(),
             raster,
             fit,
             extent,
@@ -94,19 +96,43 @@ impl Dem {
         })
     }
 
-    /// The same, called `name`.
+    /// The same, out of the dataset called `name`, which `sha256` stands for whatever it is called.
     #[must_use]
-    pub fn named(self, name: impl Into<String>) -> Self {
+    pub fn named(self, name: impl Into<String>, sha256: impl Into<String>) -> Self {
         Self {
             name: name.into(),
+            sha256: sha256.into(),
             ..self
         }
+    }
+
+    /// The same, higher by so many metres: above another datum.
+    #[must_use]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "rounding to single precision is what is wanted"
+    )]
+    pub fn lifted(mut self, metres: f64) -> Self {
+        if metres != 0.0 {
+            for elevation in &mut self.raster.elevations {
+                *elevation = (f64::from(*elevation) + metres) as f32;
+            }
+            self.slabs = Slabs::of(&self.raster);
+            self.steepest = steepest(&self.raster);
+        }
+        self
     }
 
     /// What the dataset is called; empty unless it was [`Dem::named`].
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// What stands for the dataset; empty likewise.
+    #[must_use]
+    pub fn sha256(&self) -> &str {
+        &self.sha256
     }
 
     /// The rectangle that has an elevation everywhere; beyond it, that of its edge goes on.

@@ -300,8 +300,16 @@ impl Dataset {
         })
     }
 
-    /// The elevations at `places`, metres, bilinear; `None` outside the data and beside no-data. Reads the file
-    /// once.
+    /// Whether `place` lies among the samples, be they elevations or no data.
+    #[must_use]
+    pub fn covers(&self, place: LatLon) -> bool {
+        let lattice = &self.metadata.lattice;
+        let cells = lattice.cells(place);
+        cells.is_some_and(|cells| lattice.cell(cells).is_some())
+    }
+
+    /// The elevations at `places`, metres, bilinear; `None` outside the data and beside no-data. Reads the
+    /// part of the file that they lie in, once.
     ///
     /// # Errors
     /// As [`Dataset::survey`].
@@ -322,7 +330,10 @@ impl Dataset {
                 nodes.insert(node, f32::NAN);
             }
         }
-        self.read(&lattice.span(), &mut |row, column, samples| {
+        let Some(span) = span(nodes.keys()) else {
+            return Ok(vec![None; places.len()]);
+        };
+        self.read(&span, &mut |row, column, samples| {
             for ([_, at], node) in nodes.range_mut([row, column]..[row, column + samples.len()]) {
                 *node = samples[at - column];
             }
@@ -391,6 +402,20 @@ impl Dataset {
             Reader::Hgt(layout) => layout.read(&self.path, span, &mut checked),
         }
     }
+}
+
+/// The rows and columns that hold all of `nodes`, each a row and a column; `None` without any.
+fn span<'a>(nodes: impl Iterator<Item = &'a [usize; 2]>) -> Option<Span> {
+    nodes.fold(None, |span, [row, column]| {
+        let Span { rows, columns } = span.unwrap_or(Span {
+            rows: *row..row + 1,
+            columns: *column..column + 1,
+        });
+        Some(Span {
+            rows: rows.start.min(*row)..rows.end.max(row + 1),
+            columns: columns.start.min(*column)..columns.end.max(column + 1),
+        })
+    })
 }
 
 impl fmt::Display for Format {

@@ -193,10 +193,10 @@ const CASES: &[Case] = &[
     ),
     (
         r#""columns":3,"rows":3"#,
-        r#""columns":1001,"rows":1000"#,
+        r#""columns":2001,"rows":2000"#,
         "/terrain/elevations",
         "too-many",
-        "the grid has 1001000 nodes, must have at most 1000000 (limit terrain_nodes)",
+        "the grid has 4002000 nodes, must have at most 4000000 (limit terrain_nodes)",
     ),
     (
         r#""spacing":5"#,
@@ -261,13 +261,6 @@ const CASES: &[Case] = &[
         "/planner/parameters/threads",
         "out-of-range",
         "threads is 0, must be >= 1 and <= 256",
-    ),
-    (
-        r#""kind":"grid""#,
-        r#""kind":"dataset""#,
-        "/terrain/kind",
-        "not-available",
-        "kind is \"dataset\", which is not available yet, must be one of flat, peaks, grid",
     ),
     (
         r#""frame":"local""#,
@@ -465,6 +458,7 @@ pub(crate) fn all_cases() -> Vec<(String, Fault)> {
     let detail = "the polygons have 20003 vertices together, must have at most 20000 (limit polygon_vertices)";
     cases.push((detailed, fault("/threats", "too-many", detail)));
     let in_degrees = super::wgs84::cases().into_iter();
+    let in_degrees = in_degrees.chain(super::dataset::cases());
     cases.extend(
         in_degrees
             .map(|(document, pointer, code, detail)| (document, fault(pointer, code, detail))),

@@ -1,6 +1,7 @@
 //! Scenario documents: what is accepted, and every fault of what is not.
 
 mod cases;
+mod dataset;
 mod fuzz;
 mod wgs84;
 
@@ -31,19 +32,17 @@ fn rules() -> Rules {
             max: 1.0,
         },
     ];
-    Rules {
-        limits: Limits::default(),
-        algorithms: vec![
-            AlgorithmRule {
-                name: "tms-sba",
-                parameters,
-            },
-            AlgorithmRule {
-                name: "sba",
-                parameters: Vec::new(),
-            },
-        ],
-    }
+    let algorithms = vec![
+        AlgorithmRule {
+            name: "tms-sba",
+            parameters,
+        },
+        AlgorithmRule {
+            name: "sba",
+            parameters: Vec::new(),
+        },
+    ];
+    Rules::new(Limits::default(), algorithms).with_datasets(dataset::datasets())
 }
 
 fn read(text: &str) -> Result<Scenario, Refusal> {

@@ -1,5 +1,6 @@
 //! The service without a socket, over a store of its own. Each answer is held to `openapi.yaml`.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -8,9 +9,10 @@ use axum::body::Body;
 use axum::http::{HeaderMap, Method, Request, StatusCode};
 use bytes::Bytes;
 use http_body_util::BodyExt as _;
+use noctule::catalogue::Directories;
 use noctule::http::auth::{Access, Keys, Settings};
 use noctule::http::webhook;
-use noctule::http::{self, AppState, Capacity, InFlight, Origins, Phase};
+use noctule::http::{self, AppState, Capacity, InFlight, Origins, Phase, Terrains};
 use noctule::planner;
 use noctule::scenario::limits::Limits;
 use noctule::store::measured::MeasuredStore;
@@ -31,7 +33,8 @@ pub(crate) struct Api {
     pub(crate) router: Router,
     pub(crate) phase: watch::Sender<Phase>,
     pub(crate) clock: watch::Sender<Option<i64>>,
-    _directory: TempDir,
+    uploads: PathBuf,
+    directory: TempDir,
 }
 
 /// An answer, read to its end.
@@ -83,6 +86,24 @@ impl Api {
         api
     }
 
+    /// Whose datasets are kept otherwise: the function is given the directory for uploads.
+    pub(crate) fn with_catalogue(open: impl FnOnce(PathBuf) -> Directories) -> Self {
+        let mut api = Self::new();
+        // A directory of its own: the first one is taken.
+        let catalogue = Arc::new(open(api.directory.path().join("more")));
+        let rules = (*api.state.rules).clone().with_datasets(catalogue.clone());
+        api.state.rules = Arc::new(rules);
+        api.state.terrains = Terrains::new(catalogue);
+        api.uploads = api.directory.path().join("more");
+        api.router = http::router(api.state.clone());
+        api
+    }
+
+    /// The directory of uploads.
+    pub(crate) fn uploads(&self) -> PathBuf {
+        self.uploads.clone()
+    }
+
     fn made(options: Options, access: Access, origins: &[&str]) -> Self {
         let queue = usize::try_from(options.queue_limit).expect("a small number");
         let directory = tempfile::tempdir().expect("a temporary directory");
@@ -92,12 +113,16 @@ impl Api {
         let clock = watch::channel(None);
         let origins: Vec<String> = origins.iter().map(ToString::to_string).collect();
         let (phase, watched) = watch::channel(Phase::Serving);
+        let uploads = directory.path().join("terrains");
+        let catalogue = Arc::new(Directories::new(uploads.clone(), None));
+        let limits = Limits {
+            body_bytes: 4096,
+            ..Limits::default()
+        };
         let state = AppState {
             store: store.clone(),
-            rules: Arc::new(planner::rules(Limits {
-                body_bytes: 4096,
-                ..Limits::default()
-            })),
+            rules: Arc::new(planner::rules(limits).with_datasets(catalogue.clone())),
+            terrains: Terrains::new(catalogue),
             capacity: Capacity { workers: 2, queue },
             in_flight: InFlight::default(),
             clock_jump_ms: clock.1,
@@ -114,7 +139,8 @@ impl Api {
             state,
             phase,
             clock: clock.0,
-            _directory: directory,
+            uploads,
+            directory,
         }
     }
 

@@ -7,7 +7,7 @@ use async_trait::async_trait;
 use noctule::export::document::Incumbent;
 use noctule::job::{Event, Plan, PlanId, Submission};
 use noctule::store::{
-    Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Webhook,
+    DatasetUse, Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Webhook,
 };
 use tokio::sync::watch;
 
@@ -105,6 +105,10 @@ impl Store for FaultyStore {
 
     async fn webhook_tried(&self, id: PlanId, next_ms: Option<i64>) -> Result<(), StoreError> {
         self.sound.webhook_tried(id, next_ms).await
+    }
+
+    async fn datasets_in_use(&self) -> Result<Vec<DatasetUse>, StoreError> {
+        self.sound.datasets_in_use().await
     }
 
     async fn stats(&self) -> Result<Stats, StoreError> {

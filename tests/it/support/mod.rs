@@ -3,6 +3,7 @@
 pub(crate) mod api;
 pub(crate) mod collector;
 pub(crate) mod description;
+pub(crate) mod elevations;
 pub(crate) mod engines;
 pub(crate) mod faulty_store;
 pub(crate) mod keys;

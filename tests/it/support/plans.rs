@@ -19,6 +19,7 @@ pub(crate) fn submission() -> Submission {
         quota: None,
         webhook: None,
         idempotency: None,
+        dataset: None,
     }
 }
 

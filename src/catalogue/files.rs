@@ -1,0 +1,61 @@
+//! Files that are whole or not there.
+
+use std::fs::{self, DirBuilder, File};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use uuid::Uuid;
+
+/// Make a directory for its owner alone, with those above it.
+pub(super) fn make_directory(path: &Path) -> io::Result<()> {
+    let mut builder = DirBuilder::new();
+    builder.recursive(true);
+    #[cfg(unix)]
+    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+    builder.create(path)
+}
+
+/// A name in `directory` that nothing has.
+pub(super) fn fresh_name(directory: &Path) -> PathBuf {
+    directory.join(format!("{}.part", Uuid::now_v7()))
+}
+
+/// Put `from`, which is on the disk, at `to`, durably.
+pub(super) fn put(from: &Path, to: &Path) -> io::Result<()> {
+    fs::rename(from, to)?;
+    sync_parent(to)
+}
+
+/// Write a small file at `path` in one step, by way of `incoming`.
+pub(super) fn write(incoming: &Path, path: &Path, text: &str) -> io::Result<()> {
+    let part = fresh_name(incoming);
+    let written = File::create_new(&part)
+        .and_then(|mut file| {
+            file.write_all(text.as_bytes())?;
+            file.sync_all()
+        })
+        .and_then(|()| put(&part, path));
+    if written.is_err() {
+        let _ = fs::remove_file(&part);
+    }
+    written
+}
+
+/// Remove a file that may have gone already, durably.
+pub(super) fn remove(path: &Path) -> io::Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => sync_parent(path),
+    }
+}
+
+/// A change is only found again after a power failure when its directory is on the disk too.
+fn sync_parent(path: &Path) -> io::Result<()> {
+    #[cfg(unix)]
+    if let Some(parent) = path.parent() {
+        File::open(parent)?.sync_all()?;
+    }
+    #[cfg(not(unix))]
+    let _ = path;
+    Ok(())
+}

@@ -1,0 +1,220 @@
+//! The operator's own files: a directory that is only read. A file's name without its extension, in
+//! lower case, is what scenarios call it.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
+
+use super::content::{Declaration, Identity};
+use super::{CatalogueError, Entry};
+use crate::terrain::dem::{Dataset, DemError, Survey};
+use crate::terrain::{DatasetError, Datasets, Found, is_dataset_name};
+
+/// Extensions of the files that count, in lower case.
+const EXTENSIONS: [&str; 4] = ["tif", "tiff", "asc", "hgt"];
+
+/// A directory of datasets that is only read.
+#[derive(Debug)]
+pub struct Mounted {
+    directory: PathBuf,
+    /// What has been found out, as long as the files stay as they were.
+    known: Mutex<Known>,
+}
+
+#[derive(Debug, Default)]
+struct Known {
+    files: HashMap<PathBuf, Look>,
+    /// Files that were complained about.
+    passed_over: BTreeSet<PathBuf>,
+}
+
+/// What is known of a file while its stamp is the same.
+#[derive(Debug, Clone)]
+struct Look {
+    stamp: Stamp,
+    sha256: String,
+    survey: Option<Survey>,
+}
+
+/// Changes when a file does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Stamp {
+    bytes: u64,
+    modified: Option<SystemTime>,
+}
+
+impl Stamp {
+    fn of(path: &Path) -> io::Result<Self> {
+        let metadata = fs::metadata(path)?;
+        Ok(Self {
+            bytes: metadata.len(),
+            modified: metadata.modified().ok(),
+        })
+    }
+}
+
+impl Mounted {
+    /// The files of `directory`, which is looked at anew whenever something is asked for.
+    ///
+    /// # Errors
+    /// [`CatalogueError::Unavailable`] when it cannot be read.
+    pub fn open(directory: &Path) -> Result<Self, CatalogueError> {
+        let mounted = Self {
+            directory: directory.to_owned(),
+            known: Mutex::default(),
+        };
+        mounted.files()?;
+        Ok(mounted)
+    }
+
+    /// Whether a file is called so.
+    pub(super) fn has(&self, name: &str) -> Result<bool, CatalogueError> {
+        Ok(self.files()?.contains_key(name))
+    }
+
+    /// Those that can be read.
+    pub(super) fn list(&self) -> Result<Vec<Entry>, CatalogueError> {
+        let mut entries = Vec::new();
+        for (name, path) in self.files()? {
+            match self.describe(&name, &path, false) {
+                Ok(entry) => entries.push(entry),
+                Err(error) => self.pass_over(&path, &error.to_string()),
+            }
+        }
+        Ok(entries)
+    }
+
+    pub(super) fn entry(&self, name: &str) -> Result<Entry, CatalogueError> {
+        match self.files()?.get(name) {
+            Some(path) => self.describe(name, path, true),
+            None => Err(CatalogueError::Unknown {
+                name: name.to_owned(),
+            }),
+        }
+    }
+
+    /// By name, the first of several files of the same name.
+    fn files(&self) -> Result<BTreeMap<String, PathBuf>, CatalogueError> {
+        let unreadable = |error| CatalogueError::unavailable("read", &self.directory, error);
+        let mut paths = Vec::new();
+        for entry in fs::read_dir(&self.directory).map_err(unreadable)? {
+            paths.push(entry.map_err(unreadable)?.path());
+        }
+        paths.sort();
+        let mut files = BTreeMap::new();
+        for path in paths {
+            let extension = path.extension().and_then(|extension| extension.to_str());
+            let counts = extension.is_some_and(|extension| {
+                EXTENSIONS.contains(&extension.to_ascii_lowercase().as_str())
+            });
+            if !counts || !path.is_file() {
+                continue;
+            }
+            let stem = path.file_stem().and_then(|stem| stem.to_str());
+            let name = stem.unwrap_or_default().to_ascii_lowercase();
+            if !is_dataset_name(&name) {
+                self.pass_over(&path, "its name is none that a scenario could use");
+            } else if files.contains_key(&name) {
+                self.pass_over(&path, "another file has the same name");
+            } else {
+                files.insert(name, path);
+            }
+        }
+        Ok(files)
+    }
+
+    /// Say once that a file is not used.
+    fn pass_over(&self, path: &Path, why: &str) {
+        if self.lock().passed_over.insert(path.to_owned()) {
+            tracing::warn!(file = %path.display(), why, "a mounted file is not used");
+        }
+    }
+
+    fn open_file(path: &Path) -> Result<(Dataset, Declaration), DemError> {
+        let filename = path.file_name().and_then(|name| name.to_str());
+        let declaration = Declaration {
+            crs: None,
+            filename: filename.map(str::to_owned),
+        };
+        declaration.open(None, path)
+    }
+
+    fn describe(&self, name: &str, path: &Path, wholly: bool) -> Result<Entry, CatalogueError> {
+        let (dataset, declaration) = Self::open_file(path)?;
+        let look = if wholly {
+            let mut look = self.look(path, &declaration)?;
+            if look.survey.is_none() {
+                look.survey = Some(dataset.survey()?);
+                self.remember(path, &look);
+            }
+            Some(look)
+        } else {
+            self.remembered(path)?
+        };
+        Ok(Entry {
+            name: name.to_owned(),
+            sha256: look.as_ref().map(|look| look.sha256.clone()),
+            bytes: Stamp::of(path).map_err(DemError::from)?.bytes,
+            metadata: dataset.metadata().clone(),
+            survey: look.and_then(|look| look.survey),
+            uploaded_ms: None,
+            owner: None,
+        })
+    }
+
+    /// What is known of the file as it is now.
+    fn remembered(&self, path: &Path) -> Result<Option<Look>, DemError> {
+        let stamp = Stamp::of(path)?;
+        let known = self.lock().files.get(path).cloned();
+        Ok(known.filter(|look| look.stamp == stamp))
+    }
+
+    /// The same, found out if need be.
+    fn look(&self, path: &Path, declaration: &Declaration) -> Result<Look, DemError> {
+        // A file that is being written is read until it stays as it is, but not for ever.
+        for _ in 0..3 {
+            if let Some(look) = self.remembered(path)? {
+                return Ok(look);
+            }
+            let stamp = Stamp::of(path)?;
+            let look = Look {
+                stamp,
+                sha256: Identity::of_file(path)?.with(declaration),
+                survey: None,
+            };
+            self.remember(path, &look);
+        }
+        Err(io::Error::other("the file changes while it is read").into())
+    }
+
+    fn remember(&self, path: &Path, look: &Look) {
+        self.lock().files.insert(path.to_owned(), look.clone());
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Known> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Datasets for Mounted {
+    fn find(&self, name: &str, sha256: Option<&str>) -> Result<Found, DatasetError> {
+        let mut files = self.files()?;
+        let Some(path) = files.remove(name) else {
+            return Err(DatasetError::Unknown {
+                names: files.into_keys().collect(),
+            });
+        };
+        let (dataset, declaration) = Self::open_file(&path)?;
+        let found = self.look(&path, &declaration)?.sha256;
+        if sha256.is_some_and(|sha256| sha256 != found) {
+            return Err(DatasetError::Replaced { sha256: found });
+        }
+        Ok(Found {
+            sha256: found,
+            dataset,
+        })
+    }
+}

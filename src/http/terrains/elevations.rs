@@ -1,0 +1,173 @@
+//! `GET /terrains/{name}/elevations`: a dataset sampled on a grid of degrees, to be drawn.
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+
+use super::document::{Corners, Place};
+use super::{Name, etag};
+use crate::geometry::geodesy::{LatLon, wrapped};
+use crate::http::AppState;
+use crate::http::params::{self, Params};
+use crate::http::plans::KnownTags;
+use crate::http::problem::Problem;
+use crate::terrain::DatasetError;
+use crate::terrain::dem::Degrees;
+
+/// Samples along one side at most.
+const MOST_LOOKS_ALONG: usize = 512;
+/// Samples at most.
+const MOST_LOOKS: usize = 131_072;
+/// Samples along one side, unless asked otherwise.
+const LOOKS_ALONG: usize = 64;
+
+const PARAMETERS: [&str; 7] = [
+    "south", "west", "north", "east", "columns", "rows", "sha256",
+];
+
+/// A dataset, sampled.
+#[derive(Serialize)]
+struct ElevationsDocument {
+    name: String,
+    sha256: String,
+    area: Corners<Place>,
+    columns: usize,
+    rows: usize,
+    elevations: Vec<Option<f64>>,
+}
+
+/// `GET /terrains/{name}/elevations`.
+pub(in crate::http) async fn elevations(
+    State(state): State<AppState>,
+    Name(name): Name,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let params = Params::read(&uri, &PARAMETERS)?;
+    let (columns, rows) = (looks(&params, "columns")?, looks(&params, "rows")?);
+    if columns * rows > MOST_LOOKS {
+        let allowed = format!("at most {MOST_LOOKS} divided by columns");
+        return Err(params::refused("rows", &rows.to_string(), &allowed));
+    }
+    let area = area(&params)?;
+    let (asked, sha256) = (name.clone(), params.text("sha256").map(str::to_owned));
+    let datasets = state.rules.datasets.clone();
+    let known = KnownTags::of(&headers);
+    let sampled = state.terrains.read(move || {
+        let found = datasets.find(&asked, sha256.as_deref())?;
+        let tag = etag(&found.sha256);
+        if known.is_some_and(|known| known.contain(&tag)) {
+            return Ok((tag, None));
+        }
+        let area = area.unwrap_or(found.dataset.metadata().degrees);
+        let places: Vec<LatLon> = places(area, columns, rows).collect();
+        let elevations = found.dataset.sample(&places)?;
+        let document = ElevationsDocument {
+            name: asked,
+            sha256: found.sha256,
+            area: Corners::of(area),
+            columns,
+            rows,
+            elevations: elevations
+                .into_iter()
+                .map(|elevation| elevation.map(to_the_centimetre))
+                .collect(),
+        };
+        Ok((tag, Some(document)))
+    });
+    let (tag, document) = sampled.await?.map_err(|error| refusal(error, &name))?;
+    let mut answer = match document {
+        Some(document) => Json(document).into_response(),
+        None => StatusCode::NOT_MODIFIED.into_response(),
+    };
+    let headers = answer.headers_mut();
+    headers.insert(header::ETAG, tag);
+    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
+    Ok(answer)
+}
+
+fn refusal(error: DatasetError, name: &str) -> Problem {
+    match error {
+        DatasetError::Unknown { .. } => Problem::NoSuchTerrain(name.to_owned()),
+        error @ DatasetError::Replaced { .. } => Problem::NoGround(error.to_string()),
+        DatasetError::Unreadable(error) => Problem::InvalidTerrain(error.to_string()),
+        DatasetError::Unavailable(error) => Problem::unreachable_datasets(&error),
+    }
+}
+
+fn looks(params: &Params, name: &str) -> Result<usize, Problem> {
+    let allowed = format!("a whole number from 2 to {MOST_LOOKS_ALONG}");
+    let looks = params.parse(name, &allowed)?.unwrap_or(LOOKS_ALONG);
+    if (2..=MOST_LOOKS_ALONG).contains(&looks) {
+        return Ok(looks);
+    }
+    Err(params::refused(name, &looks.to_string(), &allowed))
+}
+
+/// What was asked for; `None` is all of it.
+fn area(params: &Params) -> Result<Option<Degrees>, Problem> {
+    let degrees = |name: &str, most: f64| -> Result<Option<f64>, Problem> {
+        let allowed = format!("degrees from {} to {most}", -most);
+        let value: Option<f64> = params.parse(name, &allowed)?;
+        match value {
+            Some(value) if !(-most..=most).contains(&value) => {
+                Err(params::refused(name, &value.to_string(), &allowed))
+            }
+            value => Ok(value),
+        }
+    };
+    let sides = [
+        degrees("south", 90.0)?,
+        degrees("west", 180.0)?,
+        degrees("north", 90.0)?,
+        degrees("east", 180.0)?,
+    ];
+    let [Some(south), Some(west), Some(north), Some(east)] = sides else {
+        let missing = PARAMETERS
+            .iter()
+            .zip(sides)
+            .find(|(_, side)| side.is_none());
+        return match missing {
+            Some((name, _)) if sides.iter().any(Option::is_some) => Err(params::refused(
+                name,
+                "",
+                "given with south, west, north and east, or none of them",
+            )),
+            _ => Ok(None),
+        };
+    };
+    if south >= north {
+        let allowed = format!("more than south, {south}");
+        return Err(params::refused("north", &north.to_string(), &allowed));
+    }
+    // West is west, also across the antimeridian.
+    let east = if east > west { east } else { east + 360.0 };
+    Ok(Some(Degrees {
+        west,
+        south,
+        east,
+        north,
+    }))
+}
+
+/// From the south-west along the parallels, as a grid of a scenario goes.
+fn places(area: Degrees, columns: usize, rows: usize) -> impl Iterator<Item = LatLon> {
+    let at = |from: f64, to: f64, i: usize, n: usize| {
+        let last = n - 1;
+        if i == last {
+            to
+        } else {
+            from + (to - from) * i as f64 / last as f64
+        }
+    };
+    (0..columns * rows).map(move |look| LatLon {
+        lat: at(area.south, area.north, look / columns, rows),
+        lon: wrapped(at(area.west, area.east, look % columns, columns)),
+    })
+}
+
+fn to_the_centimetre(metres: f64) -> f64 {
+    (metres * 100.0).round() / 100.0
+}

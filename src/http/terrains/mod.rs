@@ -1,0 +1,287 @@
+//! Datasets: upload, list, show, delete, sample.
+//!
+//! All of them are everybody's to plan over; a name is its uploader's to change. Files are read and
+//! written on threads of their own, few at a time.
+
+mod document;
+mod elevations;
+mod receive;
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::body::Body;
+use axum::extract::{FromRequestParts, Path, State};
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use tokio::sync::Semaphore;
+
+pub(super) use elevations::elevations;
+
+use document::TerrainDocument;
+
+use super::caller::Caller;
+use super::params::{self, Params};
+use super::plans::now_ms;
+use super::problem::Problem;
+use super::{AppState, off_thread};
+use crate::catalogue::{
+    Catalogue, CatalogueError, Claim, Declaration, Entry, Expected, Kept, Naming,
+};
+use crate::terrain::dem::Format;
+use crate::terrain::is_dataset_name;
+
+/// Uploads at the same time; more wait, as long as a body may pause.
+const UPLOADS: usize = 4;
+/// Uploads whose files are read through at the same time.
+const CHECKS: usize = 2;
+/// Scenarios and samples that may read from datasets at the same time.
+const READS: usize = 4;
+
+/// The datasets, and how much may be done with them at once.
+#[derive(Clone)]
+pub struct Terrains {
+    /// Where they are.
+    pub catalogue: Arc<dyn Catalogue>,
+    uploads: Arc<Semaphore>,
+    checks: Arc<Semaphore>,
+    reads: Arc<Semaphore>,
+}
+
+impl Terrains {
+    /// Over a catalogue.
+    #[must_use]
+    pub fn new(catalogue: Arc<dyn Catalogue>) -> Self {
+        Self {
+            catalogue,
+            uploads: Arc::new(Semaphore::new(UPLOADS)),
+            checks: Arc::new(Semaphore::new(CHECKS)),
+            reads: Arc::new(Semaphore::new(READS)),
+        }
+    }
+
+    /// Do something with the catalogue where it may block.
+    async fn ask<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&dyn Catalogue) -> Result<T, CatalogueError> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let catalogue = self.catalogue.clone();
+        Ok(off_thread::run(move || work(&*catalogue)).await??)
+    }
+
+    /// Do what reads from datasets, when fewer others do.
+    pub(super) async fn read<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, Problem> {
+        one_of_few(&self.reads, work).await
+    }
+}
+
+/// Do `work` on a thread of its own once there is a permit; it is given back when the work is done,
+/// whoever waits for it.
+async fn one_of_few<T: Send + 'static>(
+    permits: &Arc<Semaphore>,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, Problem> {
+    let permit = permits.clone().acquire_owned().await;
+    let permit = permit.expect("nobody closes it");
+    off_thread::run(move || {
+        let done = work();
+        drop(permit);
+        done
+    })
+    .await
+}
+
+/// The `{name}` of the path. What cannot be a name names nothing.
+pub(super) struct Name(String);
+
+impl<S: Send + Sync> FromRequestParts<S> for Name {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        match Path::<String>::from_request_parts(parts, state).await {
+            Ok(Path(name)) => Ok(Self(name)),
+            Err(_) => Err(Problem::NoSuchResource(parts.uri.path().to_owned())),
+        }
+    }
+}
+
+fn claim(caller: &Caller) -> Claim {
+    Claim {
+        owner: caller.owner.clone(),
+        over_all: caller.sees_all,
+    }
+}
+
+/// `PUT /terrains/{name}`.
+pub(super) async fn put(
+    State(state): State<AppState>,
+    caller: Caller,
+    Name(name): Name,
+    uri: Uri,
+    headers: HeaderMap,
+    body: Body,
+) -> Result<Response, Problem> {
+    let params = Params::read(&uri, &["crs", "format", "filename"])?;
+    if !is_dataset_name(&name) {
+        let allowed = "1 to 64 lower-case letters, digits, - and _, the first a letter or a digit";
+        return Err(params::refused("name", &name, allowed));
+    }
+    let format = params.text("format").map(read_format).transpose()?;
+    let declaration = Declaration {
+        crs: params.text("crs").map(str::to_owned),
+        filename: Some(params.text("filename").unwrap_or(&name).to_owned()),
+    };
+    let naming = Naming {
+        name,
+        by: claim(&caller),
+        now_ms: now_ms(),
+        expected: expected(&headers),
+    };
+    // Before a long body has been sent for nothing.
+    let asked = naming.clone();
+    let terrains = &state.terrains;
+    terrains
+        .ask(move |catalogue| catalogue.permit(&asked))
+        .await?;
+    let staged = receive::receive(&state, &headers, body).await?;
+    let check = move || staged.check(format, declaration);
+    let checked = one_of_few(&terrains.checks, check).await??;
+    let sha256 = checked.sha256().to_owned();
+    let (kept, entry) = terrains
+        .ask(move |catalogue| {
+            let kept = catalogue.keep(checked, &naming)?;
+            Ok((kept, catalogue.entry(&naming.name)?))
+        })
+        .await?;
+    tracing::info!(name = entry.name, sha256, ?kept, "a dataset was uploaded");
+    let status = match kept {
+        Kept::Created => StatusCode::CREATED,
+        Kept::Replaced | Kept::Unchanged => StatusCode::OK,
+    };
+    let mut answer = shown(&state, entry).await?;
+    *answer.status_mut() = status;
+    if kept == Kept::Created {
+        let location = HeaderValue::from_str(uri.path()).expect("a path is visible ASCII");
+        answer.headers_mut().insert(header::LOCATION, location);
+    }
+    Ok(answer)
+}
+
+fn read_format(name: &str) -> Result<Format, Problem> {
+    let found = document::FORMATS.iter().find(|(known, _)| *known == name);
+    let format = found.map(|(_, format)| *format);
+    format.ok_or_else(|| params::refused("format", name, "geotiff, asc or hgt"))
+}
+
+/// What `If-Match` and `If-None-Match` say.
+fn expected(headers: &HeaderMap) -> Expected {
+    let tags = |name| -> Vec<String> {
+        let values = headers.get_all(name).iter();
+        let values = values.filter_map(|value| value.to_str().ok());
+        let tags = values.flat_map(|value| value.split(','));
+        tags.map(|tag| tag.trim().trim_matches('"').to_owned())
+            .collect()
+    };
+    let (matching, other) = (tags(header::IF_MATCH), tags(header::IF_NONE_MATCH));
+    if other.iter().any(|tag| tag == "*") {
+        Expected::Nothing
+    } else if matching.is_empty() {
+        Expected::Anything
+    } else {
+        Expected::OneOf(matching)
+    }
+}
+
+/// The list.
+#[derive(Serialize)]
+struct TerrainsDocument {
+    terrains: Vec<TerrainDocument>,
+}
+
+/// `GET /terrains`.
+pub(super) async fn list(State(state): State<AppState>, uri: Uri) -> Result<Response, Problem> {
+    Params::read(&uri, &[])?;
+    let entries = state.terrains.ask(|catalogue| catalogue.list()).await?;
+    let uses = state.store.datasets_in_use().await?;
+    let terrains = entries.into_iter();
+    let terrains = terrains
+        .map(|entry| {
+            let active = active(&uses, entry.sha256.as_deref());
+            TerrainDocument::new(entry, active)
+        })
+        .collect();
+    Ok(Json(TerrainsDocument { terrains }).into_response())
+}
+
+fn active(uses: &[crate::store::DatasetUse], sha256: Option<&str>) -> u64 {
+    let used = uses.iter().find(|used| Some(&*used.sha256) == sha256);
+    used.map_or(0, |used| used.active)
+}
+
+/// `GET /terrains/{name}`.
+pub(super) async fn show(
+    State(state): State<AppState>,
+    Name(name): Name,
+    uri: Uri,
+) -> Result<Response, Problem> {
+    Params::read(&uri, &[])?;
+    let catalogue = state.terrains.catalogue.clone();
+    let entry = one_of_few(&state.terrains.checks, move || catalogue.entry(&name)).await??;
+    shown(&state, entry).await
+}
+
+async fn shown(state: &AppState, entry: Entry) -> Result<Response, Problem> {
+    let uses = state.store.datasets_in_use().await?;
+    let active = active(&uses, entry.sha256.as_deref());
+    let tag = entry.sha256.as_deref().map(etag);
+    let mut answer = Json(TerrainDocument::new(entry, active)).into_response();
+    let headers = answer.headers_mut();
+    headers.extend(tag.map(|tag| (header::ETAG, tag)));
+    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
+    Ok(answer)
+}
+
+/// The entity tag of a content.
+fn etag(sha256: &str) -> HeaderValue {
+    HeaderValue::from_str(&format!("\"{sha256}\"")).expect("digits and quotes are visible ASCII")
+}
+
+/// `DELETE /terrains/{name}`.
+pub(super) async fn delete(
+    State(state): State<AppState>,
+    caller: Caller,
+    Name(name): Name,
+    uri: Uri,
+) -> Result<StatusCode, Problem> {
+    Params::read(&uri, &[])?;
+    let (asked, by) = (name.clone(), claim(&caller));
+    let removed = state
+        .terrains
+        .ask(move |catalogue| match catalogue.removable(&asked, &by) {
+            Err(CatalogueError::Unknown { .. }) => Ok(None),
+            found => found.map(Some),
+        })
+        .await?;
+    // Whoever asks again had no answer the first time.
+    let Some(sha256) = removed else {
+        return Ok(StatusCode::NO_CONTENT);
+    };
+    let plans = active(&state.store.datasets_in_use().await?, Some(&sha256));
+    if plans > 0 {
+        return Err(Problem::TerrainInUse { name, plans });
+    }
+    let by = claim(&caller);
+    state
+        .terrains
+        .ask(move |catalogue| match catalogue.remove(&name, &by) {
+            Err(CatalogueError::Unknown { .. }) => Ok(()),
+            removed => removed,
+        })
+        .await?;
+    Ok(StatusCode::NO_CONTENT)
+}

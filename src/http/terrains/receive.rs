@@ -1,0 +1,146 @@
+//! The body of an upload: to the disk as it comes, never in memory, not too long, not too slow.
+
+use std::io::Write as _;
+use std::time::Duration;
+
+use axum::body::Body;
+use axum::http::HeaderMap;
+use bytes::Bytes;
+use flate2::write::MultiGzDecoder;
+use futures_util::StreamExt as _;
+use tokio::sync::mpsc;
+use tokio::time::Instant;
+
+use crate::catalogue::Staged;
+use crate::http::body::{Coding, announced_length};
+use crate::http::problem::Problem;
+use crate::http::{AppState, off_thread};
+
+/// Bytes a second that must come on the whole: who sends less holds a place for nothing.
+const SLOWEST: f64 = 8.0 * 1024.0;
+
+/// Pieces on their way from the connection to the disk.
+const PIECES: usize = 4;
+
+/// What the thread that writes is told.
+enum Piece {
+    Bytes(Bytes),
+    End,
+}
+
+/// The whole body as a file that has come.
+pub(super) async fn receive(
+    state: &AppState,
+    headers: &HeaderMap,
+    body: Body,
+) -> Result<Staged, Problem> {
+    let (limit, timeout) = (state.rules.limits.terrain_bytes, state.body_timeout);
+    let coding = Coding::of(headers)?;
+    if announced_length(headers).is_some_and(|length| length > limit) {
+        return Err(Problem::TerrainTooLarge(limit));
+    }
+    let place = state.terrains.uploads.acquire();
+    let Ok(place) = tokio::time::timeout(timeout, place).await else {
+        return Err(Problem::TooManyUploads(super::UPLOADS));
+    };
+    let staged = state.terrains.ask(move |catalogue| catalogue.stage(limit));
+    let sink = Sink::new(staged.await?, coding);
+    let (pieces, coming) = mpsc::channel(PIECES);
+    let writing = tokio::spawn(off_thread::run(move || write(sink, coming)));
+    let sent = send(body, &pieces, timeout).await;
+    // What was cut off ends without its end, and is removed.
+    drop(pieces);
+    let written = writing.await.unwrap_or(Err(Problem::Internal))?;
+    drop(place);
+    sent?;
+    written
+}
+
+/// Pass the body on, piece by piece.
+async fn send(body: Body, pieces: &mpsc::Sender<Piece>, timeout: Duration) -> Result<(), Problem> {
+    let mut frames = body.into_data_stream();
+    let mut since = Instant::now();
+    let mut received = 0;
+    loop {
+        let at_this_pace = since + timeout + Duration::from_secs_f64(received as f64 / SLOWEST);
+        let deadline = (Instant::now() + timeout).min(at_this_pace);
+        let piece = match tokio::time::timeout_at(deadline, frames.next()).await {
+            Err(_) => return Err(Problem::UploadStalled(timeout)),
+            Ok(None) => Piece::End,
+            Ok(Some(Ok(bytes))) => {
+                received += bytes.len();
+                Piece::Bytes(bytes)
+            }
+            Ok(Some(Err(error))) => {
+                tracing::debug!(%error, "an upload broke off");
+                return Err(Problem::BodyIncomplete);
+            }
+        };
+        let is_end = matches!(piece, Piece::End);
+        let handed = Instant::now();
+        // It listens no more when it has failed, and says why.
+        if pieces.send(piece).await.is_err() || is_end {
+            return Ok(());
+        }
+        // The disk's time is not the caller's.
+        since += handed.elapsed();
+    }
+}
+
+/// Where bytes go.
+enum Sink {
+    Plain(Staged),
+    Gzip(Box<MultiGzDecoder<Staged>>),
+}
+
+impl Sink {
+    fn new(staged: Staged, coding: Coding) -> Self {
+        match coding {
+            Coding::Plain => Self::Plain(staged),
+            Coding::Gzip => Self::Gzip(Box::new(MultiGzDecoder::new(staged))),
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Problem> {
+        let written = match self {
+            Self::Plain(staged) => staged.write_all(bytes),
+            Self::Gzip(decoder) => decoder.write_all(bytes),
+        };
+        written.map_err(|error| self.problem(&error))
+    }
+
+    fn finish(mut self) -> Result<Staged, Problem> {
+        let finished = match &mut self {
+            Self::Plain(_) => Ok(()),
+            Self::Gzip(decoder) => decoder.try_finish(),
+        };
+        finished.map_err(|error| self.problem(&error))?;
+        match self {
+            Self::Plain(staged) => Ok(staged),
+            Self::Gzip(decoder) => decoder.finish().map_err(|error| gzip(&error)),
+        }
+    }
+
+    fn problem(&mut self, error: &std::io::Error) -> Problem {
+        let staged = match self {
+            Self::Plain(staged) => staged,
+            Self::Gzip(decoder) => decoder.get_mut(),
+        };
+        let failure = staged.failure();
+        failure.map_or_else(|| gzip(error), Problem::from)
+    }
+}
+
+fn gzip(error: &std::io::Error) -> Problem {
+    Problem::BodyNotGzip(error.to_string())
+}
+
+fn write(mut sink: Sink, mut coming: mpsc::Receiver<Piece>) -> Result<Staged, Problem> {
+    loop {
+        match coming.blocking_recv() {
+            Some(Piece::Bytes(bytes)) => sink.write(&bytes)?,
+            Some(Piece::End) => return sink.finish(),
+            None => return Err(Problem::BodyIncomplete),
+        }
+    }
+}

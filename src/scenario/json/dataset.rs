@@ -1,0 +1,375 @@
+//! `terrain` of kind `dataset`: which one it is, the default area over it, and the ground cut out of it.
+
+use crate::geometry::geodesy::{LatLon, LatLonBox, TangentPlane};
+use crate::geometry::{Point2, Point3, Rect};
+use crate::scenario::limits::Limits;
+use crate::terrain::dem::{Dataset, Degrees, DemError};
+use crate::terrain::{DatasetError, Datasets, Found, Terrain};
+
+use super::chart::{Chart, Earth};
+use super::fault::Faults;
+use super::fields::{Fields, nearest};
+use super::path::Path;
+use super::tree::Node;
+use super::value::{At, quote};
+
+pub(super) const FIELDS: &[&str] = &["kind", "name", "sha256"];
+
+/// Ground beyond the area that is kept where there is any, as a share of the longer side: what a drawing
+/// shows round the area.
+const MARGIN: f64 = 0.02;
+/// An area that sticks out of the data by no more is cut, metres: somebody copied the data's own extent.
+const OVERHANG_M: f64 = 1.0;
+/// Places looked at along each axis to tell which share of an area has no elevation.
+const LOOKS: usize = 24;
+/// Rounds of fitting a box of degrees into the data.
+const ROUNDS: usize = 8;
+/// Corners of a fitted area are rounded inwards to this many to a degree.
+const GRAIN: f64 = 1e6;
+/// Names listed to who asks for one that there is not.
+const LISTED: usize = 8;
+
+/// The dataset that a document names, before anything else of its terrain is read.
+pub(super) struct Named<'a> {
+    name: &'a str,
+    found: Result<Found, DatasetError>,
+}
+
+/// The ground, and the area as far as it has one.
+pub(super) type Ground = (Terrain, Rect);
+
+impl<'a> Named<'a> {
+    /// `None` where the terrain is none or cannot be read; its reader says so.
+    pub(super) fn of(fields: &Fields<'a>, datasets: &dyn Datasets) -> Option<Self> {
+        let terrain = fields.find("terrain")?;
+        let text = |name: &str| match terrain.get(name) {
+            Some(Node::Text(text)) => Some(&**text),
+            _ => None,
+        };
+        if text("kind") != Some("dataset") {
+            return None;
+        }
+        let name = text("name")?;
+        let found = datasets.find(name, text("sha256"));
+        Some(Self { name, found })
+    }
+
+    /// `wanted` as far as there are data, as the default area; all of it where `ends` would be cut off.
+    pub(super) fn within(
+        &self,
+        wanted: LatLonBox,
+        ends: &[LatLon],
+        earth: impl Fn(LatLonBox) -> Earth,
+    ) -> LatLonBox {
+        let Ok(Found { dataset, .. }) = &self.found else {
+            return wanted;
+        };
+        let mut fitted = cut(wanted, dataset.metadata().degrees);
+        for _ in 0..ROUNDS {
+            let Some(area) = fitted.filter(|area| ends.iter().all(|end| area.contains(*end)))
+            else {
+                return wanted;
+            };
+            let earth = earth(area);
+            let rect = earth.rect();
+            match dataset.covered(earth.plane(), rect) {
+                Some(covered) if covered == rect => return area,
+                Some(covered) => fitted = inside(covered, earth.plane()),
+                None => return wanted,
+            }
+        }
+        wanted
+    }
+}
+
+/// What `terrain` says, beside the rest of the document.
+pub(super) struct Site<'a> {
+    pub(super) named: Option<&'a Named<'a>>,
+    pub(super) datasets: &'a dyn Datasets,
+    pub(super) chart: &'a Chart,
+    pub(super) limits: &'a Limits,
+    /// Where waypoints may be, once that can be told.
+    pub(super) area: Option<Rect>,
+    /// Whether the document names the area.
+    pub(super) area_is_given: bool,
+    /// The start and the target, by their fields.
+    pub(super) ends: [(&'static str, Option<Point3>); 2],
+}
+
+/// The ground under the area out of a dataset.
+pub(super) fn ground(fields: &Fields<'_>, site: &Site<'_>, faults: &mut Faults) -> Option<Ground> {
+    let name = fields.required("name", faults, |at, faults| {
+        at.text(faults).map(str::to_owned)
+    });
+    let sha256 = fields.or("sha256", None, faults, |at, faults| {
+        sum(at, faults).map(Some)
+    });
+    let Chart::Wgs84(earth) = site.chart else {
+        faults.add(&Path::Key(fields.path, "kind"), "not-applicable", || {
+            "kind is dataset, must be flat, peaks or grid where frame is local: a dataset lies on the earth"
+        });
+        return None;
+    };
+    let (name, sha256) = (name?, sha256?);
+    let sha256 = sha256.as_deref();
+    let named = site.named.expect("a terrain with kind and name names one");
+    let found = match &named.found {
+        Ok(found) => found,
+        Err(error) => {
+            refuse(error, fields, &name, sha256, faults);
+            return None;
+        }
+    };
+    let area = site.area?;
+    let area = trimmed(area, &found.dataset, earth.plane());
+    let margin = MARGIN * (area.max - area.min).max();
+    let dataset = &found.dataset;
+    let dem = match dataset.ground(earth.plane(), area, margin, site.limits.terrain_nodes) {
+        Ok(dem) => dem,
+        Err(error @ (DemError::Outside { .. } | DemError::NoData { .. })) => {
+            gaps(&error, named, site, earth, area, faults);
+            return None;
+        }
+        Err(DemError::TooLarge { value, limit, .. }) => {
+            faults.add(&Path::Key(&Path::Root, "area"), "too-many", || {
+                format!(
+                    "the area lies over {value} elevations of the dataset, must lie over at most {limit} (limit terrain_nodes)"
+                )
+            });
+            return None;
+        }
+        Err(error) => {
+            refuse(&error.into(), fields, &name, sha256, faults);
+            return None;
+        }
+    };
+    // A mounted file may have been changed while it was read.
+    if let Err(error) = site.datasets.find(&name, Some(&found.sha256)) {
+        refuse(&error, fields, &name, Some(&found.sha256), faults);
+        return None;
+    }
+    let dem = dem
+        .lifted(earth.sea_level_m())
+        .named(name, found.sha256.as_str());
+    Some((Terrain::Dem(dem.into()), area))
+}
+
+/// 64 hexadecimal digits.
+fn sum(at: At<'_>, faults: &mut Faults) -> Option<String> {
+    let text = at.text(faults)?;
+    let digit = |c: u8| c.is_ascii_digit() || (b'a'..=b'f').contains(&c);
+    if text.len() == 64 && text.bytes().all(digit) {
+        return Some(text.to_owned());
+    }
+    faults.add(at.path, "unknown-value", || {
+        format!(
+            "sha256 is {}, must be 64 hexadecimal digits in lower case",
+            quote(text)
+        )
+    });
+    None
+}
+
+/// Say why a dataset is not found.
+fn refuse(
+    error: &DatasetError,
+    fields: &Fields<'_>,
+    name: &str,
+    sha256: Option<&str>,
+    faults: &mut Faults,
+) {
+    let (field, code) = match error {
+        DatasetError::Unknown { .. } => ("name", "unknown-dataset"),
+        DatasetError::Replaced { .. } => ("sha256", "replaced-dataset"),
+        DatasetError::Unreadable(_) => ("name", "unreadable-dataset"),
+        DatasetError::Unavailable(_) => ("name", "unreachable-datasets"),
+    };
+    faults.add(&Path::Key(fields.path, field), code, || match error {
+        DatasetError::Unknown { names } => {
+            format!("name is {}, {}", quote(name), known(name, names))
+        }
+        DatasetError::Replaced { .. } => {
+            let sha256 = sha256.unwrap_or_default();
+            format!("sha256 is {}, {error}", quote(sha256))
+        }
+        _ => format!("name is {}, {error}", quote(name)),
+    });
+}
+
+/// Which names there are.
+fn known(name: &str, names: &[String]) -> String {
+    if names.is_empty() {
+        return "there are no datasets; PUT /terrains/{name} makes one".to_owned();
+    }
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let hint = nearest(name, &names)
+        .map(|name| format!(", did you mean {name}?"))
+        .unwrap_or_default();
+    let more = match names.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        more => format!(" or {more} more"),
+    };
+    let listed = &names[..names.len().min(LISTED)];
+    format!("must be one of {}{more}{hint}", listed.join(", "))
+}
+
+/// Say where and how much of what is needed has no elevation.
+fn gaps(
+    error: &DemError,
+    named: &Named<'_>,
+    site: &Site<'_>,
+    earth: &Earth,
+    area: Rect,
+    faults: &mut Faults,
+) {
+    let Ok(Found { dataset, .. }) = &named.found else {
+        return;
+    };
+    let ends = site.ends.iter();
+    let ends: Vec<(&str, LatLon)> = ends
+        .filter_map(|(name, end)| Some((*name, earth.place((*end)?.xy()))))
+        .collect();
+    let share = |i: usize| i as f64 / (LOOKS - 1) as f64;
+    let size = area.max - area.min;
+    let looks = (0..LOOKS * LOOKS).map(|look| {
+        let (x, y) = (share(look % LOOKS), share(look / LOOKS));
+        let point = Point2::new(area.min.x + x * size.x, area.min.y + y * size.y);
+        earth.plane().geodetic(point)
+    });
+    let places: Vec<LatLon> = ends.iter().map(|(_, end)| *end).chain(looks).collect();
+    let Ok(elevations) = dataset.sample(&places) else {
+        faults.add(&Path::Key(&Path::Root, "area"), "no-elevation", || {
+            error.to_string()
+        });
+        return;
+    };
+    let (below_ends, below_area) = elevations.split_at(ends.len());
+    let mut ends_are_known = true;
+    for ((name, end), elevation) in ends.iter().zip(below_ends) {
+        if elevation.is_none() {
+            missing(name, *end, named.name, dataset, faults);
+            ends_are_known = false;
+        }
+    }
+    // The box round the ends holds them; that it has gaps, too, is no news.
+    if site.area_is_given || ends_are_known {
+        let code = match error {
+            DemError::Outside { .. } => "area-outside-terrain",
+            _ => "no-elevation",
+        };
+        let unknown = below_area.iter().filter(|known| known.is_none()).count();
+        faults.add(&Path::Key(&Path::Root, "area"), code, || {
+            let area = if site.area_is_given {
+                "the area"
+            } else {
+                "the area, by default the box round everything as far as the dataset reaches,"
+            };
+            let percent = match 100 * unknown / below_area.len() {
+                0 => "less than 1".to_owned(),
+                percent => percent.to_string(),
+            };
+            format!(
+                "{error}; {percent} % of {area} has no elevation in {}, must have one everywhere",
+                quote(named.name)
+            )
+        });
+    }
+}
+
+/// Say that there is no elevation below the start or the target.
+pub(super) fn missing(end: &str, at: LatLon, name: &str, dataset: &Dataset, faults: &mut Faults) {
+    let path = Path::Key(&Path::Root, end);
+    let place = format!("lat {:.6}, lon {:.6}", at.lat, at.lon);
+    if dataset.covers(at) {
+        faults.add(&path, "no-elevation", || {
+            format!(
+                "{end} is at {place}, where the dataset {} holds no elevation",
+                quote(name)
+            )
+        });
+        return;
+    }
+    faults.add(&path, "outside-terrain", || {
+        let Degrees { west, south, east, north } = dataset.metadata().degrees;
+        format!(
+            "{end} is at {place}, must lie in the dataset {}, from lat {south:.6}, lon {west:.6} to lat {north:.6}, lon {east:.6}",
+            quote(name)
+        )
+    });
+}
+
+/// `area` without what sticks out of the data by a hair.
+fn trimmed(area: Rect, dataset: &Dataset, plane: &TangentPlane) -> Rect {
+    let near = |a: Point2, b: Point2| (a - b).amax() <= OVERHANG_M;
+    match dataset.covered(plane, area) {
+        Some(covered) if near(covered.min, area.min) && near(covered.max, area.max) => covered,
+        _ => area,
+    }
+}
+
+/// What `wanted` and the data have in common; `None` when nothing.
+fn cut(wanted: LatLonBox, data: Degrees) -> Option<LatLonBox> {
+    let (west, width) = (wanted.min.lon, wanted.width());
+    // As many turns as bring it nearest to the data.
+    let away = f64::midpoint(data.west, data.east) - (west + width / 2.0);
+    let turns = 360.0 * (away / 360.0).round();
+    let (west, east) = (west + turns, west + width + turns);
+    let from = |wanted: f64, data: f64| {
+        if wanted >= data { wanted } else { up(data) }
+    };
+    let to = |wanted: f64, data: f64| {
+        if wanted <= data { wanted } else { down(data) }
+    };
+    boxed(
+        [from(wanted.min.lat, data.south), from(west, data.west)],
+        [to(wanted.max.lat, data.north), to(east, data.east)],
+    )
+}
+
+/// A box of degrees in a rectangle of the plane.
+fn inside(rect: Rect, plane: &TangentPlane) -> Option<LatLonBox> {
+    let middle = plane.geodetic(nalgebra::center(&rect.min, &rect.max)).lon;
+    let size = rect.max - rect.min;
+    let edge = |look: usize| (look as f64 / LOOKS as f64).min(1.0);
+    let at = |x: f64, y: f64| {
+        let place = plane.geodetic(Point2::new(
+            rect.min.x + x * size.x,
+            rect.min.y + y * size.y,
+        ));
+        // Degrees east of the middle, so that the antimeridian is nothing special.
+        [
+            place.lat,
+            crate::geometry::geodesy::wrapped(place.lon - middle),
+        ]
+    };
+    let mut min = [f64::NEG_INFINITY; 2];
+    let mut max = [f64::INFINITY; 2];
+    for look in (0..=LOOKS).map(edge) {
+        min = [min[0].max(at(look, 0.0)[0]), min[1].max(at(0.0, look)[1])];
+        max = [max[0].min(at(look, 1.0)[0]), max[1].min(at(1.0, look)[1])];
+    }
+    boxed(
+        [up(min[0]), up(middle + min[1])],
+        [down(max[0]), down(middle + max[1])],
+    )
+}
+
+fn up(degrees: f64) -> f64 {
+    (degrees * GRAIN).ceil() / GRAIN
+}
+
+fn down(degrees: f64) -> f64 {
+    (degrees * GRAIN).floor() / GRAIN
+}
+
+/// From the south-west to the north-east corner, `[lat, lon]`; `None` when nothing is between.
+fn boxed([south, west]: [f64; 2], [north, east]: [f64; 2]) -> Option<LatLonBox> {
+    let corner = |lat: f64, lon: f64| LatLon {
+        lat,
+        lon: crate::geometry::geodesy::wrapped(lon),
+    };
+    (south < north && west < east).then(|| LatLonBox {
+        min: corner(south, west),
+        max: corner(north, east),
+    })
+}

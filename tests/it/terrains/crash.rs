@@ -1,0 +1,59 @@
+//! kill -9 while a dataset comes in.
+
+use serde_json::Value;
+use tokio::io::AsyncWriteExt as _;
+use tokio::net::TcpStream;
+
+use super::{hill, jacksboro, kept};
+use crate::support::process::Service;
+
+#[tokio::test]
+async fn a_crash_midway_leaves_what_was_there_and_nothing_else() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let uploads = directory.path().join("terrains");
+    let service = Service::start(directory.path(), &[]);
+    let first = service
+        .request(reqwest::Method::PUT, "/terrains/hill")
+        .body(hill(9.0));
+    assert_eq!(first.send().await.expect("an answer").status(), 201);
+    let before = service.bytes("/terrains").await;
+
+    let file = jacksboro();
+    let mut stream = TcpStream::connect(service.address())
+        .await
+        .expect("connected");
+    let head = format!(
+        "PUT /terrains/hill HTTP/1.1\r\nhost: x\r\ncontent-length: {}\r\n\r\n",
+        file.len()
+    );
+    stream.write_all(head.as_bytes()).await.expect("sent");
+    stream
+        .write_all(&file[..file.len() / 2])
+        .await
+        .expect("sent");
+    let arrived = async {
+        loop {
+            let incoming = std::fs::read_dir(uploads.join("incoming")).expect("it is there");
+            let length = |entry: std::io::Result<std::fs::DirEntry>| {
+                entry.ok()?.metadata().ok().map(|metadata| metadata.len())
+            };
+            if incoming.filter_map(length).any(|length| length > 1000) {
+                return;
+            }
+            tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+        }
+    };
+    tokio::time::timeout(std::time::Duration::from_secs(60), arrived)
+        .await
+        .expect("it arrives");
+    service.kill();
+    assert_eq!(kept(&uploads), [2, 1, 1]);
+
+    let service = Service::start(directory.path(), &[]);
+    let after: Value = serde_json::from_slice(&service.bytes("/terrains").await).expect("JSON");
+    assert_eq!(
+        after,
+        serde_json::from_slice::<Value>(&before).expect("JSON")
+    );
+    assert_eq!(kept(&uploads), [2, 1, 0]);
+}

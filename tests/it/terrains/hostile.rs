@@ -1,0 +1,309 @@
+//! Files that are none, bodies that are too long or break off: a problem, and nothing left behind.
+
+use std::io::Write as _;
+use std::sync::Arc;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use noctule::http;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::TcpStream;
+
+use super::{hill, jacksboro, kept, put, put_with};
+use crate::support::api::Api;
+use crate::support::elevations::write_tiff;
+use crate::support::process::Service;
+use crate::support::server::Server;
+
+/// A service that takes datasets of so many bytes.
+fn with_limit(terrain_bytes: u64) -> Api {
+    let mut api = Api::new();
+    let mut rules = (*api.state.rules).clone();
+    rules.limits.terrain_bytes = terrain_bytes;
+    api.state.rules = Arc::new(rules);
+    api.router = http::router(api.state.clone());
+    api
+}
+
+fn packed(plain: &[u8]) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(plain).expect("to memory");
+    encoder.finish().expect("to memory")
+}
+
+fn tiff(size: [u32; 2]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    write_tiff(&mut bytes, size, [-85.0, 37.0], 0.001, |_, _| 300).expect("to memory");
+    bytes
+}
+
+/// The same with another value of a tag; all of them are numbers of the first directory.
+fn with_tag(mut bytes: Vec<u8>, tag: u16, value: u32) -> Vec<u8> {
+    let place = (0..13)
+        .map(|idx| 10 + 12 * idx)
+        .find(|place| bytes[*place..*place + 2] == tag.to_le_bytes());
+    let place = place.expect("the tag is there") + 8;
+    bytes[place..place + 4].copy_from_slice(&value.to_le_bytes());
+    bytes
+}
+
+#[tokio::test]
+async fn files_that_cannot_be_used_leave_nothing_behind() {
+    let api = Api::new();
+    let whole = jacksboro();
+    let mut damaged = whole.clone();
+    let length = damaged.len();
+    for byte in &mut damaged[length / 2..length / 2 + 4096] {
+        *byte ^= 0x5a;
+    }
+    let text = hill(10.0);
+    let cases: Vec<(&str, &str, Vec<u8>)> = vec![
+        ("nothing", "", Vec::new()),
+        (
+            "a letter",
+            "",
+            b"Dear aunt, the hills here are high.".to_vec(),
+        ),
+        (
+            "a picture",
+            "",
+            [&b"\x89PNG\r\n\x1a\n"[..], &[0; 4000]].concat(),
+        ),
+        ("a page", "", b"<!doctype html><title>404</title>".to_vec()),
+        ("a head alone", "", whole[..8].to_vec()),
+        ("cut in its directory", "", whole[..200].to_vec()),
+        ("cut in its middle", "", whole[..length / 2].to_vec()),
+        ("cut before its end", "", whole[..length - 1].to_vec()),
+        ("damaged", "", damaged),
+        ("far too wide", "", with_tag(tiff([8, 8]), 256, u32::MAX)),
+        ("far too high", "", with_tag(tiff([8, 8]), 257, 1 << 20)),
+        (
+            "samples elsewhere",
+            "",
+            with_tag(tiff([8, 8]), 273, u32::MAX - 8),
+        ),
+        (
+            "a directory in itself",
+            "",
+            with_tag(tiff([8, 8]), 34735, 8),
+        ),
+        ("unknown packing", "", with_tag(tiff([8, 8]), 259, 40_000)),
+        (
+            "half of its text",
+            "",
+            text.as_bytes()[..text.len() / 2].to_vec(),
+        ),
+        (
+            "more text than it says",
+            "",
+            (text.clone() + "1 2 3\n").into_bytes(),
+        ),
+        (
+            "words for numbers",
+            "",
+            text.replacen("30", "xy", 1).into_bytes(),
+        ),
+        (
+            "no number",
+            "",
+            text.replacen(" 3", " nan3", 1).into_bytes(),
+        ),
+        (
+            "a text of endless columns",
+            "",
+            text.replacen("ncols 41", "ncols 99999999999", 1)
+                .into_bytes(),
+        ),
+        (
+            "heights of nowhere",
+            "",
+            text.replacen("\n3", "\n99993", 2).into_bytes(),
+        ),
+        ("said to be a tile", "?format=hgt", whole.clone()),
+        ("said to be text", "?format=asc", whole.clone()),
+        ("said to be elsewhere", "?crs=EPSG:32616", whole.clone()),
+        ("nowhere", "?crs=EPSG:1", text.clone().into_bytes()),
+        ("not a system", "?crs=WGS84", text.clone().into_bytes()),
+        ("a tile without its place", "", vec![0; 2 * 1201 * 1201]),
+        (
+            "a tile of another place",
+            "?filename=N95W085.hgt",
+            vec![0; 2 * 1201 * 1201],
+        ),
+    ];
+    for (what, query, body) in cases {
+        let answer = put(&api, &format!("/terrains/hostile{query}"), body).await;
+        let problem = answer.expect_problem(422, "invalid-terrain");
+        let detail = problem["detail"].as_str().expect("text");
+        assert!(
+            !detail.is_empty() && !detail.contains(".part"),
+            "{what}: {detail}"
+        );
+        assert_eq!(kept(&api.uploads()), [0, 0, 0], "{what}");
+    }
+    for query in ["?format=png", "?force", "?crs=a&crs=b"] {
+        let answer = put(&api, &format!("/terrains/hostile{query}"), whole.clone()).await;
+        answer.expect_problem(400, "invalid-parameter");
+    }
+    api.get("/terrains/hostile")
+        .await
+        .expect_problem(404, "not-found");
+    // What is there stays there.
+    put(&api, "/terrains/hill", hill(1.0)).await;
+    put(&api, "/terrains/hill", b"no more hill".to_vec())
+        .await
+        .expect_problem(422, "invalid-terrain");
+    assert_eq!(api.get("/terrains/hill").await.json()["max"], 301.0);
+    assert_eq!(kept(&api.uploads()), [2, 1, 0]);
+}
+
+#[tokio::test]
+async fn a_body_is_held_to_the_limit_however_it_comes() {
+    let text = hill(1.0).into_bytes();
+    let api = with_limit(text.len() as u64);
+    let chunks = |bytes: &[u8]| {
+        let chunks: Vec<_> = bytes
+            .chunks(1000)
+            .map(|chunk| Ok::<_, std::io::Error>(bytes::Bytes::copy_from_slice(chunk)))
+            .collect();
+        axum::body::Body::from_stream(futures_util::stream::iter(chunks))
+    };
+    let longer = [&text[..], b"\n"].concat();
+    for (body, status) in [(&text, 201), (&longer, 413)] {
+        let put_it = async |body: axum::body::Body, headers: &[(&str, &str)]| {
+            let answer = api
+                .send(axum::http::Method::PUT, "/terrains/hill", headers, body)
+                .await;
+            assert_eq!(answer.status, status);
+            api.delete("/terrains/hill").await;
+        };
+        put_it(body.clone().into(), &[]).await;
+        put_it(chunks(body), &[]).await;
+        put_it(packed(body).into(), &[("content-encoding", "gzip")]).await;
+        put_it(chunks(&packed(body)), &[("content-encoding", "gzip")]).await;
+    }
+    assert_eq!(kept(&api.uploads())[1..], [0, 0]);
+    // Announced.
+    let length = [("content-length", "99999999")];
+    let answer = put_with(&api, "/terrains/hill", &length, text.clone()).await;
+    let problem = answer.expect_problem(413, "body-too-large");
+    assert!(
+        problem["detail"]
+            .as_str()
+            .expect("text")
+            .contains("terrain_bytes")
+    );
+    // A bomb goes no farther than the limit.
+    let bomb = packed(&vec![b' '; 200 << 20]);
+    let gzip = [("content-encoding", "gzip")];
+    let answer = put_with(&api, "/terrains/hill", &gzip, bomb).await;
+    answer.expect_problem(413, "body-too-large");
+    for broken in [&packed(&text)[..500], b"no gzip"] {
+        let answer = put_with(&api, "/terrains/hill", &gzip, broken).await;
+        answer.expect_problem(400, "invalid-gzip");
+    }
+    let answer = put_with(&api, "/terrains/hill", &[("content-encoding", "br")], text).await;
+    answer.expect_problem(415, "unsupported-media-type");
+    assert_eq!(kept(&api.uploads())[1..], [0, 0]);
+}
+
+#[tokio::test]
+async fn a_body_that_breaks_off_or_lies_about_its_length_leaves_nothing_behind() {
+    let api = Api::new();
+    let server = Server::start(&api).await;
+    let file = jacksboro();
+    let head = |length: usize| {
+        format!("PUT /terrains/cut HTTP/1.1\r\nhost: x\r\ncontent-length: {length}\r\n\r\n")
+            .into_bytes()
+    };
+    let short = [head(file.len()), file[..file.len() / 2].to_vec()].concat();
+    let long = [head(file.len() / 2), file.clone()].concat();
+    let chunk = [
+        b"PUT /terrains/cut HTTP/1.1\r\nhost: x\r\ntransfer-encoding: chunked\r\n\r\n1000\r\n"
+            .to_vec(),
+        file[..0x800].to_vec(),
+    ]
+    .concat();
+    for (sent, status) in [(short, None), (long, Some("422")), (chunk, None)] {
+        let mut stream = TcpStream::connect(server.address).await.expect("connected");
+        stream.write_all(&sent).await.expect("sent");
+        stream.shutdown().await.expect("no more");
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer).await;
+        let answer = String::from_utf8_lossy(&answer).into_owned();
+        if let Some(status) = status {
+            assert!(
+                answer.starts_with(&format!("HTTP/1.1 {status}")),
+                "{answer}"
+            );
+        }
+        nothing_comes_in(&api).await;
+        assert_eq!(kept(&api.uploads()), [0, 0, 0]);
+    }
+}
+
+/// Who leaves is noticed a little later.
+async fn nothing_comes_in(api: &Api) {
+    let gone = async {
+        while kept(&api.uploads())[2] > 0 {
+            tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+        }
+    };
+    let patience = std::time::Duration::from_secs(30);
+    tokio::time::timeout(patience, gone)
+        .await
+        .expect("it is removed");
+}
+
+#[tokio::test]
+async fn a_body_that_stalls_is_given_up() {
+    let mut api = Api::new();
+    api.state.body_timeout = std::time::Duration::from_millis(200);
+    api.router = http::router(api.state.clone());
+    let file = bytes::Bytes::from(jacksboro());
+    let half = file.slice(..file.len() / 2);
+    let stalls = futures_util::StreamExt::chain(
+        futures_util::stream::iter([Ok::<_, std::io::Error>(half)]),
+        futures_util::stream::pending(),
+    );
+    let body = axum::body::Body::from_stream(stalls);
+    let answer = api
+        .send(axum::http::Method::PUT, "/terrains/slow", &[], body)
+        .await;
+    answer.expect_problem(408, "request-timeout");
+    // One that goes on, but for no more than to keep its place.
+    let drips = futures_util::stream::unfold((), async |()| {
+        tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+        Some((
+            Ok::<_, std::io::Error>(bytes::Bytes::from_static(b"1 ")),
+            (),
+        ))
+    });
+    let body = axum::body::Body::from_stream(Box::pin(drips));
+    let answer = api
+        .send(axum::http::Method::PUT, "/terrains/slow", &[], body)
+        .await;
+    answer.expect_problem(408, "request-timeout");
+    nothing_comes_in(&api).await;
+}
+
+#[tokio::test]
+async fn a_full_disk_refuses_the_upload_and_goes_on() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start_on_a_small_disk(directory.path(), "size=3m");
+    let upload = async |body: Vec<u8>| {
+        let request = service.request(reqwest::Method::PUT, "/terrains/plain");
+        request.body(body).send().await.expect("an answer")
+    };
+    let answer = upload(tiff([2000, 1000])).await;
+    assert_eq!(answer.status(), 503);
+    let problem: serde_json::Value = answer.json().await.expect("JSON");
+    assert_eq!(problem["type"], "/problems/store-unavailable");
+    assert!(
+        problem["detail"].as_str().expect("text").contains("full"),
+        "{problem}"
+    );
+    let uploads = service.seen(&directory.path().join("terrains"));
+    assert_eq!(kept(&uploads), [0, 0, 0]);
+    assert_eq!(upload(tiff([200, 100])).await.status(), 201);
+}

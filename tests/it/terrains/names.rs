@@ -1,0 +1,217 @@
+//! What a name stands for, and who may change it.
+
+use axum::http::Method;
+
+use super::{hill, jacksboro, kept, put, put_with};
+use crate::support::api::Api;
+use crate::support::keys::{bearer, entry};
+
+#[tokio::test]
+async fn an_upload_says_what_it_holds() {
+    let api = Api::new();
+    let answer = put(&api, "/terrains/jacksboro", jacksboro()).await;
+    assert_eq!(answer.status, 201, "{answer:?}");
+    assert_eq!(answer.header("location"), "/terrains/jacksboro");
+    let created = answer.json();
+    let sum = created["sha256"].as_str().expect("a sum");
+    assert_eq!(answer.header("etag"), format!("\"{sum}\""));
+    assert_eq!(created["format"], "geotiff");
+    assert_eq!(created["crs"], "EPSG:4326");
+    assert_eq!(
+        (&created["columns"], &created["rows"]),
+        (&403.into(), &344.into())
+    );
+    assert_eq!(
+        (&created["min"], &created["max"]),
+        (&236.0.into(), &1076.0.into())
+    );
+    assert_eq!(created["no_data_share"], 0.0);
+    assert_eq!(
+        (&created["mounted"], &created["in_use"]),
+        (&false.into(), &0.into())
+    );
+
+    let shown = api.get("/terrains/jacksboro").await;
+    assert_eq!(
+        (shown.status, shown.json()),
+        (200.try_into().expect("a status"), created.clone())
+    );
+    let listed = api.get("/terrains").await.json();
+    assert_eq!(
+        listed["terrains"].as_array().expect("a list"),
+        std::slice::from_ref(&created)
+    );
+
+    // The same again changes nothing, its time neither.
+    let again = put(&api, "/terrains/jacksboro", jacksboro()).await;
+    assert_eq!(again.status, 200);
+    assert_eq!(again.json(), created);
+    // Under another name it is the same content, kept once.
+    let other = put(&api, "/terrains/other", jacksboro()).await;
+    assert_eq!(other.status, 201);
+    assert_eq!(other.json()["sha256"], sum);
+    assert_eq!(kept(&api.uploads()), [2, 2, 0]);
+}
+
+#[tokio::test]
+async fn a_name_can_be_given_to_another_content() {
+    let api = Api::new();
+    let first = put(&api, "/terrains/hill", hill(100.0)).await.json();
+    let second = put(&api, "/terrains/hill", hill(50.0)).await;
+    assert_eq!(second.status, 200);
+    let second = second.json();
+    assert_ne!(first["sha256"], second["sha256"]);
+    assert_eq!(api.get("/terrains/hill").await.json(), second);
+    // As the caller expects.
+    let tag = |document: &serde_json::Value| {
+        format!("\"{}\"", document["sha256"].as_str().expect("a sum"))
+    };
+    for (header, value, status) in [
+        ("if-none-match", "*", 412),
+        ("if-match", &*tag(&first), 412),
+        ("if-match", &*tag(&second), 200),
+        ("if-match", "*", 200),
+    ] {
+        let answer = put_with(&api, "/terrains/hill", &[(header, value)], hill(25.0)).await;
+        assert_eq!(answer.status, status, "{header}: {value}");
+        if status == 200 {
+            put(&api, "/terrains/hill", hill(50.0)).await;
+        }
+    }
+    for (header, value, status) in [("if-match", "*", 412), ("if-none-match", "*", 201)] {
+        let answer = put_with(&api, "/terrains/new", &[(header, value)], hill(25.0)).await;
+        assert_eq!(answer.status, status, "{header}: {value}");
+    }
+}
+
+#[tokio::test]
+async fn a_name_is_deleted_once_and_for_all() {
+    let api = Api::new();
+    put(&api, "/terrains/hill", hill(100.0)).await;
+    for _ in 0..2 {
+        assert_eq!(api.delete("/terrains/hill").await.status, 204);
+    }
+    api.get("/terrains/hill")
+        .await
+        .expect_problem(404, "not-found");
+    assert_eq!(
+        api.get("/terrains").await.json()["terrains"],
+        serde_json::json!([])
+    );
+    assert_eq!(api.delete("/terrains/never-there").await.status, 204);
+}
+
+#[tokio::test]
+async fn only_names_that_scenarios_can_write_are_taken() {
+    let api = Api::new();
+    for name in [
+        "Hill",
+        "-hill",
+        "hill.tif",
+        "%2e%2e",
+        "h%2Fl",
+        &"a".repeat(65),
+    ] {
+        let answer = put(&api, &format!("/terrains/{name}"), hill(1.0)).await;
+        answer.expect_problem(400, "invalid-parameter");
+        let shown = api.get(&format!("/terrains/{name}")).await;
+        shown.expect_problem(404, "not-found");
+    }
+    assert_eq!(kept(&api.uploads()), [0, 0, 0]);
+}
+
+#[tokio::test]
+async fn what_is_declared_belongs_to_the_content() {
+    let api = Api::new();
+    // All sea: only the name tells one tile from the other.
+    let sea = vec![0; 2 * 1201 * 1201];
+    let here = put(&api, "/terrains/n36w085", sea.clone()).await;
+    assert_eq!(here.status, 201, "{here:?}");
+    let here = here.json();
+    assert_eq!(
+        here["area"]["min"],
+        serde_json::json!({"lat": 36.0, "lon": -85.0})
+    );
+    let there = put(&api, "/terrains/sea?filename=S01E179.hgt", sea)
+        .await
+        .json();
+    assert_eq!(
+        there["area"]["max"],
+        serde_json::json!({"lat": 0.0, "lon": 180.0})
+    );
+    assert_ne!(here["sha256"], there["sha256"]);
+
+    let grid = |west, south, cell| {
+        crate::support::elevations::ascii_grid([40, 30], [west, south], cell, |_, _| 250.0)
+    };
+    let map = grid(200_000.0, 4_000_000.0, 100.0);
+    let answer = put(&api, "/terrains/map", map.clone()).await;
+    let problem = answer.expect_problem(422, "invalid-terrain");
+    assert!(
+        problem["detail"]
+            .as_str()
+            .expect("text")
+            .contains("names no coordinate"),
+        "{problem}"
+    );
+    let zones = [16, 17].map(|zone| format!("/terrains/map?crs=EPSG:326{zone}"));
+    let mut sums = Vec::new();
+    for uri in &zones {
+        let answer = put(&api, uri, map.clone()).await;
+        assert!(answer.status.is_success(), "{answer:?}");
+        sums.push(answer.json()["sha256"].clone());
+    }
+    assert_ne!(sums[0], sums[1]);
+    // What the file would be taken for anyway need not be said.
+    let degrees = grid(-85.0, 36.0, 0.01);
+    let plain = put(&api, "/terrains/plain", degrees.clone()).await.json();
+    let said = put(&api, "/terrains/said?crs=epsg:4326&format=asc", degrees)
+        .await
+        .json();
+    assert_eq!(plain["sha256"], said["sha256"]);
+}
+
+#[tokio::test]
+async fn everybody_sees_datasets_and_their_uploader_changes_them() {
+    let people = [
+        ("reader", "read"),
+        ("alice", "plan"),
+        ("bob", "plan"),
+        ("operator", "admin"),
+    ];
+    let text: String = people
+        .map(|(name, scope)| entry(name, name, scope, ""))
+        .concat();
+    let api = Api::with_keys(&text);
+    let bearer = |who: usize| bearer(people[who].0);
+    let upload = async |who: usize, height: f64| {
+        let key = bearer(who);
+        put_with(
+            &api,
+            "/terrains/hill",
+            &[("authorization", &key)],
+            hill(height),
+        )
+        .await
+    };
+    put(&api, "/terrains/hill", hill(1.0))
+        .await
+        .expect_problem(401, "unauthorized");
+    upload(0, 1.0).await.expect_problem(403, "forbidden");
+    assert_eq!(upload(1, 1.0).await.status, 201);
+    upload(2, 2.0).await.expect_problem(403, "forbidden");
+    assert_eq!(upload(1, 2.0).await.status, 200);
+    assert_eq!(upload(3, 3.0).await.status, 200);
+    // It is the operator's now.
+    upload(1, 4.0).await.expect_problem(403, "forbidden");
+    for (who, status) in [(0, 403), (1, 403), (2, 403), (3, 204)] {
+        let key = bearer(who);
+        let headers = [("authorization", key.as_str())];
+        let seen = api.get_with("/terrains/hill", &headers).await;
+        assert_eq!(seen.status, 200);
+        let answer = api
+            .send(Method::DELETE, "/terrains/hill", &headers, "")
+            .await;
+        assert_eq!(answer.status, status, "{who}");
+    }
+}

@@ -1,0 +1,143 @@
+//! Which datasets plans need, and what becomes of those that none does.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use noctule::catalogue::{Catalogue, Directories};
+use noctule::store::wall_clock;
+use noctule::worker::Sweeper;
+
+use super::{hill, kept, over, put};
+use crate::support::api::Api;
+
+/// Whose content goes as soon as nothing refers to it.
+fn impatient() -> Api {
+    Api::with_catalogue(|uploads| Directories::with_grace(uploads, None, Duration::ZERO))
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_a_plan_waits_over_cannot_be_deleted() {
+    let api = impatient();
+    put(&api, "/terrains/hill", hill(100.0)).await;
+    let submit = async || {
+        let answer = api.post("/plans", &over("hill")).await;
+        assert_eq!(answer.status, 202, "{answer:?}");
+        answer.header("location").to_owned()
+    };
+    let plans = [submit().await, submit().await];
+    assert_eq!(api.get("/terrains/hill").await.json()["in_use"], 2);
+    assert_eq!(
+        api.get("/terrains").await.json()["terrains"][0]["in_use"],
+        2
+    );
+    let problem = api
+        .delete("/terrains/hill")
+        .await
+        .expect_problem(409, "terrain-in-use");
+    assert_eq!(problem["plans"], 2);
+    // Another content under the name leaves theirs where it is.
+    put(&api, "/terrains/hill", hill(50.0)).await;
+    let used = std::collections::BTreeSet::from_iter(
+        api.store
+            .datasets_in_use()
+            .await
+            .expect("it is open")
+            .into_iter()
+            .map(|used| used.sha256),
+    );
+    assert_eq!(used.len(), 1);
+    assert_eq!(api.state.terrains.catalogue.sweep(&used).expect("swept"), 0);
+    assert_eq!(kept(&api.uploads()), [4, 1, 0]);
+    assert_eq!(api.delete("/terrains/hill").await.status, 204);
+    for plan in &plans {
+        let svg = api.get(&format!("{plan}/scenario")).await;
+        assert_eq!(svg.status, 200);
+        assert_eq!(api.delete(plan).await.status, 204);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn content_goes_with_the_last_plan_over_it() {
+    let api = impatient();
+    put(&api, "/terrains/hill", hill(100.0)).await;
+    let plan = api
+        .post("/plans", &over("hill"))
+        .await
+        .header("location")
+        .to_owned();
+    put(&api, "/terrains/hill", hill(50.0)).await;
+    put(&api, "/terrains/other", hill(25.0)).await;
+    api.delete("/terrains/other").await;
+    let catalogue: Arc<dyn Catalogue> = api.state.terrains.catalogue.clone();
+    let sweeper = Sweeper::start(api.store.clone(), catalogue, wall_clock());
+    until_kept(&api, [4, 1, 0]).await;
+    api.delete(&plan).await;
+    until_kept(&api, [2, 1, 0]).await;
+    drop(sweeper);
+}
+
+async fn until_kept(api: &Api, expected: [usize; 3]) {
+    let swept = async {
+        while kept(&api.uploads()) != expected {
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    };
+    let swept = tokio::time::timeout(Duration::from_secs(60), swept).await;
+    swept.unwrap_or_else(|_| panic!("{:?} is never {expected:?}", kept(&api.uploads())));
+}
+
+#[tokio::test]
+async fn what_was_asked_for_lately_is_kept_for_a_while() {
+    let api = Api::new();
+    put(&api, "/terrains/hill", hill(100.0)).await;
+    let accepted = api
+        .post("/plans?validate_only=true", &over("hill"))
+        .await
+        .json();
+    api.delete("/terrains/hill").await;
+    let catalogue = &api.state.terrains.catalogue;
+    assert!(catalogue.has_unnamed());
+    assert_eq!(
+        catalogue
+            .sweep(&std::collections::BTreeSet::new())
+            .expect("swept"),
+        0
+    );
+    // Somebody who was told that it is right may still hand it in.
+    let answer = api.post("/plans", &accepted["scenario"]).await;
+    assert_eq!(answer.status, 202, "{answer:?}");
+}
+
+#[tokio::test]
+async fn a_restart_finds_everything() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let open =
+        || Api::with_catalogue(|_| Directories::new(directory.path().join("terrains"), None));
+    let api = open();
+    let hill_is = put(&api, "/terrains/hill", hill(100.0)).await.json();
+    put(&api, "/terrains/hill", hill(7.0)).await;
+    put(
+        &api,
+        "/terrains/sea?filename=N36W085.hgt",
+        vec![0; 2 * 1201 * 1201],
+    )
+    .await;
+    let before = api.get("/terrains").await.json();
+    drop(api);
+    // Of a crash: an upload that had not ended, and one whose content had not come when its record had.
+    let part = |path: &str| directory.path().join("terrains").join(path);
+    std::fs::write(part("incoming/half.part"), "half").expect("written");
+    let orphan = format!("content/{}.json", "0".repeat(64));
+    std::fs::write(
+        part(&orphan),
+        r#"{"bytes":4,"min":1.0,"max":2.0,"no_data_share":0.0}"#,
+    )
+    .expect("written");
+    let api = open();
+    assert_eq!(api.get("/terrains").await.json(), before);
+    assert_eq!(kept(&directory.path().join("terrains")), [6, 2, 0]);
+    let mut pinned = over("hill");
+    pinned["terrain"]["sha256"] = hill_is["sha256"].clone();
+    let answer = api.post("/plans?validate_only=true", &pinned).await;
+    assert_eq!(answer.status, 200, "{answer:?}");
+}

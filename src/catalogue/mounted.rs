@@ -116,9 +116,7 @@ impl Mounted {
             }
             let stem = path.file_stem().and_then(|stem| stem.to_str());
             let name = stem.unwrap_or_default().to_ascii_lowercase();
-            if !is_dataset_name(&name) {
-                self.pass_over(&path, "its name is none that a scenario could use");
-            } else {
+            if is_dataset_name(&name) {
                 match files.entry(name) {
                     btree_map::Entry::Vacant(place) => {
                         place.insert(path);
@@ -127,6 +125,8 @@ impl Mounted {
                         self.pass_over(&path, "another file has the same name");
                     }
                 }
+            } else {
+                self.pass_over(&path, "its name is none that a scenario could use");
             }
         }
         Ok(files)

@@ -10,6 +10,7 @@ mod content;
 mod error;
 mod files;
 mod mounted;
+mod shipped;
 mod staged;
 mod uploaded;
 
@@ -17,6 +18,7 @@ pub use both::Directories;
 pub use content::{Checked, Declaration, Identity};
 pub use error::CatalogueError;
 pub use mounted::Mounted;
+pub use shipped::lay_down;
 pub use staged::Staged;
 
 use std::collections::BTreeSet;

@@ -13,7 +13,7 @@ use tokio::sync::watch;
 use tokio::time::Instant;
 
 use super::{access, exit};
-use crate::catalogue::{Catalogue, Directories, Mounted};
+use crate::catalogue::{self, Catalogue, Directories, Mounted};
 use crate::config::{self, Config, Flags};
 use crate::http::webhook::{self, Secret, Sender};
 use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase, Terrains};
@@ -187,7 +187,12 @@ fn catalogue(config: &Config) -> anyhow::Result<Arc<dyn Catalogue>> {
     let mounted = config.terrain_dir.as_deref().map(Mounted::open);
     let mounted = mounted.transpose().context("terrain_dir")?;
     let uploads = data_dir(config)?.join("terrains");
-    Ok(Arc::new(Directories::new(uploads, mounted)))
+    let is_new = !uploads.exists();
+    let catalogue = Directories::new(uploads, mounted);
+    if is_new && let Err(error) = catalogue::lay_down(&catalogue, store::wall_clock()()) {
+        tracing::warn!(%error, "the dataset that comes with the program cannot be kept");
+    }
+    Ok(Arc::new(catalogue))
 }
 
 async fn open_store(config: &Config) -> anyhow::Result<Arc<dyn Store>> {

@@ -1,4 +1,4 @@
-//! Scenarios that come with the program, to begin with.
+//! Scenarios that come with the program, to begin with: those that need no dataset of elevations beside it.
 
 use std::sync::LazyLock;
 
@@ -13,7 +13,11 @@ use super::params::Params;
 use super::problem::Problem;
 
 /// Name and document, in the order in which they are offered.
-static SHIPPED: [(&str, &str); 5] = [
+static SHIPPED: [(&str, &str); 6] = [
+    (
+        "jacksboro-wgs84",
+        include_str!("../../scenarios/jacksboro-wgs84.json"),
+    ),
     ("jacksboro", include_str!("../../scenarios/jacksboro.json")),
     ("paper-1", include_str!("../../scenarios/paper-1.json")),
     ("paper-2", include_str!("../../scenarios/paper-2.json")),
@@ -81,11 +85,20 @@ mod tests {
     use std::collections::BTreeSet;
     use std::fs;
     use std::path::Path;
+    use std::sync::Arc;
 
     use super::*;
+    use crate::catalogue::Mounted;
     use crate::planner;
     use crate::scenario::json;
     use crate::scenario::limits::Limits;
+
+    fn needs_a_dataset(name: &str) -> bool {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let text = fs::read_to_string(root.join(format!("scenarios/{name}.json"))).expect("text");
+        let document: Value = serde_json::from_str(&text).expect("JSON");
+        document["terrain"]["kind"] == "dataset"
+    }
 
     #[test]
     fn every_shipped_scenario_is_served_and_can_be_planned() {
@@ -94,10 +107,13 @@ mod tests {
         let there: BTreeSet<String> = files
             .map(|entry| entry.expect("listed").file_name())
             .filter_map(|name| Some(name.to_str()?.strip_suffix(".json")?.to_owned()))
+            .filter(|name| !needs_a_dataset(name))
             .collect();
         let served = SHIPPED.iter().map(|(name, _)| (*name).to_owned()).collect();
         assert_eq!(there, served);
-        let rules = planner::rules(Limits::default());
+        let ground = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/terrain");
+        let ground = Mounted::open(&ground).expect("it is there");
+        let rules = planner::rules(Limits::default()).with_datasets(Arc::new(ground));
         for (name, text) in SHIPPED {
             let read = json::read(text.as_bytes(), &rules, 0);
             assert!(read.is_ok(), "{name}");

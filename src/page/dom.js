@@ -30,6 +30,19 @@ export function calmly(ms, act) {
   };
 }
 
+/** `act` at most every `ms`, and once more after the last call. */
+export function atMost(ms, act) {
+  let timer = null;
+  let last = -Infinity;
+  return () => {
+    timer ??= setTimeout(() => {
+      timer = null;
+      last = performance.now();
+      act();
+    }, Math.max(0, last + ms - performance.now()));
+  };
+}
+
 /** `act` at most once a frame. */
 export function eachFrame(act) {
   let asked = false;

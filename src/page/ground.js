@@ -4,7 +4,7 @@ import { axes } from './frame.js';
 import { drawnBySoftware } from './graphics.js';
 
 /** Nodes of drawn ground along its longer side, at most. */
-const FINEST = drawnBySoftware() ? 151 : 301;
+const FINEST = drawnBySoftware() ? 121 : 301;
 const PEAKS_NODES = 161;
 
 /**

@@ -2,7 +2,7 @@
 
 import { Refused, Said, ask, onKeyNeeded, send } from './api.js';
 import { Chart } from './chart.js';
-import { by, calmly, el } from './dom.js';
+import { atMost, by, calmly, el } from './dom.js';
 import { Draft } from './draft.js';
 import { Editor } from './editor.js';
 import { Followed } from './followed.js';
@@ -224,8 +224,11 @@ function heard(plan, what) {
     else tell(plan.lostBecause ?? 'The connection is lost. It is being resumed; nothing will be missed.', 'note');
     if (plan.connected) say('Connected again.');
   }
-  figures(plan);
+  if (['incumbent', 'search'].includes(what)) soon();
+  else figures(plan);
 }
+
+const soon = atMost(100, () => stage.plan && figures(stage.plan));
 
 function verdict(plan) {
   if (!plan.result) return `The plan has ${plan.status.status}.`;

@@ -1,11 +1,12 @@
 // The ground in the scene: a shaded mesh with its contours, or a ruled plane where it is flat.
 
 import { BufferAttribute, BufferGeometry, Color, DoubleSide, Group, LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial } from './vendor/three.js';
+import { drawnBySoftware } from './graphics.js';
 import { ramp } from './palette.js';
 import { step } from './words.js';
 
 const CONTOURS = 14;
-const MOST_PIECES = 60000;
+const MOST_PIECES = drawnBySoftware() ? 12000 : 60000;
 // From the north-west and above, as maps have it.
 const SUN = [-0.5, 0.6, 0.62];
 

@@ -12,9 +12,11 @@ export function saveBlob(blob, name) {
   setTimeout(() => URL.revokeObjectURL(address), 10000);
 }
 
-/** What the service answers, as a file: by a request of ours, for a link could not bring a key. */
+/** What the service answers, as a file of the name that it gives: by a request of ours, for a link could not bring a key. */
 export async function saveFrom(path, name) {
-  saveBlob(await (await send(path)).blob(), name);
+  const answer = await send(path);
+  const [, given] = answer.headers.get('content-disposition')?.match(/filename="([^"]+)"/) ?? [];
+  saveBlob(await answer.blob(), given ?? name);
 }
 
 /** A scenario's name as that of a file. */

@@ -12,6 +12,9 @@ import { Volumes } from './volumes.js';
 
 const VIEWS = { oblique: new Vector3(-0.26, -0.8, 0.78), above: new Vector3(0, -0.001, 1) };
 
+/** Of the pixels of the screen, where the processor draws and much changes. */
+const COARSE = 0.6;
+
 export class World {
   #root = new Group();
   #scene = new Scene();
@@ -31,13 +34,14 @@ export class World {
   #frames = { count: 0, ms: 0 };
   #show = null;
   #view = 'oblique';
+  #ratio = Math.min(devicePixelRatio, drawnBySoftware() ? 1 : 2);
 
   /** Throws where the browser has no WebGL. */
   constructor(canvas, labels) {
     this.canvas = canvas;
     this.labels = new Labels(labels);
     this.renderer = new WebGLRenderer({ canvas, antialias: !drawnBySoftware(), powerPreference: 'high-performance' });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, drawnBySoftware() ? 1 : 2));
+    this.renderer.setPixelRatio(this.#ratio);
     this.#camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.#camera, canvas);
     this.controls.maxPolarAngle = Math.PI / 2 - 0.02;
@@ -60,6 +64,15 @@ export class World {
   set exaggeration(times) {
     this.#root.scale.z = times;
     this.wake();
+  }
+
+  /** Whether much is drawn in a short time: where that is hard, it is drawn coarser meanwhile. */
+  set hurried(yes) {
+    const ratio = yes && drawnBySoftware() ? COARSE : this.#ratio;
+    if (this.renderer.getPixelRatio() === ratio) return;
+    this.renderer.setPixelRatio(ratio);
+    // At once, for a canvas of another size is empty.
+    this.#render();
   }
 
   get ground() { return this.#show?.ground ?? null; }

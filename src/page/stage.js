@@ -2,7 +2,7 @@
 
 import { ask } from './api.js';
 import { describe } from './describe.js';
-import { eachFrame } from './dom.js';
+import { atMost, eachFrame } from './dom.js';
 import { axes, frameOf } from './frame.js';
 import { extentOf, groundOf } from './ground.js';
 import { palette } from './palette.js';
@@ -11,6 +11,8 @@ import { Way } from './way.js';
 
 const SAMPLES = 201;
 const NEAR_PX = 24;
+/** Nobody reads a chart faster. */
+const CHART_MS = 150;
 
 export class Stage {
   frame = null;
@@ -35,7 +37,7 @@ export class Stage {
     Object.assign(this, parts);
     this.acts = acts;
     this.redraw = eachFrame(() => this.#draw());
-    this.drawSearch = eachFrame(() => this.#drawSearch());
+    this.drawSearch = atMost(CHART_MS, () => this.#drawSearch());
     this.draft.addEventListener('change', ({ detail }) => {
       if (detail.why === 'replaced') {
         this.frame = null;
@@ -197,6 +199,7 @@ export class Stage {
         if (this.#trailed) this.world.past(this.#way(this.#trailed.waypoints)?.points, colours.route);
         this.#trailed = plan.latest;
       }
+      this.world.hurried = Boolean(plan && !plan.ended && plan.latest);
       const lines = new Map();
       for (const other of others) lines.set(other.id, { points: other.way.points, color: other.color, width: 2.5 });
       if (way) lines.set('route', { points: way.points, color, width: 4 });

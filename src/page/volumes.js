@@ -70,12 +70,13 @@ export class Volumes {
   /** The outlines on the ground, and those of the cores at their tops. */
   #footprints(threats, ground, colours) {
     const [cores, zones] = [[], []];
-    const sides = threats.length > MANY ? 32 : 64;
+    const many = threats.length > MANY;
+    const sides = many ? 20 : 64;
     for (const threat of threats) {
       const ring = threat.ring ?? circle(threat.center, threat.radius, sides);
       const lift = (ground.extent.max.x - ground.extent.min.x) / 2000;
       outline(cores, ring, ({ x, y }) => ground.at(x, y) + lift);
-      outline(cores, ring, () => threat.high);
+      if (!many) outline(cores, ring, () => threat.high);
       if (threat.low > ground.least) outline(cores, ring, () => threat.low);
       const wide = threat.ring ? (threat.margin > 0 ? widened(threat.ring, threat.margin) : null) : threat.influence > threat.radius && circle(threat.center, threat.influence, sides);
       if (wide) outline(zones, wide, ({ x, y }) => ground.at(x, y) + lift);

@@ -7,7 +7,7 @@ import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { SMALL, WALLED, browser, drawn, made, open, plan, scene, service } from './support.js';
+import { SMALL, WALLED, FIRST, browser, drawn, made, open, plan, scene, service } from './support.js';
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 
@@ -47,7 +47,7 @@ for (const colorScheme of ['light', 'dark']) {
 
 test('it works at 390 pixels, and axe finds nothing serious there', async () => {
   const page = await open(chrome, site.url, { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= 390), 'nothing is wider than the screen');
   await page.selectOption('#source', 'paper-1');
   await drawn(page, 3);
@@ -59,7 +59,7 @@ test('it works at 390 pixels, and axe finds nothing serious there', async () => 
 
 test('the keyboard alone leads from a scenario to a read result', async () => {
   const page = await open(chrome, site.url, { reducedMotion: 'reduce' });
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   const reach = async (test_) => {
     for (let presses = 0; presses < 400; presses += 1) {
       await page.keyboard.press('Tab');
@@ -100,7 +100,7 @@ test('a service with keys is asked with one, kept in memory, and followed with t
   assert.deepEqual(await serious(page), []);
   await page.fill('#key-field', key);
   await page.click('#key button.main');
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   await page.selectOption('#source', 'paper-1');
   await drawn(page, 3);
   await plan(page);

@@ -3,7 +3,8 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
-import { SMALL, ask, browser, color, document_, drawn, fill, made, open, pixels, plan, scene, service } from './support.js';
+import { fileURLToPath } from 'node:url';
+import { SMALL, ask, browser, color, FIRST, document_, drawn, fill, made, open, pixels, plan, scene, service } from './support.js';
 
 let site;
 let chrome;
@@ -53,7 +54,7 @@ test('the list has states, a filter and pages, and lets go', async () => {
   const other = await service();
   for (let n = 0; n < 23; n += 1) await made(other.url, { ...SMALL, name: `plan ${n}`, planner: { ...SMALL.planner, iterations: 1, population: 10 } });
   const page = await open(chrome, other.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   await page.click('#tab-plans');
   await page.waitForSelector('.plans tbody tr');
   assert.equal(await page.locator('.plans tbody tr').count(), 20);
@@ -85,9 +86,9 @@ test('a plan is taken away: formats, scenario, picture, link', async () => {
     return { name: download.suggestedFilename(), bytes: readFileSync(await download.path()) };
   };
   const served = async (path) => Buffer.from(await (await fetch(new URL(path, site.url))).arrayBuffer());
-  for (const [format, name] of [['json', 'small.json'], ['svg', 'small.svg'], ['csv', 'small.csv']]) {
+  for (const format of ['json', 'svg', 'csv']) {
     const saved = await save(`[data-format=${format}]`);
-    assert.equal(saved.name, name);
+    assert.match(saved.name, new RegExp(`^small.*\\.${format}$`));
     assert.deepEqual(saved.bytes, await served(`/plans/${id}/result?format=${format}`), format);
   }
   assert.deepEqual((await save('#save-scenario')).bytes, await served(`/plans/${id}/scenario`));
@@ -95,11 +96,59 @@ test('a plan is taken away: formats, scenario, picture, link', async () => {
   assert.equal(picture.bytes.subarray(1, 4).toString(), 'PNG');
   assert.ok(picture.bytes.length > 5000, 'and it is not empty');
   await page.click('#copy-link');
-  await page.waitForSelector('#notice:not([hidden])');
+  await page.waitForFunction(() => /clipboard/.test(document.getElementById('notice').textContent));
   const link = await page.evaluate(() => navigator.clipboard.readText());
   const again = await open(chrome, link);
   await again.waitForSelector('.verdict.good');
   assert.equal((await document_(again)).name, 'small');
   await again.done();
+  await page.done();
+});
+
+test('a map becomes a flight plan, in every format that flies', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  await page.setInputFiles('#file', fileURLToPath(new URL('./map.kml', import.meta.url)));
+  await page.waitForFunction(() => globalThis.noctule.document().frame === 'wgs84');
+  assert.match(await page.textContent('#notice'), /Taken for granted/);
+  await drawn(page, 1);
+  await fill(page, '/planner/iterations', '20');
+  const id = await plan(page);
+  const result = await ask(site.url, `/plans/${id}/result`);
+  // What is drawn in metres is where the degrees say.
+  const [start, end] = await page.evaluate((p) => [globalThis.noctule.routeAt(0), globalThis.noctule.toMetres(p)], result.waypoints[0]);
+  assert.ok(Math.hypot(start.x - end.x, start.y - end.y) < 0.01);
+  const across = await page.evaluate((p) => p.map(globalThis.noctule.toMetres), [result.waypoints[0], result.waypoints.at(-1)]);
+  const flown = result.legs.reduce((sum, leg) => sum + leg.length * Math.cos((leg.climb_deg * Math.PI) / 180), 0);
+  assert.ok(Math.hypot(across[0].x - across[1].x, across[0].y - across[1].y) <= flown * 1.0002);
+  for (const format of ['qgc', 'wpl', 'kml', 'geojson', 'gpx', 'czml', 'csv', 'json', 'svg']) {
+    const [download] = await Promise.all([page.waitForEvent('download'), page.click(`[data-format=${format}]`)]);
+    const bytes = readFileSync(await download.path());
+    assert.ok(bytes.length > 200, format);
+    if (format === 'qgc') assert.equal(JSON.parse(bytes).fileType, 'Plan');
+  }
+  await page.done();
+});
+
+test('from opening the page to a flight plan over Jacksboro takes five actions or fewer', async () => {
+  let actions = 1;
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  const { scenarios } = await ask(site.url, '/scenarios');
+  const flown = scenarios.find(({ name, frame }) => frame === 'wgs84' && name.startsWith('jacksboro'));
+  if (scenarios[0] !== flown) {
+    actions += 1;
+    await page.selectOption('#source', flown.name);
+    await drawn(page, flown.threats);
+  }
+  actions += 1;
+  await plan(page);
+  assert.equal(await page.locator('.verdict.good').count(), 1);
+  actions += 1;
+  const [download] = await Promise.all([page.waitForEvent('download'), page.click('[data-format=qgc]')]);
+  const flight = JSON.parse(readFileSync(await download.path()));
+  assert.equal(flight.fileType, 'Plan');
+  assert.ok(flight.mission.items.length > 3);
+  assert.ok(actions <= 5, `${actions}`);
   await page.done();
 });

@@ -2,8 +2,10 @@
 
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { SMALL, browser, document_, drawn, drop, fill, groundPoint, open, scene, service } from './support.js';
+import { fileURLToPath } from 'node:url';
+import { SMALL, browser, FIRST, document_, drawn, drop, fill, groundPoint, open, scene, service } from './support.js';
 
 let site;
 let chrome;
@@ -15,7 +17,7 @@ after(async () => {
 
 test('a shipped scenario is there at once, and another is one choice away', async () => {
   const page = await open(chrome, site.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   assert.match(await page.title(), /Jacksboro.*Noctule/);
   assert.equal((await scene(page)).ground.kind, 'mesh');
   await page.selectOption('#source', 'paper-4');
@@ -30,7 +32,7 @@ test('a shipped scenario is there at once, and another is one choice away', asyn
 
 test('files are opened and dropped: a scenario, GeoJSON, KML', async () => {
   const page = await open(chrome, site.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   await page.setInputFiles('#file', { name: 'mine.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(SMALL)) });
   await drawn(page, 1);
   assert.equal((await document_(page)).name, 'small');
@@ -52,7 +54,7 @@ test('files are opened and dropped: a scenario, GeoJSON, KML', async () => {
 
 test('a scenario is drawn by hand, taken back and done again', async () => {
   const page = await open(chrome, site.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   await page.click('text=Empty');
   await drawn(page, 0);
   const click = async (x, y) => {
@@ -113,7 +115,7 @@ test('a scenario is drawn by hand, taken back and done again', async () => {
 
 test('faults stand where they are, in the words of the service', async () => {
   const page = await open(chrome, site.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   await page.selectOption('#source', 'paper-1');
   await drawn(page, 3);
   await fill(page, '/threats/0/radius', '-3');
@@ -133,4 +135,25 @@ test('faults stand where they are, in the words of the service', async () => {
   await page.waitForSelector('.faults', { state: 'hidden' });
   assert.equal(await page.locator('[aria-invalid]').count(), 0);
   await page.done();
+});
+
+test('the ground of a dataset is drawn as the service has it', async () => {
+  const directory = fileURLToPath(new URL('../../scenarios', import.meta.url));
+  const mapped = await service('--terrain-dir', join(directory, 'terrain'));
+  const page = await open(chrome, mapped.url);
+  await drawn(page, FIRST);
+  await page.setInputFiles('#file', join(directory, 'jacksboro-wgs84.json'));
+  await page.waitForFunction(() => globalThis.noctule.document().terrain.kind === 'dataset');
+  await page.waitForFunction(() => globalThis.noctule.scene().ground.columns === 201);
+  const text = readFileSync(join(directory, 'jacksboro-wgs84.json'), 'utf8');
+  const { start } = JSON.parse(text);
+  const ground = await page.evaluate((p) => {
+    const { x, y } = globalThis.noctule.toMetres(p);
+    return globalThis.noctule.groundAt(x, y);
+  }, start);
+  assert.ok(ground > 300 && ground < start.alt + 1, `the ground at the start, ${ground} m, is below it`);
+  await page.evaluate(() => { for (const part of document.querySelectorAll('details')) part.open = true; });
+  assert.equal(await page.inputValue('[data-pointer="/terrain/name"]'), 'jacksboro', 'and can be chosen');
+  await page.done();
+  await mapped.stop();
 });

@@ -94,6 +94,9 @@ export async function open(chrome, url, settings = {}) {
   return Object.assign(page, { done });
 }
 
+/** Threats of the scenario that is there at once. */
+export const FIRST = 4;
+
 /** Waits until a scenario is drawn. */
 export const drawn = (page, threats) => page.waitForFunction((count) => {
   const scene = globalThis.noctule?.scene();

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { SMALL, WALLED, around, ask, browser, choose, color, drawn, made, open, pixels, plan, scene, service, wire } from './support.js';
+import { SMALL, WALLED, around, ask, browser, choose, FIRST, color, drawn, made, open, pixels, plan, scene, service, wire } from './support.js';
 
 let site;
 let chrome;
@@ -17,7 +17,7 @@ const LONG = { '/planner/iterations': 20000, '/planner/population': 100, '/plann
 
 test('the swarm is seen converging, and cancelling keeps the best', async () => {
   const page = await open(chrome, site.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   await choose(page, 'paper-4', LONG);
   await page.click('#plan');
   await page.waitForFunction(() => globalThis.noctule.scene().trail >= 2, null, { timeout: 60000 });
@@ -35,7 +35,7 @@ test('the swarm is seen converging, and cancelling keeps the best', async () => 
 
 test('the route is drawn where it is, and a place in it is one place everywhere', async () => {
   const page = await open(chrome, site.url);
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   await choose(page, 'paper-1');
   const id = await plan(page);
   const result = await ask(site.url, `/plans/${id}/result`);
@@ -77,7 +77,7 @@ test('a lost connection says so, and is taken up again without a loss', async ()
   const line = await wire(site.url);
   const page = await open(chrome, line.url);
   page.allowed = /ERR_|Failed to load resource/;
-  await drawn(page, 6);
+  await drawn(page, FIRST);
   await choose(page, 'paper-4', LONG);
   await page.click('#plan');
   await page.waitForFunction(() => globalThis.noctule.scene().trail >= 1, null, { timeout: 60000 });

@@ -1,0 +1,57 @@
+//! The dataset that comes with the program: a catalogue that is new begins with it, so that the shipped
+//! scenario over real ground can be planned at once. From then on it is a dataset like any other.
+
+use std::io::Write as _;
+
+use super::{Catalogue, CatalogueError, Claim, Declaration, Expected, Kept, Naming};
+
+/// A ridge in Tennessee; scenarios/terrain/README.md says where it is from.
+const NAME: &str = "jacksboro";
+const FILE: &[u8] = include_bytes!("../../scenarios/terrain/jacksboro.tif");
+
+/// Put it into `catalogue`, where its name is still free; `now_ms` since 1970.
+///
+/// # Errors
+/// [`CatalogueError::Unavailable`].
+pub fn lay_down(catalogue: &dyn Catalogue, now_ms: i64) -> Result<(), CatalogueError> {
+    let naming = Naming {
+        name: NAME.to_owned(),
+        by: Claim::default(),
+        now_ms,
+        expected: Expected::Nothing,
+    };
+    match lay(catalogue, &naming) {
+        Ok(_) | Err(CatalogueError::Mounted { .. } | CatalogueError::Exists { .. }) => Ok(()),
+        Err(error) => Err(error),
+    }
+}
+
+fn lay(catalogue: &dyn Catalogue, naming: &Naming) -> Result<Kept, CatalogueError> {
+    catalogue.permit(naming)?;
+    let mut staged = catalogue.stage(FILE.len() as u64)?;
+    if staged.write_all(FILE).is_err() {
+        let failure = staged.failure();
+        return Err(failure.expect("a write that fails says why"));
+    }
+    catalogue.keep(staged.check(None, Declaration::default())?, naming)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue::Directories;
+
+    #[test]
+    fn a_new_catalogue_has_it_and_one_that_has_the_name_keeps_its_own() {
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let catalogue = Directories::new(directory.path().join("terrains"), None);
+        lay_down(&catalogue, 7).expect("a place that can be written to");
+        let entry = catalogue.entry(NAME).expect("it is there");
+        assert_eq!(
+            (entry.uploaded_ms, entry.bytes),
+            (Some(7), FILE.len() as u64)
+        );
+        lay_down(&catalogue, 8).expect("nothing to do");
+        assert_eq!(catalogue.entry(NAME).expect("it is there"), entry);
+    }
+}

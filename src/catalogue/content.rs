@@ -1,5 +1,6 @@
 //! What stands for a dataset: its bytes, and what was declared that they do not say.
 
+use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -100,7 +101,10 @@ impl Identity {
             }
         }
         let digits = self.0.finalize();
-        digits.iter().map(|byte| format!("{byte:02x}")).collect()
+        digits.iter().fold(String::new(), |mut hex, byte| {
+            write!(hex, "{byte:02x}").expect("writing to a string cannot fail");
+            hex
+        })
     }
 }
 

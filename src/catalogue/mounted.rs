@@ -1,6 +1,7 @@
 //! The operator's own files: a directory that is only read. A file's name without its extension, in
 //! lower case, is what scenarios call it.
 
+use std::collections::btree_map;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
 use std::io;
@@ -115,12 +116,17 @@ impl Mounted {
             }
             let stem = path.file_stem().and_then(|stem| stem.to_str());
             let name = stem.unwrap_or_default().to_ascii_lowercase();
-            if !is_dataset_name(&name) {
-                self.pass_over(&path, "its name is none that a scenario could use");
-            } else if files.contains_key(&name) {
-                self.pass_over(&path, "another file has the same name");
+            if is_dataset_name(&name) {
+                match files.entry(name) {
+                    btree_map::Entry::Vacant(place) => {
+                        place.insert(path);
+                    }
+                    btree_map::Entry::Occupied(_) => {
+                        self.pass_over(&path, "another file has the same name");
+                    }
+                }
             } else {
-                files.insert(name, path);
+                self.pass_over(&path, "its name is none that a scenario could use");
             }
         }
         Ok(files)

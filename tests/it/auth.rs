@@ -210,6 +210,7 @@ async fn every_route_asks_for_what_the_description_says() {
         assert_eq!(described, &Value::from(expected), "{place}");
 
         let request = place.replace("{id}", NOBODY).replace("{slug}", "not-found");
+        let request = request.replace("{name}", "paper-1");
         let (method, uri) = request.split_once(' ').expect("a method and a path");
         let method: Method = method.parse().expect("a method");
         let anonymous = api.send(method, uri, &[], "").await;

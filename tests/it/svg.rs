@@ -204,7 +204,9 @@ fn every_shipped_scenario_draws() {
         let mut document: Value = serde_json::from_slice(&text).expect("JSON");
         document["planner"]["population"] = 20.into();
         document["planner"]["iterations"] = 20.into();
-        let plan = process::run(&["plan", "-", "--format", "svg"], &document.to_string());
+        let terrains = format!("{directory}/terrain");
+        let arguments = ["plan", "-", "--format", "svg", "--terrain-dir", &terrains];
+        let plan = process::run(&arguments, &document.to_string());
         let drawing = String::from_utf8(plan.stdout).expect("UTF-8");
         expect_words(&drawing, document["name"].as_str().expect("named"));
         assert!(

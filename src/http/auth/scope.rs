@@ -77,9 +77,9 @@ impl Needs {
             ("GET", "/plans/{id}/events") => Self::Ticket,
             ("GET", _) | ("POST", "/plans/{id}/tickets") => Self::Scope(Scope::Read),
             (_, path) if path.starts_with("/plans") => Self::Scope(Scope::Plan),
-            // Whose it may not be is told by the handler.
-            ("PUT" | "DELETE", "/terrains/{name}") => Self::Scope(Scope::Plan),
-            ("POST", "/scenarios:convert" | "/scenarios:ground") => Self::Scope(Scope::Plan),
+            // Whose a dataset is not to change is told by the handler.
+            ("PUT" | "DELETE", "/terrains/{name}")
+            | ("POST", "/scenarios:convert" | "/scenarios:ground") => Self::Scope(Scope::Plan),
             _ => Self::Scope(Scope::Admin),
         }
     }

@@ -47,9 +47,11 @@ fn with_tag(mut bytes: Vec<u8>, tag: u16, value: u32) -> Vec<u8> {
     bytes
 }
 
-#[tokio::test]
-async fn files_that_cannot_be_used_leave_nothing_behind() {
-    let api = Api::new();
+/// What it is, how it is sent, and what is sent.
+type Case = (&'static str, &'static str, Vec<u8>);
+
+/// Files that are none.
+fn hostile() -> Vec<Case> {
     let whole = jacksboro();
     let mut damaged = whole.clone();
     let length = damaged.len();
@@ -57,7 +59,7 @@ async fn files_that_cannot_be_used_leave_nothing_behind() {
         *byte ^= 0x5a;
     }
     let text = hill(10.0);
-    let cases: Vec<(&str, &str, Vec<u8>)> = vec![
+    vec![
         ("nothing", "", Vec::new()),
         (
             "a letter",
@@ -130,8 +132,13 @@ async fn files_that_cannot_be_used_leave_nothing_behind() {
             "?filename=N95W085.hgt",
             vec![0; 2 * 1201 * 1201],
         ),
-    ];
-    for (what, query, body) in cases {
+    ]
+}
+
+#[tokio::test]
+async fn files_that_cannot_be_used_leave_nothing_behind() {
+    let api = Api::new();
+    for (what, query, body) in hostile() {
         let answer = put(&api, &format!("/terrains/hostile{query}"), body).await;
         let problem = answer.expect_problem(422, "invalid-terrain");
         let detail = problem["detail"].as_str().expect("text");
@@ -142,7 +149,7 @@ async fn files_that_cannot_be_used_leave_nothing_behind() {
         assert_eq!(kept(&api.uploads()), [0, 0, 0], "{what}");
     }
     for query in ["?format=png", "?force", "?crs=a&crs=b"] {
-        let answer = put(&api, &format!("/terrains/hostile{query}"), whole.clone()).await;
+        let answer = put(&api, &format!("/terrains/hostile{query}"), jacksboro()).await;
         answer.expect_problem(400, "invalid-parameter");
     }
     api.get("/terrains/hostile")

@@ -1,5 +1,6 @@
 //! Which datasets plans need, and what becomes of those that none does.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -37,14 +38,8 @@ async fn what_a_plan_waits_over_cannot_be_deleted() {
     assert_eq!(problem["plans"], 2);
     // Another content under the name leaves theirs where it is.
     put(&api, "/terrains/hill", hill(50.0)).await;
-    let used = std::collections::BTreeSet::from_iter(
-        api.store
-            .datasets_in_use()
-            .await
-            .expect("it is open")
-            .into_iter()
-            .map(|used| used.sha256),
-    );
+    let uses = api.store.datasets_in_use().await.expect("it is open");
+    let used: BTreeSet<String> = uses.into_iter().map(|used| used.sha256).collect();
     assert_eq!(used.len(), 1);
     assert_eq!(api.state.terrains.catalogue.sweep(&used).expect("swept"), 0);
     assert_eq!(kept(&api.uploads()), [4, 1, 0]);
@@ -97,12 +92,7 @@ async fn what_was_asked_for_lately_is_kept_for_a_while() {
     api.delete("/terrains/hill").await;
     let catalogue = &api.state.terrains.catalogue;
     assert!(catalogue.has_unnamed());
-    assert_eq!(
-        catalogue
-            .sweep(&std::collections::BTreeSet::new())
-            .expect("swept"),
-        0
-    );
+    assert_eq!(catalogue.sweep(&BTreeSet::new()).expect("swept"), 0);
     // Somebody who was told that it is right may still hand it in.
     let answer = api.post("/plans", &accepted["scenario"]).await;
     assert_eq!(answer.status, 202, "{answer:?}");

@@ -89,14 +89,16 @@ export class Chart {
 
   #tell(bound, series, colours) {
     const last = (values) => [...values.values()].filter((value) => value !== null).at(-1);
-    const entries = [...series].reverse().map(({ label, stroke, values }) => [label, stroke, last(values)]);
-    if (bound) entries.push(['proven bound', colours.bound, bound]);
-    this.legend.replaceChildren(...entries.filter(([, , value]) => value !== undefined).map(([label, stroke, value]) => {
+    // A plan that is laid over is named even where it found no feasible route: its colour is in the scene.
+    const shown = ({ label, values }) => !['best', 'mean'].includes(label) || last(values) !== undefined;
+    const entries = [...series].reverse().filter(shown).map(({ label, stroke, values }) => [label, stroke, cost(last(values))]);
+    if (bound) entries.push(['proven bound', colours.bound, cost(bound)]);
+    this.legend.replaceChildren(...entries.map(([label, stroke, value]) => {
       const swatch = el('i');
       swatch.style.background = stroke;
-      return el('span', {}, swatch, `${label} `, el('b', {}, cost(value)));
+      return el('span', {}, swatch, `${label} `, el('b', {}, value));
     }));
-    const said = entries.filter(([, , value]) => value !== undefined).map(([label, , value]) => `${label} ${cost(value)}`);
+    const said = entries.map(([label, , value]) => `${label} ${value}`);
     this.node.setAttribute('aria-label', said.length ? `Convergence over iterations; at the end: ${said.join(', ')}` : 'No search yet');
   }
 }

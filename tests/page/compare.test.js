@@ -110,7 +110,7 @@ test('a map becomes a flight plan, in every format that flies', async () => {
   await drawn(page, FIRST);
   await page.setInputFiles('#file', fileURLToPath(new URL('./map.kml', import.meta.url)));
   await page.waitForFunction(() => globalThis.noctule.document().frame === 'wgs84');
-  assert.match(await page.textContent('#notice'), /Taken for granted/);
+  await page.waitForFunction(() => /Taken for granted/.test(document.getElementById('notice').textContent));
   await drawn(page, 1);
   await fill(page, '/planner/iterations', '20');
   const id = await plan(page);

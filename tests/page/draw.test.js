@@ -19,7 +19,8 @@ test('a shipped scenario is there at once, and another is one choice away', asyn
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);
   assert.match(await page.title(), /Jacksboro.*Noctule/);
-  assert.equal((await scene(page)).ground.kind, 'mesh');
+  // Flat until the service has said what its ground is.
+  await page.waitForFunction(() => globalThis.noctule.scene().ground.kind === 'mesh');
   await page.selectOption('#source', 'paper-4');
   await drawn(page, 5);
   assert.deepEqual((await scene(page)).ground.kind, 'mesh');

@@ -1,4 +1,4 @@
-//! Scenarios that come with the program, to begin with: those that need no dataset of elevations beside it.
+//! Scenarios that come with the program, to begin with.
 
 use std::sync::LazyLock;
 
@@ -93,13 +93,6 @@ mod tests {
     use crate::scenario::json;
     use crate::scenario::limits::Limits;
 
-    fn needs_a_dataset(name: &str) -> bool {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let text = fs::read_to_string(root.join(format!("scenarios/{name}.json"))).expect("text");
-        let document: Value = serde_json::from_str(&text).expect("JSON");
-        document["terrain"]["kind"] == "dataset"
-    }
-
     #[test]
     fn every_shipped_scenario_is_served_and_can_be_planned() {
         let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
@@ -107,7 +100,6 @@ mod tests {
         let there: BTreeSet<String> = files
             .map(|entry| entry.expect("listed").file_name())
             .filter_map(|name| Some(name.to_str()?.strip_suffix(".json")?.to_owned()))
-            .filter(|name| !needs_a_dataset(name))
             .collect();
         let served = SHIPPED.iter().map(|(name, _)| (*name).to_owned()).collect();
         assert_eq!(there, served);

@@ -8,7 +8,7 @@
 use super::coverage::{self, Gap};
 use super::fit::Fit;
 use super::slabs::Slabs;
-use super::way::Way;
+use super::way::{Way, greater, lesser};
 use super::{DemError, Raster};
 use crate::geometry::geodesy::TangentPlane;
 use crate::geometry::{Point2, Point3, Rect, Segment};
@@ -263,9 +263,9 @@ impl Dem {
     ) {
         let level = &self.slabs.levels[level_idx];
         let beyond = |range: &HeightRange, heights: HeightRange| {
-            let dip = range.min.min(band.min) - heights.min;
-            let rise = heights.max - range.max.max(band.max);
-            dip.max(rise)
+            let dip = lesser(range.min, band.min) - heights.min;
+            let rise = heights.max - greater(range.max, band.max);
+            greater(dip, rise)
         };
         let closer = |[u0, u1]: [f64; 2], range: &mut HeightRange| {
             let part = [u0, u1].map(|u| s0 + (s1 - s0) * u);
@@ -275,9 +275,12 @@ impl Dem {
                 self.descend(way, level_idx - 1, part, band, range);
             }
         };
-        let (mut most, mut worst) = (0.0, None);
+        let (mut most, mut worst, mut open) = (0.0, None, 0);
         way.blocks(level, [s0, s1], |part, heights| {
             let amount = beyond(range, heights);
+            if amount > 0.0 {
+                open += 1;
+            }
             if amount > most {
                 (most, worst) = (amount, Some(part));
             }
@@ -286,6 +289,9 @@ impl Dem {
             return;
         };
         closer(worst, range);
+        if open == 1 {
+            return;
+        }
         way.blocks(level, [s0, s1], |part, heights| {
             if beyond(range, heights) > 0.0 && part[0].to_bits() != worst[0].to_bits() {
                 closer(part, range);

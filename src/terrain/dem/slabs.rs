@@ -117,8 +117,14 @@ impl Slab {
 
     /// The plane so many cells from the first node.
     #[inline]
-    pub(super) fn at(&self, [x, y]: [f64; 2]) -> f64 {
-        f64::from(self.base) + f64::from(self.slope[0]) * x + f64::from(self.slope[1]) * y
+    pub(super) fn at(&self, place: [f64; 2]) -> f64 {
+        f64::from(self.base) + self.rise(place)
+    }
+
+    /// How much the plane rises over so many cells.
+    #[inline]
+    pub(super) fn rise(&self, [x, y]: [f64; 2]) -> f64 {
+        f64::from(self.slope[0]) * x + f64::from(self.slope[1]) * y
     }
 
     /// How far the ground is above the plane, at least and at most, metres.

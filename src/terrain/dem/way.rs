@@ -30,6 +30,7 @@ impl Way {
         mut visit: impl FnMut([f64; 2], HeightRange),
     ) {
         let [from, to] = [self.at(s0), self.at(s1)];
+        let way: Place = std::array::from_fn(|axis| to[axis] - from[axis]);
         let width = level.width as f64;
         let blocks = 1.0 / width;
         let mut column = Walk::new(from[0] * blocks, to[0] * blocks, level.columns + 1);
@@ -37,20 +38,18 @@ impl Way {
         let mut u = 0.0;
         // u runs from 0 to 1 over the part; each block ends at the next line in either direction.
         loop {
-            let next = column.leave.min(row.leave).min(1.0);
+            let next = lesser(lesser(column.leave, row.leave), 1.0);
             if next > u {
                 let slab = level.slab(column.cell, row.cell);
+                // Along the way, height above the plane is a line.
                 let first = [column.cell as f64 * width, row.cell as f64 * width];
-                let above = |u: f64| {
-                    let [x, y, z]: Place =
-                        std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * u);
-                    z - slab.at([x - first[0], y - first[1]])
-                };
-                let (h0, h1) = (above(u), above(next));
+                let h = from[2] - slab.at([from[0] - first[0], from[1] - first[1]]);
+                let rise = way[2] - slab.rise([way[0], way[1]]);
+                let (h0, h1) = (h + rise * u, h + rise * next);
                 let [least, most] = slab.reach();
                 let heights = HeightRange {
-                    min: h0.min(h1) - most - self.slack,
-                    max: h0.max(h1) - least + self.slack,
+                    min: lesser(h0, h1) - most - self.slack,
+                    max: greater(h0, h1) - least + self.slack,
                 };
                 visit([u, next], heights);
                 u = next;
@@ -65,4 +64,16 @@ impl Way {
             }
         }
     }
+}
+
+/// Of two numbers, the lesser one; faster than where one may not be a number.
+#[inline]
+pub(super) fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// Of two numbers, the greater one.
+#[inline]
+pub(super) fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }

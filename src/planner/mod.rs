@@ -105,7 +105,7 @@ fn search(model: &Model, log: &mut Log) -> StopReason {
 /// The routes of `scenario` as its algorithm sees them: positions in a box, each with its price.
 ///
 /// For measuring the pricing itself, and for searches of one's own. Once `stop` asks for it, what is
-/// left of a batch is [`Fitness::WORST`](optimizer::Fitness::WORST).
+/// left of a batch is [`Fitness::WORST`](crate::optimizer::Fitness::WORST).
 ///
 /// # Panics
 /// When the scenario names an algorithm that is not in the table; its reader refuses those.

@@ -211,6 +211,9 @@ async fn every_route_asks_for_what_the_description_says() {
 
         let request = place.replace("{id}", NOBODY).replace("{slug}", "not-found");
         let request = request.replace("{name}", "paper-1");
+        let request = request
+            .replace("vendor/{file}", "vendor/three.js")
+            .replace("{file}", "main.js");
         let (method, uri) = request.split_once(' ').expect("a method and a path");
         let method: Method = method.parse().expect("a method");
         let anonymous = api.send(method, uri, &[], "").await;

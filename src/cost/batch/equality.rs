@@ -84,7 +84,8 @@ impl Choices {
             across * metre / libm::cos(corner.lat.to_radians()),
             -along * metre,
         ];
-        let [columns, rows] = [across, along].map(|cell| (1200.0 / cell) as usize + 4);
+        // Of the shortest cells so many span the routes.
+        let [columns, rows] = [44; 2];
         let raster = Raster {
             lattice: Lattice {
                 crs: Crs::wgs84(),

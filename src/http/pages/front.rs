@@ -11,8 +11,8 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use sha2::{Digest as _, Sha256};
 
+use crate::export::sha256_hex;
 use crate::http::params::Params;
 use crate::http::problem::Problem;
 
@@ -105,11 +105,9 @@ static FILES: [File; 35] = [
 ];
 
 fn hash(bytes: &[u8]) -> String {
-    let digest = Sha256::digest(bytes);
-    digest[..12]
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect()
+    let mut digest = sha256_hex(bytes);
+    digest.truncate(24);
+    digest
 }
 
 fn gzip(bytes: &[u8]) -> Vec<u8> {
@@ -298,11 +296,7 @@ mod tests {
                 (name.to_owned(), file.bytes),
                 (format!("{name}.br"), brotli),
             ] {
-                let sum: String = Sha256::digest(bytes)
-                    .iter()
-                    .map(|byte| format!("{byte:02x}"))
-                    .collect();
-                assert_eq!(sums[name.as_str()], sum, "{name}");
+                assert_eq!(sums[name.as_str()], sha256_hex(bytes), "{name}");
                 checked += 1;
             }
         }

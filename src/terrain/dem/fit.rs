@@ -13,7 +13,7 @@ pub(super) const EXACTNESS: f64 = 2e-6;
 
 /// Values are rounded to this share of a cell. Projections use the platform's maths library, whose last
 /// bits differ from one to the next; rounded so, its results are the same on all of them but where a value
-/// lies next to the middle between two, which of a thousand million is one or two.
+/// lies next to the middle between two, which may happen in one projected scenario of some hundreds.
 const ROUNDING: f64 = 1.0 / 1_048_576.0;
 
 /// A polynomial in the metres of a rectangle, brought to -1 to 1 along each axis.

@@ -15,7 +15,7 @@ fn at(lat: f64, lon: f64) -> LatLon {
 #[test]
 fn the_whole_corpus_is_read() {
     for (name, bytes) in corpus() {
-        let (_directory, path) = file(&name, &bytes);
+        let (_directory, path) = file(name, bytes);
         let dataset = open(&path).unwrap_or_else(|error| panic!("{name}: {error}"));
         let survey = dataset
             .survey()

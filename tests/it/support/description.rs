@@ -91,10 +91,13 @@ pub(crate) fn check(
     }
 }
 
-/// As it was before it was packed for the way.
+/// As it was before it was packed for the way; what brotli packed is no document, and left as it is.
 fn plain(headers: &HeaderMap, body: &[u8]) -> Vec<u8> {
     let mut plain = Vec::new();
-    if headers.contains_key("content-encoding") {
+    if headers
+        .get("content-encoding")
+        .is_some_and(|coding| coding == "gzip")
+    {
         flate2::read::GzDecoder::new(body)
             .read_to_end(&mut plain)
             .expect("gzip");

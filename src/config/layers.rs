@@ -220,10 +220,10 @@ mod tests {
         let faults = loaded(lines, &variables, &[("log_format", "xml")]).expect_err("wrong");
         // Up to where lists of names grow with the settings.
         let expected = [
-            "FILE:2: wokers is unknown, must be one of listen, data_dir, workers, queue, ",
+            "FILE:2: wokers is unknown, must be one of listen, data_dir, terrain_dir, workers, queue, ",
             "FILE:3: limits must be a table with body_bytes, threats, ",
             "FILE:6: http.heads is unknown, must be one of head_timeout, body_timeout, ",
-            "FILE:7: htpp is unknown, must be one of listen, data_dir, workers, queue, ",
+            "FILE:7: htpp is unknown, must be one of listen, data_dir, terrain_dir, workers, queue, ",
             "FILE:1: workers is 0, must be a whole number from 1 to 4096",
             "FILE:5: http.head_timeout is \"soon\", must be seconds, or a number with a unit such as 250ms, 30s, 15m, 12h or 30d, from 0.1 to 3600",
             "NOCTULE_QUEUE is \"many\", must be a whole number from 1 to 100000000",

@@ -127,9 +127,12 @@ pub(super) async fn put(
     body: Body,
 ) -> Result<Response, Problem> {
     let params = Params::read(&uri, &["crs", "format", "filename"])?;
-    if !is_dataset_name(&name) {
-        let allowed = "1 to 64 lower-case letters, digits, - and _, the first a letter or a digit";
-        return Err(params::refused("name", &name, allowed));
+    check_name(&name)?;
+    if let Some(filename) = params.text("filename")
+        && filename.chars().count() > MAX_FILENAME_CHARS
+    {
+        let allowed = format!("at most {MAX_FILENAME_CHARS} characters");
+        return Err(params::refused("filename", filename, &allowed));
     }
     let format = params.text("format").map(read_format).transpose()?;
     let declaration = Declaration {
@@ -170,6 +173,18 @@ pub(super) async fn put(
         answer.headers_mut().insert(header::LOCATION, location);
     }
     Ok(answer)
+}
+
+/// Of a file, as its uploader calls it.
+const MAX_FILENAME_CHARS: usize = 200;
+
+/// What no dataset can be called is told from what none is called.
+fn check_name(name: &str) -> Result<(), Problem> {
+    if is_dataset_name(name) {
+        return Ok(());
+    }
+    let allowed = "1 to 64 lower-case letters, digits, - and _, the first a letter or a digit";
+    Err(params::refused("name", name, allowed))
 }
 
 fn read_format(name: &str) -> Result<Format, Problem> {
@@ -259,6 +274,7 @@ pub(super) async fn delete(
     uri: Uri,
 ) -> Result<StatusCode, Problem> {
     Params::read(&uri, &[])?;
+    check_name(&name)?;
     let (asked, by) = (name.clone(), claim(&caller));
     let removed = state
         .terrains

@@ -51,8 +51,9 @@ async fn thousands_of_plans_fit_into_the_memory_and_the_limit_of_some() {
         "{first} KiB after {} plans, {second} KiB after {n_plans}",
         n_plans / 2
     );
+    // Few plans leave much to the allocator's chance.
     assert!(
-        second as f64 <= 1.1 * first as f64,
+        second as f64 <= size(1.2, 1.1) * first as f64,
         "{first} KiB, then {second} KiB"
     );
 

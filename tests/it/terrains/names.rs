@@ -116,7 +116,18 @@ async fn only_names_that_scenarios_can_write_are_taken() {
         answer.expect_problem(400, "invalid-parameter");
         let shown = api.get(&format!("/terrains/{name}")).await;
         shown.expect_problem(404, "not-found");
+        let removed = api.delete(&format!("/terrains/{name}")).await;
+        removed.expect_problem(400, "invalid-parameter");
     }
+    assert_eq!(kept(&api.uploads()), [0, 0, 0]);
+}
+
+#[tokio::test]
+async fn a_file_name_that_no_file_has_is_refused() {
+    let api = Api::new();
+    let long = format!("/terrains/hill?filename={}.hgt", "n".repeat(300));
+    let answer = put(&api, &long, hill(1.0)).await;
+    answer.expect_problem(400, "invalid-parameter");
     assert_eq!(kept(&api.uploads()), [0, 0, 0]);
 }
 

@@ -3,6 +3,7 @@
 //! A store holds the queue, the records, the documents and the events of all plans, and makes each
 //! step durable before it answers. Deliberately absent: what a plan means, and who may see it.
 
+pub mod jetstream;
 pub mod measured;
 pub mod reopening;
 pub mod sqlite;

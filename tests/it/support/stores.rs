@@ -10,6 +10,8 @@ use noctule::store::sqlite::SqliteStore;
 use noctule::store::{Options, Retention, Store, StoreError};
 use tempfile::TempDir;
 
+use super::process::Service;
+
 /// A kind of store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Backend {
@@ -52,6 +54,11 @@ impl Place {
                 Ok(Arc::new(opened.expect("no panic")?))
             }
         }
+    }
+
+    /// A service over the store, as a process of its own.
+    pub(crate) fn serve(&self, arguments: &[&str]) -> Service {
+        Service::start(self.path(), arguments)
     }
 }
 
@@ -131,15 +138,23 @@ impl Deref for Fixture {
     }
 }
 
-/// Run a test on each backend, with room for `queue_limit` plans.
-pub(crate) async fn on_every_backend(queue_limit: u64, test: impl AsyncFn(&mut Fixture)) {
+/// Run a test for each backend.
+pub(crate) async fn for_every_backend(test: impl AsyncFn(Backend)) {
     for backend in BACKENDS {
         // Shown when the test fails.
         println!("on {backend:?}");
+        test(backend).await;
+    }
+}
+
+/// Run a test on each backend, with room for `queue_limit` plans.
+pub(crate) async fn on_every_backend(queue_limit: u64, test: impl AsyncFn(&mut Fixture)) {
+    for_every_backend(async |backend| {
         let mut fixture = Fixture::new(Place::new(backend), queue_limit).await;
         tokio::time::timeout(PATIENCE, test(&mut fixture))
             .await
             .unwrap_or_else(|_| panic!("{backend:?}: still waiting after {PATIENCE:?}"));
         fixture.close().await;
-    }
+    })
+    .await;
 }

@@ -72,6 +72,8 @@ struct JetStream {
     /// Among the other nodes.
     node: Uuid,
     consumers: Mutex<HashMap<Lane, PullConsumer>>,
+    /// Whose turn it is to claim.
+    turn: tokio::sync::Mutex<()>,
     last_patrol: Mutex<Option<Instant>>,
     all_slots: AtomicUsize,
     /// Ends that this node tells.
@@ -114,6 +116,7 @@ impl JetStreamStore {
             options,
             node: Uuid::new_v4(),
             consumers: Mutex::default(),
+            turn: tokio::sync::Mutex::default(),
             last_patrol: Mutex::default(),
             telling: Mutex::default(),
             end: watch::Sender::new(false),

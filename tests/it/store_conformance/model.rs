@@ -242,7 +242,7 @@ fn compare_history(told: &[Event], status: Status) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn a_store_and_its_model_agree(steps in vec(step(), 1..60)) {

@@ -31,7 +31,7 @@ pub(crate) const SERVED: [Backend; 1] = [Backend::Sqlite];
 pub(crate) const LEASE: Duration = Duration::from_secs(2);
 
 /// A hanging test fails after this.
-const PATIENCE: Duration = Duration::from_secs(60);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Where a store keeps its plans, and finds them when it is opened again.
 pub(crate) struct Place {

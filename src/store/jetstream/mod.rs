@@ -280,7 +280,11 @@ impl Store for JetStreamStore {
     }
 
     async fn stats(&self) -> Result<Stats, StoreError> {
-        Ok(self.open_store()?.view.known().stats())
+        let store = self.open_store()?;
+        Ok(Stats {
+            slots: Some(store.slots()),
+            ..store.view.known().stats()
+        })
     }
 
     async fn health(&self) -> Result<(), StoreError> {

@@ -194,6 +194,7 @@ async fn accept(state: &AppState, caller: &Caller, document: Bytes) -> Result<Su
     let submission = move || Submission {
         id: job::new_id(),
         scenario: json::write(&scenario),
+        work: scenario.planner.work(),
         name: scenario.name,
         algorithm: scenario.planner.algorithm,
         seed: scenario.planner.seed,

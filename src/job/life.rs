@@ -160,6 +160,7 @@ mod tests {
             algorithm: "tms-sba".to_owned(),
             seed: 7,
             iterations: 200,
+            work: 400_000,
             scenario: "{}".to_owned(),
             created_ms: 1_000,
             owner: None,

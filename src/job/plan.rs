@@ -21,6 +21,8 @@ pub struct Submission {
     pub seed: u64,
     /// Iterations asked for.
     pub iterations: u64,
+    /// population * iterations * waypoints of its planner.
+    pub work: u64,
     /// The accepted document, defaults filled in.
     pub scenario: String,
     /// Now, milliseconds since 1970.

@@ -111,6 +111,16 @@ pub struct PlannerSettings {
     pub parameters: BTreeMap<String, f64>,
 }
 
+impl PlannerSettings {
+    /// population * iterations * waypoints, as [`limits::Limits::work`] bounds it.
+    #[must_use]
+    pub fn work(&self) -> u64 {
+        [self.population, self.iterations, self.waypoints]
+            .iter()
+            .fold(1_u64, |work, factor| work.saturating_mul(*factor as u64))
+    }
+}
+
 /// Where the first bats come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seeding {

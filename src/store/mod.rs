@@ -3,6 +3,7 @@
 //! A store holds the queue, the records, the documents and the events of all plans, and makes each
 //! step durable before it answers. Deliberately absent: what a plan means, and who may see it.
 
+mod changes;
 pub mod jetstream;
 pub mod measured;
 pub mod reopening;
@@ -393,6 +394,12 @@ impl StoreError {
             trouble: Trouble::Other,
             detail: detail.into(),
         }
+    }
+}
+
+impl From<Refused> for StoreError {
+    fn from(refused: Refused) -> Self {
+        Self::unavailable(refused.to_string())
     }
 }
 

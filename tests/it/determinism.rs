@@ -3,7 +3,8 @@
 use futures_util::future::join_all;
 use serde_json::Value;
 
-use crate::support::process::{Service, run};
+use crate::support::process::run;
+use crate::support::stores::{BACKENDS, Backend, Place};
 
 /// The shipped scenarios, small enough for a test: with the defaults, and by the plain algorithm with
 /// two seeds.
@@ -46,9 +47,9 @@ fn essence(result: &[u8]) -> String {
     result.to_string()
 }
 
-async fn by_service(workers: &str, documents: &[Value]) -> Vec<String> {
-    let directory = tempfile::tempdir().expect("a temporary directory");
-    let service = Service::start(directory.path(), &["--workers", workers]);
+async fn by_service(backend: Backend, workers: &str, documents: &[Value]) -> Vec<String> {
+    let place = Place::new(backend);
+    let service = place.serve(&["--workers", workers]);
     let addresses = join_all(documents.iter().map(|document| service.submit(document))).await;
     join_all(addresses.iter().map(async |address| {
         assert_eq!(service.ended(address).await["status"], "succeeded");
@@ -74,8 +75,12 @@ async fn the_route_depends_on_the_request_alone() {
         waypoints(&alone[1]),
         "the seed matters"
     );
-    assert_eq!(by_service("1", &documents).await, alone);
-    assert_eq!(by_service("4", &documents).await, alone);
+    for backend in BACKENDS {
+        for workers in ["1", "4"] {
+            let routes = by_service(backend, workers, &documents).await;
+            assert_eq!(routes, alone, "{backend:?}, {workers} workers");
+        }
+    }
 }
 
 #[test]

@@ -12,6 +12,7 @@ use crate::support::api::Api;
 use crate::support::run;
 use crate::support::server::Server;
 use crate::support::sse::{Block, Stream, events};
+use crate::support::stores::{Backend, for_every_backend};
 
 /// 60 iterations of 10 ms, every third of which finds a better route.
 fn a_run() -> Vec<Event> {
@@ -40,6 +41,10 @@ impl Followed {
         Self::over(Api::new()).await
     }
 
+    async fn on(backend: Backend) -> Self {
+        Self::over(Api::on(backend, Options::new(10)).await).await
+    }
+
     async fn over(api: Api) -> Self {
         Self {
             server: Server::start(&api).await,
@@ -61,114 +66,123 @@ impl Followed {
 
 #[tokio::test]
 async fn a_stream_tells_the_whole_plan_and_ends_once() {
-    let plan = Followed::new().await;
-    let mut live = Stream::open(plan.events("?rate=0")).await;
-    let Some(Block::Event { id: 1, name, data }) = live.next().await else {
-        panic!("no first event")
-    };
-    assert_eq!(
-        (name.as_str(), &data["status"]),
-        ("status", &Value::from("queued"))
-    );
+    for_every_backend(async |backend| {
+        let plan = Followed::on(backend).await;
+        let mut live = Stream::open(plan.events("?rate=0")).await;
+        let Some(Block::Event { id: 1, name, data }) = live.next().await else {
+            panic!("no first event")
+        };
+        assert_eq!(
+            (name.as_str(), &data["status"]),
+            ("status", &Value::from("queued"))
+        );
 
-    let reader = tokio::spawn(live.rest());
-    run::complete(&*plan.api.store, a_run()).await;
-    let live = reader.await.expect("read");
+        let reader = tokio::spawn(live.rest());
+        run::complete(&*plan.api.store, a_run()).await;
+        let live = reader.await.expect("read");
 
-    let names: Vec<String> = events(&live).into_iter().map(|(_, name)| name).collect();
-    assert_eq!(names[0], "status", "running");
-    assert_eq!(
-        names.iter().filter(|name| *name == "convergence").count(),
-        60
-    );
-    assert_eq!(names.iter().filter(|name| *name == "incumbent").count(), 20);
-    assert_eq!(names[names.len() - 2..], ["status", "end"]);
-    assert_eq!(names.iter().filter(|name| *name == "end").count(), 1);
-    let Some(Block::Event { data: end, .. }) = live.last() else {
-        panic!("no end")
-    };
-    assert_eq!(end["status"], "succeeded");
-    assert_eq!(end["result"], format!("{}/result", plan.address));
+        let names: Vec<String> = events(&live).into_iter().map(|(_, name)| name).collect();
+        assert_eq!(names[0], "status", "running");
+        assert_eq!(
+            names.iter().filter(|name| *name == "convergence").count(),
+            60
+        );
+        assert_eq!(names.iter().filter(|name| *name == "incumbent").count(), 20);
+        assert_eq!(names[names.len() - 2..], ["status", "end"]);
+        assert_eq!(names.iter().filter(|name| *name == "end").count(), 1);
+        let Some(Block::Event { data: end, .. }) = live.last() else {
+            panic!("no end")
+        };
+        assert_eq!(end["status"], "succeeded");
+        assert_eq!(end["result"], format!("{}/result", plan.address));
 
-    let again = plan.read("?rate=0").await;
-    assert_eq!(again[1..], live, "the same when it is read afterwards");
-    let ids: Vec<u64> = events(&again).into_iter().map(|(id, _)| id).collect();
-    assert!(ids.is_sorted_by(|a, b| a < b), "{ids:?}");
+        let again = plan.read("?rate=0").await;
+        assert_eq!(again[1..], live, "the same when it is read afterwards");
+        let ids: Vec<u64> = events(&again).into_iter().map(|(id, _)| id).collect();
+        assert!(ids.is_sorted_by(|a, b| a < b), "{ids:?}");
+    })
+    .await;
 }
 
 #[tokio::test]
 async fn a_cut_stream_resumes_at_every_event_with_neither_loss_nor_repeat() {
-    let plan = Followed::new().await;
-    run::complete(&*plan.api.store, a_run()).await;
-    for rate in ["0", "10", "3"] {
-        let whole = plan.read(&format!("?rate={rate}")).await;
-        let ids: Vec<u64> = events(&whole).into_iter().map(|(id, _)| id).collect();
-        let resumed = join_all(ids.iter().enumerate().map(async |(position, id)| {
-            let by_header = plan.events(&format!("?rate={rate}&last_event_id=0"));
-            let by_header = by_header.header("last-event-id", id.to_string());
-            let by_query = plan.events(&format!("?rate={rate}&last_event_id={id}"));
-            let rest = &whole[position + 1..];
-            if rest.is_empty() {
-                for request in [by_header, by_query] {
-                    let answer = request.send().await.expect("an answer");
-                    assert_eq!(answer.status(), StatusCode::NO_CONTENT, "all has been told");
+    for_every_backend(async |backend| {
+        let plan = Followed::on(backend).await;
+        run::complete(&*plan.api.store, a_run()).await;
+        for rate in ["0", "10", "3"] {
+            let whole = plan.read(&format!("?rate={rate}")).await;
+            let ids: Vec<u64> = events(&whole).into_iter().map(|(id, _)| id).collect();
+            let resumed = join_all(ids.iter().enumerate().map(async |(position, id)| {
+                let by_header = plan.events(&format!("?rate={rate}&last_event_id=0"));
+                let by_header = by_header.header("last-event-id", id.to_string());
+                let by_query = plan.events(&format!("?rate={rate}&last_event_id={id}"));
+                let rest = &whole[position + 1..];
+                if rest.is_empty() {
+                    for request in [by_header, by_query] {
+                        let answer = request.send().await.expect("an answer");
+                        assert_eq!(answer.status(), StatusCode::NO_CONTENT, "all has been told");
+                    }
+                } else {
+                    assert_eq!(
+                        Stream::open(by_header).await.rest().await,
+                        rest,
+                        "after {id} at {rate} Hz"
+                    );
+                    assert_eq!(
+                        Stream::open(by_query).await.rest().await,
+                        rest,
+                        "after {id} at {rate} Hz"
+                    );
                 }
-            } else {
-                assert_eq!(
-                    Stream::open(by_header).await.rest().await,
-                    rest,
-                    "after {id} at {rate} Hz"
-                );
-                assert_eq!(
-                    Stream::open(by_query).await.rest().await,
-                    rest,
-                    "after {id} at {rate} Hz"
-                );
-            }
-        }));
-        assert_eq!(resumed.await.len(), ids.len());
-    }
-    let beyond = plan
-        .events("?last_event_id=1000000")
-        .send()
-        .await
-        .expect("an answer");
-    assert_eq!(beyond.status(), StatusCode::NO_CONTENT);
+            }));
+            assert_eq!(resumed.await.len(), ids.len());
+        }
+        let beyond = plan
+            .events("?last_event_id=1000000")
+            .send()
+            .await
+            .expect("an answer");
+        assert_eq!(beyond.status(), StatusCode::NO_CONTENT);
+    })
+    .await;
 }
 
 #[tokio::test]
 async fn a_live_stream_that_is_cut_resumes() {
-    let plan = Followed::new().await;
-    let store = &plan.api.store;
-    let lease = store.claim().await.expect("a queued plan");
-    let mut read = Vec::new();
-    let mut last = 0;
-    // Each connection reads one event and is dropped; what comes meanwhile is not lost.
-    for event in a_run() {
-        store
-            .append(&lease, vec![event])
+    for_every_backend(async |backend| {
+        let plan = Followed::on(backend).await;
+        let store = &plan.api.store;
+        let lease = store.claim().await.expect("a queued plan");
+        let mut read = Vec::new();
+        let mut last = 0;
+        // Each connection reads one event and is dropped; what comes meanwhile is not lost.
+        for event in a_run() {
+            store
+                .append(&lease, vec![event])
+                .await
+                .expect("the lease holds");
+            let request = plan
+                .events("?rate=0")
+                .header("last-event-id", last.to_string());
+            let Some(block) = Stream::open(request).await.next().await else {
+                panic!("no event")
+            };
+            last = events(std::slice::from_ref(&block))[0].0;
+            read.push(block);
+        }
+        run::finish(&**store, &lease, Status::Succeeded).await;
+        read.extend(
+            Stream::open(
+                plan.events("?rate=0")
+                    .header("last-event-id", last.to_string()),
+            )
             .await
-            .expect("the lease holds");
-        let request = plan
-            .events("?rate=0")
-            .header("last-event-id", last.to_string());
-        let Some(block) = Stream::open(request).await.next().await else {
-            panic!("no event")
-        };
-        last = events(std::slice::from_ref(&block))[0].0;
-        read.push(block);
-    }
-    run::finish(&**store, &lease, Status::Succeeded).await;
-    read.extend(
-        Stream::open(
-            plan.events("?rate=0")
-                .header("last-event-id", last.to_string()),
-        )
-        .await
-        .rest()
-        .await,
-    );
-    assert_eq!(read, plan.read("?rate=0").await);
+            .rest()
+            .await,
+        );
+        assert_eq!(read, plan.read("?rate=0").await);
+    })
+    .await;
 }
 
 #[tokio::test]
@@ -201,23 +215,26 @@ async fn a_rate_thins_the_curve_but_keeps_the_last_route() {
 
 #[tokio::test]
 async fn a_held_back_point_leaves_when_the_run_pauses() {
-    let plan = Followed::new().await;
-    let store = &plan.api.store;
-    let mut stream = Stream::open(plan.events("?rate=20")).await;
-    let lease = store.claim().await.expect("a queued plan");
-    let points = vec![
-        run::incumbent(1, 10.0),
-        run::convergence(1, 10.0),
-        run::convergence(2, 20.0),
-    ];
-    store.append(&lease, points).await.expect("the lease holds");
-    let mut names = Vec::new();
-    for _ in 0..4 {
-        // Without an event to close the window, time does.
-        let block = stream.next().await.expect("open");
-        names.push(events(&[block])[0].1.clone());
-    }
-    assert_eq!(names, ["status", "status", "incumbent", "convergence"]);
+    for_every_backend(async |backend| {
+        let plan = Followed::on(backend).await;
+        let store = &plan.api.store;
+        let mut stream = Stream::open(plan.events("?rate=20")).await;
+        let lease = store.claim().await.expect("a queued plan");
+        let points = vec![
+            run::incumbent(1, 10.0),
+            run::convergence(1, 10.0),
+            run::convergence(2, 20.0),
+        ];
+        store.append(&lease, points).await.expect("the lease holds");
+        let mut names = Vec::new();
+        for _ in 0..4 {
+            // Without an event to close the window, time does.
+            let block = stream.next().await.expect("open");
+            names.push(events(&[block])[0].1.clone());
+        }
+        assert_eq!(names, ["status", "status", "incumbent", "convergence"]);
+    })
+    .await;
 }
 
 #[tokio::test]
@@ -246,31 +263,34 @@ async fn lines_tell_the_same_as_events() {
 
 #[tokio::test]
 async fn plans_without_a_route_end_without_a_result() {
-    let plan = Followed::new().await;
-    let lease = plan.api.store.claim().await.expect("a queued plan");
-    run::fail(&*plan.api.store, &lease).await;
-    let Some(Block::Event { name, data, .. }) = plan.read("").await.pop() else {
-        panic!("no end")
-    };
-    assert_eq!(name, "end");
-    assert_eq!(
-        data,
-        serde_json::json!({"status": "failed", "result": null})
-    );
+    for_every_backend(async |backend| {
+        let plan = Followed::on(backend).await;
+        let lease = plan.api.store.claim().await.expect("a queued plan");
+        run::fail(&*plan.api.store, &lease).await;
+        let Some(Block::Event { name, data, .. }) = plan.read("").await.pop() else {
+            panic!("no end")
+        };
+        assert_eq!(name, "end");
+        assert_eq!(
+            data,
+            serde_json::json!({"status": "failed", "result": null})
+        );
 
-    let plan = Followed::new().await;
-    plan.api
-        .store
-        .request_cancel(lease_id(&plan.address), 0)
-        .await
-        .expect("queued");
-    let Some(Block::Event { data, .. }) = plan.read("").await.pop() else {
-        panic!("no end")
-    };
-    assert_eq!(
-        data,
-        serde_json::json!({"status": "cancelled", "result": null})
-    );
+        let plan = Followed::on(backend).await;
+        plan.api
+            .store
+            .request_cancel(lease_id(&plan.address), 0)
+            .await
+            .expect("queued");
+        let Some(Block::Event { data, .. }) = plan.read("").await.pop() else {
+            panic!("no end")
+        };
+        assert_eq!(
+            data,
+            serde_json::json!({"status": "cancelled", "result": null})
+        );
+    })
+    .await;
 }
 
 fn lease_id(address: &str) -> noctule::job::PlanId {
@@ -282,18 +302,21 @@ fn lease_id(address: &str) -> noctule::job::PlanId {
 
 #[tokio::test]
 async fn a_stream_of_a_deleted_plan_closes() {
-    let plan = Followed::new().await;
-    let mut stream = Stream::open(plan.events("")).await;
-    stream.next().await.expect("the first status");
-    plan.api.delete(&plan.address).await;
-    assert!(
-        stream
-            .rest()
-            .await
-            .iter()
-            .all(|block| matches!(block, Block::Event { .. })),
-        "and says no more"
-    );
+    for_every_backend(async |backend| {
+        let plan = Followed::on(backend).await;
+        let mut stream = Stream::open(plan.events("")).await;
+        stream.next().await.expect("the first status");
+        plan.api.delete(&plan.address).await;
+        assert!(
+            stream
+                .rest()
+                .await
+                .iter()
+                .all(|block| matches!(block, Block::Event { .. })),
+            "and says no more"
+        );
+    })
+    .await;
 }
 
 #[tokio::test]
@@ -317,26 +340,29 @@ async fn streams_end_when_the_service_stops() {
 
 #[tokio::test]
 async fn many_readers_of_one_plan_read_the_same() {
-    let plan = Followed::new().await;
-    let streams = join_all((0..50).map(|_| Stream::open(plan.events("?rate=0")))).await;
-    let readers: Vec<_> = streams
-        .into_iter()
-        .map(|stream| tokio::spawn(stream.rest()))
-        .collect();
-    run::complete(&*plan.api.store, a_run()).await;
-    let expected = plan.read("?rate=0").await;
-    for reader in readers {
-        assert_eq!(reader.await.expect("read"), expected);
-    }
+    for_every_backend(async |backend| {
+        let plan = Followed::on(backend).await;
+        let streams = join_all((0..50).map(|_| Stream::open(plan.events("?rate=0")))).await;
+        let readers: Vec<_> = streams
+            .into_iter()
+            .map(|stream| tokio::spawn(stream.rest()))
+            .collect();
+        run::complete(&*plan.api.store, a_run()).await;
+        let expected = plan.read("?rate=0").await;
+        for reader in readers {
+            assert_eq!(reader.await.expect("read"), expected);
+        }
+    })
+    .await;
 }
 
 /// A plan of whose history the first `forgotten` events are no longer kept, and its last id.
-async fn with_a_forgotten_beginning() -> (Followed, u64, u64) {
+async fn with_a_forgotten_beginning(backend: Backend) -> (Followed, u64, u64) {
     let options = Options {
         events_kept: 40,
         ..Options::new(10)
     };
-    let plan = Followed::over(Api::with_store(options)).await;
+    let plan = Followed::over(Api::on(backend, options).await).await;
     let lease = plan.api.store.claim().await.expect("a queued plan");
     for batch in a_run().chunks(10) {
         let batch = batch.to_vec();
@@ -352,35 +378,41 @@ async fn with_a_forgotten_beginning() -> (Followed, u64, u64) {
 
 #[tokio::test]
 async fn who_asks_for_forgotten_events_is_told_which_are_missing() {
-    let (plan, forgotten, last) = with_a_forgotten_beginning().await;
-    for after in [1, 2, forgotten - 1] {
-        let blocks = plan.read(&format!("?rate=0&last_event_id={after}")).await;
-        let Block::Event { id, name, data } = &blocks[0] else {
-            panic!("{blocks:?}")
-        };
-        assert_eq!((*id, name.as_str()), (forgotten, "gap"));
-        let missing = serde_json::json!({"from": after + 1, "to": forgotten});
-        assert_eq!(*data, missing);
-        let ids: Vec<u64> = events(&blocks).into_iter().map(|(id, _)| id).collect();
-        assert_eq!(ids, (forgotten..=last).collect::<Vec<_>>());
-    }
-    // Nothing is missing for who has read as far as that.
-    let blocks = plan
-        .read(&format!("?rate=0&last_event_id={forgotten}"))
-        .await;
-    assert_eq!(events(&blocks)[0].0, forgotten + 1);
-    assert!(events(&blocks).iter().all(|(_, name)| name != "gap"));
+    for_every_backend(async |backend| {
+        let (plan, forgotten, last) = with_a_forgotten_beginning(backend).await;
+        for after in [1, 2, forgotten - 1] {
+            let blocks = plan.read(&format!("?rate=0&last_event_id={after}")).await;
+            let Block::Event { id, name, data } = &blocks[0] else {
+                panic!("{blocks:?}")
+            };
+            assert_eq!((*id, name.as_str()), (forgotten, "gap"));
+            let missing = serde_json::json!({"from": after + 1, "to": forgotten});
+            assert_eq!(*data, missing);
+            let ids: Vec<u64> = events(&blocks).into_iter().map(|(id, _)| id).collect();
+            assert_eq!(ids, (forgotten..=last).collect::<Vec<_>>());
+        }
+        // Nothing is missing for who has read as far as that.
+        let blocks = plan
+            .read(&format!("?rate=0&last_event_id={forgotten}"))
+            .await;
+        assert_eq!(events(&blocks)[0].0, forgotten + 1);
+        assert!(events(&blocks).iter().all(|(_, name)| name != "gap"));
+    })
+    .await;
 }
 
 #[tokio::test]
 async fn who_comes_fresh_to_a_long_history_begins_with_the_record_as_it_is() {
-    let (plan, forgotten, last) = with_a_forgotten_beginning().await;
-    let blocks = plan.read("?rate=0").await;
-    let Block::Event { id, name, data } = &blocks[0] else {
-        panic!("{blocks:?}")
-    };
-    assert_eq!((*id, name.as_str()), (forgotten, "status"));
-    assert_eq!(data["status"], "succeeded");
-    let ids: Vec<u64> = events(&blocks).into_iter().map(|(id, _)| id).collect();
-    assert_eq!(ids, (forgotten..=last).collect::<Vec<_>>());
+    for_every_backend(async |backend| {
+        let (plan, forgotten, last) = with_a_forgotten_beginning(backend).await;
+        let blocks = plan.read("?rate=0").await;
+        let Block::Event { id, name, data } = &blocks[0] else {
+            panic!("{blocks:?}")
+        };
+        assert_eq!((*id, name.as_str()), (forgotten, "status"));
+        assert_eq!(data["status"], "succeeded");
+        let ids: Vec<u64> = events(&blocks).into_iter().map(|(id, _)| id).collect();
+        assert_eq!(ids, (forgotten..=last).collect::<Vec<_>>());
+    })
+    .await;
 }

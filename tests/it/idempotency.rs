@@ -7,8 +7,10 @@ use futures_util::FutureExt as _;
 use futures_util::future::join_all;
 use http_body_util::StreamBody;
 use hyper::body::Frame;
+use noctule::store::Options;
 
 use crate::support::api::{Answer, Api};
+use crate::support::stores::for_every_backend;
 use crate::support::{run, scenario};
 
 async fn post(api: &Api, key: &str, body: String) -> Answer {
@@ -21,65 +23,74 @@ async fn post(api: &Api, key: &str, body: String) -> Answer {
 
 #[tokio::test]
 async fn the_same_request_gets_the_same_plan_however_it_stands() {
-    let api = Api::with_queue(1);
-    let mut unseeded = scenario();
-    let planner = unseeded["planner"].as_object_mut().expect("an object");
-    planner.remove("seed");
-    let body = unseeded.to_string();
-    let first = post(&api, "k", body.clone()).await;
-    assert_eq!(first.status, StatusCode::ACCEPTED);
-    assert!(!first.headers.contains_key("idempotency-replayed"));
-    // The queue is full now, and no seed is drawn again.
-    let again = post(&api, "\"k\"", body.clone()).await;
-    assert_eq!(again.status, StatusCode::ACCEPTED);
-    assert_eq!(again.header("idempotency-replayed"), "true");
-    assert_eq!(again.header("location"), first.header("location"));
-    assert_eq!(again.json(), first.json());
+    for_every_backend(async |backend| {
+        let api = Api::on(backend, Options::new(1)).await;
+        let mut unseeded = scenario();
+        let planner = unseeded["planner"].as_object_mut().expect("an object");
+        planner.remove("seed");
+        let body = unseeded.to_string();
+        let first = post(&api, "k", body.clone()).await;
+        assert_eq!(first.status, StatusCode::ACCEPTED);
+        assert!(!first.headers.contains_key("idempotency-replayed"));
+        // The queue is full now, and no seed is drawn again.
+        let again = post(&api, "\"k\"", body.clone()).await;
+        assert_eq!(again.status, StatusCode::ACCEPTED);
+        assert_eq!(again.header("idempotency-replayed"), "true");
+        assert_eq!(again.header("location"), first.header("location"));
+        assert_eq!(again.json(), first.json());
 
-    run::complete(&*api.store, Vec::new()).await;
-    let ended = post(&api, "k", body.clone()).await;
-    assert_eq!(ended.json()["status"], "succeeded");
+        run::complete(&*api.store, Vec::new()).await;
+        let ended = post(&api, "k", body.clone()).await;
+        assert_eq!(ended.json()["status"], "succeeded");
 
-    let other = post(&api, "k", scenario().to_string()).await;
-    other.expect_problem(422, "idempotency-key-reused");
-    let listed = api.get("/plans").await.json();
-    assert_eq!(listed["plans"].as_array().expect("a list").len(), 1);
+        let other = post(&api, "k", scenario().to_string()).await;
+        other.expect_problem(422, "idempotency-key-reused");
+        let listed = api.get("/plans").await.json();
+        assert_eq!(listed["plans"].as_array().expect("a list").len(), 1);
 
-    api.delete(first.header("location")).await;
-    post(&api, "k", body).await.expect_problem(410, "gone");
+        api.delete(first.header("location")).await;
+        post(&api, "k", body).await.expect_problem(410, "gone");
+    })
+    .await;
 }
 
 #[tokio::test]
 async fn a_refused_request_leaves_its_key_free() {
-    let api = Api::new();
-    post(&api, "k", "{".to_owned())
-        .await
-        .expect_problem(400, "invalid-json");
-    let accepted = post(&api, "k", scenario().to_string()).await;
-    assert_eq!(accepted.status, StatusCode::ACCEPTED);
-    post(&api, "two words", scenario().to_string())
-        .await
-        .expect_problem(400, "invalid-parameter");
+    for_every_backend(async |backend| {
+        let api = Api::on(backend, Options::new(1_000)).await;
+        post(&api, "k", "{".to_owned())
+            .await
+            .expect_problem(400, "invalid-json");
+        let accepted = post(&api, "k", scenario().to_string()).await;
+        assert_eq!(accepted.status, StatusCode::ACCEPTED);
+        post(&api, "two words", scenario().to_string())
+            .await
+            .expect_problem(400, "invalid-parameter");
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_thousand_requests_at_once_make_one_plan() {
-    let api = Api::new();
-    let body = scenario().to_string();
-    let answers = join_all((0..1_000).map(|_| post(&api, "k", body.clone()))).await;
-    let mut places = Vec::new();
-    for answer in answers {
-        if answer.status == StatusCode::ACCEPTED {
-            places.push(answer.header("location").to_owned());
-        } else {
-            answer.expect_problem(409, "idempotency-in-flight");
-            assert_eq!(answer.header("retry-after"), "1");
+    for_every_backend(async |backend| {
+        let api = Api::on(backend, Options::new(1_000)).await;
+        let body = scenario().to_string();
+        let answers = join_all((0..1_000).map(|_| post(&api, "k", body.clone()))).await;
+        let mut places = Vec::new();
+        for answer in answers {
+            if answer.status == StatusCode::ACCEPTED {
+                places.push(answer.header("location").to_owned());
+            } else {
+                answer.expect_problem(409, "idempotency-in-flight");
+                assert_eq!(answer.header("retry-after"), "1");
+            }
         }
-    }
-    assert!(!places.is_empty() && places.iter().all(|place| *place == places[0]));
-    assert_eq!(api.store.stats().await.expect("open").queued, 1);
-    let late = post(&api, "k", body).await;
-    assert_eq!(late.header("location"), places[0]);
+        assert!(!places.is_empty() && places.iter().all(|place| *place == places[0]));
+        assert_eq!(api.store.stats().await.expect("open").queued, 1);
+        let late = post(&api, "k", body).await;
+        assert_eq!(late.header("location"), places[0]);
+    })
+    .await;
 }
 
 #[tokio::test]

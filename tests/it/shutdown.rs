@@ -7,6 +7,7 @@ use serde_json::Value;
 use crate::support::process::Service;
 use crate::support::scenario;
 use crate::support::sse::{Block, Stream, events};
+use crate::support::stores::{Place, for_every_backend};
 
 /// A plan that runs for so long, wherever it runs: its iterations alone would take minutes.
 fn a_run_of(ms: u64) -> Value {
@@ -65,89 +66,98 @@ const LONG_BEFORE: Duration = Duration::from_secs(30);
 
 #[tokio::test]
 async fn an_idle_service_leaves_at_once() {
-    for signal in ["TERM", "INT"] {
-        let directory = tempfile::tempdir().expect("a temporary directory");
-        let service = Service::start(directory.path(), &["--grace", "600"]);
-        assert_eq!(service.bytes("/readyz").await, r#"{"status":"ok"}"#);
-        let begun = Instant::now();
-        service.signal(signal);
-        assert!(service.exit().await.success());
-        assert!(begun.elapsed() < LONG_BEFORE, "{:?}", begun.elapsed());
-    }
+    for_every_backend(async |backend| {
+        for signal in ["TERM", "INT"] {
+            let place = Place::new(backend);
+            let service = place.serve(&["--grace", "600"]);
+            assert_eq!(service.bytes("/readyz").await, r#"{"status":"ok"}"#);
+            let begun = Instant::now();
+            service.signal(signal);
+            assert!(service.exit().await.success());
+            assert!(begun.elapsed() < LONG_BEFORE, "{:?}", begun.elapsed());
+        }
+    })
+    .await;
 }
 
 #[tokio::test]
 async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
-    let directory = tempfile::tempdir().expect("a temporary directory");
-    let service = Service::start(directory.path(), &["--workers", "1", "--grace", "2"]);
-    let address = service.submit(&a_run_of(4000)).await;
-    let waiting = service.submit(&a_run_of(10)).await;
-    let stream = running(&service, &address).await;
+    for_every_backend(async |backend| {
+        let place = Place::new(backend);
+        let service = place.serve(&["--workers", "1", "--grace", "2"]);
+        let address = service.submit(&a_run_of(4000)).await;
+        let waiting = service.submit(&a_run_of(10)).await;
+        let stream = running(&service, &address).await;
 
-    let begun = Instant::now();
-    service.signal("TERM");
-    let refused = loop {
-        let ready = service
-            .get("/readyz")
-            .send()
-            .await
-            .expect("it still answers");
-        if ready.status() == 503 {
-            break service.post(&a_run_of(10)).await;
+        let begun = Instant::now();
+        service.signal("TERM");
+        let refused = loop {
+            let ready = service
+                .get("/readyz")
+                .send()
+                .await
+                .expect("it still answers");
+            if ready.status() == 503 {
+                break service.post(&a_run_of(10)).await;
+            }
+        };
+        assert_eq!(refused.status(), 503);
+        assert!(refused.headers().contains_key("retry-after"));
+        let problem: Value = refused.json().await.expect("JSON");
+        assert_eq!(problem["type"], "/problems/draining");
+
+        let rest = stream.rest().await;
+        assert_eq!(
+            rest.last(),
+            Some(&Block::Comment("the service is shutting down".to_owned()))
+        );
+        assert!(
+            events(&rest).iter().all(|(_, name)| name != "end"),
+            "the plan has not ended"
+        );
+        assert!(service.exit().await.success());
+        assert!(begun.elapsed() < LONG_BEFORE, "{:?}", begun.elapsed());
+
+        let service = place.serve(&["--workers", "1"]);
+        for address in [&address, &waiting] {
+            assert_eq!(service.ended(address).await["status"], "succeeded");
         }
-    };
-    assert_eq!(refused.status(), 503);
-    assert!(refused.headers().contains_key("retry-after"));
-    let problem: Value = refused.json().await.expect("JSON");
-    assert_eq!(problem["type"], "/problems/draining");
-
-    let rest = stream.rest().await;
-    assert_eq!(
-        rest.last(),
-        Some(&Block::Comment("the service is shutting down".to_owned()))
-    );
-    assert!(
-        events(&rest).iter().all(|(_, name)| name != "end"),
-        "the plan has not ended"
-    );
-    assert!(service.exit().await.success());
-    assert!(begun.elapsed() < LONG_BEFORE, "{:?}", begun.elapsed());
-
-    let service = Service::start(directory.path(), &["--workers", "1"]);
-    for address in [&address, &waiting] {
-        assert_eq!(service.ended(address).await["status"], "succeeded");
-    }
-    assert_eq!(
-        life(&service, &address).await,
-        ["queued", "running", "queued", "running", "succeeded"]
-    );
-    assert_eq!(
-        life(&service, &waiting).await,
-        ["queued", "running", "succeeded"]
-    );
+        assert_eq!(
+            life(&service, &address).await,
+            ["queued", "running", "queued", "running", "succeeded"]
+        );
+        assert_eq!(
+            life(&service, &waiting).await,
+            ["queued", "running", "succeeded"]
+        );
+    })
+    .await;
 }
 
 #[tokio::test]
 async fn a_plan_that_ends_within_the_grace_period_is_kept() {
-    let directory = tempfile::tempdir().expect("a temporary directory");
-    let service = Service::start(directory.path(), &["--workers", "1", "--grace", "30"]);
-    let address = service.submit(&a_run_of(1000)).await;
-    let stream = running(&service, &address).await;
-    service.signal("TERM");
-    let rest = stream.rest().await;
-    let last = rest.last();
-    assert!(
-        matches!(last, Some(Block::Event { name, .. }) if name == "end"),
-        "{last:?}"
-    );
-    assert!(service.exit().await.success());
+    for_every_backend(async |backend| {
+        let place = Place::new(backend);
+        let service = place.serve(&["--workers", "1", "--grace", "30"]);
+        let address = service.submit(&a_run_of(1000)).await;
+        let stream = running(&service, &address).await;
+        service.signal("TERM");
+        let rest = stream.rest().await;
+        let last = rest.last();
+        assert!(
+            matches!(last, Some(Block::Event { name, .. }) if name == "end"),
+            "{last:?}"
+        );
+        assert!(service.exit().await.success());
 
-    let service = Service::start(directory.path(), &["--workers", "1"]);
-    assert_eq!(service.ended(&address).await["status"], "succeeded");
-    assert_eq!(
-        life(&service, &address).await,
-        ["queued", "running", "succeeded"]
-    );
+        let service = place.serve(&["--workers", "1"]);
+        assert_eq!(service.ended(&address).await["status"], "succeeded");
+        assert_eq!(
+            life(&service, &address).await,
+            ["queued", "running", "succeeded"]
+        );
+    })
+    .await;
 }
 
 #[tokio::test]

@@ -1,5 +1,318 @@
-//! The store of many machines: plans, documents and events in streams of NATS `JetStream`.
+//! The store of many machines: plans, documents and events on the servers of a NATS system, with
+//! `JetStream` as queue, memory and judge.
+//!
+//! Any number of nodes share it. What is accepted is on the servers before it is answered; a plan's
+//! every step is written only if nobody was faster; a run is this node's for as long as the node says
+//! so in time. Deliberately absent: any queue, election or replication of our own.
 
+mod claim;
+mod connect;
+mod documents;
+mod follow;
+mod history;
+mod hooks;
+mod lane;
+mod leases;
+mod nodes;
+mod record;
+mod removal;
+mod runs;
 mod settings;
+mod steps;
+mod submit;
+mod trouble;
+mod view;
+
+use std::collections::{BTreeSet, HashMap};
+use std::sync::atomic::AtomicUsize;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use async_nats::jetstream::consumer::PullConsumer;
+use async_trait::async_trait;
+use tokio::sync::watch;
+use tokio::task::JoinHandle;
+use tokio::time::Instant;
+use uuid::Uuid;
 
 pub use settings::{Address, Settings};
+
+use self::connect::Servers;
+use self::follow::Reading;
+use self::lane::Lane;
+use self::leases::Leases;
+use self::steps::Plans;
+use self::view::View;
+use super::{
+    DatasetUse, Ending, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError, Submitted,
+    Webhook,
+};
+use crate::export::document::Incumbent;
+use crate::job::{Event, Plan, PlanId, Status, Submission};
+
+/// What was there must be read so soon at the start.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// The store of many machines.
+///
+/// Dropping it without [`Store::close`] leaves its runs to the other nodes, as a crash would.
+pub struct JetStreamStore {
+    store: Arc<JetStream>,
+    reading: watch::Receiver<Reading>,
+    tasks: Vec<JoinHandle<()>>,
+}
+
+/// What all its methods and tasks share.
+struct JetStream {
+    servers: Servers,
+    view: View,
+    leases: Leases,
+    settings: Settings,
+    options: Options,
+    /// Among the other nodes.
+    node: Uuid,
+    consumers: Mutex<HashMap<Lane, PullConsumer>>,
+    last_patrol: Mutex<Option<Instant>>,
+    all_slots: AtomicUsize,
+    /// Ends that this node tells.
+    telling: Mutex<BTreeSet<PlanId>>,
+    /// Becomes true when the store is closed.
+    end: watch::Sender<bool>,
+}
+
+impl JetStream {
+    fn plans(&self) -> Plans<'_> {
+        Plans {
+            servers: &self.servers,
+            view: &self.view,
+            leases: &self.leases,
+        }
+    }
+
+    async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {
+        let standing = self.plans().standing(id).await?;
+        let record = standing.record(id, (self.options.clock)())?;
+        Ok(self.view.known().shown(&record.plan))
+    }
+}
+
+impl JetStreamStore {
+    /// Connect, make what is missing on the servers, and read what is there.
+    ///
+    /// # Errors
+    /// [`StoreError::Unavailable`] when no server answers, when it is too old or without `JetStream`,
+    /// or when it cannot keep as many replicas as asked.
+    pub async fn open(settings: Settings, options: Options) -> Result<Self, StoreError> {
+        let servers = Box::pin(Servers::open(&settings, &options)).await?;
+        let steps_kept = usize::try_from(options.events_kept).unwrap_or(usize::MAX);
+        let store = Arc::new(JetStream {
+            servers,
+            view: View::new(steps_kept),
+            leases: Leases::default(),
+            all_slots: AtomicUsize::new(settings.slots),
+            settings,
+            options,
+            node: Uuid::new_v4(),
+            consumers: Mutex::default(),
+            last_patrol: Mutex::default(),
+            telling: Mutex::default(),
+            end: watch::Sender::new(false),
+        });
+        store.announce().await?;
+        let (told, mut reading) = watch::channel(Reading::Catching);
+        let opened = Self {
+            tasks: vec![
+                tokio::spawn(store.clone().follow(told)),
+                tokio::spawn(store.clone().keep_announcing()),
+            ],
+            store,
+            reading: reading.clone(),
+        };
+        let current = reading.wait_for(|reading| *reading == Reading::Current);
+        match tokio::time::timeout(PATIENCE, current).await {
+            Ok(Ok(_)) => {}
+            _ => {
+                return Err(StoreError::unavailable(
+                    "the plans on the servers cannot be read",
+                ));
+            }
+        }
+        Ok(opened)
+    }
+
+    fn open_store(&self) -> Result<&Arc<JetStream>, StoreError> {
+        if *self.store.end.borrow() {
+            return Err(closed());
+        }
+        Ok(&self.store)
+    }
+}
+
+impl Drop for JetStreamStore {
+    fn drop(&mut self) {
+        for task in &self.tasks {
+            task.abort();
+        }
+        self.store.end.send_replace(true);
+    }
+}
+
+#[async_trait]
+impl Store for JetStreamStore {
+    async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError> {
+        self.open_store()?.submit(&submission).await
+    }
+
+    async fn claim(&self) -> Result<Lease, StoreError> {
+        self.open_store()?.claim().await
+    }
+
+    async fn append(&self, lease: &Lease, events: Vec<Event>) -> Result<(), StoreError> {
+        self.open_store()?
+            .append(lease.plan.id, lease.attempt, &events)
+            .await
+    }
+
+    async fn finish(&self, lease: &Lease, ending: Ending, now_ms: i64) -> Result<Plan, StoreError> {
+        if let Ending::Result { status, .. } = &ending {
+            assert!(
+                matches!(status, Status::Succeeded | Status::Cancelled),
+                "a {} plan has no result",
+                status.name()
+            );
+        }
+        let store = self.open_store()?;
+        store
+            .finish(lease.plan.id, lease.attempt, &ending, now_ms)
+            .await
+    }
+
+    async fn release(&self, lease: &Lease) -> Result<(), StoreError> {
+        self.open_store()?
+            .release(lease.plan.id, lease.attempt)
+            .await
+    }
+
+    async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
+        self.open_store()?.request_cancel(id, now_ms).await
+    }
+
+    async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
+        self.open_store()?.delete(id, now_ms).await
+    }
+
+    async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {
+        self.open_store()?.get(id).await
+    }
+
+    async fn scenario(&self, id: PlanId) -> Result<String, StoreError> {
+        let store = self.open_store()?;
+        let standing = store.plans().standing(id).await?;
+        let record = standing.record(id, (store.options.clock)())?;
+        store.servers.read(&record.scenario).await
+    }
+
+    async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError> {
+        let store = self.open_store()?;
+        let standing = store.plans().standing(id).await?;
+        match &standing.record(id, (store.options.clock)())?.result {
+            Some(result) => store.servers.read(result).await.map(Some),
+            None => Ok(None),
+        }
+    }
+
+    async fn incumbent(&self, id: PlanId) -> Result<Option<Incumbent>, StoreError> {
+        let store = self.open_store()?;
+        let standing = store.plans().standing(id).await?;
+        let record = standing.record(id, (store.options.clock)())?;
+        if !record.is_run_under(record.attempt) {
+            return Ok(None);
+        }
+        if let Some(history) = store.view.known().histories.whole(id) {
+            return Ok(history.incumbent(record.attempt));
+        }
+        let history = store.read_history(id).await?;
+        let incumbent = history.incumbent(record.attempt);
+        store.view.known().histories.put(id, history);
+        Ok(incumbent)
+    }
+
+    async fn list(&self, query: ListQuery) -> Result<Vec<Plan>, StoreError> {
+        Ok(self.open_store()?.view.known().list_plans(&query))
+    }
+
+    async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<EventPage, StoreError> {
+        let store = self.open_store()?;
+        let standing = store.plans().standing(id).await?;
+        standing.record(id, (store.options.clock)())?;
+        if let Some(page) = store.view.known().histories.page(id, after, limit) {
+            return Ok(page);
+        }
+        let history = store.read_history(id).await?;
+        let page = history.page(after, limit);
+        store.view.known().histories.put(id, history);
+        Ok(page)
+    }
+
+    fn changes(&self, id: PlanId) -> watch::Receiver<u64> {
+        self.store.view.changes.subscribe(id)
+    }
+
+    async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError> {
+        self.open_store()?.sweep(now_ms).await
+    }
+
+    async fn due_webhooks(&self, now_ms: i64, limit: usize) -> Result<Vec<Webhook>, StoreError> {
+        self.open_store()?.due_webhooks(now_ms, limit).await
+    }
+
+    async fn webhook_tried(&self, id: PlanId, next_ms: Option<i64>) -> Result<(), StoreError> {
+        self.open_store()?.webhook_tried(id, next_ms).await
+    }
+
+    async fn datasets_in_use(&self) -> Result<Vec<DatasetUse>, StoreError> {
+        Ok(self.open_store()?.view.known().datasets())
+    }
+
+    async fn stats(&self) -> Result<Stats, StoreError> {
+        Ok(self.open_store()?.view.known().stats())
+    }
+
+    async fn health(&self) -> Result<(), StoreError> {
+        let store = self.open_store()?;
+        if !store.servers.is_connected() {
+            return Err(StoreError::unavailable("no NATS server answers"));
+        }
+        store.announce().await?;
+        if *self.reading.borrow() != Reading::Current {
+            return Err(StoreError::unavailable(
+                "the plans on the servers are being read",
+            ));
+        }
+        Ok(())
+    }
+
+    async fn close(&self) {
+        let was_open = !self.store.end.send_replace(true);
+        if !was_open {
+            return;
+        }
+        for (id, attempt) in self.store.leases.all() {
+            if let Err(error) = self.store.release(id, attempt).await {
+                tracing::debug!(%error, "a run is left to the end of its lease");
+            }
+        }
+        self.store.let_tell_all().await;
+        self.store.take_leave().await;
+        for task in &self.tasks {
+            task.abort();
+        }
+        if let Err(error) = self.store.servers.client.flush().await {
+            tracing::debug!(%error, "the last words may not have been heard");
+        }
+    }
+}
+
+fn closed() -> StoreError {
+    StoreError::unavailable("the store is closed")
+}

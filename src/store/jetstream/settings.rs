@@ -1,6 +1,7 @@
 //! Where the servers are, and what is asked of them.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// The namespace when an address names none.
 const NAMESPACE: &str = "noctule";
@@ -14,6 +15,8 @@ pub struct Settings {
     pub credentials: Option<PathBuf>,
     /// Copies that the servers keep of everything: 1, 3 or 5.
     pub replicas: usize,
+    /// How long a run is this node's after it last said so.
+    pub lease: Duration,
     /// Plans that this node runs at a time; 0 for a node that only serves.
     pub slots: usize,
 }

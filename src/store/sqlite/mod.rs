@@ -3,7 +3,6 @@
 //! Every acknowledged change is on the disk (WAL, `synchronous = FULL`); what was being run when a
 //! process died is queued again when the next one opens the file.
 
-mod changes;
 mod idempotency;
 mod operations;
 mod read;
@@ -25,16 +24,15 @@ use async_trait::async_trait;
 use rusqlite::{Connection, ErrorCode};
 use tokio::sync::watch;
 
-use self::changes::Changes;
 use self::read::Readers;
 use self::records::Records;
 use self::writer::Writer;
+use super::changes::Changes;
 use super::{
     Clock, DatasetUse, Ending, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError,
     Submitted, Trouble, Webhook,
 };
 use crate::export::document::Incumbent;
-use crate::job::state::Refused;
 use crate::job::{Event, Plan, PlanId, Status, Submission};
 
 /// Name of the database in the data directory.
@@ -298,12 +296,6 @@ impl From<rusqlite::Error> for StoreError {
     }
 }
 
-impl From<Refused> for StoreError {
-    fn from(refused: Refused) -> Self {
-        Self::unavailable(refused.to_string())
-    }
-}
-
 fn closed() -> StoreError {
     StoreError::unavailable("the store is closed".to_owned())
 }
@@ -381,6 +373,7 @@ mod tests {
             algorithm: "tms-sba".to_owned(),
             seed: 7,
             iterations: 200,
+            work: 400_000,
             scenario: "x".repeat(bytes),
             created_ms: 1_000,
             owner: None,

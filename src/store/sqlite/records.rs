@@ -114,6 +114,7 @@ mod tests {
             algorithm: "tms-sba".to_owned(),
             seed: 7,
             iterations: 10,
+            work: 2_000,
             scenario: String::new(),
             created_ms: 0,
             owner: None,

@@ -10,12 +10,12 @@ use std::thread::JoinHandle;
 use rusqlite::Connection;
 use tokio::sync::{oneshot, watch};
 
-use super::changes::Changes;
 use super::closed;
 use super::records::Records;
 use super::transaction::{Effect, Transaction};
 use super::{operations, removal};
 use crate::job::PlanId;
+use crate::store::changes::Changes;
 use crate::store::{Lease, Options, StoreError};
 
 /// Operations in one transaction, at most.

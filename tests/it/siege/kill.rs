@@ -10,6 +10,7 @@ use super::{Dice, size};
 use crate::support::process::Service;
 use crate::support::scenario;
 use crate::support::sse::{Stream, events};
+use crate::support::stores::{Place, for_every_backend};
 
 /// A kill comes so many milliseconds after the start at the latest.
 const LIFE_MS: usize = 400;
@@ -48,35 +49,38 @@ impl Known {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn kills_at_random_points_lose_nothing_and_repeat_nothing() {
-    let (n_kills, n_plans) = size((10, 60), (100, 200));
-    let directory = tempfile::tempdir().expect("a temporary directory");
-    let mut dice = Dice::new(1);
-    let mut known = Known::default();
-    for kill in 1..=n_kills {
-        let service = Service::start(directory.path(), &["--workers", "2"]);
-        // The point is random; whatever happens then is cut, a request on its way included.
-        let point = Instant::now() + Duration::from_millis(dice.below(LIFE_MS) as u64);
-        let enough = n_plans * kill / n_kills;
-        let _ = tokio::time::timeout_at(point, known.grow(&service, enough)).await;
-        service.kill();
-    }
-    let (accepted, finished) = (known.accepted, known.finished);
-    assert!(!accepted.is_empty());
+    for_every_backend(async |backend| {
+        let (n_kills, n_plans) = size((10, 60), (100, 200));
+        let place = Place::new(backend);
+        let mut dice = Dice::new(1);
+        let mut known = Known::default();
+        for kill in 1..=n_kills {
+            let service = place.serve(&["--workers", "2"]);
+            // The point is random; whatever happens then is cut, a request on its way included.
+            let point = Instant::now() + Duration::from_millis(dice.below(LIFE_MS) as u64);
+            let enough = n_plans * kill / n_kills;
+            let _ = tokio::time::timeout_at(point, known.grow(&service, enough)).await;
+            service.kill();
+        }
+        let (accepted, finished) = (known.accepted, known.finished);
+        assert!(!accepted.is_empty());
 
-    let service = Service::start(directory.path(), &["--workers", "2"]);
-    for address in &accepted {
-        let ended = service.ended(address).await;
-        assert_eq!(ended["status"], "succeeded", "{address}");
-        let request = service.get(&format!("{address}/events?rate=0"));
-        let told = events(&Stream::open(request).await.rest().await);
-        let ends = told.iter().filter(|(_, name)| name == "end").count();
-        assert_eq!(ends, 1, "{address}");
-        assert_eq!(told.last().expect("events").1, "end", "{address}");
-        let ids: Vec<u64> = told.iter().map(|(id, _)| *id).collect();
-        assert_eq!(ids, (1..=ids.len() as u64).collect::<Vec<_>>(), "{address}");
-    }
-    for (address, before) in finished {
-        let after = service.bytes(&format!("{address}/result")).await;
-        assert_eq!(after, before, "{address}");
-    }
+        let service = place.serve(&["--workers", "2"]);
+        for address in &accepted {
+            let ended = service.ended(address).await;
+            assert_eq!(ended["status"], "succeeded", "{address}");
+            let request = service.get(&format!("{address}/events?rate=0"));
+            let told = events(&Stream::open(request).await.rest().await);
+            let ends = told.iter().filter(|(_, name)| name == "end").count();
+            assert_eq!(ends, 1, "{address}");
+            assert_eq!(told.last().expect("events").1, "end", "{address}");
+            let ids: Vec<u64> = told.iter().map(|(id, _)| *id).collect();
+            assert_eq!(ids, (1..=ids.len() as u64).collect::<Vec<_>>(), "{address}");
+        }
+        for (address, before) in finished {
+            let after = service.bytes(&format!("{address}/result")).await;
+            assert_eq!(after, before, "{address}");
+        }
+    })
+    .await;
 }

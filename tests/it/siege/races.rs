@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use noctule::job::{Event, PlanId, Status};
-use noctule::store::Store;
+use noctule::store::{Options, Store};
 use tokio::task::JoinSet;
 
 use super::size;
 use crate::support::api::Api;
 use crate::support::plans::{ending, history, submission};
 use crate::support::run;
-use crate::support::stores::on_every_backend;
+use crate::support::stores::{for_every_backend, on_every_backend};
 
 /// Races at the same time.
 const LANES: usize = 16;
@@ -77,34 +77,38 @@ async fn race_in(store: &Arc<dyn Store>, race: usize) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn cancel_and_finish_end_a_plan_once_over_http() {
-    let api = Arc::new(Api::new());
-    let mut lanes = JoinSet::new();
-    for lane in 0..LANES {
-        let api = api.clone();
-        lanes.spawn(async move {
-            for race in (lane..size(250, 5_000)).step_by(LANES) {
-                api.submit().await;
-                let lease = api.store.claim().await.expect("somebody is queued");
-                let id = lease.plan.id;
-                let finish = {
-                    let api = api.clone();
-                    async move { run::finish(&*api.store, &lease, finish_with(race)).await }
-                };
-                let finish = tokio::spawn(finish);
-                let path = format!("/plans/{id}/cancel");
-                let cancelled = api.post(&path, &serde_json::Value::Null).await;
-                assert!(
-                    cancelled.status == 200 || cancelled.status == 202,
-                    "{cancelled:?}"
-                );
-                finish.await.expect("no panic");
-                has_one_end(&*api.store, id).await;
-                let status = api.get(&format!("/plans/{id}")).await.json();
-                assert!(
-                    ["succeeded", "cancelled"].contains(&status["status"].as_str().expect("text"))
-                );
-            }
-        });
-    }
-    lanes.join_all().await;
+    for_every_backend(async |backend| {
+        let api = Arc::new(Api::on(backend, Options::new(1_000)).await);
+        let mut lanes = JoinSet::new();
+        for lane in 0..LANES {
+            let api = api.clone();
+            lanes.spawn(async move {
+                for race in (lane..size(250, 5_000)).step_by(LANES) {
+                    api.submit().await;
+                    let lease = api.store.claim().await.expect("somebody is queued");
+                    let id = lease.plan.id;
+                    let finish = {
+                        let api = api.clone();
+                        async move { run::finish(&*api.store, &lease, finish_with(race)).await }
+                    };
+                    let finish = tokio::spawn(finish);
+                    let path = format!("/plans/{id}/cancel");
+                    let cancelled = api.post(&path, &serde_json::Value::Null).await;
+                    assert!(
+                        cancelled.status == 200 || cancelled.status == 202,
+                        "{cancelled:?}"
+                    );
+                    finish.await.expect("no panic");
+                    has_one_end(&*api.store, id).await;
+                    let status = api.get(&format!("/plans/{id}")).await.json();
+                    assert!(
+                        ["succeeded", "cancelled"]
+                            .contains(&status["status"].as_str().expect("text"))
+                    );
+                }
+            });
+        }
+        lanes.join_all().await;
+    })
+    .await;
 }

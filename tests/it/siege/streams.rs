@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use futures_util::future::join_all;
 use noctule::job::{Event, Status};
+use noctule::store::Options;
 use reqwest::Client;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
@@ -12,6 +13,7 @@ use super::{Dice, PATIENCE, size};
 use crate::support::api::Api;
 use crate::support::run;
 use crate::support::server::Server;
+use crate::support::stores::{Backend, for_every_backend};
 
 /// A plan on a real port, whose run the test plays.
 struct Plan {
@@ -23,7 +25,14 @@ struct Plan {
 
 impl Plan {
     async fn new() -> Self {
-        let api = Api::new();
+        Self::over(Api::new()).await
+    }
+
+    async fn on(backend: Backend) -> Self {
+        Self::over(Api::on(backend, Options::new(10)).await).await
+    }
+
+    async fn over(api: Api) -> Self {
         Self {
             server: Server::start(&api).await,
             address: api.submit().await,
@@ -123,41 +132,47 @@ async fn read_with_cuts(plan: &Plan, query: &str, cuts: usize, dice: &mut Dice) 
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_hundred_cuts_anywhere_lose_nothing_and_repeat_nothing() {
-    let plan = Plan::new().await;
-    let mut dice = Dice::new(7);
-    let (live, ()) = tokio::join!(
-        read_with_cuts(&plan, "?rate=0", 100, &mut dice),
-        plan.run(600)
-    );
-    let ids: Vec<u64> = live.iter().map(|(id, _)| *id).collect();
-    assert_eq!(ids, (1..=ids.len() as u64).collect::<Vec<_>>());
-    assert_eq!(live.iter().filter(|(_, name)| name == "end").count(), 1);
-    assert_eq!(live, plan.read("?rate=0", 0, usize::MAX).await);
-
-    // Of a thinned stream the same events, wherever it is cut.
-    let whole = plan.read("?rate=20", 0, usize::MAX).await;
-    assert!(whole.len() < live.len() / 2, "{} events", whole.len());
-    for _ in 0..10 {
-        assert_eq!(
-            read_with_cuts(&plan, "?rate=20", 10, &mut dice).await,
-            whole
+    for_every_backend(async |backend| {
+        let plan = Plan::on(backend).await;
+        let mut dice = Dice::new(7);
+        let (live, ()) = tokio::join!(
+            read_with_cuts(&plan, "?rate=0", 100, &mut dice),
+            plan.run(600)
         );
-    }
+        let ids: Vec<u64> = live.iter().map(|(id, _)| *id).collect();
+        assert_eq!(ids, (1..=ids.len() as u64).collect::<Vec<_>>());
+        assert_eq!(live.iter().filter(|(_, name)| name == "end").count(), 1);
+        assert_eq!(live, plan.read("?rate=0", 0, usize::MAX).await);
+
+        // Of a thinned stream the same events, wherever it is cut.
+        let whole = plan.read("?rate=20", 0, usize::MAX).await;
+        assert!(whole.len() < live.len() / 2, "{} events", whole.len());
+        for _ in 0..10 {
+            assert_eq!(
+                read_with_cuts(&plan, "?rate=20", 10, &mut dice).await,
+                whole
+            );
+        }
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn five_hundred_readers_see_every_incumbent_and_one_end() {
-    let plan = Plan::new().await;
-    let readers = join_all((0..500).map(|_| plan.read("?rate=0", 0, usize::MAX)));
-    let all = tokio::time::timeout(PATIENCE, async { tokio::join!(readers, plan.run(60)).0 });
-    for told in all.await.expect("in time") {
-        let count = |wanted: &str| told.iter().filter(|(_, name)| name == wanted).count();
-        assert_eq!(
-            (count("incumbent"), count("convergence"), count("end")),
-            (20, 60, 1)
-        );
-        assert!(told.is_sorted_by(|a, b| a.0 < b.0));
-    }
+    for_every_backend(async |backend| {
+        let plan = Plan::on(backend).await;
+        let readers = join_all((0..500).map(|_| plan.read("?rate=0", 0, usize::MAX)));
+        let all = tokio::time::timeout(PATIENCE, async { tokio::join!(readers, plan.run(60)).0 });
+        for told in all.await.expect("in time") {
+            let count = |wanted: &str| told.iter().filter(|(_, name)| name == wanted).count();
+            assert_eq!(
+                (count("incumbent"), count("convergence"), count("end")),
+                (20, 60, 1)
+            );
+            assert!(told.is_sorted_by(|a, b| a.0 < b.0));
+        }
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

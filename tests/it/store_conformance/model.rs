@@ -8,7 +8,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 
 use crate::support::plans::{ending, failure, history, kind, point, statuses, submission};
-use crate::support::stores::{BACKENDS, Fixture};
+use crate::support::stores::{BACKENDS, Fixture, Place};
 
 const QUEUE_LIMIT: usize = 4;
 
@@ -248,8 +248,9 @@ proptest! {
     fn a_store_and_its_model_agree(steps in vec(step(), 1..60)) {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
         runtime.block_on(async {
-            for &(_, open) in BACKENDS {
-                let mut store = Fixture::new(open, QUEUE_LIMIT as u64);
+            for backend in BACKENDS {
+                println!("on {backend:?}");
+                let mut store = Fixture::new(Place::new(backend), QUEUE_LIMIT as u64).await;
                 let mut model = Model::default();
                 for step in &steps {
                     model.apply(&mut store, step).await;

@@ -20,11 +20,11 @@ use noctule::store::sqlite::SqliteStore;
 use noctule::store::{Options, Store};
 use noctule::telemetry::Instruments;
 use serde_json::Value;
-use tempfile::TempDir;
 use tokio::sync::watch;
 use tower::ServiceExt as _;
 
 use super::description;
+use super::stores::{Backend, Place};
 
 /// A service whose only worker is the test.
 pub(crate) struct Api {
@@ -34,7 +34,7 @@ pub(crate) struct Api {
     pub(crate) phase: watch::Sender<Phase>,
     pub(crate) clock: watch::Sender<Option<i64>>,
     uploads: PathBuf,
-    directory: TempDir,
+    place: Place,
 }
 
 /// An answer, read to its end.
@@ -59,6 +59,15 @@ impl Api {
     /// Over a store with these options.
     pub(crate) fn with_store(options: Options) -> Self {
         Self::made(options, Access::new(None, Settings::default()), &[])
+    }
+
+    /// Over a store of this kind.
+    pub(crate) async fn on(backend: Backend, options: Options) -> Self {
+        let place = Place::new(backend);
+        let queue = options.queue_limit;
+        let store = place.open(options).await.expect("a fresh store");
+        let access = Access::new(None, Settings::default());
+        Self::over(store, place, queue, access, &[])
     }
 
     /// For holders of keys alone.
@@ -90,11 +99,11 @@ impl Api {
     pub(crate) fn with_catalogue(open: impl FnOnce(PathBuf) -> Directories) -> Self {
         let mut api = Self::new();
         // A directory of its own: the first one is taken.
-        let catalogue = Arc::new(open(api.directory.path().join("more")));
+        let catalogue = Arc::new(open(api.place.path().join("more")));
         let rules = (*api.state.rules).clone().with_datasets(catalogue.clone());
         api.state.rules = Arc::new(rules);
         api.state.terrains = Terrains::new(catalogue);
-        api.uploads = api.directory.path().join("more");
+        api.uploads = api.place.path().join("more");
         api.router = http::router(api.state.clone());
         api
     }
@@ -105,15 +114,26 @@ impl Api {
     }
 
     fn made(options: Options, access: Access, origins: &[&str]) -> Self {
-        let queue = usize::try_from(options.queue_limit).expect("a small number");
-        let directory = tempfile::tempdir().expect("a temporary directory");
+        let place = Place::new(Backend::Sqlite);
+        let queue = options.queue_limit;
+        let store = SqliteStore::open(place.path(), options).expect("a fresh store");
+        Self::over(Arc::new(store), place, queue, access, origins)
+    }
+
+    fn over(
+        store: Arc<dyn Store>,
+        place: Place,
+        queue: u64,
+        access: Access,
+        origins: &[&str],
+    ) -> Self {
+        let queue = usize::try_from(queue).expect("a small number");
         let instruments = Arc::new(Instruments::default());
-        let store = SqliteStore::open(directory.path(), options).expect("a fresh store");
-        let store = Arc::new(MeasuredStore::new(Arc::new(store), instruments.clone()));
+        let store = Arc::new(MeasuredStore::new(store, instruments.clone()));
         let clock = watch::channel(None);
         let origins: Vec<String> = origins.iter().map(ToString::to_string).collect();
         let (phase, watched) = watch::channel(Phase::Serving);
-        let uploads = directory.path().join("terrains");
+        let uploads = place.path().join("terrains");
         let catalogue = Arc::new(Directories::new(uploads.clone(), None));
         let limits = Limits {
             body_bytes: 4096,
@@ -140,7 +160,7 @@ impl Api {
             phase,
             clock: clock.0,
             uploads,
-            directory,
+            place,
         }
     }
 

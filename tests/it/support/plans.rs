@@ -13,6 +13,7 @@ pub(crate) fn submission() -> Submission {
         algorithm: "tms-sba".to_owned(),
         seed: (1 << 53) - 1,
         iterations: 10,
+        work: 2_000,
         scenario: format!("{{\"name\":\"{id}\"}}"),
         created_ms: 1_000,
         owner: None,

@@ -10,20 +10,61 @@ use noctule::store::sqlite::SqliteStore;
 use noctule::store::{Options, Retention, Store, StoreError};
 use tempfile::TempDir;
 
-type Open = fn(&Path, Options) -> Result<Arc<dyn Store>, StoreError>;
+use super::process::Service;
+
+/// A kind of store.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Backend {
+    Sqlite,
+}
 
 /// The backends that the conformance suite runs on.
-pub(crate) const BACKENDS: &[(&str, Open)] = &[("sqlite", |dir, options| {
-    Ok(Arc::new(SqliteStore::open(dir, options)?))
-})];
+pub(crate) const BACKENDS: [Backend; 1] = [Backend::Sqlite];
 
 /// A hanging test fails after this.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// An open store in a directory of its own.
-pub(crate) struct Fixture {
-    open: Open,
+/// Where a store keeps its plans, and finds them when it is opened again.
+pub(crate) struct Place {
+    backend: Backend,
     directory: TempDir,
+}
+
+impl Place {
+    /// Which nobody else uses.
+    pub(crate) fn new(backend: Backend) -> Self {
+        Self {
+            backend,
+            directory: TempDir::new().expect("a temporary directory"),
+        }
+    }
+
+    /// The directory for whatever a process writes.
+    pub(crate) fn path(&self) -> &Path {
+        self.directory.path()
+    }
+
+    /// Open the store.
+    pub(crate) async fn open(&self, options: Options) -> Result<Arc<dyn Store>, StoreError> {
+        match self.backend {
+            Backend::Sqlite => {
+                let path = self.path().to_owned();
+                let open = move || SqliteStore::open(&path, options);
+                let opened = tokio::task::spawn_blocking(open).await;
+                Ok(Arc::new(opened.expect("no panic")?))
+            }
+        }
+    }
+
+    /// A service over the store, as a process of its own.
+    pub(crate) fn serve(&self, arguments: &[&str]) -> Service {
+        Service::start(self.path(), arguments)
+    }
+}
+
+/// An open store in a place of its own.
+pub(crate) struct Fixture {
+    place: Place,
     queue_limit: u64,
     /// Of the next opening.
     pub(crate) retention: Retention,
@@ -34,28 +75,28 @@ pub(crate) struct Fixture {
 }
 
 impl Fixture {
-    pub(crate) fn new(open: Open, queue_limit: u64) -> Self {
+    pub(crate) async fn new(place: Place, queue_limit: u64) -> Self {
         let mut fixture = Self {
-            open,
-            directory: TempDir::new().expect("a temporary directory"),
+            place,
             queue_limit,
             retention: Retention::default(),
             events_kept: u64::MAX,
             now_ms: Arc::new(AtomicI64::new(10_000)),
             store: None,
         };
-        fixture.open();
+        fixture.open().await;
         fixture
     }
 
-    fn open(&mut self) {
+    async fn open(&mut self) {
         let options = Options {
             clock: self.clock(),
             retention: self.retention,
             events_kept: self.events_kept,
             ..Options::new(self.queue_limit)
         };
-        self.store = Some((self.open)(self.directory.path(), options).expect("the store opens"));
+        let store = self.place.open(options).await;
+        self.store = Some(store.expect("the store opens"));
     }
 
     pub(crate) fn clock(&self) -> noctule::store::Clock {
@@ -74,7 +115,7 @@ impl Fixture {
     /// Close the store and open it again, as a new process would.
     pub(crate) async fn reopen(&mut self) {
         self.close().await;
-        self.open();
+        self.open().await;
     }
 
     pub(crate) async fn close(&mut self) {
@@ -97,13 +138,23 @@ impl Deref for Fixture {
     }
 }
 
+/// Run a test for each backend.
+pub(crate) async fn for_every_backend(test: impl AsyncFn(Backend)) {
+    for backend in BACKENDS {
+        // Shown when the test fails.
+        println!("on {backend:?}");
+        test(backend).await;
+    }
+}
+
 /// Run a test on each backend, with room for `queue_limit` plans.
 pub(crate) async fn on_every_backend(queue_limit: u64, test: impl AsyncFn(&mut Fixture)) {
-    for &(name, open) in BACKENDS {
-        let mut fixture = Fixture::new(open, queue_limit);
+    for_every_backend(async |backend| {
+        let mut fixture = Fixture::new(Place::new(backend), queue_limit).await;
         tokio::time::timeout(PATIENCE, test(&mut fixture))
             .await
-            .unwrap_or_else(|_| panic!("{name}: still waiting after {PATIENCE:?}"));
+            .unwrap_or_else(|_| panic!("{backend:?}: still waiting after {PATIENCE:?}"));
         fixture.close().await;
-    }
+    })
+    .await;
 }

@@ -1,0 +1,330 @@
+//! How a plan is taken to be run.
+
+use std::collections::HashMap;
+use std::sync::{Arc, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use async_nats::jetstream::consumer::{AckPolicy, PullConsumer, pull};
+use async_nats::jetstream::{AckKind, Message};
+use futures_util::StreamExt as _;
+use tokio::sync::oneshot;
+use tokio::time::Instant;
+
+use super::lane::{Lane, Version};
+use super::leases::Job;
+use super::record::{Record, State};
+use super::steps::Change;
+use super::trouble::{failed, refused};
+use super::view::Standing;
+use super::{JetStream, closed};
+use crate::job::{Failure, Plan, PlanId, Status};
+use crate::store::{Lease, StoreError};
+
+/// Runs of a plan whose workers were lost, after which it is taken to be the reason.
+const LOST_RUNS: u32 = 5;
+
+/// A job may be seen so long before its record.
+const RECORD_PATIENCE: Duration = Duration::from_millis(500);
+
+/// A job without a record comes again after so long,
+const ORPHAN_PAUSE: Duration = Duration::from_secs(2);
+
+/// and is nobody's after so many times.
+const ORPHANED_AFTER: i64 = 30;
+
+/// How long a consumer is kept that nobody asks.
+const UNASKED: Duration = Duration::from_secs(24 * 60 * 60);
+
+/// Between two tries at a lane whose plan was faster taken by another.
+const BREATH: Duration = Duration::from_millis(5);
+
+impl JetStream {
+    /// See [`Store::claim`](crate::store::Store::claim). Taking is a task of its own, so that a caller
+    /// who goes away in the middle of it leaves no plan behind.
+    pub(super) async fn claim(self: &Arc<Self>) -> Result<Lease, StoreError> {
+        let (mut give, take) = oneshot::channel();
+        let store = Arc::clone(self);
+        tokio::spawn(async move {
+            let Some(claimed) = store.take_next(&mut give).await else {
+                return;
+            };
+            if let Err(Ok(lease)) = give.send(claimed)
+                && let Err(error) = store.release(lease.plan.id, lease.attempt).await
+            {
+                tracing::warn!(%error, "a plan that nobody waits for goes back when its lease ends");
+            }
+        });
+        take.await.unwrap_or_else(|_| Err(closed()))
+    }
+
+    /// `None` when nobody waits for it any more.
+    async fn take_next(
+        &self,
+        give: &mut oneshot::Sender<Result<Lease, StoreError>>,
+    ) -> Option<Result<Lease, StoreError>> {
+        let mut waiting = self.view.waiting();
+        let mut end = self.end.subscribe();
+        loop {
+            waiting.mark_unchanged();
+            if *end.borrow() {
+                return Some(Err(closed()));
+            }
+            if give.is_closed() {
+                return None;
+            }
+            if let Some(claimed) = self.take_one().await.transpose() {
+                return Some(claimed);
+            }
+            tokio::select! {
+                () = give.closed() => return None,
+                _ = end.changed() => {}
+                _ = waiting.changed() => {}
+                () = tokio::time::sleep(self.patrol()) => {}
+            }
+        }
+    }
+
+    /// How often lanes are asked for jobs whose workers were lost.
+    fn patrol(&self) -> Duration {
+        (self.settings.lease / 4).min(Duration::from_secs(1))
+    }
+
+    async fn take_one(&self) -> Result<Option<Lease>, StoreError> {
+        let mut in_vain = 0;
+        while in_vain < 4 {
+            let lane = self.view.known().next_lane(Version::own(), self.slots());
+            let Some(lane) = lane else { break };
+            if let Some(job) = self.fetch(&lane).await? {
+                if let Some(lease) = self.begin(job).await? {
+                    return Ok(Some(lease));
+                }
+            } else {
+                in_vain += 1;
+                tokio::time::sleep(BREATH).await;
+            }
+        }
+        if self.is_patrol_due() {
+            let lanes = self.view.known().running_lanes(Version::own());
+            for lane in lanes {
+                while let Some(job) = self.fetch(&lane).await? {
+                    if let Some(lease) = self.begin(job).await? {
+                        return Ok(Some(lease));
+                    }
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// One slot of the node goes on patrol at a time.
+    fn is_patrol_due(&self) -> bool {
+        let mut last = self
+            .last_patrol
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let due = last.is_none_or(|last| last.elapsed() >= self.patrol());
+        if due {
+            *last = Some(Instant::now());
+        }
+        due
+    }
+
+    /// The next job of a lane, if there is one that nobody has.
+    async fn fetch(&self, lane: &Lane) -> Result<Option<Message>, StoreError> {
+        let what = || format!("lane {}", lane.name());
+        let consumer = self.consumer(lane).await?;
+        let fetched = match consumer.fetch().max_messages(1).messages().await {
+            Ok(mut batch) => batch
+                .next()
+                .await
+                .transpose()
+                .map_err(|error| refused(&what(), &error)),
+            Err(error) => Err(failed(&what(), &error)),
+        };
+        if fetched.is_err() {
+            // It may have been removed, for nobody asked it for long.
+            self.consumers().remove(lane);
+        }
+        fetched
+    }
+
+    async fn consumer(&self, lane: &Lane) -> Result<PullConsumer, StoreError> {
+        if let Some(consumer) = self.consumers().get(lane) {
+            return Ok(consumer.clone());
+        }
+        let config = pull::Config {
+            durable_name: Some(lane.name()),
+            filter_subject: format!("{}.jobs.{}.*", self.servers.namespace, lane.subject()),
+            ack_policy: AckPolicy::Explicit,
+            ack_wait: self.settings.lease,
+            // Runs that were lost are counted in the record, where giving back does not count.
+            max_deliver: -1,
+            max_ack_pending: 65_536,
+            inactive_threshold: UNASKED,
+            ..pull::Config::default()
+        };
+        let made = self.servers.jobs.create_consumer(config).await;
+        let consumer = made.map_err(|error| failed(&format!("lane {}", lane.name()), &error))?;
+        self.consumers().insert(lane.clone(), consumer.clone());
+        Ok(consumer)
+    }
+
+    fn consumers(&self) -> MutexGuard<'_, HashMap<Lane, PullConsumer>> {
+        self.consumers
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Begin to run the plan of a job; `None` when there is nothing to run.
+    async fn begin(&self, job: Message) -> Result<Option<Lease>, StoreError> {
+        let deliveries = job.info().map_or(1, |info| info.delivered);
+        let (message, acker) = job.split();
+        let job = Job::new(acker);
+        let id = message
+            .subject
+            .as_str()
+            .rsplit('.')
+            .next()
+            .and_then(|id| PlanId::parse_str(id).ok());
+        let Some(id) = id else {
+            tracing::warn!(
+                subject = message.subject.as_str(),
+                "a job of no plan is thrown away"
+            );
+            answer(&job, AckKind::Ack).await;
+            return Ok(None);
+        };
+        match self.record_of_job(id).await {
+            Ok(_) => {}
+            Err(StoreError::NotFound(_)) if deliveries > ORPHANED_AFTER => {
+                tracing::info!(plan = %id, "a job that was never accepted is thrown away");
+                self.servers.remove_documents(id, &[]).await?;
+                answer(&job, AckKind::Ack).await;
+                return Ok(None);
+            }
+            Err(StoreError::NotFound(_)) => {
+                answer(&job, AckKind::Nak(Some(ORPHAN_PAUSE))).await;
+                return Ok(None);
+            }
+            Err(error) => {
+                answer(&job, AckKind::Nak(None)).await;
+                return Err(error);
+            }
+        }
+        let found = self.start(id, &job).await?;
+        match found {
+            Found::Over => answer(&job, AckKind::Ack).await,
+            Found::Ours => {}
+            Found::Run(record) => return self.lease(*record, job).await.map(Some),
+        }
+        Ok(None)
+    }
+
+    /// Jobs are written before records.
+    async fn record_of_job(&self, id: PlanId) -> Result<Standing, StoreError> {
+        let until = Instant::now() + RECORD_PATIENCE;
+        loop {
+            match self.plans().standing(id).await {
+                Err(StoreError::NotFound(_)) if Instant::now() < until => {
+                    tokio::time::sleep(BREATH).await;
+                }
+                answer => return answer,
+            }
+        }
+    }
+
+    async fn start(&self, id: PlanId, job: &Job) -> Result<Found, StoreError> {
+        let mut found = Found::Over;
+        let now_ms = (self.options.clock)();
+        self.plans()
+            .change(id, |standing| {
+                found = Found::Over;
+                let State::Kept(record) = &*standing.state else {
+                    return Ok(None);
+                };
+                let mut record = record.clone();
+                let mut events = Vec::new();
+                match record.plan.status {
+                    Status::Queued => {}
+                    Status::Running if self.leases.again(id, record.attempt, job) => {
+                        found = Found::Ours;
+                        return Ok(None);
+                    }
+                    Status::Running => {
+                        record.lost += 1;
+                        if let Some(end) = end_of_lost(&mut record.plan, record.lost, now_ms)? {
+                            events = record.told_end(self.options.retention.age_ms);
+                            tracing::warn!(plan = %id, status = end.name(), "a plan whose worker was lost ends");
+                            return Ok(Some(Change { state: State::Kept(record), events }));
+                        }
+                        tracing::warn!(plan = %id, attempt = record.attempt, "a plan whose worker was lost runs again");
+                        record.plan.requeue()?;
+                        events.extend(record.told());
+                    }
+                    Status::Succeeded | Status::Failed | Status::Cancelled => return Ok(None),
+                }
+                record.plan.start(now_ms)?;
+                record.attempt += 1;
+                record.appended = 0;
+                events.extend(record.told());
+                found = Found::Run(record.clone());
+                Ok(Some(Change { state: State::Kept(record), events }))
+            })
+            .await
+            .map(|_| found)
+    }
+
+    async fn lease(&self, record: Record, job: Job) -> Result<Lease, StoreError> {
+        let (id, attempt) = (record.id(), record.attempt);
+        let cancel = self.leases.hold(id, attempt, job, self.settings.lease);
+        // What was asked between the step and the hold.
+        if let Some(standing) = self.view.standing(id) {
+            self.leases.heed(id, &standing.state);
+        }
+        match self.servers.read(&record.scenario).await {
+            Ok(scenario) => Ok(Lease {
+                plan: record.plan,
+                scenario: scenario.into(),
+                attempt,
+                cancel,
+            }),
+            Err(error) => {
+                self.release(id, attempt).await?;
+                Err(error)
+            }
+        }
+    }
+}
+
+/// What a job turned out to be.
+enum Found {
+    /// To be run, as it now stands.
+    Run(Box<Record>),
+    /// It is run here, under a lease that was not renewed in time.
+    Ours,
+    /// Done, or removed.
+    Over,
+}
+
+/// Ends a plan whose worker was lost, when it is not to run again.
+fn end_of_lost(plan: &mut Plan, lost: u32, now_ms: i64) -> Result<Option<Status>, StoreError> {
+    if plan.cancel_requested {
+        plan.cancel(now_ms)?;
+    } else if lost >= LOST_RUNS {
+        let failure = Failure {
+            kind: "worker-lost".to_owned(),
+            detail: format!("{lost} workers were lost while they ran the plan"),
+        };
+        plan.fail(failure, now_ms)?;
+    } else {
+        return Ok(None);
+    }
+    Ok(Some(plan.status))
+}
+
+/// Answer a delivery. A lost answer is made good by the next delivery.
+pub(super) async fn answer(job: &Job, answer: AckKind) {
+    if let Err(error) = job.ack_with(answer).await {
+        tracing::debug!(error = %error, "a job was not answered");
+    }
+}

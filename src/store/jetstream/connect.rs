@@ -1,0 +1,268 @@
+//! The connection, and the streams and buckets on the servers, made where they are missing.
+
+use std::collections::HashMap;
+use std::time::Duration;
+
+use async_nats::connection::State as Connection;
+use async_nats::jetstream::object_store::ObjectStore;
+use async_nats::jetstream::stream::{Config, DiscardPolicy, RetentionPolicy, StorageType, Stream};
+use async_nats::jetstream::{self, Context, kv, object_store};
+use async_nats::{Client, ConnectOptions};
+
+use super::lane::Version;
+use super::settings::Settings;
+use super::trouble::failed;
+use crate::job::PlanId;
+use crate::store::{IDEMPOTENCY_MS, Options, StoreError};
+
+/// The oldest server that gives what is promised.
+const OLDEST_SERVER: &str = "2.12.0";
+
+/// A server that says nothing for so long is taken for lost.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Jobs beyond the queue's limit that the stream has room for: those that are being run.
+const RUNNING: i64 = 4_096;
+
+/// How long a node is believed to live after it last said so.
+pub(super) const ALIVE: Duration = Duration::from_secs(30);
+
+/// How long a node has for the telling of one end.
+const TELLING: Duration = Duration::from_secs(120);
+
+/// All that the store keeps on the servers.
+pub(super) struct Servers {
+    pub(super) client: Client,
+    pub(super) context: Context,
+    pub(super) namespace: String,
+    /// Steps of plans' lives, by plan.
+    pub(super) plans: Stream,
+    /// The queue.
+    pub(super) jobs: Stream,
+    /// Documents, by plan.
+    pub(super) documents: kv::Store,
+    /// Those that are too long for a message.
+    pub(super) objects: ObjectStore,
+    /// Idempotency keys.
+    pub(super) keys: kv::Store,
+    /// Which nodes there are.
+    pub(super) nodes: kv::Store,
+    /// Which node tells which end.
+    pub(super) tellers: kv::Store,
+}
+
+/// Connect as the settings say.
+///
+/// # Errors
+/// [`StoreError::Unavailable`].
+pub(super) async fn connect(settings: &Settings) -> Result<Client, StoreError> {
+    let mut options = ConnectOptions::new()
+        .name(concat!("noctule ", env!("CARGO_PKG_VERSION")))
+        .connection_timeout(PATIENCE)
+        .ping_interval(PATIENCE)
+        .request_timeout(Some(PATIENCE))
+        // A reader that falls behind is caught up from the stream; it must not lose others' answers.
+        .subscription_capacity(65_536)
+        .reconnect_delay_callback(|tries| {
+            let longest = Duration::from_secs(2);
+            let exponent = u32::try_from(tries.min(8)).unwrap_or(8);
+            longest.min(Duration::from_millis(10) * 2_u32.pow(exponent))
+        })
+        .event_callback(|event| async move {
+            tracing::warn!(%event, "the connection to the NATS servers");
+        });
+    if let Some(file) = &settings.credentials {
+        options = options
+            .credentials_file(file)
+            .await
+            .map_err(|error| failed(&format!("credentials {}", file.display()), &error))?;
+    }
+    let servers = settings.address.servers.join(",");
+    let client = options
+        .connect(&settings.address.servers)
+        .await
+        .map_err(|error| failed(&format!("NATS servers {servers}"), &error))?;
+    check_version(&client.server_info().version)?;
+    Ok(client)
+}
+
+fn check_version(version: &str) -> Result<(), StoreError> {
+    let oldest = Version::read(OLDEST_SERVER).expect("it is one");
+    if Version::read(version).is_some_and(|version| version >= oldest) {
+        return Ok(());
+    }
+    Err(StoreError::unavailable(format!(
+        "the NATS server is of version {version}; the store needs {OLDEST_SERVER} or newer"
+    )))
+}
+
+impl Servers {
+    pub(super) async fn open(settings: &Settings, options: &Options) -> Result<Self, StoreError> {
+        let client = connect(settings).await?;
+        let mut context = jetstream::new(client.clone());
+        context.set_timeout(PATIENCE);
+        context
+            .query_account()
+            .await
+            .map_err(|error| failed("JetStream of the NATS server", &error))?;
+        let namespace = settings.address.namespace.clone();
+        let make = Maker {
+            context: &context,
+            namespace: &namespace,
+            replicas: settings.replicas,
+        };
+        Ok(Self {
+            plans: make.stream(plans(options)).await?,
+            jobs: make.stream(jobs(options)).await?,
+            documents: make.bucket("documents", Duration::ZERO).await?,
+            objects: make.objects("objects").await?,
+            keys: make
+                .bucket(
+                    "keys",
+                    Duration::from_millis(IDEMPOTENCY_MS.cast_unsigned()) * 2,
+                )
+                .await?,
+            nodes: make.bucket("nodes", ALIVE).await?,
+            tellers: make.bucket("tellers", TELLING).await?,
+            client,
+            context: context.clone(),
+            namespace: namespace.clone(),
+        })
+    }
+
+    pub(super) fn subject_of(&self, id: PlanId) -> String {
+        format!("{}.plans.{id}", self.namespace)
+    }
+
+    pub(super) fn is_connected(&self) -> bool {
+        self.client.connection_state() == Connection::Connected
+    }
+}
+
+/// Steps of plans' lives; as many of each plan as its readers are promised.
+fn plans(options: &Options) -> Config {
+    Config {
+        name: "plans".to_owned(),
+        max_messages_per_subject: i64::try_from(options.events_kept).unwrap_or(-1),
+        allow_direct: true,
+        ..Config::default()
+    }
+}
+
+/// The queue: no longer than its limit, each job until somebody says that it is done.
+fn jobs(options: &Options) -> Config {
+    let limit = i64::try_from(options.queue_limit).unwrap_or(i64::MAX);
+    Config {
+        name: "jobs".to_owned(),
+        retention: RetentionPolicy::WorkQueue,
+        discard: DiscardPolicy::New,
+        max_messages: limit.saturating_add(RUNNING),
+        ..Config::default()
+    }
+}
+
+struct Maker<'a> {
+    context: &'a Context,
+    namespace: &'a str,
+    replicas: usize,
+}
+
+impl Maker<'_> {
+    fn name(&self, what: &str) -> String {
+        format!("{}-{what}", self.namespace)
+    }
+
+    /// Make a stream, or bring one that is there to what is wanted; never to fewer replicas.
+    async fn stream(&self, wanted: Config) -> Result<Stream, StoreError> {
+        let name = self.name(&wanted.name);
+        let what = || format!("stream {name}");
+        let mut config = Config {
+            subjects: vec![format!("{}.{}.>", self.namespace, wanted.name)],
+            name: name.clone(),
+            storage: StorageType::File,
+            num_replicas: self.replicas,
+            metadata: HashMap::new(),
+            ..wanted
+        };
+        let mut stream = self
+            .context
+            .get_or_create_stream(config.clone())
+            .await
+            .map_err(|error| failed(&what(), &error))?;
+        let info = stream
+            .info()
+            .await
+            .map_err(|error| failed(&what(), &error))?;
+        let there = &info.config;
+        if there.num_replicas > self.replicas {
+            tracing::warn!(
+                stream = name,
+                replicas = there.num_replicas,
+                "more replicas than asked for"
+            );
+            config.num_replicas = there.num_replicas;
+        }
+        let differs = there.num_replicas != config.num_replicas
+            || there.max_messages != config.max_messages
+            || there.max_messages_per_subject != config.max_messages_per_subject
+            || there.retention != config.retention
+            || there.discard != config.discard;
+        if differs {
+            self.context
+                .update_stream(config)
+                .await
+                .map_err(|error| failed(&what(), &error))?;
+        }
+        Ok(stream)
+    }
+
+    async fn bucket(&self, what: &str, max_age: Duration) -> Result<kv::Store, StoreError> {
+        let config = kv::Config {
+            bucket: self.name(what),
+            history: 1,
+            max_age,
+            num_replicas: self.replicas,
+            ..kv::Config::default()
+        };
+        if let Ok(bucket) = self.context.get_key_value(&config.bucket).await
+            && bucket.stream.cached_info().config.num_replicas >= self.replicas
+        {
+            return Ok(bucket);
+        }
+        let what = format!("bucket {}", config.bucket);
+        self.context
+            .create_or_update_key_value(config)
+            .await
+            .map_err(|error| failed(&what, &error))
+    }
+
+    async fn objects(&self, what: &str) -> Result<ObjectStore, StoreError> {
+        let config = object_store::Config {
+            bucket: self.name(what),
+            num_replicas: self.replicas,
+            ..object_store::Config::default()
+        };
+        if let Ok(there) = self.context.get_object_store(&config.bucket).await {
+            return Ok(there);
+        }
+        let what = format!("object store {}", config.bucket);
+        self.context
+            .create_object_store(config)
+            .await
+            .map_err(|error| failed(&what, &error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_old_server_is_refused_by_its_version() {
+        assert!(check_version("2.12.0").is_ok());
+        assert!(check_version("2.15.1-RC.2").is_ok());
+        let refusal = check_version("2.9.10").expect_err("it is too old");
+        assert!(refusal.to_string().contains("version 2.9.10"), "{refusal}");
+        assert!(check_version("").is_err());
+    }
+}

@@ -1,0 +1,100 @@
+//! Scenarios and results: beside the steps, so that a step stays small.
+
+use async_nats::jetstream::object_store::DeleteErrorKind;
+use bytes::Bytes;
+use tokio::io::AsyncReadExt as _;
+
+use super::connect::Servers;
+use super::record::Document;
+use super::trouble::failed;
+use crate::job::PlanId;
+use crate::store::StoreError;
+
+/// The longest document that goes into a message; servers take messages of 1 MiB unless told otherwise.
+const LONGEST: usize = 512 << 10;
+
+impl Document {
+    /// Where the accepted scenario of a plan goes.
+    pub(super) fn scenario(id: PlanId, text: &str) -> Self {
+        Self {
+            key: format!("{id}.scenario"),
+            large: text.len() > LONGEST,
+        }
+    }
+
+    /// Where the result of a run goes; that of a late worker lies beside it, and nobody reads it.
+    pub(super) fn result(id: PlanId, attempt: u64, text: &str) -> Self {
+        Self {
+            key: format!("{id}.result.{attempt}"),
+            large: text.len() > LONGEST,
+        }
+    }
+}
+
+impl Servers {
+    pub(super) async fn write(&self, document: &Document, text: &str) -> Result<(), StoreError> {
+        let what = || format!("document {}", document.key);
+        if document.large {
+            let put = self
+                .objects
+                .put(document.key.as_str(), &mut text.as_bytes())
+                .await;
+            put.map_err(|error| failed(&what(), &error))?;
+        } else {
+            let text = Bytes::copy_from_slice(text.as_bytes());
+            let put = self.documents.put(&document.key, text).await;
+            put.map_err(|error| failed(&what(), &error))?;
+        }
+        Ok(())
+    }
+
+    pub(super) async fn read(&self, document: &Document) -> Result<String, StoreError> {
+        let what = || format!("document {}", document.key);
+        let bytes = if document.large {
+            let mut object = self
+                .objects
+                .get(&document.key)
+                .await
+                .map_err(|error| failed(&what(), &error))?;
+            let mut bytes = Vec::with_capacity(object.info().size);
+            object
+                .read_to_end(&mut bytes)
+                .await
+                .map_err(|error| failed(&what(), &error))?;
+            bytes
+        } else {
+            self.documents
+                .get(&document.key)
+                .await
+                .map_err(|error| failed(&what(), &error))?
+                .ok_or_else(|| StoreError::unavailable(format!("{} is missing", what())))?
+                .into()
+        };
+        String::from_utf8(bytes).map_err(|error| failed(&what(), &error))
+    }
+
+    /// Remove all documents of a plan. `large` are those among the objects that may be there.
+    pub(super) async fn remove_documents(
+        &self,
+        id: PlanId,
+        large: &[&Document],
+    ) -> Result<(), StoreError> {
+        let what = || format!("documents of plan {id}");
+        let subjects = format!("{}{id}.>", self.documents.prefix);
+        self.documents
+            .stream
+            .purge()
+            .filter(subjects)
+            .await
+            .map_err(|error| failed(&what(), &error))?;
+        for document in large.iter().filter(|document| document.large) {
+            match self.objects.delete(&document.key).await {
+                Err(error) if error.kind() != DeleteErrorKind::NotFound => {
+                    return Err(failed(&what(), &error));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,169 @@
+//! Keeps the view: reads the plans' stream as it grows, and takes it up again where it broke off.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use async_nats::jetstream::Message;
+use async_nats::jetstream::consumer::{DeliverPolicy, push};
+use futures_util::StreamExt as _;
+use tokio::sync::watch;
+
+use super::JetStream;
+use super::history::History;
+use super::record::{Placed, State, Step};
+use super::trouble::{failed, refused};
+use crate::job::PlanId;
+use crate::store::StoreError;
+
+/// Between two tries to read on.
+const PAUSE: Duration = Duration::from_millis(250);
+
+/// How far the reading has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Reading {
+    /// What was there at the start is still being read.
+    Catching,
+    /// All that is told is known at once.
+    Current,
+    /// It broke off and is being taken up.
+    Broken,
+}
+
+impl JetStream {
+    /// Read for ever; `told` how it stands.
+    pub(super) async fn follow(self: Arc<Self>, told: watch::Sender<Reading>) {
+        let mut read = 0;
+        loop {
+            if let Err(error) = self.read_on(&mut read, &told).await {
+                tracing::warn!(%error, "plans are no longer followed; trying again");
+            }
+            told.send_if_modified(|reading| {
+                let was_current = *reading == Reading::Current;
+                if was_current {
+                    *reading = Reading::Broken;
+                }
+                was_current
+            });
+            tokio::time::sleep(PAUSE).await;
+        }
+    }
+
+    /// Read from behind `read`, the last place that was; ends when the connection is lost for good.
+    async fn read_on(
+        &self,
+        read: &mut u64,
+        told: &watch::Sender<Reading>,
+    ) -> Result<(), StoreError> {
+        let what = "the plans' stream";
+        let begin = if *read == 0 {
+            DeliverPolicy::LastPerSubject
+        } else {
+            DeliverPolicy::ByStartSequence {
+                start_sequence: *read + 1,
+            }
+        };
+        let config = push::OrderedConfig {
+            deliver_subject: self.servers.client.new_inbox(),
+            filter_subject: format!("{}.plans.*", self.servers.namespace),
+            deliver_policy: begin,
+            ..push::OrderedConfig::default()
+        };
+        let mut consumer = self
+            .servers
+            .plans
+            .create_consumer(config)
+            .await
+            .map_err(|error| failed(what, &error))?;
+        let info = consumer
+            .info()
+            .await
+            .map_err(|error| failed(what, &error))?;
+        if info.num_pending == 0 && info.delivered.stream_sequence == 0 {
+            told.send_replace(Reading::Current);
+        }
+        let mut messages = consumer
+            .messages()
+            .await
+            .map_err(|error| failed(what, &error))?;
+        while let Some(message) = messages.next().await {
+            let message = message.map_err(|error| refused(what, &error))?;
+            let (sequence, pending) = {
+                let info = message.info().map_err(|error| refused(what, &*error))?;
+                (info.stream_sequence, info.pending)
+            };
+            self.take_in(&message, sequence);
+            *read = sequence.max(*read);
+            if pending == 0 {
+                told.send_if_modified(|reading| {
+                    let news = *reading != Reading::Current;
+                    *reading = Reading::Current;
+                    news
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn take_in(&self, message: &Message, sequence: u64) {
+        let id = message
+            .subject
+            .as_str()
+            .rsplit('.')
+            .next()
+            .and_then(|id| PlanId::parse_str(id).ok());
+        let read = Step::read(&message.payload);
+        match (id, read) {
+            (Some(id), Ok(step)) => self.plans().learn(id, &Placed { sequence, step }),
+            (_, Err(error)) => {
+                tracing::error!(%error, subject = message.subject.as_str(), sequence, "a step cannot be read; it is left out");
+            }
+            (None, Ok(_)) => {}
+        }
+    }
+
+    /// All that the stream keeps of a plan's events.
+    pub(super) async fn read_history(&self, id: PlanId) -> Result<History, StoreError> {
+        let what = format!("events of plan {id}");
+        let subject = self.servers.subject_of(id);
+        let steps_kept = self.view.known().histories.steps_kept();
+        let config = push::OrderedConfig {
+            deliver_subject: self.servers.client.new_inbox(),
+            filter_subject: subject,
+            deliver_policy: DeliverPolicy::All,
+            ..push::OrderedConfig::default()
+        };
+        let mut consumer = self
+            .servers
+            .plans
+            .create_consumer(config)
+            .await
+            .map_err(|error| failed(&what, &error))?;
+        let info = consumer
+            .info()
+            .await
+            .map_err(|error| failed(&what, &error))?;
+        let mut history = History::whole();
+        if info.num_pending == 0 && info.delivered.stream_sequence == 0 {
+            return Ok(history);
+        }
+        let mut messages = consumer
+            .messages()
+            .await
+            .map_err(|error| failed(&what, &error))?;
+        while let Some(message) = messages.next().await {
+            let message = message.map_err(|error| refused(&what, &error))?;
+            let pending = message
+                .info()
+                .map_err(|error| refused(&what, &*error))?
+                .pending;
+            let step = Step::read(&message.payload)?;
+            if matches!(step.state, State::Kept(_)) {
+                history.push(&step, steps_kept);
+            }
+            if pending == 0 {
+                break;
+            }
+        }
+        Ok(history)
+    }
+}

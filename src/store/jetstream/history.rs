@@ -1,0 +1,209 @@
+//! Events of plans that are read much: kept in memory as far as there is room.
+
+use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::sync::Arc;
+
+use super::record::{State, Step};
+use crate::export::document::Incumbent;
+use crate::job::{Event, NumberedEvent, PlanId};
+use crate::store::EventPage;
+
+/// Bytes of events in memory, about.
+const ROOM: usize = 64 << 20;
+
+/// Bytes that are reckoned for an event that is no route.
+const SMALL_EVENT: usize = 256;
+
+/// What one step told.
+#[derive(Debug, Clone)]
+struct Batch {
+    /// Id of the newest event until then.
+    last: u64,
+    events: Arc<[NumberedEvent]>,
+    bytes: usize,
+}
+
+/// What one plan has told.
+#[derive(Debug, Clone, Default)]
+pub(super) struct History {
+    /// Events up to this one are not here.
+    before: u64,
+    /// Whether they are nowhere else either.
+    complete: bool,
+    batches: VecDeque<Batch>,
+    incumbent: Option<(u64, Incumbent)>,
+    bytes: usize,
+    touched: u64,
+}
+
+impl History {
+    /// Begin where the stream begins to know of the plan.
+    pub(super) fn whole() -> Self {
+        Self {
+            complete: true,
+            ..Self::default()
+        }
+    }
+
+    fn last(&self) -> u64 {
+        self.batches.back().map_or(self.before, |batch| batch.last)
+    }
+
+    /// Add a step; false when there is a hole before it.
+    pub(super) fn push(&mut self, step: &Step, steps_kept: usize) -> bool {
+        let State::Kept(record) = &step.state else {
+            return true;
+        };
+        let events = step.numbered();
+        let first = record.last_event + 1 - events.len() as u64;
+        if self.batches.is_empty() && self.before == 0 {
+            self.before = first - 1;
+        }
+        if record.last_event < self.last() {
+            return true;
+        }
+        if first != self.last() + 1 {
+            return first <= self.last();
+        }
+        let route = events.iter().rev().find_map(|event| match &event.event {
+            Event::Incumbent(route) => Some(route.clone()),
+            _ => None,
+        });
+        if let Some(route) = route {
+            self.incumbent = Some((record.attempt, route));
+        }
+        let bytes = SMALL_EVENT + events.iter().map(|one| bytes_of(&one.event)).sum::<usize>();
+        self.bytes += bytes;
+        self.batches.push_back(Batch {
+            last: record.last_event,
+            events: events.into(),
+            bytes,
+        });
+        while self.batches.len() > steps_kept {
+            self.forget_one();
+        }
+        true
+    }
+
+    fn forget_one(&mut self) {
+        if let Some(batch) = self.batches.pop_front() {
+            self.before = batch.last;
+            self.bytes -= batch.bytes;
+        }
+    }
+
+    /// Whether it has what follows `after`.
+    fn reaches(&self, after: u64) -> bool {
+        self.complete || after >= self.before
+    }
+
+    pub(super) fn page(&self, after: u64, limit: usize) -> EventPage {
+        let from = self.batches.partition_point(|batch| batch.last <= after);
+        let events = self
+            .batches
+            .range(from..)
+            .flat_map(|batch| batch.events.iter())
+            .filter(|event| event.id > after)
+            .take(limit)
+            .cloned()
+            .collect();
+        EventPage {
+            forgotten: if self.complete { self.before } else { 0 },
+            events,
+        }
+    }
+
+    /// The best route of a run.
+    pub(super) fn incumbent(&self, attempt: u64) -> Option<Incumbent> {
+        let (under, route) = self.incumbent.as_ref()?;
+        (*under == attempt).then(|| route.clone())
+    }
+}
+
+fn bytes_of(event: &Event) -> usize {
+    match event {
+        Event::Incumbent(route) => SMALL_EVENT + 64 * route.waypoints.len(),
+        Event::Status(_) => 4 * SMALL_EVENT,
+        Event::Convergence(_) | Event::End(_) => SMALL_EVENT,
+    }
+}
+
+/// The histories in memory; those that nobody has touched for long make room.
+#[derive(Debug)]
+pub(super) struct Histories {
+    plans: HashMap<PlanId, History>,
+    by_touch: BTreeMap<u64, PlanId>,
+    touches: u64,
+    bytes: usize,
+    steps_kept: usize,
+}
+
+impl Histories {
+    /// Of each plan the stream keeps `steps_kept` steps.
+    pub(super) fn new(steps_kept: usize) -> Self {
+        Self {
+            plans: HashMap::new(),
+            by_touch: BTreeMap::new(),
+            touches: 0,
+            bytes: 0,
+            steps_kept,
+        }
+    }
+
+    pub(super) fn steps_kept(&self) -> usize {
+        self.steps_kept
+    }
+
+    /// A step has come. Of plans whose beginning was not seen nothing is kept.
+    pub(super) fn push(&mut self, id: PlanId, step: &Step) {
+        let begins = matches!(&step.state, State::Kept(record) if record.last_event == step.events.len() as u64);
+        let known = self.take(id);
+        let Some(mut history) = known.or_else(|| begins.then(History::whole)) else {
+            return;
+        };
+        if history.push(step, self.steps_kept) {
+            self.put(id, history);
+        }
+    }
+
+    /// What there is after an event; `None` when the stream must be asked.
+    pub(super) fn page(&mut self, id: PlanId, after: u64, limit: usize) -> Option<EventPage> {
+        self.touched(id)
+            .filter(|history| history.reaches(after))
+            .map(|history| history.page(after, limit))
+    }
+
+    /// What there is of a plan; `None` when the stream must be asked.
+    pub(super) fn whole(&mut self, id: PlanId) -> Option<&History> {
+        self.touched(id).filter(|history| history.complete)
+    }
+
+    /// Keep what was read from the stream.
+    pub(super) fn put(&mut self, id: PlanId, mut history: History) {
+        self.take(id);
+        self.touches += 1;
+        history.touched = self.touches;
+        self.bytes += history.bytes;
+        self.by_touch.insert(history.touched, id);
+        self.plans.insert(id, history);
+        while self.bytes > ROOM && self.plans.len() > 1 {
+            let Some((_, oldest)) = self.by_touch.first_key_value() else {
+                return;
+            };
+            self.take(*oldest);
+        }
+    }
+
+    pub(super) fn take(&mut self, id: PlanId) -> Option<History> {
+        let history = self.plans.remove(&id)?;
+        self.by_touch.remove(&history.touched);
+        self.bytes -= history.bytes;
+        Some(history)
+    }
+
+    fn touched(&mut self, id: PlanId) -> Option<&History> {
+        let history = self.take(id)?;
+        self.put(id, history);
+        self.plans.get(&id)
+    }
+}

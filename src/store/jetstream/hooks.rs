@@ -1,0 +1,115 @@
+//! Ends that are to be told: each by one node at a time.
+
+use std::collections::BTreeSet;
+use std::sync::PoisonError;
+
+use async_nats::jetstream::kv::CreateErrorKind;
+
+use super::JetStream;
+use super::record::State;
+use super::steps::Change;
+use super::trouble::failed;
+use crate::job::PlanId;
+use crate::store::{StoreError, Webhook};
+
+impl JetStream {
+    pub(super) async fn due_webhooks(
+        &self,
+        now_ms: i64,
+        limit: usize,
+    ) -> Result<Vec<Webhook>, StoreError> {
+        let due = self.view.known().due(now_ms, limit);
+        let mut taken = Vec::new();
+        for id in due {
+            if !self.may_tell(id).await? {
+                continue;
+            }
+            let standing = self.plans().standing(id).await?;
+            if let State::Kept(record) = &*standing.state
+                && let Some(hook) = &record.webhook
+            {
+                taken.push(Webhook {
+                    plan: record.plan.clone(),
+                    url: hook.url.clone(),
+                    tries: hook.tries,
+                });
+            }
+        }
+        Ok(taken)
+    }
+
+    /// Whether this node tells that end; for two minutes no other does.
+    async fn may_tell(&self, id: PlanId) -> Result<bool, StoreError> {
+        if self.telling().contains(&id) {
+            return Ok(true);
+        }
+        let own = self.node.to_string();
+        match self
+            .servers
+            .tellers
+            .create(id.to_string(), own.into())
+            .await
+        {
+            Ok(_) => {
+                self.telling().insert(id);
+                Ok(true)
+            }
+            Err(error) if error.kind() == CreateErrorKind::AlreadyExists => Ok(false),
+            Err(error) => Err(failed(&format!("webhook of plan {id}"), &error)),
+        }
+    }
+
+    pub(super) async fn webhook_tried(
+        &self,
+        id: PlanId,
+        next_ms: Option<i64>,
+    ) -> Result<(), StoreError> {
+        let tried = self
+            .plans()
+            .change(id, |standing| {
+                let State::Kept(record) = &*standing.state else {
+                    return Ok(None);
+                };
+                let mut record = record.clone();
+                let Some(hook) = record.webhook.as_mut() else {
+                    return Ok(None);
+                };
+                hook.tries += 1;
+                hook.due_ms = next_ms;
+                if next_ms.is_none() {
+                    record.webhook = None;
+                }
+                Ok(Some(Change {
+                    state: State::Kept(record),
+                    events: Vec::new(),
+                }))
+            })
+            .await;
+        self.let_tell(id).await;
+        match tried {
+            Ok(_) | Err(StoreError::NotFound(_)) => Ok(()),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Leave an end to whichever node is first.
+    async fn let_tell(&self, id: PlanId) {
+        if self.telling().remove(&id)
+            && let Err(error) = self.servers.tellers.purge(id.to_string()).await
+        {
+            tracing::debug!(%error, plan = %id, "a webhook is left to others two minutes later");
+        }
+    }
+
+    /// Leave all of them to others.
+    pub(super) async fn let_tell_all(&self) {
+        let all = self.telling().clone();
+        for id in all {
+            self.let_tell(id).await;
+        }
+    }
+
+    fn telling(&self) -> std::sync::MutexGuard<'_, BTreeSet<PlanId>> {
+        self.telling.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,140 @@
+//! The runs of this node: each keeps its job by saying again and again that it is being done.
+
+use std::collections::HashMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use async_nats::jetstream::AckKind;
+use async_nats::jetstream::message::Acker;
+use tokio::sync::watch;
+use tokio::task::JoinHandle;
+
+use super::record::State;
+use crate::job::PlanId;
+
+/// Says so as many times within the time after which the job would be given to another.
+const RENEWALS: u32 = 4;
+
+/// The runs of this node.
+#[derive(Default)]
+pub(super) struct Leases(Mutex<HashMap<PlanId, Held>>);
+
+/// One of them.
+struct Held {
+    attempt: u64,
+    cancel: watch::Sender<bool>,
+    job: watch::Sender<Job>,
+    renewing: JoinHandle<()>,
+    /// Steps that have been appended, as far as the worker knows.
+    appended: u64,
+}
+
+/// The delivery by which the job is held.
+pub(super) type Job = std::sync::Arc<Acker>;
+
+impl Leases {
+    fn held(&self) -> MutexGuard<'_, HashMap<PlanId, Held>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Hold a job from now on; tells when its run shall end.
+    pub(super) fn hold(
+        &self,
+        id: PlanId,
+        attempt: u64,
+        job: Job,
+        ack_wait: Duration,
+    ) -> watch::Receiver<bool> {
+        let (cancel, cancelled) = watch::channel(false);
+        let (job, jobs) = watch::channel(job);
+        let held = Held {
+            attempt,
+            cancel,
+            job,
+            renewing: tokio::spawn(renew(jobs, ack_wait / RENEWALS)),
+            appended: 0,
+        };
+        if let Some(before) = self.held().insert(id, held) {
+            before.renewing.abort();
+        }
+        cancelled
+    }
+
+    /// A job came again while it is being done here: the servers missed what was said. True when so.
+    pub(super) fn again(&self, id: PlanId, attempt: u64, job: &Job) -> bool {
+        self.held()
+            .get(&id)
+            .filter(|held| held.attempt == attempt)
+            .map(|held| held.job.send_replace(job.clone()))
+            .is_some()
+    }
+
+    /// A plan has changed; its run here is stopped when that was asked for, or is no longer ours.
+    pub(super) fn heed(&self, id: PlanId, state: &State) {
+        let all = self.held();
+        let Some(held) = all.get(&id) else { return };
+        let own = matches!(state, State::Kept(record) if record.is_run_under(held.attempt));
+        let asked = matches!(state, State::Kept(record) if record.plan.cancel_requested);
+        if asked || !own {
+            held.cancel.send_replace(true);
+        }
+        if !own {
+            // Its worker will ask what became of it, and let go.
+            held.renewing.abort();
+        }
+    }
+
+    /// Number of the step that a run appends next.
+    pub(super) fn next_append(&self, id: PlanId, attempt: u64) -> Option<u64> {
+        let all = self.held();
+        let held = all.get(&id).filter(|held| held.attempt == attempt)?;
+        Some(held.appended + 1)
+    }
+
+    pub(super) fn appended(&self, id: PlanId, attempt: u64, number: u64) {
+        if let Some(held) = self
+            .held()
+            .get_mut(&id)
+            .filter(|held| held.attempt == attempt)
+        {
+            held.appended = number;
+        }
+    }
+
+    /// Let go of a run; its job, if it was held.
+    pub(super) fn let_go(&self, id: PlanId, attempt: u64) -> Option<Job> {
+        let mut all = self.held();
+        if all.get(&id).is_none_or(|held| held.attempt != attempt) {
+            return None;
+        }
+        let held = all.remove(&id)?;
+        held.renewing.abort();
+        Some(held.job.borrow().clone())
+    }
+
+    /// The runs that are held, with their attempts.
+    pub(super) fn all(&self) -> Vec<(PlanId, u64)> {
+        self.held()
+            .iter()
+            .map(|(id, held)| (*id, held.attempt))
+            .collect()
+    }
+}
+
+impl Drop for Leases {
+    fn drop(&mut self) {
+        for held in self.held().values() {
+            held.renewing.abort();
+        }
+    }
+}
+
+async fn renew(jobs: watch::Receiver<Job>, period: Duration) {
+    loop {
+        tokio::time::sleep(period).await;
+        let job = jobs.borrow().clone();
+        if let Err(error) = job.ack_with(AckKind::Progress).await {
+            tracing::warn!(error = %error, "a lease was not renewed; trying again");
+        }
+    }
+}

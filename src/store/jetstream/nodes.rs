@@ -1,0 +1,104 @@
+//! Which nodes there are, and what they can do.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use async_nats::jetstream::kv::Operation;
+use futures_util::StreamExt as _;
+use serde::{Deserialize, Serialize};
+
+use super::JetStream;
+use super::connect::ALIVE;
+use super::trouble::failed;
+use crate::store::StoreError;
+
+/// What a node says of itself.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Node {
+    /// Version of its program; it runs no plans of newer ones.
+    engine_version: String,
+    /// Plans that it runs at a time.
+    slots: usize,
+}
+
+impl JetStream {
+    /// Say that this node is there. A small durable write, like any other.
+    pub(super) async fn announce(&self) -> Result<(), StoreError> {
+        let node = Node {
+            engine_version: env!("CARGO_PKG_VERSION").to_owned(),
+            slots: self.settings.slots,
+        };
+        let node = serde_json::to_vec(&node).map_err(|error| failed("this node", &error))?;
+        let said = self
+            .servers
+            .nodes
+            .put(self.node.to_string(), node.into())
+            .await;
+        said.map_err(|error| failed("this node", &error))?;
+        Ok(())
+    }
+
+    /// Say it again and again, and count what the others say.
+    pub(super) async fn keep_announcing(self: Arc<Self>) {
+        loop {
+            if let Err(error) = self.count_nodes().await {
+                tracing::debug!(%error, "nodes were not counted");
+            }
+            tokio::time::sleep(self.next_announcement()).await;
+            if let Err(error) = self.announce().await {
+                tracing::debug!(%error, "this node was not announced");
+            }
+        }
+    }
+
+    fn next_announcement(&self) -> Duration {
+        let spread = Duration::from_millis(u64::from(self.node.as_bytes()[15]) * 4);
+        ALIVE / 4 + spread
+    }
+
+    pub(super) async fn count_nodes(&self) -> Result<(), StoreError> {
+        let what = |error: &(dyn std::error::Error + 'static)| {
+            StoreError::unavailable(format!("nodes: {error}"))
+        };
+        let mut names = self
+            .servers
+            .nodes
+            .keys()
+            .await
+            .map_err(|error| what(&error))?;
+        let (mut slots, mut nodes) = (0, 0);
+        while let Some(name) = names.next().await {
+            let name = name.map_err(|error| what(&error))?;
+            let entry = self
+                .servers
+                .nodes
+                .entry(name)
+                .await
+                .map_err(|error| what(&error))?;
+            let Some(entry) = entry.filter(|entry| entry.operation == Operation::Put) else {
+                continue;
+            };
+            if let Ok(node) = serde_json::from_slice::<Node>(&entry.value) {
+                slots += node.slots;
+                nodes += 1;
+            }
+        }
+        self.all_slots
+            .store(slots.max(self.settings.slots), Ordering::Relaxed);
+        tracing::debug!(nodes, slots, "nodes were counted");
+        Ok(())
+    }
+
+    /// Plans that all nodes together run at a time, as far as is known.
+    pub(super) fn slots(&self) -> usize {
+        self.all_slots.load(Ordering::Relaxed).max(1)
+    }
+
+    /// This node goes.
+    pub(super) async fn take_leave(&self) {
+        if let Err(error) = self.servers.nodes.purge(self.node.to_string()).await {
+            tracing::debug!(%error, "this node is missed only after a while");
+        }
+    }
+}

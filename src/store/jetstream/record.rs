@@ -1,0 +1,185 @@
+//! What the plans' stream holds: steps of their lives.
+//!
+//! Each message is one step: the plan as it became, and the events that this tells. So a state and
+//! its events are one write, which is there wholly or not at all.
+
+use async_nats::jetstream::message::StreamMessage;
+use serde::{Deserialize, Serialize};
+use uuid::Uuid;
+
+use super::lane::Lane;
+use crate::job::{Event, NumberedEvent, Owner, Plan, PlanId, Status, Submission};
+use crate::store::{StoreError, Tombstone};
+
+/// A step, as it is written.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Step {
+    /// By which a writer whose answer was lost recognises its own.
+    pub(super) mark: Uuid,
+    /// As the step left it.
+    pub(super) state: State,
+    /// What it told.
+    pub(super) events: Vec<Event>,
+}
+
+/// How a plan stands.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum State {
+    /// It is kept.
+    Kept(Box<Record>),
+    /// It was removed.
+    Buried(Grave),
+}
+
+/// A plan with what the store alone knows of it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Record {
+    pub(super) plan: Plan,
+    pub(super) lane: Lane,
+    /// Runs begun.
+    pub(super) attempt: u64,
+    /// Runs whose worker was lost.
+    pub(super) lost: u32,
+    /// Steps that the present run has appended.
+    pub(super) appended: u64,
+    /// Id of the newest event.
+    pub(super) last_event: u64,
+    /// Of its documents and events.
+    pub(super) bytes: u64,
+    pub(super) scenario: Document,
+    pub(super) result: Option<Document>,
+    pub(super) dataset: Option<String>,
+    pub(super) webhook: Option<Hook>,
+}
+
+/// Where a document lies.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Document {
+    pub(super) key: String,
+    /// Whether among the objects, for it is too long for a message.
+    pub(super) large: bool,
+}
+
+/// Where an end is told.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Hook {
+    pub(super) url: String,
+    pub(super) tries: u32,
+    /// `None` before the end.
+    pub(super) due_ms: Option<i64>,
+}
+
+/// What remains of a plan.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Grave {
+    pub(super) owner: Option<Owner>,
+    pub(super) expired: bool,
+    pub(super) deleted_ms: i64,
+}
+
+impl Record {
+    /// Of a plan that has just been accepted.
+    pub(super) fn accepted(submission: &Submission, place: u64, scenario: Document) -> Self {
+        Self {
+            plan: Plan::accepted(submission, place),
+            lane: Lane::of(submission),
+            attempt: 0,
+            lost: 0,
+            appended: 0,
+            last_event: 0,
+            bytes: submission.scenario.len() as u64,
+            scenario,
+            result: None,
+            dataset: submission.dataset.clone(),
+            webhook: submission.webhook.as_ref().map(|url| Hook {
+                url: url.clone(),
+                tries: 0,
+                due_ms: None,
+            }),
+        }
+    }
+
+    pub(super) fn id(&self) -> PlanId {
+        self.plan.id
+    }
+
+    /// The events of a step whose status it is.
+    pub(super) fn told(&self) -> Vec<Event> {
+        vec![Event::Status(Box::new(self.plan.clone()))]
+    }
+
+    /// Those of its end, from which on its time runs and its end is to be told.
+    pub(super) fn told_end(&mut self, age_ms: Option<i64>) -> Vec<Event> {
+        let finished_ms = self.plan.finished_ms;
+        let expires_ms = finished_ms.zip(age_ms);
+        self.plan.expires_ms = expires_ms.map(|(end, age)| end.saturating_add(age));
+        if let Some(hook) = &mut self.webhook {
+            hook.due_ms = finished_ms;
+        }
+        let mut events = self.told();
+        events.push(Event::End(self.plan.status));
+        events
+    }
+
+    pub(super) fn is_run_under(&self, attempt: u64) -> bool {
+        self.plan.status == Status::Running && self.attempt == attempt
+    }
+}
+
+impl Grave {
+    pub(super) fn tombstone(&self, id: PlanId) -> Tombstone {
+        Tombstone {
+            id,
+            owner: self.owner.clone(),
+            expired: self.expired,
+        }
+    }
+}
+
+impl Step {
+    /// Give the events their ids.
+    pub(super) fn numbered(&self) -> Vec<NumberedEvent> {
+        let last = match &self.state {
+            State::Kept(record) => record.last_event,
+            State::Buried(_) => return Vec::new(),
+        };
+        let first = last + 1 - self.events.len() as u64;
+        (first..)
+            .zip(&self.events)
+            .map(|(id, event)| NumberedEvent {
+                id,
+                event: event.clone(),
+            })
+            .collect()
+    }
+
+    pub(super) fn write(&self) -> Result<bytes::Bytes, StoreError> {
+        serde_json::to_vec(self)
+            .map(bytes::Bytes::from)
+            .map_err(|error| StoreError::unavailable(format!("a step of a plan: {error}")))
+    }
+
+    pub(super) fn read(payload: &[u8]) -> Result<Self, StoreError> {
+        serde_json::from_slice(payload)
+            .map_err(|error| StoreError::unavailable(format!("a step of a plan: {error}")))
+    }
+}
+
+/// A step with its place in the stream.
+#[derive(Debug, Clone)]
+pub(super) struct Placed {
+    pub(super) sequence: u64,
+    pub(super) step: Step,
+}
+
+impl TryFrom<StreamMessage> for Placed {
+    type Error = StoreError;
+
+    fn try_from(message: StreamMessage) -> Result<Self, StoreError> {
+        Ok(Self {
+            sequence: message.sequence,
+            step: Step::read(&message.payload)?,
+        })
+    }
+}

@@ -1,0 +1,208 @@
+//! The one way in which a plan changes: a step that is written if nobody was faster.
+
+use std::time::Duration;
+
+use async_nats::jetstream::context::PublishErrorKind;
+use async_nats::jetstream::message::PublishMessage;
+use async_nats::jetstream::stream::LastRawMessageErrorKind;
+use tokio::time::Instant;
+use uuid::Uuid;
+
+use super::connect::Servers;
+use super::leases::Leases;
+use super::record::{Placed, State, Step};
+use super::trouble::failed;
+use super::view::{Standing, View};
+use crate::job::{Event, PlanId};
+use crate::store::StoreError;
+
+/// How long a step is tried again while the servers do not answer: an election takes a few seconds.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// What a step makes of a plan.
+pub(super) struct Change {
+    /// The plan as it becomes; ids of the events are counted on by the writer.
+    pub(super) state: State,
+    pub(super) events: Vec<Event>,
+}
+
+/// The plans: on the servers, and as they are known here.
+pub(super) struct Plans<'a> {
+    pub(super) servers: &'a Servers,
+    pub(super) view: &'a View,
+    pub(super) leases: &'a Leases,
+}
+
+impl Plans<'_> {
+    /// Take in a step, whoever wrote it.
+    pub(super) fn learn(&self, id: PlanId, placed: &Placed) {
+        if self.view.learn(id, placed) {
+            self.leases.heed(id, &placed.step.state);
+        }
+    }
+
+    /// How a plan stands, as far as is known here; asked of the servers when it is not.
+    pub(super) async fn standing(&self, id: PlanId) -> Result<Standing, StoreError> {
+        if let Some(standing) = self.view.standing(id) {
+            return Ok(standing);
+        }
+        self.look_up(id).await
+    }
+
+    /// How a plan stands for the servers.
+    async fn look_up(&self, id: PlanId) -> Result<Standing, StoreError> {
+        let newest = self.newest(id).await?.ok_or(StoreError::NotFound(id))?;
+        self.learn(id, &newest);
+        Ok(Standing {
+            sequence: newest.sequence,
+            state: newest.step.state.into(),
+        })
+    }
+
+    async fn newest(&self, id: PlanId) -> Result<Option<Placed>, StoreError> {
+        let subject = self.servers.subject_of(id);
+        match self
+            .servers
+            .plans
+            .get_last_raw_message_by_subject(&subject)
+            .await
+        {
+            Ok(message) => Ok(Some(message.try_into()?)),
+            Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => Ok(None),
+            Err(error) => Err(failed(&format!("plan {id}"), &error)),
+        }
+    }
+
+    /// Write the first step of a plan's life.
+    pub(super) async fn begin(&self, id: PlanId, change: Change) -> Result<(), StoreError> {
+        let mut change = Some(change);
+        let begin = |standing: Option<&Standing>| match (standing, change.take()) {
+            (None, Some(change)) => Ok(Some(change)),
+            _ => Err(StoreError::unavailable(format!(
+                "plan {id} is there already"
+            ))),
+        };
+        self.write(id, None, begin).await.map(drop)
+    }
+
+    /// Change a plan as `change` says of how it stands; returns how it then stands. `None` of `change`
+    /// leaves it as it is. When somebody else was faster, `change` is asked again.
+    pub(super) async fn change(
+        &self,
+        id: PlanId,
+        mut change: impl FnMut(&Standing) -> Result<Option<Change>, StoreError> + Send,
+    ) -> Result<Standing, StoreError> {
+        let standing = self.standing(id).await?;
+        let written = self
+            .write(id, Some(standing), |standing| match standing {
+                Some(standing) => change(standing),
+                None => Err(StoreError::NotFound(id)),
+            })
+            .await?;
+        written.ok_or(StoreError::NotFound(id))
+    }
+
+    async fn write(
+        &self,
+        id: PlanId,
+        mut standing: Option<Standing>,
+        mut change: impl FnMut(Option<&Standing>) -> Result<Option<Change>, StoreError> + Send,
+    ) -> Result<Option<Standing>, StoreError> {
+        let until = Instant::now() + PATIENCE;
+        let mut pause = Duration::from_millis(20);
+        loop {
+            let Some(change) = change(standing.as_ref())? else {
+                return Ok(standing);
+            };
+            let step = step(change);
+            let expected = standing.as_ref().map_or(0, |standing| standing.sequence);
+            let newest = loop {
+                match self.publish(id, expected, &step).await {
+                    Ok(sequence) => {
+                        break Some(Placed {
+                            sequence,
+                            step: step.clone(),
+                        });
+                    }
+                    Err(PublishError::Outrun) => break self.newest(id).await?,
+                    Err(PublishError::Hopeless(error)) => return Err(error),
+                    Err(PublishError::Unanswered(error)) if Instant::now() > until => {
+                        return Err(error);
+                    }
+                    // It may have been written. Written again it is refused, and found by its mark.
+                    Err(PublishError::Unanswered(_)) => {
+                        tokio::time::sleep(pause).await;
+                        pause = (pause * 2).min(Duration::from_secs(1));
+                    }
+                }
+            };
+            if let Some(newest) = &newest {
+                self.learn(id, newest);
+            }
+            let own = newest
+                .as_ref()
+                .is_some_and(|newest| newest.step.mark == step.mark);
+            standing = newest.map(|newest| Standing {
+                sequence: newest.sequence,
+                state: newest.step.state.into(),
+            });
+            if own {
+                return Ok(standing);
+            }
+        }
+    }
+
+    async fn publish(&self, id: PlanId, expected: u64, step: &Step) -> Result<u64, PublishError> {
+        let what = || format!("a step of plan {id}");
+        let message = PublishMessage::build()
+            .payload(step.write().map_err(PublishError::Hopeless)?)
+            .expected_last_subject_sequence(expected);
+        let sent = self
+            .servers
+            .context
+            .send_publish(self.servers.subject_of(id), message)
+            .await;
+        let answered = match sent {
+            Ok(answer) => answer.await,
+            Err(error) => Err(error),
+        };
+        answered
+            .map(|ack| ack.sequence)
+            .map_err(|error| match error.kind() {
+                PublishErrorKind::WrongLastSequence => PublishError::Outrun,
+                // Servers have a second code for it, which the client does not know.
+                _ if failed("", &error)
+                    .to_string()
+                    .contains("wrong last sequence") =>
+                {
+                    PublishError::Outrun
+                }
+                PublishErrorKind::MaxPayloadExceeded => {
+                    PublishError::Hopeless(failed(&what(), &error))
+                }
+                _ => PublishError::Unanswered(failed(&what(), &error)),
+            })
+    }
+}
+
+enum PublishError {
+    /// The plan has changed meanwhile.
+    Outrun,
+    /// Perhaps it was written.
+    Unanswered(StoreError),
+    /// It never will be.
+    Hopeless(StoreError),
+}
+
+/// With the events counted.
+fn step(change: Change) -> Step {
+    let Change { mut state, events } = change;
+    if let State::Kept(record) = &mut state {
+        record.last_event += events.len() as u64;
+    }
+    Step {
+        mark: Uuid::new_v4(),
+        state,
+        events,
+    }
+}

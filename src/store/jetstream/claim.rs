@@ -35,6 +35,9 @@ const ORPHANED_AFTER: i64 = 30;
 /// How long a consumer is kept that nobody asks.
 const UNASKED: Duration = Duration::from_secs(24 * 60 * 60);
 
+/// Jobs that came again and are put in order, at most.
+const MOST_SORTED: usize = 64;
+
 /// Between two tries at a lane whose plan was faster taken by another.
 const BREATH: Duration = Duration::from_millis(5);
 
@@ -131,6 +134,34 @@ impl JetStream {
 
     /// The next job of a lane, if there is one that nobody has.
     async fn fetch(&self, lane: &Lane) -> Result<Option<Message>, StoreError> {
+        let Some(first) = self.fetch_any(lane).await? else {
+            return Ok(None);
+        };
+        if !came_again(&first) {
+            return Ok(Some(first));
+        }
+        // The servers give jobs again in the order in which they were given back.
+        let mut jobs = vec![first];
+        while jobs.len() < MOST_SORTED
+            && let Some(job) = self.fetch_any(lane).await?
+        {
+            let again = came_again(&job);
+            jobs.push(job);
+            if !again {
+                break;
+            }
+        }
+        jobs.sort_by_key(place);
+        let next = jobs.remove(0);
+        for job in jobs {
+            if let Err(error) = job.ack_with(AckKind::Nak(None)).await {
+                tracing::debug!(error = %error, "a job was not given back");
+            }
+        }
+        Ok(Some(next))
+    }
+
+    async fn fetch_any(&self, lane: &Lane) -> Result<Option<Message>, StoreError> {
         let what = || format!("lane {}", lane.name());
         let consumer = self.consumer(lane).await?;
         let fetched = match consumer.fetch().max_messages(1).messages().await {
@@ -294,6 +325,15 @@ impl JetStream {
             }
         }
     }
+}
+
+fn came_again(job: &Message) -> bool {
+    job.info().is_ok_and(|info| info.delivered > 1)
+}
+
+/// Its place in the queue's stream.
+fn place(job: &Message) -> u64 {
+    job.info().map_or(u64::MAX, |info| info.stream_sequence)
 }
 
 /// What a job turned out to be.

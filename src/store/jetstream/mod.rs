@@ -94,7 +94,7 @@ impl JetStream {
     async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {
         let standing = self.plans().standing(id).await?;
         let record = standing.record(id, (self.options.clock)())?;
-        Ok(self.view.known().shown(&record.plan))
+        Ok(self.view.known().shown(record))
     }
 }
 
@@ -162,7 +162,8 @@ impl Drop for JetStreamStore {
 #[async_trait]
 impl Store for JetStreamStore {
     async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError> {
-        self.open_store()?.submit(&submission).await
+        let store = Arc::clone(self.open_store()?);
+        detached(async move { store.submit(&submission).await }).await
     }
 
     async fn claim(&self) -> Result<Lease, StoreError> {
@@ -200,7 +201,8 @@ impl Store for JetStreamStore {
     }
 
     async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
-        self.open_store()?.delete(id, now_ms).await
+        let store = Arc::clone(self.open_store()?);
+        detached(async move { store.delete(id, now_ms).await }).await
     }
 
     async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {
@@ -299,7 +301,10 @@ impl Store for JetStreamStore {
         if !was_open {
             return;
         }
-        for (id, attempt) in self.store.leases.all() {
+        let mut runs = self.store.leases.all();
+        // In the order in which they are to be run again.
+        runs.sort_by_key(|(id, _)| self.store.view.known().place(*id));
+        for (id, attempt) in runs {
             if let Err(error) = self.store.release(id, attempt).await {
                 tracing::debug!(%error, "a run is left to the end of its lease");
             }
@@ -313,6 +318,17 @@ impl Store for JetStreamStore {
             tracing::debug!(%error, "the last words may not have been heard");
         }
     }
+}
+
+/// Go on with several writes even when the caller goes away between them.
+async fn detached<T: Send + 'static>(
+    writes: impl Future<Output = Result<T, StoreError>> + Send + 'static,
+) -> Result<T, StoreError> {
+    tokio::spawn(writes).await.unwrap_or_else(|broken| {
+        Err(StoreError::unavailable(format!(
+            "a task of the store broke: {broken}"
+        )))
+    })
 }
 
 fn closed() -> StoreError {

@@ -37,6 +37,8 @@ pub(super) enum State {
 pub(super) struct Record {
     pub(super) plan: Plan,
     pub(super) lane: Lane,
+    /// Its job's place in the queue's stream: the order of acceptance.
+    pub(super) place: u64,
     /// Runs begun.
     pub(super) attempt: u64,
     /// Runs whose worker was lost.
@@ -51,6 +53,15 @@ pub(super) struct Record {
     pub(super) result: Option<Document>,
     pub(super) dataset: Option<String>,
     pub(super) webhook: Option<Hook>,
+}
+
+/// Where a plan waits.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Queued {
+    /// See [`Record::place`].
+    pub(super) place: u64,
+    /// 1 for the next to run.
+    pub(super) position: u64,
 }
 
 /// Where a document lies.
@@ -80,10 +91,11 @@ pub(super) struct Grave {
 
 impl Record {
     /// Of a plan that has just been accepted.
-    pub(super) fn accepted(submission: &Submission, place: u64, scenario: Document) -> Self {
+    pub(super) fn accepted(submission: &Submission, queued: Queued, scenario: Document) -> Self {
         Self {
-            plan: Plan::accepted(submission, place),
+            plan: Plan::accepted(submission, queued.position),
             lane: Lane::of(submission),
+            place: queued.place,
             attempt: 0,
             lost: 0,
             appended: 0,

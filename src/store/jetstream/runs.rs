@@ -133,7 +133,7 @@ impl JetStream {
                     record.told_end(self.options.retention.age_ms)
                 } else {
                     record.plan.requeue()?;
-                    record.plan.queue_position = Some(1);
+                    record.plan.queue_position = Some(self.view.known().position(record.place));
                     record.told()
                 };
                 Ok(Some(Change {

@@ -14,7 +14,7 @@ use tokio::time::Instant;
 
 use super::JetStream;
 use super::lane::Lane;
-use super::record::{Document, Record, State};
+use super::record::{Document, Queued, Record, State};
 use super::steps::Change;
 use super::trouble::failed;
 use crate::export::sha256_hex;
@@ -75,8 +75,8 @@ impl JetStream {
     async fn accept(&self, submission: &Submission) -> Result<Plan, StoreError> {
         let lane = Lane::of(submission);
         let limit = self.options.queue_limit;
-        let place = self.view.known().expect(limit, submission.quota, &lane)?;
-        let accepted = self.write_all(submission, &lane, place).await;
+        let position = self.view.known().expect(limit, submission.quota, &lane)?;
+        let accepted = self.write_all(submission, &lane, position).await;
         self.view.known().arrived(&lane);
         accepted
     }
@@ -85,7 +85,7 @@ impl JetStream {
         &self,
         submission: &Submission,
         lane: &Lane,
-        place: u64,
+        position: u64,
     ) -> Result<Plan, StoreError> {
         let id = submission.id;
         let scenario = Document::scenario(id, &submission.scenario);
@@ -93,11 +93,15 @@ impl JetStream {
             self.servers.write(&scenario, &submission.scenario),
             self.enqueue(id, lane)
         );
-        if let Err(error) = document.and(job) {
-            let _ = self.servers.remove_documents(id, &[&scenario]).await;
-            return Err(error);
-        }
-        let record = Record::accepted(submission, place, scenario);
+        let place = match document.and(job) {
+            Ok(place) => place,
+            Err(error) => {
+                // What remains of it is thrown away with its job.
+                let _ = self.servers.remove_documents(id, &[&scenario]).await;
+                return Err(error);
+            }
+        };
+        let record = Record::accepted(submission, Queued { place, position }, scenario);
         let plan = record.plan.clone();
         let change = Change {
             events: record.told(),
@@ -107,7 +111,8 @@ impl JetStream {
         Ok(plan)
     }
 
-    async fn enqueue(&self, id: PlanId, lane: &Lane) -> Result<(), StoreError> {
+    /// Its place in the queue's stream.
+    async fn enqueue(&self, id: PlanId, lane: &Lane) -> Result<u64, StoreError> {
         let what = || format!("job of plan {id}");
         let job = PublishMessage::build().message_id(id.to_string());
         let subject = self.job_subject(id, lane);
@@ -117,7 +122,7 @@ impl JetStream {
             Err(error) => Err(error),
         };
         match answered {
-            Ok(_) => Ok(()),
+            Ok(ack) => Ok(ack.sequence),
             Err(error) => {
                 let refusal = failed(&what(), &error);
                 let is_full = error.kind() == PublishErrorKind::Other

@@ -36,9 +36,10 @@ pub(super) struct Standing {
 pub(super) struct Known {
     plans: BTreeMap<PlanId, Standing>,
     pub(super) histories: Histories,
-    queue: BTreeSet<PlanId>,
-    lanes: HashMap<Lane, BTreeSet<PlanId>>,
-    running: HashMap<Lane, BTreeSet<PlanId>>,
+    /// In the order of acceptance.
+    queue: BTreeSet<(u64, PlanId)>,
+    lanes: HashMap<Lane, BTreeSet<(u64, PlanId)>>,
+    running: HashMap<Lane, BTreeSet<(u64, PlanId)>>,
     /// By the time of their ends.
     ended: BTreeSet<(i64, PlanId)>,
     ended_bytes: u64,
@@ -91,7 +92,7 @@ impl View {
             if !known.stand(id, placed) {
                 return false;
             }
-            known.queue.contains(&id)
+            known.is_queued(id)
         };
         if queued {
             self.waiting.send_modify(|ticks| *ticks += 1);
@@ -158,17 +159,13 @@ impl Known {
         };
         match record.plan.status {
             Status::Queued => {
-                self.queue.insert(id);
-                self.lanes
-                    .entry(record.lane.clone())
-                    .or_default()
-                    .insert(id);
+                self.queue.insert((record.place, id));
+                let lane = self.lanes.entry(record.lane.clone()).or_default();
+                lane.insert((record.place, id));
             }
             Status::Running => {
-                self.running
-                    .entry(record.lane.clone())
-                    .or_default()
-                    .insert(id);
+                let lane = self.running.entry(record.lane.clone()).or_default();
+                lane.insert((record.place, id));
             }
             Status::Succeeded | Status::Failed | Status::Cancelled => self.list_ended(record),
         }
@@ -204,10 +201,10 @@ impl Known {
                 return;
             }
         };
-        self.queue.remove(&id);
+        self.queue.remove(&(record.place, id));
         for lanes in [&mut self.lanes, &mut self.running] {
             if let Some(lane) = lanes.get_mut(&record.lane) {
-                lane.remove(&id);
+                lane.remove(&(record.place, id));
                 if lane.is_empty() {
                     lanes.remove(&record.lane);
                 }
@@ -234,13 +231,28 @@ impl Known {
         }
     }
 
-    /// Its record as it is shown: with its place in the queue.
-    pub(super) fn shown(&self, plan: &Plan) -> Plan {
+    fn is_queued(&self, id: PlanId) -> bool {
+        self.kept(id)
+            .is_some_and(|record| record.plan.status == Status::Queued)
+    }
+
+    /// A record as it is shown: with its place in the queue.
+    pub(super) fn shown(&self, record: &Record) -> Plan {
         Plan {
-            queue_position: (plan.status == Status::Queued)
-                .then(|| self.queue.range(..plan.id).count() as u64 + 1),
-            ..plan.clone()
+            queue_position: (record.plan.status == Status::Queued)
+                .then(|| self.position(record.place)),
+            ..record.plan.clone()
         }
+    }
+
+    /// 1 for the next to run.
+    pub(super) fn position(&self, place: u64) -> u64 {
+        self.queue.range(..(place, PlanId::nil())).count() as u64 + 1
+    }
+
+    /// Place of a plan, when it is kept.
+    pub(super) fn place(&self, id: PlanId) -> Option<u64> {
+        self.kept(id).map(|record| record.place)
     }
 
     pub(super) fn list_plans(&self, query: &ListQuery) -> Vec<Plan> {
@@ -254,12 +266,12 @@ impl Known {
             .filter_map(|(id, _)| self.kept(*id))
             .filter(|record| wanted(&record.plan))
             .take(query.limit)
-            .map(|record| self.shown(&record.plan))
+            .map(|record| self.shown(record))
             .collect()
     }
 
     pub(super) fn stats(&self) -> Stats {
-        let head = self.queue.first().and_then(|id| self.kept(*id));
+        let head = self.queue.first().and_then(|(_, id)| self.kept(*id));
         let times = &self.run_times;
         Stats {
             queued: self.queue.len() as u64,
@@ -303,7 +315,7 @@ impl Known {
             return Err(StoreError::QueueFull { queued });
         }
         let coming = self.coming.get(&lane.owner).copied().unwrap_or_default();
-        let of_owner = |lanes: &HashMap<Lane, BTreeSet<PlanId>>| {
+        let of_owner = |lanes: &HashMap<Lane, BTreeSet<(u64, PlanId)>>| {
             let own = lanes.iter().filter(|(one, _)| one.owner == lane.owner);
             own.map(|(_, plans)| plans.len() as u64).sum::<u64>()
         };

@@ -53,8 +53,11 @@ fn step() -> impl Strategy<Value = Step> {
     ]
 }
 
-/// At which node, what, and at which call it fails, before or after that was done.
-fn steps() -> impl Strategy<Value = Vec<(usize, Step, Option<(usize, bool)>)>> {
+/// At which call something fails, before or after it was done.
+type Failing = Option<(usize, bool)>;
+
+/// At which node, and what.
+fn steps() -> impl Strategy<Value = Vec<(usize, Step, Failing)>> {
     let trouble = prop::option::weighted(0.3, (0..6_usize, any::<bool>()));
     prop::collection::vec((0..2_usize, step(), trouble), 1..30)
 }

@@ -17,6 +17,7 @@ use crate::catalogue::{
 };
 use crate::geometry::geodesy::LatLon;
 use crate::telemetry::Instruments;
+use crate::telemetry::metrics::Queue;
 use crate::terrain::{DatasetError, Found};
 
 /// A node and its directory.
@@ -335,6 +336,39 @@ fn a_damaged_copy_is_fetched_again() {
     fs::write(&copy, hill(200)).expect("written");
     let b = b.restarted(&shelf, AGES, u64::MAX);
     assert_eq!(height(&b.find("hill").expect("found")), 100);
+}
+
+#[test]
+fn copies_are_counted() {
+    let (shelf, a, b) = two_with(AGES);
+    a.keep("hill", 100).expect("kept");
+    b.find("hill").expect("found");
+    b.find("hill").expect("found");
+    a.keep("hill", 50).expect("kept");
+    // Of the three calls of a find the second is the fetch.
+    shelf.trouble_in(1, Trouble::FailsBefore);
+    b.find("hill").expect("found at the second try");
+    let queue = Queue {
+        queued: None,
+        running: None,
+        oldest_queued_ms: None,
+        limit: 1,
+        workers: 1,
+    };
+    let text = b.shared.instruments.metrics.text(queue);
+    for (series, expected) in [
+        ("fetches_total{outcome=\"fetched\"}", 2),
+        ("fetches_total{outcome=\"failed\"}", 1),
+        (
+            "fetched_bytes_total",
+            hill(100).len() + hill(50).len() + hill(50).len() / 2,
+        ),
+    ] {
+        let line = format!("noctule_terrain_{series} {expected}");
+        assert!(text.lines().any(|found| found == line), "{line}\n{text}");
+    }
+    let tally = b.shared.tally();
+    assert_eq!((tally.datasets, tally.bytes), (1, tally.cached_bytes));
 }
 
 #[test]

@@ -18,6 +18,7 @@ mod record;
 mod removal;
 mod runs;
 mod settings;
+mod shelf;
 mod steps;
 mod submit;
 mod trouble;
@@ -36,6 +37,7 @@ use tokio::time::Instant;
 use uuid::Uuid;
 
 pub use settings::{Address, Settings};
+pub use shelf::JetStreamShelf;
 
 use self::connect::Servers;
 use self::follow::Reading;

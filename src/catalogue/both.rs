@@ -1,25 +1,51 @@
-//! The catalogue of one service on one machine: uploads in its data directory, and the operator's files
-//! beside them, which count first.
+//! The catalogue of a service: uploads, on this machine or on a shelf that all nodes share, and the
+//! operator's files beside them, which count first.
 
 use std::collections::BTreeSet;
+use std::fmt::Debug;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use super::shared::Shared;
 use super::uploaded::Uploaded;
 use super::{
-    Catalogue, CatalogueError, Checked, Claim, Entry, GRACE, Kept, Mounted, Naming, Staged,
+    Catalogue, CatalogueError, Checked, Claim, Entry, GRACE, Kept, Mounted, Naming, Sharing,
+    Staged, Tally,
 };
 use crate::terrain::{DatasetError, Datasets, Found};
 
-/// Uploads in one directory, mounted files in another.
+/// What has been uploaded. Methods as those of [`Catalogue`].
+pub(super) trait Uploads: Debug + Send + Sync {
+    fn entries(&self) -> Result<Vec<Entry>, CatalogueError>;
+    fn tally(&self) -> Tally;
+    fn find(&self, name: &str, sha256: Option<&str>) -> Result<Found, DatasetError>;
+    fn entry(&self, name: &str) -> Result<Entry, CatalogueError>;
+    fn stage(&self, limit: u64) -> Result<Staged, CatalogueError>;
+    fn permit(&self, naming: &Naming) -> Result<(), CatalogueError>;
+    fn keep(&self, file: &Checked, naming: &Naming) -> Result<Kept, CatalogueError>;
+    fn removable(&self, name: &str, by: &Claim) -> Result<String, CatalogueError>;
+    fn remove(&self, name: &str, by: &Claim) -> Result<(), CatalogueError>;
+    fn has_unnamed(&self) -> bool;
+    fn sweep(&self, used: &BTreeSet<String>) -> Result<usize, CatalogueError>;
+}
+
+/// Uploads in one place, mounted files in another.
 #[derive(Debug)]
 pub struct Directories {
-    uploads: PathBuf,
-    grace: Duration,
+    place: Place,
     mounted: Option<Mounted>,
     /// Opened as soon as it can be: a disk that is read-only now may not be so for ever.
-    uploaded: Mutex<Option<Arc<Uploaded>>>,
+    uploaded: Mutex<Option<Arc<dyn Uploads>>>,
+}
+
+/// Where uploads are.
+#[derive(Debug)]
+enum Place {
+    /// On this machine alone.
+    Own { directory: PathBuf, grace: Duration },
+    /// Where every node finds them.
+    Shared(Sharing),
 }
 
 impl Directories {
@@ -32,9 +58,20 @@ impl Directories {
     /// The same, with another time than [`GRACE`].
     #[must_use]
     pub fn with_grace(uploads: PathBuf, mounted: Option<Mounted>, grace: Duration) -> Self {
+        let directory = uploads;
+        Self::at(Place::Own { directory, grace }, mounted)
+    }
+
+    /// Uploads on a shelf that other nodes use, too. The mounted files are this node's own: plans over them
+    /// can only be run by nodes that mount the same.
+    #[must_use]
+    pub fn shared(sharing: Sharing, mounted: Option<Mounted>) -> Self {
+        Self::at(Place::Shared(sharing), mounted)
+    }
+
+    fn at(place: Place, mounted: Option<Mounted>) -> Self {
         let directories = Self {
-            uploads,
-            grace,
+            place,
             mounted,
             uploaded: Mutex::default(),
         };
@@ -44,12 +81,15 @@ impl Directories {
         directories
     }
 
-    fn uploaded(&self) -> Result<Arc<Uploaded>, CatalogueError> {
+    fn uploaded(&self) -> Result<Arc<dyn Uploads>, CatalogueError> {
         let mut uploaded = self.uploaded.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(uploaded) = &*uploaded {
             return Ok(uploaded.clone());
         }
-        let opened = Arc::new(Uploaded::open(&self.uploads, self.grace)?);
+        let opened: Arc<dyn Uploads> = match &self.place {
+            Place::Own { directory, grace } => Arc::new(Uploaded::open(directory, *grace)?),
+            Place::Shared(sharing) => Arc::new(Shared::open(sharing)?),
+        };
         *uploaded = Some(opened.clone());
         Ok(opened)
     }
@@ -99,22 +139,22 @@ impl Catalogue for Directories {
             Some(mounted) => mounted.list()?,
             None => Vec::new(),
         };
-        let uploaded = self.uploaded()?;
-        for name in uploaded.names() {
-            if entries.iter().any(|entry| entry.name == name) {
-                continue;
-            }
-            match uploaded.entry(&name) {
-                Ok(entry) => entries.push(entry),
-                // Removed since.
-                Err(CatalogueError::Unknown { .. }) => {}
-                Err(error) => {
-                    tracing::error!(name, %error, "an uploaded dataset cannot be read any more");
-                }
+        for entry in self.uploaded()?.entries()? {
+            if !entries.iter().any(|mounted| mounted.name == entry.name) {
+                entries.push(entry);
             }
         }
         entries.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(entries)
+    }
+
+    fn tally(&self) -> Tally {
+        let uploaded = self.uploaded().map(|uploaded| uploaded.tally());
+        let mounted = self.mounted.as_ref().map(Mounted::tally);
+        [uploaded.ok(), mounted]
+            .into_iter()
+            .flatten()
+            .fold(Tally::default(), Tally::plus)
     }
 
     fn entry(&self, name: &str) -> Result<Entry, CatalogueError> {

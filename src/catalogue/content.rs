@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::Staged;
-use crate::terrain::dem::{self, Dataset, Declared, DemError, Format, Survey};
+use crate::terrain::dem::{self, Dataset, Declared, DemError, Format, Metadata, Survey};
 
 /// What a file does not say of itself and somebody else did.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -114,6 +114,7 @@ pub struct Checked {
     pub(super) staged: Staged,
     pub(super) sha256: String,
     pub(super) declaration: Declaration,
+    pub(super) metadata: Metadata,
     pub(super) survey: Survey,
 }
 

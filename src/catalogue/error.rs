@@ -65,6 +65,22 @@ impl CatalogueError {
             error,
         }
     }
+
+    /// For a reason that no system call gave.
+    pub(super) fn away(what: impl Into<String>, why: impl Into<String>) -> Self {
+        Self::Unavailable {
+            what: what.into(),
+            error: io::Error::other(why.into()),
+        }
+    }
+
+    /// The shelf did not do what it was asked.
+    pub(super) fn shelf(error: io::Error) -> Self {
+        Self::Unavailable {
+            what: "the datasets that all nodes share cannot be reached".to_owned(),
+            error,
+        }
+    }
 }
 
 impl From<CatalogueError> for DatasetError {

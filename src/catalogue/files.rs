@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use uuid::Uuid;
 
+use super::CatalogueError;
+
 /// Make a directory for its owner alone, with those above it.
 pub(super) fn make_directory(path: &Path) -> io::Result<()> {
     let mut builder = DirBuilder::new();
@@ -58,4 +60,27 @@ fn sync_parent(path: &Path) -> io::Result<()> {
     #[cfg(not(unix))]
     let _ = path;
     Ok(())
+}
+
+/// What lies in a directory.
+pub(super) fn listed(directory: &Path) -> Result<Vec<PathBuf>, CatalogueError> {
+    let unreadable = |error| CatalogueError::unavailable("read", directory, error);
+    let entries = fs::read_dir(directory).map_err(unreadable)?;
+    entries
+        .map(|entry| Ok(entry.map_err(unreadable)?.path()))
+        .collect()
+}
+
+/// Take a directory for this process alone, for as long as what is returned lives.
+pub(super) fn lock(directory: &Path) -> Result<File, CatalogueError> {
+    let path = directory.join("lock");
+    let unusable = |error| CatalogueError::unavailable("locked", &path, error);
+    let lock = File::options()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(&path)
+        .map_err(unusable)?;
+    lock.try_lock().map_err(|error| unusable(error.into()))?;
+    Ok(lock)
 }

@@ -10,17 +10,24 @@ mod content;
 mod error;
 mod files;
 mod mounted;
+mod records;
+mod shared;
+mod shelf;
 mod shipped;
 mod staged;
+mod stamp;
 mod uploaded;
 
 pub use both::Directories;
 pub use content::{Checked, Declaration, Identity};
 pub use error::CatalogueError;
 pub use mounted::Mounted;
+pub use shared::Sharing;
+pub use shelf::{Change, Changes, Shelf};
 pub use shipped::lay_down;
 pub use staged::Staged;
 
+use both::Uploads;
 use std::collections::BTreeSet;
 use std::time::Duration;
 
@@ -39,6 +46,9 @@ pub trait Catalogue: Datasets {
     /// # Errors
     /// [`CatalogueError::Unavailable`].
     fn list(&self) -> Result<Vec<Entry>, CatalogueError>;
+
+    /// How many there are and how long they are, as far as that is known at once.
+    fn tally(&self) -> Tally;
 
     /// One dataset, with all that can be known of it.
     ///
@@ -113,6 +123,27 @@ impl Entry {
     #[must_use]
     pub fn is_mounted(&self) -> bool {
         self.uploaded_ms.is_none()
+    }
+}
+
+/// Counts of datasets.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Names that can be planned over.
+    pub datasets: u64,
+    /// Of their files, and of those that only plans still need.
+    pub bytes: u64,
+    /// Of copies on this node, where datasets are shared.
+    pub cached_bytes: u64,
+}
+
+impl Tally {
+    fn plus(self, other: Self) -> Self {
+        Self {
+            datasets: self.datasets + other.datasets,
+            bytes: self.bytes + other.bytes,
+            cached_bytes: self.cached_bytes + other.cached_bytes,
+        }
     }
 }
 

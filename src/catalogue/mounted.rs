@@ -7,10 +7,10 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::SystemTime;
 
 use super::content::{Declaration, Identity};
-use super::{CatalogueError, Entry};
+use super::stamp::Stamp;
+use super::{CatalogueError, Entry, Tally};
 use crate::terrain::dem::{Dataset, DemError, Survey};
 use crate::terrain::{DatasetError, Datasets, Found, is_dataset_name};
 
@@ -38,23 +38,6 @@ struct Look {
     stamp: Stamp,
     sha256: String,
     survey: Option<Survey>,
-}
-
-/// Changes when a file does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Stamp {
-    bytes: u64,
-    modified: Option<SystemTime>,
-}
-
-impl Stamp {
-    fn of(path: &Path) -> io::Result<Self> {
-        let metadata = fs::metadata(path)?;
-        Ok(Self {
-            bytes: metadata.len(),
-            modified: metadata.modified().ok(),
-        })
-    }
 }
 
 impl Mounted {
@@ -86,6 +69,17 @@ impl Mounted {
             }
         }
         Ok(entries)
+    }
+
+    /// How many there are, and how long their files are, also those that cannot be read.
+    pub(super) fn tally(&self) -> Tally {
+        let files = self.files().unwrap_or_default();
+        let lengths = files.values().filter_map(|path| Stamp::of(path).ok());
+        Tally {
+            datasets: files.len() as u64,
+            bytes: lengths.map(|stamp| stamp.bytes).sum(),
+            cached_bytes: 0,
+        }
     }
 
     pub(super) fn entry(&self, name: &str) -> Result<Entry, CatalogueError> {

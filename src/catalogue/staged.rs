@@ -62,11 +62,27 @@ impl Staged {
         let (dataset, declaration) = declaration.open(format, &self.path)?;
         let survey = dataset.survey()?;
         Ok(Checked {
-            sha256: self.identity.clone().with(&declaration),
+            sha256: self.sum(&declaration),
             staged: self,
             declaration,
+            metadata: dataset.metadata().clone(),
             survey,
         })
+    }
+
+    /// What stands for what has come, so declared.
+    pub(super) fn sum(&self, declaration: &Declaration) -> String {
+        self.identity.clone().with(declaration)
+    }
+
+    /// Where it is, unless it was kept.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// To read what has come.
+    pub(super) fn reader(&self) -> io::Result<File> {
+        File::open(&self.path)
     }
 
     /// Put it at `to`.

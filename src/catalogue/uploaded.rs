@@ -11,12 +11,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 
-use super::content::{Checked, Declaration};
-use super::{CatalogueError, Claim, Entry, Expected, Kept, Naming, Staged, files};
-use crate::terrain::dem::{self, Survey};
+use super::content::Checked;
+use super::records::{Content, Name};
+use super::{CatalogueError, Claim, Entry, Kept, Naming, Staged, Tally, Uploads, files};
+use crate::terrain::dem;
 use crate::terrain::{DatasetError, Found};
 
 /// The directory of uploads.
@@ -37,36 +38,6 @@ struct State {
     asked: HashMap<String, Instant>,
 }
 
-/// What a name stands for, as it lies on the disk.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct Name {
-    sha256: String,
-    uploaded_ms: i64,
-    owner: Option<String>,
-}
-
-/// What is known of a content, as it lies on the disk.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct Content {
-    bytes: u64,
-    #[serde(default)]
-    declared: Declaration,
-    /// `None` when no sample holds any.
-    min: Option<f64>,
-    max: Option<f64>,
-    no_data_share: f64,
-}
-
-impl Content {
-    fn survey(&self) -> Survey {
-        Survey {
-            min: self.min.unwrap_or(f64::INFINITY),
-            max: self.max.unwrap_or(f64::NEG_INFINITY),
-            no_data_share: self.no_data_share,
-        }
-    }
-}
-
 impl Uploaded {
     /// Open the directory, made if need be, and remove what was on its way in when a process died.
     pub(super) fn open(directory: &Path, grace: Duration) -> Result<Self, CatalogueError> {
@@ -75,15 +46,7 @@ impl Uploaded {
             files::make_directory(&part)
                 .map_err(|error| CatalogueError::unavailable("made", &part, error))?;
         }
-        let path = directory.join("lock");
-        let unusable = |error| CatalogueError::unavailable("locked", &path, error);
-        let lock = File::options()
-            .create(true)
-            .truncate(false)
-            .write(true)
-            .open(&path)
-            .map_err(unusable)?;
-        lock.try_lock().map_err(|error| unusable(error.into()))?;
+        let lock = files::lock(directory)?;
         let uploaded = Self {
             directory: directory.to_owned(),
             grace,
@@ -96,13 +59,13 @@ impl Uploaded {
 
     fn load(&self) -> Result<(), CatalogueError> {
         let incoming = self.directory.join("incoming");
-        for path in listed(&incoming)? {
+        for path in files::listed(&incoming)? {
             fs::remove_file(&path)
                 .map_err(|error| CatalogueError::unavailable("removed", &path, error))?;
             tracing::info!(file = %path.display(), "removed an upload that was never finished");
         }
         let mut state = self.lock();
-        for path in listed(&self.directory.join("content"))? {
+        for path in files::listed(&self.directory.join("content"))? {
             let stem = path.file_stem().and_then(|stem| stem.to_str());
             let Some(sha256) = stem.filter(|_| path.extension().is_some()) else {
                 continue;
@@ -115,7 +78,7 @@ impl Uploaded {
                 state.contents.insert(sha256.to_owned(), content);
             }
         }
-        for path in listed(&self.directory.join("names"))? {
+        for path in files::listed(&self.directory.join("names"))? {
             let stem = path.file_stem().and_then(|stem| stem.to_str());
             if let (Some(name), Some(record)) = (stem, read(&path)) {
                 state.names.insert(name.to_owned(), record);
@@ -124,15 +87,70 @@ impl Uploaded {
         Ok(())
     }
 
-    pub(super) fn names(&self) -> Vec<String> {
-        self.lock().names.keys().cloned().collect()
+    fn keep_content(&self, state: &mut State, file: &Checked) -> Result<(), CatalogueError> {
+        let path = self.content(&file.sha256);
+        if state.contents.contains_key(&file.sha256) && path.is_file() {
+            return Ok(());
+        }
+        let content = Content::of(file);
+        self.write(&path.with_extension("json"), &content)?;
+        file.staged
+            .put(&path)
+            .map_err(|error| CatalogueError::unavailable("written", &path, error))?;
+        state.contents.insert(file.sha256.clone(), content);
+        Ok(())
     }
 
-    pub(super) fn stage(&self, limit: u64) -> Result<Staged, CatalogueError> {
+    fn content(&self, sha256: &str) -> PathBuf {
+        self.directory.join("content").join(sha256)
+    }
+
+    fn name(&self, name: &str) -> PathBuf {
+        self.directory.join("names").join(format!("{name}.json"))
+    }
+
+    fn write(&self, path: &Path, record: &impl Serialize) -> Result<(), CatalogueError> {
+        let text = serde_json::to_string(record).expect("records have text keys");
+        files::write(&self.directory.join("incoming"), path, &text)
+            .map_err(|error| CatalogueError::unavailable("written", path, error))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Uploads for Uploaded {
+    fn entries(&self) -> Result<Vec<Entry>, CatalogueError> {
+        let names: Vec<String> = self.lock().names.keys().cloned().collect();
+        let mut entries = Vec::new();
+        for name in names {
+            match self.entry(&name) {
+                Ok(entry) => entries.push(entry),
+                // Removed since.
+                Err(CatalogueError::Unknown { .. }) => {}
+                Err(error) => {
+                    tracing::error!(name, %error, "an uploaded dataset cannot be read any more");
+                }
+            }
+        }
+        Ok(entries)
+    }
+
+    fn tally(&self) -> Tally {
+        let state = self.lock();
+        Tally {
+            datasets: state.names.len() as u64,
+            bytes: state.contents.values().map(|content| content.bytes).sum(),
+            cached_bytes: 0,
+        }
+    }
+
+    fn stage(&self, limit: u64) -> Result<Staged, CatalogueError> {
         Staged::new(&self.directory.join("incoming"), limit)
     }
 
-    pub(super) fn find(&self, name: &str, sha256: Option<&str>) -> Result<Found, DatasetError> {
+    fn find(&self, name: &str, sha256: Option<&str>) -> Result<Found, DatasetError> {
         let (sha256, declared) = {
             let mut state = self.lock();
             let named = state.names.get(name).map(|name| name.sha256.clone());
@@ -160,7 +178,7 @@ impl Uploaded {
         Ok(Found { sha256, dataset })
     }
 
-    pub(super) fn entry(&self, name: &str) -> Result<Entry, CatalogueError> {
+    fn entry(&self, name: &str) -> Result<Entry, CatalogueError> {
         let known = {
             let state = self.lock();
             let known = state.names.get(name).cloned();
@@ -187,65 +205,39 @@ impl Uploaded {
         })
     }
 
-    pub(super) fn permit(&self, naming: &Naming) -> Result<(), CatalogueError> {
-        self.lock().permit(naming)
+    fn permit(&self, naming: &Naming) -> Result<(), CatalogueError> {
+        Name::permit(self.lock().names.get(&naming.name), naming)
     }
 
-    pub(super) fn keep(&self, file: &Checked, naming: &Naming) -> Result<Kept, CatalogueError> {
+    fn keep(&self, file: &Checked, naming: &Naming) -> Result<Kept, CatalogueError> {
         let name = naming.name.clone();
         let mut state = self.lock();
-        state.permit(naming)?;
-        let before = state.names.get(&name).map(|before| before.sha256.clone());
+        let before = state.names.get(&name).cloned();
+        Name::permit(before.as_ref(), naming)?;
         self.keep_content(&mut state, file)?;
-        if before.as_ref() == Some(&file.sha256) {
-            return Ok(Kept::Unchanged);
+        let kept = Name::kept(before.as_ref(), file);
+        if kept == Kept::Unchanged {
+            return Ok(kept);
         }
-        let record = Name {
-            sha256: file.sha256.clone(),
-            uploaded_ms: naming.now_ms,
-            owner: naming.by.owner.clone(),
-        };
+        let record = Name::new(file, naming);
         self.write(&self.name(&name), &record)?;
         state.names.insert(name, record);
         let now = Instant::now();
         state.asked.insert(file.sha256.clone(), now);
-        Ok(match before {
-            Some(before) => {
-                state.asked.insert(before, now);
-                Kept::Replaced
-            }
-            None => Kept::Created,
-        })
-    }
-
-    fn keep_content(&self, state: &mut State, file: &Checked) -> Result<(), CatalogueError> {
-        let path = self.content(&file.sha256);
-        if state.contents.contains_key(&file.sha256) && path.is_file() {
-            return Ok(());
+        if let Some(before) = before {
+            state.asked.insert(before.sha256, now);
         }
-        let finite = |value: f64| Some(value).filter(|value| value.is_finite());
-        let content = Content {
-            bytes: file.staged.bytes(),
-            declared: file.declaration.clone(),
-            min: finite(file.survey.min),
-            max: finite(file.survey.max),
-            no_data_share: file.survey.no_data_share,
-        };
-        self.write(&path.with_extension("json"), &content)?;
-        file.staged
-            .put(&path)
-            .map_err(|error| CatalogueError::unavailable("written", &path, error))?;
-        state.contents.insert(file.sha256.clone(), content);
-        Ok(())
+        Ok(kept)
     }
 
-    pub(super) fn removable(&self, name: &str, by: &Claim) -> Result<String, CatalogueError> {
-        self.lock().removable(name, by)
+    fn removable(&self, name: &str, by: &Claim) -> Result<String, CatalogueError> {
+        let state = self.lock();
+        Name::removable(state.names.get(name), name, by).map(str::to_owned)
     }
 
-    pub(super) fn remove(&self, name: &str, by: &Claim) -> Result<(), CatalogueError> {
+    fn remove(&self, name: &str, by: &Claim) -> Result<(), CatalogueError> {
         let mut state = self.lock();
-        let sha256 = state.removable(name, by)?;
+        let sha256 = Name::removable(state.names.get(name), name, by)?.to_owned();
         let path = self.name(name);
         files::remove(&path)
             .map_err(|error| CatalogueError::unavailable("removed", &path, error))?;
@@ -254,11 +246,11 @@ impl Uploaded {
         Ok(())
     }
 
-    pub(super) fn has_unnamed(&self) -> bool {
+    fn has_unnamed(&self) -> bool {
         !self.lock().unnamed().is_empty()
     }
 
-    pub(super) fn sweep(&self, used: &BTreeSet<String>) -> Result<usize, CatalogueError> {
+    fn sweep(&self, used: &BTreeSet<String>) -> Result<usize, CatalogueError> {
         let mut state = self.lock();
         let mut removed = 0;
         for sha256 in state.unnamed() {
@@ -279,59 +271,9 @@ impl Uploaded {
         }
         Ok(removed)
     }
-
-    fn content(&self, sha256: &str) -> PathBuf {
-        self.directory.join("content").join(sha256)
-    }
-
-    fn name(&self, name: &str) -> PathBuf {
-        self.directory.join("names").join(format!("{name}.json"))
-    }
-
-    fn write(&self, path: &Path, record: &impl Serialize) -> Result<(), CatalogueError> {
-        let text = serde_json::to_string(record).expect("records have text keys");
-        files::write(&self.directory.join("incoming"), path, &text)
-            .map_err(|error| CatalogueError::unavailable("written", path, error))
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 impl State {
-    /// Whether a name may be given to another content.
-    fn permit(&self, naming: &Naming) -> Result<(), CatalogueError> {
-        let name = naming.name.clone();
-        let before = self.names.get(&name);
-        match (&naming.expected, before) {
-            (Expected::Nothing, Some(_)) => return Err(CatalogueError::Exists { name }),
-            (Expected::OneOf(_), None) => return Err(CatalogueError::Changed { name }),
-            (Expected::OneOf(sums), Some(before))
-                if !sums.iter().any(|sum| *sum == before.sha256 || sum == "*") =>
-            {
-                return Err(CatalogueError::Changed { name });
-            }
-            _ => {}
-        }
-        if before.is_some_and(|before| !naming.by.covers(before.owner.as_ref())) {
-            return Err(CatalogueError::Owned { name });
-        }
-        Ok(())
-    }
-
-    /// The sum of what a name stands for that may be taken away.
-    fn removable(&self, name: &str, by: &Claim) -> Result<String, CatalogueError> {
-        let name = name.to_owned();
-        match self.names.get(&name) {
-            None => Err(CatalogueError::Unknown { name }),
-            Some(record) if !by.covers(record.owner.as_ref()) => {
-                Err(CatalogueError::Owned { name })
-            }
-            Some(record) => Ok(record.sha256.clone()),
-        }
-    }
-
     /// Contents that no name stands for.
     fn unnamed(&self) -> Vec<String> {
         let named: BTreeSet<&String> = self.names.values().map(|name| &name.sha256).collect();
@@ -341,15 +283,6 @@ impl State {
             .cloned()
             .collect()
     }
-}
-
-/// What lies in a directory.
-fn listed(directory: &Path) -> Result<Vec<PathBuf>, CatalogueError> {
-    let unreadable = |error| CatalogueError::unavailable("read", directory, error);
-    let entries = fs::read_dir(directory).map_err(unreadable)?;
-    entries
-        .map(|entry| Ok(entry.map_err(unreadable)?.path()))
-        .collect()
 }
 
 /// A record; one that cannot be read is passed over, and left for the operator to look at.

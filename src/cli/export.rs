@@ -73,7 +73,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
 pub(super) fn code(error: &ExportError) -> u8 {
     match error {
         ExportError::Infeasible { .. } => exit::INFEASIBLE,
-        ExportError::Option(_) => exit::FAILED,
+        ExportError::Option(_) | ExportError::Unreachable(_) => exit::FAILED,
         ExportError::NoGeodeticFrame { .. }
         | ExportError::Unflyable(_)
         | ExportError::NoGround(_)

@@ -26,7 +26,7 @@ use crate::scenario::json::{self, Refusal, Rules};
 use crate::store::measured::MeasuredStore;
 use crate::store::{self, Store};
 use crate::telemetry::{self, Instruments};
-use crate::worker::{self, Engine, Pool, Sweeper};
+use crate::worker::{self, Engine, Pool, Sweeper, Unplanned};
 
 /// Callers that may wait to be let in; Linux allows as many since 5.4. Who comes when there are more
 /// may be left waiting for an answer that never comes.
@@ -147,7 +147,12 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
 /// What the pool runs: the accepted document, read again, and planned.
 fn engine(rules: Arc<Rules>) -> Engine {
     Arc::new(move |document, observer, stop| {
-        let scenario = json::read_accepted(document, &rules).map_err(|refusal| unread(&refusal))?;
+        let scenario = json::read_accepted(document, &rules).map_err(|refusal| {
+            match refusal.unreachable_ground() {
+                Some(fault) => Unplanned::NotNow(fault.detail.clone()),
+                None => Unplanned::Failed(unread(&refusal)),
+            }
+        })?;
         Ok(planner::plan(&scenario, observer, stop))
     })
 }

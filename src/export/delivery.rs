@@ -34,9 +34,13 @@ impl Delivery {
     ///
     /// # Errors
     /// [`ExportError::Damaged`] when one cannot be read, or has a route without extent,
-    /// [`ExportError::NoGround`] when the dataset is not there any more.
+    /// [`ExportError::NoGround`] when the dataset is not there any more, [`ExportError::Unreachable`] when
+    /// it cannot be reached now.
     pub fn read(input: &ResultInput) -> Result<Self, ExportError> {
         let scenario = json::read_accepted(input.scenario, input.rules).map_err(|refusal| {
+            if let Some(fault) = refusal.unreachable_ground() {
+                return ExportError::Unreachable(fault.detail.clone());
+            }
             match refusal.lost_ground() {
                 Some(fault) => ExportError::NoGround(fault.detail.clone()),
                 None => ExportError::Damaged(format!("the scenario: {refusal}")),

@@ -30,6 +30,9 @@ pub enum ExportError {
     /// The dataset that it was planned over is not there any more.
     #[error("the ground that it was planned over is not there: {0}")]
     NoGround(String),
+    /// It may be there, but cannot be reached now.
+    #[error("{0}")]
+    Unreachable(String),
     /// The documents are none that this program wrote, or do not belong together.
     #[error("{0}")]
     Damaged(String),

@@ -27,6 +27,11 @@ pub(super) async fn show(State(state): State<AppState>, uri: Uri) -> Result<Resp
         limit: state.capacity.queue,
         workers: state.capacity.workers,
     };
+    let terrains = state.terrains.tally().await;
+    state
+        .instruments
+        .metrics
+        .terrains(terrains.datasets, terrains.bytes, terrains.cached_bytes);
     let text = state.instruments.metrics.text(queue);
     Ok(([(header::CONTENT_TYPE, MEDIA_TYPE)], text).into_response())
 }

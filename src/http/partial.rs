@@ -49,6 +49,9 @@ fn measure(
     origin: Origin,
 ) -> Result<String, Problem> {
     let scenario = json::read_accepted(scenario, rules).map_err(|refusal| {
+        if let Some(fault) = refusal.unreachable_ground() {
+            return Problem::unreachable_datasets(&fault.detail);
+        }
         if let Some(fault) = refusal.lost_ground() {
             return Problem::NoGround(fault.detail.clone());
         }

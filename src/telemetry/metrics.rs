@@ -21,6 +21,9 @@ pub const MEDIA_TYPE: &str = "application/openmetrics-text; version=1.0.0; chars
 /// What a request's method is called when it is none of those that routes have.
 const OTHER: &str = "OTHER";
 
+/// How a copy ends.
+const FETCHES: [&str; 2] = ["fetched", "failed"];
+
 /// Counts and times of this process.
 #[derive(Debug)]
 pub struct Metrics {
@@ -42,6 +45,11 @@ pub struct Metrics {
     evaluations: Counter,
     operation_times: Family<Operation, Histogram, fn() -> Histogram>,
     operation_faults: Family<Operation, Counter>,
+    terrains: Level,
+    terrain_sizes: Level,
+    terrain_copies: Level,
+    terrain_fetches: Family<Fetch, Counter>,
+    terrain_fetched: Counter,
 }
 
 /// A figure that is read when it is asked for; not a number when it cannot be read.
@@ -68,6 +76,11 @@ struct Status {
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 struct Operation {
     operation: &'static str,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct Fetch {
+    outcome: &'static str,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
@@ -155,6 +168,26 @@ impl Default for Metrics {
                 "store_operation_failures",
                 "Operations that failed because of the store",
             ),
+            terrains: new.add("terrains", "Datasets that can be planned over"),
+            terrain_sizes: new.add_with_unit(
+                "terrain",
+                "Length of all datasets, and of those that only plans still need",
+                Unit::Bytes,
+            ),
+            terrain_copies: new.add_with_unit(
+                "terrain_cache",
+                "Length of the datasets on this node that are copies of shared ones",
+                Unit::Bytes,
+            ),
+            terrain_fetches: new.add(
+                "terrain_fetches",
+                "Shared datasets that were copied to this node, by outcome",
+            ),
+            terrain_fetched: new.add_with_unit(
+                "terrain_fetched",
+                "Length of what was copied to this node",
+                Unit::Bytes,
+            ),
             registry,
         }
         .with_all_series()
@@ -170,6 +203,9 @@ impl Metrics {
         }
         let claim = Operation { operation: "claim" };
         drop(self.operation_faults.get_or_create(&claim));
+        for outcome in FETCHES {
+            drop(self.terrain_fetches.get_or_create(&Fetch { outcome }));
+        }
         self
     }
 
@@ -254,6 +290,20 @@ impl Metrics {
     pub fn store_failed(&self, operation: &'static str) {
         let operation = Operation { operation };
         self.operation_faults.get_or_create(&operation).inc();
+    }
+
+    /// A shared dataset was copied to this node, or so many bytes of it before that failed.
+    pub fn terrain_fetched(&self, wholly: bool, bytes: u64) {
+        let outcome = FETCHES[usize::from(!wholly)];
+        self.terrain_fetches.get_or_create(&Fetch { outcome }).inc();
+        self.terrain_fetched.inc_by(bytes);
+    }
+
+    /// There are so many datasets, so many bytes long, with so many bytes of copies on this node.
+    pub fn terrains(&self, datasets: u64, bytes: u64, cached_bytes: u64) {
+        self.terrains.set(datasets as f64);
+        self.terrain_sizes.set(bytes as f64);
+        self.terrain_copies.set(cached_bytes as f64);
     }
 
     /// Everything, in the text format of `OpenMetrics`.

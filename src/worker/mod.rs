@@ -24,7 +24,17 @@ use crate::telemetry::{Instruments, spans};
 
 /// Plans an accepted scenario document, calling back as it goes. A panic of it fails its plan only.
 pub type Engine =
-    Arc<dyn Fn(&str, &mut dyn Observer, &dyn Stop) -> Result<Outcome, Failure> + Send + Sync>;
+    Arc<dyn Fn(&str, &mut dyn Observer, &dyn Stop) -> Result<Outcome, Unplanned> + Send + Sync>;
+
+/// Why an engine does not plan.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Unplanned {
+    /// It never will: the plan fails.
+    Failed(Failure),
+    /// Something that it needs cannot be had now: it is asked again for a while, then the plan goes back
+    /// to the queue.
+    NotNow(String),
+}
 
 /// What a pool is started with.
 #[derive(Clone)]

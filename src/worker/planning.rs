@@ -4,17 +4,27 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
-use std::time::Instant;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use tokio::sync::{mpsc, oneshot, watch};
 use tracing::Span;
 
-use super::Engine;
+use super::{Engine, Unplanned};
 use crate::export::document::ResultDocument;
 use crate::job::{Event, Failure, Plan, Status};
 use crate::planner::{ConvergencePoint, Incumbent, Observer, Outcome, Stop, StopReason};
 use crate::store::{Ending, Lease};
 use crate::telemetry::Instruments;
+
+/// An engine that cannot plan now is asked again for so long; then another worker may have more luck.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Between two such questions, at first and at most.
+const PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(2)];
+
+/// While it waits, a thread looks so often whether it shall stop.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// Why a run shall stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,7 +70,7 @@ pub(super) struct Reports {
 }
 
 /// Start planning on a thread of its own, within the span of the caller. The ending comes after the
-/// last event.
+/// last event; `None` is that of a plan that must go back to the queue.
 ///
 /// # Errors
 /// When the machine has no thread left.
@@ -69,40 +79,73 @@ pub(super) fn start(
     engine: Engine,
     lease: &Lease,
     reports: Reports,
-) -> std::io::Result<oneshot::Receiver<Ending>> {
+) -> std::io::Result<oneshot::Receiver<Option<Ending>>> {
     let (ended, ending) = oneshot::channel();
     let (plan, scenario) = (lease.plan.clone(), Arc::clone(&lease.scenario));
     let span = Span::current();
-    std::thread::Builder::new()
-        .name(thread_name)
-        .spawn(move || {
-            let _within = span.enter();
-            let end = catch_unwind(AssertUnwindSafe(|| {
-                plan_to_its_end(&engine, &plan, &scenario, reports)
-            }));
-            // Nobody listens when the pool was dropped.
-            let _ = ended.send(end.unwrap_or_else(|payload| panicked(&*payload)));
-        })?;
+    thread::Builder::new().name(thread_name).spawn(move || {
+        let _within = span.enter();
+        let end = catch_unwind(AssertUnwindSafe(|| {
+            plan_to_its_end(&engine, &plan, &scenario, reports)
+        }));
+        // Nobody listens when the pool was dropped.
+        let _ = ended.send(end.unwrap_or_else(|payload| Some(panicked(&*payload))));
+    })?;
     Ok(ending)
 }
 
-fn plan_to_its_end(engine: &Engine, plan: &Plan, scenario: &str, reports: Reports) -> Ending {
-    let watch = Watch {
-        began: Instant::now(),
-        stop: Arc::clone(&reports.stop),
-    };
+fn plan_to_its_end(
+    engine: &Engine,
+    plan: &Plan,
+    scenario: &str,
+    reports: Reports,
+) -> Option<Ending> {
+    let stop = Arc::clone(&reports.stop);
     let mut teller = Teller {
         reports,
         iterations: 0,
         evaluations: 0,
     };
-    match engine(scenario, &mut teller, &watch) {
-        Ok(outcome) => {
-            teller.ended(&outcome);
-            ending(&outcome, plan, scenario, watch.elapsed_ms())
+    let asked = Instant::now();
+    let mut pause = PAUSES[0];
+    loop {
+        // What was waited for is not the search's time.
+        let watch = Watch {
+            began: Instant::now(),
+            stop: Arc::clone(&stop),
+        };
+        match engine(scenario, &mut teller, &watch) {
+            Ok(outcome) => {
+                teller.ended(&outcome);
+                return Some(ending(&outcome, plan, scenario, watch.elapsed_ms()));
+            }
+            Err(Unplanned::Failed(failure)) => return Some(Ending::Failed(failure)),
+            Err(Unplanned::NotNow(why)) => {
+                if asked.elapsed() >= PATIENCE {
+                    tracing::warn!(why, "cannot be planned here now");
+                    return None;
+                }
+                tracing::warn!(why, "cannot be planned now; trying again");
+            }
         }
-        Err(failure) => Ending::Failed(failure),
+        if stopped_within(pause, &stop) {
+            return None;
+        }
+        pause = (2 * pause).min(PAUSES[1]);
     }
+}
+
+/// Wait, but no longer than until a stop.
+fn stopped_within(pause: Duration, stop: &StopFlag) -> bool {
+    let began = Instant::now();
+    while !stop.is_raised() {
+        let left = pause.saturating_sub(began.elapsed());
+        if left.is_zero() {
+            return false;
+        }
+        thread::sleep(left.min(LOOK));
+    }
+    true
 }
 
 fn ending(outcome: &Outcome, plan: &Plan, scenario: &str, run_ms: f64) -> Ending {

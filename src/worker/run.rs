@@ -77,10 +77,10 @@ impl Slot {
         let ending = ending
             .await
             .expect("the planning thread answers even when it panics");
-        let abandoned = matches!(ending, Ending::Result { .. }) && stop.is_abandoned();
+        let abandoned = matches!(ending, Some(Ending::Result { .. })) && stop.is_abandoned();
         Some(Over {
             lease,
-            ending: (!abandoned).then_some(ending),
+            ending: ending.filter(|_| !abandoned),
             span: Span::current(),
         })
     }

@@ -11,7 +11,7 @@ use noctule::export::document::ResultDocument;
 use noctule::job::{Event, Failure, PlanId, Status, Submission};
 use noctule::planner::StopReason;
 use noctule::store::{Clock, Store};
-use noctule::worker::{Engine, Pool, Settings};
+use noctule::worker::{Engine, Pool, Settings, Unplanned};
 
 use crate::support::engines::{deterministic, endless, engine, incumbent, outcome, point};
 use crate::support::faulty_store::FaultyStore;
@@ -172,6 +172,52 @@ async fn a_panic_fails_its_plan_and_no_other() {
             assert_eq!((told.len(), &told[4]), (5, &Event::End(status)));
         }
         pool.drain(AGES).await;
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_cannot_be_planned_now_is_planned_a_little_later() {
+    on_every_backend(10, async |store| {
+        let asked = Arc::new(AtomicUsize::new(0));
+        let counted = Arc::clone(&asked);
+        let at_last = deterministic(3);
+        let pool = pool(
+            store,
+            1,
+            Arc::new(move |scenario, observer, stop| {
+                if counted.fetch_add(1, Ordering::Relaxed) < 2 {
+                    return Err(Unplanned::NotNow("the ground is away".to_owned()));
+                }
+                at_last(scenario, observer, stop)
+            }),
+        );
+        let id = submit(&**store, "{}").await;
+        assert_eq!(ended(&**store, id).await, Status::Succeeded);
+        assert_eq!(asked.load(Ordering::Relaxed), 3);
+        let told = history(&**store, id).await;
+        let status = [Status::Queued, Status::Running, Status::Succeeded];
+        assert_eq!(statuses(&told), status, "it was never given back");
+        pool.drain(AGES).await;
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn who_waits_to_plan_heeds_a_stop() {
+    on_every_backend(10, async |store| {
+        let never: Engine = Arc::new(|_, _, _| Err(Unplanned::NotNow("away".to_owned())));
+        let pool = pool(store, 2, never);
+        let [first, second] = [submit(&**store, "{}").await, submit(&**store, "{}").await];
+        for id in [first, second] {
+            until(&**store, id, |plan| plan.status == Status::Running).await;
+        }
+        store.request_cancel(first, 0).await.unwrap();
+        assert_eq!(ended(&**store, first).await, Status::Cancelled);
+        assert_eq!(store.result(first).await.unwrap(), None);
+        pool.drain(Duration::ZERO).await;
+        let plan = store.get(second).await.unwrap();
+        assert_eq!(plan.status, Status::Queued, "for another worker");
     })
     .await;
 }

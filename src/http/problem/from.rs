@@ -41,6 +41,9 @@ impl From<StoreError> for Problem {
 
 impl From<Refusal> for Problem {
     fn from(refusal: Refusal) -> Self {
+        if let Some(fault) = refusal.unreachable_ground() {
+            return Self::unreachable_datasets(&fault.detail);
+        }
         match refusal {
             Refusal::Syntax {
                 line,
@@ -53,13 +56,7 @@ impl From<Refusal> for Problem {
                 pointer,
                 detail,
             },
-            Refusal::Invalid(faults) => {
-                let mut codes = faults.iter().map(|fault| fault.code);
-                if codes.any(|code| code == "unreachable-datasets") {
-                    return Self::unreachable_datasets(&faults[0].detail);
-                }
-                Self::InvalidScenario(faults)
-            }
+            Refusal::Invalid(faults) => Self::InvalidScenario(faults),
         }
     }
 }
@@ -76,6 +73,7 @@ impl From<ExportError> for Problem {
                 detail: fault.detail,
             },
             ExportError::NoGround(_) => Self::NoGround(detail),
+            ExportError::Unreachable(error) => Self::unreachable_datasets(&error),
             ExportError::Damaged(_) => {
                 tracing::error!(%error, "a stored plan cannot be read");
                 Self::Internal

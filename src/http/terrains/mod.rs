@@ -28,7 +28,7 @@ use super::plans::now_ms;
 use super::problem::Problem;
 use super::{AppState, off_thread};
 use crate::catalogue::{
-    Catalogue, CatalogueError, Claim, Declaration, Entry, Expected, Kept, Naming,
+    Catalogue, CatalogueError, Claim, Declaration, Entry, Expected, Kept, Naming, Tally,
 };
 use crate::terrain::dem::Format;
 use crate::terrain::is_dataset_name;
@@ -69,6 +69,13 @@ impl Terrains {
     ) -> Result<T, Problem> {
         let catalogue = self.catalogue.clone();
         Ok(off_thread::run(move || work(&*catalogue)).await??)
+    }
+
+    /// How many there are, as far as is known at once; behind no other work.
+    pub(super) async fn tally(&self) -> Tally {
+        let catalogue = self.catalogue.clone();
+        let tally = tokio::task::spawn_blocking(move || catalogue.tally()).await;
+        tally.unwrap_or_default()
     }
 
     /// Do what reads from datasets, when fewer others do.

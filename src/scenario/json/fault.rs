@@ -163,21 +163,23 @@ pub enum Refusal {
 
 impl Refusal {
     /// The fault of a dataset that is not there or cannot be used, when there is one: a document that was
-    /// accepted before can have no other.
+    /// accepted before can have no other, but one of a dataset that cannot be reached now.
     #[must_use]
     pub fn lost_ground(&self) -> Option<&Fault> {
-        let Self::Invalid(faults) = self else {
-            return None;
-        };
-        faults.iter().find(|fault| {
-            [
-                "unknown-dataset",
-                "replaced-dataset",
-                "unreadable-dataset",
-                "unreachable-datasets",
-            ]
-            .contains(&fault.code)
-        })
+        self.fault_of(&["unknown-dataset", "replaced-dataset", "unreadable-dataset"])
+    }
+
+    /// The fault of a dataset that cannot be reached now, and may be a little later.
+    #[must_use]
+    pub fn unreachable_ground(&self) -> Option<&Fault> {
+        self.fault_of(&["unreachable-datasets"])
+    }
+
+    fn fault_of(&self, codes: &[&str]) -> Option<&Fault> {
+        match self {
+            Self::Invalid(faults) => faults.iter().find(|fault| codes.contains(&fault.code)),
+            Self::Syntax { .. } => None,
+        }
     }
 }
 

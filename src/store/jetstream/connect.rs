@@ -99,18 +99,13 @@ fn check_version(version: &str) -> Result<(), StoreError> {
 impl Servers {
     pub(super) async fn open(settings: &Settings, options: &Options) -> Result<Self, StoreError> {
         let client = connect(settings).await?;
-        let mut context = jetstream::new(client.clone());
-        context.set_timeout(PATIENCE);
+        let context = Self::context(&client);
         context
             .query_account()
             .await
             .map_err(|error| failed("JetStream of the NATS server", &error))?;
         let namespace = settings.address.namespace.clone();
-        let make = Maker {
-            context: &context,
-            namespace: &namespace,
-            replicas: settings.replicas,
-        };
+        let make = maker(&context, settings);
         Ok(Self {
             plans: make.stream(plans(options)).await?,
             jobs: make.stream(jobs(options)).await?,
@@ -128,6 +123,13 @@ impl Servers {
             context: context.clone(),
             namespace: namespace.clone(),
         })
+    }
+
+    /// `JetStream` over a connection.
+    pub(super) fn context(client: &Client) -> Context {
+        let mut context = jetstream::new(client.clone());
+        context.set_timeout(PATIENCE);
+        context
     }
 
     pub(super) fn subject_of(&self, id: PlanId) -> String {
@@ -161,14 +163,24 @@ fn jobs(options: &Options) -> Config {
     }
 }
 
-struct Maker<'a> {
+/// Makes what is missing on the servers.
+pub(super) struct Maker<'a> {
     context: &'a Context,
     namespace: &'a str,
     replicas: usize,
 }
 
+/// For the namespace of the settings.
+pub(super) fn maker<'a>(context: &'a Context, settings: &'a Settings) -> Maker<'a> {
+    Maker {
+        context,
+        namespace: &settings.address.namespace,
+        replicas: settings.replicas,
+    }
+}
+
 impl Maker<'_> {
-    fn name(&self, what: &str) -> String {
+    pub(super) fn name(&self, what: &str) -> String {
         format!("{}-{what}", self.namespace)
     }
 
@@ -216,7 +228,11 @@ impl Maker<'_> {
         Ok(stream)
     }
 
-    async fn bucket(&self, what: &str, max_age: Duration) -> Result<kv::Store, StoreError> {
+    pub(super) async fn bucket(
+        &self,
+        what: &str,
+        max_age: Duration,
+    ) -> Result<kv::Store, StoreError> {
         let config = kv::Config {
             bucket: self.name(what),
             history: 1,
@@ -236,7 +252,7 @@ impl Maker<'_> {
             .map_err(|error| failed(&what, &error))
     }
 
-    async fn objects(&self, what: &str) -> Result<ObjectStore, StoreError> {
+    pub(super) async fn objects(&self, what: &str) -> Result<ObjectStore, StoreError> {
         let config = object_store::Config {
             bucket: self.name(what),
             num_replicas: self.replicas,

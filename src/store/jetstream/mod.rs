@@ -18,6 +18,7 @@ mod record;
 mod removal;
 mod runs;
 mod settings;
+mod shelf;
 mod steps;
 mod submit;
 mod trouble;
@@ -36,6 +37,7 @@ use tokio::time::Instant;
 use uuid::Uuid;
 
 pub use settings::{Address, Settings};
+pub use shelf::JetStreamShelf;
 
 use self::connect::Servers;
 use self::follow::Reading;
@@ -72,6 +74,8 @@ struct JetStream {
     /// Among the other nodes.
     node: Uuid,
     consumers: Mutex<HashMap<Lane, PullConsumer>>,
+    /// Whose turn it is to claim.
+    turn: tokio::sync::Mutex<()>,
     last_patrol: Mutex<Option<Instant>>,
     all_slots: AtomicUsize,
     /// Ends that this node tells.
@@ -114,6 +118,7 @@ impl JetStreamStore {
             options,
             node: Uuid::new_v4(),
             consumers: Mutex::default(),
+            turn: tokio::sync::Mutex::default(),
             last_patrol: Mutex::default(),
             telling: Mutex::default(),
             end: watch::Sender::new(false),

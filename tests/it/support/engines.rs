@@ -9,16 +9,18 @@ use noctule::planner::{
     StopReason,
 };
 use noctule::scenario::Frame;
-use noctule::worker::Engine;
+use noctule::worker::{Engine, Unplanned};
 
-/// Wraps a function as an engine.
+/// Wraps a function as an engine that plans or fails.
 pub(crate) fn engine(
     plan: impl Fn(&str, &mut dyn Observer, &dyn Stop) -> Result<Outcome, Failure>
     + Send
     + Sync
     + 'static,
 ) -> Engine {
-    Arc::new(plan)
+    Arc::new(move |scenario, observer, stop| {
+        plan(scenario, observer, stop).map_err(Unplanned::Failed)
+    })
 }
 
 /// An engine that runs `iterations` and finds a better route in each third; its figures are drawn

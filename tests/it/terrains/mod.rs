@@ -7,6 +7,7 @@ mod mounted;
 mod names;
 mod planning;
 mod sampling;
+mod shared;
 mod uses;
 
 use std::path::{Path, PathBuf};

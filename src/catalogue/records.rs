@@ -1,0 +1,102 @@
+//! What is written down of names and of contents, and what may be done to a name.
+
+use serde::{Deserialize, Serialize};
+
+use super::content::{Checked, Declaration};
+use super::{CatalogueError, Claim, Expected, Kept, Naming};
+use crate::terrain::dem::Survey;
+
+/// What a name stands for, as it is written down.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Name {
+    pub(super) sha256: String,
+    pub(super) uploaded_ms: i64,
+    pub(super) owner: Option<String>,
+}
+
+impl Name {
+    pub(super) fn new(file: &Checked, naming: &Naming) -> Self {
+        Self {
+            sha256: file.sha256.clone(),
+            uploaded_ms: naming.now_ms,
+            owner: naming.by.owner.clone(),
+        }
+    }
+
+    /// Whether `name`, which stands for `before`, may be given to another content.
+    pub(super) fn permit(before: Option<&Self>, naming: &Naming) -> Result<(), CatalogueError> {
+        let name = naming.name.clone();
+        match (&naming.expected, before) {
+            (Expected::Nothing, Some(_)) => return Err(CatalogueError::Exists { name }),
+            (Expected::OneOf(_), None) => return Err(CatalogueError::Changed { name }),
+            (Expected::OneOf(sums), Some(before))
+                if !sums.iter().any(|sum| *sum == before.sha256 || sum == "*") =>
+            {
+                return Err(CatalogueError::Changed { name });
+            }
+            _ => {}
+        }
+        if before.is_some_and(|before| !naming.by.covers(before.owner.as_ref())) {
+            return Err(CatalogueError::Owned { name });
+        }
+        Ok(())
+    }
+
+    /// What came of giving it to `file`.
+    pub(super) fn kept(before: Option<&Self>, file: &Checked) -> Kept {
+        match before {
+            None => Kept::Created,
+            Some(before) if before.sha256 == file.sha256 => Kept::Unchanged,
+            Some(_) => Kept::Replaced,
+        }
+    }
+
+    /// The sum of what `name` stands for, when it may be taken away.
+    pub(super) fn removable<'a>(
+        before: Option<&'a Self>,
+        name: &str,
+        by: &Claim,
+    ) -> Result<&'a str, CatalogueError> {
+        let name = name.to_owned();
+        match before {
+            None => Err(CatalogueError::Unknown { name }),
+            Some(record) if !by.covers(record.owner.as_ref()) => {
+                Err(CatalogueError::Owned { name })
+            }
+            Some(record) => Ok(&record.sha256),
+        }
+    }
+}
+
+/// What is known of a content, as it is written down.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Content {
+    pub(super) bytes: u64,
+    #[serde(default)]
+    pub(super) declared: Declaration,
+    /// `None` when no sample holds any.
+    min: Option<f64>,
+    max: Option<f64>,
+    no_data_share: f64,
+}
+
+impl Content {
+    pub(super) fn of(file: &Checked) -> Self {
+        let finite = |value: f64| Some(value).filter(|value| value.is_finite());
+        Self {
+            bytes: file.staged.bytes(),
+            declared: file.declaration.clone(),
+            min: finite(file.survey.min),
+            max: finite(file.survey.max),
+            no_data_share: file.survey.no_data_share,
+        }
+    }
+
+    pub(super) fn survey(&self) -> Survey {
+        Survey {
+            min: self.min.unwrap_or(f64::INFINITY),
+            max: self.max.unwrap_or(f64::NEG_INFINITY),
+            no_data_share: self.no_data_share,
+        }
+    }
+}

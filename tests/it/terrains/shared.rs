@@ -1,0 +1,437 @@
+//! Datasets that several nodes share, on real servers.
+
+use std::collections::BTreeSet;
+use std::io::{self, Read};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use noctule::catalogue::{Catalogue, Directories, Sharing, Shelf};
+use noctule::http;
+use noctule::job::Status;
+use noctule::planner;
+use noctule::scenario::json;
+use noctule::store::jetstream::{Address, JetStreamShelf, JetStreamStore, Settings};
+use noctule::store::{Options, wall_clock};
+use noctule::worker::{self, Engine, Pool, Unplanned};
+use tokio::task::spawn_blocking;
+
+use super::{hill, over, put, put_with};
+use crate::support::api::Api;
+use crate::support::nats::{self, Cluster, NatsServer};
+
+fn settings(address: &str, replicas: usize) -> Settings {
+    Settings {
+        address: Address::read(address).expect("an address"),
+        credentials: None,
+        replicas,
+        lease: Duration::from_secs(2),
+        slots: 0,
+    }
+}
+
+async fn shelf(address: &str) -> Arc<dyn Shelf> {
+    let shelf = JetStreamShelf::open(&settings(address, 1)).await;
+    Arc::new(shelf.expect("it can be reached"))
+}
+
+/// A node of a service whose datasets are shared; contents go as soon as nothing refers to them.
+struct Node {
+    api: Api,
+    catalogue: Arc<dyn Catalogue>,
+    cache: PathBuf,
+}
+
+impl Node {
+    async fn new(address: &str) -> Self {
+        Self::over(shelf(address).await, Duration::ZERO)
+    }
+
+    fn over(shelf: Arc<dyn Shelf>, grace: Duration) -> Self {
+        let api = Api::with_catalogue(|cache| {
+            let sharing = Sharing::new(shelf, cache, Arc::default()).with_grace(grace);
+            Directories::shared(sharing, None)
+        });
+        Self {
+            catalogue: api.state.terrains.catalogue.clone(),
+            cache: api.uploads(),
+            api,
+        }
+    }
+
+    /// Files of its cache.
+    fn copies(&self) -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(self.cache.join("content")).expect("it is there");
+        entries
+            .map(|entry| entry.expect("it is there").path())
+            .collect()
+    }
+
+    async fn sweep(&self, used: BTreeSet<String>) -> usize {
+        let catalogue = self.catalogue.clone();
+        let swept = spawn_blocking(move || catalogue.sweep(&used)).await;
+        swept.expect("no panic").expect("it can be reached")
+    }
+
+    async fn validate(&self, name: &str) -> serde_json::Value {
+        let answer = self
+            .api
+            .post("/plans?validate_only=true", &over(name))
+            .await;
+        assert_eq!(answer.status, 200, "{answer:?}");
+        answer.json()
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_one_node_uploads_every_node_plans_over() {
+    let address = nats::address();
+    let (a, b) = (Node::new(&address).await, Node::new(&address).await);
+    assert_eq!(
+        a.api.get("/terrains").await.json()["terrains"],
+        serde_json::json!([])
+    );
+    let uploaded = put(&a.api, "/terrains/hill", hill(100.0)).await;
+    assert_eq!(uploaded.status, 201);
+    for path in ["/terrains", "/terrains/hill", "/terrains/hill/elevations"] {
+        let (here, there) = (a.api.get(path).await, b.api.get(path).await);
+        assert_eq!(here.json(), there.json(), "{path}");
+    }
+    let accepted = b.validate("hill").await;
+    assert_eq!(
+        accepted["scenario"]["terrain"]["sha256"],
+        uploaded.json()["sha256"]
+    );
+
+    // Whose name it is and what it stands for is told everywhere at once.
+    let again = put_with(
+        &b.api,
+        "/terrains/hill",
+        &[("if-none-match", "*")],
+        hill(1.0),
+    )
+    .await;
+    again.expect_problem(412, "precondition-failed");
+    let tag = uploaded.header("etag");
+    let replaced = put_with(&b.api, "/terrains/hill", &[("if-match", tag)], hill(50.0)).await;
+    assert_eq!(replaced.status, 200);
+    let late = put_with(&a.api, "/terrains/hill", &[("if-match", tag)], hill(25.0)).await;
+    late.expect_problem(412, "precondition-failed");
+    // An accepted document keeps its ground, on every node, for as long as its plan is kept.
+    for node in [&a, &b] {
+        let answer = node
+            .api
+            .post("/plans?validate_only=true", &accepted["scenario"])
+            .await;
+        assert_eq!(answer.status, 200, "{answer:?}");
+    }
+    let sha256 = uploaded.json()["sha256"].as_str().expect("text").to_owned();
+    assert_eq!(a.sweep(BTreeSet::from([sha256])).await, 0);
+    let swept = tokio::join!(a.sweep(BTreeSet::new()), b.sweep(BTreeSet::new()));
+    assert_eq!(swept.0 + swept.1, 1);
+    let answer = a
+        .api
+        .post("/plans?validate_only=true", &accepted["scenario"])
+        .await;
+    answer.expect_problem(422, "invalid-scenario");
+    assert_eq!(b.api.delete("/terrains/hill").await.status, 204);
+    a.api
+        .get("/terrains/hill")
+        .await
+        .expect_problem(404, "not-found");
+    a.sweep(BTreeSet::new()).await;
+    assert_eq!(files(&address).await, 0);
+}
+
+/// Files on the servers, whole ones and others.
+async fn files(address: &str) -> usize {
+    let shelf = shelf(address).await;
+    let files = spawn_blocking(move || shelf.files()).await;
+    files.expect("no panic").expect("it can be reached").len()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_damaged_copy_is_fetched_again() {
+    let address = nats::address();
+    let (a, b) = (Node::new(&address).await, Node::new(&address).await);
+    put(&a.api, "/terrains/hill", hill(100.0)).await;
+    let elevations = a.api.get("/terrains/hill/elevations").await.json();
+    assert_eq!(
+        b.api.get("/terrains/hill/elevations").await.json(),
+        elevations
+    );
+    let copies = b.copies();
+    std::fs::write(&copies[0], hill(200.0)).expect("written");
+    assert_eq!(
+        b.api.get("/terrains/hill/elevations").await.json(),
+        elevations
+    );
+    assert_eq!(
+        std::fs::read_to_string(&copies[0]).expect("read"),
+        hill(100.0)
+    );
+}
+
+/// More than one message, and more than the servers' memory for one.
+#[tokio::test(flavor = "multi_thread")]
+async fn files_of_many_chunks_come_whole() {
+    let address = nats::address();
+    let shelf = shelf(&address).await;
+    let moved = spawn_blocking(move || {
+        let bytes: Vec<u8> = (0..9_000_001_u32)
+            .map(|i| (i / 251).to_le_bytes()[0])
+            .collect();
+        let file = shelf.put(&mut &*bytes).expect("put");
+        let mut came = Vec::new();
+        assert!(shelf.fetch(&file, &mut came).expect("fetched"));
+        assert!(came == bytes, "{} bytes came", came.len());
+        let empty = shelf.put(&mut io::empty()).expect("put");
+        assert!(shelf.fetch(&empty, &mut came).expect("fetched"));
+        assert_eq!(came.len(), bytes.len());
+        assert!(!shelf.fetch("nothing", &mut came).expect("answered"));
+        // Who cannot write says so himself.
+        let mut full = [0; 1000];
+        let error = shelf
+            .fetch(&file, &mut &mut full[..])
+            .expect_err("it is full");
+        assert_eq!(error.kind(), io::ErrorKind::WriteZero);
+        assert_eq!(
+            shelf.files().expect("listed"),
+            BTreeSet::from([file.clone(), empty])
+        );
+        shelf.discard(&file).expect("discarded");
+        shelf.discard(&file).expect("discarded already");
+        assert!(!shelf.fetch(&file, &mut came).expect("answered"));
+        assert_eq!(shelf.files().expect("listed").len(), 1);
+    });
+    moved.await.expect("no panic");
+}
+
+/// Breaks off after so many bytes.
+struct Broken(usize);
+
+impl Read for Broken {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.0 == 0 {
+            return Err(io::Error::other("broken"));
+        }
+        let length = buffer.len().min(self.0);
+        buffer[..length].fill(7);
+        self.0 -= length;
+        Ok(length)
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_upload_that_broke_is_seen_by_nobody_and_removed() {
+    let address = nats::address();
+    let node = Node::new(&address).await;
+    put(&node.api, "/terrains/hill", hill(100.0)).await;
+    let own = shelf(&address).await;
+    let broken = spawn_blocking(move || own.put(&mut Broken(1 << 20))).await;
+    assert!(broken.expect("no panic").is_err());
+    // What was put, but never came to have a name: its process was killed.
+    let own = shelf(&address).await;
+    let lost = spawn_blocking(move || own.put(&mut "whole".as_bytes())).await;
+    lost.expect("no panic").expect("put");
+    assert_eq!(files(&address).await, 3);
+    assert_eq!(node.sweep(BTreeSet::new()).await, 0);
+    assert_eq!(files(&address).await, 1);
+    node.validate("hill").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn while_the_servers_are_away_all_is_refused_and_nothing_lost() {
+    let mut server = NatsServer::start();
+    let address = server.address();
+    let (a, b) = (Node::new(&address).await, Node::new(&address).await);
+    let uploaded = put(&a.api, "/terrains/hill", hill(100.0)).await;
+    let sha256 = uploaded.json()["sha256"].as_str().expect("text").to_owned();
+    server.kill();
+    // What is pinned and there needs no server; nothing else is told from what is gone.
+    let catalogue = a.catalogue.clone();
+    let pinned = sha256.clone();
+    let found = spawn_blocking(move || catalogue.find("hill", Some(&pinned))).await;
+    assert_eq!(found.expect("no panic").expect("a copy").sha256, sha256);
+    for node in [&a, &b] {
+        let refused = [
+            put(&node.api, "/terrains/hill", hill(50.0)).await,
+            node.api.get("/terrains").await,
+            node.api.get("/terrains/hill/elevations").await,
+            node.api.delete("/terrains/hill").await,
+            node.api.post("/plans", &over("hill")).await,
+        ];
+        for answer in refused {
+            answer.expect_problem(503, "store-unavailable");
+        }
+        assert_eq!(node.api.get("/metrics").await.status, 200);
+    }
+    server.restart();
+    let back = async {
+        while b.api.get("/terrains").await.status != 200 {
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    };
+    let back = tokio::time::timeout(Duration::from_secs(30), back).await;
+    back.expect("it comes back");
+    assert_eq!(
+        b.validate("hill").await["scenario"]["terrain"]["sha256"],
+        sha256
+    );
+}
+
+impl Node {
+    /// Whose plans are shared, too.
+    async fn with_store(mut self, address: &str, slots: usize) -> Self {
+        let settings = Settings {
+            slots,
+            ..settings(address, 1)
+        };
+        let store = JetStreamStore::open(settings, Options::new(100)).await;
+        let store = Arc::new(store.expect("it can be reached"));
+        self.api.store = store.clone();
+        self.api.state.store = store;
+        self.api.router = http::router(self.api.state.clone());
+        self
+    }
+
+    /// Plan as the service does.
+    fn work(&self) -> Pool {
+        let rules = self.api.state.rules.clone();
+        let engine: Engine = Arc::new(move |document, observer, stop| {
+            let scenario = json::read_accepted(document, &rules);
+            let away = |refusal: json::Refusal| Unplanned::NotNow(refusal.to_string());
+            Ok(planner::plan(&scenario.map_err(away)?, observer, stop))
+        });
+        let settings = worker::Settings {
+            workers: 1,
+            clock: wall_clock(),
+            instruments: Arc::default(),
+        };
+        Pool::start(self.api.store.clone(), settings, engine)
+    }
+
+    /// Once as many plans as that are known here to be queued or running over a dataset.
+    async fn until_in_use(&self, path: &str, plans: u64) {
+        let known = async {
+            while self.api.get(path).await.json()["in_use"] != plans {
+                tokio::time::sleep(Duration::from_millis(20)).await;
+            }
+        };
+        let known = tokio::time::timeout(Duration::from_secs(30), known).await;
+        known.expect("it comes to be known");
+    }
+
+    async fn ended(&self, plan: &str) -> serde_json::Value {
+        let ended = async {
+            loop {
+                let status = self.api.get(plan).await.json();
+                if ["succeeded", "failed"].contains(&status["status"].as_str().expect("text")) {
+                    return status;
+                }
+                tokio::time::sleep(Duration::from_millis(20)).await;
+            }
+        };
+        let ended = tokio::time::timeout(Duration::from_secs(60), ended).await;
+        ended.expect("it ends")
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_worker_plans_over_what_was_uploaded_elsewhere_and_replaced_since() {
+    let address = nats::address();
+    let a = Node::new(&address).await.with_store(&address, 0).await;
+    let b = Node::new(&address).await.with_store(&address, 1).await;
+    put(&a.api, "/terrains/hill", hill(100.0)).await;
+    let answer = a.api.post("/plans", &over("hill")).await;
+    assert_eq!(answer.status, 202, "{answer:?}");
+    let plan = answer.header("location").to_owned();
+    b.until_in_use("/terrains/hill", 1).await;
+    let problem = b.api.delete("/terrains/hill").await;
+    assert_eq!(problem.expect_problem(409, "terrain-in-use")["plans"], 1);
+    // The name goes on; what the plan was promised stays, though two nodes sweep.
+    assert_eq!(put(&b.api, "/terrains/hill", hill(50.0)).await.status, 200);
+    for node in [&a, &b] {
+        let uses = node.api.store.datasets_in_use().await.expect("it is open");
+        let used: BTreeSet<String> = uses.into_iter().map(|used| used.sha256).collect();
+        assert_eq!((used.len(), node.sweep(used).await), (1, 0));
+    }
+    let pool = b.work();
+    let status = a.ended(&plan).await;
+    assert_eq!(status["status"], "succeeded", "{status}");
+    for format in ["svg", "geojson"] {
+        let answer = a.api.get(&format!("{plan}/result?format={format}")).await;
+        assert_eq!(answer.status, 200, "{answer:?}");
+    }
+    assert_eq!(b.copies().len(), 2);
+    pool.drain(Duration::from_secs(60)).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plan_waits_for_ground_that_is_away() {
+    let mut server = NatsServer::start();
+    let (datasets, plans) = (server.address(), nats::address());
+    let a = Node::new(&datasets).await.with_store(&plans, 0).await;
+    let b = Node::new(&datasets).await.with_store(&plans, 1).await;
+    put(&a.api, "/terrains/hill", hill(100.0)).await;
+    let answer = a.api.post("/plans", &over("hill")).await;
+    let plan = answer.header("location").to_owned();
+    server.kill();
+    let pool = b.work();
+    let id = plan.rsplit('/').next().and_then(|id| id.parse().ok());
+    let id = id.expect("an id");
+    let run = async {
+        while a.api.store.get(id).await.expect("it is there").status != Status::Running {
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    };
+    let run = tokio::time::timeout(Duration::from_secs(30), run).await;
+    run.expect("it is tried");
+    server.restart();
+    let status = a.ended(&plan).await;
+    assert_eq!(status["status"], "succeeded", "{status}");
+    pool.drain(Duration::from_secs(60)).await;
+}
+
+/// Three copies of everything: what was answered by one server is known to all.
+#[tokio::test(flavor = "multi_thread")]
+async fn names_are_the_same_at_once_wherever_they_are_asked_for() {
+    let cluster = Cluster::start();
+    let address = cluster.address();
+    let mut nodes = Vec::new();
+    for _ in 0..3 {
+        let shelf = JetStreamShelf::open(&settings(&address, 3)).await;
+        let shelf = Arc::new(shelf.expect("it can be reached"));
+        nodes.push(Node::over(shelf, Duration::from_secs(600)));
+    }
+    for round in 0_u8..12 {
+        let height = 10.0 * f64::from(round);
+        let [here, there] = [0, 1].map(|i| &nodes[usize::from(round + i) % 3]);
+        let uploaded = put(&here.api, "/terrains/hill", hill(height)).await;
+        assert!(uploaded.status.is_success(), "{uploaded:?}");
+        let accepted = there.validate("hill").await;
+        assert_eq!(
+            accepted["scenario"]["terrain"]["sha256"],
+            uploaded.json()["sha256"],
+            "round {round}"
+        );
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn copies_are_counted() {
+    let address = nats::address();
+    let (a, b) = (Node::new(&address).await, Node::new(&address).await);
+    put(&a.api, "/terrains/hill", hill(100.0)).await;
+    b.validate("hill").await;
+    let text = b.api.get("/metrics").await;
+    let text = std::str::from_utf8(&text.body).expect("UTF-8").to_owned();
+    let length = hill(100.0).len();
+    for line in [
+        "noctule_terrains 1.0".to_owned(),
+        format!("noctule_terrain_bytes {length}.0"),
+        format!("noctule_terrain_cache_bytes {length}.0"),
+    ] {
+        assert!(text.lines().any(|found| found == line), "{line}\n{text}");
+    }
+}

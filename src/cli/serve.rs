@@ -1,5 +1,8 @@
 //! `noctule serve`: put the parts together, and take them apart in the right order.
 
+mod backend;
+mod ending;
+
 use std::io::Write as _;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -8,10 +11,10 @@ use std::time::Duration;
 
 use anyhow::{Context, anyhow};
 use tokio::net::{TcpListener, TcpSocket};
-use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::watch;
 use tokio::time::Instant;
 
+use self::ending::{Signals, Times};
 use super::{access, exit};
 use crate::catalogue::{self, Catalogue, Directories, Mounted};
 use crate::config::{self, Config, Flags};
@@ -21,8 +24,6 @@ use crate::job::Failure;
 use crate::planner;
 use crate::scenario::json::{self, Refusal, Rules};
 use crate::store::measured::MeasuredStore;
-use crate::store::reopening::{Open, Reopening};
-use crate::store::sqlite::SqliteStore;
 use crate::store::{self, Store};
 use crate::telemetry::{self, Instruments};
 use crate::worker::{self, Engine, Pool, Sweeper, Unplanned};
@@ -66,13 +67,13 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let listener =
         listen(config.listen).with_context(|| format!("cannot listen on {}", config.listen))?;
     let instruments = Arc::new(Instruments::default());
-    let store = open_store(config).await?;
+    let store = backend::open(config).await?;
     let store: Arc<dyn Store> = Arc::new(MeasuredStore::new(store, instruments.clone()));
     let catalogue = catalogue(config)?;
     let rules = planner::rules(config.limits).with_datasets(catalogue.clone());
     let rules = Arc::new(rules);
     let settings = worker::Settings {
-        workers: config.workers,
+        workers: slots(config),
         clock: store::wall_clock(),
         instruments: instruments.clone(),
     };
@@ -80,14 +81,15 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let sweeper = Sweeper::start(store.clone(), catalogue.clone(), store::wall_clock());
     let sender = webhooks
         .clone()
+        .filter(|_| config.role.serves())
         .map(|settings| Sender::start(store.clone(), settings));
     let (phase, watched) = watch::channel(Phase::Serving);
-    let router = http::router(AppState {
+    let state = AppState {
         store: store.clone(),
         rules,
         terrains: Terrains::new(catalogue),
         capacity: Capacity {
-            workers: config.workers,
+            workers: slots(config),
             queue: config.queue,
         },
         in_flight: InFlight::default(),
@@ -98,7 +100,12 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         cors,
         phase: watched.clone(),
         instruments: instruments.clone(),
-    });
+    };
+    let router = if config.role.serves() {
+        http::router(state)
+    } else {
+        http::upkeep_router(state)
+    };
     access::reload_on_hangup(config, access)?;
     announce(&listener)?;
     let times = Times::within(config.grace);
@@ -123,7 +130,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         std::process::exit(exit::FAILED.into());
     });
     phase.send_replace(Phase::Draining);
-    drain(pool, &times).await;
+    ending::drain(pool, &times).await;
     phase.send_replace(Phase::Stopping);
     if let Ok(ended) = tokio::time::timeout_at(signalled + times.answers, server).await {
         ended.context("the server broke")?;
@@ -171,14 +178,12 @@ fn unread(refusal: &Refusal) -> Failure {
     }
 }
 
-/// Let runs finish, then give them back; without those that do not heed their stop in time, which
-/// the next process finds as after a crash.
-async fn drain(pool: Pool, times: &Times) {
-    if tokio::time::timeout(times.runs + times.giving_back, pool.drain(times.runs))
-        .await
-        .is_err()
-    {
-        tracing::warn!("some runs did not stop in time; the next process runs them again");
+/// Plans that this node runs at a time.
+fn slots(config: &Config) -> usize {
+    if config.role.runs() {
+        config.workers
+    } else {
+        0
     }
 }
 
@@ -200,26 +205,6 @@ fn catalogue(config: &Config) -> anyhow::Result<Arc<dyn Catalogue>> {
     Ok(Arc::new(catalogue))
 }
 
-async fn open_store(config: &Config) -> anyhow::Result<Arc<dyn Store>> {
-    let data_dir = data_dir(config)?;
-    let options = store::Options {
-        retention: retention(config.retention),
-        events_kept: config.retention.events,
-        ..store::Options::new(config.queue as u64)
-    };
-    let open: Open = Arc::new(move |suspicious| {
-        let open = if suspicious {
-            SqliteStore::open_suspicious
-        } else {
-            SqliteStore::open
-        };
-        let store = open(&data_dir, options.clone())?;
-        tracing::info!(data_dir = %data_dir.display(), "the store is open");
-        Ok(Arc::new(store))
-    });
-    Ok(Arc::new(Reopening::start(open).await))
-}
-
 /// How ends of plans are told; `None` when nobody is.
 fn webhooks(config: &config::Webhook) -> anyhow::Result<Option<webhook::Settings>> {
     let Some(path) = &config.secret_file else {
@@ -232,17 +217,6 @@ fn webhooks(config: &config::Webhook) -> anyhow::Result<Option<webhook::Settings
         secret,
         allow_private: config.allow_private,
     }))
-}
-
-/// Of a setting, 0 is no limit.
-fn retention(settings: config::Retention) -> store::Retention {
-    let limit = |setting: u64| (setting > 0).then_some(setting);
-    let age_ms = i64::try_from(settings.age.as_millis()).unwrap_or(i64::MAX);
-    store::Retention {
-        age_ms: (age_ms > 0).then_some(age_ms),
-        plans: limit(settings.plans),
-        bytes: limit(settings.bytes),
-    }
 }
 
 /// Take the address, for as many callers at once as the system lets wait.
@@ -264,48 +238,4 @@ fn announce(listener: &TcpListener) -> anyhow::Result<()> {
     writeln!(stdout, "listening on http://{address}")?;
     stdout.flush()?;
     Ok(())
-}
-
-/// How the grace period is spent.
-struct Times {
-    /// Runs may finish until then.
-    runs: Duration,
-    /// Then they are stopped and given back.
-    giving_back: Duration,
-    /// Connections may finish their answers until then; what remains is for the store.
-    answers: Duration,
-}
-
-impl Times {
-    /// The last quarter, at most two seconds, is for giving back, for connections, and for the store.
-    fn within(grace: Duration) -> Self {
-        let reserve = (grace / 4).min(Duration::from_secs(2));
-        Self {
-            runs: grace.saturating_sub(reserve),
-            giving_back: reserve / 4,
-            answers: grace.saturating_sub(reserve / 4),
-        }
-    }
-}
-
-/// The signals that ask for an end.
-struct Signals {
-    terminate: Signal,
-    interrupt: Signal,
-}
-
-impl Signals {
-    fn new() -> std::io::Result<Self> {
-        Ok(Self {
-            terminate: signal(SignalKind::terminate())?,
-            interrupt: signal(SignalKind::interrupt())?,
-        })
-    }
-
-    async fn next(&mut self) -> &'static str {
-        tokio::select! {
-            _ = self.terminate.recv() => "SIGTERM",
-            _ = self.interrupt.recv() => "SIGINT",
-        }
-    }
 }

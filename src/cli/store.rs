@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 
 use super::exit;
@@ -32,10 +32,27 @@ pub(super) struct Place {
     /// Directory of the plans [default: noctule in the user's data home]
     #[arg(long, env = "NOCTULE_DATA_DIR", value_name = "DIR")]
     data_dir: Option<PathBuf>,
+    /// As serve takes it; servers of NATS have commands of their own for this
+    #[arg(
+        long,
+        env = "NOCTULE_STORE",
+        value_name = "PLACE",
+        hide_env_values = true
+    )]
+    store: Option<String>,
 }
 
 impl Place {
-    fn data_dir(self) -> anyhow::Result<PathBuf> {
+    fn data_dir(self, instead: &str) -> anyhow::Result<PathBuf> {
+        // Whatever is no file is looked after by those who keep it.
+        if self
+            .store
+            .is_some_and(|store| !["", "sqlite"].contains(&store.as_str()))
+        {
+            bail!(
+                "the plans are on NATS servers, and this looks after a file of one machine: {instead}"
+            );
+        }
         self.data_dir
             .or(Config::default().data_dir)
             .context("the user has no home; name a directory with --data-dir")
@@ -45,12 +62,14 @@ impl Place {
 pub(super) fn run(command: Command) -> anyhow::Result<u8> {
     match command {
         Command::Backup { place, file } => {
-            upkeep::backup(&place.data_dir()?, &file)?;
+            let instead = "nats stream backup, or nats account backup, copies what they keep (docs/OPERATIONS.md)";
+            upkeep::backup(&place.data_dir(instead)?, &file)?;
             println!("written to {}", file.display());
             Ok(exit::DONE)
         }
         Command::Check { place } => {
-            let findings = upkeep::check(&place.data_dir()?)?;
+            let instead = "nats server check jetstream, and nats stream report, say how they are (docs/OPERATIONS.md)";
+            let findings = upkeep::check(&place.data_dir(instead)?)?;
             for fault in &findings.faults {
                 println!("{fault}");
             }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use super::setting::Setting;
 use super::settings;
 use super::value::Given;
-use super::{Config, Flags, file};
+use super::{Config, Flags, Role, file};
 
 /// What is in effect.
 #[derive(Debug)]
@@ -59,6 +59,7 @@ pub fn load(
     layers.file(flags);
     layers.environment(variable);
     layers.flags(flags);
+    layers.together();
     if layers.faults.is_empty() {
         let (config, sources) = (layers.config, layers.sources);
         Ok(Loaded { config, sources })
@@ -125,12 +126,31 @@ impl Layers<'_> {
         }
     }
 
+    /// What is right by itself may still not go together.
+    fn together(&mut self) {
+        let Config { role, store, .. } = &self.config;
+        if *role != Role::All && !store.is_shared() && self.faults.is_empty() {
+            let place = match &self.sources[self.index("role")] {
+                source @ Source::File(..) => format!("{source}: role"),
+                source => source.to_string(),
+            };
+            let reason = match role {
+                Role::Worker => "no other process could take plans for it to run",
+                _ => "no other process could run its plans",
+            };
+            self.faults.push(format!(
+                "{place} is {:?}, must be all while store is sqlite: {reason}; nodes share a store nats://...",
+                role.name()
+            ));
+        }
+    }
+
     fn put(&mut self, key: &str, given: &Given, source: Source, place: &str) {
         let index = self.index(key);
         match self.settings[index].set(&mut self.config, given) {
             Ok(()) => self.sources[index] = source,
             Err(allowed) => {
-                let found = if self.settings[index].is_secret() {
+                let found = if self.settings[index].hides(given) {
                     "wrong".to_owned()
                 } else {
                     given.shown()
@@ -262,6 +282,46 @@ mod tests {
         let faults = loaded("otlp_headers = \"hush\"\n", &[], &[]).expect_err("wrong");
         assert!(faults[0].starts_with("FILE:1: otlp_headers is wrong, must be name=value"));
         assert!(!faults[0].contains("hush"), "{faults:?}");
+    }
+
+    #[test]
+    fn a_password_in_an_address_is_refused_unshown() {
+        for text in ["nats://user:hush@a:4222", "user:hush@a"] {
+            let faults = loaded("", &[("NOCTULE_STORE", text)], &[]).expect_err("wrong");
+            let expected = "NOCTULE_STORE is wrong, must be sqlite, or nats://HOST:PORT or tls://HOST:PORT \
+                without user and password (store_credentials has those)";
+            assert!(faults[0].starts_with(expected), "{faults:?}");
+            assert!(!faults[0].contains("hush"), "{faults:?}");
+        }
+    }
+
+    #[test]
+    fn a_part_is_played_where_nodes_share_a_store() {
+        let check = |lines: &str, given: &[(&'static str, &str)], expected: &str| {
+            let faults = loaded(lines, &[], given).expect_err("wrong");
+            assert_eq!(faults, [expected]);
+        };
+        check(
+            "role = \"worker\"\n",
+            &[],
+            "FILE:1: role is \"worker\", must be all while store is sqlite: no other process could take plans for \
+             it to run; nodes share a store nats://...",
+        );
+        check(
+            "",
+            &[("role", "api")],
+            "--role is \"api\", must be all while store is sqlite: no other process could run its plans; nodes \
+             share a store nats://...",
+        );
+        for (name, role) in [
+            ("all", Role::All),
+            ("api", Role::Api),
+            ("worker", Role::Worker),
+        ] {
+            let given = [("store", "nats://a:4222"), ("role", name)];
+            let config = loaded("", &[], &given).expect("right").config;
+            assert_eq!(config.role, role);
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod collector;
 mod file;
 mod flags;
 mod layers;
+mod place;
 mod print;
 mod setting;
 mod settings;
@@ -20,6 +21,7 @@ use std::time::Duration;
 pub use collector::{Endpoint, Headers};
 pub use flags::Flags;
 pub use layers::{Loaded, load};
+pub use place::{Place, Replicas, Role};
 pub use value::{Filter, LogFormat};
 
 use crate::scenario::limits::Limits;
@@ -39,6 +41,16 @@ pub struct Config {
     pub queue: usize,
     /// Time from a signal to the exit.
     pub grace: Duration,
+    /// Where plans are kept.
+    pub store: Place,
+    /// What the servers of a shared store want to know of this node; a file as `nsc` writes it.
+    pub store_credentials: Option<PathBuf>,
+    /// How many copies they keep.
+    pub store_replicas: Replicas,
+    /// How long a run is a node's after it last said so.
+    pub store_lease: Duration,
+    /// What this node does for those that share its store.
+    pub role: Role,
     /// The keys of those who may use the service; `None` when it is for everybody who reaches it.
     pub keys_file: Option<PathBuf>,
     /// Whether it may be reached from other machines without keys.
@@ -110,6 +122,11 @@ impl Default for Config {
             workers: std::thread::available_parallelism().map_or(1, Into::into),
             queue: 1000,
             grace: Duration::from_secs(10),
+            store: Place::default(),
+            store_credentials: None,
+            store_replicas: Replicas::default(),
+            store_lease: Duration::from_secs(30),
+            role: Role::default(),
             keys_file: None,
             allow_anonymous: false,
             cors_origins: Vec::new(),

@@ -59,6 +59,11 @@ impl Setting {
         self.place.is_secret()
     }
 
+    /// Whether a refusal of `given` must not show it.
+    pub(super) fn hides(&self, given: &Given) -> bool {
+        self.place.hides(given)
+    }
+
     /// Whether its flag may stand without a value.
     pub(super) fn is_switch(&self) -> bool {
         self.place.is_switch()
@@ -89,6 +94,7 @@ trait Place {
     fn shown(&self, config: &Config) -> Option<String>;
     fn is_switch(&self) -> bool;
     fn is_secret(&self) -> bool;
+    fn hides(&self, given: &Given) -> bool;
 }
 
 struct Field<T> {
@@ -113,6 +119,10 @@ impl<T: Value> Place for Field<T> {
 
     fn is_secret(&self) -> bool {
         T::IS_SECRET
+    }
+
+    fn hides(&self, given: &Given) -> bool {
+        T::is_secret(given)
     }
 }
 

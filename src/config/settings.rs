@@ -59,6 +59,41 @@ fn service() -> Vec<Setting> {
             |c| &mut c.grace,
         ),
         row(
+            "store",
+            "PLACE",
+            "Where plans are kept: sqlite, or nats://HOST:PORT[,HOST:PORT...][/NAMESPACE], which nodes share",
+            ..,
+            |c| &mut c.store,
+        ),
+        row(
+            "store_credentials",
+            "FILE",
+            "Credentials for the NATS servers, as nsc writes them",
+            ..,
+            |c| &mut c.store_credentials,
+        ),
+        row(
+            "store_replicas",
+            "N",
+            "Copies of everything that the NATS servers keep: 1, 3 or 5",
+            ..,
+            |c| &mut c.store_replicas,
+        ),
+        row(
+            "store_lease",
+            "SECONDS",
+            "A node that is silent for so long has lost the plans that it runs to the others of its NATS store",
+            Duration::from_secs(1)..=Duration::from_secs(3600),
+            |c| &mut c.store_lease,
+        ),
+        row(
+            "role",
+            "ROLE",
+            "What this node does for those that share its store: all, api (it runs no plans) or worker (it only runs them)",
+            ..,
+            |c| &mut c.role,
+        ),
+        row(
             "keys_file",
             "FILE",
             "Keys of those who may use the service, see noctule key new; NOCTULE_KEYS may hold them instead",
@@ -363,6 +398,15 @@ mod tests {
             ),
         );
         check("log_format", "xml", Err("text or json"));
+        check("role", "boss", Err("all, api or worker"));
+        check("store_replicas", "2", Err("1, 3 or 5"));
+        check(
+            "store_lease",
+            "0.5",
+            Err(
+                "seconds, or a number with a unit such as 250ms, 30s, 15m, 12h or 30d, from 1 to 3600",
+            ),
+        );
         check(
             "listen",
             "here",

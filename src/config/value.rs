@@ -61,6 +61,11 @@ pub(super) trait Value: Clone + PartialOrd + 'static {
     /// `None` when it is no such value.
     fn read(given: &Given) -> Option<Self>;
 
+    /// Whether a refusal of it must not show it.
+    fn is_secret(_given: &Given) -> bool {
+        Self::IS_SECRET
+    }
+
     /// As it stands in the file; `None` when there is none.
     fn to_toml(&self) -> Option<String>;
 }

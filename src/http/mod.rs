@@ -55,7 +55,7 @@ pub use phase::Phase;
 pub use terrains::Terrains;
 
 use crate::scenario::json::Rules;
-use crate::store::Store;
+use crate::store::{Stats, Store};
 use crate::telemetry::Instruments;
 use auth::{Access, Needs};
 use problem::Problem;
@@ -92,10 +92,18 @@ pub struct AppState {
 /// How much the service does at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacity {
-    /// Plans run at the same time.
+    /// Plans run at the same time by this node; other nodes of its store may run more.
     pub workers: usize,
     /// Plans waiting at most.
     pub queue: usize,
+}
+
+impl Capacity {
+    /// Plans run at the same time by all nodes of a store, at least 1: somebody is to run what is accepted.
+    fn all_workers(self, stats: Option<&Stats>) -> usize {
+        let of_all = stats.and_then(|stats| stats.slots);
+        of_all.unwrap_or(self.workers).max(1)
+    }
 }
 
 /// One row of the table of routes.
@@ -149,15 +157,34 @@ pub fn routes() -> Vec<Route> {
 
 /// The service: every route, every refusal a problem, every answer with its request's id.
 pub fn router(state: AppState) -> Router {
+    let nowhere = async |uri: Uri| Problem::NoSuchResource(uri.path().to_owned());
+    assemble(state, routes(), nowhere)
+}
+
+/// A node that only runs plans: the routes of those who look after it, and no word of plans.
+pub fn upkeep_router(state: AppState) -> Router {
+    const UPKEEP: [&str; 4] = ["/livez", "/readyz", "/metrics", "/version"];
+    let mut routes = routes();
+    routes.retain(|route| UPKEEP.contains(&route.path));
+    let nowhere = async |uri: Uri| Problem::NotServedHere(uri.path().to_owned());
+    assemble(state, routes, nowhere)
+}
+
+/// These routes, and what is said where there is none.
+fn assemble<T: 'static>(
+    state: AppState,
+    routes: Vec<Route>,
+    nowhere: impl Handler<T, AppState>,
+) -> Router {
     let (access, cors) = (state.access.clone(), state.cors.clone());
-    let router = routes()
+    let router = routes
         .into_iter()
         .fold(Router::new(), |router, route| {
             let gate = from_fn_with_state((access.clone(), route.needs), auth::gate);
             router.route(route.path, route.handler.route_layer(gate))
         })
         .method_not_allowed_fallback(async || Problem::MethodNotAllowed)
-        .fallback(async |uri: Uri| Problem::NoSuchResource(uri.path().to_owned()))
+        .fallback(nowhere)
         .with_state(state.clone());
     wrap(router, &cors, state.instruments)
 }

@@ -18,12 +18,13 @@ const UNKNOWN_RUN_MS: f64 = 1000.0;
 /// A tenth rather than one place, so that not everyone refused comes back for the same place.
 pub(super) fn for_room(stats: &Stats, capacity: Capacity) -> u64 {
     let runs = stats.queued as f64 / 10.0 + 1.0;
-    seconds(runs * mean_run_ms(stats) / capacity.workers.max(1) as f64)
+    seconds(runs * mean_run_ms(stats) / capacity.all_workers(Some(stats)) as f64)
 }
 
 /// Seconds until an active plan is likely to end: those before it in the queue, and its own run.
 pub(super) fn for_end(plan: &Plan, stats: &Stats, capacity: Capacity) -> u64 {
-    let waiting = plan.queue_position.unwrap_or(0) as f64 / capacity.workers.max(1) as f64;
+    let waiting =
+        plan.queue_position.unwrap_or(0) as f64 / capacity.all_workers(Some(stats)) as f64;
     let running = match plan.status {
         Status::Running => 1.0 - plan.progress,
         _ => 1.0,
@@ -51,12 +52,13 @@ mod tests {
 
     #[test]
     fn grows_with_the_queue_and_shrinks_with_the_workers() {
-        let room = |queued, mean_run_ms, workers| {
+        let room_of = |queued, mean_run_ms, workers, slots| {
             let stats = Stats {
                 queued,
                 oldest_queued_ms: None,
                 running: 0,
                 mean_run_ms,
+                slots,
             };
             for_room(
                 &stats,
@@ -66,6 +68,7 @@ mod tests {
                 },
             )
         };
+        let room = |queued, mean_run_ms, workers| room_of(queued, mean_run_ms, workers, None);
         assert_eq!(
             room(1000, Some(2000.0), 4),
             51,
@@ -79,5 +82,9 @@ mod tests {
             "a second a run while none is known"
         );
         assert_eq!(room(1_000_000, Some(1e6), 1), 600, "at most ten minutes");
+        let shared = |workers, slots| room_of(1000, Some(2000.0), workers, slots);
+        assert_eq!(shared(0, Some(8)), 26, "other nodes run plans");
+        assert_eq!(shared(4, Some(8)), 26);
+        assert_eq!(shared(0, Some(0)), 202, "as if somebody came");
     }
 }

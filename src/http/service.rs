@@ -76,6 +76,7 @@ pub(super) async fn limits(State(state): State<AppState>, uri: Uri) -> Result<Re
     Params::read(&uri, &[])?;
     let limits = state.rules.limits;
     let access = state.access.settings();
+    let stats = state.store.stats().await.ok();
     let document = LimitsDocument {
         body_bytes: limits.body_bytes,
         threats: limits.threats,
@@ -88,7 +89,7 @@ pub(super) async fn limits(State(state): State<AppState>, uri: Uri) -> Result<Re
         iterations: limits.iterations,
         work: limits.work,
         path_samples: limits.path_samples,
-        workers: state.capacity.workers,
+        workers: state.capacity.all_workers(stats.as_ref()),
         queue: state.capacity.queue,
         page: plans::MAX_PAGE,
         wait_s: prefer::MAX_WAIT_S,

@@ -345,6 +345,8 @@ pub struct Stats {
     pub running: u64,
     /// Mean run time of the last few plans that ended with a result, milliseconds; `None` before the first.
     pub mean_run_ms: Option<f64>,
+    /// Plans that all nodes of the store together run at the same time; `None` when one process alone uses it.
+    pub slots: Option<usize>,
 }
 
 /// Why a store did not do what it was asked.

@@ -50,6 +50,9 @@ impl Problem {
             Self::NoSuchResource(path) => {
                 format!("nothing is at {path}; GET /docs lists what is")
             }
+            Self::NotServedHere(path) => {
+                format!("this node runs plans and serves none, so nothing is at {path}; nodes of the role api or all serve them")
+            }
             Self::NoSuchPlan(id) => format!("there is no plan {id}"),
             Self::NoSuchTerrain(name) => {
                 format!("there is no dataset {name:?}; GET /terrains lists what there is")

@@ -43,9 +43,10 @@ impl Problem {
                 "forbidden",
                 "The key may not do this",
             ),
-            Self::NoSuchResource(_) | Self::NoSuchPlan(_) | Self::NoSuchTerrain(_) => {
-                (StatusCode::NOT_FOUND, "not-found", "No such resource")
-            }
+            Self::NoSuchResource(_)
+            | Self::NotServedHere(_)
+            | Self::NoSuchPlan(_)
+            | Self::NoSuchTerrain(_) => (StatusCode::NOT_FOUND, "not-found", "No such resource"),
             Self::MethodNotAllowed => (
                 StatusCode::METHOD_NOT_ALLOWED,
                 "method-not-allowed",

@@ -29,6 +29,8 @@ use crate::store::{Tombstone, Trouble};
 pub(super) enum Problem {
     /// No route has this path.
     NoSuchResource(String),
+    /// This node only runs plans, and has no route for the path.
+    NotServedHere(String),
     /// There never was such a plan, or nothing with that name can be one.
     NoSuchPlan(String),
     /// No dataset is called so.

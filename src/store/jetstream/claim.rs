@@ -45,45 +45,47 @@ impl JetStream {
     /// See [`Store::claim`](crate::store::Store::claim). Taking is a task of its own, so that a caller
     /// who goes away in the middle of it leaves no plan behind.
     pub(super) async fn claim(self: &Arc<Self>) -> Result<Lease, StoreError> {
-        let (mut give, take) = oneshot::channel();
+        let (give, take) = oneshot::channel();
         let store = Arc::clone(self);
-        tokio::spawn(async move {
-            let Some(claimed) = store.take_next(&mut give).await else {
-                return;
-            };
-            if let Err(Ok(lease)) = give.send(claimed)
-                && let Err(error) = store.release(lease.plan.id, lease.attempt).await
-            {
-                tracing::warn!(%error, "a plan that nobody waits for goes back when its lease ends");
-            }
-        });
+        tokio::spawn(async move { store.take_for(give).await });
         take.await.unwrap_or_else(|_| Err(closed()))
     }
 
-    /// `None` when nobody waits for it any more.
-    async fn take_next(
-        &self,
-        give: &mut oneshot::Sender<Result<Lease, StoreError>>,
-    ) -> Option<Result<Lease, StoreError>> {
+    async fn take_for(&self, mut give: oneshot::Sender<Result<Lease, StoreError>>) {
         let mut waiting = self.view.waiting();
         let mut end = self.end.subscribe();
         loop {
+            // One slot at a time: two would ask the same lanes, and get its plans out of order.
+            let turn = self.turn.lock().await;
             waiting.mark_unchanged();
-            if *end.borrow() {
-                return Some(Err(closed()));
-            }
             if give.is_closed() {
-                return None;
+                return;
             }
-            if let Some(claimed) = self.take_one().await.transpose() {
-                return Some(claimed);
+            let taken = if *end.borrow() {
+                Some(Err(closed()))
+            } else {
+                self.take_one().await.transpose()
+            };
+            if let Some(taken) = taken {
+                if let Err(Ok(lease)) = give.send(taken) {
+                    self.take_back(&lease).await;
+                }
+                return;
             }
+            drop(turn);
             tokio::select! {
-                () = give.closed() => return None,
+                () = give.closed() => return,
                 _ = end.changed() => {}
                 _ = waiting.changed() => {}
                 () = tokio::time::sleep(self.patrol()) => {}
             }
+        }
+    }
+
+    /// Nobody waits for it any more.
+    async fn take_back(&self, lease: &Lease) {
+        if let Err(error) = self.release(lease.plan.id, lease.attempt).await {
+            tracing::warn!(%error, "a plan that nobody waits for goes back when its lease ends");
         }
     }
 
@@ -119,7 +121,7 @@ impl JetStream {
         Ok(None)
     }
 
-    /// One slot of the node goes on patrol at a time.
+    /// One slot of the node goes on patrol for all.
     fn is_patrol_due(&self) -> bool {
         let mut last = self
             .last_patrol
@@ -154,7 +156,7 @@ impl JetStream {
         jobs.sort_by_key(place);
         let next = jobs.remove(0);
         for job in jobs {
-            if let Err(error) = job.ack_with(AckKind::Nak(None)).await {
+            if let Err(error) = job.double_ack_with(AckKind::Nak(None)).await {
                 tracing::debug!(error = %error, "a job was not given back");
             }
         }
@@ -364,7 +366,8 @@ fn end_of_lost(plan: &mut Plan, lost: u32, now_ms: i64) -> Result<Option<Status>
 
 /// Answer a delivery. A lost answer is made good by the next delivery.
 pub(super) async fn answer(job: &Job, answer: AckKind) {
-    if let Err(error) = job.ack_with(answer).await {
+    // Heard before the next job is asked for, so that one that is given back comes first.
+    if let Err(error) = job.double_ack_with(answer).await {
         tracing::debug!(error = %error, "a job was not answered");
     }
 }

@@ -74,6 +74,8 @@ struct JetStream {
     /// Among the other nodes.
     node: Uuid,
     consumers: Mutex<HashMap<Lane, PullConsumer>>,
+    /// Whose turn it is to claim.
+    turn: tokio::sync::Mutex<()>,
     last_patrol: Mutex<Option<Instant>>,
     all_slots: AtomicUsize,
     /// Ends that this node tells.
@@ -116,6 +118,7 @@ impl JetStreamStore {
             options,
             node: Uuid::new_v4(),
             consumers: Mutex::default(),
+            turn: tokio::sync::Mutex::default(),
             last_patrol: Mutex::default(),
             telling: Mutex::default(),
             end: watch::Sender::new(false),
@@ -279,7 +282,11 @@ impl Store for JetStreamStore {
     }
 
     async fn stats(&self) -> Result<Stats, StoreError> {
-        Ok(self.open_store()?.view.known().stats())
+        let store = self.open_store()?;
+        Ok(Stats {
+            slots: Some(store.slots()),
+            ..store.view.known().stats()
+        })
     }
 
     async fn health(&self) -> Result<(), StoreError> {

@@ -1,7 +1,6 @@
 //! Plans that are removed, and what remains of them.
 
 use super::JetStream;
-use super::lane::Lane;
 use super::record::{Document, Grave, State};
 use super::steps::Change;
 use super::trouble::failed;
@@ -18,14 +17,14 @@ impl JetStream {
 
     /// Remove a plan and all that belongs to it, except its tombstone.
     async fn bury(&self, id: PlanId, now_ms: i64, expired: bool) -> Result<(), StoreError> {
-        let mut remains: Option<(Lane, Vec<Document>)> = None;
+        let mut remains: Option<(u64, Vec<Document>)> = None;
         let standing = self
             .plans()
             .change(id, |standing| {
                 let record = standing.record(id, now_ms)?;
                 let documents = [Some(&record.scenario), record.result.as_ref()];
                 remains = Some((
-                    record.lane.clone(),
+                    record.place,
                     documents.into_iter().flatten().cloned().collect(),
                 ));
                 let grave = Grave {
@@ -39,8 +38,8 @@ impl JetStream {
                 }))
             })
             .await?;
-        if let Some((lane, documents)) = remains {
-            self.withdraw(id, &lane).await;
+        if let Some((place, documents)) = remains {
+            self.withdraw(id, place).await;
             self.servers
                 .remove_documents(id, &documents.iter().collect::<Vec<_>>())
                 .await?;
@@ -55,10 +54,11 @@ impl JetStream {
         Ok(())
     }
 
-    /// Take a job out of the queue. One that stays is thrown away by whoever is given it.
-    pub(super) async fn withdraw(&self, id: PlanId, lane: &Lane) {
-        let job = self.job_subject(id, lane);
-        if let Err(error) = self.servers.jobs.purge().filter(job).await {
+    /// Take a job out of the queue, by its place. One that stays is thrown away by whoever is given it.
+    ///
+    /// (To purge its subject would also make the servers forget which jobs were given back.)
+    pub(super) async fn withdraw(&self, id: PlanId, place: u64) {
+        if let Err(error) = self.servers.jobs.delete_message(place).await {
             tracing::debug!(%error, plan = %id, "a job is left in the queue");
         }
     }

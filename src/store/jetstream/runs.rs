@@ -160,7 +160,7 @@ impl JetStream {
                 let events = match record.plan.status {
                     Status::Queued => {
                         record.plan.cancel(now_ms)?;
-                        waited = Some(record.lane.clone());
+                        waited = Some(record.place);
                         record.told_end(self.options.retention.age_ms)
                     }
                     Status::Running if !record.plan.cancel_requested => {
@@ -177,8 +177,8 @@ impl JetStream {
                 }))
             })
             .await?;
-        if let Some(lane) = waited {
-            self.withdraw(id, &lane).await;
+        if let Some(place) = waited {
+            self.withdraw(id, place).await;
         }
         Ok(standing.record(id, clock_ms)?.plan.clone())
     }

@@ -279,6 +279,7 @@ impl Known {
             running: self.running.values().map(|lane| lane.len() as u64).sum(),
             mean_run_ms: (!times.is_empty())
                 .then(|| times.iter().sum::<i64>() as f64 / times.len() as f64),
+            slots: None,
         }
     }
 

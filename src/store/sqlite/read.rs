@@ -275,6 +275,7 @@ pub(super) fn stats(connection: &Connection) -> Result<Stats, StoreError> {
         oldest_queued_ms,
         running: count(Status::Running)?,
         mean_run_ms,
+        slots: None,
     })
 }
 

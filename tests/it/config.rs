@@ -101,6 +101,36 @@ fn what_is_wrong_is_refused_before_anything_is_opened() {
 }
 
 #[test]
+fn a_shared_store_is_printed_and_a_password_is_not() {
+    let text = printed(
+        &[("NOCTULE_STORE", "nats://a:4222,b:4222/fleet")],
+        &["--role=worker", "--store-replicas=3", "--store-lease=10"],
+    );
+    for line in [
+        "store = \"nats://a:4222,b:4222/fleet\" # NOCTULE_STORE",
+        "store_replicas = 3 # --store-replicas",
+        "store_lease = 10 # --store-lease",
+        "role = \"worker\" # --role",
+    ] {
+        assert!(text.lines().any(|found| found == line), "{line}\n{text}");
+    }
+    for (variables, arguments) in [
+        (vec![("NOCTULE_STORE", "nats://me:hush@a:4222")], vec![]),
+        (vec![], vec!["--store=nats://hush@a:4222"]),
+    ] {
+        let arguments = [vec!["serve", "--print-config"], arguments].concat();
+        let refused = run_with(&variables, &arguments, "");
+        assert_eq!(refused.status.code(), Some(1));
+        let text = String::from_utf8(refused.stderr).expect("UTF-8");
+        assert!(
+            text.contains("is wrong, must be sqlite, or nats://HOST:PORT"),
+            "{text}"
+        );
+        assert!(!text.contains("hush"), "{text}");
+    }
+}
+
+#[test]
 fn the_help_tells_flag_variable_and_default() {
     let help = run(&["serve", "--help"], "");
     let text = String::from_utf8(help.stdout).expect("UTF-8");

@@ -6,11 +6,11 @@ use futures_util::future::join_all;
 
 use crate::support::scenario;
 use crate::support::sse::{Stream, events};
-use crate::support::stores::{Place, for_every_service};
+use crate::support::stores::{Place, for_every_backend};
 
 #[tokio::test]
 async fn no_accepted_plan_is_lost_or_done_twice() {
-    for_every_service(async |backend| {
+    for_every_backend(async |backend| {
         let place = Place::new(backend);
         let service = place.serve(&["--workers", "2"]);
         let addresses = join_all((0..50).map(|seed| {

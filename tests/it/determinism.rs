@@ -4,7 +4,7 @@ use futures_util::future::join_all;
 use serde_json::Value;
 
 use crate::support::process::run;
-use crate::support::stores::{Backend, Place, SERVED};
+use crate::support::stores::{BACKENDS, Backend, Place};
 
 /// The shipped scenarios, small enough for a test: with the defaults, and by the plain algorithm with
 /// two seeds.
@@ -75,7 +75,7 @@ async fn the_route_depends_on_the_request_alone() {
         waypoints(&alone[1]),
         "the seed matters"
     );
-    for backend in SERVED {
+    for backend in BACKENDS {
         for workers in ["1", "4"] {
             let routes = by_service(backend, workers, &documents).await;
             assert_eq!(routes, alone, "{backend:?}, {workers} workers");

@@ -22,6 +22,7 @@ mod metrics;
 mod openapi;
 mod page;
 mod refusals;
+mod roles;
 mod scenario;
 mod shutdown;
 mod siege;

@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::support::process::Service;
 use crate::support::scenario;
 use crate::support::sse::{Block, Stream, events};
-use crate::support::stores::{Place, for_every_service};
+use crate::support::stores::{Place, for_every_backend};
 
 /// A plan that runs for so long, wherever it runs: its iterations alone would take minutes.
 fn a_run_of(ms: u64) -> Value {
@@ -66,7 +66,7 @@ const LONG_BEFORE: Duration = Duration::from_secs(30);
 
 #[tokio::test]
 async fn an_idle_service_leaves_at_once() {
-    for_every_service(async |backend| {
+    for_every_backend(async |backend| {
         for signal in ["TERM", "INT"] {
             let place = Place::new(backend);
             let service = place.serve(&["--grace", "600"]);
@@ -82,7 +82,7 @@ async fn an_idle_service_leaves_at_once() {
 
 #[tokio::test]
 async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
-    for_every_service(async |backend| {
+    for_every_backend(async |backend| {
         let place = Place::new(backend);
         let service = place.serve(&["--workers", "1", "--grace", "2"]);
         let address = service.submit(&a_run_of(4000)).await;
@@ -136,7 +136,7 @@ async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
 
 #[tokio::test]
 async fn a_plan_that_ends_within_the_grace_period_is_kept() {
-    for_every_service(async |backend| {
+    for_every_backend(async |backend| {
         let place = Place::new(backend);
         let service = place.serve(&["--workers", "1", "--grace", "30"]);
         let address = service.submit(&a_run_of(1000)).await;

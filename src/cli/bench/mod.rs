@@ -5,6 +5,7 @@
 mod case;
 mod chart;
 mod clock;
+mod cluster;
 mod paper;
 mod price;
 mod progress;
@@ -17,7 +18,7 @@ mod summary;
 mod table;
 mod trial;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
@@ -37,6 +38,8 @@ pub(super) enum Command {
     Speed(speed::Arguments),
     /// The service under load: requests, refusals, streams and plans a second, beside a bare handler
     Serve(serve::Arguments),
+    /// A NATS system under load: rates beside a bare client, workers that sleep, a day's load
+    Cluster(cluster::Arguments),
     /// The violation and cost of routes from standard input, for searches outside of this program
     Price(price::Arguments),
 }
@@ -72,6 +75,10 @@ pub(super) fn run(command: &Command) -> anyhow::Result<u8> {
                 serve::measure(arguments, cases)
             })
         }),
+        Command::Cluster(arguments) => cluster::measure(arguments).and_then(|report| {
+            write(&report, arguments.output.out.as_deref(), "cluster")
+                .context("cannot write the report")
+        }),
         Command::Price(arguments) => price::run(arguments),
     };
     let Err(error) = done else {
@@ -94,11 +101,11 @@ fn report(
     measure: impl FnOnce(&[Case]) -> anyhow::Result<Report>,
 ) -> anyhow::Result<()> {
     let report = measure(&case::cases(&common.scenario)?)?;
-    write(&report, common, name).context("cannot write the report")
+    write(&report, common.out.as_deref(), name).context("cannot write the report")
 }
 
-fn write(report: &Report, common: &Common, name: &str) -> std::io::Result<()> {
-    match &common.out {
+fn write(report: &Report, out: Option<&Path>, name: &str) -> std::io::Result<()> {
+    match out {
         Some(directory) => report.save(directory, name),
         None => report.print(),
     }

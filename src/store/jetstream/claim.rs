@@ -227,8 +227,14 @@ impl JetStream {
             answer(&job, AckKind::Ack).await;
             return Ok(None);
         };
-        match self.record_of_job(id).await {
-            Ok(_) => {}
+        let document = match self.record_of_job(id).await {
+            Ok(standing) => match &*standing.state {
+                State::Kept(record) => record.scenario.clone(),
+                State::Buried(_) => {
+                    answer(&job, AckKind::Ack).await;
+                    return Ok(None);
+                }
+            },
             Err(StoreError::NotFound(_)) if deliveries > ORPHANED_AFTER => {
                 tracing::info!(plan = %id, "a job that was never accepted is thrown away");
                 self.servers.remove_documents(id, &[]).await?;
@@ -243,12 +249,12 @@ impl JetStream {
                 answer(&job, AckKind::Nak(None)).await;
                 return Err(error);
             }
-        }
-        let found = self.start(id, &job).await?;
-        match found {
+        };
+        let (found, scenario) = tokio::join!(self.start(id, &job), self.servers.read(&document));
+        match found? {
             Found::Over => answer(&job, AckKind::Ack).await,
             Found::Ours => {}
-            Found::Run(record) => return self.lease(*record, job).await.map(Some),
+            Found::Run(record) => return self.lease(*record, scenario, job).await.map(Some),
         }
         Ok(None)
     }
@@ -307,14 +313,19 @@ impl JetStream {
             .map(|_| found)
     }
 
-    async fn lease(&self, record: Record, job: Job) -> Result<Lease, StoreError> {
+    async fn lease(
+        &self,
+        record: Record,
+        scenario: Result<String, StoreError>,
+        job: Job,
+    ) -> Result<Lease, StoreError> {
         let (id, attempt) = (record.id(), record.attempt);
         let cancel = self.leases.hold(id, attempt, job, self.settings.lease);
         // What was asked between the step and the hold.
         if let Some(standing) = self.view.standing(id) {
             self.leases.heed(id, &standing.state);
         }
-        match self.servers.read(&record.scenario).await {
+        match scenario {
             Ok(scenario) => Ok(Lease {
                 plan: record.plan,
                 scenario: scenario.into(),

@@ -111,13 +111,20 @@ impl JetStream {
             .rsplit('.')
             .next()
             .and_then(|id| PlanId::parse_str(id).ok());
-        let read = Step::read(&message.payload);
-        match (id, read) {
-            (Some(id), Ok(step)) => self.plans().learn(id, &Placed { sequence, step }),
-            (_, Err(error)) => {
-                tracing::error!(%error, subject = message.subject.as_str(), sequence, "a step cannot be read; it is left out");
+        let Some(id) = id else { return };
+        // What this node wrote itself is known already.
+        if self
+            .view
+            .standing(id)
+            .is_some_and(|known| known.sequence >= sequence)
+        {
+            return;
+        }
+        match Step::read(&message.payload) {
+            Ok(step) => self.plans().learn(id, &Placed { sequence, step }),
+            Err(error) => {
+                tracing::error!(%error, plan = %id, sequence, "a step cannot be read; it is left out");
             }
-            (None, Ok(_)) => {}
         }
     }
 

@@ -207,3 +207,101 @@ impl Histories {
         self.plans.get(&id)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use uuid::Uuid;
+
+    use super::*;
+    use crate::job::{Status, Submission};
+    use crate::store::jetstream::record::{Document, Queued, Record};
+
+    fn record() -> Record {
+        let submission = Submission {
+            id: Uuid::nil(),
+            name: None,
+            algorithm: "tms-sba".to_owned(),
+            seed: 7,
+            iterations: 200,
+            work: 1,
+            scenario: "{}".to_owned(),
+            created_ms: 0,
+            owner: None,
+            quota: None,
+            webhook: None,
+            idempotency: None,
+            dataset: None,
+        };
+        let queued = Queued {
+            place: 1,
+            position: 1,
+        };
+        Record::accepted(&submission, queued, Document::scenario(Uuid::nil(), "{}"))
+    }
+
+    /// Steps of one, two, one, two ... events.
+    fn steps(count: u64) -> Vec<Step> {
+        let mut record = record();
+        (0..count)
+            .map(|nth| {
+                let events = vec![Event::End(Status::Failed); 1 + (nth % 2) as usize];
+                record.last_event += events.len() as u64;
+                Step {
+                    mark: Uuid::nil(),
+                    state: State::Kept(Box::new(record.clone())),
+                    events,
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn pages_are_whole_from_any_place_and_say_what_is_forgotten() {
+        let mut histories = Histories::new(4);
+        for step in steps(10) {
+            histories.push(Uuid::nil(), &step);
+        }
+        // Fifteen events; the last four steps have six.
+        let page = histories.page(Uuid::nil(), 0, 100).expect("it began here");
+        assert_eq!(page.forgotten, 9);
+        let ids: Vec<_> = page.events.iter().map(|event| event.id).collect();
+        assert_eq!(ids, [10, 11, 12, 13, 14, 15]);
+        for after in 9..16 {
+            let page = histories
+                .page(Uuid::nil(), after, 2)
+                .expect("it began here");
+            let expected: Vec<_> = (after + 1..=15).take(2).collect();
+            let ids: Vec<_> = page.events.iter().map(|event| event.id).collect();
+            assert_eq!(ids, expected, "after {after}");
+        }
+    }
+
+    #[test]
+    fn a_history_with_a_hole_is_not_kept_and_one_without_a_beginning_not_begun() {
+        let steps = steps(6);
+        let mut histories = Histories::new(usize::MAX);
+        histories.push(Uuid::nil(), &steps[2]);
+        assert_eq!(histories.page(Uuid::nil(), 0, 100), None);
+        for nth in [0, 1, 1, 0, 2] {
+            histories.push(Uuid::nil(), &steps[nth]);
+        }
+        let page = histories.page(Uuid::nil(), 0, 100).expect("it began here");
+        assert_eq!(page.events.len(), 4);
+        histories.push(Uuid::nil(), &steps[4]);
+        assert_eq!(histories.page(Uuid::nil(), 0, 100), None);
+    }
+
+    #[test]
+    fn what_nobody_reads_makes_room() {
+        let mut histories = Histories::new(usize::MAX);
+        let step = &steps(1)[0];
+        let count = ROOM / (2 * SMALL_EVENT) + 10;
+        for nth in 0..count as u128 {
+            histories.push(Uuid::from_u128(nth), step);
+        }
+        assert!(histories.bytes <= ROOM);
+        assert_eq!(histories.page(Uuid::from_u128(0), 0, 1), None);
+        let last = Uuid::from_u128(count as u128 - 1);
+        assert!(histories.page(last, 0, 1).is_some());
+    }
+}

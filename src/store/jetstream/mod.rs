@@ -22,6 +22,7 @@ mod shelf;
 mod steps;
 mod submit;
 mod trouble;
+mod turns;
 mod view;
 
 use std::collections::{BTreeSet, HashMap};

@@ -7,8 +7,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::watch;
 
 use super::history::Histories;
-use super::lane::{Lane, Size, Version};
+use super::lane::{Lane, Version};
 use super::record::{Placed, Record, State};
+use super::turns::{self, Lanes};
 use crate::job::{Plan, PlanId, Status};
 use crate::store::changes::Changes;
 use crate::store::{DatasetUse, ListQuery, Stats, StoreError, TOMBSTONE_MS};
@@ -38,8 +39,8 @@ pub(super) struct Known {
     pub(super) histories: Histories,
     /// In the order of acceptance.
     queue: BTreeSet<(u64, PlanId)>,
-    lanes: HashMap<Lane, BTreeSet<(u64, PlanId)>>,
-    running: HashMap<Lane, BTreeSet<(u64, PlanId)>>,
+    lanes: Lanes,
+    running: Lanes,
     /// By the time of their ends.
     ended: BTreeSet<(i64, PlanId)>,
     ended_bytes: u64,
@@ -316,7 +317,7 @@ impl Known {
             return Err(StoreError::QueueFull { queued });
         }
         let coming = self.coming.get(&lane.owner).copied().unwrap_or_default();
-        let of_owner = |lanes: &HashMap<Lane, BTreeSet<(u64, PlanId)>>| {
+        let of_owner = |lanes: &Lanes| {
             let own = lanes.iter().filter(|(one, _)| one.owner == lane.owner);
             own.map(|(_, plans)| plans.len() as u64).sum::<u64>()
         };
@@ -340,26 +341,9 @@ impl Known {
         }
     }
 
-    /// The lane whose turn it is, for a worker of that version in a system of so many slots: that of
-    /// the owner who has the fewest plans running, of equals that of the oldest plan. Large plans
-    /// leave a quarter of the slots to small ones.
+    /// The lane whose turn it is; see [`turns::next`].
     pub(super) fn next_lane(&self, version: Version, slots: usize) -> Option<Lane> {
-        let mut running: HashMap<&str, usize> = HashMap::new();
-        let mut large = 0;
-        for (lane, plans) in &self.running {
-            *running.entry(&lane.owner).or_default() += plans.len();
-            large += usize::from(lane.size == Size::Large) * plans.len();
-        }
-        let room_for_large = large < slots.saturating_sub(slots.div_ceil(4)).max(1);
-        let turns = self.lanes.iter().filter(|(lane, _)| {
-            lane.version <= version && (lane.size == Size::Small || room_for_large)
-        });
-        turns
-            .min_by_key(|(lane, plans)| {
-                let share = running.get(lane.owner.as_str()).copied();
-                (share.unwrap_or_default(), plans.first().copied())
-            })
-            .map(|(lane, _)| lane.clone())
+        turns::next(&self.lanes, &self.running, version, slots)
     }
 
     /// Lanes whose running plans may have lost their workers.

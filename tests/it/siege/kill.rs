@@ -10,7 +10,7 @@ use super::{Dice, size};
 use crate::support::process::Service;
 use crate::support::scenario;
 use crate::support::sse::{Stream, events};
-use crate::support::stores::{Place, for_every_service};
+use crate::support::stores::{Place, for_every_backend};
 
 /// A kill comes so many milliseconds after the start at the latest.
 const LIFE_MS: usize = 400;
@@ -49,7 +49,7 @@ impl Known {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn kills_at_random_points_lose_nothing_and_repeat_nothing() {
-    for_every_service(async |backend| {
+    for_every_backend(async |backend| {
         let (n_kills, n_plans) = size((10, 60), (100, 200));
         let place = Place::new(backend);
         let mut dice = Dice::new(1);

@@ -67,6 +67,14 @@ impl NatsServer {
         server
     }
 
+    /// One that keeps nothing.
+    pub(crate) fn without_jetstream() -> Self {
+        let mut server = Self::new("", "enabled: false");
+        server.launch();
+        server.wait("/healthz");
+        server
+    }
+
     /// Neither started nor alone, perhaps.
     fn new(cluster: &str, storage: &str) -> Self {
         let directory = TempDir::new().expect("a temporary directory");
@@ -201,6 +209,25 @@ impl Cluster {
             server.wait("/healthz");
         }
         Self { servers }
+    }
+
+    /// Which of them leads the plans of an address.
+    pub(crate) async fn leader(&self, address: &str) -> usize {
+        let hosts: Vec<_> = self.servers.iter().map(NatsServer::host).collect();
+        let client = async_nats::connect(hosts).await.expect("connected");
+        let context = async_nats::jetstream::new(client);
+        let stream = format!("{}-plans", namespace(address));
+        loop {
+            if let Ok(mut stream) = context.get_stream(&stream).await
+                && let Ok(info) = stream.info().await
+                && let Some(leader) = info.cluster.as_ref().and_then(|one| one.leader.clone())
+                && let Some(found) = self.servers.iter().position(|one| one.name() == leader)
+                && self.servers[found].running.is_some()
+            {
+                return found;
+            }
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
     }
 
     /// The address of a namespace that nobody else uses, by way of any of them.

@@ -24,9 +24,6 @@ pub(crate) enum Backend {
 /// The backends that the conformance suite runs on.
 pub(crate) const BACKENDS: [Backend; 2] = [Backend::Sqlite, Backend::JetStream];
 
-/// Those that a process can be told of.
-pub(crate) const SERVED: [Backend; 1] = [Backend::Sqlite];
-
 /// How long a run is a node's after it last said so.
 pub(crate) const LEASE: Duration = Duration::from_secs(2);
 
@@ -68,7 +65,12 @@ impl Place {
 
     /// A service over the store, as a process of its own.
     pub(crate) fn serve(&self, arguments: &[&str]) -> Service {
-        Service::start(self.path(), arguments)
+        let lease = format!("{}s", LEASE.as_secs());
+        let mut all = arguments.to_vec();
+        if let Some(address) = &self.address {
+            all.extend(["--store", address, "--store-lease", &lease]);
+        }
+        Service::start(self.path(), &all)
     }
 }
 
@@ -156,15 +158,6 @@ impl Deref for Fixture {
 
     fn deref(&self) -> &Self::Target {
         self.store.as_deref().expect("the store is open")
-    }
-}
-
-/// Run a test for each backend that a process can be told of.
-pub(crate) async fn for_every_service(test: impl AsyncFn(Backend)) {
-    for backend in SERVED {
-        // Shown when the test fails.
-        println!("on {backend:?}");
-        test(backend).await;
     }
 }
 

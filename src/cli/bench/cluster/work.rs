@@ -1,0 +1,192 @@
+//! The store under fixed-time jobs: nodes as processes would be, each with its connection and view.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::Context as _;
+use futures_util::stream::{self, TryStreamExt as _};
+
+use super::Took;
+use crate::export::document::Convergence;
+use crate::job::{self, Event, Status, Submission};
+use crate::store::jetstream::{JetStreamStore, Settings};
+use crate::store::{Ending, Options, Store, wall_clock};
+
+/// Callers at a time.
+pub(super) const CALLERS: usize = 32;
+
+/// Workers that run what was accepted.
+pub(super) const WORKERS: u16 = 8;
+
+/// Bytes of a scenario document.
+pub(super) const SCENARIO: usize = 2_000;
+
+/// Bytes of a result document.
+pub(super) const RESULT: usize = 8_000;
+
+/// Nodes of one system, the first of which also accepts plans.
+pub(super) struct Nodes {
+    all: Vec<Arc<JetStreamStore>>,
+    settings: Settings,
+    workers: u16,
+}
+
+impl Nodes {
+    /// As many as `workers` need, `slots` each.
+    pub(super) async fn open(settings: Settings, workers: u16, slots: u16) -> anyhow::Result<Self> {
+        let mut all = Vec::new();
+        for _ in 0..workers.div_ceil(slots) {
+            let options = Options::new(10_000_000);
+            all.push(Arc::new(
+                JetStreamStore::open(settings.clone(), options).await?,
+            ));
+        }
+        Ok(Self {
+            all,
+            settings,
+            workers,
+        })
+    }
+
+    /// Accept so many plans.
+    pub(super) async fn accept(&self, plans: u32) -> anyhow::Result<()> {
+        let store = &self.all[0];
+        stream::iter((0..plans).map(Ok))
+            .try_for_each_concurrent(CALLERS, |_| async move {
+                store.submit(submission()).await?;
+                anyhow::Ok(())
+            })
+            .await
+    }
+
+    /// Run so many plans, each asleep for a while.
+    pub(super) async fn run(&self, plans: u32, asleep: Duration) -> anyhow::Result<Duration> {
+        let left = Arc::new(AtomicU32::new(plans));
+        let began = Instant::now();
+        let mut workers = tokio::task::JoinSet::new();
+        for number in 0..usize::from(self.workers) {
+            let store = Arc::clone(&self.all[number % self.all.len()]);
+            workers.spawn(work(store, Arc::clone(&left), asleep));
+        }
+        while let Some(worker) = workers.join_next().await {
+            worker??;
+        }
+        Ok(began.elapsed())
+    }
+
+    /// The node that accepts.
+    pub(super) fn front(&self) -> Arc<JetStreamStore> {
+        Arc::clone(&self.all[0])
+    }
+
+    /// Take away all that was written.
+    pub(super) async fn remove(self) -> anyhow::Result<()> {
+        for store in &self.all {
+            store.close().await;
+        }
+        super::raw::remove(&self.settings).await
+    }
+}
+
+/// One worker's life, until no plan is left to be taken.
+async fn work(
+    store: Arc<JetStreamStore>,
+    left: Arc<AtomicU32>,
+    asleep: Duration,
+) -> anyhow::Result<()> {
+    let mut over = None;
+    loop {
+        let has_more = left
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
+                left.checked_sub(1)
+            })
+            .is_ok();
+        // As the pool does: the end of one run and the claim of the next go together.
+        let conclusion = async {
+            match over.take() {
+                Some(lease) => store
+                    .finish(&lease, ending(), wall_clock()())
+                    .await
+                    .map(drop),
+                None => Ok(()),
+            }
+        };
+        let claim = async {
+            if has_more {
+                store.claim().await.map(Some)
+            } else {
+                Ok(None)
+            }
+        };
+        let (concluded, lease) = tokio::join!(conclusion, claim);
+        concluded.context("finish")?;
+        let Some(lease) = lease.context("claim")? else {
+            return Ok(());
+        };
+        tokio::time::sleep(asleep).await;
+        store
+            .append(&lease, vec![point()])
+            .await
+            .context("append")?;
+        over = Some(lease);
+    }
+}
+
+/// How fast plans are accepted, and then run, that take no time.
+pub(super) async fn rates(settings: Settings, plans: u32) -> anyhow::Result<Took> {
+    let nodes = Nodes::open(settings, WORKERS, WORKERS.div_ceil(2)).await?;
+    let began = Instant::now();
+    nodes.accept(plans).await?;
+    let accepting = began.elapsed();
+    let running = nodes.run(plans, Duration::ZERO).await?;
+    nodes.remove().await?;
+    Ok(Took {
+        accepting,
+        running,
+        plans,
+    })
+}
+
+/// As a caller would hand in.
+pub(super) fn submission() -> Submission {
+    Submission {
+        id: job::new_id(),
+        name: Some("bench".to_owned()),
+        algorithm: "tms-sba".to_owned(),
+        seed: 1,
+        iterations: 200,
+        work: 400_000,
+        scenario: "s".repeat(SCENARIO),
+        created_ms: wall_clock()(),
+        owner: None,
+        quota: None,
+        webhook: None,
+        idempotency: None,
+        dataset: None,
+    }
+}
+
+fn point() -> Event {
+    Event::Convergence(Convergence {
+        iteration: 200,
+        evaluations: 40_000,
+        elapsed_ms: 20.0,
+        best_cost: Some(500.0),
+        best_violation: 0.0,
+        mean_cost: 510.0,
+        feasible_fraction: 1.0,
+    })
+}
+
+fn ending() -> Ending {
+    Ending::Result {
+        status: Status::Succeeded,
+        stop_reason: "iterations".to_owned(),
+        feasible: true,
+        best_cost: Some(500.0),
+        evaluations: 40_000,
+        iteration: 200,
+        document: "r".repeat(RESULT),
+    }
+}

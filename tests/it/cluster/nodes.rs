@@ -1,0 +1,245 @@
+//! Several nodes over the same servers: what one does the others see, and no plan is two nodes' at once.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use futures_util::future::join_all;
+use noctule::job::{Event, Idempotency, PlanId, Status, Submission};
+use noctule::store::jetstream::{Address, JetStreamStore, Settings};
+use noctule::store::{Options, Store, StoreError};
+
+use super::{open, open_as};
+use crate::support::nats::{self, NatsServer};
+use crate::support::plans::{ending, history, kind, point, statuses, submission, until};
+use crate::support::stores::node;
+
+/// Until another node knows of the plan.
+async fn known(store: &dyn Store, id: PlanId) {
+    let mut changes = store.changes(id);
+    while store.get(id).await.is_err() {
+        changes.changed().await.unwrap();
+    }
+}
+
+fn of(owner: &str, work: u64) -> Submission {
+    Submission {
+        owner: Some(owner.to_owned()),
+        work,
+        ..submission()
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_one_node_accepts_and_another_runs_a_third_tells() {
+    let address = nats::address();
+    let (accepting, running, telling) =
+        tokio::join!(open(&address), open(&address), open(&address));
+    let id = accepting.submit(submission()).await.unwrap().plan.id;
+    let reader = tokio::spawn(async move {
+        known(&*telling, id).await;
+        let mut changes = telling.changes(id);
+        let mut read = Vec::new();
+        while !matches!(read.last(), Some(Event::End(_))) {
+            let page = telling.events(id, read.len() as u64, 3).await.unwrap();
+            if page.events.is_empty() {
+                changes.changed().await.unwrap();
+            }
+            read.extend(page.events.into_iter().map(|numbered| numbered.event));
+        }
+        (read, telling.result(id).await.unwrap())
+    });
+    let lease = running.claim().await.unwrap();
+    assert_eq!(&*lease.scenario, accepting.scenario(id).await.unwrap());
+    for iteration in 0..20 {
+        running
+            .append(&lease, vec![point(iteration, None)])
+            .await
+            .unwrap();
+    }
+    running
+        .finish(&lease, ending(Status::Succeeded), 0)
+        .await
+        .unwrap();
+    let (read, result) = reader.await.unwrap();
+    assert_eq!(read, history(&*running, id).await);
+    assert!(result.is_some());
+    until(&*accepting, id, |plan| plan.status == Status::Succeeded).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_cancel_reaches_the_node_that_runs_the_plan() {
+    let address = nats::address();
+    let (asked, running) = tokio::join!(open(&address), open(&address));
+    let id = asked.submit(submission()).await.unwrap().plan.id;
+    let mut lease = running.claim().await.unwrap();
+    asked.request_cancel(id, 1).await.unwrap();
+    lease.cancel.wait_for(|cancelled| *cancelled).await.unwrap();
+    running
+        .finish(&lease, ending(Status::Cancelled), 2)
+        .await
+        .unwrap();
+    until(&*asked, id, |plan| plan.status == Status::Cancelled).await;
+
+    let id = asked.submit(submission()).await.unwrap().plan.id;
+    let mut lease = running.claim().await.unwrap();
+    asked.delete(id, 1).await.unwrap();
+    lease.cancel.wait_for(|cancelled| *cancelled).await.unwrap();
+    let late = running.finish(&lease, ending(Status::Succeeded), 2).await;
+    assert_eq!(kind(late), Err("lease lost"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_key_makes_one_plan_whichever_node_is_asked() {
+    let address = nats::address();
+    let nodes = join_all((0..3).map(|_| open(&address))).await;
+    let answers = join_all((0..60).map(|nth| {
+        nodes[nth % 3].submit(Submission {
+            idempotency: Some(Idempotency {
+                key: "k".to_owned(),
+                body_sha256: "body".to_owned(),
+            }),
+            ..submission()
+        })
+    }))
+    .await;
+    let answers: Vec<_> = answers.into_iter().map(Result::unwrap).collect();
+    let ids: BTreeSet<_> = answers.iter().map(|answer| answer.plan.id).collect();
+    assert_eq!(ids.len(), 1);
+    assert_eq!(answers.iter().filter(|answer| !answer.replayed).count(), 1);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_plan_is_taken_once_however_many_nodes_take() {
+    let address = nats::address();
+    let nodes = join_all((0..3).map(|_| open(&address))).await;
+    let submitted = join_all((0..90).map(|nth| nodes[nth % 3].submit(submission()))).await;
+    let submitted: BTreeSet<_> = submitted
+        .into_iter()
+        .map(|answer| answer.unwrap().plan.id)
+        .collect();
+    let takers = (0..90).map(|nth| {
+        let node = nodes[nth % 3].clone();
+        tokio::spawn(async move {
+            let lease = node.claim().await.unwrap();
+            assert_eq!(lease.attempt, 1);
+            node.finish(&lease, ending(Status::Succeeded), 0)
+                .await
+                .unwrap();
+            lease.plan.id
+        })
+    });
+    let taken: BTreeSet<_> = join_all(takers)
+        .await
+        .into_iter()
+        .map(Result::unwrap)
+        .collect();
+    assert_eq!(taken, submitted);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plan_whose_node_is_lost_is_another_nodes_to_run() {
+    let address = nats::address();
+    let (lost, other) = tokio::join!(open(&address), open(&address));
+    let id = other.submit(submission()).await.unwrap().plan.id;
+    let lease = lost.claim().await.unwrap();
+    lost.append(&lease, vec![point(1, None)]).await.unwrap();
+    drop(lost);
+    let lease = other.claim().await.unwrap();
+    assert_eq!((lease.plan.id, lease.attempt), (id, 2));
+    other
+        .finish(&lease, ending(Status::Succeeded), 0)
+        .await
+        .unwrap();
+    let told = history(&*other, id).await;
+    let expected = [
+        Status::Queued,
+        Status::Running,
+        Status::Queued,
+        Status::Running,
+        Status::Succeeded,
+    ];
+    assert_eq!(statuses(&told), expected);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plan_that_loses_one_node_after_another_fails() {
+    let address = nats::address();
+    let settings = || Settings {
+        lease: Duration::from_millis(300),
+        ..node(&address)
+    };
+    let observer = open_as(Settings {
+        slots: 0,
+        ..settings()
+    })
+    .await;
+    let id = observer.submit(submission()).await.unwrap().plan.id;
+    for attempt in 1..=5 {
+        let lost = open_as(settings()).await;
+        assert_eq!(lost.claim().await.unwrap().attempt, attempt);
+        drop(lost);
+    }
+    let last = open_as(settings()).await;
+    let idle = tokio::spawn(async move { last.claim().await });
+    let plan = until(&*observer, id, |plan| plan.status.is_final()).await;
+    assert_eq!(plan.status, Status::Failed);
+    assert_eq!(plan.error.unwrap().kind, "worker-lost");
+    idle.abort();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn owners_and_small_plans_do_not_wait_behind_a_crowd() {
+    let store = open(&nats::address()).await;
+    for _ in 0..10 {
+        store.submit(of("crowd", 1)).await.unwrap();
+    }
+    store.submit(of("late", 1)).await.unwrap();
+    let mut owners = Vec::new();
+    for _ in 0..3 {
+        owners.push(store.claim().await.unwrap().plan.owner.unwrap());
+    }
+    assert_eq!(owners, ["crowd", "late", "crowd"]);
+
+    // One of four slots is never a large plan's.
+    let store = open(&nats::address()).await;
+    for _ in 0..6 {
+        store.submit(of("same", u64::MAX)).await.unwrap();
+    }
+    let small = store.submit(of("same", 1)).await.unwrap().plan.id;
+    let mut taken = Vec::new();
+    for _ in 0..4 {
+        taken.push(store.claim().await.unwrap().plan.id);
+    }
+    assert_eq!(taken[3], small);
+}
+
+async fn refusal(settings: Settings) -> String {
+    let opened = JetStreamStore::open(settings, Options::new(10)).await;
+    match opened.map(drop) {
+        Err(StoreError::Unavailable { detail, .. }) => detail,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn servers_that_cannot_give_what_is_promised_are_refused() {
+    let address = nats::address();
+    let three = Settings {
+        replicas: 3,
+        ..node(&address)
+    };
+    let detail = refusal(three).await;
+    assert!(detail.contains("replicas"), "{detail}");
+
+    let plain = NatsServer::without_jetstream();
+    let detail = refusal(node(&plain.address())).await;
+    assert!(detail.contains("JetStream"), "{detail}");
+
+    let gone = plain.address();
+    drop(plain);
+    let detail = refusal(node(&gone)).await;
+    let Address { servers, .. } = Address::read(&gone).unwrap();
+    assert!(detail.contains(&servers[0]), "{detail}");
+}

@@ -1,0 +1,103 @@
+//! Servers that are killed, stopped and started again beneath a store that is open.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
+
+use std::time::Duration;
+
+use noctule::job::{Event, Status};
+use noctule::store::Store;
+use noctule::store::jetstream::Settings;
+
+use super::{open, open_as, turn};
+use crate::support::nats::{Cluster, NatsServer};
+use crate::support::plans::{ending, history, kind, point, submission, until};
+use crate::support::stores::node;
+
+/// Ask again until the store is sound.
+async fn until_sound(store: &dyn Store) {
+    while store.health().await.is_err() {
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_that_comes_back_has_everything_and_is_taken_up_again() {
+    let mut server = NatsServer::start();
+    let address = server.address();
+    let (store, follower) = tokio::join!(open(&address), open(&address));
+    let running = store.submit(submission()).await.unwrap().plan.id;
+    let waiting = store.submit(submission()).await.unwrap().plan.id;
+    let lease = store.claim().await.unwrap();
+    store.append(&lease, vec![point(1, None)]).await.unwrap();
+
+    server.kill();
+    while store.health().await.is_ok() {
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    assert_eq!(kind(store.submit(submission()).await), Err("unavailable"));
+    // What is known is still told.
+    assert_eq!(follower.get(running).await.unwrap().status, Status::Running);
+    server.restart();
+    until_sound(&*store).await;
+    until_sound(&*follower).await;
+
+    store.append(&lease, vec![point(2, None)]).await.unwrap();
+    store
+        .finish(&lease, ending(Status::Succeeded), 0)
+        .await
+        .unwrap();
+    until(&*follower, running, |plan| plan.status == Status::Succeeded).await;
+    let told = history(&*follower, running).await;
+    assert_eq!(told.last(), Some(&Event::End(Status::Succeeded)));
+    assert_eq!(told, history(&*store, running).await);
+    assert_eq!(store.claim().await.unwrap().plan.id, waiting);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_that_stops_answering_is_told_and_waited_for() {
+    let server = NatsServer::start();
+    let store = open(&server.address()).await;
+    let id = store.submit(submission()).await.unwrap().plan.id;
+    server.pause();
+    assert_eq!(kind(store.health().await), Err("unavailable"));
+    server.resume();
+    until_sound(&*store).await;
+    assert_eq!(store.claim().await.unwrap().plan.id, id);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_run_goes_on_over_the_loss_of_the_leader() {
+    let _turn = turn().await;
+    let mut cluster = Cluster::start();
+    let address = cluster.address();
+    let settings = || Settings {
+        replicas: 3,
+        ..node(&address)
+    };
+    let (store, follower) = tokio::join!(open_as(settings()), open_as(settings()));
+    let id = store.submit(submission()).await.unwrap().plan.id;
+    let lease = store.claim().await.unwrap();
+    for round in 0..2 {
+        store
+            .append(&lease, vec![point(2 * round, None)])
+            .await
+            .unwrap();
+        let leader = cluster.leader(&address).await;
+        cluster.servers[leader].kill();
+        // Tried again until another one leads.
+        store
+            .append(&lease, vec![point(2 * round + 1, None)])
+            .await
+            .unwrap();
+        cluster.servers[leader].restart();
+        until_sound(&*store).await;
+    }
+    store
+        .finish(&lease, ending(Status::Succeeded), 0)
+        .await
+        .unwrap();
+    until(&*follower, id, |plan| plan.status == Status::Succeeded).await;
+    let told = history(&*follower, id).await;
+    assert_eq!(told.len(), 2 + 4 + 2);
+    assert_eq!(told, history(&*store, id).await);
+}

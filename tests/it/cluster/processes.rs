@@ -1,0 +1,225 @@
+//! Processes that are killed, paused and replaced.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
+
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use futures_util::future::join_all;
+use reqwest::Client;
+use serde_json::Value;
+
+use super::{Node, ends_once};
+use crate::support::nats;
+use crate::support::process::Service;
+use crate::support::scenario;
+use crate::support::sse::{Block, Stream, events};
+
+/// A plan of some hundred milliseconds.
+fn a_plan(seed: usize) -> Value {
+    let mut scenario = scenario();
+    scenario["planner"]["population"] = 50.into();
+    scenario["planner"]["iterations"] = 100.into();
+    scenario["planner"]["seed"] = seed.into();
+    scenario
+}
+
+/// A plan that runs for so long, wherever it runs.
+fn a_run_of(ms: u64) -> Value {
+    let mut scenario = scenario();
+    scenario["planner"]["population"] = 2000.into();
+    scenario["planner"]["iterations"] = 100_000.into();
+    scenario["planner"]["time_limit_ms"] = ms.into();
+    scenario
+}
+
+/// Read until the plan is running.
+async fn running(service: &Service, address: &str) -> Stream {
+    let mut stream = Stream::open(service.get(&format!("{address}/events?rate=1"))).await;
+    loop {
+        match stream.next().await.expect("it has not ended") {
+            Block::Event { data, .. } if data["status"] == "running" => return stream,
+            _ => {}
+        }
+    }
+}
+
+/// How often the plan began to run.
+async fn runs(service: &Service, address: &str) -> usize {
+    let request = service.get(&format!("{address}/events?rate=1"));
+    let blocks = Stream::open(request).await.rest().await;
+    let ends = events(&blocks)
+        .into_iter()
+        .filter(|(_, name)| name == "end");
+    assert_eq!(ends.count(), 1);
+    let began = blocks.iter().filter(|block| {
+        matches!(block, Block::Event { name, data, .. } if name == "status" && data["status"] == "running")
+    });
+    began.count()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn plans_of_a_killed_worker_are_done_by_the_others_once() {
+    let address = nats::address();
+    let api = Node::api(&address, &[]);
+    let mut workers = [Node::worker(&address, &[]), Node::worker(&address, &[])];
+    let long = api.submit(&a_run_of(3_000)).await;
+    running(&api, &long).await;
+    let plans = join_all((0..20).map(async |seed| api.submit(&a_plan(seed)).await)).await;
+    // One of them runs the long plan; its runs are counted.
+    workers[0].kill();
+    for plan in plans.iter().chain([&long]) {
+        ends_once(&api, plan).await;
+    }
+    assert!(runs(&api, &long).await <= 2);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_worker_that_is_paused_past_its_lease_ends_nothing() {
+    let address = nats::address();
+    let api = Node::api(&address, &[]);
+    let paused = Node::worker(&address, &[]);
+    let plan = api.submit(&a_run_of(4_000)).await;
+    let stream = running(&api, &plan).await;
+    paused.signal("STOP");
+    let other = Node::worker(&address, &[]);
+    // The plan's reader sees it taken by the other, and one end.
+    let rest = tokio::spawn(stream.rest());
+    let again = running_again(&api, &plan).await;
+    paused.signal("CONT");
+    ends_once(&api, &plan).await;
+    assert_eq!(runs(&api, &plan).await, 2);
+    drop(again);
+    let told = events(&rest.await.unwrap());
+    assert_eq!(told.iter().filter(|(_, name)| name == "end").count(), 1);
+    // Who was late goes on with other plans.
+    drop(other);
+    let next = api.submit(&a_plan(1)).await;
+    ends_once(&api, &next).await;
+}
+
+/// Read until the plan has begun to run a second time.
+async fn running_again(service: &Service, address: &str) -> Stream {
+    let mut stream = Stream::open(service.get(&format!("{address}/events?rate=1"))).await;
+    let mut runs = 0;
+    while runs < 2 {
+        if let Block::Event { name, data, .. } = stream.next().await.expect("it has not ended")
+            && name == "status"
+            && data["status"] == "running"
+        {
+            runs += 1;
+        }
+    }
+    stream
+}
+
+/// What a caller does who has two addresses: another try at the other one, with the same key.
+async fn persist(client: &Client, urls: &Mutex<[Option<String>; 2]>, nth: usize) -> String {
+    let body = a_plan(nth);
+    for attempt in nth.. {
+        let Some(url) = urls.lock().unwrap()[attempt % 2].clone() else {
+            continue;
+        };
+        let request = client
+            .post(format!("{url}/plans"))
+            .header("idempotency-key", format!("plan {nth}").replace(' ', "-"))
+            .json(&body);
+        // A connection that breaks is nobody's answer.
+        let Ok(answer) = request.send().await else {
+            continue;
+        };
+        let status = answer.status().as_u16();
+        if status == 202 {
+            return answer.headers()["location"].to_str().unwrap().to_owned();
+        }
+        let problem: Value = answer.json().await.unwrap();
+        let leaving = status == 503 && problem["type"] == "/problems/draining";
+        let same = status == 409 && problem["type"] == "/problems/idempotency-in-flight";
+        assert!(leaving || same, "{problem}");
+    }
+    unreachable!("it tries for ever")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn nodes_are_replaced_under_load_and_no_request_fails() {
+    const PLANS: usize = 120;
+    let address = nats::address();
+    let mut replaced = Node::api(&address, &[]);
+    let other = Node::api(&address, &[]);
+    let _worker = Node::worker(&address, &[]);
+    let urls = Arc::new(Mutex::new([Some(replaced.url("")), Some(other.url(""))]));
+    let client = Client::builder().no_proxy().build().unwrap();
+    let load = tokio::spawn({
+        let urls = urls.clone();
+        async move {
+            let mut plans = Vec::new();
+            for first in (0..PLANS).step_by(4) {
+                let four = (first..first + 4).map(|nth| persist(&client, &urls, nth));
+                plans.extend(join_all(four).await);
+                tokio::time::sleep(Duration::from_millis(50)).await;
+            }
+            plans
+        }
+    });
+    // Once as it should be, and once as it should not.
+    replaced.leave().await;
+    replaced.restart();
+    urls.lock().unwrap()[0] = Some(replaced.url(""));
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    replaced.kill();
+    replaced.restart();
+    urls.lock().unwrap()[0] = Some(replaced.url(""));
+    let plans = load.await.unwrap();
+    for plan in &plans {
+        ends_once(&replaced, plan).await;
+    }
+    let listed: Value = serde_json::from_slice(&other.bytes("/plans?limit=1000").await).unwrap();
+    assert_eq!(listed["plans"].as_array().unwrap().len(), PLANS);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_full_queue_is_full_at_every_node() {
+    let address = nats::address();
+    let nodes = [
+        Node::api(&address, &["--queue", "5"]),
+        Node::api(&address, &["--queue", "5"]),
+    ];
+    for _ in 0..5 {
+        nodes[0].submit(&scenario()).await;
+    }
+    for node in &nodes {
+        let refused = loop {
+            let answer = node.post(&scenario()).await;
+            // The other one hears of it a moment later.
+            if answer.status() != 202 {
+                break answer;
+            }
+        };
+        assert_eq!(refused.status(), 503);
+        assert!(refused.headers().contains_key("retry-after"));
+        let problem: Value = refused.json().await.unwrap();
+        assert_eq!(problem["type"], "/problems/queue-full");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_node_without_servers_says_so_and_begins_when_they_come() {
+    let mut server = nats::NatsServer::start();
+    let address = server.address();
+    server.kill();
+    let node = Node::start(&address, "all", &[]);
+    node.bytes("/livez").await;
+    let detail = node.until_ready(503).await;
+    assert!(!detail.is_empty());
+    server.restart();
+    node.until_ready(200).await;
+    let plan = node.submit(&scenario()).await;
+    ends_once(&node, &plan).await;
+    // And once more, beneath an open store.
+    server.kill();
+    node.until_ready(503).await;
+    server.restart();
+    node.until_ready(200).await;
+    let plan = node.submit(&scenario()).await;
+    ends_once(&node, &plan).await;
+}

@@ -1,0 +1,126 @@
+//! Nodes that share a store: some answer, some run plans.
+
+use std::path::Path;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::support::process::{Service, run_with};
+use crate::support::{nats, scenario};
+
+/// A node of a store that other machines could reach, too.
+fn node(directory: &Path, address: &str, arguments: &[&str]) -> Service {
+    let arguments = [&["--store", address], arguments].concat();
+    Service::start(directory, &arguments)
+}
+
+fn directory() -> TempDir {
+    tempfile::tempdir().expect("a temporary directory")
+}
+
+#[tokio::test]
+async fn one_node_answers_and_another_runs_the_plans() {
+    let address = nats::address();
+    let (of_api, of_worker) = (directory(), directory());
+    let api = node(of_api.path(), &address, &["--role", "api"]);
+    api.until_ready(200).await;
+    let plan = api.submit(&scenario()).await;
+    let waiting: Value = api.get(&plan).send().await.unwrap().json().await.unwrap();
+    assert_eq!(waiting["status"], "queued", "nobody runs plans yet");
+    let levels = api.bytes("/metrics").await;
+    let levels = String::from_utf8_lossy(&levels);
+    assert!(levels.contains("noctule_workers 0.0\n"), "{levels}");
+
+    let worker = node(
+        of_worker.path(),
+        &address,
+        &["--role", "worker", "--workers", "3"],
+    );
+    assert_eq!(api.ended(&plan).await["status"], "succeeded");
+    let levels = worker.bytes("/metrics").await;
+    let levels = String::from_utf8_lossy(&levels);
+    assert!(levels.contains("noctule_workers 3.0\n"), "{levels}");
+    worker.signal("TERM");
+    assert!(worker.exit().await.success());
+    api.signal("TERM");
+    assert!(api.exit().await.success());
+}
+
+#[tokio::test]
+async fn a_worker_answers_those_alone_who_look_after_it() {
+    let directory = directory();
+    let worker = node(directory.path(), &nats::address(), &["--role", "worker"]);
+    worker.until_ready(200).await;
+    for path in ["/livez", "/readyz", "/metrics", "/version"] {
+        let answer = worker.get(path).send().await.expect("an answer");
+        assert_eq!(answer.status(), 200, "{path}");
+    }
+    for path in ["/plans", "/", "/limits", "/openapi.yaml", "/terrains"] {
+        let answer = worker.get(path).send().await.expect("an answer");
+        assert_eq!(answer.status(), 404, "{path}");
+        let problem: Value = answer.json().await.expect("JSON");
+        assert_eq!(problem["type"], "/problems/not-found");
+        let detail = format!(
+            "this node runs plans and serves none, so nothing is at {path}; nodes of the role api or all serve them"
+        );
+        assert_eq!(problem["detail"], detail);
+    }
+    assert_eq!(worker.post(&scenario()).await.status(), 404);
+}
+
+#[tokio::test]
+async fn limits_tell_of_the_workers_of_all_nodes() {
+    let address = nats::address();
+    let (first, second) = (directory(), directory());
+    let worker = node(
+        first.path(),
+        &address,
+        &["--role", "worker", "--workers", "5"],
+    );
+    worker.until_ready(200).await;
+    // It counts the others at its start.
+    let api = node(second.path(), &address, &["--role", "api"]);
+    api.until_ready(200).await;
+    let workers = async {
+        loop {
+            let limits: Value = serde_json::from_slice(&api.bytes("/limits").await).expect("JSON");
+            if limits["workers"] == 5 {
+                return;
+            }
+        }
+    };
+    let told = tokio::time::timeout(std::time::Duration::from_secs(30), workers).await;
+    told.expect("five");
+}
+
+/// A node without its servers answers, says why it is not ready, and goes on when they are there.
+#[tokio::test]
+async fn a_node_waits_for_its_servers() {
+    let directory = directory();
+    let alone = node(
+        directory.path(),
+        "nats://127.0.0.1:1",
+        &["--role", "api", "--grace", "1"],
+    );
+    alone.until_ready(503).await;
+    assert_eq!(alone.post(&scenario()).await.status(), 503);
+    let alive = alone.get("/livez").send().await.expect("an answer");
+    assert_eq!(alive.status(), 200);
+    alone.signal("TERM");
+    assert!(alone.exit().await.success());
+}
+
+#[test]
+fn the_commands_for_the_file_say_what_looks_after_servers() {
+    let variables = [("NOCTULE_STORE", "nats://127.0.0.1:1")];
+    for (arguments, instead) in [
+        (&["store", "check"][..], "nats server check jetstream"),
+        (&["store", "backup", "copy.db"], "nats stream backup"),
+    ] {
+        let refused = run_with(&variables, arguments, "");
+        assert_eq!(refused.status.code(), Some(1));
+        let text = String::from_utf8(refused.stderr).expect("UTF-8");
+        assert!(text.contains("the plans are on NATS servers"), "{text}");
+        assert!(text.contains(instead), "{text}");
+    }
+}

@@ -1,6 +1,7 @@
 //! `noctule serve`: put the parts together, and take them apart in the right order.
 
 mod backend;
+mod datasets;
 mod ending;
 
 use std::io::Write as _;
@@ -16,7 +17,6 @@ use tokio::time::Instant;
 
 use self::ending::{Signals, Times};
 use super::{access, exit};
-use crate::catalogue::{self, Catalogue, Directories, Mounted};
 use crate::config::{self, Config, Flags};
 use crate::http::webhook::{self, Secret, Sender};
 use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase, Terrains};
@@ -69,7 +69,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let instruments = Arc::new(Instruments::default());
     let store = backend::open(config).await?;
     let store: Arc<dyn Store> = Arc::new(MeasuredStore::new(store, instruments.clone()));
-    let catalogue = catalogue(config)?;
+    let catalogue = datasets::open(config, &instruments).await?;
     let rules = planner::rules(config.limits).with_datasets(catalogue.clone());
     let rules = Arc::new(rules);
     let settings = worker::Settings {
@@ -190,19 +190,6 @@ fn slots(config: &Config) -> usize {
 fn data_dir(config: &Config) -> anyhow::Result<PathBuf> {
     let data_dir = config.data_dir.clone();
     data_dir.context("the user has no home; name a directory with --data-dir")
-}
-
-/// The datasets of the data directory, and those of the operator's own.
-fn catalogue(config: &Config) -> anyhow::Result<Arc<dyn Catalogue>> {
-    let mounted = config.terrain_dir.as_deref().map(Mounted::open);
-    let mounted = mounted.transpose().context("terrain_dir")?;
-    let uploads = data_dir(config)?.join("terrains");
-    let is_new = !uploads.exists();
-    let catalogue = Directories::new(uploads, mounted);
-    if is_new && let Err(error) = catalogue::lay_down(&catalogue, store::wall_clock()()) {
-        tracing::warn!(%error, "the dataset that comes with the program cannot be kept");
-    }
-    Ok(Arc::new(catalogue))
 }
 
 /// How ends of plans are told; `None` when nobody is.

@@ -1,5 +1,7 @@
 //! Where plans are kept, and which part a node plays there.
 
+use std::net::Ipv6Addr;
+
 use super::value::{Given, Value, quoted};
 
 /// The store.
@@ -63,22 +65,21 @@ fn is_namespace(text: &str) -> bool {
     (1..=32).contains(&text.len()) && text.bytes().all(is_part)
 }
 
-/// A name or an address, perhaps with a port.
+/// A name or an address, perhaps with a port. An address of version 6 stands in brackets, for it has colons.
 fn is_host(text: &str) -> bool {
-    let (name, port) = match text.strip_prefix('[') {
-        // What is in brackets has colons of its own.
-        Some(rest) => match rest.split_once(']') {
-            Some((name, port)) => (name.parse::<std::net::Ipv6Addr>().is_ok(), port),
-            None => return false,
-        },
-        None => {
-            let (name, port) = text.split_at(text.find(':').unwrap_or(text.len()));
-            let is_part = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
-            (!name.is_empty() && name.bytes().all(is_part), port)
-        }
+    let bracketed = text.strip_prefix('[').map(|rest| rest.split_once(']'));
+    let (is_name, port) = if let Some(bracketed) = bracketed {
+        let Some((address, port)) = bracketed else {
+            return false;
+        };
+        (address.parse::<Ipv6Addr>().is_ok(), port)
+    } else {
+        let (name, port) = text.split_at(text.find(':').unwrap_or(text.len()));
+        let is_part = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
+        (!name.is_empty() && name.bytes().all(is_part), port)
     };
     let is_port = |port: &str| port.parse::<u16>().is_ok_and(|port| port > 0);
-    name && (port.is_empty() || port.strip_prefix(':').is_some_and(is_port))
+    is_name && (port.is_empty() || port.strip_prefix(':').is_some_and(is_port))
 }
 
 /// How many copies the servers keep of everything.
@@ -125,19 +126,16 @@ pub enum Role {
 }
 
 impl Role {
-    /// Each with its name.
-    const ALL: [(Self, &'static str); 3] = [
-        (Self::All, "all"),
-        (Self::Api, "api"),
-        (Self::Worker, "worker"),
-    ];
+    const ALL: [Self; 3] = [Self::All, Self::Api, Self::Worker];
 
     /// As it is given.
     #[must_use]
     pub fn name(self) -> &'static str {
-        let mut all = Self::ALL.into_iter();
-        let found = all.find(|(role, _)| *role == self);
-        found.expect("the table has every role").1
+        match self {
+            Self::All => "all",
+            Self::Api => "api",
+            Self::Worker => "worker",
+        }
     }
 
     /// Whether it takes plans and answers about them.
@@ -158,8 +156,7 @@ impl Value for Role {
 
     fn read(given: &Given) -> Option<Self> {
         let text = given.text()?;
-        let mut all = Self::ALL.into_iter();
-        all.find(|(_, name)| *name == text).map(|(role, _)| role)
+        Self::ALL.into_iter().find(|role| role.name() == text)
     }
 
     fn to_toml(&self) -> Option<String> {

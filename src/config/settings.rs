@@ -7,13 +7,21 @@ use super::setting::{Setting, row};
 
 /// Every setting, in the order in which they are shown.
 pub(super) fn all() -> Vec<Setting> {
-    [service(), http(), webhook(), retention(), limits()]
-        .into_iter()
-        .flatten()
-        .collect()
+    [
+        service(),
+        store(),
+        edges(),
+        http(),
+        webhook(),
+        retention(),
+        limits(),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
-/// Those without a table.
+/// Those without a table come first: the service itself.
 fn service() -> Vec<Setting> {
     vec![
         row(
@@ -58,6 +66,12 @@ fn service() -> Vec<Setting> {
             Duration::ZERO..=Duration::from_secs(3600),
             |c| &mut c.grace,
         ),
+    ]
+}
+
+/// Where plans are kept, and with whom.
+fn store() -> Vec<Setting> {
+    vec![
         row(
             "store",
             "PLACE",
@@ -93,6 +107,12 @@ fn service() -> Vec<Setting> {
             ..,
             |c| &mut c.role,
         ),
+    ]
+}
+
+/// Who may use the service, and what it tells of itself.
+fn edges() -> Vec<Setting> {
+    vec![
         row(
             "keys_file",
             "FILE",

@@ -25,7 +25,7 @@ async fn one_node_answers_and_another_runs_the_plans() {
     let api = node(of_api.path(), &address, &["--role", "api"]);
     api.until_ready(200).await;
     let plan = api.submit(&scenario()).await;
-    let waiting: Value = api.get(&plan).send().await.unwrap().json().await.unwrap();
+    let waiting: Value = serde_json::from_slice(&api.bytes(&plan).await).expect("JSON");
     assert_eq!(waiting["status"], "queued", "nobody runs plans yet");
     let levels = api.bytes("/metrics").await;
     let levels = String::from_utf8_lossy(&levels);

@@ -4,6 +4,7 @@
 use std::array;
 use std::collections::HashMap;
 use std::fs::{self, File};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -14,6 +15,9 @@ use crate::catalogue::{CatalogueError, Staged, files};
 
 /// Files that are fetched or summed up at the same time.
 const LANES: usize = 16;
+
+/// Nodes of one machine that may share a data directory.
+const MOST_NODES: usize = 64;
 
 /// The directory of files.
 #[derive(Debug)]
@@ -40,12 +44,27 @@ struct Held {
 }
 
 impl Cache {
-    /// Open the directory, made if need be, and remove what was on its way when a process died.
+    /// Open the directory, made if need be, and remove what was on its way when a process died. Where
+    /// another node has it, one beside it.
     pub(super) fn open(
         directory: &Path,
         limit: u64,
         grace: Duration,
     ) -> Result<Self, CatalogueError> {
+        let beside = (2..=MOST_NODES).map(|node| directory.with_extension(node.to_string()));
+        let mut taken = Self::open_own(directory, limit, grace);
+        for directory in beside {
+            match &taken {
+                Err(CatalogueError::Unavailable { error, .. })
+                    if error.kind() == io::ErrorKind::WouldBlock => {}
+                _ => break,
+            }
+            taken = Self::open_own(&directory, limit, grace);
+        }
+        taken
+    }
+
+    fn open_own(directory: &Path, limit: u64, grace: Duration) -> Result<Self, CatalogueError> {
         for part in ["incoming", "content"] {
             let part = directory.join(part);
             files::make_directory(&part)
@@ -256,7 +275,7 @@ impl Cache {
 
 fn remove(path: &Path) -> Result<(), CatalogueError> {
     match fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
             Err(CatalogueError::unavailable("removed", path, error))
         }
         _ => Ok(()),

@@ -9,6 +9,7 @@
 
 mod cache;
 mod headers;
+mod retire;
 mod view;
 
 #[cfg(test)]
@@ -18,16 +19,17 @@ mod model;
 #[cfg(test)]
 mod tests;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde::Serialize;
 
 use self::cache::Cache;
 use self::headers::Headers;
+use self::retire::Watched;
 use self::view::{Shelved, View, content_key, name_key};
 use super::both::Uploads;
 use super::records::{Content, Name};
@@ -35,13 +37,6 @@ use super::{CatalogueError, Checked, Claim, Entry, GRACE, Kept, Naming, Shelf, S
 use crate::telemetry::Instruments;
 use crate::terrain::dem;
 use crate::terrain::{DatasetError, Found};
-
-/// Files that no content refers to may belong to uploads that go on: they are kept for so many times the
-/// grace of contents.
-const GRACES_OF_FILES: u32 = 6;
-
-/// Files are looked for so often in the grace of contents.
-const LOOKS_PER_GRACE: u32 = 10;
 
 /// A file that was put a moment ago may not have come to every server.
 const TRIES: u32 = 4;
@@ -110,17 +105,6 @@ pub(super) struct Shared {
     grace: Duration,
     view: Mutex<Arc<View>>,
     watched: Mutex<Watched>,
-}
-
-/// What this node has seen that may have to go.
-#[derive(Debug, Default)]
-struct Watched {
-    /// Contents with a mark: at which revision, and since when.
-    contents: HashMap<String, (u64, Instant)>,
-    /// Files that no content refers to.
-    files: BTreeMap<String, Instant>,
-    /// When files were looked for.
-    looked: Option<Instant>,
 }
 
 impl Shared {
@@ -337,73 +321,6 @@ impl Shared {
         })
     }
 
-    /// Mark a content that nothing refers to, or take it away when its mark has stood for long enough.
-    fn retire(
-        &self,
-        view: &View,
-        sha256: &str,
-        watched: &mut Watched,
-    ) -> Result<bool, CatalogueError> {
-        let (key, content) = (content_key(sha256), &view.contents[sha256]);
-        let mut revision = view.written(&key);
-        if !content.unneeded {
-            let marked = Shelved {
-                unneeded: true,
-                ..content.clone()
-            };
-            let Some(marked) = self.write(&key, &marked, revision)? else {
-                return Ok(false);
-            };
-            revision = marked;
-        }
-        let seen = watched
-            .contents
-            .entry(sha256.to_owned())
-            .or_insert_with(|| (revision, Instant::now()));
-        if seen.0 != revision {
-            *seen = (revision, Instant::now());
-        }
-        if seen.1.elapsed() < self.grace {
-            return Ok(false);
-        }
-        watched.contents.remove(sha256);
-        let removed = self.erase(&key, revision)?;
-        if removed {
-            self.discard(&content.file);
-            tracing::info!(sha256, "removed a dataset that nothing refers to");
-        }
-        Ok(removed)
-    }
-
-    /// Remove files of uploads that never came to their end, and of removals that did not.
-    fn tidy(&self, watched: &mut Watched) -> Result<(), CatalogueError> {
-        if !self.is_time_to_look(watched) {
-            return Ok(());
-        }
-        let files = self.shelf.files().map_err(CatalogueError::shelf)?;
-        let view = self.view()?;
-        watched.looked = Some(Instant::now());
-        let lost = |file: &String| files.contains(file) && !view.refers_to(file);
-        watched.files.retain(|file, _| lost(file));
-        if view.has_unread() {
-            return Ok(());
-        }
-        for file in files.iter().filter(|file| lost(file)) {
-            let since = watched.files.entry(file.clone());
-            let since = since.or_insert_with(Instant::now);
-            if since.elapsed() >= self.grace * GRACES_OF_FILES {
-                self.shelf.discard(file).map_err(CatalogueError::shelf)?;
-                tracing::info!(file, "removed a file that no dataset refers to");
-            }
-        }
-        Ok(())
-    }
-
-    fn is_time_to_look(&self, watched: &Watched) -> bool {
-        let looked = watched.looked.map(|looked| looked.elapsed());
-        looked.is_none_or(|since| since >= self.grace / LOOKS_PER_GRACE)
-    }
-
     fn watched(&self) -> MutexGuard<'_, Watched> {
         self.watched.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -500,19 +417,7 @@ impl Uploads for Shared {
 
     fn sweep(&self, used: &BTreeSet<String>) -> Result<usize, CatalogueError> {
         let mut watched = self.watched();
-        let view = self.view()?;
-        let needless: BTreeSet<&String> = view
-            .unnamed()
-            .into_iter()
-            .filter(|sha256| !used.contains(*sha256))
-            .collect();
-        watched
-            .contents
-            .retain(|sha256, _| needless.contains(sha256));
-        let mut removed = 0;
-        for sha256 in needless {
-            removed += usize::from(self.retire(&view, sha256, &mut watched)?);
-        }
+        let removed = self.retire_all(used, &mut watched)?;
         self.tidy(&mut watched)?;
         drop(watched);
         let view = self.view()?;

@@ -395,6 +395,26 @@ fn copies_serve_what_is_pinned_while_the_shelf_is_away() {
     assert_eq!(height(&b.find("other").expect("found")), 50);
 }
 
+/// Two workers of one machine and user.
+#[test]
+fn nodes_with_one_directory_have_a_cache_each() {
+    let shelf = Arc::new(Memory::default());
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let open = || Shared::open(&sharing(&shelf, directory.path(), AGES)).expect("there is room");
+    let nodes = [open(), open(), open()];
+    let checked = nodes[0].stage(10_000).map(|mut staged| {
+        staged.write_all(hill(9).as_bytes()).expect("it is short");
+        staged.check(None, Declaration::default()).expect("right")
+    });
+    let checked = checked.expect("there is room");
+    nodes[0].keep(&checked, &naming("hill")).expect("kept");
+    for node in &nodes {
+        assert_eq!(height(&node.find("hill", None).expect("found")), 9);
+    }
+    let caches = fs::read_dir(directory.path()).expect("it is there");
+    assert_eq!(caches.count(), 3);
+}
+
 #[test]
 fn copies_go_when_there_are_too_many() {
     let shelf = Arc::new(Memory::default());

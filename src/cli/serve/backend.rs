@@ -7,8 +7,9 @@ use anyhow::anyhow;
 use tokio::runtime::Handle;
 
 use super::{data_dir, slots};
+use crate::catalogue::Shelf;
 use crate::config::{self, Config, Place};
-use crate::store::jetstream::{Address, JetStreamStore, Settings};
+use crate::store::jetstream::{Address, JetStreamShelf, JetStreamStore, Settings};
 use crate::store::reopening::{Open, Reopening};
 use crate::store::sqlite::SqliteStore;
 use crate::store::{Options, Retention, Store};
@@ -48,6 +49,17 @@ fn jetstream(settings: Settings, options: Options) -> Open {
         let Address { servers, namespace } = &settings.address;
         tracing::info!(servers = %servers.join(","), namespace, "the store is open");
         Ok(Arc::new(store))
+    })
+}
+
+/// What nodes share their datasets through; `None` where there is one node.
+///
+/// # Errors
+/// As [`open`].
+pub(super) fn shelf(config: &Config) -> anyhow::Result<Option<Arc<dyn Shelf>>> {
+    Ok(match &config.store {
+        Place::Sqlite => None,
+        Place::Nats(address) => Some(Arc::new(JetStreamShelf::new(settings(config, address)?))),
     })
 }
 

@@ -7,7 +7,7 @@ use async_nats::connection::State as Connection;
 use async_nats::jetstream::object_store::ObjectStore;
 use async_nats::jetstream::stream::{Config, DiscardPolicy, RetentionPolicy, StorageType, Stream};
 use async_nats::jetstream::{self, Context, kv, object_store};
-use async_nats::{Client, ConnectOptions};
+use async_nats::{Client, ConnectOptions, Event};
 
 use super::lane::Version;
 use super::settings::Settings;
@@ -69,7 +69,10 @@ pub(super) async fn connect(settings: &Settings) -> Result<Client, StoreError> {
             longest.min(Duration::from_millis(10) * 2_u32.pow(exponent))
         })
         .event_callback(|event| async move {
-            tracing::warn!(%event, "the connection to the NATS servers");
+            match event {
+                Event::Connected => tracing::debug!("a NATS server answers"),
+                event => tracing::warn!(%event, "the connection to the NATS servers"),
+            }
         });
     if let Some(file) = &settings.credentials {
         options = options

@@ -7,8 +7,9 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::io::{self, Read, Write};
 use std::pin::Pin;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context as Task, Poll};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use async_nats::Client;
 use async_nats::connection::State as Connection;
@@ -39,18 +40,37 @@ const STALL: Duration = Duration::from_secs(10);
 /// A file that has not been put by then never is: whoever finds its chunks later may remove them.
 const LONGEST_PUT: Duration = Duration::from_secs(30 * 60);
 
+/// A file that has not been fetched by then is asked for again.
+const LONGEST_FETCH: Duration = LONGEST_PUT;
+
 /// Bytes in a message; servers take messages of 1 MiB unless told otherwise.
 const CHUNK: usize = 256 << 10;
 
 /// What chunks of unfinished files go by.
 const UNFINISHED: &str = "unfinished.";
 
-/// Where the nodes of a namespace share their datasets.
+/// Servers that could not be reached a moment ago are taken to be away still.
+const RESPITE: Duration = Duration::from_secs(1);
+
+/// Where the nodes of a namespace share their datasets; connected when something is first asked for.
 ///
 /// Its methods block: they may be called from threads that plan or are kept for blocking work, not from
 /// tasks.
 pub struct JetStreamShelf {
     runtime: Handle,
+    settings: Settings,
+    opening: Mutex<Opening>,
+}
+
+/// How far the connection is.
+#[derive(Default)]
+struct Opening {
+    opened: Option<Arc<Opened>>,
+    failed: Option<(Instant, StoreError)>,
+}
+
+/// What is there once the servers have been reached; the client comes back to them by itself.
+struct Opened {
     client: Client,
     records: kv::Store,
     files: ObjectStore,
@@ -61,14 +81,58 @@ pub struct JetStreamShelf {
 }
 
 impl JetStreamShelf {
-    /// Connect, and make what is missing on the servers.
-    ///
-    /// # Errors
-    /// [`StoreError::Unavailable`].
+    /// On the servers of the settings.
     ///
     /// # Panics
     /// Outside a tokio runtime.
-    pub async fn open(settings: &Settings) -> Result<Self, StoreError> {
+    #[must_use]
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            runtime: Handle::current(),
+            settings,
+            opening: Mutex::default(),
+        }
+    }
+
+    fn opened(&self) -> Result<Arc<Opened>, StoreError> {
+        let mut opening = self.opening.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(opened) = &opening.opened {
+            return Ok(opened.clone());
+        }
+        if let Some((failed, error)) = &opening.failed
+            && failed.elapsed() < RESPITE
+        {
+            return Err(error.clone());
+        }
+        match self.runtime.block_on(Opened::new(&self.settings)) {
+            Ok(opened) => Ok(opening.opened.insert(Arc::new(opened)).clone()),
+            Err(error) => {
+                opening.failed = Some((Instant::now(), error.clone()));
+                Err(error)
+            }
+        }
+    }
+
+    /// Have the servers do something, but wait no longer than that.
+    fn ask<T, E: From<StoreError>>(
+        &self,
+        patience: Duration,
+        work: impl AsyncFnOnce(&Opened) -> Result<T, E>,
+    ) -> Result<T, E> {
+        let opened = self.opened()?;
+        if opened.client.connection_state() != Connection::Connected {
+            return Err(StoreError::unavailable("no NATS server answers").into());
+        }
+        let done = async { tokio::time::timeout(patience, work(&opened)).await };
+        self.runtime.block_on(done).unwrap_or_else(|_| {
+            Err(StoreError::unavailable("the NATS servers take too long").into())
+        })
+    }
+}
+
+impl Opened {
+    /// Connect, and make what is missing on the servers.
+    async fn new(settings: &Settings) -> Result<Self, StoreError> {
         let client = connect(settings).await?;
         let context = Servers::context(&client);
         let make = maker(&context, settings);
@@ -81,35 +145,12 @@ impl JetStreamShelf {
             .await
             .map_err(|error| failed(&format!("stream {stream}"), &error))?;
         Ok(Self {
-            runtime: Handle::current(),
             client,
             records,
             files,
             chunks,
             bucket,
         })
-    }
-
-    /// Wait for the servers, but no longer than that.
-    fn wait<T>(
-        &self,
-        patience: Duration,
-        work: impl Future<Output = Result<T, StoreError>>,
-    ) -> io::Result<T> {
-        if self.client.connection_state() != Connection::Connected {
-            let away = "no NATS server answers";
-            return Err(io::Error::new(io::ErrorKind::NotConnected, away));
-        }
-        let done = self
-            .runtime
-            .block_on(async { tokio::time::timeout(patience, work).await });
-        match done {
-            Ok(done) => done.map_err(unavailable),
-            Err(_) => Err(io::Error::new(
-                io::ErrorKind::TimedOut,
-                "the NATS servers take too long",
-            )),
-        }
     }
 
     async fn read_changes(&self, after: u64) -> Result<Changes, StoreError> {
@@ -233,43 +274,49 @@ impl JetStreamShelf {
 
 impl fmt::Debug for JetStreamShelf {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "JetStreamShelf({})", self.bucket)
+        write!(out, "JetStreamShelf({:?})", self.settings.address)
     }
 }
 
 impl Shelf for JetStreamShelf {
     fn changes(&self, after: u64) -> io::Result<Changes> {
-        self.wait(PATIENCE, self.read_changes(after))
+        let read = self.ask(PATIENCE, async |servers| servers.read_changes(after).await);
+        read.map_err(unavailable)
     }
 
     fn write(&self, key: &str, value: &str, expected: u64) -> io::Result<Option<u64>> {
-        self.wait(PATIENCE, async {
+        let written = self.ask(PATIENCE, async |servers| {
             let value = value.to_owned().into();
-            match self.records.update(key, value, expected).await {
+            match servers.records.update(key, value, expected).await {
                 Ok(revision) => Ok(Some(revision)),
                 Err(error) if error.kind() == UpdateErrorKind::WrongLastRevision => Ok(None),
                 Err(error) => Err(failed(&format!("record {key}"), &error)),
             }
-        })
+        });
+        written.map_err(unavailable)
     }
 
     fn erase(&self, key: &str, expected: u64) -> io::Result<bool> {
-        self.wait(PATIENCE, async {
-            let erased = self.records.delete_expect_revision(key, Some(expected));
+        let erased = self.ask(PATIENCE, async |servers| {
+            let erased = servers.records.delete_expect_revision(key, Some(expected));
             match erased.await {
                 Ok(()) => Ok(true),
                 Err(error) if error.kind() == UpdateErrorKind::WrongLastRevision => Ok(false),
                 Err(error) => Err(failed(&format!("record {key}"), &error)),
             }
-        })
+        });
+        erased.map_err(unavailable)
     }
 
     fn put(&self, file: &mut dyn Read) -> io::Result<String> {
-        self.wait(LONGEST_PUT, self.put_file(file))
+        let put = self.ask(LONGEST_PUT, async |servers| servers.put_file(file).await);
+        put.map_err(unavailable)
     }
 
     fn fetch(&self, file: &str, to: &mut dyn Write) -> io::Result<bool> {
-        let fetched = self.wait(Duration::MAX, async { Ok(self.fetch_file(file, to).await) })?;
+        let fetched = self.ask(LONGEST_FETCH, async |servers| {
+            servers.fetch_file(file, to).await
+        });
         fetched.map_err(|error| match error {
             Fetch::From(error) => unavailable(error),
             Fetch::To(error) => error,
@@ -277,11 +324,13 @@ impl Shelf for JetStreamShelf {
     }
 
     fn files(&self) -> io::Result<BTreeSet<String>> {
-        self.wait(PATIENCE, self.list_files())
+        let listed = self.ask(PATIENCE, async |servers| servers.list_files().await);
+        listed.map_err(unavailable)
     }
 
     fn discard(&self, file: &str) -> io::Result<()> {
-        self.wait(PATIENCE, self.discard_file(file))
+        let discarded = self.ask(PATIENCE, async |servers| servers.discard_file(file).await);
+        discarded.map_err(unavailable)
     }
 }
 
@@ -289,6 +338,12 @@ impl Shelf for JetStreamShelf {
 enum Fetch {
     From(StoreError),
     To(io::Error),
+}
+
+impl From<StoreError> for Fetch {
+    fn from(error: StoreError) -> Self {
+        Self::From(error)
+    }
 }
 
 impl Fetch {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io::{self, Read};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use noctule::catalogue::{Catalogue, Directories, Sharing, Shelf};
 use noctule::http;
@@ -14,11 +14,14 @@ use noctule::scenario::json;
 use noctule::store::jetstream::{Address, JetStreamShelf, JetStreamStore, Settings};
 use noctule::store::{Options, wall_clock};
 use noctule::worker::{self, Engine, Pool, Unplanned};
+use reqwest::Method;
+use serde_json::Value;
 use tokio::task::spawn_blocking;
 
 use super::{hill, over, put, put_with};
 use crate::support::api::Api;
 use crate::support::nats::{self, Cluster, NatsServer};
+use crate::support::process::Service;
 
 fn settings(address: &str, replicas: usize) -> Settings {
     Settings {
@@ -30,9 +33,8 @@ fn settings(address: &str, replicas: usize) -> Settings {
     }
 }
 
-async fn shelf(address: &str) -> Arc<dyn Shelf> {
-    let shelf = JetStreamShelf::open(&settings(address, 1)).await;
-    Arc::new(shelf.expect("it can be reached"))
+fn shelf(address: &str) -> Arc<dyn Shelf> {
+    Arc::new(JetStreamShelf::new(settings(address, 1)))
 }
 
 /// A node of a service whose datasets are shared; contents go as soon as nothing refers to them.
@@ -43,8 +45,8 @@ struct Node {
 }
 
 impl Node {
-    async fn new(address: &str) -> Self {
-        Self::over(shelf(address).await, Duration::ZERO)
+    fn new(address: &str) -> Self {
+        Self::over(shelf(address), Duration::ZERO)
     }
 
     fn over(shelf: Arc<dyn Shelf>, grace: Duration) -> Self {
@@ -73,7 +75,7 @@ impl Node {
         swept.expect("no panic").expect("it can be reached")
     }
 
-    async fn validate(&self, name: &str) -> serde_json::Value {
+    async fn validate(&self, name: &str) -> Value {
         let answer = self
             .api
             .post("/plans?validate_only=true", &over(name))
@@ -86,10 +88,10 @@ impl Node {
 #[tokio::test(flavor = "multi_thread")]
 async fn what_one_node_uploads_every_node_plans_over() {
     let address = nats::address();
-    let (a, b) = (Node::new(&address).await, Node::new(&address).await);
+    let (a, b) = (Node::new(&address), Node::new(&address));
     assert_eq!(
         a.api.get("/terrains").await.json()["terrains"],
-        serde_json::json!([])
+        Value::Array(Vec::new())
     );
     let uploaded = put(&a.api, "/terrains/hill", hill(100.0)).await;
     assert_eq!(uploaded.status, 201);
@@ -145,7 +147,7 @@ async fn what_one_node_uploads_every_node_plans_over() {
 
 /// Files on the servers, whole ones and others.
 async fn files(address: &str) -> usize {
-    let shelf = shelf(address).await;
+    let shelf = shelf(address);
     let files = spawn_blocking(move || shelf.files()).await;
     files.expect("no panic").expect("it can be reached").len()
 }
@@ -153,7 +155,7 @@ async fn files(address: &str) -> usize {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_damaged_copy_is_fetched_again() {
     let address = nats::address();
-    let (a, b) = (Node::new(&address).await, Node::new(&address).await);
+    let (a, b) = (Node::new(&address), Node::new(&address));
     put(&a.api, "/terrains/hill", hill(100.0)).await;
     let elevations = a.api.get("/terrains/hill/elevations").await.json();
     assert_eq!(
@@ -176,7 +178,7 @@ async fn a_damaged_copy_is_fetched_again() {
 #[tokio::test(flavor = "multi_thread")]
 async fn files_of_many_chunks_come_whole() {
     let address = nats::address();
-    let shelf = shelf(&address).await;
+    let shelf = shelf(&address);
     let moved = spawn_blocking(move || {
         let bytes: Vec<u8> = (0..9_000_001_u32)
             .map(|i| (i / 251).to_le_bytes()[0])
@@ -225,13 +227,13 @@ impl Read for Broken {
 #[tokio::test(flavor = "multi_thread")]
 async fn an_upload_that_broke_is_seen_by_nobody_and_removed() {
     let address = nats::address();
-    let node = Node::new(&address).await;
+    let node = Node::new(&address);
     put(&node.api, "/terrains/hill", hill(100.0)).await;
-    let own = shelf(&address).await;
+    let own = shelf(&address);
     let broken = spawn_blocking(move || own.put(&mut Broken(1 << 20))).await;
     assert!(broken.expect("no panic").is_err());
     // What was put, but never came to have a name: its process was killed.
-    let own = shelf(&address).await;
+    let own = shelf(&address);
     let lost = spawn_blocking(move || own.put(&mut "whole".as_bytes())).await;
     lost.expect("no panic").expect("put");
     assert_eq!(files(&address).await, 3);
@@ -244,7 +246,7 @@ async fn an_upload_that_broke_is_seen_by_nobody_and_removed() {
 async fn while_the_servers_are_away_all_is_refused_and_nothing_lost() {
     let mut server = NatsServer::start();
     let address = server.address();
-    let (a, b) = (Node::new(&address).await, Node::new(&address).await);
+    let (a, b) = (Node::new(&address), Node::new(&address));
     let uploaded = put(&a.api, "/terrains/hill", hill(100.0)).await;
     let sha256 = uploaded.json()["sha256"].as_str().expect("text").to_owned();
     server.kill();
@@ -322,7 +324,7 @@ impl Node {
         known.expect("it comes to be known");
     }
 
-    async fn ended(&self, plan: &str) -> serde_json::Value {
+    async fn ended(&self, plan: &str) -> Value {
         let ended = async {
             loop {
                 let status = self.api.get(plan).await.json();
@@ -340,8 +342,8 @@ impl Node {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_worker_plans_over_what_was_uploaded_elsewhere_and_replaced_since() {
     let address = nats::address();
-    let a = Node::new(&address).await.with_store(&address, 0).await;
-    let b = Node::new(&address).await.with_store(&address, 1).await;
+    let a = Node::new(&address).with_store(&address, 0).await;
+    let b = Node::new(&address).with_store(&address, 1).await;
     put(&a.api, "/terrains/hill", hill(100.0)).await;
     let answer = a.api.post("/plans", &over("hill")).await;
     assert_eq!(answer.status, 202, "{answer:?}");
@@ -371,8 +373,8 @@ async fn a_worker_plans_over_what_was_uploaded_elsewhere_and_replaced_since() {
 async fn a_plan_waits_for_ground_that_is_away() {
     let mut server = NatsServer::start();
     let (datasets, plans) = (server.address(), nats::address());
-    let a = Node::new(&datasets).await.with_store(&plans, 0).await;
-    let b = Node::new(&datasets).await.with_store(&plans, 1).await;
+    let a = Node::new(&datasets).with_store(&plans, 0).await;
+    let b = Node::new(&datasets).with_store(&plans, 1).await;
     put(&a.api, "/terrains/hill", hill(100.0)).await;
     let answer = a.api.post("/plans", &over("hill")).await;
     let plan = answer.header("location").to_owned();
@@ -393,6 +395,75 @@ async fn a_plan_waits_for_ground_that_is_away() {
     pool.drain(Duration::from_secs(60)).await;
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn processes_share_what_one_of_them_was_given() {
+    let address = nats::address();
+    let directories = [(); 2].map(|()| tempfile::tempdir().expect("a temporary directory"));
+    let start = |node: usize, role: &str| {
+        let arguments = ["--store", &address, "--role", role, "--workers", "1"];
+        Service::start(directories[node].path(), &arguments)
+    };
+    let (front, worker) = (start(0, "api"), start(1, "worker"));
+    // A service that is new begins with a dataset; with one, however many nodes start.
+    let shipped: Value = of(&front, "/terrains").await;
+    assert_eq!(shipped["terrains"][0]["name"], "jacksboro");
+    let upload = front.request(Method::PUT, "/terrains/hill");
+    let uploaded = upload.body(hill(100.0)).send().await.expect("an answer");
+    assert_eq!(uploaded.status(), 201);
+    let plan = front.submit(&over("hill")).await;
+    let status = front.ended(&plan).await;
+    assert_eq!(status["status"], "succeeded", "{status}");
+    let metrics = worker.bytes("/metrics").await;
+    let metrics = std::str::from_utf8(&metrics).expect("UTF-8");
+    let fetched = "noctule_terrain_fetches_total{outcome=\"fetched\"} 1";
+    assert!(metrics.lines().any(|line| line == fetched), "{metrics}");
+    // A node that comes later finds it all, and lays nothing down again.
+    let deleted = front.request(Method::DELETE, "/terrains/jacksboro");
+    assert_eq!(deleted.send().await.expect("an answer").status(), 204);
+    drop(front);
+    let front = start(0, "all");
+    let known: Value = of(&front, "/terrains").await;
+    let known = known["terrains"].as_array().expect("a list");
+    assert_eq!(known.len(), 1);
+    assert_eq!(known[0]["name"], "hill");
+}
+
+async fn of(service: &Service, path: &str) -> Value {
+    serde_json::from_slice(&service.bytes(path).await).expect("JSON")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_node_killed_amid_an_upload_leaves_nothing_that_is_seen() {
+    let address = nats::address();
+    let directories = [(); 2].map(|()| tempfile::tempdir().expect("a temporary directory"));
+    let start = |node: usize| Service::start(directories[node].path(), &["--store", &address]);
+    let (a, b) = (start(0), start(1));
+    let before = b.bytes("/terrains").await;
+    // Long enough to be caught in the middle of.
+    let request = a.request(Method::PUT, "/terrains/sea?filename=N36W085.hgt");
+    let upload = tokio::spawn(request.body(vec![0; 2 * 3601 * 3601]).send());
+    let own = shelf(&address);
+    let is_there = spawn_blocking(move || {
+        let until = Instant::now() + Duration::from_secs(60);
+        while own.files().expect("it can be reached").len() < 2 {
+            assert!(Instant::now() < until, "it never comes");
+        }
+    });
+    is_there.await.expect("it comes");
+    a.kill();
+    assert!(upload.await.expect("no panic").is_err(), "it was too quick");
+    assert_eq!(b.bytes("/terrains").await, before);
+    // Its chunks go with time, which for this node is short.
+    let impatient = Node::new(&address);
+    impatient.sweep(BTreeSet::new()).await;
+    assert_eq!(files(&address).await, 1);
+    let a = start(0);
+    let upload = a.request(Method::PUT, "/terrains/sea?filename=N36W085.hgt");
+    let upload = upload.body(vec![0; 2 * 3601 * 3601]).send().await;
+    assert_eq!(upload.expect("an answer").status(), 201);
+    assert!(of(&b, "/terrains/sea/elevations").await["elevations"].is_array());
+}
+
 /// Three copies of everything: what was answered by one server is known to all.
 #[tokio::test(flavor = "multi_thread")]
 async fn names_are_the_same_at_once_wherever_they_are_asked_for() {
@@ -400,8 +471,7 @@ async fn names_are_the_same_at_once_wherever_they_are_asked_for() {
     let address = cluster.address();
     let mut nodes = Vec::new();
     for _ in 0..3 {
-        let shelf = JetStreamShelf::open(&settings(&address, 3)).await;
-        let shelf = Arc::new(shelf.expect("it can be reached"));
+        let shelf = Arc::new(JetStreamShelf::new(settings(&address, 3)));
         nodes.push(Node::over(shelf, Duration::from_secs(600)));
     }
     for round in 0_u8..12 {
@@ -421,7 +491,7 @@ async fn names_are_the_same_at_once_wherever_they_are_asked_for() {
 #[tokio::test(flavor = "multi_thread")]
 async fn copies_are_counted() {
     let address = nats::address();
-    let (a, b) = (Node::new(&address).await, Node::new(&address).await);
+    let (a, b) = (Node::new(&address), Node::new(&address));
     put(&a.api, "/terrains/hill", hill(100.0)).await;
     b.validate("hill").await;
     let text = b.api.get("/metrics").await;

@@ -359,14 +359,14 @@ async fn many_readers_of_one_plan_read_the_same() {
 /// A plan of whose history the first `forgotten` events are no longer kept, and its last id.
 async fn with_a_forgotten_beginning(backend: Backend) -> (Followed, u64, u64) {
     let options = Options {
-        events_kept: 40,
+        events_kept: 20,
         ..Options::new(10)
     };
     let plan = Followed::over(Api::on(backend, options).await).await;
     let lease = plan.api.store.claim().await.expect("a queued plan");
-    for batch in a_run().chunks(10) {
-        let batch = batch.to_vec();
-        plan.api.store.append(&lease, batch).await.expect("held");
+    for event in a_run() {
+        let store = &plan.api.store;
+        store.append(&lease, vec![event]).await.expect("held");
     }
     run::finish(&*plan.api.store, &lease, Status::Succeeded).await;
     let id = lease.plan.id;

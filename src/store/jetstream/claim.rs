@@ -367,7 +367,11 @@ impl Drop for Caller {
             && let Ok(runtime) = Handle::try_current()
         {
             let store = Arc::clone(&self.store);
-            runtime.spawn(async move { store.take_back(&lease).await });
+            runtime.spawn(async move {
+                // Whoever takes next finds the job back in its place, and not only the record.
+                let _turn = store.turn.lock().await;
+                store.take_back(&lease).await;
+            });
         }
     }
 }

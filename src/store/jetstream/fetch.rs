@@ -1,0 +1,105 @@
+//! A lane's jobs, as the servers give them.
+
+use std::collections::HashMap;
+use std::sync::{MutexGuard, PoisonError};
+use std::time::Duration;
+
+use async_nats::jetstream::consumer::{AckPolicy, PullConsumer, pull};
+use async_nats::jetstream::{AckKind, Message};
+use futures_util::StreamExt as _;
+
+use super::JetStream;
+use super::lane::Lane;
+use super::trouble::{failed, refused};
+use crate::store::StoreError;
+
+/// How long a consumer is kept that nobody asks.
+const UNASKED: Duration = Duration::from_secs(24 * 60 * 60);
+
+/// Jobs that came again and are put in order, at most.
+const MOST_SORTED: usize = 64;
+
+impl JetStream {
+    /// The next job of a lane, if there is one that nobody has.
+    pub(super) async fn fetch(&self, lane: &Lane) -> Result<Option<Message>, StoreError> {
+        let Some(first) = self.fetch_any(lane).await? else {
+            return Ok(None);
+        };
+        if !came_again(&first) {
+            return Ok(Some(first));
+        }
+        // The servers give jobs again in the order in which they were given back.
+        let mut jobs = vec![first];
+        while jobs.len() < MOST_SORTED
+            && let Some(job) = self.fetch_any(lane).await?
+        {
+            let again = came_again(&job);
+            jobs.push(job);
+            if !again {
+                break;
+            }
+        }
+        jobs.sort_by_key(place);
+        let next = jobs.remove(0);
+        for job in jobs {
+            if let Err(error) = job.double_ack_with(AckKind::Nak(None)).await {
+                tracing::debug!(error = %error, "a job was not given back");
+            }
+        }
+        Ok(Some(next))
+    }
+
+    async fn fetch_any(&self, lane: &Lane) -> Result<Option<Message>, StoreError> {
+        let what = || format!("lane {}", lane.name());
+        let consumer = self.consumer(lane).await?;
+        let fetched = match consumer.fetch().max_messages(1).messages().await {
+            Ok(mut batch) => batch
+                .next()
+                .await
+                .transpose()
+                .map_err(|error| refused(&what(), &error)),
+            Err(error) => Err(failed(&what(), &error)),
+        };
+        if fetched.is_err() {
+            // It may have been removed, for nobody asked it for long.
+            self.consumers().remove(lane);
+        }
+        fetched
+    }
+
+    async fn consumer(&self, lane: &Lane) -> Result<PullConsumer, StoreError> {
+        if let Some(consumer) = self.consumers().get(lane) {
+            return Ok(consumer.clone());
+        }
+        let config = pull::Config {
+            durable_name: Some(lane.name()),
+            filter_subject: format!("{}.jobs.{}.*", self.servers.namespace, lane.subject()),
+            ack_policy: AckPolicy::Explicit,
+            ack_wait: self.settings.lease,
+            // Runs that were lost are counted in the record, where giving back does not count.
+            max_deliver: -1,
+            max_ack_pending: 65_536,
+            inactive_threshold: UNASKED,
+            ..pull::Config::default()
+        };
+        let made = self.servers.jobs.create_consumer(config).await;
+        let consumer = made.map_err(|error| failed(&format!("lane {}", lane.name()), &error))?;
+        self.consumers().insert(lane.clone(), consumer.clone());
+        Ok(consumer)
+    }
+
+    fn consumers(&self) -> MutexGuard<'_, HashMap<Lane, PullConsumer>> {
+        self.consumers
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn came_again(job: &Message) -> bool {
+    job.info().is_ok_and(|info| info.delivered > 1)
+}
+
+/// Its place in the queue's stream.
+fn place(job: &Message) -> u64 {
+    job.info().map_or(u64::MAX, |info| info.stream_sequence)
+}

@@ -3,7 +3,7 @@
 //! On the shelf, `name.NAME` says which content a name stands for, and `content.SUM` what is known of a
 //! content and which file holds it. A file is put there before the content that refers to it, and a content
 //! before the name. A content that nothing refers to is marked first, and taken away when the mark has
-//! stood for [`GRACE`](super::GRACE) by the clock of the node that takes it away; who needs it meanwhile
+//! stood for [`GRACE`] by the clock of the node that takes it away; who needs it meanwhile
 //! takes the mark off, and a write after the last one that the other side saw is refused. So of a removal
 //! and a use that race, one sees the other, whatever the clocks of the nodes say.
 

@@ -309,10 +309,14 @@ fn end_of_lost(plan: &mut Plan, lost: u32, now_ms: i64) -> Result<Option<Status>
     Ok(Some(plan.status))
 }
 
-/// Answer a delivery. A lost answer is made good by the next delivery.
+/// Answer a delivery. A lost answer is made good by the next delivery, so nobody waits for one to be
+/// heard, except where a job is given back: it comes before whatever is asked for next.
 pub(super) async fn answer(job: &Job, answer: AckKind) {
-    // Heard before the next job is asked for, so that one that is given back comes first.
-    if let Err(error) = job.double_ack_with(answer).await {
+    let answered = match answer {
+        AckKind::Nak(_) => job.double_ack_with(answer).await,
+        other => job.ack_with(other).await,
+    };
+    if let Err(error) = answered {
         tracing::debug!(error = %error, "a job was not answered");
     }
 }

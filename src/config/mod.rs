@@ -4,6 +4,7 @@
 //! its key in the file follow from the row. Where several give it, the flag counts, then the
 //! variable, then the file. Deliberately absent: what a setting does.
 
+mod address;
 mod collector;
 mod file;
 mod flags;
@@ -18,6 +19,7 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::time::Duration;
 
+pub use address::Address;
 pub use collector::{Endpoint, Headers};
 pub use flags::Flags;
 pub use layers::{Loaded, load};

@@ -1,7 +1,7 @@
 //! How each step of a plan's life changes its record. Every step goes through the transition table.
 
 use super::state::{Refused, Status};
-use super::{Failure, Plan, Submission};
+use super::{Event, Failure, Plan, Submission};
 use crate::export::document::{Convergence, Origin, Timing};
 use crate::export::sha256_hex;
 
@@ -104,8 +104,18 @@ impl Plan {
         Ok(())
     }
 
-    /// Its run has come as far as `point`.
-    pub fn advance(&mut self, point: &Convergence) {
+    /// Its run has told this: it has come as far as the last convergence point, if there is one.
+    pub fn advance(&mut self, told: &[Event]) {
+        let point = told.iter().rev().find_map(|event| match event {
+            Event::Convergence(point) => Some(point),
+            _ => None,
+        });
+        if let Some(point) = point {
+            self.reach(point);
+        }
+    }
+
+    fn reach(&mut self, point: &Convergence) {
         self.iteration = point.iteration as u64;
         self.evaluations = point.evaluations;
         self.best_cost = point.best_cost;
@@ -151,29 +161,13 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use uuid::Uuid;
 
     fn accepted() -> Plan {
-        let submission = Submission {
-            id: Uuid::nil(),
-            name: None,
-            algorithm: "tms-sba".to_owned(),
-            seed: 7,
-            iterations: 200,
-            work: 400_000,
-            scenario: "{}".to_owned(),
-            created_ms: 1_000,
-            owner: None,
-            quota: None,
-            webhook: None,
-            idempotency: None,
-            dataset: None,
-        };
-        Plan::accepted(&submission, 3)
+        Plan::accepted(&Submission::example(), 3)
     }
 
-    fn point(iteration: usize, best_cost: Option<f64>) -> Convergence {
-        Convergence {
+    fn point(iteration: usize, best_cost: Option<f64>) -> Event {
+        Event::Convergence(Convergence {
             iteration,
             evaluations: 40,
             elapsed_ms: 1.0,
@@ -181,14 +175,18 @@ mod tests {
             best_violation: 0.0,
             mean_cost: 9.0,
             feasible_fraction: 0.5,
-        }
+        })
     }
 
     #[test]
     fn a_requeued_plan_is_as_it_was_accepted_but_for_its_revision() {
         let mut plan = accepted();
         plan.start(2_000).expect("queued may run");
-        plan.advance(&point(50, Some(470.0)));
+        plan.advance(&[
+            point(20, None),
+            point(50, Some(470.0)),
+            Event::End(Status::Failed),
+        ]);
         assert_eq!((plan.feasible, plan.best_cost), (Some(true), Some(470.0)));
         assert!((plan.progress - 0.25).abs() < 1e-12);
         plan.requeue().expect("running may be queued");
@@ -209,7 +207,7 @@ mod tests {
             ..accepted()
         };
         plan.start(2_000).expect("queued may run");
-        plan.advance(&point(0, None));
+        plan.advance(&[point(0, None)]);
         assert!((plan.progress - 1.0).abs() < 1e-12);
         assert_eq!(plan.feasible, Some(false));
     }

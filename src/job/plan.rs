@@ -107,3 +107,25 @@ pub struct Failure {
     /// For people.
     pub detail: String,
 }
+
+#[cfg(test)]
+impl Submission {
+    /// The same each time.
+    pub(crate) fn example() -> Self {
+        Self {
+            id: Uuid::nil(),
+            name: None,
+            algorithm: "tms-sba".to_owned(),
+            seed: 7,
+            iterations: 200,
+            work: 400_000,
+            scenario: "{}".to_owned(),
+            created_ms: 1_000,
+            owner: None,
+            quota: None,
+            webhook: None,
+            idempotency: None,
+            dataset: None,
+        }
+    }
+}

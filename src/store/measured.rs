@@ -66,8 +66,14 @@ impl Store for MeasuredStore {
             .await
     }
 
-    async fn finish(&self, lease: &Lease, ending: Ending, now_ms: i64) -> Result<Plan, StoreError> {
-        self.measured("finish", self.store.finish(lease, ending, now_ms))
+    async fn finish(
+        &self,
+        lease: &Lease,
+        told: Vec<Event>,
+        ending: Ending,
+        now_ms: i64,
+    ) -> Result<Plan, StoreError> {
+        self.measured("finish", self.store.finish(lease, told, ending, now_ms))
             .await
     }
 

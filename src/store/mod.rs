@@ -47,14 +47,18 @@ pub trait Store: Send + Sync + 'static {
     /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.
     async fn append(&self, lease: &Lease, events: Vec<Event>) -> Result<(), StoreError>;
 
-    /// End a run: state, result, last status and `end` event in one step.
+    /// End a run: what it told since the last [`Store::append`], state, result, last status and `end`
+    /// event in one step.
     ///
     /// # Errors
     /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.
-    ///
-    /// # Panics
-    /// When the status of an [`Ending::Result`] is none of the two that have a result.
-    async fn finish(&self, lease: &Lease, ending: Ending, now_ms: i64) -> Result<Plan, StoreError>;
+    async fn finish(
+        &self,
+        lease: &Lease,
+        told: Vec<Event>,
+        ending: Ending,
+        now_ms: i64,
+    ) -> Result<Plan, StoreError>;
 
     /// Give a plan back, to its old place in the queue, which is the head: running -> queued. Its
     /// next run begins again from its seed. When its end has been asked for, it is cancelled
@@ -270,10 +274,10 @@ pub struct Lease {
 /// How a run ended.
 #[derive(Debug, Clone)]
 pub enum Ending {
-    /// With a result: `succeeded`, or `cancelled` when it was asked to stop.
+    /// With a result.
     Result {
-        /// [`Status::Succeeded`] or [`Status::Cancelled`].
-        status: Status,
+        /// Whether it was asked to stop; such a plan is `cancelled`, any other `succeeded`.
+        cancelled: bool,
         /// Why the search ended.
         stop_reason: String,
         /// Whether the route meets every constraint.
@@ -299,7 +303,7 @@ impl Ending {
     fn apply(&self, plan: &mut Plan, now_ms: i64) -> Result<(), Refused> {
         match self {
             Self::Result {
-                status,
+                cancelled,
                 stop_reason,
                 feasible,
                 best_cost,
@@ -307,7 +311,12 @@ impl Ending {
                 iteration,
                 document: _,
             } => {
-                plan.end(*status, now_ms)?;
+                let status = if *cancelled {
+                    Status::Cancelled
+                } else {
+                    Status::Succeeded
+                };
+                plan.end(status, now_ms)?;
                 plan.stop_reason = Some(stop_reason.clone());
                 plan.feasible = Some(*feasible);
                 plan.best_cost = *best_cost;

@@ -148,9 +148,15 @@ impl Store for Reopening {
         self.heed(&store, store.append(lease, events).await)
     }
 
-    async fn finish(&self, lease: &Lease, ending: Ending, now_ms: i64) -> Result<Plan, StoreError> {
+    async fn finish(
+        &self,
+        lease: &Lease,
+        told: Vec<Event>,
+        ending: Ending,
+        now_ms: i64,
+    ) -> Result<Plan, StoreError> {
         let store = self.store()?;
-        self.heed(&store, store.finish(lease, ending, now_ms).await)
+        self.heed(&store, store.finish(lease, told, ending, now_ms).await)
     }
 
     async fn release(&self, lease: &Lease) -> Result<(), StoreError> {

@@ -12,7 +12,7 @@ use tracing::Span;
 
 use super::{Engine, Unplanned};
 use crate::export::document::ResultDocument;
-use crate::job::{Event, Failure, Plan, Status};
+use crate::job::{Event, Failure, Plan};
 use crate::planner::{ConvergencePoint, Incumbent, Observer, Outcome, Stop, StopReason};
 use crate::store::{Ending, Lease};
 use crate::telemetry::Instruments;
@@ -150,12 +150,7 @@ fn stopped_within(pause: Duration, stop: &StopFlag) -> bool {
 
 fn ending(outcome: &Outcome, plan: &Plan, scenario: &str, run_ms: f64) -> Ending {
     Ending::Result {
-        status: match outcome.stop_reason {
-            StopReason::Cancelled => Status::Cancelled,
-            StopReason::Iterations | StopReason::Converged | StopReason::TimeLimit => {
-                Status::Succeeded
-            }
-        },
+        cancelled: outcome.stop_reason == StopReason::Cancelled,
         stop_reason: outcome.stop_reason.name().to_owned(),
         feasible: outcome.feasible,
         best_cost: outcome.feasible.then_some(outcome.cost.total),

@@ -29,6 +29,8 @@ const GATHERING: Duration = Duration::from_millis(5);
 /// A run that is over, but not yet in the store.
 pub(super) struct Over {
     lease: Lease,
+    /// What it told last; stored with its end.
+    told: Vec<Event>,
     /// `None` when its plan goes back to the queue.
     ending: Option<Ending>,
     span: Span,
@@ -67,19 +69,21 @@ impl Slot {
                 return None;
             }
         };
-        let kept = tokio::select! {
-            kept = self.keep_events(&lease, told, silent) => kept,
+        let rest = tokio::select! {
+            rest = self.keep_events(&lease, told, silent) => rest,
             never = stop_when_asked(&lease, self.phase.clone(), &stop) => match never {},
         };
-        if !kept {
+        let rest = rest.unwrap_or_else(|| {
             stop.raise(Reason::Abandoned);
-        }
+            Vec::new()
+        });
         let ending = ending
             .await
             .expect("the planning thread answers even when it panics");
         let abandoned = matches!(ending, Some(Ending::Result { .. })) && stop.is_abandoned();
         Some(Over {
             lease,
+            told: rest,
             ending: ending.filter(|_| !abandoned),
             span: Span::current(),
         })
@@ -89,26 +93,27 @@ impl Slot {
     pub(super) async fn conclude(&self, over: Over) {
         let Over {
             lease,
+            told,
             ending,
             span,
         } = over;
         let conclusion = async {
             match ending {
-                Some(ending) => self.finish(&lease, ending).await,
+                Some(ending) => self.finish(&lease, told, ending).await,
                 None => self.give_back(&lease).await,
             }
         };
         conclusion.instrument(span).await;
     }
 
-    /// Store events until there are no more, of which `silent` tells by losing its sender; false
-    /// when that became pointless.
+    /// Store events until there are no more, of which `silent` tells by losing its sender; returns the
+    /// last of them, which go with the end, and `None` when storing them became pointless.
     async fn keep_events(
         &self,
         lease: &Lease,
         mut told: mpsc::Receiver<Event>,
         mut silent: watch::Receiver<()>,
-    ) -> bool {
+    ) -> Option<Vec<Event>> {
         let mut batch = Vec::new();
         let mut due = Instant::now();
         loop {
@@ -128,21 +133,20 @@ impl Slot {
                 }
                 continue;
             }
-            if !batch.is_empty() {
-                let events = std::mem::take(&mut batch);
-                let append = || self.store.append(lease, events.clone());
-                if self.persist("events", append).await.is_none() {
-                    return false;
-                }
-            }
             if more == Some(false) {
-                return true;
+                return Some(batch);
             }
+            let events = std::mem::take(&mut batch);
+            let append = || self.store.append(lease, events.clone());
+            self.persist("events", append).await?;
         }
     }
 
-    async fn finish(&self, lease: &Lease, ending: Ending) {
-        let finish = || self.store.finish(lease, ending.clone(), (self.clock)());
+    async fn finish(&self, lease: &Lease, told: Vec<Event>, ending: Ending) {
+        let finish = || {
+            let (told, ending) = (told.clone(), ending.clone());
+            self.store.finish(lease, told, ending, (self.clock)())
+        };
         if let Some(plan) = self.persist("ending", finish).await {
             let run_ms = plan
                 .finished_ms

@@ -5,7 +5,6 @@ use std::fs;
 use axum::http::Method;
 use noctule::export::document::{Convergence, Origin, Position, ResultDocument, Timing};
 use noctule::export::{ALL, sha256_hex};
-use noctule::job::Status;
 use noctule::planner;
 use noctule::scenario::json;
 use noctule::scenario::limits::Limits;
@@ -54,7 +53,7 @@ async fn ended(api: &Api, scenario: &Value, lat: f64, lon: f64) -> String {
         },
     };
     let ending = Ending::Result {
-        status: Status::Succeeded,
+        cancelled: false,
         stop_reason: "iterations".to_owned(),
         feasible: outcome.feasible,
         best_cost: None,
@@ -77,7 +76,7 @@ async fn ended(api: &Api, scenario: &Value, lat: f64, lon: f64) -> String {
     };
     let at_ms = lease.plan.created_ms + 50;
     api.store
-        .finish(&lease, ending, at_ms)
+        .finish(&lease, Vec::new(), ending, at_ms)
         .await
         .expect("the lease holds");
     format!("/plans/{}", lease.plan.id)

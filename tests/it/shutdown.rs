@@ -4,61 +4,10 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
+use crate::support::lives::{a_run_of, life, running, running_at};
 use crate::support::process::Service;
-use crate::support::scenario;
-use crate::support::sse::{Block, Stream, events};
+use crate::support::sse::{Block, events};
 use crate::support::stores::{Place, for_every_backend};
-
-/// A plan that runs for so long, wherever it runs: its iterations alone would take minutes.
-fn a_run_of(ms: u64) -> Value {
-    let mut scenario = scenario();
-    scenario["planner"]["population"] = 2000.into();
-    scenario["planner"]["iterations"] = 100_000.into();
-    scenario["planner"]["time_limit_ms"] = ms.into();
-    scenario
-}
-
-/// Read until the plan is running.
-async fn running(service: &Service, address: &str) -> Stream {
-    running_at(service, address, 10.0).await
-}
-
-/// The same, told so many points a second.
-async fn running_at(service: &Service, address: &str, rate_hz: f64) -> Stream {
-    let path = format!("{address}/events?rate={rate_hz}");
-    let mut stream = Stream::open(service.get(&path)).await;
-    loop {
-        match stream.next().await {
-            Some(Block::Event { data, .. }) if data["status"] == "running" => return stream,
-            Some(_) => {}
-            None => panic!("the stream ended before the plan ran"),
-        }
-    }
-}
-
-/// The statuses of a plan that has ended.
-async fn life(service: &Service, address: &str) -> Vec<String> {
-    let blocks = Stream::open(service.get(&format!("{address}/events")))
-        .await
-        .rest()
-        .await;
-    assert_eq!(
-        events(&blocks)
-            .iter()
-            .filter(|(_, name)| name == "end")
-            .count(),
-        1
-    );
-    blocks
-        .into_iter()
-        .filter_map(|block| match block {
-            Block::Event { name, data, .. } if name == "status" => {
-                Some(data["status"].as_str()?.to_owned())
-            }
-            _ => None,
-        })
-        .collect()
-}
 
 /// An end that waited for a plan of a minute, for a stream, or for the whole of an idle grace period would
 /// come after it; a slow machine alone does not make one so late.

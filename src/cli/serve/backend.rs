@@ -3,13 +3,12 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use anyhow::anyhow;
 use tokio::runtime::Handle;
 
 use super::{data_dir, slots};
 use crate::catalogue::Shelf;
-use crate::config::{self, Config, Place};
-use crate::store::jetstream::{Address, JetStreamShelf, JetStreamStore, Settings};
+use crate::config::{self, Address, Config, Place};
+use crate::store::jetstream::{JetStreamShelf, JetStreamStore, Settings};
 use crate::store::reopening::{Open, Reopening};
 use crate::store::sqlite::SqliteStore;
 use crate::store::{Options, Retention, Store};
@@ -22,7 +21,7 @@ pub(super) async fn open(config: &Config) -> anyhow::Result<Arc<dyn Store>> {
     let options = options(config);
     let open = match &config.store {
         Place::Sqlite => sqlite(data_dir(config)?, options),
-        Place::Nats(address) => jetstream(settings(config, address)?, options),
+        Place::Nats(address) => jetstream(settings(config, address), options),
     };
     Ok(Arc::new(Reopening::start(open).await))
 }
@@ -53,26 +52,21 @@ fn jetstream(settings: Settings, options: Options) -> Open {
 }
 
 /// What nodes share their datasets through; `None` where there is one node.
-///
-/// # Errors
-/// As [`open`].
-pub(super) fn shelf(config: &Config) -> anyhow::Result<Option<Arc<dyn Shelf>>> {
-    Ok(match &config.store {
+pub(super) fn shelf(config: &Config) -> Option<Arc<dyn Shelf>> {
+    match &config.store {
         Place::Sqlite => None,
-        Place::Nats(address) => Some(Arc::new(JetStreamShelf::new(settings(config, address)?))),
-    })
+        Place::Nats(address) => Some(Arc::new(JetStreamShelf::new(settings(config, address)))),
+    }
 }
 
-fn settings(config: &Config, address: &str) -> anyhow::Result<Settings> {
-    let read = Address::read(address);
-    Ok(Settings {
-        address: read
-            .ok_or_else(|| anyhow!("store is {address:?}, must be {}", Address::ALLOWED))?,
+fn settings(config: &Config, address: &Address) -> Settings {
+    Settings {
+        address: address.clone(),
         credentials: config.store_credentials.clone(),
         replicas: config.store_replicas.count(),
         lease: config.store_lease,
         slots: slots(config),
-    })
+    }
 }
 
 fn options(config: &Config) -> Options {

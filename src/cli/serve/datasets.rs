@@ -22,7 +22,7 @@ pub(super) async fn open(
     let mounted = config.terrain_dir.as_deref().map(Mounted::open);
     let mounted = mounted.transpose().context("terrain_dir")?;
     let data_dir = data_dir(config)?;
-    let shelf = backend::shelf(config)?;
+    let shelf = backend::shelf(config);
     let instruments = instruments.clone();
     let opening = move || -> Arc<dyn Catalogue> {
         let (catalogue, is_new) = if let Some(shelf) = shelf {

@@ -8,6 +8,7 @@ use tokio::runtime::Handle;
 use tokio::sync::oneshot;
 use tokio::time::Instant;
 
+use super::connect::plan_of;
 use super::lane::Version;
 use super::leases::Job;
 use super::record::{Record, State};
@@ -134,13 +135,7 @@ impl JetStream {
         let deliveries = job.info().map_or(1, |info| info.delivered);
         let (message, acker) = job.split();
         let job = Job::new(acker);
-        let id = message
-            .subject
-            .as_str()
-            .rsplit('.')
-            .next()
-            .and_then(|id| PlanId::parse_str(id).ok());
-        let Some(id) = id else {
+        let Some(id) = plan_of(&message.subject) else {
             tracing::warn!(
                 subject = message.subject.as_str(),
                 "a job of no plan is thrown away"
@@ -213,22 +208,21 @@ impl JetStream {
                     Status::Running => {
                         record.lost += 1;
                         if let Some(end) = end_of_lost(&mut record.plan, record.lost, now_ms)? {
-                            events = record.told_end(self.options.retention.age_ms);
+                            record.ended(self.options.retention.age_ms);
                             tracing::warn!(plan = %id, status = end.name(), "a plan whose worker was lost ends");
-                            return Ok(Some(Change { state: State::Kept(record), events }));
+                            return Ok(Some(Change::told(record)));
                         }
                         tracing::warn!(plan = %id, attempt = record.attempt, "a plan whose worker was lost runs again");
                         record.plan.requeue()?;
-                        events.extend(record.told());
+                        events.push(record.status());
                     }
                     Status::Succeeded | Status::Failed | Status::Cancelled => return Ok(None),
                 }
                 record.plan.start(now_ms)?;
                 record.attempt += 1;
                 record.appended = 0;
-                events.extend(record.told());
                 found = Found::Run(record.clone());
-                Ok(Some(Change { state: State::Kept(record), events }))
+                Ok(Some(Change { events, ..Change::told(record) }))
             })
             .await
             .map(|_| found)

@@ -272,6 +272,12 @@ impl Maker<'_> {
     }
 }
 
+/// The plan of whose step or job a subject is: its last part.
+pub(super) fn plan_of(subject: &str) -> Option<PlanId> {
+    let (_, id) = subject.rsplit_once('.')?;
+    PlanId::parse_str(id).ok()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,6 +9,7 @@ use futures_util::StreamExt as _;
 use tokio::sync::watch;
 
 use super::JetStream;
+use super::connect::plan_of;
 use super::history::History;
 use super::record::{Placed, State, Step};
 use super::trouble::{failed, refused};
@@ -62,29 +63,11 @@ impl JetStream {
                 start_sequence: *read + 1,
             }
         };
-        let config = push::OrderedConfig {
-            deliver_subject: self.servers.client.new_inbox(),
-            filter_subject: format!("{}.plans.*", self.servers.namespace),
-            deliver_policy: begin,
-            ..push::OrderedConfig::default()
-        };
-        let mut consumer = self
-            .servers
-            .plans
-            .create_consumer(config)
-            .await
-            .map_err(|error| failed(what, &error))?;
-        let info = consumer
-            .info()
-            .await
-            .map_err(|error| failed(what, &error))?;
-        if info.num_pending == 0 && info.delivered.stream_sequence == 0 {
+        let all = format!("{}.plans.*", self.servers.namespace);
+        let (is_empty, mut messages) = self.read_steps(what, all, begin).await?;
+        if is_empty {
             told.send_replace(Reading::Current);
         }
-        let mut messages = consumer
-            .messages()
-            .await
-            .map_err(|error| failed(what, &error))?;
         while let Some(message) = messages.next().await {
             let message = message.map_err(|error| refused(what, &error))?;
             let (sequence, pending) = {
@@ -105,13 +88,9 @@ impl JetStream {
     }
 
     fn take_in(&self, message: &Message, sequence: u64) {
-        let id = message
-            .subject
-            .as_str()
-            .rsplit('.')
-            .next()
-            .and_then(|id| PlanId::parse_str(id).ok());
-        let Some(id) = id else { return };
+        let Some(id) = plan_of(&message.subject) else {
+            return;
+        };
         // What this node wrote itself is known already.
         if self
             .view
@@ -128,35 +107,40 @@ impl JetStream {
         }
     }
 
+    /// The steps of a subject from a place on, as they come, and whether there are none so far.
+    async fn read_steps(
+        &self,
+        what: &str,
+        filter_subject: String,
+        deliver_policy: DeliverPolicy,
+    ) -> Result<(bool, push::Ordered), StoreError> {
+        let config = push::OrderedConfig {
+            deliver_subject: self.servers.client.new_inbox(),
+            filter_subject,
+            deliver_policy,
+            ..push::OrderedConfig::default()
+        };
+        let made = self.servers.plans.create_consumer(config).await;
+        let mut consumer = made.map_err(|error| failed(what, &error))?;
+        let info = consumer
+            .info()
+            .await
+            .map_err(|error| failed(what, &error))?;
+        let is_empty = info.num_pending == 0 && info.delivered.stream_sequence == 0;
+        let messages = consumer.messages().await;
+        Ok((is_empty, messages.map_err(|error| failed(what, &error))?))
+    }
+
     /// All that the stream keeps of a plan's events.
     pub(super) async fn read_history(&self, id: PlanId) -> Result<History, StoreError> {
         let what = format!("events of plan {id}");
         let subject = self.servers.subject_of(id);
         let steps_kept = self.view.known().histories.steps_kept();
-        let config = push::OrderedConfig {
-            deliver_subject: self.servers.client.new_inbox(),
-            filter_subject: subject,
-            deliver_policy: DeliverPolicy::All,
-            ..push::OrderedConfig::default()
-        };
-        let mut consumer = self
-            .servers
-            .plans
-            .create_consumer(config)
-            .await
-            .map_err(|error| failed(&what, &error))?;
-        let info = consumer
-            .info()
-            .await
-            .map_err(|error| failed(&what, &error))?;
         let mut history = History::whole();
-        if info.num_pending == 0 && info.delivered.stream_sequence == 0 {
+        let (is_empty, mut messages) = self.read_steps(&what, subject, DeliverPolicy::All).await?;
+        if is_empty {
             return Ok(history);
         }
-        let mut messages = consumer
-            .messages()
-            .await
-            .map_err(|error| failed(&what, &error))?;
         while let Some(message) = messages.next().await {
             let message = message.map_err(|error| refused(&what, &error))?;
             let pending = message
@@ -164,7 +148,7 @@ impl JetStream {
                 .map_err(|error| refused(&what, &*error))?
                 .pending;
             let step = Step::read(&message.payload)?;
-            if matches!(step.state, State::Kept(_)) {
+            if matches!(*step.state, State::Kept(_)) {
                 history.push(&step, steps_kept);
             }
             if pending == 0 {

@@ -51,11 +51,11 @@ impl History {
 
     /// Add a step; false when there is a hole before it.
     pub(super) fn push(&mut self, step: &Step, steps_kept: usize) -> bool {
-        let State::Kept(record) = &step.state else {
+        let State::Kept(record) = &*step.state else {
             return true;
         };
         let events = step.numbered();
-        let first = record.last_event + 1 - events.len() as u64;
+        let first = step.first_event(record);
         if self.batches.is_empty() && self.before == 0 {
             self.before = first - 1;
         }
@@ -120,7 +120,8 @@ impl History {
     }
 }
 
-fn bytes_of(event: &Event) -> usize {
+/// In memory, and at most about so many in a message.
+pub(super) fn bytes_of(event: &Event) -> usize {
     match event {
         Event::Incumbent(route) => SMALL_EVENT + 64 * route.waypoints.len(),
         Event::Status(_) => 4 * SMALL_EVENT,
@@ -156,7 +157,7 @@ impl Histories {
 
     /// A step has come. Of plans whose beginning was not seen nothing is kept.
     pub(super) fn push(&mut self, id: PlanId, step: &Step) {
-        let begins = matches!(&step.state, State::Kept(record) if record.last_event == step.events.len() as u64);
+        let begins = matches!(&*step.state, State::Kept(record) if step.first_event(record) == 1);
         let known = self.take(id);
         let Some(mut history) = known.or_else(|| begins.then(History::whole)) else {
             return;
@@ -217,21 +218,7 @@ mod tests {
     use crate::store::jetstream::record::{Document, Queued, Record};
 
     fn record() -> Record {
-        let submission = Submission {
-            id: Uuid::nil(),
-            name: None,
-            algorithm: "tms-sba".to_owned(),
-            seed: 7,
-            iterations: 200,
-            work: 1,
-            scenario: "{}".to_owned(),
-            created_ms: 0,
-            owner: None,
-            quota: None,
-            webhook: None,
-            idempotency: None,
-            dataset: None,
-        };
+        let submission = Submission::example();
         let queued = Queued {
             place: 1,
             position: 1,
@@ -248,8 +235,9 @@ mod tests {
                 record.last_event += events.len() as u64;
                 Step {
                     mark: Uuid::nil(),
-                    state: State::Kept(Box::new(record.clone())),
+                    state: Arc::new(State::Kept(Box::new(record.clone()))),
                     events,
+                    told: false,
                 }
             })
             .collect()

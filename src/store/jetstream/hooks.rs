@@ -79,10 +79,7 @@ impl JetStream {
                 if next_ms.is_none() {
                     record.webhook = None;
                 }
-                Ok(Some(Change {
-                    state: State::Kept(record),
-                    events: Vec::new(),
-                }))
+                Ok(Some(Change::silent(State::Kept(record))))
             })
             .await;
         self.let_tell(id).await;

@@ -84,11 +84,11 @@ impl Leases {
         }
     }
 
-    /// Number of the step that a run appends next.
-    pub(super) fn next_append(&self, id: PlanId, attempt: u64) -> Option<u64> {
+    /// Number of the step that a run appended last.
+    pub(super) fn appended_last(&self, id: PlanId, attempt: u64) -> Option<u64> {
         let all = self.held();
         let held = all.get(&id).filter(|held| held.attempt == attempt)?;
-        Some(held.appended + 1)
+        Some(held.appended)
     }
 
     pub(super) fn appended(&self, id: PlanId, attempt: u64, number: u64) {

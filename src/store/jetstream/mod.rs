@@ -38,7 +38,7 @@ use tokio::task::JoinHandle;
 use tokio::time::Instant;
 use uuid::Uuid;
 
-pub use settings::{Address, Settings};
+pub use settings::Settings;
 pub use shelf::JetStreamShelf;
 
 use self::connect::Servers;
@@ -52,7 +52,7 @@ use super::{
     Webhook,
 };
 use crate::export::document::Incumbent;
-use crate::job::{Event, Plan, PlanId, Status, Submission};
+use crate::job::{Event, Plan, PlanId, Submission};
 
 /// What was there must be read so soon at the start.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -181,17 +181,15 @@ impl Store for JetStreamStore {
             .await
     }
 
-    async fn finish(&self, lease: &Lease, ending: Ending, now_ms: i64) -> Result<Plan, StoreError> {
-        if let Ending::Result { status, .. } = &ending {
-            assert!(
-                matches!(status, Status::Succeeded | Status::Cancelled),
-                "a {} plan has no result",
-                status.name()
-            );
-        }
-        let store = self.open_store()?;
-        store
-            .finish(lease.plan.id, lease.attempt, &ending, now_ms)
+    async fn finish(
+        &self,
+        lease: &Lease,
+        told: Vec<Event>,
+        ending: Ending,
+        now_ms: i64,
+    ) -> Result<Plan, StoreError> {
+        self.open_store()?
+            .finish(lease.plan.id, lease.attempt, &told, &ending, now_ms)
             .await
     }
 

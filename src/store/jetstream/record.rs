@@ -3,11 +3,14 @@
 //! Each message is one step: the plan as it became, and the events that this tells. So a state and
 //! its events are one write, which is there wholly or not at all.
 
+use std::sync::Arc;
+
 use async_nats::jetstream::message::StreamMessage;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 use super::lane::Lane;
+use super::steps::Change;
 use crate::job::{Event, NumberedEvent, Owner, Plan, PlanId, Status, Submission};
 use crate::store::{StoreError, Tombstone};
 
@@ -17,9 +20,13 @@ pub(super) struct Step {
     /// By which a writer whose answer was lost recognises its own.
     pub(super) mark: Uuid,
     /// As the step left it.
-    pub(super) state: State,
-    /// What it told.
+    #[serde(with = "shared")]
+    pub(super) state: Arc<State>,
+    /// What was told before it.
     pub(super) events: Vec<Event>,
+    /// Whether the plan as it left it is told too, and its end when it has come to one: they are in the
+    /// state, and not written twice.
+    pub(super) told: bool,
 }
 
 /// How a plan stands.
@@ -116,22 +123,19 @@ impl Record {
         self.plan.id
     }
 
-    /// The events of a step whose status it is.
-    pub(super) fn told(&self) -> Vec<Event> {
-        vec![Event::Status(Box::new(self.plan.clone()))]
+    /// The event of its status.
+    pub(super) fn status(&self) -> Event {
+        Event::Status(Box::new(self.plan.clone()))
     }
 
-    /// Those of its end, from which on its time runs and its end is to be told.
-    pub(super) fn told_end(&mut self, age_ms: Option<i64>) -> Vec<Event> {
+    /// It has ended: its time runs, and its end is to be told.
+    pub(super) fn ended(&mut self, age_ms: Option<i64>) {
         let finished_ms = self.plan.finished_ms;
         let expires_ms = finished_ms.zip(age_ms);
         self.plan.expires_ms = expires_ms.map(|(end, age)| end.saturating_add(age));
         if let Some(hook) = &mut self.webhook {
             hook.due_ms = finished_ms;
         }
-        let mut events = self.told();
-        events.push(Event::End(self.plan.status));
-        events
     }
 
     pub(super) fn is_run_under(&self, attempt: u64) -> bool {
@@ -150,19 +154,43 @@ impl Grave {
 }
 
 impl Step {
-    /// Give the events their ids.
+    /// As `change` says, with the events counted.
+    pub(super) fn of(change: Change) -> Self {
+        let Change {
+            mut state,
+            events,
+            told,
+        } = change;
+        if let State::Kept(record) = &mut state {
+            record.last_event += count(events.len(), told, &record.plan);
+        }
+        Self {
+            mark: Uuid::new_v4(),
+            state: Arc::new(state),
+            events,
+            told,
+        }
+    }
+
+    /// Id of the first event that it tells; of the next one, when it tells none.
+    pub(super) fn first_event(&self, record: &Record) -> u64 {
+        record.last_event + 1 - count(self.events.len(), self.told, &record.plan)
+    }
+
+    /// All events that it tells, with their ids.
     pub(super) fn numbered(&self) -> Vec<NumberedEvent> {
-        let last = match &self.state {
-            State::Kept(record) => record.last_event,
-            State::Buried(_) => return Vec::new(),
+        let State::Kept(record) = &*self.state else {
+            return Vec::new();
         };
-        let first = last + 1 - self.events.len() as u64;
-        (first..)
-            .zip(&self.events)
-            .map(|(id, event)| NumberedEvent {
-                id,
-                event: event.clone(),
-            })
+        let status = record.plan.status;
+        let now = [
+            Some(record.status()),
+            status.is_final().then_some(Event::End(status)),
+        ];
+        let now = now.into_iter().flatten().filter(|_| self.told);
+        (self.first_event(record)..)
+            .zip(self.events.iter().cloned().chain(now))
+            .map(|(id, event)| NumberedEvent { id, event })
             .collect()
     }
 
@@ -175,6 +203,28 @@ impl Step {
     pub(super) fn read(payload: &[u8]) -> Result<Self, StoreError> {
         serde_json::from_slice(payload)
             .map_err(|error| StoreError::unavailable(format!("a step of a plan: {error}")))
+    }
+}
+
+/// Events of a step that tells so many before the plan as it leaves it, and perhaps this.
+fn count(before: usize, told: bool, plan: &Plan) -> u64 {
+    before as u64 + u64::from(told) + u64::from(told && plan.status.is_final())
+}
+
+/// A state is read and written as if it were not shared.
+mod shared {
+    use std::sync::Arc;
+
+    use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer};
+
+    use super::State;
+
+    pub(super) fn serialize<S: Serializer>(state: &Arc<State>, to: S) -> Result<S::Ok, S::Error> {
+        state.as_ref().serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Arc<State>, D::Error> {
+        State::deserialize(from).map(Arc::new)
     }
 }
 

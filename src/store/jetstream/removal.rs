@@ -32,10 +32,7 @@ impl JetStream {
                     expired,
                     deleted_ms: now_ms,
                 };
-                Ok(Some(Change {
-                    state: State::Buried(grave),
-                    events: Vec::new(),
-                }))
+                Ok(Some(Change::silent(State::Buried(grave))))
             })
             .await?;
         if let Some((place, documents)) = remains {

@@ -4,14 +4,18 @@ use async_nats::jetstream::AckKind;
 
 use super::JetStream;
 use super::claim::answer;
+use super::history::bytes_of;
 use super::record::{Document, Record, State};
 use super::steps::Change;
 use super::view::Standing;
 use crate::job::{Event, Plan, PlanId, Status};
 use crate::store::{Ending, StoreError};
 
-/// Events of one step; a message must not grow too long.
+/// Events of one step, at most.
 const EVENTS: usize = 256;
+
+/// Bytes of them, about; servers take messages of 1 MiB unless told otherwise.
+const BYTES: usize = 256 << 10;
 
 impl JetStream {
     pub(super) async fn append(
@@ -21,29 +25,46 @@ impl JetStream {
         events: &[Event],
     ) -> Result<(), StoreError> {
         if events.is_empty() {
-            let standing = self.plans().standing(id).await?;
-            return own(&standing, id, attempt).map(drop);
+            return self.still_own(id, attempt).await;
         }
-        for part in events.chunks(EVENTS) {
-            self.append_part(id, attempt, part).await?;
-        }
+        let appended = self.append_all(id, attempt, &parts(events)).await?;
+        self.leases.appended(id, attempt, appended);
         Ok(())
+    }
+
+    async fn still_own(&self, id: PlanId, attempt: u64) -> Result<(), StoreError> {
+        let standing = self.plans().standing(id).await;
+        let standing = standing.map_err(|error| lost(error, id))?;
+        own(&standing, id, attempt).map(drop)
+    }
+
+    /// Append a step for each part; returns the number of the last. Until that is noted, doing it again
+    /// writes only what was not written.
+    async fn append_all(
+        &self,
+        id: PlanId,
+        attempt: u64,
+        parts: &[&[Event]],
+    ) -> Result<u64, StoreError> {
+        let appended = self
+            .leases
+            .appended_last(id, attempt)
+            .ok_or(StoreError::LeaseLost(id))?;
+        let mut number = appended;
+        for part in parts {
+            number += 1;
+            self.append_part(id, attempt, number, part).await?;
+        }
+        Ok(number)
     }
 
     async fn append_part(
         &self,
         id: PlanId,
         attempt: u64,
+        number: u64,
         events: &[Event],
     ) -> Result<(), StoreError> {
-        let number = self
-            .leases
-            .next_append(id, attempt)
-            .ok_or(StoreError::LeaseLost(id))?;
-        let point = events.iter().rev().find_map(|event| match event {
-            Event::Convergence(point) => Some(point),
-            _ => None,
-        });
         let appended = self
             .plans()
             .change(id, |standing| {
@@ -54,42 +75,30 @@ impl JetStream {
                 }
                 let mut record = Box::new(record.clone());
                 record.appended = number;
-                if let Some(point) = point {
-                    record.plan.advance(point);
-                }
+                record.plan.advance(events);
                 Ok(Some(Change {
-                    state: State::Kept(record),
                     events: events.to_vec(),
+                    ..Change::silent(State::Kept(record))
                 }))
             })
             .await;
-        match appended {
-            Ok(_) => {
-                self.leases.appended(id, attempt, number);
-                Ok(())
-            }
-            Err(error) => Err(lost(error, id)),
-        }
+        appended.map(drop).map_err(|error| lost(error, id))
     }
 
     pub(super) async fn finish(
         &self,
         id: PlanId,
         attempt: u64,
+        told: &[Event],
         ending: &Ending,
         now_ms: i64,
     ) -> Result<Plan, StoreError> {
+        let mut parts = parts(told);
+        let last = parts.pop().unwrap_or_default();
+        self.still_own(id, attempt).await?;
+        self.append_all(id, attempt, &parts).await?;
         let result = match ending {
             Ending::Result { document, .. } => {
-                own(
-                    &self
-                        .plans()
-                        .standing(id)
-                        .await
-                        .map_err(|error| lost(error, id))?,
-                    id,
-                    attempt,
-                )?;
                 let result = Document::result(id, attempt, document);
                 self.servers.write(&result, document).await?;
                 Some((result, document.len() as u64))
@@ -100,15 +109,16 @@ impl JetStream {
             .plans()
             .change(id, |standing| {
                 let mut record = Box::new(own(standing, id, attempt)?.clone());
+                record.plan.advance(last);
                 ending.apply(&mut record.plan, now_ms)?;
                 if let Some((result, bytes)) = &result {
                     record.bytes += bytes;
                     record.result = Some(result.clone());
                 }
-                let events = record.told_end(self.options.retention.age_ms);
+                record.ended(self.options.retention.age_ms);
                 Ok(Some(Change {
-                    state: State::Kept(record),
-                    events,
+                    events: last.to_vec(),
+                    ..Change::told(record)
                 }))
             })
             .await;
@@ -127,19 +137,15 @@ impl JetStream {
             .plans()
             .change(id, |standing| {
                 let mut record = Box::new(own(standing, id, attempt)?.clone());
-                let events = if record.plan.cancel_requested {
+                if record.plan.cancel_requested {
                     record.plan.cancel(now_ms)?;
                     back = AckKind::Ack;
-                    record.told_end(self.options.retention.age_ms)
+                    record.ended(self.options.retention.age_ms);
                 } else {
                     record.plan.requeue()?;
                     record.plan.queue_position = Some(self.view.known().position(record.place));
-                    record.told()
-                };
-                Ok(Some(Change {
-                    state: State::Kept(record),
-                    events,
-                }))
+                }
+                Ok(Some(Change::told(record)))
             })
             .await;
         released.map_err(|error| lost(error, id))?;
@@ -157,24 +163,20 @@ impl JetStream {
             .change(id, |standing| {
                 waited = None;
                 let mut record = Box::new(standing.record(id, clock_ms)?.clone());
-                let events = match record.plan.status {
+                match record.plan.status {
                     Status::Queued => {
                         record.plan.cancel(now_ms)?;
                         waited = Some(record.place);
-                        record.told_end(self.options.retention.age_ms)
+                        record.ended(self.options.retention.age_ms);
                     }
                     Status::Running if !record.plan.cancel_requested => {
                         record.plan.request_cancel();
-                        record.told()
                     }
                     Status::Running | Status::Succeeded | Status::Failed | Status::Cancelled => {
                         return Ok(None);
                     }
-                };
-                Ok(Some(Change {
-                    state: State::Kept(record),
-                    events,
-                }))
+                }
+                Ok(Some(Change::told(record)))
             })
             .await?;
         if let Some(place) = waited {
@@ -197,5 +199,58 @@ fn lost(error: StoreError, id: PlanId) -> StoreError {
     match error {
         StoreError::NotFound(_) | StoreError::Gone(_) => StoreError::LeaseLost(id),
         other => other,
+    }
+}
+
+/// What goes into a step each.
+fn parts(events: &[Event]) -> Vec<&[Event]> {
+    let mut parts = Vec::new();
+    let mut rest = events;
+    while !rest.is_empty() {
+        let mut bytes = 0;
+        let fits = |event: &&Event| {
+            bytes += bytes_of(event);
+            bytes <= BYTES
+        };
+        let count = rest.iter().take(EVENTS).take_while(fits).count().max(1);
+        let (part, more) = rest.split_at(count);
+        parts.push(part);
+        rest = more;
+    }
+    parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::export::document::{Incumbent, Position};
+
+    fn incumbent(waypoints: usize) -> Event {
+        let place = Position::Local {
+            x: -1.234_567_890_123_456_7e-300,
+            y: -1.234_567_890_123_456_7e-300,
+            z: -1.234_567_890_123_456_7e-300,
+        };
+        Event::Incumbent(Incumbent {
+            iteration: 1,
+            elapsed_ms: 1.0,
+            cost: 1.0,
+            feasible: false,
+            waypoints: vec![place; waypoints],
+        })
+    }
+
+    #[test]
+    fn parts_are_all_in_order_and_none_is_too_long_for_a_message() {
+        for (events, waypoints) in [(0, 3), (1, 3), (600, 3), (40, 200), (3, 20_000)] {
+            let all = vec![incumbent(waypoints); events];
+            let parts = parts(&all);
+            assert_eq!(parts.concat(), all);
+            for part in parts {
+                let bytes = serde_json::to_vec(part).expect("they can be written").len();
+                assert!(bytes <= 1 << 20 || part.len() == 1, "{bytes}");
+                assert!(part.len() <= EVENTS);
+            }
+        }
     }
 }

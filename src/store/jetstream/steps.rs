@@ -5,12 +5,12 @@ use std::time::Duration;
 use async_nats::jetstream::context::PublishErrorKind;
 use async_nats::jetstream::message::PublishMessage;
 use async_nats::jetstream::stream::LastRawMessageErrorKind;
+use bytes::Bytes;
 use tokio::time::Instant;
-use uuid::Uuid;
 
 use super::connect::Servers;
 use super::leases::Leases;
-use super::record::{Placed, State, Step};
+use super::record::{Placed, Record, State, Step};
 use super::trouble::failed;
 use super::view::{Standing, View};
 use crate::job::{Event, PlanId};
@@ -23,7 +23,30 @@ const PATIENCE: Duration = Duration::from_secs(10);
 pub(super) struct Change {
     /// The plan as it becomes; ids of the events are counted on by the writer.
     pub(super) state: State,
+    /// What is told first.
     pub(super) events: Vec<Event>,
+    /// Whether the plan as it becomes is told, and its end with it.
+    pub(super) told: bool,
+}
+
+impl Change {
+    /// The plan becomes this, and that is told.
+    pub(super) fn told(record: Box<Record>) -> Self {
+        Self {
+            state: State::Kept(record),
+            events: Vec::new(),
+            told: true,
+        }
+    }
+
+    /// The plan becomes this, and nobody need know.
+    pub(super) fn silent(state: State) -> Self {
+        Self {
+            state,
+            events: Vec::new(),
+            told: false,
+        }
+    }
 }
 
 /// The plans: on the servers, and as they are known here.
@@ -55,7 +78,7 @@ impl Plans<'_> {
         self.learn(id, &newest);
         Ok(Standing {
             sequence: newest.sequence,
-            state: newest.step.state.into(),
+            state: newest.step.state,
         })
     }
 
@@ -114,16 +137,13 @@ impl Plans<'_> {
             let Some(change) = change(standing.as_ref())? else {
                 return Ok(standing);
             };
-            let step = step(change);
+            let step = Step::of(change);
+            let mark = step.mark;
             let expected = standing.as_ref().map_or(0, |standing| standing.sequence);
+            let payload = step.write()?;
             let newest = loop {
-                match self.publish(id, expected, &step).await {
-                    Ok(sequence) => {
-                        break Some(Placed {
-                            sequence,
-                            step: step.clone(),
-                        });
-                    }
+                match self.publish(id, expected, payload.clone()).await {
+                    Ok(sequence) => break Some(Placed { sequence, step }),
                     Err(PublishError::Outrun) => break self.newest(id).await?,
                     Err(PublishError::Hopeless(error)) => return Err(error),
                     Err(PublishError::Unanswered(error)) if Instant::now() > until => {
@@ -141,10 +161,10 @@ impl Plans<'_> {
             }
             let own = newest
                 .as_ref()
-                .is_some_and(|newest| newest.step.mark == step.mark);
+                .is_some_and(|newest| newest.step.mark == mark);
             standing = newest.map(|newest| Standing {
                 sequence: newest.sequence,
-                state: newest.step.state.into(),
+                state: newest.step.state,
             });
             if own {
                 return Ok(standing);
@@ -152,10 +172,10 @@ impl Plans<'_> {
         }
     }
 
-    async fn publish(&self, id: PlanId, expected: u64, step: &Step) -> Result<u64, PublishError> {
+    async fn publish(&self, id: PlanId, expected: u64, step: Bytes) -> Result<u64, PublishError> {
         let what = || format!("a step of plan {id}");
         let message = PublishMessage::build()
-            .payload(step.write().map_err(PublishError::Hopeless)?)
+            .payload(step)
             .expected_last_subject_sequence(expected);
         let sent = self
             .servers
@@ -192,17 +212,4 @@ enum PublishError {
     Unanswered(StoreError),
     /// It never will be.
     Hopeless(StoreError),
-}
-
-/// With the events counted.
-fn step(change: Change) -> Step {
-    let Change { mut state, events } = change;
-    if let State::Kept(record) = &mut state {
-        record.last_event += events.len() as u64;
-    }
-    Step {
-        mark: Uuid::new_v4(),
-        state,
-        events,
-    }
 }

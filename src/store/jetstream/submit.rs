@@ -14,7 +14,7 @@ use tokio::time::Instant;
 
 use super::JetStream;
 use super::lane::Lane;
-use super::record::{Document, Queued, Record, State};
+use super::record::{Document, Queued, Record};
 use super::steps::Change;
 use super::trouble::failed;
 use crate::export::sha256_hex;
@@ -103,10 +103,7 @@ impl JetStream {
         };
         let record = Record::accepted(submission, Queued { place, position }, scenario);
         let plan = record.plan.clone();
-        let change = Change {
-            events: record.told(),
-            state: State::Kept(Box::new(record)),
-        };
+        let change = Change::told(Box::new(record));
         self.plans().begin(id, change).await?;
         Ok(plan)
     }

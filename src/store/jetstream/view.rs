@@ -141,9 +141,17 @@ impl Known {
         {
             return false;
         }
+        let had_ended = self
+            .kept(id)
+            .is_some_and(|record| record.plan.status.is_final());
         self.unlist(id);
-        let state = Arc::new(placed.step.state.clone());
+        let state = Arc::clone(&placed.step.state);
         self.list(id, &state);
+        if let State::Kept(record) = &*state
+            && !had_ended
+        {
+            self.time_run(&record.plan);
+        }
         let sequence = placed.sequence;
         self.plans.insert(id, Standing { sequence, state });
         true
@@ -181,10 +189,14 @@ impl Known {
         let hook = record.webhook.as_ref();
         self.due
             .extend(hook.and_then(|hook| hook.due_ms).map(|at| (at, id)));
+    }
+
+    /// Of one that has ended with a result.
+    fn time_run(&mut self, plan: &Plan) {
         if plan.stop_reason.is_some()
-            && let Some(began_ms) = plan.started_ms
+            && let Some((end_ms, began_ms)) = plan.finished_ms.zip(plan.started_ms)
         {
-            self.run_times.push_back(ended_ms - began_ms);
+            self.run_times.push_back(end_ms - began_ms);
             if self.run_times.len() > RUNS {
                 self.run_times.pop_front();
             }

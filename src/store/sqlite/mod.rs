@@ -33,7 +33,7 @@ use super::{
     Submitted, Trouble, Webhook,
 };
 use crate::export::document::Incumbent;
-use crate::job::{Event, Plan, PlanId, Status, Submission};
+use crate::job::{Event, Plan, PlanId, Submission};
 
 /// Name of the database in the data directory.
 const DATABASE: &str = "noctule.db";
@@ -144,17 +144,16 @@ impl Store for SqliteStore {
             .await
     }
 
-    async fn finish(&self, lease: &Lease, ending: Ending, now_ms: i64) -> Result<Plan, StoreError> {
-        if let Ending::Result { status, .. } = &ending {
-            assert!(
-                matches!(status, Status::Succeeded | Status::Cancelled),
-                "a {} plan has no result",
-                status.name()
-            );
-        }
+    async fn finish(
+        &self,
+        lease: &Lease,
+        told: Vec<Event>,
+        ending: Ending,
+        now_ms: i64,
+    ) -> Result<Plan, StoreError> {
         let (id, attempt) = (lease.plan.id, lease.attempt);
         self.writer
-            .change(move |tx| operations::finish(tx, id, attempt, &ending, now_ms))
+            .change(move |tx| operations::finish(tx, id, attempt, &told, &ending, now_ms))
             .await
     }
 

@@ -107,13 +107,7 @@ pub(super) fn append(
     events: &[Event],
 ) -> Result<(), StoreError> {
     let mut row = leased(tx, id, attempt)?;
-    let last_point = events.iter().rev().find_map(|event| match event {
-        Event::Convergence(point) => Some(point),
-        _ => None,
-    });
-    if let Some(point) = last_point {
-        row.plan.advance(point);
-    }
+    row.plan.advance(events);
     let best = events.iter().rev().find_map(|event| match event {
         Event::Incumbent(incumbent) => Some(incumbent),
         _ => None,
@@ -130,10 +124,13 @@ pub(super) fn finish(
     tx: &mut Transaction<'_>,
     id: PlanId,
     attempt: u64,
+    told: &[Event],
     ending: &Ending,
     now_ms: i64,
 ) -> Result<Plan, StoreError> {
     let mut row = leased(tx, id, attempt)?;
+    row.plan.advance(told);
+    tx.tell(&mut row, told)?;
     ending.apply(&mut row.plan, now_ms)?;
     forget_incumbent(tx, &row)?;
     if let Ending::Result { document, .. } = ending {

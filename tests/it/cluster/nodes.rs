@@ -6,8 +6,9 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use futures_util::future::join_all;
+use noctule::config::Address;
 use noctule::job::{Event, Idempotency, PlanId, Status, Submission};
-use noctule::store::jetstream::{Address, JetStreamStore, Settings};
+use noctule::store::jetstream::{JetStreamStore, Settings};
 use noctule::store::{Options, Store, StoreError};
 
 use super::{open, open_as};
@@ -59,7 +60,7 @@ async fn what_one_node_accepts_and_another_runs_a_third_tells() {
             .unwrap();
     }
     running
-        .finish(&lease, ending(Status::Succeeded), 0)
+        .finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
         .await
         .unwrap();
     let (read, result) = reader.await.unwrap();
@@ -77,7 +78,7 @@ async fn a_cancel_reaches_the_node_that_runs_the_plan() {
     asked.request_cancel(id, 1).await.unwrap();
     lease.cancel.wait_for(|cancelled| *cancelled).await.unwrap();
     running
-        .finish(&lease, ending(Status::Cancelled), 2)
+        .finish(&lease, Vec::new(), ending(Status::Cancelled), 2)
         .await
         .unwrap();
     until(&*asked, id, |plan| plan.status == Status::Cancelled).await;
@@ -86,7 +87,9 @@ async fn a_cancel_reaches_the_node_that_runs_the_plan() {
     let mut lease = running.claim().await.unwrap();
     asked.delete(id, 1).await.unwrap();
     lease.cancel.wait_for(|cancelled| *cancelled).await.unwrap();
-    let late = running.finish(&lease, ending(Status::Succeeded), 2).await;
+    let late = running
+        .finish(&lease, Vec::new(), ending(Status::Succeeded), 2)
+        .await;
     assert_eq!(kind(late), Err("lease lost"));
 }
 
@@ -124,7 +127,7 @@ async fn every_plan_is_taken_once_however_many_nodes_take() {
         tokio::spawn(async move {
             let lease = node.claim().await.unwrap();
             assert_eq!(lease.attempt, 1);
-            node.finish(&lease, ending(Status::Succeeded), 0)
+            node.finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
                 .await
                 .unwrap();
             lease.plan.id
@@ -149,7 +152,7 @@ async fn a_plan_whose_node_is_lost_is_another_nodes_to_run() {
     let lease = other.claim().await.unwrap();
     assert_eq!((lease.plan.id, lease.attempt), (id, 2));
     other
-        .finish(&lease, ending(Status::Succeeded), 0)
+        .finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
         .await
         .unwrap();
     let told = history(&*other, id).await;

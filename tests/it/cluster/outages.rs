@@ -5,8 +5,8 @@
 use std::time::Duration;
 
 use noctule::job::{Event, Status};
-use noctule::store::Store;
 use noctule::store::jetstream::Settings;
+use noctule::store::{Store, StoreError};
 
 use super::{open, open_as, turn};
 use crate::support::nats::{Cluster, NatsServer};
@@ -17,6 +17,21 @@ use crate::support::stores::node;
 async fn until_sound(store: &dyn Store) {
     while store.health().await.is_err() {
         tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
+/// Do a step as a worker does: again, until a server that leads has answered.
+async fn persist<T, F>(step: impl Fn() -> F)
+where
+    F: Future<Output = Result<T, StoreError>>,
+{
+    loop {
+        match step().await {
+            Err(StoreError::Unavailable { .. }) => {
+                tokio::time::sleep(Duration::from_millis(50)).await;
+            }
+            done => return drop(done.unwrap()),
+        }
     }
 }
 
@@ -43,7 +58,7 @@ async fn a_server_that_comes_back_has_everything_and_is_taken_up_again() {
 
     store.append(&lease, vec![point(2, None)]).await.unwrap();
     store
-        .finish(&lease, ending(Status::Succeeded), 0)
+        .finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
         .await
         .unwrap();
     until(&*follower, running, |plan| plan.status == Status::Succeeded).await;
@@ -78,26 +93,16 @@ async fn a_run_goes_on_over_the_loss_of_the_leader() {
     let id = store.submit(submission()).await.unwrap().plan.id;
     let lease = store.claim().await.unwrap();
     for round in 0..2 {
-        store
-            .append(&lease, vec![point(2 * round, None)])
-            .await
-            .unwrap();
+        persist(|| store.append(&lease, vec![point(2 * round, None)])).await;
         let leader = cluster.leader(&address).await;
         cluster.servers[leader].kill();
-        // Tried again until another one leads.
-        store
-            .append(&lease, vec![point(2 * round + 1, None)])
-            .await
-            .unwrap();
+        persist(|| store.append(&lease, vec![point(2 * round + 1, None)])).await;
         cluster.servers[leader].restart();
         until_sound(&*store).await;
     }
-    store
-        .finish(&lease, ending(Status::Succeeded), 0)
-        .await
-        .unwrap();
+    persist(|| store.finish(&lease, vec![point(4, None)], ending(Status::Succeeded), 0)).await;
     until(&*follower, id, |plan| plan.status == Status::Succeeded).await;
     let told = history(&*follower, id).await;
-    assert_eq!(told.len(), 2 + 4 + 2);
+    assert_eq!(told.len(), 2 + 5 + 2);
     assert_eq!(told, history(&*store, id).await);
 }

@@ -10,10 +10,11 @@ use reqwest::Client;
 use serde_json::Value;
 
 use super::{Node, ends_once};
+use crate::support::lives::{a_run_of, await_run, life, running};
 use crate::support::nats;
 use crate::support::process::Service;
 use crate::support::scenario;
-use crate::support::sse::{Block, Stream, events};
+use crate::support::sse::events;
 
 /// A plan of some hundred milliseconds.
 fn a_plan(seed: usize) -> Value {
@@ -24,38 +25,10 @@ fn a_plan(seed: usize) -> Value {
     scenario
 }
 
-/// A plan that runs for so long, wherever it runs.
-fn a_run_of(ms: u64) -> Value {
-    let mut scenario = scenario();
-    scenario["planner"]["population"] = 2000.into();
-    scenario["planner"]["iterations"] = 100_000.into();
-    scenario["planner"]["time_limit_ms"] = ms.into();
-    scenario
-}
-
-/// Read until the plan is running.
-async fn running(service: &Service, address: &str) -> Stream {
-    let mut stream = Stream::open(service.get(&format!("{address}/events?rate=1"))).await;
-    loop {
-        match stream.next().await.expect("it has not ended") {
-            Block::Event { data, .. } if data["status"] == "running" => return stream,
-            _ => {}
-        }
-    }
-}
-
 /// How often the plan began to run.
 async fn runs(service: &Service, address: &str) -> usize {
-    let request = service.get(&format!("{address}/events?rate=1"));
-    let blocks = Stream::open(request).await.rest().await;
-    let ends = events(&blocks)
-        .into_iter()
-        .filter(|(_, name)| name == "end");
-    assert_eq!(ends.count(), 1);
-    let began = blocks.iter().filter(|block| {
-        matches!(block, Block::Event { name, data, .. } if name == "status" && data["status"] == "running")
-    });
-    began.count()
+    let life = life(service, address).await;
+    life.iter().filter(|status| *status == "running").count()
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -85,7 +58,8 @@ async fn a_worker_that_is_paused_past_its_lease_ends_nothing() {
     let other = Node::worker(&address, &[]);
     // The plan's reader sees it taken by the other, and one end.
     let rest = tokio::spawn(stream.rest());
-    let again = running_again(&api, &plan).await;
+    let mut again = running(&api, &plan).await;
+    await_run(&mut again).await;
     paused.signal("CONT");
     ends_once(&api, &plan).await;
     assert_eq!(runs(&api, &plan).await, 2);
@@ -96,21 +70,6 @@ async fn a_worker_that_is_paused_past_its_lease_ends_nothing() {
     drop(other);
     let next = api.submit(&a_plan(1)).await;
     ends_once(&api, &next).await;
-}
-
-/// Read until the plan has begun to run a second time.
-async fn running_again(service: &Service, address: &str) -> Stream {
-    let mut stream = Stream::open(service.get(&format!("{address}/events?rate=1"))).await;
-    let mut runs = 0;
-    while runs < 2 {
-        if let Block::Event { name, data, .. } = stream.next().await.expect("it has not ended")
-            && name == "status"
-            && data["status"] == "running"
-        {
-            runs += 1;
-        }
-    }
-    stream
 }
 
 /// What a caller does who has two addresses: another try at the other one, with the same key.

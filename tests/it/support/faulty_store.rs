@@ -49,9 +49,15 @@ impl Store for FaultyStore {
         self.sound.append(lease, events).await
     }
 
-    async fn finish(&self, lease: &Lease, ending: Ending, now_ms: i64) -> Result<Plan, StoreError> {
+    async fn finish(
+        &self,
+        lease: &Lease,
+        told: Vec<Event>,
+        ending: Ending,
+        now_ms: i64,
+    ) -> Result<Plan, StoreError> {
         self.stumble()?;
-        self.sound.finish(lease, ending, now_ms).await
+        self.sound.finish(lease, told, ending, now_ms).await
     }
 
     async fn release(&self, lease: &Lease) -> Result<(), StoreError> {

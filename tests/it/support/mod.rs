@@ -7,6 +7,7 @@ pub(crate) mod elevations;
 pub(crate) mod engines;
 pub(crate) mod faulty_store;
 pub(crate) mod keys;
+pub(crate) mod lives;
 pub(crate) mod nats;
 pub(crate) mod openmetrics;
 pub(crate) mod plans;

@@ -39,7 +39,7 @@ pub(crate) fn point(iteration: usize, best_cost: Option<f64>) -> Event {
 /// With a result document that a careless store would change.
 pub(crate) fn ending(status: Status) -> Ending {
     Ending::Result {
-        status,
+        cancelled: status == Status::Cancelled,
         stop_reason: "iterations".to_owned(),
         feasible: true,
         best_cost: Some(471.2),

@@ -13,6 +13,18 @@ pub(crate) enum Block {
     Event { id: u64, name: String, data: Value },
 }
 
+impl Block {
+    /// What a `status` event says.
+    pub(crate) fn status(&self) -> Option<String> {
+        match self {
+            Self::Event { name, data, .. } if name == "status" => {
+                Some(data["status"].as_str()?.to_owned())
+            }
+            _ => None,
+        }
+    }
+}
+
 /// A stream that is being read.
 pub(crate) struct Stream {
     response: Response,

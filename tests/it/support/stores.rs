@@ -6,7 +6,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 
-use noctule::store::jetstream::{Address, JetStreamStore, Settings};
+use noctule::config::Address;
+use noctule::store::jetstream::{JetStreamStore, Settings};
 use noctule::store::sqlite::SqliteStore;
 use noctule::store::{Options, Retention, Store, StoreError};
 use tempfile::TempDir;

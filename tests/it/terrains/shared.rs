@@ -7,11 +7,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use noctule::catalogue::{Catalogue, Directories, Sharing, Shelf};
+use noctule::config::Address;
 use noctule::http;
 use noctule::job::Status;
 use noctule::planner;
 use noctule::scenario::json;
-use noctule::store::jetstream::{Address, JetStreamShelf, JetStreamStore, Settings};
+use noctule::store::jetstream::{JetStreamShelf, JetStreamStore, Settings};
 use noctule::store::{Options, wall_clock};
 use noctule::worker::{self, Engine, Pool, Unplanned};
 use reqwest::Method;

@@ -17,7 +17,8 @@ use super::progress;
 use super::report::Report;
 use super::summary::median;
 use super::table::{Cell, Table};
-use crate::store::jetstream::{Address, Settings};
+use crate::config::Address;
+use crate::store::jetstream::Settings;
 
 #[derive(Args)]
 pub(in crate::cli) struct Arguments {

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use anyhow::Context as _;
-use async_nats::jetstream::consumer::{AckPolicy, PullConsumer, pull};
+use async_nats::jetstream::consumer::{AckPolicy, PullConsumer, pull, push};
 use async_nats::jetstream::message::PublishMessage;
 use async_nats::jetstream::stream::{Config, DiscardPolicy, RetentionPolicy, Stream};
 use async_nats::jetstream::{self, Context, kv};
@@ -13,16 +13,17 @@ use tokio::task::JoinSet;
 use uuid::Uuid;
 
 use super::Took;
-use super::work::{CALLERS, RESULT, SCENARIO, WORKERS};
+use super::work::{CALLERS, NODES, RESULT, SCENARIO, WORKERS};
 use crate::store::jetstream::Settings;
 
-/// Bytes of a step, as the store writes them for such plans.
-const STEP: usize = 1_400;
+/// Bytes of a step, about as the store writes them for such plans.
+const STEP: usize = 900;
 
 #[derive(Clone)]
 struct Bare {
     context: Context,
     namespace: String,
+    plans: Stream,
     jobs: Stream,
     documents: kv::Store,
 }
@@ -30,6 +31,10 @@ struct Bare {
 /// How fast the calls of plans are answered: first those of their acceptance, then those of their runs.
 pub(super) async fn measure(settings: Settings, plans: u32) -> anyhow::Result<Took> {
     let bare = Bare::open(&settings).await?;
+    let mut readers = JoinSet::new();
+    for _ in 0..NODES {
+        readers.spawn(bare.clone().read());
+    }
     let began = Instant::now();
     stream::iter((0..plans).map(Ok))
         .try_for_each_concurrent(CALLERS, |_| bare.accept())
@@ -75,13 +80,10 @@ async fn work(bare: Bare, lane: PullConsumer) -> anyhow::Result<()> {
         );
         let started = started?;
         document?;
-        let appended = bare.step(&id, started).await?;
         let result = vec![b'r'; RESULT].into();
         bare.documents.put(format!("{id}.result"), result).await?;
-        bare.step(&id, appended).await?;
-        job.double_ack()
-            .await
-            .map_err(|error| anyhow::anyhow!(error))?;
+        bare.step(&id, started).await?;
+        job.ack().await.map_err(|error| anyhow::anyhow!(error))?;
     }
     Ok(())
 }
@@ -99,9 +101,8 @@ impl Bare {
             num_replicas: settings.replicas,
             ..Config::default()
         };
-        context
-            .create_stream(stream("plans", RetentionPolicy::Limits, DiscardPolicy::Old))
-            .await?;
+        let plans = stream("plans", RetentionPolicy::Limits, DiscardPolicy::Old);
+        let plans = context.create_stream(plans).await?;
         let jobs = stream("jobs", RetentionPolicy::WorkQueue, DiscardPolicy::New);
         let jobs = context.create_stream(jobs).await?;
         let documents = kv::Config {
@@ -114,6 +115,7 @@ impl Bare {
         Ok(Self {
             context,
             namespace,
+            plans,
             jobs,
             documents,
         })
@@ -132,6 +134,20 @@ impl Bare {
         enqueued?;
         written?;
         self.step(&id.to_string(), 0).await?;
+        Ok(())
+    }
+
+    /// Read all steps as they come, which each node does; never ends.
+    async fn read(self) -> anyhow::Result<()> {
+        let config = push::OrderedConfig {
+            deliver_subject: self.context.client().new_inbox(),
+            filter_subject: format!("{}.plans.*", self.namespace),
+            ..push::OrderedConfig::default()
+        };
+        let mut steps = self.plans.create_consumer(config).await?.messages().await?;
+        while let Some(step) = steps.next().await {
+            step?;
+        }
         Ok(())
     }
 

@@ -9,15 +9,18 @@ use futures_util::stream::{self, TryStreamExt as _};
 
 use super::Took;
 use crate::export::document::Convergence;
-use crate::job::{self, Event, Status, Submission};
+use crate::job::{self, Event, Submission};
 use crate::store::jetstream::{JetStreamStore, Settings};
-use crate::store::{Ending, Options, Store, wall_clock};
+use crate::store::{Ending, Lease, Options, Store, wall_clock};
 
 /// Callers at a time.
 pub(super) const CALLERS: usize = 32;
 
 /// Workers that run what was accepted.
 pub(super) const WORKERS: u16 = 8;
+
+/// Nodes among which they are shared.
+pub(super) const NODES: u16 = 2;
 
 /// Bytes of a scenario document.
 pub(super) const SCENARIO: usize = 2_000;
@@ -95,7 +98,7 @@ async fn work(
     left: Arc<AtomicU32>,
     asleep: Duration,
 ) -> anyhow::Result<()> {
-    let mut over = None;
+    let mut over: Option<Lease> = None;
     loop {
         let has_more = left
             .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
@@ -106,7 +109,7 @@ async fn work(
         let conclusion = async {
             match over.take() {
                 Some(lease) => store
-                    .finish(&lease, ending(), wall_clock()())
+                    .finish(&lease, vec![point()], ending(), wall_clock()())
                     .await
                     .map(drop),
                 None => Ok(()),
@@ -125,17 +128,13 @@ async fn work(
             return Ok(());
         };
         tokio::time::sleep(asleep).await;
-        store
-            .append(&lease, vec![point()])
-            .await
-            .context("append")?;
         over = Some(lease);
     }
 }
 
 /// How fast plans are accepted, and then run, that take no time.
 pub(super) async fn rates(settings: Settings, plans: u32) -> anyhow::Result<Took> {
-    let nodes = Nodes::open(settings, WORKERS, WORKERS.div_ceil(2)).await?;
+    let nodes = Nodes::open(settings, WORKERS, WORKERS / NODES).await?;
     let began = Instant::now();
     nodes.accept(plans).await?;
     let accepting = began.elapsed();
@@ -181,7 +180,7 @@ fn point() -> Event {
 
 fn ending() -> Ending {
     Ending::Result {
-        status: Status::Succeeded,
+        cancelled: false,
         stop_reason: "iterations".to_owned(),
         feasible: true,
         best_cost: Some(500.0),

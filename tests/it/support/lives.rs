@@ -1,0 +1,49 @@
+//! Lives of plans in the real program, followed as a caller would.
+
+use serde_json::Value;
+
+use super::process::Service;
+use super::scenario;
+use super::sse::{Block, Stream, events};
+
+/// A plan that runs for so long, wherever it runs: its iterations alone would take minutes.
+pub(crate) fn a_run_of(ms: u64) -> Value {
+    let mut scenario = scenario();
+    scenario["planner"]["population"] = 2000.into();
+    scenario["planner"]["iterations"] = 100_000.into();
+    scenario["planner"]["time_limit_ms"] = ms.into();
+    scenario
+}
+
+/// Read until the plan is running.
+pub(crate) async fn running(service: &Service, address: &str) -> Stream {
+    running_at(service, address, 10.0).await
+}
+
+/// The same, told so many points a second.
+pub(crate) async fn running_at(service: &Service, address: &str, rate_hz: f64) -> Stream {
+    let mut stream = Stream::open(service.get(&format!("{address}/events?rate={rate_hz}"))).await;
+    await_run(&mut stream).await;
+    stream
+}
+
+/// Read on until the plan's next run begins.
+pub(crate) async fn await_run(stream: &mut Stream) {
+    loop {
+        match stream.next().await.expect("it has not ended").status() {
+            Some(status) if status == "running" => return,
+            _ => {}
+        }
+    }
+}
+
+/// The statuses of a plan that has ended, which it did once.
+pub(crate) async fn life(service: &Service, address: &str) -> Vec<String> {
+    let stream = Stream::open(service.get(&format!("{address}/events?rate=1"))).await;
+    let blocks = stream.rest().await;
+    let ends = events(&blocks)
+        .into_iter()
+        .filter(|(_, name)| name == "end");
+    assert_eq!(ends.count(), 1);
+    blocks.iter().filter_map(Block::status).collect()
+}

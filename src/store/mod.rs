@@ -35,7 +35,8 @@ pub trait Store: Send + Sync + 'static {
     async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError>;
 
     /// Wait for the plan at the head of the queue and take it: queued -> running, at the time that
-    /// the store's clock shows then. Dropping the future before it is done takes nothing.
+    /// the store's clock shows then. Dropping the future before it is done takes nothing; what was on its way
+    /// goes back, and meanwhile others are given what stands behind it.
     ///
     /// # Errors
     /// [`StoreError::Unavailable`] when the store fails or is closed meanwhile.

@@ -30,7 +30,10 @@ const ORPHAN_PAUSE: Duration = Duration::from_secs(2);
 /// and is nobody's after so many times.
 const ORPHANED_AFTER: i64 = 30;
 
-/// Between two tries at a lane whose plan was faster taken by another.
+/// Tries at lanes whose jobs others took faster.
+const TRIES: usize = 4;
+
+/// Between two of them.
 const BREATH: Duration = Duration::from_millis(5);
 
 impl JetStream {
@@ -51,16 +54,28 @@ impl JetStream {
         let mut waiting = self.view.waiting();
         let mut end = self.end.subscribe();
         loop {
-            // One slot at a time: two would ask the same lanes, and get its plans out of order.
+            // One slot at a time: two would ask the same lanes, and get its jobs out of order.
             let turn = self.turn.lock().await;
             waiting.mark_unchanged();
             if give.is_closed() {
                 return;
             }
-            let taken = if *end.borrow() {
-                Some(Err(closed()))
+            let job = if *end.borrow() {
+                Err(closed())
             } else {
-                self.take_one().await.transpose()
+                self.next_job().await
+            };
+            drop(turn);
+            let taken = match job {
+                Ok(Some(job)) => match self.begin(job).await {
+                    Ok(None) => {
+                        self.patrol_again();
+                        continue;
+                    }
+                    lease => lease.transpose(),
+                },
+                Ok(None) => None,
+                Err(error) => Some(Err(error)),
             };
             if let Some(taken) = taken {
                 if let Err(Ok(lease)) = give.send(taken) {
@@ -68,7 +83,6 @@ impl JetStream {
                 }
                 return;
             }
-            drop(turn);
             tokio::select! {
                 () = give.closed() => return,
                 _ = end.changed() => {}
@@ -78,8 +92,10 @@ impl JetStream {
         }
     }
 
-    /// Nobody waits for it any more.
+    /// Nobody waits for it any more. Whoever takes next finds the job back in its place, and not only
+    /// the record.
     async fn take_back(&self, lease: &Lease) {
+        let _turn = self.turn.lock().await;
         if let Err(error) = self.release(lease.plan.id, lease.attempt).await {
             tracing::warn!(%error, "a plan that nobody waits for goes back when its lease ends");
         }
@@ -90,27 +106,25 @@ impl JetStream {
         (self.settings.lease / 4).min(Duration::from_secs(1))
     }
 
-    async fn take_one(&self) -> Result<Option<Lease>, StoreError> {
-        let mut in_vain = 0;
-        while in_vain < 4 {
+    /// The next job, from the lane whose turn it is or from one whose workers were lost.
+    async fn next_job(&self) -> Result<Option<Message>, StoreError> {
+        for _ in 0..TRIES {
             let lane = self.view.known().next_lane(Version::own(), self.slots());
             let Some(lane) = lane else { break };
             if let Some(job) = self.fetch(&lane).await? {
-                if let Some(lease) = self.begin(job).await? {
-                    return Ok(Some(lease));
+                // The next slot need not ask for it again.
+                if let Some(id) = plan_of(&job.subject) {
+                    self.view.known().expect_run(id);
                 }
-            } else {
-                in_vain += 1;
-                tokio::time::sleep(BREATH).await;
+                return Ok(Some(job));
             }
+            tokio::time::sleep(BREATH).await;
         }
         if self.is_patrol_due() {
             let lanes = self.view.known().running_lanes(Version::own());
             for lane in lanes {
-                while let Some(job) = self.fetch(&lane).await? {
-                    if let Some(lease) = self.begin(job).await? {
-                        return Ok(Some(lease));
-                    }
+                if let Some(job) = self.fetch(&lane).await? {
+                    return Ok(Some(job));
                 }
             }
         }
@@ -130,8 +144,25 @@ impl JetStream {
         due
     }
 
+    /// There may be more where something was found.
+    fn patrol_again(&self) {
+        *self
+            .last_patrol
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
     /// Begin to run the plan of a job; `None` when there is nothing to run.
     async fn begin(&self, job: Message) -> Result<Option<Lease>, StoreError> {
+        let id = plan_of(&job.subject);
+        let begun = self.try_to_begin(job).await;
+        if let (Some(id), Ok(None) | Err(_)) = (id, &begun) {
+            self.view.expect_no_run(id);
+        }
+        begun
+    }
+
+    async fn try_to_begin(&self, job: Message) -> Result<Option<Lease>, StoreError> {
         let deliveries = job.info().map_or(1, |info| info.delivered);
         let (message, acker) = job.split();
         let job = Job::new(acker);
@@ -268,11 +299,7 @@ impl Drop for Caller {
             && let Ok(runtime) = Handle::try_current()
         {
             let store = Arc::clone(&self.store);
-            runtime.spawn(async move {
-                // Whoever takes next finds the job back in its place, and not only the record.
-                let _turn = store.turn.lock().await;
-                store.take_back(&lease).await;
-            });
+            runtime.spawn(async move { store.take_back(&lease).await });
         }
     }
 }

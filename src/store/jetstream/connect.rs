@@ -243,14 +243,13 @@ impl Maker<'_> {
             num_replicas: self.replicas,
             ..kv::Config::default()
         };
-        if let Ok(bucket) = self.context.get_key_value(&config.bucket).await
-            && bucket.stream.cached_info().config.num_replicas >= self.replicas
-        {
-            return Ok(bucket);
+        if let Ok(there) = self.context.get_key_value(&config.bucket).await {
+            self.raise(&there.stream.cached_info().config).await?;
+            return Ok(there);
         }
         let what = format!("bucket {}", config.bucket);
         self.context
-            .create_or_update_key_value(config)
+            .create_key_value(config)
             .await
             .map_err(|error| failed(&what, &error))
     }
@@ -261,14 +260,34 @@ impl Maker<'_> {
             num_replicas: self.replicas,
             ..object_store::Config::default()
         };
+        let what = format!("object store {}", config.bucket);
         if let Ok(there) = self.context.get_object_store(&config.bucket).await {
+            let beneath = format!("OBJ_{}", config.bucket);
+            let beneath = self.context.get_stream(beneath).await;
+            let beneath = beneath.map_err(|error| failed(&what, &error))?;
+            self.raise(&beneath.cached_info().config).await?;
             return Ok(there);
         }
-        let what = format!("object store {}", config.bucket);
         self.context
             .create_object_store(config)
             .await
             .map_err(|error| failed(&what, &error))
+    }
+
+    /// Bring what lies beneath a bucket to the replicas that are wanted; never to fewer.
+    async fn raise(&self, there: &Config) -> Result<(), StoreError> {
+        if there.num_replicas >= self.replicas {
+            return Ok(());
+        }
+        let raised = Config {
+            num_replicas: self.replicas,
+            ..there.clone()
+        };
+        self.context
+            .update_stream(raised)
+            .await
+            .map(drop)
+            .map_err(|error| failed(&format!("stream {}", there.name), &error))
     }
 }
 

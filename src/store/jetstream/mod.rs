@@ -12,6 +12,7 @@ mod fetch;
 mod follow;
 mod history;
 mod hooks;
+mod known;
 mod lane;
 mod leases;
 mod nodes;

@@ -368,18 +368,8 @@ mod tests {
     fn submission(bytes: usize) -> Submission {
         Submission {
             id: PlanId::now_v7(),
-            name: None,
-            algorithm: "tms-sba".to_owned(),
-            seed: 7,
-            iterations: 200,
-            work: 400_000,
             scenario: "x".repeat(bytes),
-            created_ms: 1_000,
-            owner: None,
-            quota: None,
-            webhook: None,
-            idempotency: None,
-            dataset: None,
+            ..Submission::example()
         }
     }
 

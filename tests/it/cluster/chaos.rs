@@ -11,25 +11,17 @@ use serde_json::Value;
 
 use super::{Node, is_whole, turn};
 use crate::siege::size;
+use crate::support::lives::a_plan;
 use crate::support::nats::Cluster;
 use crate::support::process::Service;
-use crate::support::scenario;
 use crate::support::sse::{Stream, events};
 
 /// Between two kills.
 const PERIOD: Duration = Duration::from_secs(5);
 
-fn plan(nth: usize) -> Value {
-    let mut scenario = scenario();
-    scenario["planner"]["population"] = 30.into();
-    scenario["planner"]["iterations"] = 60.into();
-    scenario["planner"]["seed"] = nth.into();
-    scenario
-}
-
 /// Post until it is accepted: a store without a leader refuses.
 async fn submit(api: &Service, nth: usize) -> String {
-    let document = plan(nth);
+    let document = a_plan(30, 60, nth);
     loop {
         let request = api
             .request(reqwest::Method::POST, "/plans")

@@ -4,6 +4,8 @@
 
 use std::time::Duration;
 
+use futures_util::TryStreamExt as _;
+use noctule::config::Address;
 use noctule::job::{Event, Status};
 use noctule::store::jetstream::Settings;
 use noctule::store::{Store, StoreError};
@@ -105,4 +107,46 @@ async fn a_run_goes_on_over_the_loss_of_the_leader() {
     let told = history(&*follower, id).await;
     assert_eq!(told.len(), 2 + 5 + 2);
     assert_eq!(told, history(&*store, id).await);
+}
+
+/// Copies that the servers keep of each stream of a namespace, by its name.
+async fn copies(address: &str) -> Vec<(String, usize)> {
+    let servers = Address::read(address).unwrap();
+    let client = async_nats::connect(&servers.servers).await.unwrap();
+    let context = async_nats::jetstream::new(client);
+    let all: Vec<_> = context.streams().try_collect().await.unwrap();
+    let mut copies: Vec<_> = all
+        .into_iter()
+        .map(|stream| (stream.config.name, stream.config.num_replicas))
+        .filter(|(name, _)| name.contains(&servers.namespace))
+        .collect();
+    copies.sort_unstable();
+    copies
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn more_copies_are_made_of_what_is_there_and_never_fewer() {
+    let _turn = turn().await;
+    let cluster = Cluster::start();
+    let address = cluster.address();
+    let with = |replicas| Settings {
+        replicas,
+        ..node(&address)
+    };
+    let one = open_as(with(1)).await;
+    let id = one.submit(submission()).await.unwrap().plan.id;
+    let names: Vec<_> = copies(&address).await;
+    assert!(names.len() >= 7, "{names:?}");
+    assert!(names.iter().all(|(_, copies)| *copies == 1), "{names:?}");
+    drop(one);
+    for replicas in [3, 1] {
+        let store = open_as(with(replicas)).await;
+        let of_three = copies(&address).await;
+        assert_eq!(of_three.len(), names.len());
+        assert!(
+            of_three.iter().all(|(_, copies)| *copies == 3),
+            "{of_three:?}"
+        );
+        assert_eq!(store.get(id).await.unwrap().status, Status::Queued);
+    }
 }

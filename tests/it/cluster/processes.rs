@@ -10,7 +10,7 @@ use reqwest::Client;
 use serde_json::Value;
 
 use super::{Node, ends_once};
-use crate::support::lives::{a_run_of, await_run, life, running};
+use crate::support::lives::{self, a_run_of, await_run, life, running};
 use crate::support::nats;
 use crate::support::process::Service;
 use crate::support::scenario;
@@ -18,11 +18,7 @@ use crate::support::sse::events;
 
 /// A plan of some hundred milliseconds.
 fn a_plan(seed: usize) -> Value {
-    let mut scenario = scenario();
-    scenario["planner"]["population"] = 50.into();
-    scenario["planner"]["iterations"] = 100.into();
-    scenario["planner"]["seed"] = seed.into();
-    scenario
+    lives::a_plan(50, 100, seed)
 }
 
 /// How often the plan began to run.

@@ -123,7 +123,6 @@ async fn a_dropped_claim_takes_nothing() {
         assert!(waiting.as_mut().now_or_never().is_none());
         drop(waiting);
         let id = store.submit(submission()).await.unwrap().plan.id;
-        let second = store.submit(submission()).await.unwrap().plan.id;
         assert_eq!(store.get(id).await.unwrap().status, Status::Queued);
 
         // Dropped at any time after it has been sent, its answer on the way or already there.
@@ -136,6 +135,7 @@ async fn a_dropped_claim_takes_nothing() {
             drop(claim);
             until(&**store, id, |plan| plan.status == Status::Queued).await;
         }
+        let second = store.submit(submission()).await.unwrap().plan.id;
         assert_eq!(store.claim().await.unwrap().plan.id, id);
         assert_eq!(store.claim().await.unwrap().plan.id, second);
     })

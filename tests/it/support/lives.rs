@@ -8,10 +8,17 @@ use super::sse::{Block, Stream, events};
 
 /// A plan that runs for so long, wherever it runs: its iterations alone would take minutes.
 pub(crate) fn a_run_of(ms: u64) -> Value {
-    let mut scenario = scenario();
-    scenario["planner"]["population"] = 2000.into();
-    scenario["planner"]["iterations"] = 100_000.into();
+    let mut scenario = a_plan(2_000, 100_000, 7);
     scenario["planner"]["time_limit_ms"] = ms.into();
+    scenario
+}
+
+/// A plan of so many bats and iterations.
+pub(crate) fn a_plan(population: u64, iterations: u64, seed: usize) -> Value {
+    let mut scenario = scenario();
+    scenario["planner"]["population"] = population.into();
+    scenario["planner"]["iterations"] = iterations.into();
+    scenario["planner"]["seed"] = seed.into();
     scenario
 }
 

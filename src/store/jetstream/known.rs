@@ -1,0 +1,366 @@
+//! The plans that a node knows of, and what is counted of them: lists by which each question is
+//! answered without looking at all plans.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
+use std::sync::Arc;
+
+use super::history::Histories;
+use super::lane::{Lane, Version};
+use super::record::{Placed, Record, State};
+use super::turns::{self, Lanes};
+use super::view::Standing;
+use crate::job::{Plan, PlanId, Status};
+use crate::store::{DatasetUse, ListQuery, Stats, StoreError, TOMBSTONE_MS};
+
+/// Runs over which the mean time is taken.
+const RUNS: usize = 20;
+
+/// The plans, and what is counted of them.
+#[derive(Debug)]
+pub(super) struct Known {
+    plans: BTreeMap<PlanId, Standing>,
+    pub(super) histories: Histories,
+    /// In the order of acceptance.
+    queue: BTreeSet<(u64, PlanId)>,
+    lanes: Lanes,
+    running: Lanes,
+    /// By the time of their ends.
+    ended: BTreeSet<(i64, PlanId)>,
+    ended_bytes: u64,
+    expiring: BTreeSet<(i64, PlanId)>,
+    due: BTreeSet<(i64, PlanId)>,
+    graves: BTreeSet<(i64, PlanId)>,
+    run_times: VecDeque<i64>,
+    /// Plans that are being submitted here, by owner.
+    coming: HashMap<String, u64>,
+    coming_in_all: u64,
+}
+
+impl Known {
+    pub(super) fn new(steps_kept: usize) -> Self {
+        Self {
+            plans: BTreeMap::new(),
+            histories: Histories::new(steps_kept),
+            queue: BTreeSet::new(),
+            lanes: HashMap::new(),
+            running: HashMap::new(),
+            ended: BTreeSet::new(),
+            ended_bytes: 0,
+            expiring: BTreeSet::new(),
+            due: BTreeSet::new(),
+            graves: BTreeSet::new(),
+            run_times: VecDeque::new(),
+            coming: HashMap::new(),
+            coming_in_all: 0,
+        }
+    }
+
+    /// False when as much or more was known already.
+    pub(super) fn stand(&mut self, id: PlanId, placed: &Placed) -> bool {
+        if self
+            .plans
+            .get(&id)
+            .is_some_and(|known| known.sequence >= placed.sequence)
+        {
+            return false;
+        }
+        let had_ended = self
+            .kept(id)
+            .is_some_and(|record| record.plan.status.is_final());
+        self.unlist(id);
+        let state = Arc::clone(&placed.step.state);
+        self.list(id, &state);
+        if let State::Kept(record) = &*state
+            && !had_ended
+        {
+            self.time_run(&record.plan);
+        }
+        let sequence = placed.sequence;
+        self.plans.insert(id, Standing { sequence, state });
+        true
+    }
+
+    pub(super) fn forget(&mut self, id: PlanId) {
+        self.unlist(id);
+        self.plans.remove(&id);
+        self.histories.take(id);
+    }
+
+    pub(super) fn standing(&self, id: PlanId) -> Option<Standing> {
+        self.plans.get(&id).cloned()
+    }
+
+    fn list(&mut self, id: PlanId, state: &State) {
+        let record = match state {
+            State::Kept(record) => record,
+            State::Buried(grave) => {
+                self.graves.insert((grave.deleted_ms, id));
+                self.histories.take(id);
+                return;
+            }
+        };
+        match record.plan.status {
+            Status::Queued => {
+                self.queue.insert((record.place, id));
+                insert(&mut self.lanes, record);
+            }
+            Status::Running => {
+                insert(&mut self.running, record);
+            }
+            Status::Succeeded | Status::Failed | Status::Cancelled => self.list_ended(record),
+        }
+    }
+
+    fn list_ended(&mut self, record: &Record) {
+        let (id, plan) = (record.id(), &record.plan);
+        let ended_ms = plan.finished_ms.unwrap_or_default();
+        self.ended.insert((ended_ms, id));
+        self.ended_bytes += record.bytes;
+        self.expiring.extend(plan.expires_ms.map(|at| (at, id)));
+        let hook = record.webhook.as_ref();
+        self.due
+            .extend(hook.and_then(|hook| hook.due_ms).map(|at| (at, id)));
+    }
+
+    /// Of one that has ended with a result.
+    fn time_run(&mut self, plan: &Plan) {
+        if plan.stop_reason.is_some()
+            && let Some((end_ms, began_ms)) = plan.finished_ms.zip(plan.started_ms)
+        {
+            self.run_times.push_back(end_ms - began_ms);
+            if self.run_times.len() > RUNS {
+                self.run_times.pop_front();
+            }
+        }
+    }
+
+    fn unlist(&mut self, id: PlanId) {
+        let Some(standing) = self.plans.get(&id).cloned() else {
+            return;
+        };
+        let record = match &*standing.state {
+            State::Kept(record) => record,
+            State::Buried(grave) => {
+                self.graves.remove(&(grave.deleted_ms, id));
+                return;
+            }
+        };
+        self.queue.remove(&(record.place, id));
+        remove(&mut self.lanes, record);
+        remove(&mut self.running, record);
+        let plan = &record.plan;
+        if plan.status.is_final() {
+            self.ended
+                .remove(&(plan.finished_ms.unwrap_or_default(), id));
+            self.ended_bytes -= record.bytes;
+            if let Some(at) = plan.expires_ms {
+                self.expiring.remove(&(at, id));
+            }
+            if let Some(at) = record.webhook.as_ref().and_then(|hook| hook.due_ms) {
+                self.due.remove(&(at, id));
+            }
+        }
+    }
+
+    fn kept(&self, id: PlanId) -> Option<&Record> {
+        match &*self.plans.get(&id)?.state {
+            State::Kept(record) => Some(record),
+            State::Buried(_) => None,
+        }
+    }
+
+    pub(super) fn is_queued(&self, id: PlanId) -> bool {
+        self.kept(id)
+            .is_some_and(|record| record.plan.status == Status::Queued)
+    }
+
+    /// A record as it is shown: with its place in the queue.
+    pub(super) fn shown(&self, record: &Record) -> Plan {
+        Plan {
+            queue_position: (record.plan.status == Status::Queued)
+                .then(|| self.position(record.place)),
+            ..record.plan.clone()
+        }
+    }
+
+    /// 1 for the next to run.
+    pub(super) fn position(&self, place: u64) -> u64 {
+        self.queue.range(..(place, PlanId::nil())).count() as u64 + 1
+    }
+
+    /// Place of a plan, when it is kept.
+    pub(super) fn place(&self, id: PlanId) -> Option<u64> {
+        self.kept(id).map(|record| record.place)
+    }
+
+    pub(super) fn list_plans(&self, query: &ListQuery) -> Vec<Plan> {
+        let wanted = |plan: &Plan| {
+            query.status.is_none_or(|status| plan.status == status)
+                && (query.owner.is_none() || plan.owner == query.owner)
+        };
+        let older = self.plans.iter().rev();
+        let older = older.skip_while(|(id, _)| query.before.is_some_and(|before| **id >= before));
+        older
+            .filter_map(|(id, _)| self.kept(*id))
+            .filter(|record| wanted(&record.plan))
+            .take(query.limit)
+            .map(|record| self.shown(record))
+            .collect()
+    }
+
+    pub(super) fn stats(&self) -> Stats {
+        let head = self.queue.first().and_then(|(_, id)| self.kept(*id));
+        let times = &self.run_times;
+        Stats {
+            queued: self.queue.len() as u64,
+            oldest_queued_ms: head.map(|record| record.plan.created_ms),
+            running: self.running.values().map(|lane| lane.len() as u64).sum(),
+            mean_run_ms: (!times.is_empty())
+                .then(|| times.iter().sum::<i64>() as f64 / times.len() as f64),
+            slots: None,
+        }
+    }
+
+    pub(super) fn datasets(&self) -> Vec<DatasetUse> {
+        let mut uses: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
+        for id in self.plans.keys() {
+            if let Some(record) = self.kept(*id)
+                && let Some(dataset) = &record.dataset
+            {
+                let (active, plans) = uses.entry(dataset).or_default();
+                *active += u64::from(!record.plan.status.is_final());
+                *plans += 1;
+            }
+        }
+        uses.into_iter()
+            .map(|(sha256, (active, plans))| DatasetUse {
+                sha256: sha256.to_owned(),
+                active,
+                plans,
+            })
+            .collect()
+    }
+
+    /// Make room for a submission in the queue and its owner's quota; returns its place. Give it back
+    /// with [`Known::arrived`].
+    pub(super) fn expect(
+        &mut self,
+        limit: u64,
+        quota: Option<u64>,
+        lane: &Lane,
+    ) -> Result<u64, StoreError> {
+        let queued = self.queue.len() as u64 + self.coming_in_all;
+        if queued >= limit {
+            return Err(StoreError::QueueFull { queued });
+        }
+        let coming = self.coming.get(&lane.owner).copied().unwrap_or_default();
+        let of_owner = |lanes: &Lanes| {
+            let own = lanes.iter().filter(|(one, _)| one.owner == lane.owner);
+            own.map(|(_, plans)| plans.len() as u64).sum::<u64>()
+        };
+        let active = coming + of_owner(&self.lanes) + of_owner(&self.running);
+        if quota.is_some_and(|quota| active >= quota) {
+            return Err(StoreError::QuotaReached { active });
+        }
+        *self.coming.entry(lane.owner.clone()).or_default() += 1;
+        self.coming_in_all += 1;
+        Ok(queued + 1)
+    }
+
+    /// A queued plan whose job is here counts as running until its step says so.
+    pub(super) fn expect_run(&mut self, id: PlanId) {
+        let Some(standing) = self.standing(id) else {
+            return;
+        };
+        if let State::Kept(record) = &*standing.state
+            && record.plan.status == Status::Queued
+        {
+            remove(&mut self.lanes, record);
+            insert(&mut self.running, record);
+        }
+    }
+
+    /// It stays as it is; true when it is queued.
+    pub(super) fn expect_no_run(&mut self, id: PlanId) -> bool {
+        if let Some(standing) = self.standing(id) {
+            self.unlist(id);
+            self.list(id, &standing.state);
+        }
+        self.is_queued(id)
+    }
+
+    /// A submission that was expected is there, or will not come.
+    pub(super) fn arrived(&mut self, lane: &Lane) {
+        self.coming_in_all -= 1;
+        if let Some(coming) = self.coming.get_mut(&lane.owner) {
+            *coming -= 1;
+            if *coming == 0 {
+                self.coming.remove(&lane.owner);
+            }
+        }
+    }
+
+    /// The lane whose turn it is; see [`turns::next`].
+    pub(super) fn next_lane(&self, version: Version, slots: usize) -> Option<Lane> {
+        turns::next(&self.lanes, &self.running, version, slots)
+    }
+
+    /// Lanes whose running plans may have lost their workers.
+    pub(super) fn running_lanes(&self, version: Version) -> Vec<Lane> {
+        let lanes = self.running.keys().filter(|lane| lane.version <= version);
+        lanes.cloned().collect()
+    }
+
+    /// Plans to be removed by then, the longest ended first, beyond what is kept.
+    pub(super) fn removable(
+        &self,
+        now_ms: i64,
+        plans: u64,
+        bytes: u64,
+        at_most: usize,
+    ) -> Vec<PlanId> {
+        let expired = self.expiring.range(..=(now_ms, PlanId::max()));
+        let mut going: Vec<_> = expired.map(|(_, id)| *id).take(at_most).collect();
+        let known: BTreeSet<_> = going.iter().copied().collect();
+        let bytes_of = |id| self.kept(id).map_or(0, |record| record.bytes);
+        let mut left = (self.ended.len() - known.len()) as u64;
+        let mut left_bytes = self.ended_bytes - known.iter().copied().map(bytes_of).sum::<u64>();
+        for (_, id) in self.ended.iter().filter(|(_, id)| !known.contains(id)) {
+            let is_beyond = left > plans || left_bytes > bytes;
+            if !is_beyond || going.len() >= at_most {
+                break;
+            }
+            left -= 1;
+            left_bytes -= bytes_of(*id);
+            going.push(*id);
+        }
+        going
+    }
+
+    /// Tombstones whose time is over.
+    pub(super) fn mouldered(&self, now_ms: i64, at_most: usize) -> Vec<PlanId> {
+        let until = (now_ms.saturating_sub(TOMBSTONE_MS), PlanId::max());
+        let graves = self.graves.range(..=until).take(at_most);
+        graves.map(|(_, id)| *id).collect()
+    }
+
+    /// Ends that are to be told by then, the longest due first.
+    pub(super) fn due(&self, now_ms: i64, at_most: usize) -> Vec<PlanId> {
+        let due = self.due.range(..=(now_ms, PlanId::max())).take(at_most);
+        due.map(|(_, id)| *id).collect()
+    }
+}
+
+fn insert(lanes: &mut Lanes, record: &Record) {
+    let lane = lanes.entry(record.lane.clone()).or_default();
+    lane.insert((record.place, record.id()));
+}
+
+fn remove(lanes: &mut Lanes, record: &Record) {
+    if let Some(lane) = lanes.get_mut(&record.lane) {
+        lane.remove(&(record.place, record.id()));
+        if lane.is_empty() {
+            lanes.remove(&record.lane);
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! How a content is had: put on the shelf for all nodes, found there, fetched to this one.
+
+use std::path::PathBuf;
+use std::thread;
+use std::time::Duration;
+
+use super::Shared;
+use super::headers::Headers;
+use super::view::{Shelved, View, content_key};
+use crate::catalogue::records::Content;
+use crate::catalogue::{CatalogueError, Checked, Staged};
+use crate::terrain::DatasetError;
+
+/// A file that was put a moment ago may not have come to every server.
+const TRIES: u32 = 4;
+
+/// Between the first two of them; twice as long each time.
+const PAUSE: Duration = Duration::from_millis(50);
+
+impl Shared {
+    /// Take the mark off a content that is needed; false when it has gone or changed meanwhile.
+    pub(super) fn need(&self, view: &View, sha256: &str) -> Result<bool, CatalogueError> {
+        let Some(content) = view.contents.get(sha256) else {
+            return Ok(false);
+        };
+        if !content.unneeded {
+            return Ok(true);
+        }
+        let needed = Shelved {
+            unneeded: false,
+            ..content.clone()
+        };
+        let key = content_key(sha256);
+        let written = self.write(&key, &needed, view.written(&key))?;
+        Ok(written.is_some())
+    }
+
+    /// Have a content on the shelf that is not about to go.
+    pub(super) fn shelve(&self, file: &Checked) -> Result<(), CatalogueError> {
+        let sha256 = &file.sha256;
+        loop {
+            let view = self.view()?;
+            if self.need(&view, sha256)? {
+                return Ok(());
+            }
+            if view.contents.contains_key(sha256) {
+                continue;
+            }
+            let mut bytes = file
+                .staged
+                .reader()
+                .map_err(|error| CatalogueError::unavailable("read", file.staged.path(), error))?;
+            let put = self.shelf.put(&mut bytes).map_err(CatalogueError::shelf)?;
+            let content = Shelved {
+                content: Content::of(file),
+                headers: Headers::of(&file.metadata),
+                file: put.clone(),
+                unneeded: false,
+            };
+            // When this fails it may have been written all the same: the file stays until that is seen.
+            let key = content_key(sha256);
+            let written = self.write(&key, &content, view.written(&key))?;
+            if written.is_some() {
+                return Ok(());
+            }
+            self.discard(&put);
+        }
+    }
+
+    /// Remove a file, or leave that to a sweep.
+    pub(super) fn discard(&self, file: &str) {
+        if let Err(error) = self.shelf.discard(file) {
+            tracing::warn!(file, %error, "a file that nothing refers to is left for a later sweep");
+        }
+    }
+
+    /// The content that is meant, with no mark on it.
+    pub(super) fn meant(
+        &self,
+        name: &str,
+        sha256: Option<&str>,
+    ) -> Result<(String, Shelved), DatasetError> {
+        loop {
+            let view = match self.view() {
+                Ok(view) => view,
+                // What has a sum never changes: a copy is as good as the original.
+                Err(away) => return self.copied(sha256).ok_or_else(|| away.into()),
+            };
+            let unknown = || DatasetError::Unknown {
+                names: view.names.keys().cloned().collect(),
+            };
+            let named = view.names.get(name).map(|name| &name.sha256);
+            let wanted = match (sha256, named) {
+                (Some(sha256), _) => sha256,
+                (None, Some(named)) => named,
+                (None, None) => return Err(unknown()),
+            };
+            let Some(content) = view.contents.get(wanted) else {
+                return Err(match named {
+                    Some(named) if named == wanted || view.has_unread() => {
+                        let why = format!("nothing is known of the content {wanted}");
+                        DatasetError::Unavailable(why)
+                    }
+                    Some(named) => DatasetError::Replaced {
+                        sha256: named.clone(),
+                    },
+                    None => unknown(),
+                });
+            };
+            if self.need(&view, wanted)? {
+                return Ok((wanted.to_owned(), content.clone()));
+            }
+        }
+    }
+
+    /// What was known of a content whose bytes are on this node.
+    fn copied(&self, sha256: Option<&str>) -> Option<(String, Shelved)> {
+        let (sha256, view) = (sha256?, self.last_view());
+        let content = view.contents.get(sha256)?;
+        let path = self.cache.find(sha256, &content.content.declared);
+        path.ok()??;
+        Some((sha256.to_owned(), content.clone()))
+    }
+
+    /// Where the bytes of a content lie on this node.
+    pub(super) fn fetched(
+        &self,
+        sha256: &str,
+        content: &Shelved,
+    ) -> Result<PathBuf, CatalogueError> {
+        let Content {
+            bytes, declared, ..
+        } = &content.content;
+        let mut tries = 0;
+        loop {
+            let path = self
+                .cache
+                .find_or_fetch(sha256, declared, *bytes, |staged| {
+                    let fetched = self.fetch(&content.file, staged);
+                    let metrics = &self.instruments.metrics;
+                    metrics.terrain_fetched(fetched.is_ok(), staged.bytes());
+                    fetched
+                });
+            tries += 1;
+            match path {
+                Err(error) if tries < TRIES => {
+                    tracing::debug!(sha256, %error, "a dataset could not be fetched; trying again");
+                    thread::sleep(PAUSE * (1 << tries));
+                }
+                path => return path,
+            }
+        }
+    }
+
+    fn fetch(&self, file: &str, to: &mut Staged) -> Result<(), CatalogueError> {
+        match self.shelf.fetch(file, to) {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(CatalogueError::away(
+                "the datasets that all nodes share cannot be reached",
+                format!("the file {file} is not there"),
+            )),
+            Err(error) => Err(to.failure().unwrap_or_else(|| CatalogueError::shelf(error))),
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! How nodes share what is uploaded.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use crate::catalogue::{CatalogueError, GRACE, Shelf};
+use crate::telemetry::Instruments;
+
+/// Files kept on a node, bytes, unless they are asked for all the time.
+const CACHE_BYTES: u64 = 8 << 30;
+
+/// How nodes share what is uploaded.
+#[derive(Debug, Clone)]
+pub struct Sharing {
+    pub(super) shelf: Arc<dyn Shelf>,
+    pub(super) cache: PathBuf,
+    pub(super) instruments: Arc<Instruments>,
+    pub(super) cache_bytes: u64,
+    pub(super) grace: Duration,
+}
+
+impl Sharing {
+    /// On `shelf`, with a directory of this process alone for copies, made if need be. Fetches are counted
+    /// in `instruments`.
+    #[must_use]
+    pub fn new(shelf: Arc<dyn Shelf>, cache: PathBuf, instruments: Arc<Instruments>) -> Self {
+        Self {
+            shelf,
+            cache,
+            instruments,
+            cache_bytes: CACHE_BYTES,
+            grace: GRACE,
+        }
+    }
+
+    /// With another time than [`GRACE`].
+    #[must_use]
+    pub fn with_grace(self, grace: Duration) -> Self {
+        Self { grace, ..self }
+    }
+
+    /// With copies of at most so many bytes, besides those in use.
+    #[must_use]
+    pub fn with_cache_bytes(self, cache_bytes: u64) -> Self {
+        Self {
+            cache_bytes,
+            ..self
+        }
+    }
+
+    /// Whether nothing has ever been uploaded there.
+    ///
+    /// # Errors
+    /// [`CatalogueError::Unavailable`].
+    pub fn is_new(&self) -> Result<bool, CatalogueError> {
+        let changes = self.shelf.changes(0).map_err(CatalogueError::shelf)?;
+        Ok(changes.revision == 0)
+    }
+}

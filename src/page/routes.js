@@ -106,7 +106,7 @@ export class Curtain {
     this.mesh = new Mesh(new BufferGeometry(), material);
     this.mesh.name = 'curtain';
     this.mesh.frustumCulled = false;
-    this.mesh.renderOrder = 1;
+    this.mesh.renderOrder = 4;
     this.mesh.visible = false;
   }
 

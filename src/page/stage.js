@@ -199,7 +199,6 @@ export class Stage {
         if (this.#trailed) this.world.past(this.#way(this.#trailed.waypoints)?.points, colours.route);
         this.#trailed = plan.latest;
       }
-      this.world.hurried = Boolean(plan && !plan.ended && plan.latest);
       const lines = new Map();
       for (const other of others) lines.set(other.id, { points: other.way.points, color: other.color, width: 2.5 });
       if (way) lines.set('route', { points: way.points, color, width: 4 });

@@ -31,14 +31,14 @@ export class Backdrop {
     this.mesh.visible = false;
   }
 
-  /** Takes the picture: `drawPicture` draws what is to be seen on it, `drawDepths` what hides the things before it. */
-  take(renderer, drawPicture, drawDepths) {
+  /** Takes the picture of what `draw` draws. */
+  take(renderer, draw) {
     this.#fit(renderer.getDrawingBufferSize(new Vector2()));
     this.mesh.visible = false;
-    drawPicture();
+    draw();
     renderer.copyFramebufferToTexture(this.#uniforms.picture.value);
     renderer.setRenderTarget(this.#depths);
-    drawDepths();
+    draw();
     renderer.setRenderTarget(null);
   }
 

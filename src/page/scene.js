@@ -309,15 +309,12 @@ export class World {
       this.renderer.setPixelRatio(ratio);
       this.#unstirred = 0;
     }
+    this.#relief.coarse = this.#volumes.coarse = ratio !== this.#ratio;
     const draw = () => this.renderer.render(this.#scene, this.#camera);
     if (this.#unstirred === 1) {
       this.#changing.visible = false;
       this.#standing.visible = true;
-      this.#backdrop.take(this.renderer, draw, () => {
-        this.#volumes.group.visible = false;
-        draw();
-        this.#volumes.group.visible = true;
-      });
+      this.#backdrop.take(this.renderer, draw);
       this.#changing.visible = true;
     }
     this.#backdrop.mesh.visible = this.#unstirred > 0;
@@ -350,6 +347,7 @@ export class World {
       mark: this.#mark.count,
       faults: this.#faults.count,
       handles: this.#handles.count,
+      backdrop: this.#backdrop.mesh.visible,
       memory: { ...this.renderer.info.memory },
       frames: { ...this.#frames },
     };

@@ -1,6 +1,7 @@
 // The page put together: what is chosen, planned, looked at, compared and taken away.
 
 import { Refused, Said, ask, onKeyNeeded, send } from './api.js';
+import { Again } from './again.js';
 import { Chart } from './chart.js';
 import { atMost, by, calmly, el } from './dom.js';
 import { Draft } from './draft.js';
@@ -61,6 +62,10 @@ const stage = new Stage({ world, strip, chart, draft }, {
   marked: (place) => {
     by('strip-at').textContent = place ? `${metres(place.distance, 0)}: ${number(place.z, 0)} m, ${number(place.z - place.ground, 0)} m above ground` : '';
   },
+});
+const again = new Again(by('watch'), (iteration, trail) => {
+  stage.scrub(iteration, trail);
+  chart.mark(iteration);
 });
 const editor = new Editor(by('scenario'), draft, {
   load: (name) => attempt(() => load(name)),
@@ -199,6 +204,7 @@ function show(plan) {
   if (before && before !== plan && !stage.compared.has(before.id)) before.close();
   if (plan && stage.compared.delete(plan.id)) plans.mark();
   stage.front(plan);
+  again.offer(plan);
   plan?.addEventListener('news', ({ detail }) => plan === stage.plan && heard(plan, detail));
   if (plan) for (const what of ['status', 'search']) heard(plan, what);
   else {
@@ -219,6 +225,7 @@ function heard(plan, what) {
     say(verdict(plan));
   }
   if (what === 'end' || what === 'status') result(plan);
+  if (what === 'end' || what === 'history') again.offer(plan);
   if (what === 'connection') {
     if (plan.connected) tell('');
     else tell(plan.lostBecause ?? 'The connection is lost. It is being resumed; nothing will be missed.', 'note');
@@ -425,6 +432,7 @@ Object.defineProperty(globalThis, 'noctule', {
       const way = stage.plan && stage.wayOf(stage.plan);
       return way ? way.at(way.length * share) : null;
     },
+    history: () => ({ points: stage.plan?.points.length ?? 0, incumbents: stage.plan?.incumbents.length ?? 0 }),
     document: () => structuredClone(draft.document),
   }),
 });

@@ -29,6 +29,7 @@ export class Stage {
   #trailed = null;
   #ways = new WeakMap();
   #scrubbed = null;
+  #faded = null;
   #fault = null;
   #fresh = true;
 
@@ -61,6 +62,7 @@ export class Stage {
     this.#scrubbed = null;
     this.#fault = null;
     this.#trailed = null;
+    this.#faded = null;
     this.world?.past(null);
     this.mark(null);
     this.redraw();
@@ -266,13 +268,23 @@ export class Stage {
     this.mark(best);
   }
 
-  /** Shows the best route as it was at an iteration; null for now. */
-  scrub(iteration) {
+  /** Shows the best route as it was at an iteration, and fainter the incumbents of `trail`; null for now. */
+  scrub(iteration, trail = []) {
     const then = iteration === null ? null : this.plan?.incumbents.filter((one) => one.iteration <= iteration).at(-1);
+    if (this.world && this.plan?.result) this.#trace(trail);
     const way = then ? this.#way(then.waypoints) : null;
     if (way === this.#scrubbed) return;
     this.#scrubbed = way;
     this.redraw();
+  }
+
+  #trace(trail) {
+    const faded = trail.at(-1) ?? null;
+    if (faded === this.#faded) return;
+    const from = trail.indexOf(this.#faded) + 1;
+    if (!from) this.world.past(null);
+    for (const one of trail.slice(from)) this.world.past(this.#way(one.waypoints)?.points ?? null, palette().route);
+    this.#faded = faded;
   }
 
   /** Brings one violation forward. */

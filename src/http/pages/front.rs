@@ -66,10 +66,11 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 36] = [
+static FILES: [File; 37] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
+    file!("again.js"),
     file!("api.js"),
     file!("backdrop.js"),
     file!("chart.js"),

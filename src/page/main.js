@@ -9,7 +9,7 @@ import { Editor } from './editor.js';
 import { Followed } from './followed.js';
 import { axes, isGeodetic, written } from './frame.js';
 import { readFile } from './import.js';
-import { OTHERS, palette } from './palette.js';
+import { OTHERS, onSchemeChange, palette } from './palette.js';
 import { Plans } from './plans.js';
 import { showResult } from './result.js';
 import { fileName, saveBlob, saveFrom } from './save.js';
@@ -28,6 +28,8 @@ const EMPTY = {
 const draft = new Draft();
 const notice = by('notice');
 let busy = false;
+/** The document that the plan in front was made of. */
+let planned = null;
 
 // -- The key ---------------------------------------------------------------------------------------
 
@@ -134,9 +136,13 @@ async function load(name) {
 }
 
 function begin(document_, plan = null) {
+  // What was laid over one scenario says nothing of another.
+  if (!plan) clearCompared();
   show(plan);
   editor.from('');
   draft.replace({ ...document_, planner: { ...document_.planner, warm_start: undefined } });
+  planned = plan ? draft.document : null;
+  by('stale').hidden = true;
 }
 
 async function openFile(file) {
@@ -165,6 +171,7 @@ const check = calmly(VALIDATE_MS, async () => {
 draft.addEventListener('change', () => {
   by('undo').disabled = !draft.canUndo;
   by('redo').disabled = !draft.canRedo;
+  by('stale').hidden = !stage.plan || draft.document === planned;
   by('title').textContent = draft.document.name ?? '';
   document.title = draft.document.name ? `${draft.document.name} · Noctule` : 'Noctule';
   check();
@@ -179,10 +186,13 @@ async function submit(warm) {
   try {
     const planner = { ...draft.document.planner, ...(warm ? { warm_start: { plan_id: stage.plan.id } } : {}) };
     const before = stage.plan;
+    const sent = draft.document;
     const status = await ask('/plans', { method: 'POST', body: { ...draft.document, planner } });
     if (warm && before) lay(before, `before: ${before.status.name ?? before.id.slice(0, 8)}`);
     const plan = new Followed(status.id, status);
     show(plan);
+    planned = sent;
+    by('stale').hidden = draft.document === sent;
     await plan.open();
     if (!by('plans').hidden) plans.look();
   } catch (error) {
@@ -299,6 +309,21 @@ function lay(plan, name) {
   stage.drawSearch();
   remember();
 }
+
+function clearCompared() {
+  for (const { plan } of stage.compared.values()) if (plan !== stage.plan) plan.close();
+  stage.compared.clear();
+  plans.mark();
+}
+
+// Light and dark have colours of their own.
+onSchemeChange(() => {
+  const colours = palette();
+  for (const other of stage.compared.values()) other.color = colours[`other-${other.slot}`];
+  plans.mark();
+  stage.redraw();
+  stage.drawSearch();
+});
 
 async function compare(id, yes, name) {
   if (!yes) {

@@ -14,7 +14,7 @@ export class RouteLine {
   constructor(name, color, width) {
     // After all that is seen through, whether it lies behind or before: what hides it has left its depth.
     this.near = new LineMaterial({ color, linewidth: width, transparent: true });
-    this.through = new LineMaterial({ color, linewidth: Math.max(1, width - 1.5), transparent: true, opacity: 0.35, depthTest: false, depthWrite: false });
+    this.through = new LineMaterial({ color, linewidth: Math.max(1, width - 1.5), transparent: true, opacity: 0.5, depthTest: false, depthWrite: false });
     for (const [material, order] of [[this.through, 6], [this.near, 7]]) {
       const line = new Line2(this.#geometry, material);
       line.frustumCulled = false;
@@ -46,9 +46,11 @@ export class RouteLine {
     this.#count = points.length;
   }
 
-  paint(color) {
+  /** `through` is how much of it is seen behind what hides it, from 0 to 1. */
+  paint(color, through = 0.5) {
     this.near.color.set(color);
     this.through.color.set(color);
+    this.through.opacity = through;
   }
 
   dispose() {

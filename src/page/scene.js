@@ -143,7 +143,7 @@ export class World {
     this.wake();
   }
 
-  /** The lines of routes by name: `{points, color, width}`; those not named are taken away. */
+  /** The lines of routes by name: `{points, color, width, through}`; those not named are taken away. */
   routes(lines) {
     for (const [name, line] of this.#routes) {
       if (!lines.has(name)) {
@@ -151,7 +151,7 @@ export class World {
         this.#routes.delete(name);
       }
     }
-    for (const [name, { points, color, width }] of lines) {
+    for (const [name, { points, color, width, through }] of lines) {
       let line = this.#routes.get(name);
       if (!line) {
         line = new RouteLine(name, color, width);
@@ -159,7 +159,7 @@ export class World {
         this.#changing.add(line.group);
       }
       line.set(points);
-      line.paint(color);
+      line.paint(color, through);
     }
     this.wake();
   }

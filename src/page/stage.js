@@ -80,7 +80,7 @@ export class Stage {
     const [first, second] = axes(this.draft.document);
     const plane = (place) => {
       const p = this.frame.from({ ...place, z: 0 });
-      const scale = this.frame.geodetic ? 1e7 : 10;
+      const scale = this.frame.geodetic ? 1e6 : 10;
       return { [first]: Math.round(p[first] * scale) / scale, [second]: Math.round(p[second] * scale) / scale };
     };
     const { min, max } = this.ground.extent;
@@ -203,7 +203,8 @@ export class Stage {
       }
       const lines = new Map();
       for (const other of others) lines.set(other.id, { points: other.way.points, color: other.color, width: 2.5 });
-      if (way) lines.set('route', { points: way.points, color, width: 4 });
+      // Where a route enters what it must not, it is inside of it, and has to be seen.
+      if (way) lines.set('route', { points: way.points, color, width: 4, through: broken ? 0.9 : undefined });
       if (this.#scrubbed) lines.set('then', { points: this.#scrubbed.points, color: colours.mean, width: 2.5 });
       this.world.routes(lines);
       this.world.dress(waypoints?.points.slice(1, -1) ?? [], way?.points ?? null, color);

@@ -20,6 +20,7 @@ import { Tools } from './tools.js';
 import { cost, metres, number } from './words.js';
 
 const VALIDATE_MS = 300;
+const TURN = Math.PI / 12;
 const EMPTY = {
   name: 'untitled', frame: 'local', start: { x: 100, y: 100, z: 50 }, target: { x: 900, y: 900, z: 50 },
   area: { min: { x: 0, y: 0 }, max: { x: 1000, y: 1000 } }, threats: [], terrain: { kind: 'flat', elevation: 0 }, altitude: { min: 20, max: 120 },
@@ -435,7 +436,9 @@ if (world) {
     el('button', { type: 'button', onclick: () => world.look('oblique') }, 'Oblique'),
     el('button', { type: 'button', onclick: () => world.look('above') }, 'Above'),
     el('button', { type: 'button', 'aria-label': 'Nearer', onclick: () => world.zoom(0.8) }, '+'),
-    el('button', { type: 'button', 'aria-label': 'Farther', onclick: () => world.zoom(1.25) }, '−'));
+    el('button', { type: 'button', 'aria-label': 'Farther', onclick: () => world.zoom(1.25) }, '−'),
+    el('button', { type: 'button', 'aria-label': 'Turn left', title: 'Turn left', onclick: () => world.turn(-TURN) }, '⟲'),
+    el('button', { type: 'button', 'aria-label': 'Turn right', title: 'Turn right', onclick: () => world.turn(TURN) }, '⟳'));
   // Low hills under a wide sky look flat; they are drawn higher, and the box says so.
   stage.exaggerate = (ground, ceiling) => {
     const width = Math.max(ground.extent.max.x - ground.extent.min.x, ground.extent.max.y - ground.extent.min.y);

@@ -143,6 +143,13 @@ export class World {
     this.wake();
   }
 
+  /** Round the middle by an angle, seen from above; what pointers do by dragging. */
+  turn(angle) {
+    this.#camera.position.sub(this.controls.target).applyAxisAngle(this.#camera.up, angle).add(this.controls.target);
+    this.controls.update();
+    this.wake();
+  }
+
   /** The lines of routes by name: `{points, color, width, through}`; those not named are taken away. */
   routes(lines) {
     for (const [name, line] of this.#routes) {

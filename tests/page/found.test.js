@@ -99,3 +99,44 @@ test('what is laid over one scenario goes with it', async () => {
   assert.equal(await page.locator('#legend span').count(), 0);
   await page.done();
 });
+
+test('the keyboard turns the scene', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  const { start } = await document_(page);
+  const at = () => page.evaluate((position) => globalThis.noctule.onScreen(globalThis.noctule.toMetres(position)), start);
+  await page.waitForTimeout(400);
+  const before_ = await at();
+  await page.focus('[aria-label="Turn left"]');
+  await page.keyboard.press('Enter');
+  await page.waitForTimeout(100);
+  const turned = await at();
+  assert.ok(Math.hypot(turned.x - before_.x, turned.y - before_.y) > 20);
+  await page.keyboard.press('Tab');
+  await page.keyboard.press('Enter');
+  await page.waitForTimeout(100);
+  const back = await at();
+  assert.ok(Math.hypot(back.x - before_.x, back.y - before_.y) < 1);
+  await page.done();
+});
+
+test('the name of a chosen threat can be read, light and dark', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  await page.focus('[data-pointer="/threats/0/name"]');
+  await page.waitForSelector('#labels .chosen');
+  for (const colorScheme of ['light', 'dark']) {
+    await page.emulateMedia({ colorScheme });
+    const contrast = await page.locator('#labels .chosen').evaluate((node) => {
+      const { color, backgroundColor } = getComputedStyle(node);
+      const linear = (part) => (part / 255 <= 0.04045 ? part / 255 / 12.92 : ((part / 255 + 0.055) / 1.055) ** 2.4);
+      const [light, dark] = [color, backgroundColor].map((css) => {
+        const [r, g, b] = css.match(/[\d.]+/g).map(Number).map(linear);
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05;
+      }).sort((a, b) => b - a);
+      return light / dark;
+    });
+    assert.ok(contrast >= 4.5, `${contrast.toFixed(2)} in ${colorScheme}`);
+  }
+  await page.done();
+});

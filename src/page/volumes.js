@@ -21,14 +21,12 @@ export class Volumes {
   #coarse = prism(circle({ x: 0, y: 0 }, 1, ROUND / 2), 0, 1);
   #plain = prism(circle({ x: 0, y: 0 }, 1, ROUND / 4), 0, 1);
 
-  /** Whether they are in motion where that is hard: with fewer sides then, and without outlines, if there are many. */
+  /** Whether they are in motion where that is hard: many have fewer sides then, no outlines, and hide nothing. */
   set coarse(yes) {
+    if (!this.#many) return;
     for (const child of this.group.children) {
-      if (!child.isInstancedMesh) {
-        if (child.isLineSegments && this.#many) child.visible = !yes;
-      } else if (this.#many) {
-        child.geometry = yes ? this.#plain : this.#coarse;
-      }
+      if (child.isInstancedMesh) child.geometry = yes ? this.#plain : this.#coarse;
+      if (child.isLineSegments || child.name === 'core depths') child.visible = !yes;
     }
   }
 

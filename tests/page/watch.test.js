@@ -167,3 +167,23 @@ test('a search of milliseconds has its whole history, also when its plan is open
   await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 1 && globalThis.noctule.scene().trail === 0);
   await page.done();
 });
+
+test('a search that starts over is shown from its new beginning', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  await choose(page, 'paper-4', LONG);
+  const event = (kind, data) => `event: ${kind}\ndata: ${JSON.stringify(data)}\n\n`;
+  const told = (iteration) => event('incumbent', { iteration, cost: 500, feasible: true, waypoints: [{ x: 200, y: 200, z: 0 }, { x: 800, y: 800, z: 150 }] })
+    + event('convergence', { iteration, best_cost: 500, mean_cost: 600, feasible_fraction: 1 });
+  await page.route('**/events?*', async (route) => {
+    const status = await ask(site.url, new URL(route.request().url()).pathname.replace('/events', ''));
+    const as = (state) => event('status', { ...status, status: state });
+    await route.fulfill({ contentType: 'text/event-stream', body: `retry: 60000\n\n${as('running')}${told(0)}${told(1)}${told(2)}${as('queued')}${as('running')}${told(0)}` });
+  });
+  await page.click('#plan');
+  await page.waitForFunction(() => globalThis.noctule.history().points > 0);
+  await page.waitForTimeout(300);
+  assert.deepEqual(await page.evaluate(() => globalThis.noctule.history()), { points: 1, incumbents: 1 });
+  await page.click('#cancel');
+  await page.done();
+});

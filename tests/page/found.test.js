@@ -101,8 +101,8 @@ test('what is laid over one scenario goes with it', async () => {
 });
 
 test('the keyboard turns the scene', async () => {
-  const page = await open(chrome, site.url);
-  await drawn(page, FIRST);
+  const page = await opened(await made(site.url, SMALL));
+  await drawn(page, 1);
   const { start } = await document_(page);
   const at = () => page.evaluate((position) => globalThis.noctule.onScreen(globalThis.noctule.toMetres(position)), start);
   await page.waitForTimeout(400);
@@ -127,7 +127,9 @@ test('the name of a chosen threat can be read, light and dark', async () => {
   await page.waitForSelector('#labels .chosen');
   for (const colorScheme of ['light', 'dark']) {
     await page.emulateMedia({ colorScheme });
-    const contrast = await page.locator('#labels .chosen').evaluate((node) => {
+    await page.waitForTimeout(300);
+    const contrast = await page.evaluate(() => {
+      const node = document.querySelector('#labels .chosen');
       const { color, backgroundColor } = getComputedStyle(node);
       const linear = (part) => (part / 255 <= 0.04045 ? part / 255 / 12.92 : ((part / 255 + 0.055) / 1.055) ** 2.4);
       const [light, dark] = [color, backgroundColor].map((css) => {

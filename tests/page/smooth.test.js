@@ -13,7 +13,7 @@ after(async () => {
 });
 
 const width = (page) => page.evaluate(() => document.getElementById('canvas').width);
-const rested = (page, whole) => page.waitForFunction((size) => document.getElementById('canvas').width === size, whole);
+const rested = (page) => page.waitForFunction(() => document.getElementById('canvas').width === document.getElementById('canvas').clientWidth);
 
 test('a picture of ground and threats with a route on it is what drawing all of it gives', async () => {
   const page = await open(chrome, site.url);
@@ -45,8 +45,9 @@ test('a picture of ground and threats with a route on it is what drawing all of 
 test('turning is drawn coarser, its end sharp', async () => {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);
+  await choose(page, 'paper-1');
   await plan(page);
-  await page.waitForTimeout(400);
+  await rested(page);
   const whole = await width(page);
   const box = await page.locator('#canvas').boundingBox();
   const [x, y] = [box.x + box.width / 2, box.y + box.height / 3];
@@ -59,7 +60,7 @@ test('turning is drawn coarser, its end sharp', async () => {
   }
   assert.ok(least < whole, `${least} of ${whole} pixels while it turns`);
   await page.mouse.up();
-  await rested(page, whole);
+  await rested(page);
   assert.equal((await scene(page)).routes[0].name, 'route');
   await page.done();
 });

@@ -1,8 +1,9 @@
 // What the page draws with; nothing else of three.js is taken along.
 export {
-  BufferAttribute, BufferGeometry, CanvasTexture, Color, DoubleSide, Group,
+  BufferAttribute, BufferGeometry, CanvasTexture, Color, DepthTexture, DoubleSide, FramebufferTexture, Group,
   InstancedMesh, Line, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial,
-  PerspectiveCamera, Points, PointsMaterial, Raycaster, Scene, ShapeUtils, Vector2, Vector3, WebGLRenderer,
+  PerspectiveCamera, Points, PointsMaterial, Raycaster, Scene, ShaderMaterial, ShapeUtils, Vector2, Vector3,
+  WebGLRenderer, WebGLRenderTarget,
 } from 'three';
 export { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 export { Line2 } from 'three/addons/lines/Line2.js';

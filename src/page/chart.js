@@ -12,6 +12,7 @@ export class Chart {
   #plot = null;
   #shown = { points: [], bound: null, others: [], color: null };
   #shape = '';
+  #marking = false;
 
   /** `pointed(iteration)` is told where the pointer is; null where it is not. */
   constructor(node, legend, pointed) {
@@ -29,6 +30,14 @@ export class Chart {
   show({ points, bound, others, color }) {
     this.#shown = { points, bound, others, color };
     this.#draw();
+  }
+
+  /** Marks an iteration; null for none. */
+  mark(iteration) {
+    if (!this.#plot) return;
+    this.#marking = true;
+    this.#plot.setCursor(iteration === null ? { left: -10, top: -10 } : { left: this.#plot.valToPos(iteration, 'x'), top: 0 });
+    this.#marking = false;
   }
 
   #draw() {
@@ -68,6 +77,7 @@ export class Chart {
       series: [{}, ...series.map(({ label, stroke, width, dash }) => ({ label, stroke, width, dash, spanGaps: true, points: { show: false } }))],
       hooks: {
         setCursor: [(plot) => {
+          if (this.#marking) return;
           const at = plot.cursor.idx;
           this.pointed(at === null || at === undefined || plot.cursor.left < 0 ? null : plot.data[0][at]);
         }],

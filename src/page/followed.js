@@ -1,9 +1,11 @@
 // One plan: what the service says about it, kept as it comes.
 
 import { ask } from './api.js';
-import { follow } from './stream.js';
+import { RATE_HZ, follow } from './stream.js';
 
 const MOST_INCUMBENTS = 240;
+/** What the service takes, other than 0 for all. */
+const MOST_HZ = 1000;
 
 export class Followed extends EventTarget {
   status = null;
@@ -35,12 +37,14 @@ export class Followed extends EventTarget {
     Object.assign(this, { status, scenario });
     this.#tell('status');
     if (this.ended) await this.#finish();
-    this.#stop = follow(this.id, (kind, data) => this.#heard(kind, data), (connected, why) => {
-      // What has ended lacks nothing but its history.
-      if (this.ended && this.result) return;
-      Object.assign(this, { connected, lostBecause: why ?? null });
-      this.#tell('connection');
-    });
+    else {
+      this.#stop = follow(this.id, (kind, data) => this.#heard(kind, data), (connected, why) => {
+        // What has ended lacks nothing but its history.
+        if (this.ended && this.result) return;
+        Object.assign(this, { connected, lostBecause: why ?? null });
+        this.#tell('connection');
+      });
+    }
     return this;
   }
 
@@ -53,6 +57,8 @@ export class Followed extends EventTarget {
 
   #heard(kind, data) {
     if (kind === 'status') {
+      // A run that starts over tells its points anew.
+      if (data.status === 'queued' && !this.result) this.points = this.incumbents = [];
       this.status = data;
       this.#tell('status');
     } else if (kind === 'convergence') {
@@ -60,11 +66,7 @@ export class Followed extends EventTarget {
       this.points.push(data);
       this.#tell('search');
     } else if (kind === 'incumbent') {
-      this.incumbents.push(data);
-      // Every other one of the older half goes, so that the whole history stays in sight.
-      if (this.incumbents.length > MOST_INCUMBENTS) {
-        this.incumbents = this.incumbents.filter((_, at) => at > MOST_INCUMBENTS / 2 || at % 2 === 0);
-      }
+      this.incumbents = kept(this.incumbents, data);
       this.#tell('incumbent');
     } else if (kind === 'end') {
       this.connected = true;
@@ -84,9 +86,32 @@ export class Followed extends EventTarget {
       this.refusal = refusal;
     }
     this.#tell('end');
+    if (this.result) this.#recall(this.result.timing.run_ms / 1000);
+  }
+
+  /** Fetches the routes that were best on the way, where a short search was told of in few of them or in none. */
+  #recall(seconds) {
+    // More than are kept, for many of the windows that a rate makes of a search have none.
+    const rate = (4 * MOST_INCUMBENTS) / Math.max(seconds, 1e-3);
+    if (this.incumbents.length && rate <= RATE_HZ) return;
+    let all = [];
+    this.#stop = follow(this.id, (kind, data) => {
+      if (kind === 'status' && data.status === 'queued') all = [];
+      else if (kind === 'incumbent') all = kept(all, data);
+      else if (kind === 'end') {
+        this.incumbents = all;
+        this.#tell('history');
+      }
+    }, () => {}, rate > MOST_HZ ? 0 : rate);
   }
 
   #tell(what) {
     this.dispatchEvent(new CustomEvent('news', { detail: what }));
   }
+}
+
+/** The history with one more route. Every other one of its older half goes when it is full, so that all of it stays in sight. */
+function kept(incumbents, one) {
+  const more = [...incumbents, one];
+  return more.length > MOST_INCUMBENTS ? more.filter((_, at) => at > MOST_INCUMBENTS / 2 || at % 2 === 0) : more;
 }

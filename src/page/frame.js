@@ -74,10 +74,10 @@ function earthCentred(lat, lon) {
 
 const radians = (degrees) => (degrees * Math.PI) / 180;
 
-/** A position as it is written: to a decimetre, in degrees to a centimetre. */
+/** A position as it is written: to a decimetre, which is a millionth of a degree. */
 export function written(document, position) {
   const [first, second, third] = axes(document);
-  const plane = isGeodetic(document) ? 1e7 : 1e1;
+  const plane = isGeodetic(document) ? 1e6 : 1e1;
   const round = (value, scale) => Math.round(value * scale) / scale;
   const result = { [first]: round(position[first], plane), [second]: round(position[second], plane) };
   if (position[third] !== undefined) result[third] = round(position[third], 10);

@@ -3,6 +3,8 @@
 import { el } from './dom.js';
 
 const MOST = 30;
+/** The style sheet lifts the ends' names over their dots. */
+const LIFT = 11;
 
 export class Labels {
   #items = [];
@@ -13,20 +15,21 @@ export class Labels {
 
   /** `[{place, text, kind}]`; those that there is no room for are left out, the last ones first. */
   set(items) {
-    this.#items = items.slice(0, MOST).map(({ place, text, kind }) => ({ place, node: el('span', { class: kind }, text) }));
+    this.#items = items.slice(0, MOST).map(({ place, text, kind }) => ({ place, lift: /\bend\b/.test(kind) ? LIFT : 0, node: el('span', { class: kind }, text) }));
     this.layer.replaceChildren(...this.#items.map((item) => item.node));
   }
 
   /** Puts each where `onScreen` says, and hides those that would cover another. */
   place(onScreen) {
     const taken = [];
-    for (const { place, node } of this.#items) {
+    for (const { place, lift, node } of this.#items) {
       const at = onScreen(place);
+      const y = at && at.y - lift;
       const wide = (node.textContent.length * 6.4) / 2 + 6;
-      const free = at && taken.every((other) => Math.abs(other.x - at.x) > other.wide + wide || Math.abs(other.y - at.y) > 17);
+      const free = at && taken.every((other) => Math.abs(other.x - at.x) > other.wide + wide || Math.abs(other.y - y) > 18);
       node.hidden = !free;
       if (!free) continue;
-      taken.push({ ...at, wide });
+      taken.push({ x: at.x, y, wide });
       node.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px) translate(-50%, -100%)`;
     }
   }

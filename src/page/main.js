@@ -1,6 +1,7 @@
 // The page put together: what is chosen, planned, looked at, compared and taken away.
 
 import { Refused, Said, ask, onKeyNeeded, send } from './api.js';
+import { Again } from './again.js';
 import { Chart } from './chart.js';
 import { atMost, by, calmly, el } from './dom.js';
 import { Draft } from './draft.js';
@@ -8,7 +9,7 @@ import { Editor } from './editor.js';
 import { Followed } from './followed.js';
 import { axes, isGeodetic, written } from './frame.js';
 import { readFile } from './import.js';
-import { OTHERS, palette } from './palette.js';
+import { OTHERS, onSchemeChange, palette } from './palette.js';
 import { Plans } from './plans.js';
 import { showResult } from './result.js';
 import { fileName, saveBlob, saveFrom } from './save.js';
@@ -19,6 +20,7 @@ import { Tools } from './tools.js';
 import { cost, metres, number } from './words.js';
 
 const VALIDATE_MS = 300;
+const TURN = Math.PI / 12;
 const EMPTY = {
   name: 'untitled', frame: 'local', start: { x: 100, y: 100, z: 50 }, target: { x: 900, y: 900, z: 50 },
   area: { min: { x: 0, y: 0 }, max: { x: 1000, y: 1000 } }, threats: [], terrain: { kind: 'flat', elevation: 0 }, altitude: { min: 20, max: 120 },
@@ -27,6 +29,8 @@ const EMPTY = {
 const draft = new Draft();
 const notice = by('notice');
 let busy = false;
+/** The document that the plan in front was made of. */
+let planned = null;
 
 // -- The key ---------------------------------------------------------------------------------------
 
@@ -61,6 +65,10 @@ const stage = new Stage({ world, strip, chart, draft }, {
   marked: (place) => {
     by('strip-at').textContent = place ? `${metres(place.distance, 0)}: ${number(place.z, 0)} m, ${number(place.z - place.ground, 0)} m above ground` : '';
   },
+});
+const again = new Again(by('watch'), (iteration, trail) => {
+  stage.scrub(iteration, trail);
+  chart.mark(iteration);
 });
 const editor = new Editor(by('scenario'), draft, {
   load: (name) => attempt(() => load(name)),
@@ -129,9 +137,13 @@ async function load(name) {
 }
 
 function begin(document_, plan = null) {
+  // What was laid over one scenario says nothing of another.
+  if (!plan) clearCompared();
   show(plan);
   editor.from('');
   draft.replace({ ...document_, planner: { ...document_.planner, warm_start: undefined } });
+  planned = plan ? draft.document : null;
+  by('stale').hidden = true;
 }
 
 async function openFile(file) {
@@ -160,6 +172,7 @@ const check = calmly(VALIDATE_MS, async () => {
 draft.addEventListener('change', () => {
   by('undo').disabled = !draft.canUndo;
   by('redo').disabled = !draft.canRedo;
+  by('stale').hidden = !stage.plan || draft.document === planned;
   by('title').textContent = draft.document.name ?? '';
   document.title = draft.document.name ? `${draft.document.name} · Noctule` : 'Noctule';
   check();
@@ -174,10 +187,13 @@ async function submit(warm) {
   try {
     const planner = { ...draft.document.planner, ...(warm ? { warm_start: { plan_id: stage.plan.id } } : {}) };
     const before = stage.plan;
+    const sent = draft.document;
     const status = await ask('/plans', { method: 'POST', body: { ...draft.document, planner } });
     if (warm && before) lay(before, `before: ${before.status.name ?? before.id.slice(0, 8)}`);
     const plan = new Followed(status.id, status);
     show(plan);
+    planned = sent;
+    by('stale').hidden = draft.document === sent;
     await plan.open();
     if (!by('plans').hidden) plans.look();
   } catch (error) {
@@ -199,6 +215,7 @@ function show(plan) {
   if (before && before !== plan && !stage.compared.has(before.id)) before.close();
   if (plan && stage.compared.delete(plan.id)) plans.mark();
   stage.front(plan);
+  again.offer(plan);
   plan?.addEventListener('news', ({ detail }) => plan === stage.plan && heard(plan, detail));
   if (plan) for (const what of ['status', 'search']) heard(plan, what);
   else {
@@ -219,6 +236,7 @@ function heard(plan, what) {
     say(verdict(plan));
   }
   if (what === 'end' || what === 'status') result(plan);
+  if (what === 'end' || what === 'history') again.offer(plan);
   if (what === 'connection') {
     if (plan.connected) tell('');
     else tell(plan.lostBecause ?? 'The connection is lost. It is being resumed; nothing will be missed.', 'note');
@@ -292,6 +310,21 @@ function lay(plan, name) {
   stage.drawSearch();
   remember();
 }
+
+function clearCompared() {
+  for (const { plan } of stage.compared.values()) if (plan !== stage.plan) plan.close();
+  stage.compared.clear();
+  plans.mark();
+}
+
+// Light and dark have colours of their own.
+onSchemeChange(() => {
+  const colours = palette();
+  for (const other of stage.compared.values()) other.color = colours[`other-${other.slot}`];
+  plans.mark();
+  stage.redraw();
+  stage.drawSearch();
+});
 
 async function compare(id, yes, name) {
   if (!yes) {
@@ -403,7 +436,9 @@ if (world) {
     el('button', { type: 'button', onclick: () => world.look('oblique') }, 'Oblique'),
     el('button', { type: 'button', onclick: () => world.look('above') }, 'Above'),
     el('button', { type: 'button', 'aria-label': 'Nearer', onclick: () => world.zoom(0.8) }, '+'),
-    el('button', { type: 'button', 'aria-label': 'Farther', onclick: () => world.zoom(1.25) }, '−'));
+    el('button', { type: 'button', 'aria-label': 'Farther', onclick: () => world.zoom(1.25) }, '−'),
+    el('button', { type: 'button', 'aria-label': 'Turn left', title: 'Turn left', onclick: () => world.turn(-TURN) }, '⟲'),
+    el('button', { type: 'button', 'aria-label': 'Turn right', title: 'Turn right', onclick: () => world.turn(TURN) }, '⟳'));
   // Low hills under a wide sky look flat; they are drawn higher, and the box says so.
   stage.exaggerate = (ground, ceiling) => {
     const width = Math.max(ground.extent.max.x - ground.extent.min.x, ground.extent.max.y - ground.extent.min.y);
@@ -425,6 +460,7 @@ Object.defineProperty(globalThis, 'noctule', {
       const way = stage.plan && stage.wayOf(stage.plan);
       return way ? way.at(way.length * share) : null;
     },
+    history: () => ({ points: stage.plan?.points.length ?? 0, incumbents: stage.plan?.incumbents.length ?? 0 }),
     document: () => structuredClone(draft.document),
   }),
 });

@@ -13,6 +13,15 @@ const SUN = [-0.5, 0.6, 0.62];
 /** Draws a ground into a group, ever the same one: what was drawn before is given back first. */
 export class Relief {
   group = new Group();
+  #ranges = null;
+
+  /** Whether it is in motion where that is hard: with fewer triangles then, and without the thinner contours. */
+  set coarse(yes) {
+    for (const child of this.group.children) {
+      if (child.name === 'contours') child.visible = !yes;
+      if (child.name === 'ground' && this.#ranges) child.geometry.setDrawRange(...(yes ? this.#ranges.coarse : this.#ranges.fine));
+    }
+  }
 
   draw(ground, colours) {
     this.clear();
@@ -21,6 +30,7 @@ export class Relief {
   }
 
   clear() {
+    this.#ranges = null;
     for (const child of [...this.group.children]) {
       child.geometry.dispose();
       child.material.dispose();
@@ -35,16 +45,14 @@ export class Relief {
     for (let k = 0; k < xs.length; k += 1) positions.set([xs[k], ys[k], zs[k]], k * 3);
     geometry.setAttribute('position', new BufferAttribute(positions, 3));
     geometry.setAttribute('color', new BufferAttribute(shades(ground, colours), 3));
-    const faces = new Uint32Array((columns - 1) * (rows - 1) * 6);
-    let at = 0;
-    for (let row = 0; row + 1 < rows; row += 1) {
-      for (let column = 0; column + 1 < columns; column += 1) {
-        const k = row * columns + column;
-        faces.set([k, k + 1, k + columns, k + 1, k + columns + 1, k + columns], at);
-        at += 6;
-      }
-    }
+    // Twice: of all nodes, and of every other one.
+    const [fine, coarse] = [facesOf(columns, rows, 1), facesOf(columns, rows, 2)];
+    const faces = new Uint32Array(fine.length + coarse.length);
+    faces.set(fine);
+    faces.set(coarse, fine.length);
     geometry.setIndex(new BufferAttribute(faces, 1));
+    this.#ranges = { fine: [0, fine.length], coarse: [fine.length, coarse.length] };
+    geometry.setDrawRange(...this.#ranges.fine);
     const material = new MeshBasicMaterial({ vertexColors: true, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
     const mesh = new Mesh(geometry, material);
     mesh.name = 'ground';
@@ -109,6 +117,20 @@ export class Relief {
     lines.name = name;
     this.group.add(lines);
   }
+}
+
+/** Two triangles for each square between the nodes of every `stride`th column and row, and the last ones. */
+function facesOf(columns, rows, stride) {
+  const [wide, high] = [columns, rows].map((count) => Math.ceil((count - 1) / stride));
+  const faces = new Uint32Array(wide * high * 6);
+  for (let row = 0; row < high; row += 1) {
+    for (let column = 0; column < wide; column += 1) {
+      const [w, e] = [column * stride, Math.min((column + 1) * stride, columns - 1)];
+      const [s, n] = [row * stride * columns, Math.min((row + 1) * stride, rows - 1) * columns];
+      faces.set([s + w, s + e, n + w, s + e, n + e, n + w], (row * wide + column) * 6);
+    }
+  }
+  return faces;
 }
 
 /** Height and light of each node as a colour. */

@@ -12,9 +12,10 @@ export class RouteLine {
   #count = 0;
 
   constructor(name, color, width) {
-    this.near = new LineMaterial({ color, linewidth: width });
-    this.through = new LineMaterial({ color, linewidth: Math.max(1, width - 1.5), transparent: true, opacity: 0.35, depthTest: false, depthWrite: false });
-    for (const [material, order] of [[this.through, 5], [this.near, 6]]) {
+    // After all that is seen through, whether it lies behind or before: what hides it has left its depth.
+    this.near = new LineMaterial({ color, linewidth: width, transparent: true });
+    this.through = new LineMaterial({ color, linewidth: Math.max(1, width - 1.5), transparent: true, opacity: 0.5, depthTest: false, depthWrite: false });
+    for (const [material, order] of [[this.through, 6], [this.near, 7]]) {
       const line = new Line2(this.#geometry, material);
       line.frustumCulled = false;
       line.renderOrder = order;
@@ -45,9 +46,11 @@ export class RouteLine {
     this.#count = points.length;
   }
 
-  paint(color) {
+  /** `through` is how much of it is seen behind what hides it, from 0 to 1. */
+  paint(color, through = 0.5) {
     this.near.color.set(color);
     this.through.color.set(color);
+    this.through.opacity = through;
   }
 
   dispose() {
@@ -86,7 +89,7 @@ export class Trail {
     } else {
       line = new Line(new BufferGeometry(), new LineBasicMaterial({ transparent: true, depthWrite: false, depthTest: false }));
       line.frustumCulled = false;
-      line.renderOrder = 4;
+      line.renderOrder = 5;
       this.group.add(line);
     }
     const positions = new Float32Array(points.flatMap(({ x, y, z }) => [x, y, z]));
@@ -106,7 +109,7 @@ export class Curtain {
     this.mesh = new Mesh(new BufferGeometry(), material);
     this.mesh.name = 'curtain';
     this.mesh.frustumCulled = false;
-    this.mesh.renderOrder = 1;
+    this.mesh.renderOrder = 5;
     this.mesh.visible = false;
   }
 

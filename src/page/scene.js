@@ -3,6 +3,8 @@
 import {
   Color, Group, OrbitControls, PerspectiveCamera, Raycaster, Scene, Vector2, Vector3, WebGLRenderer,
 } from './vendor/three.js';
+import { Backdrop } from './backdrop.js';
+import { calmly } from './dom.js';
 import { drawnBySoftware } from './graphics.js';
 import { Labels } from './labels.js';
 import { onSchemeChange, palette } from './palette.js';
@@ -12,11 +14,18 @@ import { Volumes } from './volumes.js';
 
 const VIEWS = { oblique: new Vector3(-0.26, -0.8, 0.78), above: new Vector3(0, -0.001, 1) };
 
-/** Of the pixels of the screen, where the processor draws and much changes. */
+/** Of the pixels of the screen, where the processor draws and the whole is in motion. */
 const COARSE = 0.6;
+/** So many frames one after another in which the whole has changed, each so soon after the one before, are a motion. */
+const RUN = 3;
+const SOON_MS = 250;
 
 export class World {
   #root = new Group();
+  /** What only an edit changes, and what a search does. */
+  #standing = new Group();
+  #changing = new Group();
+  #backdrop = new Backdrop();
   #scene = new Scene();
   #camera = new PerspectiveCamera(38, 1, 1, 1e6);
   #relief = new Relief();
@@ -35,6 +44,14 @@ export class World {
   #show = null;
   #view = 'oblique';
   #ratio = Math.min(devicePixelRatio, drawnBySoftware() ? 1 : 2);
+  /** Frames since the whole has changed last; how many did so one after another; when the last one was. */
+  #unstirred = 0;
+  #run = 0;
+  #stirred = -Infinity;
+  #rest = calmly(SOON_MS, () => {
+    this.#run = 0;
+    if (this.renderer.getPixelRatio() !== this.#ratio) this.#stir();
+  });
 
   /** Throws where the browser has no WebGL. */
   constructor(canvas, labels) {
@@ -47,9 +64,11 @@ export class World {
     this.controls.maxPolarAngle = Math.PI / 2 - 0.02;
     this.controls.zoomToCursor = true;
     this.controls.enableDamping = !matchMedia('(prefers-reduced-motion: reduce)').matches;
-    this.controls.addEventListener('change', () => this.wake());
-    this.#root.add(this.#relief.group, this.#volumes.group, this.#trail.group, this.#curtain.mesh, this.#waypoints.group, this.#mark.group, this.#faults.group, this.#handles.group, this.#ends.start.group, this.#ends.target.group);
-    this.#scene.add(this.#root);
+    this.controls.addEventListener('change', () => this.#stir());
+    this.#standing.add(this.#relief.group, this.#volumes.group);
+    this.#changing.add(this.#trail.group, this.#curtain.mesh, this.#waypoints.group, this.#mark.group, this.#faults.group, this.#handles.group, this.#ends.start.group, this.#ends.target.group);
+    this.#root.add(this.#standing, this.#changing);
+    this.#scene.add(this.#root, this.#backdrop.mesh);
     new ResizeObserver(() => this.#resize()).observe(canvas.parentElement);
     onSchemeChange(() => {
       this.colours = palette();
@@ -63,16 +82,7 @@ export class World {
   get exaggeration() { return this.#root.scale.z; }
   set exaggeration(times) {
     this.#root.scale.z = times;
-    this.wake();
-  }
-
-  /** Whether much is drawn in a short time: where that is hard, it is drawn coarser meanwhile. */
-  set hurried(yes) {
-    const ratio = yes && drawnBySoftware() ? COARSE : this.#ratio;
-    if (this.renderer.getPixelRatio() === ratio) return;
-    this.renderer.setPixelRatio(ratio);
-    // At once, for a canvas of another size is empty.
-    this.#render();
+    this.#stir();
   }
 
   get ground() { return this.#show?.ground ?? null; }
@@ -84,7 +94,7 @@ export class World {
     if (!same) this.#drawGround();
     else this.#volumes.draw(threats, ground, this.colours);
     if (anew) this.look(this.#view);
-    this.wake();
+    this.#stir();
   }
 
   #drawGround() {
@@ -92,7 +102,7 @@ export class World {
     this.#scene.background = new Color(this.colours.sky);
     this.#relief.draw(ground, this.colours);
     this.#volumes.draw(threats, ground, this.colours);
-    this.wake();
+    this.#stir();
   }
 
   /** From one of the places that the camera has. */
@@ -123,7 +133,7 @@ export class World {
     this.controls.minDistance = distance / 60;
     this.controls.maxDistance = distance * 4;
     this.controls.update();
-    this.wake();
+    this.#stir();
   }
 
   /** Nearer for less than 1. */
@@ -133,7 +143,14 @@ export class World {
     this.wake();
   }
 
-  /** The lines of routes by name: `{points, color, width}`; those not named are taken away. */
+  /** Round the middle by an angle, seen from above; what pointers do by dragging. */
+  turn(angle) {
+    this.#camera.position.sub(this.controls.target).applyAxisAngle(this.#camera.up, angle).add(this.controls.target);
+    this.controls.update();
+    this.wake();
+  }
+
+  /** The lines of routes by name: `{points, color, width, through}`; those not named are taken away. */
   routes(lines) {
     for (const [name, line] of this.#routes) {
       if (!lines.has(name)) {
@@ -141,15 +158,15 @@ export class World {
         this.#routes.delete(name);
       }
     }
-    for (const [name, { points, color, width }] of lines) {
+    for (const [name, { points, color, width, through }] of lines) {
       let line = this.#routes.get(name);
       if (!line) {
         line = new RouteLine(name, color, width);
         this.#routes.set(name, line);
-        this.#root.add(line.group);
+        this.#changing.add(line.group);
       }
       line.set(points);
-      line.paint(color);
+      line.paint(color, through);
     }
     this.wake();
   }
@@ -256,6 +273,7 @@ export class World {
 
   /** The view as a PNG. */
   async picture() {
+    this.#run = 0;
     this.#render();
     return new Promise((done) => { this.canvas.toBlob(done, 'image/png'); });
   }
@@ -270,13 +288,46 @@ export class World {
     });
   }
 
+  /** More has changed than a route. */
+  #stir() {
+    this.#unstirred = 0;
+    this.wake();
+  }
+
   #render() {
     const start = performance.now();
     this.controls.update();
-    this.renderer.render(this.#scene, this.#camera);
+    if (drawnBySoftware()) this.#renderSparingly(start);
+    else this.renderer.render(this.#scene, this.#camera);
     this.labels.place((place) => this.onScreen(place));
     this.#frames.count += 1;
     this.#frames.ms = performance.now() - start;
+  }
+
+  /** Coarser as long as all of it is in motion; and what stands still is drawn once only. */
+  #renderSparingly(now) {
+    if (this.#unstirred === 0) {
+      this.#run = now - this.#stirred < SOON_MS ? this.#run + 1 : 1;
+      this.#stirred = now;
+      this.#rest();
+    }
+    const ratio = this.#run >= RUN ? COARSE : this.#ratio;
+    if (this.renderer.getPixelRatio() !== ratio) {
+      this.renderer.setPixelRatio(ratio);
+      this.#unstirred = 0;
+    }
+    this.#relief.coarse = this.#volumes.coarse = ratio !== this.#ratio;
+    const draw = () => this.renderer.render(this.#scene, this.#camera);
+    if (this.#unstirred === 1) {
+      this.#changing.visible = false;
+      this.#standing.visible = true;
+      this.#backdrop.take(this.renderer, draw);
+      this.#changing.visible = true;
+    }
+    this.#backdrop.mesh.visible = this.#unstirred > 0;
+    this.#standing.visible = this.#unstirred === 0;
+    draw();
+    this.#unstirred += 1;
   }
 
   #resize() {
@@ -287,7 +338,7 @@ export class World {
     this.#camera.aspect = clientWidth / clientHeight;
     this.#camera.updateProjectionMatrix();
     if (Math.abs(before / this.#camera.aspect - 1) > 0.25) this.look(this.#view);
-    this.wake();
+    this.#stir();
   }
 
   /** What is in the scene, for tests and for the curious. */
@@ -303,6 +354,7 @@ export class World {
       mark: this.#mark.count,
       faults: this.#faults.count,
       handles: this.#handles.count,
+      backdrop: this.#backdrop.mesh.visible,
       memory: { ...this.renderer.info.memory },
       frames: { ...this.#frames },
     };

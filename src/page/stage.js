@@ -29,6 +29,7 @@ export class Stage {
   #trailed = null;
   #ways = new WeakMap();
   #scrubbed = null;
+  #faded = null;
   #fault = null;
   #fresh = true;
 
@@ -61,6 +62,7 @@ export class Stage {
     this.#scrubbed = null;
     this.#fault = null;
     this.#trailed = null;
+    this.#faded = null;
     this.world?.past(null);
     this.mark(null);
     this.redraw();
@@ -78,7 +80,7 @@ export class Stage {
     const [first, second] = axes(this.draft.document);
     const plane = (place) => {
       const p = this.frame.from({ ...place, z: 0 });
-      const scale = this.frame.geodetic ? 1e7 : 10;
+      const scale = this.frame.geodetic ? 1e6 : 10;
       return { [first]: Math.round(p[first] * scale) / scale, [second]: Math.round(p[second] * scale) / scale };
     };
     const { min, max } = this.ground.extent;
@@ -199,10 +201,10 @@ export class Stage {
         if (this.#trailed) this.world.past(this.#way(this.#trailed.waypoints)?.points, colours.route);
         this.#trailed = plan.latest;
       }
-      this.world.hurried = Boolean(plan && !plan.ended && plan.latest);
       const lines = new Map();
       for (const other of others) lines.set(other.id, { points: other.way.points, color: other.color, width: 2.5 });
-      if (way) lines.set('route', { points: way.points, color, width: 4 });
+      // Where a route enters what it must not, it is inside of it, and has to be seen.
+      if (way) lines.set('route', { points: way.points, color, width: 4, through: broken ? 0.9 : undefined });
       if (this.#scrubbed) lines.set('then', { points: this.#scrubbed.points, color: colours.mean, width: 2.5 });
       this.world.routes(lines);
       this.world.dress(waypoints?.points.slice(1, -1) ?? [], way?.points ?? null, color);
@@ -267,13 +269,23 @@ export class Stage {
     this.mark(best);
   }
 
-  /** Shows the best route as it was at an iteration; null for now. */
-  scrub(iteration) {
+  /** Shows the best route as it was at an iteration, and fainter the incumbents of `trail`; null for now. */
+  scrub(iteration, trail = []) {
     const then = iteration === null ? null : this.plan?.incumbents.filter((one) => one.iteration <= iteration).at(-1);
+    if (this.world && this.plan?.result) this.#trace(trail);
     const way = then ? this.#way(then.waypoints) : null;
     if (way === this.#scrubbed) return;
     this.#scrubbed = way;
     this.redraw();
+  }
+
+  #trace(trail) {
+    const faded = trail.at(-1) ?? null;
+    if (faded === this.#faded) return;
+    const from = trail.indexOf(this.#faded) + 1;
+    if (!from) this.world.past(null);
+    for (const one of trail.slice(from)) this.world.past(this.#way(one.waypoints)?.points ?? null, palette().route);
+    this.#faded = faded;
   }
 
   /** Brings one violation forward. */

@@ -2,16 +2,18 @@
 
 import { Refused, eventsAddress } from './api.js';
 
-const RATE_HZ = 20;
+/** No eye sees more. */
+export const RATE_HZ = 20;
 const KINDS = ['status', 'convergence', 'incumbent', 'gap', 'end'];
 
 /**
  * Calls `heard(kind, data)` for each event and `connected(yes, why)` when that changes. Returns what ends it.
+ * `rateHz` points a second at most, 0 for all.
  *
  * The browser itself takes up a connection that broke, with the last id; what it gives up, an answer that is no
  * stream, such as that to a ticket whose time is over, is asked for again here.
  */
-export function follow(id, heard, connected) {
+export function follow(id, heard, connected, rateHz = RATE_HZ) {
   let source = null;
   let last = 0;
   let over = false;
@@ -21,7 +23,7 @@ export function follow(id, heard, connected) {
   async function open() {
     let address;
     try {
-      address = await eventsAddress(id, last, RATE_HZ);
+      address = await eventsAddress(id, last, rateHz);
     } catch (refusal) {
       const hopeless = refusal instanceof Refused && [401, 403, 404, 410].includes(refusal.status);
       connected(false, hopeless ? refusal.message : null);

@@ -10,16 +10,30 @@ const MANY = 60;
 // Where the light comes from, seen from above.
 const SUN = Math.PI * 0.75;
 const ARC = Math.PI / 10;
+// All is seen through; then cores leave their depths, so that a route behind one is drawn faintly.
+const ORDER = { cores: 2, zones: 3, 'core outlines': 4, 'zone outlines': 4, 'core depths': 4.5 };
 
 /** Draws threats, given in metres of the frame, into a group. */
 export class Volumes {
   group = new Group();
+  #many = false;
   #fine = prism(circle({ x: 0, y: 0 }, 1, ROUND), 0, 1);
   #coarse = prism(circle({ x: 0, y: 0 }, 1, ROUND / 2), 0, 1);
+  #plain = prism(circle({ x: 0, y: 0 }, 1, ROUND / 4), 0, 1);
+
+  /** Whether they are in motion where that is hard: many have fewer sides then, no outlines, and hide nothing. */
+  set coarse(yes) {
+    if (!this.#many) return;
+    for (const child of this.group.children) {
+      if (child.isInstancedMesh) child.geometry = yes ? this.#plain : this.#coarse;
+      if (child.isLineSegments || child.name === 'core depths') child.visible = !yes;
+    }
+  }
 
   /** `threats` as `threatsOf` gives them. */
   draw(threats, ground, colours) {
     this.clear();
+    this.#many = threats.length > MANY;
     const round = threats.filter((threat) => threat.center);
     if (round.length) {
       this.#cylinders('cores', round, (threat) => threat.radius, solid(colours.core));
@@ -34,7 +48,7 @@ export class Volumes {
 
   clear() {
     for (const child of [...this.group.children]) {
-      if (child.geometry !== this.#fine && child.geometry !== this.#coarse) child.geometry.dispose();
+      if (!child.isInstancedMesh) child.geometry.dispose();
       child.material.dispose();
       child.dispose?.();
       this.group.remove(child);
@@ -46,31 +60,39 @@ export class Volumes {
       material.dispose();
       return;
     }
-    const mesh = new InstancedMesh(threats.length > MANY ? this.#coarse : this.#fine, material, threats.length);
+    const mesh = new InstancedMesh(this.#many ? this.#coarse : this.#fine, material, threats.length);
     const matrix = new Matrix4();
     threats.forEach((threat, at) => {
       const r = radius(threat);
       matrix.makeScale(r, r, threat.high - threat.low).setPosition(threat.center.x, threat.center.y, threat.low);
       mesh.setMatrixAt(at, matrix);
     });
-    mesh.name = name;
     mesh.frustumCulled = false;
-    mesh.renderOrder = name === 'cores' ? 2 : 3;
-    this.group.add(mesh);
+    if (name === 'cores') {
+      const hiding = new InstancedMesh(mesh.geometry, hidden(), threats.length);
+      hiding.instanceMatrix = mesh.instanceMatrix;
+      hiding.frustumCulled = false;
+      this.#add('core depths', hiding);
+    }
+    this.#add(name, mesh);
   }
 
   #prism(name, threat, ring, material) {
     const geometry = prism(ring, threat.low, threat.high);
-    const mesh = new Mesh(geometry, material);
+    if (name === 'cores') this.#add('core depths', new Mesh(geometry, hidden()));
+    this.#add(name, new Mesh(geometry, material));
+  }
+
+  #add(name, mesh) {
     mesh.name = name;
-    mesh.renderOrder = name === 'cores' ? 2 : 3;
+    mesh.renderOrder = ORDER[name];
     this.group.add(mesh);
   }
 
   /** The outlines on the ground, and those of the cores at their tops. */
   #footprints(threats, ground, colours) {
     const [cores, zones] = [[], []];
-    const many = threats.length > MANY;
+    const many = this.#many;
     const sides = many ? 20 : 64;
     for (const threat of threats) {
       const ring = threat.ring ?? circle(threat.center, threat.radius, sides);
@@ -86,14 +108,13 @@ export class Volumes {
       const geometry = new BufferGeometry();
       geometry.setAttribute('position', new BufferAttribute(new Float32Array(coordinates), 3));
       const lines = new LineSegments(geometry, new LineBasicMaterial({ color, transparent: true, opacity, depthWrite: false }));
-      lines.name = name;
-      lines.renderOrder = 4;
-      this.group.add(lines);
+      this.#add(name, lines);
     }
   }
 }
 
 const solid = (color) => new MeshBasicMaterial({ color, vertexColors: true, transparent: true, opacity: 0.66, depthWrite: false });
+const hidden = () => new MeshBasicMaterial({ colorWrite: false, transparent: true });
 const soft = (color) => new MeshBasicMaterial({ color, transparent: true, opacity: 0.16, depthWrite: false });
 
 /** Walls and a lid over a ring, seen from outside, lighter where the sun is. */

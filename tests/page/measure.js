@@ -48,8 +48,8 @@ function processorTime() {
   return ticks / 100;
 }
 
-/** The service, but for a plan's events: those are 20 incumbents a second, of 22 points each, for ten seconds. */
-async function busy(url) {
+/** The service, but for a plan's events: those are `rate` incumbents a second, of 22 points each. */
+async function busy(url, rate) {
   const { port } = new URL(url);
   const at = (k, n) => ({ x: 500 + (28500 * k) / 21, y: 500 + (28500 * k) / 21 + 900 * Math.sin(k + n / 6), z: 330 + 40 * Math.sin(k * 2 + n / 5) });
   const server = http.createServer((request, answer) => {
@@ -65,38 +65,51 @@ async function busy(url) {
     answer.writeHead(200, { 'content-type': 'text/event-stream' });
     let n = 0;
     const tick = setInterval(() => {
-      const incumbent = { iteration: n, elapsed_ms: n * 50, cost: 1000 - n, feasible: true, waypoints: Array.from({ length: 22 }, (_, k) => at(k, n)) };
-      const point = { iteration: n, evaluations: n, elapsed_ms: n * 50, best_cost: 1000 - n, best_violation: 0, mean_cost: 1200 - n, feasible_fraction: 1 };
+      const incumbent = { iteration: n, elapsed_ms: (n * 1000) / rate, cost: 1000 - n, feasible: true, waypoints: Array.from({ length: 22 }, (_, k) => at(k, n)) };
+      const point = { iteration: n, evaluations: n, elapsed_ms: (n * 1000) / rate, best_cost: 1000 - n, best_violation: 0, mean_cost: 1200 - n, feasible_fraction: 1 };
       answer.write(`id: ${2 * n + 1}\nevent: incumbent\ndata: ${JSON.stringify(incumbent)}\n\nid: ${2 * n + 2}\nevent: convergence\ndata: ${JSON.stringify(point)}\n\n`);
       n += 1;
-      if (n === 200) clearInterval(tick);
-    }, 50);
+    }, 1000 / rate);
     request.on('close', () => clearInterval(tick));
   });
   await new Promise((done) => { server.listen(0, '127.0.0.1', done); });
-  return { url: `http://127.0.0.1:${server.address().port}`, stop: () => server.closeAllConnections() };
+  return { url: `http://127.0.0.1:${server.address().port}`, stop: () => { server.closeAllConnections(); server.close(); } };
 }
 
-async function frames(site, chrome) {
-  const stage = await busy(site.url);
-  const page = await open(chrome, stage.url);
-  await drawn(page);
-  await page.setInputFiles('#file', { name: 'wide.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(wide())) });
-  await drawn(page, 200);
-  await page.waitForTimeout(3000);
-  await page.click('#plan');
-  await page.waitForFunction(() => globalThis.noctule.scene().trail > 3);
-  // Processor time rather than elapsed: it is the same on a machine that others use, too.
+/** Frames within five seconds in which `act` is done again and again, in words. */
+async function drawing(page, act) {
+  // Processor time beside the elapsed: it is the same on a machine that others use, too.
   const from = { count: (await scene(page)).frames.count, cpu: processorTime(), at: performance.now() };
-  await page.waitForTimeout(7000);
+  while (performance.now() - from.at < 5000) await act();
   const { frames: { count, ms } } = await scene(page);
   const drawn_ = count - from.count;
-  const cpu = processorTime() - from.cpu;
-  const seconds = (performance.now() - from.at) / 1000;
-  const size = await page.evaluate(() => `${document.getElementById('canvas').width} x ${document.getElementById('canvas').height}`);
-  console.log(`frames: ${drawn_} in ${seconds.toFixed(1)} s at 20 incumbents/s, ${size} px; ${((1000 * cpu) / drawn_).toFixed(1)} ms of processor time a frame, all processes of the browser together; script ${ms.toFixed(1)} ms`);
-  await page.context().close();
-  stage.stop();
+  const [cpu, elapsed] = [1000 * (processorTime() - from.cpu), performance.now() - from.at];
+  const size = await page.evaluate(() => `${document.getElementById('canvas').width} x ${document.getElementById('canvas').height} px`);
+  return `${drawn_} frames in ${(elapsed / 1000).toFixed(1)} s, ${(elapsed / drawn_).toFixed(1)} ms by the clock and ${(cpu / drawn_).toFixed(1)} ms of processor time each (all processes of the browser), script ${ms.toFixed(1)} ms; ${size}`;
+}
+
+/** At 20 incumbents a second, at more than can be drawn, and while the camera is turned. */
+async function frames(site, chrome) {
+  for (const rate of [20, 100]) {
+    const stage = await busy(site.url, rate);
+    const page = await open(chrome, stage.url);
+    await drawn(page);
+    await page.setInputFiles('#file', { name: 'wide.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(wide())) });
+    await drawn(page, 200);
+    await page.waitForTimeout(3000);
+    await page.click('#plan');
+    await page.waitForFunction(() => globalThis.noctule.scene().trail > 3);
+    console.log(`${rate} incumbents/s: ${await drawing(page, () => page.waitForTimeout(100))}`);
+    const box = await page.locator('#canvas').boundingBox();
+    const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+    let turn = 0;
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    if (rate === 20) console.log(`and the camera turned: ${await drawing(page, () => page.mouse.move(x + 150 * Math.sin(turn += 0.1), y + 40 * Math.cos(turn)))}`);
+    await page.mouse.up();
+    await page.context().close();
+    stage.stop();
+  }
 }
 
 async function leaks(site, chrome) {

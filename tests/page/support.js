@@ -152,6 +152,28 @@ export async function pixels(page, color, clip) {
   }
 }
 
+/** What share of the pixels of two pictures, addresses of data both, differs by more than a shade. */
+export async function difference(page, one, other) {
+  const eye = await page.context().newPage();
+  try {
+    return await eye.evaluate(async (pictures) => {
+      const [a, b] = await Promise.all(pictures.map(async (data) => {
+        const image = new Image();
+        image.src = data;
+        await image.decode();
+        const pen = new OffscreenCanvas(image.width, image.height).getContext('2d');
+        pen.drawImage(image, 0, 0);
+        return pen.getImageData(0, 0, image.width, image.height).data;
+      }));
+      let count = 0;
+      for (let at = 0; at < a.length; at += 4) if ([0, 1, 2].some((k) => Math.abs(a[at + k] - b[at + k]) > 8)) count += 1;
+      return count / (a.length / 4);
+    }, [one, other]);
+  } finally {
+    await eye.close();
+  }
+}
+
 /** A colour of the style sheet. */
 export const color = (page, name) => page.evaluate((variable) => getComputedStyle(document.documentElement).getPropertyValue(`--${variable}`).trim(), name);
 

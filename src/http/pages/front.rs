@@ -66,11 +66,13 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 35] = [
+static FILES: [File; 37] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
+    file!("again.js"),
     file!("api.js"),
+    file!("backdrop.js"),
     file!("chart.js"),
     file!("describe.js"),
     file!("dom.js"),

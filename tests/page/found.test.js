@@ -44,19 +44,34 @@ test('a route within a threat is seen there', async () => {
   await page.done();
 });
 
-test('names in the scene cover no others', async () => {
-  const page = await open(chrome, site.url);
-  await drawn(page, FIRST);
-  await page.waitForTimeout(500);
-  const boxes = await page.locator('#labels span:not([hidden])').evaluateAll((nodes) => nodes.map((node) => {
+/** Fails where one of what a selector finds covers another. */
+async function apart(page, selector, atLeast) {
+  const boxes = await page.locator(selector).evaluateAll((nodes) => nodes.map((node) => {
     const { left, right, top, bottom } = node.getBoundingClientRect();
     return { name: node.textContent, left, right, top, bottom };
   }));
-  assert.ok(boxes.length >= 4);
+  assert.ok(boxes.length >= atLeast);
   for (const [k, a] of boxes.entries()) {
     for (const b of boxes.slice(k + 1)) {
       assert.ok(a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top, `${a.name} and ${b.name}`);
     }
+  }
+}
+
+test('names in the scene cover no others', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  await page.waitForTimeout(500);
+  await apart(page, '#labels span:not([hidden])', 4);
+  await page.done();
+});
+
+test('what is pressed in the scene covers nothing else, however narrow', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  for (const width of [1600, 1280, 1100, 800, 600, 390]) {
+    await page.setViewportSize({ width, height: 760 });
+    await apart(page, '#tools button, #camera > *', 11);
   }
   await page.done();
 });

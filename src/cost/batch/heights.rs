@@ -6,8 +6,8 @@ use pulp::Simd;
 use super::leg::{Leg, Point};
 use super::peaks::{Massif, Panorama};
 use super::pyramid::Pyramid;
-use super::suspects::Suspects;
-use super::{PointRow, Pricer};
+use super::suspects::{Suspect, Suspects};
+use super::{PointRow, Price, Pricer};
 use crate::cost::band::Excess;
 use crate::cost::{Model, Section, Tolerance};
 use crate::geometry::lane::{Lane, Mask};
@@ -52,7 +52,7 @@ struct Zone {
 const GLANCES: [f64; 3] = [0.5, 0.25, 0.75];
 
 /// A breach seen at a point, of more metres than this, is one.
-const SURELY: f64 = 0.05;
+pub(super) const SURELY: f64 = 0.05;
 
 /// The part of each leg in a terminal zone: `[enter, leave]`, 1 to 1 where there is none.
 pub(super) struct Inside<S: Simd> {
@@ -165,7 +165,7 @@ impl Pricer<'_> {
     ) -> Lane<S> {
         let inside = self.inside(leg);
         let none = leg.splat(0.0);
-        let outlook = match &self.heights.surface {
+        let (massif, outlook) = match &self.heights.surface {
             Surface::Flat(elevation) => {
                 let ends = [leg.a.z - *elevation, leg.b.z - *elevation];
                 let clear = self.heights.within(ends, [none; 2], &inside, [0.0, 1.0]);
@@ -183,12 +183,18 @@ impl Pricer<'_> {
             Surface::Grid(_) | Surface::Dem => {
                 let in_zone = inside.met().row();
                 return none.map(|lane, _| {
+                    if !suspects.wants(slot + lane) {
+                        return 0.0;
+                    }
                     self.measured(&leg.segment(lane), in_zone[lane], |leg, section| {
                         self.beyond_cells(leg, section)
                     })
                 });
             }
-            Surface::Peaks(massif) => massif.outlook(leg, panorama, &inside, &self.heights),
+            Surface::Peaks(massif) => {
+                let outlook = massif.outlook(leg, panorama, &inside, &self.heights);
+                (massif, outlook)
+            }
         };
         let open = !(outlook.clear & !inside.unclear);
         if !open.any() {
@@ -197,9 +203,23 @@ impl Pricer<'_> {
         let seen = self.heights.seen(&inside, &outlook.heights);
         let counts = if self.verdict { SURELY } else { f64::INFINITY };
         let sure = open & leg.splat(counts).lt(seen);
-        let open = open & !sure;
+        let mut open = open & !sure;
         if open.any() {
-            self.suspect(leg, open, outlook.widest, &inside, slot, suspects);
+            let clear = massif.closer_outlook(leg, panorama, &outlook, &inside, &self.heights);
+            open = open & !(clear & !inside.unclear);
+        }
+        if open.any() {
+            let (widest, in_zone) = (outlook.widest.row(), inside.met().row());
+            open.each(|lane| {
+                if suspects.wants(slot + lane) {
+                    suspects.push(Suspect {
+                        slot: slot + lane,
+                        leg: leg.segment(lane),
+                        widest: widest[lane],
+                        in_zone: in_zone[lane],
+                    });
+                }
+            });
         }
         sure.keep(seen)
     }
@@ -253,43 +273,11 @@ impl Pricer<'_> {
         self.beyond(leg, window, section)
     }
 
-    /// Leave the legs of the lanes that are `open` to `suspects`.
+    /// Measure all `suspects`, of which slot `k` has lane `k` of `prices` laid end to end.
     #[inline(always)]
-    fn suspect<S: Simd>(
-        &self,
-        leg: &Leg<S>,
-        open: Mask<S>,
-        widest: Lane<S>,
-        inside: &Inside<S>,
-        slot: usize,
-        suspects: &mut Suspects,
-    ) {
-        let widest = widest.row();
-        let in_zone = inside.met().row();
-        open.each(|lane| {
-            let segment = leg.segment(lane);
-            suspects.next_leg();
-            if in_zone[lane] {
-                self.model.sections(&segment, |section| {
-                    suspects.push(slot + lane, &segment, &section, widest[lane]);
-                });
-            } else {
-                let whole = self.model.outside();
-                suspects.push(slot + lane, &segment, &whole, widest[lane]);
-            }
-        });
-    }
-
-    /// Measure all `suspects` and pass the violation of each leg on with its slot.
-    #[inline(always)]
-    pub(super) fn settle<S: Simd>(
-        &self,
-        simd: S,
-        suspects: &Suspects,
-        each: impl FnMut(usize, f64),
-    ) {
+    pub(super) fn settle<S: Simd>(&self, simd: S, suspects: &Suspects, prices: &mut [Price]) {
         if let Surface::Peaks(massif) = &self.heights.surface {
-            self.measure(simd, massif, suspects, each);
+            self.measure(simd, massif, suspects, prices);
         }
     }
 
@@ -307,19 +295,24 @@ impl Pricer<'_> {
         }
     }
 
-    /// How far the end of each leg lies from the middle of the band, Eq. 6.
+    /// The elevation of the ground below the end of each leg, whose `panorama` this is.
     #[inline(always)]
-    pub(super) fn off_middle<S: Simd>(&self, leg: &Leg<S>, panorama: &Panorama<S>) -> Lane<S> {
-        let band = self.model.scenario.altitude;
-        let middle = 0.5 * (band.max + band.min);
-        let ground = match &self.heights.surface {
+    pub(super) fn ground<S: Simd>(&self, leg: &Leg<S>, panorama: &Panorama<S>) -> Lane<S> {
+        match &self.heights.surface {
             Surface::Flat(elevation) => leg.splat(*elevation),
             Surface::Peaks(_) => panorama.ground(),
             Surface::Grid(_) | Surface::Dem => leg.b.z.map(|lane, _| {
                 let below = leg.segment(lane).b.xy();
                 self.model.scenario.terrain.elevation(below)
             }),
-        };
+        }
+    }
+
+    /// How far the end of each leg, above `ground`, lies from the middle of the band, Eq. 6.
+    #[inline(always)]
+    pub(super) fn off_middle<S: Simd>(&self, leg: &Leg<S>, ground: Lane<S>) -> Lane<S> {
+        let band = self.model.scenario.altitude;
+        let middle = 0.5 * (band.max + band.min);
         (leg.b.z - ground - middle).abs()
     }
 

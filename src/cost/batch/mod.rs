@@ -132,11 +132,36 @@ impl<'s> Pricer<'s> {
     /// With fewer than two points.
     #[must_use]
     pub fn routes(&self, points: &[PointRow]) -> Price {
+        self.first_routes(points, LANES)
+    }
+
+    /// As [`Pricer::routes`], of the first `count` of them alone; the others are free.
+    ///
+    /// # Panics
+    /// With fewer than two points.
+    #[must_use]
+    pub fn first_routes(&self, points: &[PointRow], count: usize) -> Price {
+        self.dispatch::<true>(points, count)
+    }
+
+    /// As [`Pricer::routes`], did every leg keep the heights that are asked of it: above hills, where
+    /// those take longest to measure, this tells of most routes that they are not good enough. No
+    /// violation is more than that by `routes`, and the costs are the same bits.
+    ///
+    /// # Panics
+    /// With fewer than two points.
+    #[must_use]
+    pub fn routes_at_best(&self, points: &[PointRow]) -> Price {
+        self.dispatch::<false>(points, LANES)
+    }
+
+    fn dispatch<const HEIGHTS: bool>(&self, points: &[PointRow], count: usize) -> Price {
         assert!(points.len() >= 2, "a route has a start and a target");
         let mut price = Price::ZERO;
-        self.arch.dispatch(Routes {
+        self.arch.dispatch(Routes::<HEIGHTS> {
             pricer: self,
             points,
+            count,
             price: &mut price,
         });
         price
@@ -149,11 +174,54 @@ impl<'s> Pricer<'s> {
     /// # Panics
     /// When the slices differ in length.
     pub fn legs(&self, a: &[PointRow], b: &[PointRow], prices: &mut [Price]) {
+        self.dispatch_legs::<true, true>(a, b, usize::MAX, prices);
+    }
+
+    /// As [`Pricer::legs`], of the first `count` of them alone; the others are free.
+    ///
+    /// # Panics
+    /// When the slices differ in length.
+    pub fn first_legs(&self, a: &[PointRow], b: &[PointRow], count: usize, prices: &mut [Price]) {
+        self.dispatch_legs::<true, true>(a, b, count, prices);
+    }
+
+    /// As [`Pricer::legs`], did every leg keep the heights that are asked of it, see
+    /// [`Pricer::routes_at_best`].
+    ///
+    /// # Panics
+    /// When the slices differ in length.
+    pub fn legs_at_best(&self, a: &[PointRow], b: &[PointRow], prices: &mut [Price]) {
+        self.dispatch_legs::<true, false>(a, b, usize::MAX, prices);
+    }
+
+    /// As [`Pricer::first_legs`], but for everything except the heights that are asked of a leg: what
+    /// [`Pricer::legs_at_best`] leaves out.
+    ///
+    /// # Panics
+    /// When the slices differ in length.
+    pub fn heights_of_legs(
+        &self,
+        a: &[PointRow],
+        b: &[PointRow],
+        count: usize,
+        prices: &mut [Price],
+    ) {
+        self.dispatch_legs::<false, true>(a, b, count, prices);
+    }
+
+    fn dispatch_legs<const FLIGHT: bool, const HEIGHTS: bool>(
+        &self,
+        a: &[PointRow],
+        b: &[PointRow],
+        count: usize,
+        prices: &mut [Price],
+    ) {
         assert!(a.len() == prices.len() && b.len() == prices.len());
-        self.arch.dispatch(Legs {
+        self.arch.dispatch(Legs::<FLIGHT, HEIGHTS> {
             pricer: self,
             a,
             b,
+            count,
             prices,
         });
     }
@@ -187,62 +255,69 @@ impl WithSimd for Raise<'_, '_> {
     }
 }
 
-struct Routes<'a, 's> {
+struct Routes<'a, 's, const HEIGHTS: bool> {
     pricer: &'a Pricer<'s>,
     points: &'a [PointRow],
+    count: usize,
     price: &'a mut Price,
 }
 
-impl WithSimd for Routes<'_, '_> {
+impl<const HEIGHTS: bool> WithSimd for Routes<'_, '_, HEIGHTS> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let mut suspects = Suspects::default();
-        for part in 0..parts::<S>() {
-            let (violation, cost) = self.pricer.route(simd, part, self.points, &mut suspects);
+        let mut suspects = Suspects::of(self.count);
+        for part in 0..self.count.div_ceil(S::F64_LANES) {
+            let (violation, cost) =
+                self.pricer
+                    .route::<S, HEIGHTS>(simd, part, self.points, &mut suspects);
             violation.store(&mut self.price.violation, part);
             cost.store(&mut self.price.cost, part);
         }
-        self.pricer.settle(simd, &suspects, |slot, violation| {
-            self.price.violation[slot] += violation;
-        });
+        let prices = std::slice::from_mut(self.price);
+        self.pricer.settle(simd, &suspects, prices);
     }
 }
 
 /// Rows of legs whose suspects wait for each other.
 const AT_ONCE: usize = 64;
 
-struct Legs<'a, 's> {
+struct Legs<'a, 's, const FLIGHT: bool, const HEIGHTS: bool> {
     pricer: &'a Pricer<'s>,
     a: &'a [PointRow],
     b: &'a [PointRow],
+    count: usize,
     prices: &'a mut [Price],
 }
 
-impl WithSimd for Legs<'_, '_> {
+impl<const FLIGHT: bool, const HEIGHTS: bool> WithSimd for Legs<'_, '_, FLIGHT, HEIGHTS> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let mut suspects = Suspects::default();
+        let mut suspects = Suspects::of(0);
         let chunks = self.a.chunks(AT_ONCE).zip(self.b.chunks(AT_ONCE));
+        let mut left = self.count;
         for ((a, b), prices) in chunks.zip(self.prices.chunks_mut(AT_ONCE)) {
-            suspects.clear();
+            suspects.clear(left);
+            left = left.saturating_sub(AT_ONCE * LANES);
             for (row, ends) in a.iter().zip(b).enumerate() {
                 for part in 0..parts::<S>() {
                     let slot = row * LANES + part * S::F64_LANES;
                     let ends = [ends.0, ends.1];
-                    let (violation, cost) =
-                        self.pricer
-                            .single_leg(simd, part, ends, slot, &mut suspects);
+                    let (violation, cost) = self.pricer.single_leg::<S, FLIGHT, HEIGHTS>(
+                        simd,
+                        part,
+                        ends,
+                        slot,
+                        &mut suspects,
+                    );
                     violation.store(&mut prices[row].violation, part);
                     cost.store(&mut prices[row].cost, part);
                 }
             }
-            self.pricer.settle(simd, &suspects, |slot, violation| {
-                prices[slot / LANES].violation[slot % LANES] += violation;
-            });
+            self.pricer.settle(simd, &suspects, prices);
         }
     }
 }

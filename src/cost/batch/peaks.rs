@@ -20,14 +20,12 @@ const FAR: f64 = 12.0;
 /// `e^-FAR`, rounded up.
 const FAR_SHARE: f64 = 6.2e-6;
 
-/// Greatest squared length in spreads of a leg that may be proven clear.
+/// Greatest squared length in spreads of a leg that may be proven clear by its ends and its middle; by
+/// twice as many points, that of one twice as long.
 const WIDEST: f64 = 4.0;
 
-/// `e^(WIDEST / 16)`, rounded up: how much higher a summit may be than the nearest of the three points.
+/// `e^(WIDEST / 16)`, rounded up: how much higher a summit may be than the nearest of those points.
 const BETWEEN: f64 = 1.285;
-
-/// A parabola over half a leg sags by so much of its second derivative.
-const SAG: f64 = 1.0 / 32.0;
 
 /// Mountains, made ready for lanes.
 #[derive(Debug, Clone)]
@@ -197,26 +195,116 @@ impl Massif {
             leg.a.z + leg.dz * 0.5 - ground,
             leg.b.z - panorama.ground[1],
         ];
-        let stray = fourth * (BETWEEN / 32.0);
-        let mut clear = widest.le(leg.splat(WIDEST));
-        let mut half = 0;
-        while half < 2 {
-            let ends = [heights_at[half], heights_at[half + 1]];
-            let most = bends[half].max(bends[half + 1]) + stray;
-            let least = bends[half].min(bends[half + 1]) - stray;
-            let slack = [
-                most.max(zero) * SAG + 2.0 * self.far,
-                (-least).max(zero) * SAG + 2.0 * self.far,
-            ];
-            let part = [half as f64 * 0.5, (half + 1) as f64 * 0.5];
-            clear = clear & heights.within(ends, slack, inside, part);
-            half += 1;
-        }
+        let clear = widest.le(leg.splat(WIDEST))
+            & self.keeps(heights, inside, &heights_at, &bends, fourth * BETWEEN);
         Outlook {
             clear,
             heights: heights_at,
             widest,
         }
+    }
+}
+
+impl Massif {
+    /// As the `outlook`, at twice as many points: where a leg, a part of which is near a peak for which it is
+    /// too long, or which comes near a limit, is proven to keep its heights all the same.
+    #[inline(always)]
+    pub(super) fn closer_outlook<S: Simd>(
+        &self,
+        leg: &Leg<S>,
+        panorama: &Panorama<S>,
+        outlook: &Outlook<S>,
+        inside: &Inside<S>,
+        heights: &Heights,
+    ) -> Mask<S> {
+        let zero = leg.splat(0.0);
+        let mut ground = [leg.splat(self.base); 2];
+        let (mut bends, mut fourth) = ([zero; 5], zero);
+        let mut peak_idx = 0;
+        while peak_idx < self.peaks.len() {
+            let peak = &self.peaks[peak_idx];
+            let (a, b) = (&panorama.from[peak_idx], &panorama.to[peak_idx]);
+            peak_idx += 1;
+            let near = leg.near(peak.center, peak.reach);
+            if !near.any() {
+                continue;
+            }
+            let (u, v) = (near.keep(b.p - a.p), near.keep(b.q - a.q));
+            let square = u * u + v * v;
+            // Half way between two points the exponent is the mean of theirs less `s / 4` times the square
+            // of the way between them, so that the peak is the root of their product times a power.
+            let fold = (square * (1.0 / 16.0)).exp();
+            let twofold = fold * fold;
+            let sign = peak.height.signum();
+            let (first, last) = (near.keep(a.lift * sign), near.keep(b.lift * sign));
+            let middle = (first * last).sqrt() * (twofold * twofold);
+            let quarters = [
+                (first * middle).sqrt() * fold,
+                (middle * last).sqrt() * fold,
+            ];
+            let lifts = [first, quarters[0], middle, quarters[1], last];
+            let twice = square + square;
+            let mut steepness = (a.p * u + a.q * v) * 2.0;
+            let mut highest = zero;
+            let mut point = 0;
+            while point < 5 {
+                let bend = lifts[point] * (twice - steepness * steepness);
+                bends[point] = bends[point] + bend * sign;
+                highest = highest.max(lifts[point]);
+                steepness = steepness + twice * 0.25;
+                point += 1;
+            }
+            ground[0] = ground[0] + quarters[0] * sign;
+            ground[1] = ground[1] + quarters[1] * sign;
+            // As in `stretch.rs`; the exponent is the least at the highest point.
+            let mean = (a.exponent + b.exponent) * 0.5 - square * 0.25;
+            let least = a.exponent.min(b.exponent).min(mean);
+            fourth = fourth + square * square * highest * (least * least * 16.0 + 12.0);
+        }
+        let [from, middle, to] = [outlook.heights[0], outlook.heights[1], outlook.heights[2]];
+        let heights_at = [
+            from,
+            leg.a.z + leg.dz * 0.25 - ground[0],
+            middle,
+            leg.a.z + leg.dz * 0.75 - ground[1],
+            to,
+        ];
+        outlook.widest.le(leg.splat(4.0 * WIDEST))
+            & self.keeps(heights, inside, &heights_at, &bends, fourth * BETWEEN)
+    }
+
+    /// Whether legs keep within `heights`, being at those given, with those second derivatives, at points of
+    /// equal distance, and a fourth derivative of at most so much.
+    #[inline(always)]
+    fn keeps<S: Simd, const N: usize>(
+        &self,
+        heights: &Heights,
+        inside: &Inside<S>,
+        heights_at: &[Lane<S>; N],
+        bends: &[Lane<S>; N],
+        fourth: Lane<S>,
+    ) -> Mask<S> {
+        let zero = fourth.with(0.0);
+        let step = 1.0 / (N - 1) as f64;
+        // A parabola over a step sags by so much of its second derivative, which strays from those at both
+        // ends by as much of the fourth.
+        let sag = step * step / 8.0;
+        let stray = fourth * sag;
+        let mut clear = zero.le(zero);
+        let mut point = 0;
+        while point + 1 < N {
+            let ends = [heights_at[point], heights_at[point + 1]];
+            let most = bends[point].max(bends[point + 1]) + stray;
+            let least = bends[point].min(bends[point + 1]) - stray;
+            let slack = [
+                most.max(zero) * sag + 2.0 * self.far,
+                (-least).max(zero) * sag + 2.0 * self.far,
+            ];
+            let part = [point as f64 * step, (point + 1) as f64 * step];
+            clear = clear & heights.within(ends, slack, inside, part);
+            point += 1;
+        }
+        clear
     }
 }
 

@@ -1,4 +1,4 @@
-//! Legs that are known to keep the heights asked of them.
+//! By how much legs are known to leave the heights asked of them; most keep them.
 //!
 //! Most legs of a candidate are those of the route that it comes from, to the last bit, and what was measured
 //! once need not be measured again. A leg that is forgotten is measured anew, so that nothing depends on what
@@ -21,7 +21,7 @@ const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Each leg has one place; of those that share it the last is known.
 pub(super) struct Kept {
-    places: Vec<Ends>,
+    places: Vec<(Ends, f64)>,
 }
 
 impl Kept {
@@ -29,21 +29,22 @@ impl Kept {
     pub(super) fn of(legs: usize) -> Self {
         let places = (2 * legs).next_power_of_two().clamp(FEWEST, MOST);
         Self {
-            places: vec![NONE; places],
+            places: vec![(NONE, 0.0); places],
         }
     }
 
-    /// Whether the leg from `a` to `b` is known to keep its heights.
-    pub(super) fn knows(&self, a: Point3, b: Point3) -> bool {
+    /// The violation of the leg from `a` to `b`, if it is known.
+    pub(super) fn violation(&self, a: Point3, b: Point3) -> Option<f64> {
         let ends = ends(a, b);
-        self.places[self.place(&ends)] == ends
+        let (known, violation) = self.places[self.place(&ends)];
+        (known == ends).then_some(violation)
     }
 
-    /// The leg from `a` to `b` keeps its heights.
-    pub(super) fn note(&mut self, a: Point3, b: Point3) {
+    /// Remember the violation of the leg from `a` to `b`.
+    pub(super) fn note(&mut self, a: Point3, b: Point3, violation: f64) {
         let ends = ends(a, b);
         let place = self.place(&ends);
-        self.places[place] = ends;
+        self.places[place] = (ends, violation);
     }
 
     #[expect(
@@ -72,13 +73,14 @@ mod tests {
         let point = |x: f64| Point3::new(x, 2.0 * x, 3.0);
         for idx in 0..20 {
             let (a, b) = (point(f64::from(idx)), point(f64::from(idx) + 0.5));
-            assert!(!kept.knows(a, b));
-            kept.note(a, b);
-            assert!(kept.knows(a, b) && !kept.knows(b, a));
+            assert_eq!(kept.violation(a, b), None);
+            kept.note(a, b, f64::from(idx));
+            assert_eq!(kept.violation(a, b), Some(f64::from(idx)));
+            assert_eq!(kept.violation(b, a), None);
             for axis in 0..3 {
                 let mut other = b;
                 other[axis] = other[axis].next_up();
-                assert!(!kept.knows(a, other));
+                assert_eq!(kept.violation(a, other), None);
             }
         }
     }

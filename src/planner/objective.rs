@@ -11,7 +11,6 @@ use crate::cost::Model;
 use crate::cost::batch::{LANES, Pricer};
 use crate::geometry::Point3;
 use crate::optimizer::{Bounds, Fitness, Objective, Random};
-use crate::terrain::Terrain;
 
 /// The routes of one scenario.
 pub(super) struct Routes<'s> {
@@ -23,8 +22,6 @@ pub(super) struct Routes<'s> {
     /// Of each thread.
     kept: Vec<Kept>,
     route: Vec<Point3>,
-    /// Whether to ask for heights last.
-    hilly: bool,
     pub(super) watch: Watch<'s>,
 }
 
@@ -57,28 +54,21 @@ impl<'s> Routes<'s> {
         let tolerance = model.tolerance.scaled(PRICED_FROM);
         let settings = &model.scenario.planner;
         let quadrature = settings.quadrature;
-        let hilly = !matches!(model.scenario.terrain, Terrain::Flat(_));
-        // Above level ground nobody asks.
-        let legs = if hilly {
-            settings.population * (settings.waypoints + 1)
-        } else {
-            0
-        };
+        let pricers = Pricers::new(Pricer::new(model, quadrature, tolerance));
+        let legs = settings.population * (settings.waypoints + 1);
         let threads = settings.threads.max(1);
         Self {
             coding,
             guide,
-            pricers: Pricers::new(Pricer::new(model, quadrature, tolerance)),
+            pricers,
             model: model.clone(),
             kept: (0..threads).map(|_| Kept::of(legs)).collect(),
             route: Vec::new(),
-            hilly,
             watch: Watch::new(model.scenario, stop),
         }
     }
 
     fn price(&mut self, positions: &[f64], rivals: Option<&[Fitness]>, fitness: &mut [Fitness]) {
-        let rivals = rivals.filter(|_| self.hilly);
         let threads = self.model.scenario.planner.threads;
         let stride = self.watch.stride;
         if threads > 1 && fitness.len() >= WORTH_THREADS && stride >= fitness.len() as u64 {

@@ -4,7 +4,7 @@
 use pulp::Simd;
 
 use super::leg::{Leg, Point};
-use super::peaks::{Massif, Panorama};
+use super::peaks::Massif;
 use super::pyramid::Pyramid;
 use super::suspects::{Suspect, Suspects};
 use super::{PointRow, Price, Pricer};
@@ -100,6 +100,10 @@ impl Heights {
 }
 
 impl Heights {
+    pub(super) fn is_hilly(&self) -> bool {
+        !matches!(self.surface, Surface::Flat(_))
+    }
+
     /// Where a leg keeps its heights over its part `[t0, t1]`, being `from` and `to` at the ends of
     /// it and the curve between them, with a second derivative of so much that it sags at most by
     /// `dip` below and rises by `rise` above the line that joins these.
@@ -135,37 +139,31 @@ impl Heights {
         below_ceiling & low.with(self.ground).le(low) & low.with(self.floor).le(outside)
     }
 
-    /// How far a leg is seen to leave the band at its end and in its middle, where no zone is.
+    /// How far a leg is seen to leave the band, being at those `heights`, where no zone is.
     #[inline(always)]
-    fn seen<S: Simd>(&self, inside: &Inside<S>, heights: &[Lane<S>; 3]) -> Lane<S> {
-        let off = |height: Lane<S>| (height.with(self.floor) - height).max(height - self.ceiling);
-        let most = off(heights[1]).max(off(heights[2]));
-        (inside.leave.le(inside.enter) & !inside.unclear).keep(most)
+    fn seen<S: Simd>(&self, inside: &Inside<S>, heights: &[Lane<S>]) -> Lane<S> {
+        let (mut least, mut most) = (heights[0], heights[0]);
+        for &height in &heights[1..] {
+            (least, most) = (least.min(height), most.max(height));
+        }
+        let off = (least.with(self.floor) - least).max(most - self.ceiling);
+        (inside.leave.le(inside.enter) & !inside.unclear).keep(off)
     }
 }
 
 impl Pricer<'_> {
-    /// Look round from `point`, an end of a leg.
-    #[inline(always)]
-    pub(super) fn look<S: Simd>(&self, point: Point<S>, panorama: &mut Panorama<S>) {
-        if let Surface::Peaks(massif) = &self.heights.surface {
-            massif.look(point, panorama);
-        }
-    }
-
-    /// Beyond the band or below the ground; `panorama` is that of the leg's ends. What takes longer
-    /// to find is left to `suspects`, for the slots from `slot` on.
+    /// Beyond the band or below the ground. What takes longer to find is left to `suspects`, for the slots
+    /// from `slot` on.
     #[inline(always)]
     pub(super) fn heights<S: Simd>(
         &self,
         leg: &Leg<S>,
-        panorama: &Panorama<S>,
         slot: usize,
         suspects: &mut Suspects,
     ) -> Lane<S> {
         let inside = self.inside(leg);
         let none = leg.splat(0.0);
-        let (massif, outlook) = match &self.heights.surface {
+        let outlook = match &self.heights.surface {
             Surface::Flat(elevation) => {
                 let ends = [leg.a.z - *elevation, leg.b.z - *elevation];
                 let clear = self.heights.within(ends, [none; 2], &inside, [0.0, 1.0]);
@@ -191,23 +189,20 @@ impl Pricer<'_> {
                     })
                 });
             }
-            Surface::Peaks(massif) => {
-                let outlook = massif.outlook(leg, panorama, &inside, &self.heights);
-                (massif, outlook)
-            }
+            Surface::Peaks(massif) => massif.outlook(leg, &inside, &self.heights),
         };
         let open = !(outlook.clear & !inside.unclear);
         if !open.any() {
             return none;
         }
         let seen = self.heights.seen(&inside, &outlook.heights);
-        let counts = if self.verdict { SURELY } else { f64::INFINITY };
+        let counts = if self.verdict {
+            SURELY + outlook.allowed
+        } else {
+            f64::INFINITY
+        };
         let sure = open & leg.splat(counts).lt(seen);
-        let mut open = open & !sure;
-        if open.any() {
-            let clear = massif.closer_outlook(leg, panorama, &outlook, &inside, &self.heights);
-            open = open & !(clear & !inside.unclear);
-        }
+        let open = open & !sure;
         if open.any() {
             let (widest, in_zone) = (outlook.widest.row(), inside.met().row());
             open.each(|lane| {
@@ -221,7 +216,7 @@ impl Pricer<'_> {
                 }
             });
         }
-        sure.keep(seen)
+        sure.keep(seen - outlook.allowed)
     }
 
     /// The violation of a leg that reaches `beyond` the limits of its sections.
@@ -290,19 +285,6 @@ impl Pricer<'_> {
             Surface::Peaks(massif) => massif.elevation(point),
             Surface::Grid(_) | Surface::Dem => point.x.map(|lane, _| {
                 let below = row.get(part * S::F64_LANES + lane).xy();
-                self.model.scenario.terrain.elevation(below)
-            }),
-        }
-    }
-
-    /// The elevation of the ground below the end of each leg, whose `panorama` this is.
-    #[inline(always)]
-    pub(super) fn ground<S: Simd>(&self, leg: &Leg<S>, panorama: &Panorama<S>) -> Lane<S> {
-        match &self.heights.surface {
-            Surface::Flat(elevation) => leg.splat(*elevation),
-            Surface::Peaks(_) => panorama.ground(),
-            Surface::Grid(_) | Surface::Dem => leg.b.z.map(|lane, _| {
-                let below = leg.segment(lane).b.xy();
                 self.model.scenario.terrain.elevation(below)
             }),
         }

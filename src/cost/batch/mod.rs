@@ -26,7 +26,6 @@ use crate::geometry::Point3;
 use crate::geometry::lane::parts;
 use crate::scenario::Quadrature;
 use heights::Heights;
-use leg::Point;
 use route::Limits;
 use suspects::Suspects;
 use threats::Threats;
@@ -141,26 +140,43 @@ impl<'s> Pricer<'s> {
     /// With fewer than two points.
     #[must_use]
     pub fn first_routes(&self, points: &[PointRow], count: usize) -> Price {
-        self.dispatch::<true>(points, count)
+        self.dispatch::<true>(points, &[], count)
     }
 
-    /// As [`Pricer::routes`], did every leg keep the heights that are asked of it: above hills, where
+    /// As [`Pricer::first_routes`], did every leg keep the heights that are asked of it: above hills, where
     /// those take longest to measure, this tells of most routes that they are not good enough. No
-    /// violation is more than that by `routes`, and the costs are the same bits.
+    /// violation is more than that by `routes`, and the costs are the same bits. `ground` is the elevation
+    /// below each free waypoint.
     ///
     /// # Panics
-    /// With fewer than two points.
+    /// With fewer than two points, or where there is not as much ground.
     #[must_use]
-    pub fn routes_at_best(&self, points: &[PointRow]) -> Price {
-        self.dispatch::<false>(points, LANES)
+    pub fn routes_at_best(&self, points: &[PointRow], ground: &[Row], count: usize) -> Price {
+        assert!(
+            ground.len() + 2 == points.len(),
+            "every free waypoint is above ground"
+        );
+        self.dispatch::<false>(points, ground, count)
     }
 
-    fn dispatch<const HEIGHTS: bool>(&self, points: &[PointRow], count: usize) -> Price {
+    /// Whether there are hills, above which heights take long to measure.
+    #[must_use]
+    pub fn is_hilly(&self) -> bool {
+        self.heights.is_hilly()
+    }
+
+    fn dispatch<const HEIGHTS: bool>(
+        &self,
+        points: &[PointRow],
+        ground: &[Row],
+        count: usize,
+    ) -> Price {
         assert!(points.len() >= 2, "a route has a start and a target");
         let mut price = Price::ZERO;
         self.arch.dispatch(Routes::<HEIGHTS> {
             pricer: self,
             points,
+            ground,
             count,
             price: &mut price,
         });
@@ -226,30 +242,44 @@ impl<'s> Pricer<'s> {
         });
     }
 
-    /// Raise points whose heights are above ground by the ground's elevation.
-    pub fn raise(&self, points: &mut [PointRow]) {
-        self.arch.dispatch(Raise {
+    /// Raise points whose heights are above ground by the ground's elevation, which is written to `ground`, a
+    /// row for each.
+    pub fn raise(&self, points: &mut [PointRow], ground: &mut Vec<Row>) {
+        self.ground(points, ground);
+        for (point, ground) in points.iter_mut().zip(ground) {
+            for (z, ground) in point.z.iter_mut().zip(ground) {
+                *z += *ground;
+            }
+        }
+    }
+
+    /// Write the elevation of the ground below `points` to `ground`, a row for each.
+    pub fn ground(&self, points: &[PointRow], ground: &mut Vec<Row>) {
+        ground.clear();
+        ground.resize(points.len(), [0.0; LANES]);
+        self.arch.dispatch(Ground {
             pricer: self,
             points,
+            ground,
         });
     }
 }
 
-struct Raise<'a, 's> {
+struct Ground<'a, 's> {
     pricer: &'a Pricer<'s>,
-    points: &'a mut [PointRow],
+    points: &'a [PointRow],
+    ground: &'a mut [Row],
 }
 
-impl WithSimd for Raise<'_, '_> {
+impl WithSimd for Ground<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        for point in self.points {
+        for (point, ground) in self.points.iter().zip(self.ground) {
             for part in 0..parts::<S>() {
-                let own = Point::load(simd, point, part);
-                let ground = self.pricer.elevation(simd, part, point);
-                (own.z + ground).store(&mut point.z, part);
+                let elevation = self.pricer.elevation(simd, part, point);
+                elevation.store(ground, part);
             }
         }
     }
@@ -258,6 +288,8 @@ impl WithSimd for Raise<'_, '_> {
 struct Routes<'a, 's, const HEIGHTS: bool> {
     pricer: &'a Pricer<'s>,
     points: &'a [PointRow],
+    /// Of the free waypoints; known where heights are left out.
+    ground: &'a [Row],
     count: usize,
     price: &'a mut Price,
 }
@@ -269,9 +301,13 @@ impl<const HEIGHTS: bool> WithSimd for Routes<'_, '_, HEIGHTS> {
     fn with_simd<S: Simd>(self, simd: S) {
         let mut suspects = Suspects::of(self.count);
         for part in 0..self.count.div_ceil(S::F64_LANES) {
-            let (violation, cost) =
-                self.pricer
-                    .route::<S, HEIGHTS>(simd, part, self.points, &mut suspects);
+            let (violation, cost) = self.pricer.route::<S, HEIGHTS>(
+                simd,
+                part,
+                self.points,
+                self.ground,
+                &mut suspects,
+            );
             violation.store(&mut self.price.violation, part);
             cost.store(&mut self.price.cost, part);
         }
@@ -305,6 +341,9 @@ impl<const FLIGHT: bool, const HEIGHTS: bool> WithSimd for Legs<'_, '_, FLIGHT, 
             for (row, ends) in a.iter().zip(b).enumerate() {
                 for part in 0..parts::<S>() {
                     let slot = row * LANES + part * S::F64_LANES;
+                    if !suspects.wants(slot) {
+                        break;
+                    }
                     let ends = [ends.0, ends.1];
                     let (violation, cost) = self.pricer.single_leg::<S, FLIGHT, HEIGHTS>(
                         simd,

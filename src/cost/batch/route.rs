@@ -3,10 +3,9 @@
 use pulp::Simd;
 
 use super::leg::{Leg, Point};
-use super::peaks::Panorama;
 use super::suspects::Suspects;
 use super::threats::Candidates;
-use super::{PointRow, Pricer};
+use super::{PointRow, Pricer, Row};
 use crate::cost::fuel;
 use crate::cost::threat::SHARE;
 use crate::geometry::lane::{Lane, Mask};
@@ -55,13 +54,14 @@ struct Heading<S: Simd> {
 
 impl Pricer<'_> {
     /// Violation and cost of one part of the routes, but for the violation of `suspects`; without
-    /// `HEIGHTS` no leg is asked for those that it keeps.
+    /// `HEIGHTS` no leg is asked for those that it keeps, and the `ground` below free waypoints is known.
     #[inline(always)]
     pub(super) fn route<S: Simd, const HEIGHTS: bool>(
         &self,
         simd: S,
         part: usize,
         points: &[PointRow],
+        ground: &[Row],
         suspects: &mut Suspects,
     ) -> (Lane<S>, Lane<S>) {
         let zero = Lane::splat(simd, 0.0);
@@ -72,18 +72,13 @@ impl Pricer<'_> {
             level: zero,
         };
         let mut candidates = Candidates::default();
-        let mut panorama = Panorama::new(simd);
-        if HEIGHTS {
-            self.look(Point::load(simd, &points[0], part), &mut panorama);
-        }
         for (leg_idx, rows) in points.windows(2).enumerate() {
             let leg = Leg::new(simd, part, [&rows[0], &rows[1]]);
             length = length + leg.length;
             self.threats(&leg, &mut candidates, &mut exposure, &mut violation);
             if HEIGHTS {
-                self.look(leg.b, &mut panorama);
                 let slot = part * S::F64_LANES;
-                violation = violation + self.heights(&leg, &panorama, slot, suspects);
+                violation = violation + self.heights(&leg, slot, suspects);
             }
             let (near, sharp) = self.turn(&leg, &mut heading);
             let mut suspect = near | self.may_break_limits(&leg);
@@ -91,9 +86,9 @@ impl Pricer<'_> {
             if free {
                 suspect = suspect | self.outside(leg.b);
                 let ground = if HEIGHTS {
-                    self.ground(&leg, &panorama)
-                } else {
                     self.elevation(simd, part, &rows[1])
+                } else {
+                    Lane::load(simd, &ground[leg_idx], part)
                 };
                 off_middle = off_middle + self.off_middle(&leg, ground);
             }
@@ -127,10 +122,7 @@ impl Pricer<'_> {
             self.threats(&leg, &mut candidates, &mut exposure, &mut violation);
         }
         if HEIGHTS {
-            let mut panorama = Panorama::new(simd);
-            self.look(leg.a, &mut panorama);
-            self.look(leg.b, &mut panorama);
-            violation = violation + self.heights(&leg, &panorama, slot, suspects);
+            violation = violation + self.heights(&leg, slot, suspects);
         }
         if !FLIGHT {
             return (violation, exposure);

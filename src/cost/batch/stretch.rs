@@ -267,20 +267,6 @@ fn times<S: Simd, const N: usize>(mut lanes: [Lane<S>; N], factor: f64) -> [Lane
     lanes
 }
 
-/// All `lanes` joined by `join`, from the first on.
-#[inline(always)]
-fn fold<S: Simd, const N: usize>(
-    lanes: &[Lane<S>; N],
-    join: impl Fn(Lane<S>, Lane<S>) -> Lane<S>,
-) -> Lane<S> {
-    let (mut joined, mut idx) = (lanes[0], 1);
-    while idx < N {
-        joined = join(joined, lanes[idx]);
-        idx += 1;
-    }
-    joined
-}
-
 impl<S: Simd> Samples<S> {
     /// The least height, of those turned round by `sign`, or something above `limit` less `overlooked` if it
     /// is, or something below that less `surely`; and where it is not known.
@@ -294,7 +280,11 @@ impl<S: Simd> Samples<S> {
     ) -> (Lane<S>, Mask<S>) {
         let bar = limit - overlooked;
         let (heights, bends) = (times(self.heights, sign), times(self.bends, sign));
-        let (least, most) = (fold(&heights, Lane::min), fold(&bends, Lane::max));
+        let (mut least, mut most, mut sample) = (heights[0], bends[0], 1);
+        while sample < SAMPLES {
+            (least, most) = (least.min(heights[sample]), most.max(bends[sample]));
+            sample += 1;
+        }
         // Below its lower end a parabola sags by no more than an eighth of its bend.
         let sag = (most + self.stray).max(bar.with(0.0)) * (STEP * STEP / 8.0);
         let sure = least.lt(limit - surely);

@@ -7,11 +7,13 @@
 use super::super::price::PRICED_FROM;
 use super::clear::ClearWays;
 use super::turns::Turns;
-use super::ways::{CHOICES, Leg, Waypoint, Ways, count};
+use super::ways::{CHOICES, Each, Leg, Waypoint, Ways, count};
 use crate::cost::batch::{LANES, PointRow, Price, Pricer};
 use crate::cost::{Model, Tolerance};
 use crate::geometry::{LEVEL, Point2, Point3, Vector2};
-use crate::terrain::Terrain;
+
+/// To join the legs again costs more than to measure a few that may be asked for next.
+const AT_ONCE: usize = 3 * LANES;
 
 /// The new places, as shares of the step along the route, across it, and up.
 const PATTERNS: [[[f64; 3]; LANES]; 2] = [pattern(0.7), pattern(-0.7)];
@@ -62,10 +64,10 @@ impl<'m, 's> Lattice<'m, 's> {
         Self {
             model,
             verdicts: pricer.clone().verdicts(),
+            hilly: pricer.is_hilly(),
             pricer,
             tolerance,
             steepest: libm::tan(model.scenario.vehicle.max_climb_deg.to_radians()),
-            hilly: !matches!(model.scenario.terrain, Terrain::Flat(_)),
             legs_priced: 0,
             waypoints: Vec::new(),
             legs: Vec::new(),
@@ -134,9 +136,13 @@ impl<'m, 's> Lattice<'m, 's> {
             cost: [0.0; CHOICES],
         };
         if idx > 0 && idx + 1 < route.len() {
-            waypoint.new = self.places(route, idx, step, turn);
+            let (new, ground) = self.places(route, idx, step, turn);
+            waypoint.new = new;
             for place in 0..CHOICES {
-                let (violation, cost) = self.model.waypoint(waypoint.place(place), self.tolerance);
+                let point = waypoint.place(place);
+                let (violation, cost) =
+                    self.model
+                        .waypoint_above(point, ground[place], self.tolerance);
                 (waypoint.violation[place], waypoint.cost[place]) = (violation, cost);
             }
         }
@@ -203,7 +209,7 @@ impl<'m, 's> Lattice<'m, 's> {
         }
     }
 
-    /// Measure the heights of the legs of the best way, and of others beside those while there are lanes left;
+    /// Measure the heights of the legs of the best way, and of a few others beside those;
     /// whether any breaks a limit.
     fn measure(&mut self) -> bool {
         self.from.clear();
@@ -215,10 +221,9 @@ impl<'m, 's> Lattice<'m, 's> {
         for idx in 0..legs.len() {
             let (leg_idx, ..) = legs[idx];
             for b in 0..count(leg_idx + 1, self.measured.len()) {
-                if legs.len() % LANES == 0 {
-                    break;
+                if legs.len() < AT_ONCE {
+                    self.choose(leg_idx, b, &mut legs);
                 }
-                self.choose(leg_idx, b, &mut legs);
             }
         }
         self.prices.clear();
@@ -258,8 +263,8 @@ impl<'m, 's> Lattice<'m, 's> {
         }
     }
 
-    /// New places of waypoint `idx`. Frames follow the legs before, after and between by turns.
-    fn places(&self, route: &[Point3], idx: usize, step: f64, turn: usize) -> PointRow {
+    /// New places of waypoint `idx`, and the elevation of the ground at all. Frames follow the legs before, after and between by turns.
+    fn places(&self, route: &[Point3], idx: usize, step: f64, turn: usize) -> (PointRow, Each) {
         let here = route[idx];
         let (before, after) = (route[idx - 1].xy(), route[idx + 1].xy());
         let way = match turn % 3 {
@@ -277,7 +282,8 @@ impl<'m, 's> Lattice<'m, 's> {
         let scenario = self.model.scenario;
         let band = scenario.altitude;
         let middle = 0.5 * (band.min + band.max);
-        let height = here.z - scenario.terrain.elevation(here.xy());
+        let mut grounds = [scenario.terrain.elevation(here.xy()); CHOICES];
+        let height = here.z - grounds[0];
         let mut places = PointRow::splat(here);
         for (lane, [a, c, rise]) in PATTERNS[turn % 2].into_iter().enumerate() {
             let at = scenario
@@ -288,10 +294,12 @@ impl<'m, 's> Lattice<'m, 's> {
             if (height - middle) * (raised - middle) < 0.0 {
                 raised = middle;
             }
-            let z = scenario.terrain.elevation(at) + raised.clamp(band.min, band.max);
+            let ground = scenario.terrain.elevation(at);
+            grounds[lane + 1] = ground;
+            let z = ground + raised.clamp(band.min, band.max);
             places.set(lane, self.reachable(at, z));
         }
-        places
+        (places, grounds)
     }
 
     /// `z`, or the height nearest to it that can be climbed to from the start and from the target.
@@ -301,5 +309,39 @@ impl<'m, 's> Lattice<'m, 's> {
             z = z.clamp(end.z - reach, end.z + reach);
         }
         Point3::new(at.x, at.y, z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::price::price;
+    use crate::planner::starts;
+    use crate::planner::tests::hilly_scenario;
+    use crate::planner::{Nobody, plan};
+
+    /// From a feasible route the quick way and the thorough one choose the same places.
+    #[test]
+    fn the_clear_way_is_the_best_of_all() {
+        let mut scenario = hilly_scenario();
+        scenario.planner.iterations = 3;
+        for seed in 0..4 {
+            scenario.planner.seed = seed;
+            let model = Model::new(&scenario);
+            let mut route = plan(&scenario, &mut Nobody, &Nobody).waypoints;
+            route = starts::with_waypoints(&model, route, 7);
+            let (mut quick, mut thorough) = (Lattice::new(&model), Lattice::new(&model));
+            let mut moves = 0;
+            for turn in 0..12 {
+                let step = 60.0 / (1.0 + turn as f64);
+                let mut other = route.clone();
+                let feasible = price(&model, &route).is_feasible();
+                let moved = quick.sweep(&mut route, feasible, step, turn);
+                assert_eq!(moved, thorough.sweep(&mut other, false, step, turn));
+                assert_eq!(route, other, "seed {seed}, turn {turn}");
+                moves += usize::from(feasible && moved);
+            }
+            assert!(moves > 2, "{moves}");
+        }
     }
 }

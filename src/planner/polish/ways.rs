@@ -115,16 +115,18 @@ impl Ways {
             let (arrival, from) = if let Some(from) = straight {
                 (price(from), from)
             } else {
-                let turned = |from: usize| {
+                let mut best = (Fitness::WORST, 0);
+                for from in order.all() {
                     let mut turned = price(from);
+                    if turned.violation > best.0.violation {
+                        break;
+                    }
                     turned.violation += turns.excess(way(from), onto);
-                    (turned, from)
-                };
-                order
-                    .all()
-                    .map(turned)
-                    .reduce(|best, next| if next.0.beats(&best.0) { next } else { best })
-                    .expect("a waypoint has a place")
+                    if turned.beats(&best.0) {
+                        best = (turned, from);
+                    }
+                }
+                best
             };
             reached.violation[b][c] += arrival.violation;
             reached.cost[b][c] += arrival.cost;

@@ -289,3 +289,36 @@ fn near(model: &Model, route: &[Point3], other: &[Point3]) -> bool {
         })
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::tests::hilly_scenario;
+
+    /// Chains are the same whether legs are measured when their turn comes or all of them before.
+    #[test]
+    fn legs_measured_late_change_no_chain() {
+        let scenario = hilly_scenario();
+        let model = Model::new(&scenario);
+        let places = places(&model);
+        let (mut late, mut early) = (Legs::new(&model, &places), Legs::new(&model, &places));
+        let all: Vec<usize> = (0..places.len()).collect();
+        for place in 0..places.len() {
+            early.measure(&all[..place], place);
+        }
+        for source in [0, places.len() - 1] {
+            let (costs, before) = cheapest(&mut late, source);
+            let (expected, expected_before) = cheapest(&mut early, source);
+            let bits = |costs: &[f64]| costs.iter().map(|cost| cost.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&costs), bits(&expected));
+            assert_eq!(before, expected_before);
+        }
+        let measured = late
+            .measured
+            .iter()
+            .flatten()
+            .filter(|&&known| known)
+            .count();
+        assert!(measured < places.len() * places.len() / 2, "{measured}");
+    }
+}

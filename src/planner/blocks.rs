@@ -62,6 +62,11 @@ impl<'s> Pricers<'s> {
             full,
         }
     }
+
+    /// Whether heights take long to measure, so that legs are worth remembering.
+    pub(super) fn is_hilly(&self) -> bool {
+        self.full.is_hilly()
+    }
 }
 
 impl<'a, 's> Blocks<'a, 's> {
@@ -74,7 +79,7 @@ impl<'a, 's> Blocks<'a, 's> {
             coding,
             pricers,
             kept,
-            hilly: pricers.full.is_hilly(),
+            hilly: pricers.is_hilly(),
             points: Vec::new(),
             ground: Vec::new(),
             unmeasured: [Unmeasured::default(), Unmeasured::default()],

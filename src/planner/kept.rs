@@ -47,10 +47,6 @@ impl Kept {
         self.places[place] = (ends, violation);
     }
 
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "only as many bits are taken as there are places"
-    )]
     fn place(&self, ends: &Ends) -> usize {
         let mixed = ends.iter().fold(0_u64, |mixed, bits| {
             (mixed.rotate_left(29) ^ bits).wrapping_mul(FACTOR)

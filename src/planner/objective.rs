@@ -55,7 +55,11 @@ impl<'s> Routes<'s> {
         let settings = &model.scenario.planner;
         let quadrature = settings.quadrature;
         let pricers = Pricers::new(Pricer::new(model, quadrature, tolerance));
-        let legs = settings.population * (settings.waypoints + 1);
+        let legs = if pricers.is_hilly() {
+            settings.population * (settings.waypoints + 1)
+        } else {
+            0
+        };
         let threads = settings.threads.max(1);
         Self {
             coding,

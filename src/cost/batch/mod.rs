@@ -260,7 +260,7 @@ impl<'s> Pricer<'s> {
         self.arch.dispatch(Ground {
             pricer: self,
             points,
-            ground,
+            elevations: ground,
         });
     }
 }
@@ -268,7 +268,7 @@ impl<'s> Pricer<'s> {
 struct Ground<'a, 's> {
     pricer: &'a Pricer<'s>,
     points: &'a [PointRow],
-    ground: &'a mut [Row],
+    elevations: &'a mut [Row],
 }
 
 impl WithSimd for Ground<'_, '_> {
@@ -276,10 +276,10 @@ impl WithSimd for Ground<'_, '_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        for (point, ground) in self.points.iter().zip(self.ground) {
+        for (point, row) in self.points.iter().zip(self.elevations) {
             for part in 0..parts::<S>() {
                 let elevation = self.pricer.elevation(simd, part, point);
-                elevation.store(ground, part);
+                elevation.store(row, part);
             }
         }
     }

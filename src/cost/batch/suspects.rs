@@ -121,26 +121,26 @@ impl Cut {
     /// Side by side; lanes that are left over repeat the first.
     #[inline(always)]
     fn load<S: Simd>(simd: S, cuts: &[Self]) -> Stretch<S> {
-        let mut rows = [[0.0; LANES]; 8];
+        let (mut from, mut way) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+        let mut limits = [[0.0; LANES]; 2];
         for lane in 0..S::F64_LANES {
             let cut = cuts.get(lane).unwrap_or(&cuts[0]);
             for axis in 0..3 {
-                rows[axis][lane] = cut.from[axis];
-                rows[3 + axis][lane] = cut.way[axis];
+                (from[axis][lane], way[axis][lane]) = (cut.from[axis], cut.way[axis]);
             }
-            (rows[6][lane], rows[7][lane]) = (cut.floor, cut.ceiling);
+            (limits[0][lane], limits[1][lane]) = (cut.floor, cut.ceiling);
         }
         let lane = |row: &Row| Lane::load(simd, row, 0);
-        let point = |rows: &[Row]| Point {
+        let point = |rows: &[Row; 3]| Point {
             x: lane(&rows[0]),
             y: lane(&rows[1]),
             z: lane(&rows[2]),
         };
         Stretch {
-            from: point(&rows[..3]),
-            way: point(&rows[3..6]),
-            floor: lane(&rows[6]),
-            ceiling: lane(&rows[7]),
+            from: point(&from),
+            way: point(&way),
+            floor: lane(&limits[0]),
+            ceiling: lane(&limits[1]),
         }
     }
 }

@@ -50,10 +50,12 @@ impl ClearWays {
         self.legs.clear();
         for (leg_idx, leg) in legs.iter().enumerate() {
             let mut own = [[f64::INFINITY; CHOICES]; CHOICES];
-            for a in 0..count(leg_idx, last) {
-                for b in 0..count(leg_idx + 1, last) {
-                    if leg.violation[a][b] <= 0.0 {
-                        own[a][b] = leg.cost[a][b];
+            let rows = own.iter_mut().zip(&leg.violation).zip(&leg.cost);
+            for ((own, violation), cost) in rows.take(count(leg_idx, last)) {
+                let legs = own.iter_mut().zip(violation).zip(cost);
+                for ((own, violation), cost) in legs.take(count(leg_idx + 1, last)) {
+                    if *violation <= 0.0 {
+                        *own = *cost;
                     }
                 }
             }

@@ -138,11 +138,9 @@ impl<'m, 's> Lattice<'m, 's> {
         if idx > 0 && idx + 1 < route.len() {
             let (new, ground) = self.places(route, idx, step, turn);
             waypoint.new = new;
-            for place in 0..CHOICES {
+            for (place, ground) in ground.into_iter().enumerate() {
                 let point = waypoint.place(place);
-                let (violation, cost) =
-                    self.model
-                        .waypoint_above(point, ground[place], self.tolerance);
+                let (violation, cost) = self.model.waypoint_above(point, ground, self.tolerance);
                 (waypoint.violation[place], waypoint.cost[place]) = (violation, cost);
             }
         }
@@ -252,7 +250,7 @@ impl<'m, 's> Lattice<'m, 's> {
 
     /// Add a leg as number `idx` of those priced lane by lane.
     fn push_leg(&mut self, idx: usize, a: Point3, b: Point3) {
-        if idx % LANES == 0 {
+        if idx.is_multiple_of(LANES) {
             // Lanes that are left over repeat a leg.
             self.from.push(PointRow::splat(a));
             self.to.push(PointRow::splat(b));

@@ -7,10 +7,16 @@ impl Model<'_> {
     /// F3: the sum over the free waypoints of the distance of their height above ground from the
     /// middle of the band, metres.
     pub(super) fn altitude(&self, free: &[Point3]) -> f64 {
+        let ground = |point: &Point3| self.scenario.terrain.elevation(point.xy());
+        free.iter()
+            .map(|point| self.off_middle(*point, ground(point)))
+            .sum()
+    }
+
+    /// The share of one of them, above `ground`.
+    pub(super) fn off_middle(&self, point: Point3, ground: f64) -> f64 {
         let band = self.scenario.altitude;
         let middle = 0.5 * (band.max + band.min);
-        free.iter()
-            .map(|point| (point.z - self.scenario.terrain.elevation(point.xy()) - middle).abs())
-            .sum()
+        (point.z - ground - middle).abs()
     }
 }

@@ -129,6 +129,13 @@ impl<'s> Model<'s> {
     /// its altitude cost.
     #[must_use]
     pub fn waypoint(&self, point: Point3, tolerance: Tolerance) -> (f64, f64) {
+        let ground = self.scenario.terrain.elevation(point.xy());
+        self.waypoint_above(point, ground, tolerance)
+    }
+
+    /// As [`Model::waypoint`], where the elevation of the ground below `point` is known.
+    #[must_use]
+    pub fn waypoint_above(&self, point: Point3, ground: f64, tolerance: Tolerance) -> (f64, f64) {
         let outside = self.scenario.area.excess(point.xy());
         let violation = if outside > tolerance.length_m {
             outside
@@ -137,7 +144,7 @@ impl<'s> Model<'s> {
         };
         (
             violation,
-            self.scenario.weights.altitude * self.altitude(&[point]),
+            self.scenario.weights.altitude * self.off_middle(point, ground),
         )
     }
 

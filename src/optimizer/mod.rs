@@ -117,6 +117,17 @@ pub trait Objective {
 
     /// Price `fitness.len()` positions, laid end to end.
     fn evaluate(&mut self, positions: &[f64], fitness: &mut [Fitness]);
+
+    /// As [`Objective::evaluate`], of positions that matter only where they beat their `rivals`, one
+    /// for each: of one that does not, any fitness that does not beat its rival either may be told.
+    fn evaluate_against(
+        &mut self,
+        positions: &[f64],
+        _rivals: &[Fitness],
+        fitness: &mut [Fitness],
+    ) {
+        self.evaluate(positions, fitness);
+    }
 }
 
 /// A running search.

@@ -92,6 +92,22 @@ impl Swarm {
         fitness: &mut [Fitness],
     ) {
         objective.evaluate(positions, fitness);
+        self.note(positions, fitness);
+    }
+
+    /// As [`Swarm::price`], of `positions` that each matter only where it beats the member of the same
+    /// index: the fitness of another is whatever does not beat it either.
+    pub fn challenge(
+        &mut self,
+        objective: &mut dyn Objective,
+        positions: &[f64],
+        fitness: &mut [Fitness],
+    ) {
+        objective.evaluate_against(positions, &self.fitness, fitness);
+        self.note(positions, fitness);
+    }
+
+    fn note(&mut self, positions: &[f64], fitness: &[Fitness]) {
         self.evaluations += fitness.len() as u64;
         for (position, fitness) in positions.chunks_exact(self.dimension).zip(fitness.iter()) {
             if fitness.beats(&self.best_fitness) {

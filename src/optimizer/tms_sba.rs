@@ -165,7 +165,7 @@ impl TmsSba {
         self.iteration += 1;
         self.move_bats(objective, progress);
         self.swarm
-            .price(objective, &self.candidates, &mut self.outcome);
+            .challenge(objective, &self.candidates, &mut self.outcome);
         self.accept(objective.bounds().dimension());
     }
 

@@ -3,9 +3,11 @@
 //! Plain functions: no async, no store, no clock of their own.
 
 mod beside;
+mod blocks;
 mod certificate;
 mod coding;
 mod guide;
+mod kept;
 mod log;
 mod moves;
 mod objective;
@@ -18,6 +20,7 @@ mod smoothing;
 mod starts;
 #[cfg(test)]
 mod tests;
+mod watch;
 
 pub use outcome::{
     Bound, Clearance, ConvergencePoint, Incumbent, Leg, Measures, Outcome, Path, StopReason,

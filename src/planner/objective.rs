@@ -1,16 +1,16 @@
 //! Routes as an optimizer sees them: positions in, fitness out.
 
+use super::Stop;
+use super::blocks::{Blocks, Pricers};
 use super::coding::{Cartesian, Coding};
 use super::guide::Guide;
+use super::kept::Kept;
 use super::price::{PRICED_FROM, price};
-use super::{Stop, why_stop};
+use super::watch::Watch;
 use crate::cost::Model;
-use crate::cost::batch::{LANES, PointRow, Pricer};
+use crate::cost::batch::{LANES, Pricer};
 use crate::geometry::Point3;
 use crate::optimizer::{Bounds, Fitness, Objective, Random};
-use crate::scenario::Scenario;
-use crate::terrain::Terrain;
-use crate::threat::Shape;
 
 /// The routes of one scenario.
 pub(super) struct Routes<'s> {
@@ -18,20 +18,12 @@ pub(super) struct Routes<'s> {
     /// Of a guided search.
     guide: Option<Guide<'s>>,
     pub(super) model: Model<'s>,
-    pricer: Pricer<'s>,
+    pricers: Pricers<'s>,
+    /// Of each thread.
+    kept: Vec<Kept>,
     route: Vec<Point3>,
-    points: Vec<PointRow>,
-    stop: &'s dyn Stop,
-    /// Evaluations between two looks at the clock.
-    stride: u64,
-    /// Routes priced so far.
-    pub(super) evaluations: u64,
-    /// Whether the run was stopped within an iteration: what was left of it is [`Fitness::WORST`].
-    pub(super) interrupted: bool,
+    pub(super) watch: Watch<'s>,
 }
-
-/// So many steps, each some nanoseconds, may pass between two looks at the clock.
-const STEPS_UNWATCHED: usize = 1_000_000;
 
 /// Fewer routes are not worth the start of a thread.
 const WORTH_THREADS: usize = 64;
@@ -60,65 +52,79 @@ impl<'s> Routes<'s> {
         stop: &'s dyn Stop,
     ) -> Self {
         let tolerance = model.tolerance.scaled(PRICED_FROM);
-        let quadrature = model.scenario.planner.quadrature;
-        let stride = (STEPS_UNWATCHED / steps(model.scenario)).max(1) as u64;
+        let settings = &model.scenario.planner;
+        let quadrature = settings.quadrature;
+        let pricers = Pricers::new(Pricer::new(model, quadrature, tolerance));
+        let legs = if pricers.is_hilly() {
+            settings.population * (settings.waypoints + 1)
+        } else {
+            0
+        };
+        let threads = settings.threads.max(1);
         Self {
             coding,
             guide,
-            pricer: Pricer::new(model, quadrature, tolerance),
+            pricers,
             model: model.clone(),
+            kept: (0..threads).map(|_| Kept::of(legs)).collect(),
             route: Vec::new(),
-            points: Vec::new(),
-            stop,
-            stride,
-            evaluations: 0,
-            interrupted: false,
+            watch: Watch::new(model.scenario, stop),
         }
     }
 
-    /// Whether the next `count` routes may be priced; looks at the clock now and then.
-    fn may_go_on(&mut self, count: usize) -> bool {
-        let since = self.evaluations % self.stride;
-        // There is always one route to deliver.
-        let due = self.evaluations > 0 && (since == 0 || since + count as u64 > self.stride);
-        if due && !self.interrupted {
-            self.interrupted = why_stop(self.model.scenario, self.stop).is_some();
+    fn price(&mut self, positions: &[f64], rivals: Option<&[Fitness]>, fitness: &mut [Fitness]) {
+        let threads = self.model.scenario.planner.threads;
+        let stride = self.watch.stride;
+        if threads > 1 && fitness.len() >= WORTH_THREADS && stride >= fitness.len() as u64 {
+            return self.side_by_side(threads, positions, rivals, fitness);
         }
-        !self.interrupted
+        if stride < LANES as u64 {
+            return self.one_by_one(positions, fitness);
+        }
+        let watch = &mut self.watch;
+        Blocks::new(&self.coding, &self.pricers, &mut self.kept[0]).price(
+            positions,
+            rivals,
+            fitness,
+            |count| watch.may_price(count),
+        );
     }
 
     /// Price all positions on several threads, each a run of whole blocks; no price depends on which.
-    fn side_by_side(&mut self, threads: usize, positions: &[f64], fitness: &mut [Fitness]) {
-        if !self.may_go_on(fitness.len()) {
+    fn side_by_side(
+        &mut self,
+        threads: usize,
+        positions: &[f64],
+        rivals: Option<&[Fitness]>,
+        fitness: &mut [Fitness],
+    ) {
+        if !self.watch.may_price(fitness.len()) {
             return fitness.fill(Fitness::WORST);
         }
-        self.evaluations += fitness.len() as u64;
-        let (coding, pricer) = (&self.coding, &self.pricer);
+        let (coding, pricers) = (&self.coding, &self.pricers);
         let dimension = coding.bounds().dimension();
         let share = fitness.len().div_ceil(threads).next_multiple_of(LANES);
         std::thread::scope(|scope| {
-            let shares = positions.chunks(share * dimension);
-            for (positions, fitness) in shares.zip(fitness.chunks_mut(share)) {
+            let shares = positions.chunks(share * dimension).zip(&mut self.kept);
+            for (idx, ((positions, kept), fitness)) in
+                shares.zip(fitness.chunks_mut(share)).enumerate()
+            {
+                let rivals = rivals.map(|all| &all[idx * share..idx * share + fitness.len()]);
                 scope.spawn(move || {
-                    let mut points = Vec::new();
-                    let blocks = positions.chunks(LANES * dimension);
-                    for (positions, fitness) in blocks.zip(fitness.chunks_mut(LANES)) {
-                        price_block(coding, pricer, positions, &mut points, fitness);
-                    }
+                    Blocks::new(coding, pricers, kept).price(positions, rivals, fitness, |_| true);
                 });
             }
         });
     }
 
-    /// As `price_block`, where a single route takes long: between two of them a run may end.
+    /// As a block, where a single route takes long: between two of them a run may end.
     fn one_by_one(&mut self, positions: &[f64], fitness: &mut [Fitness]) {
         let dimension = self.coding.bounds().dimension();
         let mut route = std::mem::take(&mut self.route);
         for (position, fitness) in positions.chunks_exact(dimension).zip(fitness) {
-            if self.may_go_on(1) {
+            if self.watch.may_price(1) {
                 self.coding.decode(position, &mut route);
                 *fitness = price(&self.model, &route);
-                self.evaluations += 1;
             } else {
                 *fitness = Fitness::WORST;
             }
@@ -150,70 +156,10 @@ impl Objective for Routes<'_> {
     }
 
     fn evaluate(&mut self, positions: &[f64], fitness: &mut [Fitness]) {
-        let dimension = self.coding.bounds().dimension();
-        let threads = self.model.scenario.planner.threads;
-        if threads > 1 && fitness.len() >= WORTH_THREADS && self.stride >= fitness.len() as u64 {
-            return self.side_by_side(threads, positions, fitness);
-        }
-        let blocks = positions.chunks(LANES * dimension);
-        let mut points = std::mem::take(&mut self.points);
-        for (positions, fitness) in blocks.zip(fitness.chunks_mut(LANES)) {
-            if self.stride < LANES as u64 {
-                self.one_by_one(positions, fitness);
-                continue;
-            }
-            if self.may_go_on(fitness.len()) {
-                price_block(&self.coding, &self.pricer, positions, &mut points, fitness);
-                self.evaluations += fitness.len() as u64;
-            } else {
-                fitness.fill(Fitness::WORST);
-            }
-        }
-        self.points = points;
+        self.price(positions, None, fitness);
     }
-}
 
-/// Price the routes of up to [`LANES`] positions side by side. It depends on each position alone.
-fn price_block(
-    coding: &Coding,
-    pricer: &Pricer,
-    positions: &[f64],
-    points: &mut Vec<PointRow>,
-    fitness: &mut [Fitness],
-) {
-    let dimension = coding.bounds().dimension();
-    // Spare lanes repeat the last position.
-    let own = |lane: usize| {
-        let from = lane.min(fitness.len() - 1) * dimension;
-        &positions[from..from + dimension]
-    };
-    let lanes = std::array::from_fn(own);
-    coding.decode_lanes(lanes, pricer, points);
-    let price = pricer.routes(points);
-    for (lane, fitness) in fitness.iter_mut().enumerate() {
-        *fitness = Fitness {
-            violation: price.violation[lane],
-            cost: price.cost[lane],
-        };
+    fn evaluate_against(&mut self, positions: &[f64], rivals: &[Fitness], fitness: &mut [Fitness]) {
+        self.price(positions, Some(rivals), fitness);
     }
-}
-
-/// About how many steps the pricing of one route takes.
-fn steps(scenario: &Scenario) -> usize {
-    let vertices = |shape: &Shape| match shape {
-        Shape::Cylinder(_) => 1,
-        Shape::Polygon(polygon) => 10 * polygon.vertices().len(),
-    };
-    let threats: usize = scenario
-        .threats
-        .iter()
-        .map(|threat| vertices(&threat.shape))
-        .sum();
-    let ground = match &scenario.terrain {
-        Terrain::Flat(_) => 1,
-        Terrain::Peaks(peaks) => 100 * (1 + peaks.peaks.len()),
-        Terrain::Grid(grid) => grid.columns + grid.rows,
-        Terrain::Dem(dem) => dem.raster().lattice.columns + dem.raster().lattice.rows,
-    };
-    (scenario.planner.waypoints + 1) * (1 + threats + ground)
 }

@@ -130,8 +130,8 @@ fn run(
     let (first, last) = (*iterations.start(), *iterations.end());
     let mut offered = Fitness::WORST;
     let mut note = |iteration: usize, search: &dyn Optimizer, routes: &Routes, log: &mut Log| {
-        log.evaluations += routes.evaluations - counted;
-        counted = routes.evaluations;
+        log.evaluations += routes.watch.evaluations - counted;
+        counted = routes.watch.evaluations;
         let best = search.swarm().best_fitness();
         if best.beats(&offered) || log.route.is_empty() {
             offered = best;
@@ -160,7 +160,7 @@ fn run(
         }
         let progress = (iteration + 1 - first.max(1)) as f64 / count as f64;
         search.iterate(routes, progress);
-        if routes.interrupted {
+        if routes.watch.interrupted {
             // Half an iteration is none: the result is that of the one before.
             let reason = why_stop(model.scenario, log.stop).unwrap_or(StopReason::Cancelled);
             return (search, reason);

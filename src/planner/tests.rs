@@ -3,8 +3,32 @@ use crate::geometry::{Point2, Rect};
 use crate::scenario::{
     AltitudeBand, Frame, PlannerSettings, Seeding, Smoothing, Vehicle, WarmStart, Weights,
 };
-use crate::terrain::{Flat, Terrain};
+use crate::terrain::{Flat, Peak, Peaks, Terrain};
 use crate::threat::{Cylinder, Shape, Threat};
+
+/// The same among hills, over which a route must keep between 30 and 150 m.
+pub(super) fn hilly_scenario() -> Scenario {
+    let peak = |x, y, height, spread| Peak {
+        center: Point2::new(x, y),
+        height,
+        spread: Point2::new(spread, 0.8 * spread),
+    };
+    let mut scenario = scenario();
+    scenario.terrain = Terrain::Peaks(Peaks {
+        base: -20.0,
+        peaks: vec![
+            peak(420.0, 360.0, 180.0, 90.0),
+            peak(600.0, 500.0, 240.0, 110.0),
+            peak(300.0, 600.0, 150.0, 70.0),
+            peak(520.0, 690.0, -60.0, 60.0),
+        ],
+    });
+    scenario.altitude = AltitudeBand {
+        min: 30.0,
+        max: 150.0,
+    };
+    scenario
+}
 
 /// Three radars on flat ground, as in the first scenario of the paper.
 pub(super) fn scenario() -> Scenario {

@@ -109,7 +109,7 @@ fn price(
         }
         points.push(PointRow::splat(scenario.target));
         if above_ground {
-            pricer.raise(&mut points[1..=free]);
+            pricer.raise(&mut points[1..=free], &mut Vec::new());
         }
         let price = pricer.routes(&points);
         prices.extend((0..routes.len()).map(|lane| [price.violation[lane], price.cost[lane]]));

@@ -222,8 +222,14 @@ fn priced(scenario: &Scenario, batch: usize, time_ms: u32) -> f64 {
 
 fn rate(objective: &mut impl Objective, positions: &[f64], batch: usize, time_ms: u32) -> f64 {
     let mut fitness = vec![Fitness::WORST; batch];
+    let mut positions = positions.to_vec();
+    let dimension = positions.len() / batch;
     best_rate(batch, time_ms, || {
-        objective.evaluate(positions, &mut fitness);
+        // By a hair another course: what is remembered of legs is of no use.
+        for position in positions.chunks_exact_mut(dimension) {
+            position[1] = position[1].next_up();
+        }
+        objective.evaluate(&positions, &mut fitness);
         std::hint::black_box(&fitness);
     })
 }

@@ -264,6 +264,15 @@ proptest! {
         let points = rows(&routes);
         let together = pricer.routes(&points);
         prop_assert_eq!(bits(&together), bits(&scalar.routes(&points)));
+        let mut ground = Vec::new();
+        pricer.ground(&points[1..points.len() - 1], &mut ground);
+        let at_best = pricer.routes_at_best(&points, &ground, LANES);
+        prop_assert_eq!(at_best.cost.map(f64::to_bits), together.cost.map(f64::to_bits));
+        let first = pricer.first_routes(&points, 3);
+        for lane in 0..LANES {
+            prop_assert!(at_best.violation[lane] <= together.violation[lane]);
+            prop_assert!(lane >= 3 || bits(&first).map(|row| row[lane]) == bits(&together).map(|row| row[lane]));
+        }
         for (lane, route) in routes.iter().enumerate() {
             let mut violation = 0.0;
             let mut by_leg = vec![(0.0, 0.0); route.len() - 1];
@@ -283,9 +292,19 @@ proptest! {
             }
             let mut prices = vec![Price::ZERO; by_leg.len()];
             pricer.legs(&points[..route.len() - 1], &points[1..], &mut prices);
-            for (price, (violation, cost)) in prices.iter().zip(by_leg) {
-                prop_assert!(close(price.violation[lane], violation), "{} {violation}", price.violation[lane]);
-                prop_assert!(close(price.cost[lane], cost), "{} {cost}", price.cost[lane]);
+            for (price, (violation, cost)) in prices.iter().zip(&by_leg) {
+                prop_assert!(close(price.violation[lane], *violation), "{} {violation}", price.violation[lane]);
+                prop_assert!(close(price.cost[lane], *cost), "{} {cost}", price.cost[lane]);
+            }
+            let [mut at_best, mut heights] = [0, 1].map(|_| vec![Price::ZERO; by_leg.len()]);
+            pricer.legs_at_best(&points[..route.len() - 1], &points[1..], &mut at_best);
+            let (from, to) = (&points[..route.len() - 1], &points[1..]);
+            pricer.heights_of_legs(from, to, usize::MAX, &mut heights);
+            for ((price, at_best), heights) in prices.iter().zip(&at_best).zip(&heights) {
+                let both = at_best.violation[lane] + heights.violation[lane];
+                prop_assert!(close(both, price.violation[lane]), "{both} {}", price.violation[lane]);
+                prop_assert!(at_best.violation[lane] <= price.violation[lane]);
+                prop_assert_eq!(at_best.cost[lane].to_bits(), price.cost[lane].to_bits());
             }
             let mut found = vec![Price::ZERO; prices.len()];
             verdicts.legs(&points[..route.len() - 1], &points[1..], &mut found);

@@ -4,10 +4,10 @@
 use pulp::Simd;
 
 use super::leg::{Leg, Point};
-use super::peaks::{Massif, Panorama};
+use super::peaks::Massif;
 use super::pyramid::Pyramid;
-use super::suspects::Suspects;
-use super::{PointRow, Pricer};
+use super::suspects::{Suspect, Suspects};
+use super::{PointRow, Price, Pricer};
 use crate::cost::band::Excess;
 use crate::cost::{Model, Section, Tolerance};
 use crate::geometry::lane::{Lane, Mask};
@@ -52,7 +52,7 @@ struct Zone {
 const GLANCES: [f64; 3] = [0.5, 0.25, 0.75];
 
 /// A breach seen at a point, of more metres than this, is one.
-const SURELY: f64 = 0.05;
+pub(super) const SURELY: f64 = 0.05;
 
 /// The part of each leg in a terminal zone: `[enter, leave]`, 1 to 1 where there is none.
 pub(super) struct Inside<S: Simd> {
@@ -100,6 +100,10 @@ impl Heights {
 }
 
 impl Heights {
+    pub(super) fn is_hilly(&self) -> bool {
+        !matches!(self.surface, Surface::Flat(_))
+    }
+
     /// Where a leg keeps its heights over its part `[t0, t1]`, being `from` and `to` at the ends of
     /// it and the curve between them, with a second derivative of so much that it sags at most by
     /// `dip` below and rises by `rise` above the line that joins these.
@@ -135,31 +139,25 @@ impl Heights {
         below_ceiling & low.with(self.ground).le(low) & low.with(self.floor).le(outside)
     }
 
-    /// How far a leg is seen to leave the band at its end and in its middle, where no zone is.
+    /// How far a leg is seen to leave the band, being at those `heights`, where no zone is.
     #[inline(always)]
-    fn seen<S: Simd>(&self, inside: &Inside<S>, heights: &[Lane<S>; 3]) -> Lane<S> {
-        let off = |height: Lane<S>| (height.with(self.floor) - height).max(height - self.ceiling);
-        let most = off(heights[1]).max(off(heights[2]));
-        (inside.leave.le(inside.enter) & !inside.unclear).keep(most)
+    fn seen<S: Simd>(&self, inside: &Inside<S>, heights: &[Lane<S>]) -> Lane<S> {
+        let (mut least, mut most) = (heights[0], heights[0]);
+        for &height in &heights[1..] {
+            (least, most) = (least.min(height), most.max(height));
+        }
+        let off = (least.with(self.floor) - least).max(most - self.ceiling);
+        (inside.leave.le(inside.enter) & !inside.unclear).keep(off)
     }
 }
 
 impl Pricer<'_> {
-    /// Look round from `point`, an end of a leg.
-    #[inline(always)]
-    pub(super) fn look<S: Simd>(&self, point: Point<S>, panorama: &mut Panorama<S>) {
-        if let Surface::Peaks(massif) = &self.heights.surface {
-            massif.look(point, panorama);
-        }
-    }
-
-    /// Beyond the band or below the ground; `panorama` is that of the leg's ends. What takes longer
-    /// to find is left to `suspects`, for the slots from `slot` on.
+    /// Beyond the band or below the ground. What takes longer to find is left to `suspects`, for the slots
+    /// from `slot` on.
     #[inline(always)]
     pub(super) fn heights<S: Simd>(
         &self,
         leg: &Leg<S>,
-        panorama: &Panorama<S>,
         slot: usize,
         suspects: &mut Suspects,
     ) -> Lane<S> {
@@ -183,25 +181,42 @@ impl Pricer<'_> {
             Surface::Grid(_) | Surface::Dem => {
                 let in_zone = inside.met().row();
                 return none.map(|lane, _| {
+                    if !suspects.wants(slot + lane) {
+                        return 0.0;
+                    }
                     self.measured(&leg.segment(lane), in_zone[lane], |leg, section| {
                         self.beyond_cells(leg, section)
                     })
                 });
             }
-            Surface::Peaks(massif) => massif.outlook(leg, panorama, &inside, &self.heights),
+            Surface::Peaks(massif) => massif.outlook(leg, &inside, &self.heights),
         };
         let open = !(outlook.clear & !inside.unclear);
         if !open.any() {
             return none;
         }
         let seen = self.heights.seen(&inside, &outlook.heights);
-        let counts = if self.verdict { SURELY } else { f64::INFINITY };
+        let counts = if self.verdict {
+            SURELY + outlook.allowed
+        } else {
+            f64::INFINITY
+        };
         let sure = open & leg.splat(counts).lt(seen);
         let open = open & !sure;
         if open.any() {
-            self.suspect(leg, open, outlook.widest, &inside, slot, suspects);
+            let (widest, in_zone) = (outlook.widest.row(), inside.met().row());
+            open.each(|lane| {
+                if suspects.wants(slot + lane) {
+                    suspects.push(Suspect {
+                        slot: slot + lane,
+                        leg: leg.segment(lane),
+                        widest: widest[lane],
+                        in_zone: in_zone[lane],
+                    });
+                }
+            });
         }
-        sure.keep(seen)
+        sure.keep(seen - outlook.allowed)
     }
 
     /// The violation of a leg that reaches `beyond` the limits of its sections.
@@ -253,43 +268,11 @@ impl Pricer<'_> {
         self.beyond(leg, window, section)
     }
 
-    /// Leave the legs of the lanes that are `open` to `suspects`.
+    /// Measure all `suspects`, of which slot `k` has lane `k` of `prices` laid end to end.
     #[inline(always)]
-    fn suspect<S: Simd>(
-        &self,
-        leg: &Leg<S>,
-        open: Mask<S>,
-        widest: Lane<S>,
-        inside: &Inside<S>,
-        slot: usize,
-        suspects: &mut Suspects,
-    ) {
-        let widest = widest.row();
-        let in_zone = inside.met().row();
-        open.each(|lane| {
-            let segment = leg.segment(lane);
-            suspects.next_leg();
-            if in_zone[lane] {
-                self.model.sections(&segment, |section| {
-                    suspects.push(slot + lane, &segment, &section, widest[lane]);
-                });
-            } else {
-                let whole = self.model.outside();
-                suspects.push(slot + lane, &segment, &whole, widest[lane]);
-            }
-        });
-    }
-
-    /// Measure all `suspects` and pass the violation of each leg on with its slot.
-    #[inline(always)]
-    pub(super) fn settle<S: Simd>(
-        &self,
-        simd: S,
-        suspects: &Suspects,
-        each: impl FnMut(usize, f64),
-    ) {
+    pub(super) fn settle<S: Simd>(&self, simd: S, suspects: &Suspects, prices: &mut [Price]) {
         if let Surface::Peaks(massif) = &self.heights.surface {
-            self.measure(simd, massif, suspects, each);
+            self.measure(simd, massif, suspects, prices);
         }
     }
 
@@ -307,19 +290,11 @@ impl Pricer<'_> {
         }
     }
 
-    /// How far the end of each leg lies from the middle of the band, Eq. 6.
+    /// How far the end of each leg, above `ground`, lies from the middle of the band, Eq. 6.
     #[inline(always)]
-    pub(super) fn off_middle<S: Simd>(&self, leg: &Leg<S>, panorama: &Panorama<S>) -> Lane<S> {
+    pub(super) fn off_middle<S: Simd>(&self, leg: &Leg<S>, ground: Lane<S>) -> Lane<S> {
         let band = self.model.scenario.altitude;
         let middle = 0.5 * (band.max + band.min);
-        let ground = match &self.heights.surface {
-            Surface::Flat(elevation) => leg.splat(*elevation),
-            Surface::Peaks(_) => panorama.ground(),
-            Surface::Grid(_) | Surface::Dem => leg.b.z.map(|lane, _| {
-                let below = leg.segment(lane).b.xy();
-                self.model.scenario.terrain.elevation(below)
-            }),
-        };
         (leg.b.z - ground - middle).abs()
     }
 

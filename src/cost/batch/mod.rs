@@ -26,7 +26,6 @@ use crate::geometry::Point3;
 use crate::geometry::lane::parts;
 use crate::scenario::Quadrature;
 use heights::Heights;
-use leg::Point;
 use route::Limits;
 use suspects::Suspects;
 use threats::Threats;
@@ -132,11 +131,53 @@ impl<'s> Pricer<'s> {
     /// With fewer than two points.
     #[must_use]
     pub fn routes(&self, points: &[PointRow]) -> Price {
+        self.first_routes(points, LANES)
+    }
+
+    /// As [`Pricer::routes`], of the first `count` of them alone; the others are free.
+    ///
+    /// # Panics
+    /// With fewer than two points.
+    #[must_use]
+    pub fn first_routes(&self, points: &[PointRow], count: usize) -> Price {
+        self.dispatch::<true>(points, &[], count)
+    }
+
+    /// As [`Pricer::first_routes`], did every leg keep the heights that are asked of it: above hills, where
+    /// those take longest to measure, this tells of most routes that they are not good enough. No
+    /// violation is more than that by `routes`, and the costs are the same bits. `ground` is the elevation
+    /// below each free waypoint.
+    ///
+    /// # Panics
+    /// With fewer than two points, or where there is not as much ground.
+    #[must_use]
+    pub fn routes_at_best(&self, points: &[PointRow], ground: &[Row], count: usize) -> Price {
+        assert!(
+            ground.len() + 2 == points.len(),
+            "every free waypoint is above ground"
+        );
+        self.dispatch::<false>(points, ground, count)
+    }
+
+    /// Whether there are hills, above which heights take long to measure.
+    #[must_use]
+    pub fn is_hilly(&self) -> bool {
+        self.heights.is_hilly()
+    }
+
+    fn dispatch<const HEIGHTS: bool>(
+        &self,
+        points: &[PointRow],
+        ground: &[Row],
+        count: usize,
+    ) -> Price {
         assert!(points.len() >= 2, "a route has a start and a target");
         let mut price = Price::ZERO;
-        self.arch.dispatch(Routes {
+        self.arch.dispatch(Routes::<HEIGHTS> {
             pricer: self,
             points,
+            ground,
+            count,
             price: &mut price,
         });
         price
@@ -149,100 +190,173 @@ impl<'s> Pricer<'s> {
     /// # Panics
     /// When the slices differ in length.
     pub fn legs(&self, a: &[PointRow], b: &[PointRow], prices: &mut [Price]) {
+        self.dispatch_legs::<true, true>(a, b, usize::MAX, prices);
+    }
+
+    /// As [`Pricer::legs`], of the first `count` of them alone; the others are free.
+    ///
+    /// # Panics
+    /// When the slices differ in length.
+    pub fn first_legs(&self, a: &[PointRow], b: &[PointRow], count: usize, prices: &mut [Price]) {
+        self.dispatch_legs::<true, true>(a, b, count, prices);
+    }
+
+    /// As [`Pricer::legs`], did every leg keep the heights that are asked of it, see
+    /// [`Pricer::routes_at_best`].
+    ///
+    /// # Panics
+    /// When the slices differ in length.
+    pub fn legs_at_best(&self, a: &[PointRow], b: &[PointRow], prices: &mut [Price]) {
+        self.dispatch_legs::<true, false>(a, b, usize::MAX, prices);
+    }
+
+    /// As [`Pricer::first_legs`], but for everything except the heights that are asked of a leg: what
+    /// [`Pricer::legs_at_best`] leaves out.
+    ///
+    /// # Panics
+    /// When the slices differ in length.
+    pub fn heights_of_legs(
+        &self,
+        a: &[PointRow],
+        b: &[PointRow],
+        count: usize,
+        prices: &mut [Price],
+    ) {
+        self.dispatch_legs::<false, true>(a, b, count, prices);
+    }
+
+    fn dispatch_legs<const FLIGHT: bool, const HEIGHTS: bool>(
+        &self,
+        a: &[PointRow],
+        b: &[PointRow],
+        count: usize,
+        prices: &mut [Price],
+    ) {
         assert!(a.len() == prices.len() && b.len() == prices.len());
-        self.arch.dispatch(Legs {
+        self.arch.dispatch(Legs::<FLIGHT, HEIGHTS> {
             pricer: self,
             a,
             b,
+            count,
             prices,
         });
     }
 
-    /// Raise points whose heights are above ground by the ground's elevation.
-    pub fn raise(&self, points: &mut [PointRow]) {
-        self.arch.dispatch(Raise {
+    /// Raise points whose heights are above ground by the ground's elevation, which is written to `ground`, a
+    /// row for each.
+    pub fn raise(&self, points: &mut [PointRow], ground: &mut Vec<Row>) {
+        self.ground(points, ground);
+        for (point, ground) in points.iter_mut().zip(ground) {
+            for (z, ground) in point.z.iter_mut().zip(ground) {
+                *z += *ground;
+            }
+        }
+    }
+
+    /// Write the elevation of the ground below `points` to `ground`, a row for each.
+    pub fn ground(&self, points: &[PointRow], ground: &mut Vec<Row>) {
+        ground.clear();
+        ground.resize(points.len(), [0.0; LANES]);
+        self.arch.dispatch(Ground {
             pricer: self,
             points,
+            elevations: ground,
         });
     }
 }
 
-struct Raise<'a, 's> {
+struct Ground<'a, 's> {
     pricer: &'a Pricer<'s>,
-    points: &'a mut [PointRow],
+    points: &'a [PointRow],
+    elevations: &'a mut [Row],
 }
 
-impl WithSimd for Raise<'_, '_> {
+impl WithSimd for Ground<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        for point in self.points {
+        for (point, row) in self.points.iter().zip(self.elevations) {
             for part in 0..parts::<S>() {
-                let own = Point::load(simd, point, part);
-                let ground = self.pricer.elevation(simd, part, point);
-                (own.z + ground).store(&mut point.z, part);
+                let elevation = self.pricer.elevation(simd, part, point);
+                elevation.store(row, part);
             }
         }
     }
 }
 
-struct Routes<'a, 's> {
+struct Routes<'a, 's, const HEIGHTS: bool> {
     pricer: &'a Pricer<'s>,
     points: &'a [PointRow],
+    /// Of the free waypoints; known where heights are left out.
+    ground: &'a [Row],
+    count: usize,
     price: &'a mut Price,
 }
 
-impl WithSimd for Routes<'_, '_> {
+impl<const HEIGHTS: bool> WithSimd for Routes<'_, '_, HEIGHTS> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let mut suspects = Suspects::default();
-        for part in 0..parts::<S>() {
-            let (violation, cost) = self.pricer.route(simd, part, self.points, &mut suspects);
+        let mut suspects = Suspects::of(self.count);
+        for part in 0..self.count.div_ceil(S::F64_LANES) {
+            let (violation, cost) = self.pricer.route::<S, HEIGHTS>(
+                simd,
+                part,
+                self.points,
+                self.ground,
+                &mut suspects,
+            );
             violation.store(&mut self.price.violation, part);
             cost.store(&mut self.price.cost, part);
         }
-        self.pricer.settle(simd, &suspects, |slot, violation| {
-            self.price.violation[slot] += violation;
-        });
+        let prices = std::slice::from_mut(self.price);
+        self.pricer.settle(simd, &suspects, prices);
     }
 }
 
 /// Rows of legs whose suspects wait for each other.
 const AT_ONCE: usize = 64;
 
-struct Legs<'a, 's> {
+struct Legs<'a, 's, const FLIGHT: bool, const HEIGHTS: bool> {
     pricer: &'a Pricer<'s>,
     a: &'a [PointRow],
     b: &'a [PointRow],
+    count: usize,
     prices: &'a mut [Price],
 }
 
-impl WithSimd for Legs<'_, '_> {
+impl<const FLIGHT: bool, const HEIGHTS: bool> WithSimd for Legs<'_, '_, FLIGHT, HEIGHTS> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let mut suspects = Suspects::default();
+        let mut suspects = Suspects::of(0);
         let chunks = self.a.chunks(AT_ONCE).zip(self.b.chunks(AT_ONCE));
+        let mut left = self.count;
         for ((a, b), prices) in chunks.zip(self.prices.chunks_mut(AT_ONCE)) {
-            suspects.clear();
+            suspects.clear(left);
+            left = left.saturating_sub(AT_ONCE * LANES);
             for (row, ends) in a.iter().zip(b).enumerate() {
                 for part in 0..parts::<S>() {
                     let slot = row * LANES + part * S::F64_LANES;
+                    if !suspects.wants(slot) {
+                        break;
+                    }
                     let ends = [ends.0, ends.1];
-                    let (violation, cost) =
-                        self.pricer
-                            .single_leg(simd, part, ends, slot, &mut suspects);
+                    let (violation, cost) = self.pricer.single_leg::<S, FLIGHT, HEIGHTS>(
+                        simd,
+                        part,
+                        ends,
+                        slot,
+                        &mut suspects,
+                    );
                     violation.store(&mut prices[row].violation, part);
                     cost.store(&mut prices[row].cost, part);
                 }
             }
-            self.pricer.settle(simd, &suspects, |slot, violation| {
-                prices[slot / LANES].violation[slot % LANES] += violation;
-            });
+            self.pricer.settle(simd, &suspects, prices);
         }
     }
 }

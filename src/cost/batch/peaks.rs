@@ -1,10 +1,9 @@
-//! Analytic mountains in lanes: their height at the ends of legs, and proofs that legs keep clear.
+//! Analytic mountains in lanes: their height, and proofs that legs keep clear.
 //!
 //! Along a leg a peak is `g(t) = height e^-x(t)`, `x = e0 + 2 b t + s t^2`. The height above ground, and
-//! its second derivative, are known at both ends and in the middle; between them the latter lies no
-//! farther from those than an eighth of the step squared times a bound of the fourth derivative, so
-//! that either half lies between two parabolas. That proves most legs clear; the others are measured,
-//! see `stretch.rs`.
+//! its second derivative, are worked out at five points; between two of them the latter lies no farther from
+//! those than an eighth of the step squared times a bound of the fourth derivative, so that every quarter of
+//! the leg lies between two parabolas. That proves most legs clear; the others are measured, see `stretch.rs`.
 
 use pulp::Simd;
 
@@ -17,25 +16,27 @@ use crate::terrain::{NEGLIGIBLE, Peak, Peaks};
 /// Beyond this exponent a proof allows for the little that a peak lifts the ground, instead of summing.
 const FAR: f64 = 12.0;
 
-/// `e^-FAR`, rounded up.
-const FAR_SHARE: f64 = 6.2e-6;
+/// `e^-FAR` and what a proof's exponentials may be off by, both as a share of the height and rounded up: of the
+/// value 1.2e-8, of its part in a parabola's sag another 2.2e-7.
+const ALLOWED: f64 = 6.5e-6;
+
+/// Points of a leg at which a proof looks.
+const POINTS: usize = 5;
+const STEP: f64 = 1.0 / (POINTS - 1) as f64;
 
 /// Greatest squared length in spreads of a leg that may be proven clear.
-const WIDEST: f64 = 4.0;
+const WIDEST: f64 = 16.0;
 
-/// `e^(WIDEST / 16)`, rounded up: how much higher a summit may be than the nearest of the three points.
+/// `e^(WIDEST STEP^2 / 4)`, rounded up: how much higher a summit may be than the nearest of the points.
 const BETWEEN: f64 = 1.285;
-
-/// A parabola over half a leg sags by so much of its second derivative.
-const SAG: f64 = 1.0 / 32.0;
 
 /// Mountains, made ready for lanes.
 #[derive(Debug, Clone)]
 pub(super) struct Massif {
     base: f64,
     pub(super) peaks: Vec<Mountain>,
-    /// By how much far peaks may raise or lower the ground together.
-    far: f64,
+    /// By how much the ground may be higher or lower than a proof's sum.
+    allowed: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -50,49 +51,16 @@ pub(super) struct Mountain {
     reach: f64,
 }
 
-/// A peak as seen from a point: offsets in spreads, the exponent, and how high it lifts the ground.
-#[derive(Clone, Copy)]
-struct View<S: Simd> {
-    p: Lane<S>,
-    q: Lane<S>,
-    exponent: Lane<S>,
-    lift: Lane<S>,
-}
-
-/// All peaks from the ends of a leg; kept from leg to leg, as one ends where the next begins.
-pub(super) struct Panorama<S: Simd> {
-    from: Vec<View<S>>,
-    to: Vec<View<S>>,
-    /// Elevations of the ground at both ends.
-    ground: [Lane<S>; 2],
-}
-
 /// What is known of a leg's heights above ground.
 pub(super) struct Outlook<S: Simd> {
     /// Where it is proven to keep them.
     pub(super) clear: Mask<S>,
-    /// Above ground at the ends and in the middle.
-    pub(super) heights: [Lane<S>; 3],
+    /// Above ground, at equal distances from one end to the other.
+    pub(super) heights: [Lane<S>; POINTS],
+    /// By how much those may be off, metres.
+    pub(super) allowed: f64,
     /// The squared length in spreads of the narrowest peak near it.
     pub(super) widest: Lane<S>,
-}
-
-impl<S: Simd> Panorama<S> {
-    /// Of no peaks, from nowhere.
-    #[inline(always)]
-    pub(super) fn new(simd: S) -> Self {
-        let zero = Lane::splat(simd, 0.0);
-        Self {
-            from: Vec::new(),
-            to: Vec::new(),
-            ground: [zero; 2],
-        }
-    }
-
-    /// The elevation of the ground at the end.
-    pub(super) fn ground(&self) -> Lane<S> {
-        self.ground[1]
-    }
 }
 
 impl Massif {
@@ -109,24 +77,20 @@ impl Massif {
                 reach: reach(FAR),
             }
         };
+        let highest = peaks.peaks.iter().map(|peak| peak.height.abs());
         Self {
             base: peaks.base,
             peaks: peaks.peaks.iter().map(mountain).collect(),
-            far: FAR_SHARE
-                * peaks
-                    .peaks
-                    .iter()
-                    .map(|peak| peak.height.abs())
-                    .sum::<f64>(),
+            allowed: ALLOWED * highest.sum::<f64>(),
         }
     }
 
-    /// The elevation of the ground at `point`; the same as by `look`.
+    /// The elevation of the ground at `point`.
     #[inline(always)]
     pub(super) fn elevation<S: Simd>(&self, point: Point<S>) -> Lane<S> {
         let mut ground = point.x.with(self.base);
         for peak in &self.peaks {
-            ground = ground + peak.view(point).lift;
+            ground = ground + peak.at(point);
         }
         ground
     }
@@ -136,107 +100,98 @@ impl Massif {
         self.base
     }
 
-    /// Look round from `point`, the end of a leg; the end before becomes its beginning.
-    #[inline(always)]
-    pub(super) fn look<S: Simd>(&self, point: Point<S>, panorama: &mut Panorama<S>) {
-        std::mem::swap(&mut panorama.from, &mut panorama.to);
-        panorama.to.clear();
-        panorama.to.reserve(self.peaks.len());
-        let mut ground = point.x.with(self.base);
-        for peak in &self.peaks {
-            let view = peak.view(point);
-            ground = ground + view.lift;
-            panorama.to.push(view);
-        }
-        panorama.ground = [panorama.ground[1], ground];
-    }
-
-    /// Whether a leg keeps within `heights`; `panorama` is that of its ends.
+    /// Whether a leg keeps within `heights`.
     #[inline(always)]
     pub(super) fn outlook<S: Simd>(
         &self,
         leg: &Leg<S>,
-        panorama: &Panorama<S>,
         inside: &Inside<S>,
         heights: &Heights,
     ) -> Outlook<S> {
         let zero = leg.splat(0.0);
-        let mut ground = leg.splat(self.base);
-        let (mut bends, mut fourth, mut widest) = ([zero; 3], zero, zero);
+        let (mut ground, mut bends) = ([leg.splat(self.base); POINTS], [zero; POINTS]);
+        let (mut fourth, mut widest) = (zero, zero);
         let mut peak_idx = 0;
         while peak_idx < self.peaks.len() {
             let peak = &self.peaks[peak_idx];
-            let (a, b) = (&panorama.from[peak_idx], &panorama.to[peak_idx]);
             peak_idx += 1;
             let near = leg.near(peak.center, peak.reach);
             if !near.any() {
                 continue;
             }
-            let (u, v) = (near.keep(b.p - a.p), near.keep(b.q - a.q));
-            let square = u * u + v * v;
+            let p = (leg.a.x - peak.center.x) * peak.narrowness.x;
+            let q = (leg.a.y - peak.center.y) * peak.narrowness.y;
+            let (u, v) = (leg.dx * peak.narrowness.x, leg.dy * peak.narrowness.y);
+            let square = near.keep(u * u + v * v);
             widest = widest.max(square);
-            // The middle's exponent is the mean of those of the ends less `s / 4`.
-            let exponent = (a.exponent + b.exponent) * 0.5 - square * 0.25;
-            let near = near & exponent.lt(leg.splat(NEGLIGIBLE));
-            let lift = near.keep((-near.keep(exponent)).exp() * peak.height);
-            ground = ground + lift;
+            let height = near.keep(zero.with(peak.height));
             let twice = square + square;
-            let steepness = (a.p * u + a.q * v) * 2.0;
-            let in_middle = steepness + square;
-            let at_end = in_middle + square;
-            bends[0] = bends[0] + a.lift * (twice - steepness * steepness);
-            bends[1] = bends[1] + lift * (twice - in_middle * in_middle);
-            bends[2] = bends[2] + b.lift * (twice - at_end * at_end);
+            let mut steepness = near.keep((p * u + q * v) * 2.0);
+            let mut exponent = p * p + q * q;
+            let (mut highest, mut least) = (zero, exponent);
+            // From one point to the next the exponent grows by the mean of both slopes.
+            let (change, steeper) = (square * (STEP * STEP), twice * STEP);
+            let mut point = 0;
+            loop {
+                let lift = height * (-exponent.min(zero.with(NEGLIGIBLE))).exp_roughly();
+                ground[point] = ground[point] + lift;
+                bends[point] = bends[point] + lift * (twice - steepness * steepness);
+                highest = highest.max(lift.abs());
+                least = least.min(exponent);
+                point += 1;
+                if point == POINTS {
+                    break;
+                }
+                exponent = exponent + steepness * STEP + change;
+                steepness = steepness + steeper;
+            }
             // As in `stretch.rs`.
-            let highest = a.lift.abs().max(b.lift.abs()).max(lift.abs());
-            let least = a.exponent.min(b.exponent).min(exponent);
             fourth = fourth + square * square * highest * (least * least * 16.0 + 12.0);
         }
-        let heights_at = [
-            leg.a.z - panorama.ground[0],
-            leg.a.z + leg.dz * 0.5 - ground,
-            leg.b.z - panorama.ground[1],
-        ];
-        let stray = fourth * (BETWEEN / 32.0);
+        let mut point = 0;
+        while point < POINTS {
+            ground[point] = leg.a.z + leg.dz * (STEP * point as f64) - ground[point];
+            point += 1;
+        }
+        // A parabola over a step sags by an eighth of the step squared times its second derivative, which
+        // strays from those at both ends by as much of the fourth.
+        let sag = STEP * STEP / 8.0;
+        let stray = fourth * (BETWEEN * sag);
         let mut clear = widest.le(leg.splat(WIDEST));
-        let mut half = 0;
-        while half < 2 {
-            let ends = [heights_at[half], heights_at[half + 1]];
-            let most = bends[half].max(bends[half + 1]) + stray;
-            let least = bends[half].min(bends[half + 1]) - stray;
+        let mut point = 0;
+        while point + 1 < POINTS {
+            let ends = [ground[point], ground[point + 1]];
+            let most = bends[point].max(bends[point + 1]) + stray;
+            let least = bends[point].min(bends[point + 1]) - stray;
             let slack = [
-                most.max(zero) * SAG + 2.0 * self.far,
-                (-least).max(zero) * SAG + 2.0 * self.far,
+                most.max(zero) * sag + 2.0 * self.allowed,
+                (-least).max(zero) * sag + 2.0 * self.allowed,
             ];
-            let part = [half as f64 * 0.5, (half + 1) as f64 * 0.5];
+            let part = [point as f64 * STEP, (point + 1) as f64 * STEP];
             clear = clear & heights.within(ends, slack, inside, part);
-            half += 1;
+            point += 1;
         }
         Outlook {
             clear,
-            heights: heights_at,
+            heights: ground,
+            allowed: self.allowed,
             widest,
         }
     }
 }
 
 impl Mountain {
+    /// By how much it lifts the ground at `point`.
     #[inline(always)]
-    fn view<S: Simd>(&self, point: Point<S>) -> View<S> {
+    fn at<S: Simd>(&self, point: Point<S>) -> Lane<S> {
         let p = (point.x - self.center.x) * self.narrowness.x;
         let q = (point.y - self.center.y) * self.narrowness.y;
         let exponent = p * p + q * q;
         let near = exponent.lt(exponent.with(NEGLIGIBLE));
-        let lift = if near.any() {
+        if near.any() {
             near.keep((-near.keep(exponent)).exp() * self.height)
         } else {
             exponent.with(0.0)
-        };
-        View {
-            p,
-            q,
-            exponent,
-            lift,
         }
     }
 }

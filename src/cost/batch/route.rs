@@ -3,10 +3,9 @@
 use pulp::Simd;
 
 use super::leg::{Leg, Point};
-use super::peaks::Panorama;
 use super::suspects::Suspects;
 use super::threats::Candidates;
-use super::{PointRow, Pricer};
+use super::{PointRow, Pricer, Row};
 use crate::cost::fuel;
 use crate::cost::threat::SHARE;
 use crate::geometry::lane::{Lane, Mask};
@@ -54,13 +53,15 @@ struct Heading<S: Simd> {
 }
 
 impl Pricer<'_> {
-    /// Violation and cost of one part of the routes, but for the violation of `suspects`.
+    /// Violation and cost of one part of the routes, but for the violation of `suspects`; without
+    /// `HEIGHTS` no leg is asked for those that it keeps, and the `ground` below free waypoints is known.
     #[inline(always)]
-    pub(super) fn route<S: Simd>(
+    pub(super) fn route<S: Simd, const HEIGHTS: bool>(
         &self,
         simd: S,
         part: usize,
         points: &[PointRow],
+        ground: &[Row],
         suspects: &mut Suspects,
     ) -> (Lane<S>, Lane<S>) {
         let zero = Lane::splat(simd, 0.0);
@@ -71,20 +72,25 @@ impl Pricer<'_> {
             level: zero,
         };
         let mut candidates = Candidates::default();
-        let mut panorama = Panorama::new(simd);
-        self.look(Point::load(simd, &points[0], part), &mut panorama);
         for (leg_idx, rows) in points.windows(2).enumerate() {
             let leg = Leg::new(simd, part, [&rows[0], &rows[1]]);
             length = length + leg.length;
-            self.look(leg.b, &mut panorama);
             self.threats(&leg, &mut candidates, &mut exposure, &mut violation);
-            violation = violation + self.heights(&leg, &panorama, part * S::F64_LANES, suspects);
+            if HEIGHTS {
+                let slot = part * S::F64_LANES;
+                violation = violation + self.heights(&leg, slot, suspects);
+            }
             let (near, sharp) = self.turn(&leg, &mut heading);
             let mut suspect = near | self.may_break_limits(&leg);
             let free = leg_idx + 2 < points.len();
             if free {
                 suspect = suspect | self.outside(leg.b);
-                off_middle = off_middle + self.off_middle(&leg, &panorama);
+                let ground = if HEIGHTS {
+                    self.elevation(simd, part, &rows[1])
+                } else {
+                    Lane::load(simd, &ground[leg_idx], part)
+                };
+                off_middle = off_middle + self.off_middle(&leg, ground);
             }
             if suspect.any() {
                 violation = violation + self.leg_limits(&leg) + self.turn_limit(near, sharp);
@@ -98,9 +104,10 @@ impl Pricer<'_> {
     }
 
     /// Violation and cost of one leg by itself, but for the violation of `suspects`; its lanes have
-    /// the slots from `slot` on.
+    /// the slots from `slot` on. Without `HEIGHTS` it is not asked for those that it keeps, without `FLIGHT`
+    /// for nothing else.
     #[inline(always)]
-    pub(super) fn single_leg<S: Simd>(
+    pub(super) fn single_leg<S: Simd, const FLIGHT: bool, const HEIGHTS: bool>(
         &self,
         simd: S,
         part: usize,
@@ -110,16 +117,16 @@ impl Pricer<'_> {
     ) -> (Lane<S>, Lane<S>) {
         let leg = Leg::new(simd, part, [a, b]);
         let (mut exposure, mut violation) = (leg.splat(0.0), leg.splat(0.0));
-        let mut panorama = Panorama::new(simd);
-        self.look(leg.a, &mut panorama);
-        self.look(leg.b, &mut panorama);
-        self.threats(
-            &leg,
-            &mut Candidates::default(),
-            &mut exposure,
-            &mut violation,
-        );
-        violation = violation + self.heights(&leg, &panorama, slot, suspects);
+        if FLIGHT {
+            let mut candidates = Candidates::default();
+            self.threats(&leg, &mut candidates, &mut exposure, &mut violation);
+        }
+        if HEIGHTS {
+            violation = violation + self.heights(&leg, slot, suspects);
+        }
+        if !FLIGHT {
+            return (violation, exposure);
+        }
         if self.may_break_limits(&leg).any() {
             violation = violation + self.leg_limits(&leg);
         }

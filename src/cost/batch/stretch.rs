@@ -101,12 +101,13 @@ struct Jet<S: Simd> {
 
 impl Massif {
     /// How far `stretch` reaches beyond its limits. What is less than `overlooked` may be taken for
-    /// nothing. `courses` is scratch.
+    /// nothing, and what is more than `surely` for as little as is seen of it. `courses` is scratch.
     #[inline(always)]
     pub(super) fn beyond<S: Simd>(
         &self,
         stretch: &Stretch<S>,
         overlooked: f64,
+        surely: f64,
         courses: &mut Vec<Course<S>>,
     ) -> Beyond<S> {
         let (samples, too_wide) = self.samples(stretch, courses);
@@ -116,8 +117,9 @@ impl Massif {
             stretch,
             courses,
         };
-        let (low, low_unknown) = samples.lowest(1.0, stretch.floor - overlooked, &along);
-        let (high, high_unknown) = samples.lowest(-1.0, -stretch.ceiling - overlooked, &along);
+        let (low, low_unknown) = samples.lowest(1.0, stretch.floor, [overlooked, surely], &along);
+        let (high, high_unknown) =
+            samples.lowest(-1.0, -stretch.ceiling, [overlooked, surely], &along);
         Beyond {
             below: (stretch.floor - low).max(zero),
             above: (-stretch.ceiling - high).max(zero),
@@ -266,15 +268,34 @@ fn times<S: Simd, const N: usize>(mut lanes: [Lane<S>; N], factor: f64) -> [Lane
 }
 
 impl<S: Simd> Samples<S> {
-    /// The least height, of those turned round by `sign`, or something above `bar` if it is; and
-    /// where it is not known.
+    /// The least height, of those turned round by `sign`, or something above `limit` less `overlooked` if it
+    /// is, or something below that less `surely`; and where it is not known.
     #[inline(always)]
-    fn lowest(&self, sign: f64, bar: Lane<S>, along: &Along<S>) -> (Lane<S>, Mask<S>) {
+    fn lowest(
+        &self,
+        sign: f64,
+        limit: Lane<S>,
+        [overlooked, surely]: [f64; 2],
+        along: &Along<S>,
+    ) -> (Lane<S>, Mask<S>) {
+        let bar = limit - overlooked;
         let (heights, bends) = (times(self.heights, sign), times(self.bends, sign));
+        let (mut least, mut most, mut sample) = (heights[0], bends[0], 1);
+        while sample < SAMPLES {
+            (least, most) = (least.min(heights[sample]), most.max(bends[sample]));
+            sample += 1;
+        }
+        // Below its lower end a parabola sags by no more than an eighth of its bend.
+        let sag = (most + self.stray).max(bar.with(0.0)) * (STEP * STEP / 8.0);
+        let sure = least.lt(limit - surely);
+        if !((least - sag).lt(bar) & !sure).any() {
+            return (least, bar.lt(bar));
+        }
         let bracket = self.bracket(&heights, &bends, bar);
-        let (mut least, mut open) = (bracket.least, bracket.open & !bracket.unknown);
+        let unknown = bracket.unknown & !sure;
+        let (mut least, mut open) = (bracket.least, bracket.open & !bracket.unknown & !sure);
         if !open.any() {
-            return (least, bracket.unknown);
+            return (least, unknown);
         }
         let (low, high) = (bracket.low * STEP, bracket.high * STEP);
         let mut t = (bracket.start(&heights) * STEP).clamp(low, high);
@@ -291,7 +312,7 @@ impl<S: Simd> Samples<S> {
             open = open & !found;
             t = (t - slope / bend).clamp(low, high);
         }
-        (least, bracket.unknown | open)
+        (least, unknown | open)
     }
 
     #[inline(always)]

@@ -12,7 +12,7 @@ pub(super) use cartesian::{Cartesian, PER_WAYPOINT};
 pub(super) use course::Course;
 pub(super) use spherical::Spherical;
 
-use crate::cost::batch::{LANES, PointRow, Pricer};
+use crate::cost::batch::{LANES, PointRow, Pricer, Row};
 use crate::geometry::Point3;
 use crate::optimizer::Bounds;
 use crate::scenario::Scenario;
@@ -80,12 +80,14 @@ impl<'s> Coding<'s> {
         }
     }
 
-    /// As `decode`, of as many positions as there are lanes; within rounding the same.
+    /// As `decode`, of as many positions as there are lanes; within rounding the same. The elevation below
+    /// free waypoints is written to `ground`.
     pub(super) fn decode_lanes(
         &self,
         positions: [&[f64]; LANES],
         pricer: &Pricer,
         points: &mut Vec<PointRow>,
+        ground: &mut Vec<Row>,
     ) {
         match self {
             Self::Spherical(coding) => coding.decode_lanes(positions, points),
@@ -102,11 +104,12 @@ impl<'s> Coding<'s> {
                         row.set(lane, *point);
                     }
                 }
-                return;
+                let last = points.len() - 1;
+                return pricer.ground(&points[1..last], ground);
             }
         }
         let last = points.len() - 1;
-        pricer.raise(&mut points[1..last]);
+        pricer.raise(&mut points[1..last], ground);
     }
 }
 
@@ -153,7 +156,7 @@ mod tests {
                     Model::new(&scenario).tolerance,
                 );
                 let mut points = Vec::new();
-                coding.decode_lanes([&position; LANES], &pricer, &mut points);
+                coding.decode_lanes([&position; LANES], &pricer, &mut points, &mut Vec::new());
                 prop_assert_eq!(points.len(), route.len());
                 for (row, point) in points.iter().zip(&route) {
                     for lane in 0..LANES {

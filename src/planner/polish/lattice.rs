@@ -5,19 +5,15 @@
 //! waypoints that only gain together, such as those of one bend, move together.
 
 use super::super::price::PRICED_FROM;
-use crate::cost::batch::{LANES, PointRow, Price, Pricer, Row};
+use super::clear::ClearWays;
+use super::turns::Turns;
+use super::ways::{CHOICES, Each, Leg, Waypoint, Ways, count};
+use crate::cost::batch::{LANES, PointRow, Price, Pricer};
 use crate::cost::{Model, Tolerance};
-use crate::geometry::{LEVEL, Point2, Point3, Vector2, wrap_angle};
-use crate::optimizer::Fitness;
+use crate::geometry::{LEVEL, Point2, Point3, Vector2};
 
-/// Places of a waypoint: its own, and eight new ones that fill the lanes.
-const CHOICES: usize = LANES + 1;
-
-/// A number for each place of a waypoint.
-type Each = [f64; CHOICES];
-
-/// A number for each pair of places of two neighbours, by the first one's place.
-type Pairs = [Each; CHOICES];
+/// To join the legs again costs more than to measure a few that may be asked for next.
+const AT_ONCE: usize = 3 * LANES;
 
 /// The new places, as shares of the step along the route, across it, and up.
 const PATTERNS: [[[f64; 3]; LANES]; 2] = [pattern(0.7), pattern(-0.7)];
@@ -35,90 +31,100 @@ const fn pattern(diagonal: f64) -> [[f64; 3]; LANES] {
     ]
 }
 
-/// Cosines nearer than this to that of the greatest turn are not decided by it.
-const NEAR_LIMIT: f64 = 1e-9;
-
 /// Prices legs and joins them.
 pub(super) struct Lattice<'m, 's> {
     model: &'m Model<'s>,
     pricer: Pricer<'s>,
+    /// Where a leg that breaks a limit is worth nothing.
+    verdicts: Pricer<'s>,
     tolerance: Tolerance,
     /// Tangent of the steepest climb.
     steepest: f64,
-    cos_turn: f64,
-    max_turn_deg: f64,
+    /// Whether heights take long to measure.
+    hilly: bool,
     pub(super) legs_priced: u64,
     waypoints: Vec<Waypoint>,
+    /// Between the places of neighbours, in order.
     legs: Vec<Leg>,
-    reached: Vec<Reached>,
+    ways: Ways,
+    clear: ClearWays,
+    /// Place of each waypoint on the best way.
+    chosen: Vec<usize>,
+    /// Of each leg, by the places of its ends: whether its heights are in its price.
+    measured: Vec<[[bool; CHOICES]; CHOICES]>,
     from: Vec<PointRow>,
     to: Vec<PointRow>,
     prices: Vec<Price>,
 }
 
-/// Where a waypoint may go; an end of the route stays, and none but its own place counts.
-struct Waypoint {
-    own: Point3,
-    new: PointRow,
-    /// What each place costs by itself, its own first.
-    violation: Each,
-    cost: Each,
-}
-
-/// From the places of one waypoint to those of the next, the latter's own prices included.
-#[derive(Clone)]
-struct Leg {
-    violation: Pairs,
-    cost: Pairs,
-    /// Horizontal unit vectors; zero where a leg has no heading.
-    east: Pairs,
-    north: Pairs,
-}
-
-/// The best ways to the end of a leg.
-#[derive(Clone)]
-struct Reached {
-    violation: Pairs,
-    cost: Pairs,
-    /// Place of the waypoint before the leg's start.
-    from: [[u8; CHOICES]; CHOICES],
-}
-
-const EMPTY: Pairs = [[0.0; CHOICES]; CHOICES];
-
 impl<'m, 's> Lattice<'m, 's> {
     pub(super) fn new(model: &'m Model<'s>) -> Self {
-        let vehicle = &model.scenario.vehicle;
         let tolerance = model.tolerance.scaled(PRICED_FROM);
+        let pricer = Pricer::new(model, model.scenario.planner.quadrature, tolerance);
         Self {
             model,
-            pricer: Pricer::new(model, model.scenario.planner.quadrature, tolerance),
+            verdicts: pricer.clone().verdicts(),
+            hilly: pricer.is_hilly(),
+            pricer,
             tolerance,
-            steepest: libm::tan(vehicle.max_climb_deg.to_radians()),
-            cos_turn: libm::cos(vehicle.max_turn_deg.to_radians()),
-            max_turn_deg: vehicle.max_turn_deg,
+            steepest: libm::tan(model.scenario.vehicle.max_climb_deg.to_radians()),
             legs_priced: 0,
             waypoints: Vec::new(),
             legs: Vec::new(),
-            reached: Vec::new(),
+            ways: Ways::new(model, tolerance),
+            clear: ClearWays::new(Turns::new(model, tolerance)),
+            chosen: Vec::new(),
+            measured: Vec::new(),
             from: Vec::new(),
             to: Vec::new(),
             prices: Vec::new(),
         }
     }
 
-    /// Move the waypoints of `route` to the best combination of places one `step` away; `turn` tells
-    /// one sweep from the next. Whether any moved.
-    pub(super) fn sweep(&mut self, route: &mut [Point3], step: f64, turn: usize) -> bool {
+    /// Move the waypoints of `route`, which may be `feasible`, to the best combination of places one
+    /// `step` away; `turn` tells one sweep from the next. Whether any moved.
+    pub(super) fn sweep(
+        &mut self,
+        route: &mut [Point3],
+        feasible: bool,
+        step: f64,
+        turn: usize,
+    ) -> bool {
         let last = route.len() - 1;
         self.waypoints.clear();
         for idx in 0..=last {
             let waypoint = self.waypoint(route, idx, step, turn);
             self.waypoints.push(waypoint);
         }
-        self.price_legs(last);
-        self.reach(last);
-        self.trace_back(route)
+        if !(feasible && self.find_clear(last)) {
+            self.price_legs(last, false);
+            self.ways.reach(&self.legs);
+            self.ways.trace_back(&mut self.chosen);
+        }
+        let mut moved = false;
+        for (idx, &place) in self.chosen.iter().enumerate() {
+            route[idx] = self.waypoints[idx].place(place);
+            moved |= place != 0;
+        }
+        moved
+    }
+
+    /// Choose the best way where the route keeps every limit; the best way then keeps them, too. Above hills
+    /// legs are priced at best, and measured until all those of the best way are as good as that.
+    fn find_clear(&mut self, last: usize) -> bool {
+        self.price_legs(last, self.hilly);
+        self.clear.set(&self.legs);
+        self.measured.clear();
+        let mut measured = [[false; CHOICES]; CHOICES];
+        // The route itself keeps its heights.
+        measured[0][0] = true;
+        self.measured.resize(last, measured);
+        while self.clear.find(&self.legs, &mut self.chosen) {
+            if !(self.hilly && self.measure()) {
+                return true;
+            }
+        }
+        false
     }
 
     fn waypoint(&self, route: &[Point3], idx: usize, step: f64, turn: usize) -> Waypoint {
@@ -130,29 +136,26 @@ impl<'m, 's> Lattice<'m, 's> {
             cost: [0.0; CHOICES],
         };
         if idx > 0 && idx + 1 < route.len() {
-            waypoint.new = self.places(route, idx, step, turn);
-            for place in 0..CHOICES {
-                let (violation, cost) = self.model.waypoint(waypoint.place(place), self.tolerance);
+            let (new, ground) = self.places(route, idx, step, turn);
+            waypoint.new = new;
+            for (place, ground) in ground.into_iter().enumerate() {
+                let point = waypoint.place(place);
+                let (violation, cost) = self.model.waypoint_above(point, ground, self.tolerance);
                 (waypoint.violation[place], waypoint.cost[place]) = (violation, cost);
             }
         }
         waypoint
     }
 
-    /// Places that waypoint `idx` of a route up to `last` has.
-    fn count(idx: usize, last: usize) -> usize {
-        if idx == 0 || idx == last { 1 } else { CHOICES }
-    }
-
     /// Price every leg between places of neighbours: those of the route itself last, the others in
     /// rows that lead to the eight new places of one waypoint, or come from them.
-    fn price_legs(&mut self, last: usize) {
+    fn price_legs(&mut self, last: usize, at_best: bool) {
         self.from.clear();
         self.to.clear();
         for leg_idx in 0..last {
             let (a, b) = (&self.waypoints[leg_idx], &self.waypoints[leg_idx + 1]);
             if leg_idx + 1 < last {
-                for place in 0..Self::count(leg_idx, last) {
+                for place in 0..count(leg_idx, last) {
                     self.from.push(PointRow::splat(a.place(place)));
                     self.to.push(b.new);
                 }
@@ -166,32 +169,23 @@ impl<'m, 's> Lattice<'m, 's> {
         let own = self.from.len();
         for leg_idx in 0..last {
             let (a, b) = (self.waypoints[leg_idx].own, self.waypoints[leg_idx + 1].own);
-            let lane = leg_idx % LANES;
-            if lane == 0 {
-                // Lanes that are left over repeat a leg.
-                self.from.push(PointRow::splat(a));
-                self.to.push(PointRow::splat(b));
-            } else {
-                let row = self.from.len() - 1;
-                self.from[row].set(lane, a);
-                self.to[row].set(lane, b);
-            }
+            self.push_leg(leg_idx, a, b);
         }
         self.prices.clear();
         self.prices.resize(self.from.len(), Price::ZERO);
-        self.pricer.legs(&self.from, &self.to, &mut self.prices);
+        if at_best {
+            self.pricer
+                .legs_at_best(&self.from, &self.to, &mut self.prices);
+        } else {
+            self.pricer.legs(&self.from, &self.to, &mut self.prices);
+        }
         self.legs.clear();
         let mut rows = self.prices.iter();
         let mut next = || rows.next().expect("as many rows as were priced");
         for leg_idx in 0..last {
-            let mut leg = Leg {
-                violation: EMPTY,
-                cost: EMPTY,
-                east: EMPTY,
-                north: EMPTY,
-            };
+            let mut leg = Leg::EMPTY;
             if leg_idx + 1 < last {
-                for place in 0..Self::count(leg_idx, last) {
+                for place in 0..count(leg_idx, last) {
                     let price = next();
                     leg.violation[place][1..].copy_from_slice(&price.violation);
                     leg.cost[place][1..].copy_from_slice(&price.cost);
@@ -208,94 +202,67 @@ impl<'m, 's> Lattice<'m, 's> {
             leg.violation[0][0] = self.prices[row].violation[lane];
             leg.cost[0][0] = self.prices[row].cost[lane];
             let (a, b) = (&self.waypoints[leg_idx], &self.waypoints[leg_idx + 1]);
-            leg.finish(a, b, Self::count(leg_idx, last));
+            leg.finish(a, b, count(leg_idx, last));
             self.legs.push(leg);
         }
     }
 
-    /// The best way to the end of every leg between places, from the start on.
-    fn reach(&mut self, last: usize) {
-        self.reached.clear();
-        let first = &self.legs[0];
-        self.reached.push(Reached {
-            violation: first.violation,
-            cost: first.cost,
-            from: [[0; CHOICES]; CHOICES],
-        });
-        for leg_idx in 1..last {
-            let (before, leg) = (&self.legs[leg_idx - 1], &self.legs[leg_idx]);
-            let arrivals = &self.reached[leg_idx - 1];
-            let mut reached = Reached {
-                violation: leg.violation,
-                cost: leg.cost,
-                from: [[0; CHOICES]; CHOICES],
-            };
-            let sources = Self::count(leg_idx - 1, last);
-            for b in 0..CHOICES {
-                let price = |from: usize| Fitness {
-                    violation: arrivals.violation[from][b],
-                    cost: arrivals.cost[from][b],
-                };
-                let way = |from: usize| Vector2::new(before.east[from][b], before.north[from][b]);
-                let best = (1..sources).fold(0, |best, from| {
-                    if price(from).beats(&price(best)) {
-                        from
-                    } else {
-                        best
-                    }
-                });
-                for c in 0..Self::count(leg_idx + 1, last) {
-                    let onto = Vector2::new(leg.east[b][c], leg.north[b][c]);
-                    // Most departures need but one look.
-                    let excess = self.excess_turn(way(best), onto);
-                    let (mut arrival, mut from) = (price(best), best);
-                    arrival.violation += excess;
-                    if excess > 0.0 {
-                        for other in 0..sources {
-                            let mut turned = price(other);
-                            if turned.violation > arrival.violation {
-                                continue;
-                            }
-                            turned.violation += self.excess_turn(way(other), onto);
-                            if turned.beats(&arrival) {
-                                (arrival, from) = (turned, other);
-                            }
-                        }
-                    }
-                    reached.violation[b][c] += arrival.violation;
-                    reached.cost[b][c] += arrival.cost;
-                    reached.from[b][c] = u8::try_from(from).expect("there are nine places");
+    /// Measure the heights of the legs of the best way, and of a few others beside those;
+    /// whether any breaks a limit.
+    fn measure(&mut self) -> bool {
+        self.from.clear();
+        self.to.clear();
+        let mut legs = Vec::new();
+        for leg_idx in 0..self.measured.len() {
+            self.choose(leg_idx, self.chosen[leg_idx + 1], &mut legs);
+        }
+        for idx in 0..legs.len() {
+            let (leg_idx, ..) = legs[idx];
+            for b in 0..count(leg_idx + 1, self.measured.len()) {
+                if legs.len() < AT_ONCE {
+                    self.choose(leg_idx, b, &mut legs);
                 }
             }
-            self.reached.push(reached);
         }
-    }
-
-    /// From the target back along the best way.
-    fn trace_back(&self, route: &mut [Point3]) -> bool {
-        let last = route.len() - 1;
-        let end = &self.reached[last - 1];
-        let price = |place: usize| Fitness {
-            violation: end.violation[place][0],
-            cost: end.cost[place][0],
-        };
-        let (mut b, mut c) = (0, 0);
-        for place in 1..Self::count(last - 1, last) {
-            if price(place).beats(&price(b)) {
-                b = place;
+        self.prices.clear();
+        self.prices.resize(self.from.len(), Price::ZERO);
+        self.verdicts
+            .heights_of_legs(&self.from, &self.to, legs.len(), &mut self.prices);
+        let mut worse = false;
+        for (idx, (leg_idx, a, b)) in legs.into_iter().enumerate() {
+            if self.prices[idx / LANES].violation[idx % LANES] > 0.0 {
+                self.clear.break_off(leg_idx, a, b);
+                worse = true;
             }
         }
-        let mut moved = false;
-        for leg_idx in (0..last).rev() {
-            route[leg_idx] = self.waypoints[leg_idx].place(b);
-            moved |= b != 0;
-            (b, c) = (usize::from(self.reached[leg_idx].from[b][c]), b);
-        }
-        moved
+        worse
     }
 
-    /// New places of waypoint `idx`. Frames follow the legs before, after and between by turns.
-    fn places(&self, route: &[Point3], idx: usize, step: f64, turn: usize) -> PointRow {
+    /// Add leg number `leg_idx` from the best way's place to `b` to the `legs` to be measured, once.
+    fn choose(&mut self, leg_idx: usize, b: usize, legs: &mut Vec<(usize, usize, usize)>) {
+        let a = self.chosen[leg_idx];
+        if !std::mem::replace(&mut self.measured[leg_idx][a][b], true) {
+            let (from, to) = (&self.waypoints[leg_idx], &self.waypoints[leg_idx + 1]);
+            self.push_leg(legs.len(), from.place(a), to.place(b));
+            legs.push((leg_idx, a, b));
+        }
+    }
+
+    /// Add a leg as number `idx` of those priced lane by lane.
+    fn push_leg(&mut self, idx: usize, a: Point3, b: Point3) {
+        if idx.is_multiple_of(LANES) {
+            // Lanes that are left over repeat a leg.
+            self.from.push(PointRow::splat(a));
+            self.to.push(PointRow::splat(b));
+        } else {
+            let row = self.from.len() - 1;
+            self.from[row].set(idx % LANES, a);
+            self.to[row].set(idx % LANES, b);
+        }
+    }
+
+    /// New places of waypoint `idx`, and the elevation of the ground at all. Frames follow the legs before, after and between by turns.
+    fn places(&self, route: &[Point3], idx: usize, step: f64, turn: usize) -> (PointRow, Each) {
         let here = route[idx];
         let (before, after) = (route[idx - 1].xy(), route[idx + 1].xy());
         let way = match turn % 3 {
@@ -313,7 +280,8 @@ impl<'m, 's> Lattice<'m, 's> {
         let scenario = self.model.scenario;
         let band = scenario.altitude;
         let middle = 0.5 * (band.min + band.max);
-        let height = here.z - scenario.terrain.elevation(here.xy());
+        let mut grounds = [scenario.terrain.elevation(here.xy()); CHOICES];
+        let height = here.z - grounds[0];
         let mut places = PointRow::splat(here);
         for (lane, [a, c, rise]) in PATTERNS[turn % 2].into_iter().enumerate() {
             let at = scenario
@@ -324,10 +292,12 @@ impl<'m, 's> Lattice<'m, 's> {
             if (height - middle) * (raised - middle) < 0.0 {
                 raised = middle;
             }
-            let z = scenario.terrain.elevation(at) + raised.clamp(band.min, band.max);
+            let ground = scenario.terrain.elevation(at);
+            grounds[lane + 1] = ground;
+            let z = ground + raised.clamp(band.min, band.max);
             places.set(lane, self.reachable(at, z));
         }
-        places
+        (places, grounds)
     }
 
     /// `z`, or the height nearest to it that can be climbed to from the start and from the target.
@@ -338,59 +308,38 @@ impl<'m, 's> Lattice<'m, 's> {
         }
         Point3::new(at.x, at.y, z)
     }
-
-    /// Degrees beyond the turn limit from one unit vector to the next.
-    fn excess_turn(&self, before: Vector2, after: Vector2) -> f64 {
-        let dot = before.dot(&after);
-        // Most turns are well within; a leg without heading does not turn.
-        if dot > self.cos_turn + NEAR_LIMIT
-            || before == Vector2::zeros()
-            || after == Vector2::zeros()
-        {
-            return 0.0;
-        }
-        let turn = wrap_angle(libm::atan2(before.perp(&after), dot)).abs();
-        let amount = turn.to_degrees() - self.max_turn_deg;
-        if amount > self.tolerance.angle_deg {
-            amount
-        } else {
-            0.0
-        }
-    }
 }
 
-impl Waypoint {
-    fn place(&self, place: usize) -> Point3 {
-        if place == 0 {
-            self.own
-        } else {
-            self.new.get(place - 1)
-        }
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::price::price;
+    use crate::planner::starts;
+    use crate::planner::tests::hilly_scenario;
+    use crate::planner::{Nobody, plan};
 
-    /// One coordinate of each place.
-    fn each(own: f64, new: &Row) -> Each {
-        let mut each = [own; CHOICES];
-        each[1..].copy_from_slice(new);
-        each
-    }
-}
-
-impl Leg {
-    /// Add what the places of `b` cost, and the ways from those of `a`, of which so many count.
-    fn finish(&mut self, a: &Waypoint, b: &Waypoint, count: usize) {
-        let xs = Waypoint::each(b.own.x, &b.new.x);
-        let ys = Waypoint::each(b.own.y, &b.new.y);
-        for from in 0..count {
-            let at = a.place(from);
-            for to in 0..CHOICES {
-                self.violation[from][to] += b.violation[to];
-                self.cost[from][to] += b.cost[to];
-                let (dx, dy) = (xs[to] - at.x, ys[to] - at.y);
-                let length = (dx * dx + dy * dy).sqrt();
-                let inverse = if length < LEVEL { 0.0 } else { 1.0 / length };
-                (self.east[from][to], self.north[from][to]) = (dx * inverse, dy * inverse);
+    /// From a feasible route the quick way and the thorough one choose the same places.
+    #[test]
+    fn the_clear_way_is_the_best_of_all() {
+        let mut scenario = hilly_scenario();
+        scenario.planner.iterations = 3;
+        for seed in 0..4 {
+            scenario.planner.seed = seed;
+            let model = Model::new(&scenario);
+            let mut route = plan(&scenario, &mut Nobody, &Nobody).waypoints;
+            route = starts::with_waypoints(&model, route, 7);
+            let (mut quick, mut thorough) = (Lattice::new(&model), Lattice::new(&model));
+            let mut moves = 0;
+            for turn in 0..12 {
+                let step = 60.0 / (1.0 + turn as f64);
+                let mut other = route.clone();
+                let feasible = price(&model, &route).is_feasible();
+                let moved = quick.sweep(&mut route, feasible, step, turn);
+                assert_eq!(moved, thorough.sweep(&mut other, false, step, turn));
+                assert_eq!(route, other, "seed {seed}, turn {turn}");
+                moves += usize::from(feasible && moved);
             }
+            assert!(moves > 2, "{moves}");
         }
     }
 }

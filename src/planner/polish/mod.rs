@@ -1,6 +1,9 @@
 //! Makes a good route better, to the last metre: descent on a lattice that shrinks.
 
+mod clear;
 mod lattice;
+mod turns;
+mod ways;
 
 use super::price::price;
 use super::{Stop, same, why_stop};
@@ -62,7 +65,10 @@ impl<'m, 's> Polish<'m, 's> {
         while step > to * way && why_stop(scenario, self.stop).is_none() {
             let mut trial = route.clone();
             let mut better = false;
-            if self.lattice.sweep(&mut trial, step, kind) {
+            if self
+                .lattice
+                .sweep(&mut trial, best.is_feasible(), step, kind)
+            {
                 let exact = price(self.model, &trial);
                 if exact.beats(&best) {
                     better = exact.violation < best.violation

@@ -3,14 +3,20 @@
 //! A straight part is checked against the obstacles only when its turn comes, and far obstacles join
 //! only when one of them is found in the way.
 
-use std::cmp::{Ordering, Reverse};
-use std::collections::{BinaryHeap, HashMap};
-use std::hash::{BuildHasherDefault, Hasher};
+mod check;
+mod place;
+mod way;
 
-use super::super::arc::{Arc, Rounding, Sense, Tangent, crossing, tangent};
-use super::super::obstacles::{Corner, Obstacles};
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap};
+use std::hash::BuildHasherDefault;
+
 use super::{Limits, Piece, TautString, TautStrings, same};
 use crate::geometry::Point2;
+use crate::seeding::arc::{Arc, Tangent};
+use crate::seeding::obstacles::{Corner, Obstacles};
+use place::{Mix, Place};
+use way::{Step, Way};
 
 /// With so many corners or fewer, all take part from the beginning when several strings are wanted.
 const FEW_CORNERS: usize = 64;
@@ -27,56 +33,6 @@ const FIRST_REACH_OF_FEW: f64 = 0.02;
 
 /// So many ways are looked at between two questions whether to stop.
 const WAYS_UNWATCHED: usize = 1_000;
-
-/// An arrival at a corner: the string so far.
-struct Step {
-    place: Place,
-    /// From which step, along which arc of its circle, then straight.
-    before: Option<(usize, Arc, Tangent)>,
-    length: f64,
-    /// Where it is, for a first guess at what lies ahead.
-    at: Point2,
-    /// Ways on are known as far as strings up to this length are concerned.
-    reach: f64,
-    /// By how much the reach grows next.
-    growth: f64,
-}
-
-/// A corner and the sense in which it is rounded, or an end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-enum Place {
-    Start,
-    Corner(usize, bool),
-    Target,
-}
-
-/// A way on from a step that has not been checked yet, ordered by the length of the shortest string
-/// that it could become, then by age. Back to the start stands for all ways beyond the step's reach.
-struct Way {
-    least: f64,
-    age: usize,
-    step: usize,
-    to: Place,
-}
-
-impl PartialEq for Way {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Way {}
-impl PartialOrd for Way {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Way {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.least
-            .total_cmp(&other.least)
-            .then(self.age.cmp(&other.age))
-    }
-}
 
 /// A search for the shortest few strings of one scene.
 pub(super) struct Search<'o> {
@@ -154,67 +110,6 @@ impl<'o> Search<'o> {
             }
         }
         self.ways > self.limits.most_ways
-    }
-
-    fn rounding(&self, place: Place) -> Rounding {
-        let end = |center| Rounding {
-            center,
-            radius: 0.0,
-            sense: Sense::Left,
-        };
-        match place {
-            Place::Start => end(self.obstacles.ends[0]),
-            Place::Target => end(self.obstacles.ends[1]),
-            Place::Corner(corner, left) => Rounding {
-                center: self.obstacles.corners[corner].center,
-                radius: self.obstacles.corners[corner].radius,
-                sense: if left { Sense::Left } else { Sense::Right },
-            },
-        }
-    }
-
-    fn corner(&self, place: Place) -> Option<&Corner> {
-        match place {
-            Place::Corner(corner, _) => Some(&self.obstacles.corners[corner]),
-            Place::Start | Place::Target => None,
-        }
-    }
-
-    /// The straight part from the circle of one place to that of the next, where a string can bend so at
-    /// both.
-    fn straight(&self, from: Place, to: Place) -> Option<Tangent> {
-        let straight = tangent(&self.rounding(from), &self.rounding(to))?;
-        for place in [from, to] {
-            if let (Some(corner), Place::Corner(_, left)) = (self.corner(place), place)
-                && let Some(edges) = corner.edges
-            {
-                // The edges must lie on the side that the string bends to.
-                let side = if left { 1.0 } else { -1.0 };
-                if edges
-                    .iter()
-                    .any(|edge| straight.along.perp(edge) * side < -1e-9)
-                {
-                    return None;
-                }
-            }
-        }
-        Some(straight)
-    }
-
-    /// The part along the circle of `step` up to `straight`, where a string can go on so.
-    fn arc(&self, step: &Step, straight: &Tangent) -> Option<Arc> {
-        let on = self.rounding(step.place);
-        let arc = match &step.before {
-            None => {
-                let away = outward(&on, straight);
-                Arc::new(on, away, away)
-            }
-            Some((_, _, before)) => Arc::new(on, outward(&on, before), outward(&on, straight)),
-        };
-        // Nor does a string turn back at the corner of a ring.
-        let turns_back = self.corner(step.place).is_some_and(|c| c.edges.is_some())
-            && arc.turn > std::f64::consts::PI + 1e-9;
-        (!turns_back).then_some(arc)
     }
 
     fn add_step(
@@ -354,20 +249,6 @@ impl<'o> Search<'o> {
         self.add_step(way.to, before, length, straight.to);
     }
 
-    fn in_the_way_of(&mut self, from: Place, arc: &Arc, to: Place, way: &Tangent) -> Option<usize> {
-        let own = |place| self.corner(place).map_or(&[][..], |corner| &corner.bodies);
-        if let Some(outline) = self.obstacles.blocks_arc(arc, own(from)) {
-            return Some(outline);
-        }
-        if let Some(known) = self.blocked.get(&(from, to)) {
-            return *known;
-        }
-        let both: Vec<usize> = own(from).iter().chain(own(to)).copied().collect();
-        let found = self.obstacles.blocks_segment(way.from, way.to, &both);
-        self.blocked.insert((from, to), found);
-        found
-    }
-
     /// Let the corners of `outline` take part, as if they always had.
     fn activate(&mut self, outline: usize) {
         if self.is_active[outline] {
@@ -381,45 +262,6 @@ impl<'o> Search<'o> {
                 self.push_corner(step, corner, f64::NEG_INFINITY);
             }
         }
-    }
-
-    /// Whether a string comes back to a corner in the same sense, or crosses an earlier part of
-    /// itself: it winds round something for nothing.
-    fn crosses_itself(&self, way: &Way, straight: &Tangent) -> bool {
-        let mut step = way.step;
-        loop {
-            if self.steps[step].place == way.to {
-                return true;
-            }
-            let Some((before, _, earlier)) = &self.steps[step].before else {
-                return false;
-            };
-            if crossing((earlier.from, earlier.to), (straight.from, straight.to)).is_some() {
-                return true;
-            }
-            step = *before;
-        }
-    }
-
-    /// Whether `k` earlier arrivals at `place` reach this one's point along the circle without
-    /// being longer, so that whatever it becomes, they become something better.
-    fn is_dominated(&self, place: Place, straight: &Tangent, length: f64) -> bool {
-        let Some(earlier) = self.arrivals.get(&place) else {
-            return false;
-        };
-        let on = self.rounding(place);
-        let here = outward(&on, straight);
-        let own = self.corner(place).map_or(&[][..], |corner| &corner.bodies);
-        let better = earlier.iter().filter(|&&step| {
-            let Some((_, _, before)) = &self.steps[step].before else {
-                return false;
-            };
-            let arc = Arc::new(on, outward(&on, before), here);
-            self.steps[step].length + arc.length() <= length
-                && self.obstacles.blocks_arc(&arc, own).is_none()
-                && !self.obstacles.leaves_area(&arc)
-        });
-        better.take(self.k).count() >= self.k
     }
 
     fn string(&self, last: usize, arc: &Arc, straight: &Tangent, length: f64) -> TautString {
@@ -448,42 +290,5 @@ impl<'o> Search<'o> {
         }
         pieces.reverse();
         TautString { length, pieces }
-    }
-}
-
-/// From the centre of the circle to where the tangent touches it.
-fn outward(on: &Rounding, tangent: &Tangent) -> nalgebra::Vector2<f64> {
-    nalgebra::Vector2::new(tangent.along.y, -tangent.along.x) * on.sense.sign()
-}
-
-/// Mixes the few whole numbers that a [`Place`] is made of; nobody picks them to collide.
-#[derive(Default)]
-struct Mix(u64);
-
-impl Mix {
-    fn add(&mut self, value: u64) {
-        // The fractional part of the golden ratio: its multiples spread evenly.
-        self.0 = (self.0.rotate_left(23) ^ value).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    }
-}
-
-impl Hasher for Mix {
-    fn write(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            self.add(u64::from(*byte));
-        }
-    }
-
-    fn write_u8(&mut self, value: u8) {
-        self.add(u64::from(value));
-    }
-
-    fn write_usize(&mut self, value: usize) {
-        self.add(value as u64);
-    }
-
-    fn finish(&self) -> u64 {
-        // Tables look at the low bits first, which a product fills last.
-        self.0 ^ (self.0 >> 32)
     }
 }

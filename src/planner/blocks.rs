@@ -1,0 +1,292 @@
+//! Positions priced side by side, a block of [`LANES`] at a time.
+//!
+//! Above hills most of the time goes into the heights of legs, so that all positions are first priced as if
+//! they kept them. Where a position matters only if it beats a rival, most are thereby known not to; of the
+//! others those legs are measured of which it is not known how they fare. No price depends on which other
+//! positions are in a block.
+
+use super::coding::Coding;
+use super::kept::Kept;
+use crate::cost::batch::{LANES, PointRow, Price, Pricer, Row};
+use crate::geometry::Point3;
+use crate::optimizer::Fitness;
+
+/// Prices positions of one coding.
+pub(super) struct Blocks<'a, 's> {
+    coding: &'a Coding<'s>,
+    pricers: &'a Pricers<'s>,
+    kept: &'a mut Kept,
+    hilly: bool,
+    points: Vec<PointRow>,
+    /// Below free waypoints.
+    ground: Vec<Row>,
+    /// Of positions whose rivals break no limit, and of others.
+    unmeasured: [Unmeasured; 2],
+}
+
+/// Legs of routes that may be good enough, in order.
+#[derive(Default)]
+struct Unmeasured {
+    legs: Vec<Leg>,
+    from: Vec<PointRow>,
+    to: Vec<PointRow>,
+    prices: Vec<Price>,
+    /// Of `legs`, those not known.
+    unknown: usize,
+}
+
+struct Leg {
+    a: Point3,
+    b: Point3,
+    /// The number of its position.
+    owner: usize,
+    /// Its violation, where that is known.
+    known: Option<f64>,
+}
+
+/// So many are measured at once.
+const LEGS_AT_ONCE: usize = 16 * LANES;
+
+/// What prices routes.
+pub(super) struct Pricers<'s> {
+    /// In full.
+    full: Pricer<'s>,
+    /// Where a route that breaks a limit is worth nothing.
+    verdicts: Pricer<'s>,
+}
+
+impl<'s> Pricers<'s> {
+    pub(super) fn new(full: Pricer<'s>) -> Self {
+        Self {
+            verdicts: full.clone().verdicts(),
+            full,
+        }
+    }
+
+    /// Whether heights take long to measure, so that legs are worth remembering.
+    pub(super) fn is_hilly(&self) -> bool {
+        self.full.is_hilly()
+    }
+}
+
+impl<'a, 's> Blocks<'a, 's> {
+    pub(super) fn new(
+        coding: &'a Coding<'s>,
+        pricers: &'a Pricers<'s>,
+        kept: &'a mut Kept,
+    ) -> Self {
+        Self {
+            coding,
+            pricers,
+            kept,
+            hilly: pricers.is_hilly(),
+            points: Vec::new(),
+            ground: Vec::new(),
+            unmeasured: [Unmeasured::default(), Unmeasured::default()],
+        }
+    }
+
+    /// Price `fitness.len()` positions, as [`Objective::evaluate_against`] says where there are `rivals`.
+    /// `may_go_on` is asked before each block, of so many; what it refuses is [`Fitness::WORST`].
+    ///
+    /// [`Objective::evaluate_against`]: crate::optimizer::Objective::evaluate_against
+    pub(super) fn price(
+        &mut self,
+        positions: &[f64],
+        rivals: Option<&[Fitness]>,
+        fitness: &mut [Fitness],
+        mut may_go_on: impl FnMut(usize) -> bool,
+    ) {
+        let block = LANES * self.coding.bounds().dimension();
+        for (idx, positions) in positions.chunks(block).enumerate() {
+            let first = idx * LANES;
+            let count = LANES.min(fitness.len() - first);
+            if !may_go_on(count) {
+                fitness[first..first + count].fill(Fitness::WORST);
+                continue;
+            }
+            self.decode(positions, count);
+            if !self.hilly {
+                let price = self.pricers.full.first_routes(&self.points, count);
+                for lane in 0..count {
+                    fitness[first + lane] = of_lane(&price, lane);
+                }
+                continue;
+            }
+            let price = self
+                .pricers
+                .full
+                .routes_at_best(&self.points, &self.ground, count);
+            for lane in 0..count {
+                let (owner, at_best) = (first + lane, of_lane(&price, lane));
+                let rival = rivals.map_or(Fitness::WORST, |rivals| rivals[owner]);
+                fitness[owner] = at_best;
+                if at_best.beats(&rival) {
+                    let unmeasured = &mut self.unmeasured[usize::from(!rival.is_feasible())];
+                    unmeasured.push(&self.points, lane, owner, self.kept);
+                }
+            }
+            self.settle(LEGS_AT_ONCE, fitness);
+        }
+        self.settle(1, fitness);
+    }
+
+    /// Measure the legs that wait, if they are at least so many.
+    fn settle(&mut self, count: usize, fitness: &mut [Fitness]) {
+        // Where a violation is worth nothing, it is not known exactly and not worth knowing.
+        let ways = [(&self.pricers.verdicts, false), (&self.pricers.full, true)];
+        for (unmeasured, (pricer, exact)) in self.unmeasured.iter_mut().zip(ways) {
+            if unmeasured.legs.len() >= count {
+                unmeasured.settle(pricer, exact, self.kept, fitness);
+            }
+        }
+    }
+
+    /// The routes of up to [`LANES`] positions.
+    fn decode(&mut self, positions: &[f64], count: usize) {
+        let dimension = self.coding.bounds().dimension();
+        // Spare lanes repeat the last position.
+        let lanes = std::array::from_fn(|lane| {
+            let from = lane.min(count - 1) * dimension;
+            &positions[from..from + dimension]
+        });
+        self.coding.decode_lanes(
+            lanes,
+            &self.pricers.full,
+            &mut self.points,
+            &mut self.ground,
+        );
+    }
+}
+
+impl Unmeasured {
+    /// Add the legs of the route in lane `lane` of `points`, but for those that are `kept`.
+    fn push(&mut self, points: &[PointRow], lane: usize, owner: usize, kept: &Kept) {
+        for ends in points.windows(2) {
+            let (a, b) = (ends[0].get(lane), ends[1].get(lane));
+            let known = kept.violation(a, b);
+            if known.is_some_and(|violation| violation <= 0.0) {
+                continue;
+            }
+            if known.is_none() {
+                let lane = self.unknown % LANES;
+                if lane == 0 {
+                    self.from.push(PointRow::splat(a));
+                    self.to.push(PointRow::splat(b));
+                } else {
+                    let row = self.from.len() - 1;
+                    self.from[row].set(lane, a);
+                    self.to[row].set(lane, b);
+                }
+                self.unknown += 1;
+            }
+            self.legs.push(Leg { a, b, owner, known });
+        }
+    }
+
+    /// Measure them all, and add their violations to those of their positions, leg by leg.
+    fn settle(&mut self, pricer: &Pricer, exact: bool, kept: &mut Kept, fitness: &mut [Fitness]) {
+        self.prices.clear();
+        self.prices.resize(self.from.len(), Price::ZERO);
+        pricer.heights_of_legs(&self.from, &self.to, self.unknown, &mut self.prices);
+        let mut measured = 0;
+        for Leg { a, b, owner, known } in self.legs.drain(..) {
+            let violation = known.unwrap_or_else(|| {
+                let violation = self.prices[measured / LANES].violation[measured % LANES];
+                measured += 1;
+                if exact || violation <= 0.0 {
+                    kept.note(a, b, violation);
+                }
+                violation
+            });
+            fitness[owner].violation += violation;
+        }
+        self.from.clear();
+        self.to.clear();
+        self.unknown = 0;
+    }
+}
+
+fn of_lane(price: &Price, lane: usize) -> Fitness {
+    Fitness {
+        violation: price.violation[lane],
+        cost: price.cost[lane],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cost::Model;
+    use crate::optimizer::Random;
+    use crate::planner::coding::Cartesian;
+    use crate::planner::moves::Moves;
+    use crate::planner::tests::hilly_scenario;
+    use crate::planner::{Nobody, plan};
+
+    /// Whatever is known of legs, and against whatever rivals: a position that beats its rival has the
+    /// fitness that it has alone, in full, to the bit; no other beats its rival.
+    #[test]
+    fn a_position_that_beats_its_rival_is_priced_as_alone() {
+        let scenario = hilly_scenario();
+        let model = Model::new(&scenario);
+        let pricer = Pricer::new(
+            &model,
+            scenario.planner.quadrature,
+            model.tolerance.scaled(0.5),
+        );
+        let pricers = Pricers::new(pricer.clone());
+        let space = Cartesian::new(&scenario, 6);
+        let coding = Coding::Cartesian(space.clone());
+        let dimension = coding.bounds().dimension();
+        let in_full = |position: &[f64]| {
+            let (mut points, mut ground) = (Vec::new(), Vec::new());
+            coding.decode_lanes([position; LANES], &pricer, &mut points, &mut ground);
+            of_lane(&pricer.routes(&points), 0)
+        };
+        let (mut kept, mut random) = (Kept::of(1), Random::new(5));
+        let moves = Moves::new(&scenario);
+        let mut positions = vec![0.0; 37 * dimension];
+        let mut known = scenario.clone();
+        known.planner.waypoints = 6;
+        let known = plan(&known, &mut Nobody, &Nobody).waypoints;
+        for (idx, position) in positions.chunks_exact_mut(dimension).enumerate() {
+            if idx % 3 == 0 {
+                coding.bounds().draw(&mut random, position);
+            } else {
+                space.encode(&known, position);
+            }
+        }
+        let mut fitness = vec![Fitness::WORST; 37];
+        let (mut won, mut lost) = (0, 0);
+        for round in 0..30 {
+            let rivals = fitness.clone();
+            let mut found = rivals.clone();
+            let against = (round > 0).then_some(&rivals[..]);
+            Blocks::new(&coding, &pricers, &mut kept).price(
+                &positions,
+                against,
+                &mut found,
+                |_| true,
+            );
+            for (idx, position) in positions.chunks_exact(dimension).enumerate() {
+                let own = in_full(position);
+                if own.beats(&rivals[idx]) {
+                    let bits =
+                        |fitness: Fitness| [fitness.violation, fitness.cost].map(f64::to_bits);
+                    assert_eq!(bits(found[idx]), bits(own));
+                    fitness[idx] = own;
+                    won += 1;
+                } else {
+                    assert!(!found[idx].beats(&rivals[idx]));
+                    lost += 1;
+                }
+            }
+            for position in positions.chunks_exact_mut(dimension) {
+                moves.move_a_part(position, &mut random, 0.2);
+                coding.bounds().clamp(position);
+            }
+        }
+        assert!(won > 50 && lost > 50, "{won} {lost}");
+    }
+}

@@ -1,0 +1,69 @@
+//! Counts the routes that a search prices, and looks at the clock between them now and then.
+
+use super::{Stop, why_stop};
+use crate::scenario::Scenario;
+use crate::terrain::Terrain;
+use crate::threat::Shape;
+
+/// So many steps, each some nanoseconds, may pass between two looks at the clock.
+const STEPS_UNWATCHED: usize = 1_000_000;
+
+/// What a search has priced, and whether it may go on.
+pub(super) struct Watch<'s> {
+    scenario: &'s Scenario,
+    stop: &'s dyn Stop,
+    /// Evaluations between two looks at the clock.
+    pub(super) stride: u64,
+    /// Routes priced so far.
+    pub(super) evaluations: u64,
+    /// Whether the run was stopped within an iteration: what was left of it is
+    /// [`Fitness::WORST`](crate::optimizer::Fitness::WORST).
+    pub(super) interrupted: bool,
+}
+
+impl<'s> Watch<'s> {
+    pub(super) fn new(scenario: &'s Scenario, stop: &'s dyn Stop) -> Self {
+        Self {
+            scenario,
+            stop,
+            stride: (STEPS_UNWATCHED / steps(scenario)).max(1) as u64,
+            evaluations: 0,
+            interrupted: false,
+        }
+    }
+
+    /// Whether the next `count` routes may be priced, which are counted if so.
+    pub(super) fn may_price(&mut self, count: usize) -> bool {
+        let count = count as u64;
+        let since = self.evaluations % self.stride;
+        // There is always one route to deliver.
+        let due = self.evaluations > 0 && (since == 0 || since + count > self.stride);
+        if due && !self.interrupted {
+            self.interrupted = why_stop(self.scenario, self.stop).is_some();
+        }
+        if !self.interrupted {
+            self.evaluations += count;
+        }
+        !self.interrupted
+    }
+}
+
+/// About how many steps the pricing of one route takes.
+fn steps(scenario: &Scenario) -> usize {
+    let vertices = |shape: &Shape| match shape {
+        Shape::Cylinder(_) => 1,
+        Shape::Polygon(polygon) => 10 * polygon.vertices().len(),
+    };
+    let threats: usize = scenario
+        .threats
+        .iter()
+        .map(|threat| vertices(&threat.shape))
+        .sum();
+    let ground = match &scenario.terrain {
+        Terrain::Flat(_) => 1,
+        Terrain::Peaks(peaks) => 100 * (1 + peaks.peaks.len()),
+        Terrain::Grid(grid) => grid.columns + grid.rows,
+        Terrain::Dem(dem) => dem.raster().lattice.columns + dem.raster().lattice.rows,
+    };
+    (scenario.planner.waypoints + 1) * (1 + threats + ground)
+}

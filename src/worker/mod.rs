@@ -17,6 +17,8 @@ use tracing::Instrument as _;
 
 pub use sweeper::Sweeper;
 
+use self::run::Over;
+
 use crate::job::Failure;
 use crate::planner::{Observer, Outcome, Stop};
 use crate::store::{Clock, Lease, Store, StoreError};
@@ -128,20 +130,18 @@ impl Slot {
         let mut pause = Pause::default();
         let mut over = None;
         loop {
-            // The end of one run and the claim of the next wait for the disk together.
+            // The next run does not wait until the disk has the end of the one before.
             let conclusion = async {
                 if let Some(over) = over.take() {
                     self.conclude(over).await;
                 }
             };
-            let ((), claim) = tokio::join!(conclusion, self.claim());
-            match claim {
+            let ((), next) = tokio::join!(conclusion, self.run_next());
+            match next {
                 None => return,
-                Some(Ok(lease)) => {
+                Some(Ok(next)) => {
                     pause = Pause::default();
-                    let plan = lease.plan.id;
-                    let span = spans::of_run(plan, self.instruments.origins.of(plan).as_ref());
-                    over = self.run(lease).instrument(span).await;
+                    over = next;
                 }
                 Some(Err(error)) => {
                     tracing::warn!(%error, worker = self.number, "no plan could be claimed; trying again");
@@ -152,6 +152,17 @@ impl Slot {
                 }
             }
         }
+    }
+
+    /// Claim a plan and run it; `None` when no more are to be.
+    async fn run_next(&self) -> Option<Result<Option<Over>, StoreError>> {
+        let lease = match self.claim().await? {
+            Ok(lease) => lease,
+            Err(error) => return Some(Err(error)),
+        };
+        let plan = lease.plan.id;
+        let span = spans::of_run(plan, self.instruments.origins.of(plan).as_ref());
+        Some(Ok(self.run(lease).instrument(span).await))
     }
 
     /// The next plan to run; `None` when no more are to be.

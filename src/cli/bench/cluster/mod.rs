@@ -202,8 +202,8 @@ struct Scaled {
 async fn scale(arguments: &Arguments, workers: u16) -> anyhow::Result<Scaled> {
     let settings = arguments.settings()?;
     let nodes = Nodes::open(settings, workers, arguments.slots).await?;
-    // About three seconds of work.
-    let plans = (3_000 / arguments.job_ms).max(8) * u32::from(workers);
+    // About six seconds of work, so that its beginning and end count little.
+    let plans = (6_000 / arguments.job_ms).max(8) * u32::from(workers);
     nodes.accept(plans).await.context("accepting")?;
     let took = nodes.run(plans, arguments.job()).await.context("running")?;
     nodes.remove().await?;

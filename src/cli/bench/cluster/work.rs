@@ -105,7 +105,7 @@ async fn work(
                 left.checked_sub(1)
             })
             .is_ok();
-        // As the pool does: the end of one run and the claim of the next go together.
+        // As the pool does: the next run does not wait for the end of the one before.
         let conclusion = async {
             match over.take() {
                 Some(lease) => store
@@ -115,19 +115,19 @@ async fn work(
                 None => Ok(()),
             }
         };
-        let claim = async {
-            if has_more {
-                store.claim().await.map(Some)
-            } else {
-                Ok(None)
+        let run = async {
+            if !has_more {
+                return Ok(None);
             }
+            let lease = store.claim().await;
+            tokio::time::sleep(asleep).await;
+            lease.map(Some)
         };
-        let (concluded, lease) = tokio::join!(conclusion, claim);
+        let (concluded, lease) = tokio::join!(conclusion, run);
         concluded.context("finish")?;
         let Some(lease) = lease.context("claim")? else {
             return Ok(());
         };
-        tokio::time::sleep(asleep).await;
         over = Some(lease);
     }
 }

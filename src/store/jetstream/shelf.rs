@@ -218,32 +218,39 @@ impl Opened {
     }
 
     async fn list_files(&self) -> Result<BTreeSet<String>, StoreError> {
-        let what = || format!("files of {}", self.bucket);
         // Chunks first: those of a file that is finished meanwhile are its own.
-        let subjects = self.chunks.info_with_subjects(self.chunks_of(">")).await;
-        let subjects = subjects.map_err(|error| failed(&what(), &error))?;
-        let subjects: Vec<(String, usize)> = subjects
-            .try_collect()
-            .await
-            .map_err(|error| failed(&what(), &error))?;
-        let prefix = self.chunks_of("");
-        let ids = subjects.iter();
-        let ids = ids.filter_map(|(subject, _)| subject.strip_prefix(&prefix));
-        let mut unfinished: BTreeSet<&str> = ids.collect();
-        let mut objects = self
-            .files
-            .list()
-            .await
-            .map_err(|error| failed(&what(), &error))?;
+        let mut unfinished = self.under(&self.chunks_of("")).await?;
         let mut files = BTreeSet::new();
-        while let Some(object) = objects.next().await {
-            let object = object.map_err(|error| failed(&what(), &error))?;
-            unfinished.remove(&*object.nuid);
-            files.insert(object.name);
+        // One by one: a list of the client's waits for ever for what another node takes away meanwhile.
+        for head in self.under(&self.head_of("")).await? {
+            let name = URL_SAFE.decode(&head).ok();
+            let Some(name) = name.and_then(|name| String::from_utf8(name).ok()) else {
+                continue;
+            };
+            match self.files.info(&name).await {
+                Ok(object) => {
+                    unfinished.remove(&object.nuid);
+                    files.insert(name);
+                }
+                Err(error) if error.kind() == InfoErrorKind::NotFound => {}
+                Err(error) => return Err(failed(&format!("file {name}"), &error)),
+            }
         }
         let unfinished = unfinished.into_iter();
         files.extend(unfinished.map(|chunks| format!("{UNFINISHED}{chunks}")));
         Ok(files)
+    }
+
+    /// What follows a prefix in subjects of the stream.
+    async fn under(&self, prefix: &str) -> Result<BTreeSet<String>, StoreError> {
+        let what = || format!("files of {}", self.bucket);
+        let subjects = self.chunks.info_with_subjects(format!("{prefix}>")).await;
+        let subjects = subjects.map_err(|error| failed(&what(), &error))?;
+        let ends = subjects.try_filter_map(async |(subject, _)| {
+            Ok(subject.strip_prefix(prefix).map(str::to_owned))
+        });
+        let ends = ends.try_collect().await;
+        ends.map_err(|error| failed(&what(), &error))
     }
 
     async fn discard_file(&self, name: &str) -> Result<(), StoreError> {
@@ -256,7 +263,7 @@ impl Opened {
             Err(error) => return Err(failed(&format!("file {name}"), &error)),
         };
         // Without its head it is not found any more; chunks that remain are found as unfinished.
-        let head = format!("$O.{}.M.{}", self.bucket, URL_SAFE.encode(name));
+        let head = self.head_of(&URL_SAFE.encode(name));
         self.purge(head).await?;
         self.purge(self.chunks_of(&object.nuid)).await
     }
@@ -265,6 +272,10 @@ impl Opened {
         let purged = self.chunks.purge().filter(&subject).await;
         purged.map_err(|error| failed(&subject, &error))?;
         Ok(())
+    }
+
+    fn head_of(&self, file: &str) -> String {
+        format!("$O.{}.M.{file}", self.bucket)
     }
 
     fn chunks_of(&self, file: &str) -> String {

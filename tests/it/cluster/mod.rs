@@ -3,6 +3,7 @@
 mod chaos;
 mod nodes;
 mod outages;
+mod partition;
 mod processes;
 mod servers;
 

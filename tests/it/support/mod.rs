@@ -16,6 +16,7 @@ pub(crate) mod run;
 pub(crate) mod server;
 pub(crate) mod sse;
 pub(crate) mod stores;
+pub(crate) mod wire;
 
 use serde_json::{Value, json};
 

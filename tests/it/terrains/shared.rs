@@ -146,6 +146,20 @@ async fn what_one_node_uploads_every_node_plans_over() {
     assert_eq!(files(&address).await, 0);
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn nodes_that_sweep_at_once_wait_for_nothing_that_the_other_takes_away() {
+    let address = nats::address();
+    let (a, b) = (Node::new(&address), Node::new(&address));
+    for height in 1..=20 {
+        let hill = hill(f64::from(height));
+        assert_eq!(put(&a.api, "/terrains/hill", hill).await.status, 201);
+        assert_eq!(b.api.delete("/terrains/hill").await.status, 204);
+        tokio::join!(a.sweep(BTreeSet::new()), b.sweep(BTreeSet::new()));
+    }
+    a.sweep(BTreeSet::new()).await;
+    assert_eq!(files(&address).await, 0);
+}
+
 /// Files on the servers, whole ones and others.
 async fn files(address: &str) -> usize {
     let shelf = shelf(address);

@@ -1,0 +1,99 @@
+//! A node that is cut off from the servers, and one whose clock is wrong.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use noctule::job::{Event, Status};
+use noctule::store::jetstream::JetStreamStore;
+use noctule::store::{Options, Store, wall_clock};
+
+use super::open;
+use crate::support::nats::{self, NatsServer, namespace};
+use crate::support::plans::{ending, history, kind, point, submission, until};
+use crate::support::stores::{LEASE, node};
+use crate::support::wire::Wire;
+
+/// Steps that are written while the other node is away: more than what waits in sockets.
+const STEPS: usize = 300;
+
+/// Events of each.
+const EVENTS: usize = 40;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_node_that_is_cut_off_loses_its_run_and_catches_up_when_it_is_back() {
+    let server = NatsServer::start();
+    let address = server.address();
+    let wire = Wire::to(server.host()).await;
+    let by_wire = format!("nats://{}/{}", wire.host(), namespace(&address));
+    let (near, far) = tokio::join!(open(&address), open(&by_wire));
+    let id = near.submit(submission()).await.unwrap().plan.id;
+    let lost = far.claim().await.unwrap();
+    far.append(&lost, vec![point(1, None)]).await.unwrap();
+
+    wire.cut();
+    let taken = near.claim().await.unwrap();
+    assert_eq!((taken.plan.id, taken.attempt), (id, lost.attempt + 1));
+    assert_eq!(kind(far.health().await), Err("unavailable"));
+    // What is known is still told.
+    assert_eq!(far.get(id).await.unwrap().status, Status::Running);
+    assert_eq!(kind(far.submit(submission()).await), Err("unavailable"));
+    for _ in 0..STEPS {
+        near.append(&taken, vec![point(2, None); EVENTS])
+            .await
+            .unwrap();
+    }
+
+    wire.mend();
+    while far.health().await.is_err() {
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    let late = far
+        .finish(&lost, Vec::new(), ending(Status::Succeeded), 0)
+        .await;
+    assert_eq!(kind(late), Err("lease lost"));
+    near.finish(&taken, vec![point(3, None)], ending(Status::Succeeded), 0)
+        .await
+        .unwrap();
+    until(&*far, id, |plan| plan.status == Status::Succeeded).await;
+    let told = history(&*far, id).await;
+    // Queued, running, a point; queued and running again; the points; succeeded, the end.
+    assert_eq!(told.len(), 3 + 2 + STEPS * EVENTS + 1 + 2);
+    assert_eq!(told.last(), Some(&Event::End(Status::Succeeded)));
+    assert_eq!(told, history(&*near, id).await);
+
+    let next = far.submit(submission()).await.unwrap().plan.id;
+    assert_eq!(near.claim().await.unwrap().plan.id, next);
+}
+
+/// A node whose clock is wrong by so much.
+async fn open_at(address: &str, off_ms: i64) -> Arc<dyn Store> {
+    let clock = wall_clock();
+    let options = Options {
+        clock: Arc::new(move || clock() + off_ms),
+        ..Options::new(1_000)
+    };
+    let opened = JetStreamStore::open(node(address), options).await;
+    Arc::new(opened.unwrap())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_wrong_clock_takes_no_run_from_anybody() {
+    let address = nats::address();
+    let hours = 3_600_000;
+    let (fast, slow) = tokio::join!(open_at(&address, 5 * hours), open_at(&address, -5 * hours));
+    for (accepting, running) in [(&fast, &slow), (&slow, &fast)] {
+        let id = accepting.submit(submission()).await.unwrap().plan.id;
+        let lease = running.claim().await.unwrap();
+        assert_eq!(lease.plan.id, id);
+        let stolen = tokio::time::timeout(2 * LEASE, accepting.claim()).await;
+        assert!(stolen.is_err(), "{stolen:?}");
+        running
+            .finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
+            .await
+            .unwrap();
+        until(&**accepting, id, |plan| plan.status == Status::Succeeded).await;
+        assert_eq!(history(&**accepting, id).await.len(), 4);
+    }
+}

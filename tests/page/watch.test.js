@@ -13,7 +13,7 @@ after(async () => {
 });
 
 /** A search that lasts until it is told to end. */
-const LONG = { '/planner/iterations': 20000, '/planner/population': 100, '/planner/waypoints': 8 };
+const LONG = { '/planner/iterations': 100000, '/planner/population': 100, '/planner/waypoints': 8 };
 
 test('the swarm is seen converging, and cancelling keeps the best', async () => {
   const page = await open(chrome, site.url);
@@ -24,7 +24,7 @@ test('the swarm is seen converging, and cancelling keeps the best', async () => 
   const live = await scene(page);
   assert.equal(live.routes.find((route) => route.name === 'route').points, 10);
   assert.match(await page.textContent('#state'), /running/);
-  assert.match(await page.textContent('#figures'), /Iteration \d+ of 20000/);
+  assert.match(await page.textContent('#figures'), /Iteration \d+ of 100000/);
   assert.match(await page.textContent('#legend'), /best.*mean/s);
   await page.click('#cancel');
   await page.waitForSelector('.verdict.good');

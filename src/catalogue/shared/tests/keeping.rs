@@ -1,0 +1,144 @@
+//! What is kept under a name, whoever asks and whatever breaks.
+
+use std::collections::BTreeSet;
+use std::sync::mpsc;
+
+use super::{Node, everybody, height, naming, two};
+use crate::catalogue::both::Uploads as _;
+use crate::catalogue::shared::memory::Trouble;
+use crate::catalogue::{CatalogueError, Claim, Expected, Kept, Naming};
+use crate::terrain::DatasetError;
+
+#[test]
+fn what_one_node_keeps_every_node_finds() {
+    let (_, a, b) = two();
+    assert!(b.shared.entries().expect("it is there").is_empty());
+    assert_eq!(a.keep("hill", 100).expect("kept"), Kept::Created);
+    let found = b.find("hill").expect("found");
+    assert_eq!(height(&found), 100);
+    assert_eq!(b.keep("hill", 50).expect("kept"), Kept::Replaced);
+    assert_eq!(height(&a.find("hill").expect("found")), 50);
+    // What was accepted is planned over the ground that it was accepted over.
+    for node in [&a, &b] {
+        let pinned = node.shared.find("hill", Some(&found.sha256));
+        assert_eq!(height(&pinned.expect("found")), 100);
+    }
+    assert_eq!(
+        a.shared.entry("hill").expect("there"),
+        b.shared.entry("hill").expect("there")
+    );
+    let entry = b.shared.entry("hill").expect("there");
+    let own = b.find("hill").expect("found");
+    assert_eq!(&entry.metadata, own.dataset.metadata());
+    assert_eq!(entry.survey, Some(own.dataset.survey().expect("read")));
+    let used = BTreeSet::from([found.sha256.clone()]);
+    assert_eq!(a.shared.sweep(&used).expect("swept"), 0);
+    assert_eq!(a.sweep() + b.sweep(), 1);
+    let gone = a.shared.find("hill", Some(&found.sha256));
+    assert!(matches!(gone, Err(DatasetError::Replaced { sha256 }) if sha256 == own.sha256));
+    assert_eq!(b.copies().len(), 1, "copies of what has gone go, too");
+    a.shared.remove("hill", &everybody()).expect("removed");
+    assert!(matches!(b.find("hill"), Err(DatasetError::Unknown { names }) if names.is_empty()));
+}
+
+#[test]
+fn who_expects_something_else_or_owns_nothing_is_refused_on_every_node() {
+    let (_, a, b) = two();
+    let by = |owner: &str| Claim {
+        owner: Some(owner.to_owned()),
+        over_all: false,
+    };
+    let naming = |owner: &str, expected: Expected| Naming {
+        by: by(owner),
+        expected,
+        ..naming("hill")
+    };
+    let keep = |node: &Node, height: u32, naming: &Naming| {
+        let checked = node.checked(height);
+        let sha256 = checked.sha256().to_owned();
+        node.shared.keep(&checked, naming).map(|_| sha256)
+    };
+    let first = keep(&a, 1, &naming("ada", Expected::Nothing)).expect("it is new");
+    let refused = |error: CatalogueError, expected: &str| {
+        assert!(format!("{error:?}").starts_with(expected), "{error:?}");
+    };
+    let error = keep(&b, 2, &naming("ada", Expected::Nothing)).expect_err("it is not new");
+    refused(error, "Exists");
+    let error = keep(&b, 2, &naming("bob", Expected::Anything)).expect_err("it is ada's");
+    refused(error, "Owned");
+    let other = Expected::OneOf(vec!["0".repeat(64)]);
+    let error = keep(&b, 2, &naming("ada", other)).expect_err("it is another");
+    refused(error, "Changed");
+    refused(
+        b.shared
+            .removable("hill", &by("bob"))
+            .expect_err("it is ada's"),
+        "Owned",
+    );
+    refused(
+        b.shared
+            .remove("hill", &by("bob"))
+            .expect_err("it is ada's"),
+        "Owned",
+    );
+    keep(&b, 2, &naming("ada", Expected::OneOf(vec![first]))).expect("as expected");
+    assert_eq!(height(&a.find("hill").expect("found")), 2);
+}
+
+/// Of two who both expect what is there, one is refused, at whatever step the other comes.
+#[test]
+fn of_two_replacements_one_is_refused() {
+    for step in 0..8 {
+        let (shelf, a, b) = two();
+        a.keep("hill", 1).expect("kept");
+        let naming = Naming {
+            expected: Expected::OneOf(vec![a.find("hill").expect("found").sha256]),
+            ..naming("hill")
+        };
+        let (tell, told) = mpsc::channel();
+        let theirs = naming.clone();
+        let meanwhile = move || {
+            let kept = b.shared.keep(&b.checked(2), &theirs);
+            tell.send(kept).expect("somebody listens");
+        };
+        shelf.trouble_in(step, Trouble::Interrupted(Box::new(meanwhile)));
+        let ours = a.shared.keep(&a.checked(3), &naming);
+        let Ok(theirs) = told.try_recv() else {
+            assert!(step > 5 && shelf.calm() && ours.is_ok(), "step {step}");
+            continue;
+        };
+        let now = height(&a.find("hill").expect("found"));
+        let refused = |kept| matches!(kept, Err(CatalogueError::Changed { .. }));
+        match ours {
+            Ok(_) => assert!(now == 3 && refused(theirs), "step {step}"),
+            ours => assert!(now == 2 && refused(ours) && theirs.is_ok(), "step {step}"),
+        }
+    }
+}
+
+#[test]
+fn what_broke_midway_leaves_nothing_that_is_seen_and_is_removed() {
+    for trouble in [|| Trouble::FailsBefore, || Trouble::FailsAfter] {
+        for step in 0..16 {
+            let (shelf, a, b) = two();
+            a.keep("hill", 1).expect("kept");
+            shelf.trouble_in(step, trouble());
+            let kept = a.keep("hill", 2);
+            let was_calm = shelf.calm();
+            let now = height(&b.find("hill").expect("found"));
+            match kept {
+                Ok(_) => assert_eq!(now, 2, "step {step}"),
+                Err(error) => {
+                    assert!(!was_calm && matches!(error, CatalogueError::Unavailable { .. }));
+                    assert!([1, 2].contains(&now), "step {step}");
+                }
+            }
+            a.sweep();
+            b.sweep();
+            assert_eq!(shelf.counts(), [1, 0], "step {step}");
+            // Who asks again gets what was wanted.
+            a.keep("hill", 2).expect("kept");
+            assert_eq!(height(&b.find("hill").expect("found")), 2);
+        }
+    }
+}

@@ -7,7 +7,7 @@ use async_trait::async_trait;
 use tokio::sync::watch;
 
 use super::{
-    DatasetUse, Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Webhook,
+    DatasetUse, End, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Webhook,
 };
 use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Submission};
@@ -66,15 +66,8 @@ impl Store for MeasuredStore {
             .await
     }
 
-    async fn finish(
-        &self,
-        lease: &Lease,
-        told: Vec<Event>,
-        ending: Ending,
-        now_ms: i64,
-    ) -> Result<Plan, StoreError> {
-        self.measured("finish", self.store.finish(lease, told, ending, now_ms))
-            .await
+    async fn finish(&self, lease: &Lease, end: End) -> Result<Plan, StoreError> {
+        self.measured("finish", self.store.finish(lease, end)).await
     }
 
     async fn release(&self, lease: &Lease) -> Result<(), StoreError> {

@@ -48,18 +48,11 @@ pub trait Store: Send + Sync + 'static {
     /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.
     async fn append(&self, lease: &Lease, events: Vec<Event>) -> Result<(), StoreError>;
 
-    /// End a run: what it told since the last [`Store::append`], state, result, last status and `end`
-    /// event in one step.
+    /// End a run: what it told last, state, result, last status and `end` event in one step.
     ///
     /// # Errors
     /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.
-    async fn finish(
-        &self,
-        lease: &Lease,
-        told: Vec<Event>,
-        ending: Ending,
-        now_ms: i64,
-    ) -> Result<Plan, StoreError>;
+    async fn finish(&self, lease: &Lease, end: End) -> Result<Plan, StoreError>;
 
     /// Give a plan back, to its old place in the queue, which is the head: running -> queued. Its
     /// next run begins again from its seed. When its end has been asked for, it is cancelled
@@ -297,13 +290,37 @@ pub enum Ending {
 }
 
 impl Ending {
-    /// Change the record as this ending does; the result document is left to the store.
+    /// At that time, with nothing told since the last [`Store::append`].
+    #[must_use]
+    pub fn at(self, at_ms: i64) -> End {
+        End {
+            told: Vec::new(),
+            ending: self,
+            at_ms,
+        }
+    }
+}
+
+/// The end of a run.
+#[derive(Debug, Clone)]
+pub struct End {
+    /// What the run told since the last [`Store::append`].
+    pub told: Vec<Event>,
+    /// How it ended.
+    pub ending: Ending,
+    /// When, milliseconds since 1970.
+    pub at_ms: i64,
+}
+
+impl End {
+    /// Change the record as this end does; the result document is left to the store.
     ///
     /// # Errors
     /// [`Refused`] when the plan is not running.
-    fn apply(&self, plan: &mut Plan, now_ms: i64) -> Result<(), Refused> {
-        match self {
-            Self::Result {
+    fn apply(&self, plan: &mut Plan) -> Result<(), Refused> {
+        plan.advance(&self.told);
+        match &self.ending {
+            Ending::Result {
                 cancelled,
                 stop_reason,
                 feasible,
@@ -317,7 +334,7 @@ impl Ending {
                 } else {
                     Status::Succeeded
                 };
-                plan.end(status, now_ms)?;
+                plan.end(status, self.at_ms)?;
                 plan.stop_reason = Some(stop_reason.clone());
                 plan.feasible = Some(*feasible);
                 plan.best_cost = *best_cost;
@@ -326,7 +343,7 @@ impl Ending {
                 plan.evaluations = *evaluations;
                 Ok(())
             }
-            Self::Failed(failure) => plan.fail(failure.clone(), now_ms),
+            Ending::Failed(failure) => plan.fail(failure.clone(), self.at_ms),
         }
     }
 }

@@ -11,7 +11,7 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
 use super::{
-    DatasetUse, Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Trouble,
+    DatasetUse, End, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Trouble,
     Webhook,
 };
 use crate::export::document::Incumbent;
@@ -148,15 +148,9 @@ impl Store for Reopening {
         self.heed(&store, store.append(lease, events).await)
     }
 
-    async fn finish(
-        &self,
-        lease: &Lease,
-        told: Vec<Event>,
-        ending: Ending,
-        now_ms: i64,
-    ) -> Result<Plan, StoreError> {
+    async fn finish(&self, lease: &Lease, end: End) -> Result<Plan, StoreError> {
         let store = self.store()?;
-        self.heed(&store, store.finish(lease, told, ending, now_ms).await)
+        self.heed(&store, store.finish(lease, end).await)
     }
 
     async fn release(&self, lease: &Lease) -> Result<(), StoreError> {

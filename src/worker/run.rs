@@ -11,7 +11,7 @@ use tracing::{Instrument as _, Span};
 use super::planning::{self, Reason, Reports, StopFlag};
 use super::{Pause, Phase, Slot, reached};
 use crate::job::Event;
-use crate::store::{Ending, Lease, StoreError};
+use crate::store::{End, Ending, Lease, StoreError};
 use crate::telemetry::metrics::Ended;
 
 /// Events on their way from the planning thread; when there are more, it waits.
@@ -145,7 +145,15 @@ impl Slot {
     async fn finish(&self, lease: &Lease, told: Vec<Event>, ending: Ending) {
         let finish = || {
             let (told, ending) = (told.clone(), ending.clone());
-            self.store.finish(lease, told, ending, (self.clock)())
+            let at_ms = (self.clock)();
+            self.store.finish(
+                lease,
+                End {
+                    told,
+                    ending,
+                    at_ms,
+                },
+            )
         };
         if let Some(plan) = self.persist("ending", finish).await {
             let run_ms = plan

@@ -76,7 +76,7 @@ async fn ended(api: &Api, scenario: &Value, lat: f64, lon: f64) -> String {
     };
     let at_ms = lease.plan.created_ms + 50;
     api.store
-        .finish(&lease, Vec::new(), ending, at_ms)
+        .finish(&lease, ending.at(at_ms))
         .await
         .expect("the lease holds");
     format!("/plans/{}", lease.plan.id)

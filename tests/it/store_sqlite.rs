@@ -116,7 +116,7 @@ async fn a_person_can_read_the_file() {
     store.submit(submission.clone()).await.unwrap();
     let lease = store.claim().await.unwrap();
     store
-        .finish(&lease, Vec::new(), ending(Status::Succeeded), 12_000)
+        .finish(&lease, ending(Status::Succeeded).at(12_000))
         .await
         .unwrap();
 
@@ -211,7 +211,7 @@ async fn a_file_of_the_first_version_is_brought_up_and_goes_on() {
         .await
         .unwrap();
     store
-        .finish(&lease, Vec::new(), ending(Succeeded), wall_clock()())
+        .finish(&lease, ending(Succeeded).at(wall_clock()()))
         .await
         .unwrap();
     store.close().await;

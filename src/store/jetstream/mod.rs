@@ -49,7 +49,7 @@ use self::leases::Leases;
 use self::steps::Plans;
 use self::view::View;
 use super::{
-    DatasetUse, Ending, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError, Submitted,
+    DatasetUse, End, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError, Submitted,
     Webhook,
 };
 use crate::export::document::Incumbent;
@@ -182,15 +182,9 @@ impl Store for JetStreamStore {
             .await
     }
 
-    async fn finish(
-        &self,
-        lease: &Lease,
-        told: Vec<Event>,
-        ending: Ending,
-        now_ms: i64,
-    ) -> Result<Plan, StoreError> {
+    async fn finish(&self, lease: &Lease, end: End) -> Result<Plan, StoreError> {
         self.open_store()?
-            .finish(lease.plan.id, lease.attempt, &told, &ending, now_ms)
+            .finish(lease.plan.id, lease.attempt, &end)
             .await
     }
 

@@ -9,7 +9,7 @@ use super::record::{Document, Record, State};
 use super::steps::Change;
 use super::view::Standing;
 use crate::job::{Event, Plan, PlanId, Status};
-use crate::store::{Ending, StoreError};
+use crate::store::{End, Ending, StoreError};
 
 /// Events of one step, at most.
 const EVENTS: usize = 256;
@@ -89,15 +89,13 @@ impl JetStream {
         &self,
         id: PlanId,
         attempt: u64,
-        told: &[Event],
-        ending: &Ending,
-        now_ms: i64,
+        end: &End,
     ) -> Result<Plan, StoreError> {
-        let mut parts = parts(told);
+        let mut parts = parts(&end.told);
         let last = parts.pop().unwrap_or_default();
         self.still_own(id, attempt).await?;
         self.append_all(id, attempt, &parts).await?;
-        let result = match ending {
+        let result = match &end.ending {
             Ending::Result { document, .. } => {
                 let result = Document::result(id, attempt, document);
                 self.servers.write(&result, document).await?;
@@ -109,8 +107,7 @@ impl JetStream {
             .plans()
             .change(id, |standing| {
                 let mut record = Box::new(own(standing, id, attempt)?.clone());
-                record.plan.advance(last);
-                ending.apply(&mut record.plan, now_ms)?;
+                end.apply(&mut record.plan)?;
                 if let Some((result, bytes)) = &result {
                     record.bytes += bytes;
                     record.result = Some(result.clone());
@@ -126,7 +123,7 @@ impl JetStream {
         if let Some(job) = self.leases.let_go(id, attempt) {
             answer(&job, AckKind::Ack).await;
         }
-        let record = standing.record(id, now_ms)?;
+        let record = standing.record(id, end.at_ms)?;
         Ok(record.plan.clone())
     }
 

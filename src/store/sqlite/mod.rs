@@ -29,7 +29,7 @@ use self::records::Records;
 use self::writer::Writer;
 use super::changes::Changes;
 use super::{
-    Clock, DatasetUse, Ending, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError,
+    Clock, DatasetUse, End, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError,
     Submitted, Trouble, Webhook,
 };
 use crate::export::document::Incumbent;
@@ -144,16 +144,10 @@ impl Store for SqliteStore {
             .await
     }
 
-    async fn finish(
-        &self,
-        lease: &Lease,
-        told: Vec<Event>,
-        ending: Ending,
-        now_ms: i64,
-    ) -> Result<Plan, StoreError> {
+    async fn finish(&self, lease: &Lease, end: End) -> Result<Plan, StoreError> {
         let (id, attempt) = (lease.plan.id, lease.attempt);
         self.writer
-            .change(move |tx| operations::finish(tx, id, attempt, &told, &ending, now_ms))
+            .change(move |tx| operations::finish(tx, id, attempt, &end))
             .await
     }
 

@@ -11,7 +11,7 @@ use super::transaction::{Effect, Transaction};
 use super::{idempotency, removal, webhooks};
 use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Status, Submission};
-use crate::store::{Ending, Lease, StoreError, Submitted, Tombstone};
+use crate::store::{End, Ending, Lease, StoreError, Submitted, Tombstone};
 
 pub(super) fn submit(
     tx: &mut Transaction<'_>,
@@ -124,16 +124,13 @@ pub(super) fn finish(
     tx: &mut Transaction<'_>,
     id: PlanId,
     attempt: u64,
-    told: &[Event],
-    ending: &Ending,
-    now_ms: i64,
+    end: &End,
 ) -> Result<Plan, StoreError> {
     let mut row = leased(tx, id, attempt)?;
-    row.plan.advance(told);
-    tx.tell(&mut row, told)?;
-    ending.apply(&mut row.plan, now_ms)?;
+    tx.tell(&mut row, &end.told)?;
+    end.apply(&mut row.plan)?;
     forget_incumbent(tx, &row)?;
-    if let Ending::Result { document, .. } = ending {
+    if let Ending::Result { document, .. } = &end.ending {
         row.bytes += document.len() as u64;
         tx.connection
             .prepare_cached("INSERT INTO results (plan_seq, document) VALUES (?1, ?2)")?

@@ -60,7 +60,7 @@ async fn what_one_node_accepts_and_another_runs_a_third_tells() {
             .unwrap();
     }
     running
-        .finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
+        .finish(&lease, ending(Status::Succeeded).at(0))
         .await
         .unwrap();
     let (read, result) = reader.await.unwrap();
@@ -78,7 +78,7 @@ async fn a_cancel_reaches_the_node_that_runs_the_plan() {
     asked.request_cancel(id, 1).await.unwrap();
     lease.cancel.wait_for(|cancelled| *cancelled).await.unwrap();
     running
-        .finish(&lease, Vec::new(), ending(Status::Cancelled), 2)
+        .finish(&lease, ending(Status::Cancelled).at(2))
         .await
         .unwrap();
     until(&*asked, id, |plan| plan.status == Status::Cancelled).await;
@@ -88,7 +88,7 @@ async fn a_cancel_reaches_the_node_that_runs_the_plan() {
     asked.delete(id, 1).await.unwrap();
     lease.cancel.wait_for(|cancelled| *cancelled).await.unwrap();
     let late = running
-        .finish(&lease, Vec::new(), ending(Status::Succeeded), 2)
+        .finish(&lease, ending(Status::Succeeded).at(2))
         .await;
     assert_eq!(kind(late), Err("lease lost"));
 }
@@ -127,7 +127,7 @@ async fn every_plan_is_taken_once_however_many_nodes_take() {
         tokio::spawn(async move {
             let lease = node.claim().await.unwrap();
             assert_eq!(lease.attempt, 1);
-            node.finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
+            node.finish(&lease, ending(Status::Succeeded).at(0))
                 .await
                 .unwrap();
             lease.plan.id
@@ -152,7 +152,7 @@ async fn a_plan_whose_node_is_lost_is_another_nodes_to_run() {
     let lease = other.claim().await.unwrap();
     assert_eq!((lease.plan.id, lease.attempt), (id, 2));
     other
-        .finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
+        .finish(&lease, ending(Status::Succeeded).at(0))
         .await
         .unwrap();
     let told = history(&*other, id).await;

@@ -8,7 +8,7 @@ use futures_util::TryStreamExt as _;
 use noctule::config::Address;
 use noctule::job::{Event, Status};
 use noctule::store::jetstream::Settings;
-use noctule::store::{Store, StoreError};
+use noctule::store::{End, Store, StoreError};
 
 use super::{open, open_as, turn};
 use crate::support::nats::{Cluster, NatsServer};
@@ -60,7 +60,7 @@ async fn a_server_that_comes_back_has_everything_and_is_taken_up_again() {
 
     store.append(&lease, vec![point(2, None)]).await.unwrap();
     store
-        .finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
+        .finish(&lease, ending(Status::Succeeded).at(0))
         .await
         .unwrap();
     until(&*follower, running, |plan| plan.status == Status::Succeeded).await;
@@ -102,7 +102,16 @@ async fn a_run_goes_on_over_the_loss_of_the_leader() {
         cluster.servers[leader].restart();
         until_sound(&*store).await;
     }
-    persist(|| store.finish(&lease, vec![point(4, None)], ending(Status::Succeeded), 0)).await;
+    persist(|| {
+        store.finish(
+            &lease,
+            End {
+                told: vec![point(4, None)],
+                ..ending(Status::Succeeded).at(0)
+            },
+        )
+    })
+    .await;
     until(&*follower, id, |plan| plan.status == Status::Succeeded).await;
     let told = history(&*follower, id).await;
     assert_eq!(told.len(), 2 + 5 + 2);

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use noctule::job::{Event, Status};
 use noctule::store::jetstream::JetStreamStore;
-use noctule::store::{Options, Store, wall_clock};
+use noctule::store::{End, Options, Store, wall_clock};
 
 use super::open;
 use crate::support::nats::{self, NatsServer, namespace};
@@ -49,13 +49,17 @@ async fn a_node_that_is_cut_off_loses_its_run_and_catches_up_when_it_is_back() {
     while far.health().await.is_err() {
         tokio::time::sleep(Duration::from_millis(50)).await;
     }
-    let late = far
-        .finish(&lost, Vec::new(), ending(Status::Succeeded), 0)
-        .await;
+    let late = far.finish(&lost, ending(Status::Succeeded).at(0)).await;
     assert_eq!(kind(late), Err("lease lost"));
-    near.finish(&taken, vec![point(3, None)], ending(Status::Succeeded), 0)
-        .await
-        .unwrap();
+    near.finish(
+        &taken,
+        End {
+            told: vec![point(3, None)],
+            ..ending(Status::Succeeded).at(0)
+        },
+    )
+    .await
+    .unwrap();
     until(&*far, id, |plan| plan.status == Status::Succeeded).await;
     let told = history(&*far, id).await;
     // Queued, running, a point; queued and running again; the points; succeeded, the end.
@@ -90,7 +94,7 @@ async fn a_wrong_clock_takes_no_run_from_anybody() {
         let stolen = tokio::time::timeout(2 * LEASE, accepting.claim()).await;
         assert!(stolen.is_err(), "{stolen:?}");
         running
-            .finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
+            .finish(&lease, ending(Status::Succeeded).at(0))
             .await
             .unwrap();
         until(&**accepting, id, |plan| plan.status == Status::Succeeded).await;

@@ -60,11 +60,7 @@ async fn race_in(store: &Arc<dyn Store>, race: usize) {
     };
     let finish = {
         let store = store.clone();
-        async move {
-            store
-                .finish(&lease, Vec::new(), ending(finish_with(race)), 2)
-                .await
-        }
+        async move { store.finish(&lease, ending(finish_with(race)).at(2)).await }
     };
     let (cancelled, finished) = if race.is_multiple_of(2) {
         let cancel = tokio::spawn(cancel);

@@ -39,17 +39,11 @@ async fn datasets_are_in_use_as_long_as_plans_are_kept() {
 
         // Running is active, too; ended is not, whatever the end.
         let lease = store.claim().await.unwrap();
-        store
-            .finish(&lease, Vec::new(), failure(), 0)
-            .await
-            .unwrap();
+        store.finish(&lease, failure().at(0)).await.unwrap();
         let lease = store.claim().await.unwrap();
         assert_eq!(lease.plan.id, first);
         assert_eq!(uses(&**store).await, [named("a", 1, 1), named("b", 2, 2)]);
-        store
-            .finish(&lease, Vec::new(), failure(), 0)
-            .await
-            .unwrap();
+        store.finish(&lease, failure().at(0)).await.unwrap();
         store.request_cancel(second, 0).await.unwrap();
         assert_eq!(uses(&**store).await, [named("a", 1, 1), named("b", 0, 2)]);
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use futures_util::future::join_all;
 use noctule::job::{Event, Status};
-use noctule::store::Ending;
+use noctule::store::{End, Ending};
 
 use crate::support::plans::{ending, failure, history, kind, point, statuses, submission, until};
 use crate::support::stores::on_every_backend;
@@ -18,7 +18,13 @@ async fn what_a_run_tells_last_comes_before_its_end() {
             let told: Vec<_> = (1..=count).map(|nth| point(nth, Some(500.0))).collect();
             store.append(&lease, vec![point(0, None)]).await.unwrap();
             let ended = store
-                .finish(&lease, told.clone(), failure(), 12_500)
+                .finish(
+                    &lease,
+                    End {
+                        told: told.clone(),
+                        ..failure().at(12_500)
+                    },
+                )
                 .await
                 .unwrap();
             assert_eq!(
@@ -31,7 +37,15 @@ async fn what_a_run_tells_last_comes_before_its_end() {
             assert_eq!(history[3..3 + count], told);
             let end = [Event::Status(Box::new(ended)), Event::End(Status::Failed)];
             assert_eq!(history[3 + count..], end);
-            let late = store.finish(&lease, told, failure(), 13_000).await;
+            let late = store
+                .finish(
+                    &lease,
+                    End {
+                        told,
+                        ..failure().at(13_000)
+                    },
+                )
+                .await;
             assert_eq!(kind(late), Err("lease lost"));
         }
     })
@@ -60,7 +74,7 @@ async fn a_run_moves_the_record() {
         assert!(lease.plan.revision < early.revision && early.revision < later.revision);
 
         let ended = store
-            .finish(&lease, Vec::new(), ending(Status::Succeeded), 12_500)
+            .finish(&lease, ending(Status::Succeeded).at(12_500))
             .await
             .unwrap();
         assert_eq!(ended, store.get(id).await.unwrap());
@@ -102,10 +116,7 @@ async fn a_failed_run_tells_why() {
     on_every_backend(10, async |store| {
         let id = store.submit(submission()).await.unwrap().plan.id;
         let lease = store.claim().await.unwrap();
-        store
-            .finish(&lease, Vec::new(), failure(), 12_000)
-            .await
-            .unwrap();
+        store.finish(&lease, failure().at(12_000)).await.unwrap();
         let plan = store.get(id).await.unwrap();
         let Ending::Failed(expected) = failure() else {
             unreachable!("that is what it makes")
@@ -127,7 +138,7 @@ async fn a_result_is_kept_byte_for_byte() {
         let id = store.submit(submission()).await.unwrap().plan.id;
         let lease = store.claim().await.unwrap();
         store
-            .finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
+            .finish(&lease, ending(Status::Succeeded).at(0))
             .await
             .unwrap();
         let Ending::Result { document, .. } = ending(Status::Succeeded) else {
@@ -159,20 +170,20 @@ async fn a_lease_that_is_over_changes_nothing() {
                 Err("lease lost")
             );
             assert_eq!(
-                kind(store.finish(stale, Vec::new(), failure(), 0).await),
+                kind(store.finish(stale, failure().at(0)).await),
                 Err("lease lost")
             );
             assert_eq!(kind(store.release(stale).await), Err("lease lost"));
         }
         store
-            .finish(&ended, Vec::new(), ending(Status::Succeeded), 0)
+            .finish(&ended, ending(Status::Succeeded).at(0))
             .await
             .unwrap();
         let plan = store.get(id).await.unwrap();
         let told = history(&**store, id).await;
         assert_eq!(kind(store.append(&ended, vec![]).await), Err("lease lost"));
         assert_eq!(
-            kind(store.finish(&ended, Vec::new(), failure(), 0).await),
+            kind(store.finish(&ended, failure().at(0)).await),
             Err("lease lost")
         );
         assert_eq!(kind(store.release(&ended).await), Err("lease lost"));
@@ -220,7 +231,7 @@ async fn a_running_plan_is_told_to_stop_and_ends_with_its_result() {
         assert_eq!(store.request_cancel(id, 11_500).await.unwrap(), plan);
         assert!(*lease.cancel.wait_for(|cancelled| *cancelled).await.unwrap());
         store
-            .finish(&lease, Vec::new(), ending(Status::Cancelled), 12_000)
+            .finish(&lease, ending(Status::Cancelled).at(12_000))
             .await
             .unwrap();
         let plan = store.request_cancel(id, 13_000).await.unwrap();
@@ -289,9 +300,9 @@ async fn a_plan_ends_once_however_its_endings_race() {
                 };
                 claimer.append(&lease, vec![point(0, None)]).await.ok();
                 let ends = [
-                    claimer.finish(&lease, Vec::new(), ending(Status::Succeeded), 1),
-                    claimer.finish(&lease, Vec::new(), failure(), 2),
-                    claimer.finish(&lease, Vec::new(), ending(Status::Cancelled), 3),
+                    claimer.finish(&lease, ending(Status::Succeeded).at(1)),
+                    claimer.finish(&lease, failure().at(2)),
+                    claimer.finish(&lease, ending(Status::Cancelled).at(3)),
                 ];
                 let done = join_all(ends).await.into_iter().flatten().count();
                 assert_eq!(done, 1);

@@ -13,11 +13,7 @@ async fn ended(store: &Fixture) -> PlanId {
     let lease = store.claim().await.unwrap();
     let now_ms = store.now_ms();
     let ending = ending(Status::Succeeded);
-    store
-        .finish(&lease, Vec::new(), ending, now_ms)
-        .await
-        .unwrap()
-        .id
+    store.finish(&lease, ending.at(now_ms)).await.unwrap().id
 }
 
 async fn kept(store: &dyn Store, ids: &[PlanId]) -> Vec<bool> {
@@ -88,7 +84,7 @@ async fn of_too_many_the_longest_ended_go() {
         for lease in leases.iter().rev() {
             store.pass_ms(1);
             store
-                .finish(lease, Vec::new(), failure(), store.now_ms())
+                .finish(lease, failure().at(store.now_ms()))
                 .await
                 .unwrap();
         }
@@ -118,10 +114,7 @@ async fn of_too_many_bytes_the_longest_ended_go() {
             ids.push(store.submit(large).await.unwrap().plan.id);
             let lease = store.claim().await.unwrap();
             let now_ms = store.now_ms();
-            store
-                .finish(&lease, Vec::new(), failure(), now_ms)
-                .await
-                .unwrap();
+            store.finish(&lease, failure().at(now_ms)).await.unwrap();
         }
         store.retention.bytes = Some(250_000);
         store.reopen().await;
@@ -174,7 +167,7 @@ async fn of_a_long_history_the_newest_events_are_kept() {
             assert_eq!(rest.events, page.events[page.events.len() - 3..][..2]);
         }
         store
-            .finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
+            .finish(&lease, ending(Status::Succeeded).at(0))
             .await
             .unwrap();
         let told = history(&**store, id).await;
@@ -213,10 +206,7 @@ async fn the_best_route_of_the_present_run_is_kept() {
         let lease = store.claim().await.unwrap();
         store.append(&lease, vec![incumbent(1, 0.1)]).await.unwrap();
         assert!(store.incumbent(id).await.unwrap().is_some());
-        store
-            .finish(&lease, Vec::new(), failure(), 0)
-            .await
-            .unwrap();
+        store.finish(&lease, failure().at(0)).await.unwrap();
         assert_eq!(store.incumbent(id).await.unwrap(), None);
         store.delete(id, store.now_ms()).await.unwrap();
         assert_eq!(kind(store.incumbent(id).await), Err("gone"));

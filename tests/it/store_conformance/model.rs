@@ -154,14 +154,10 @@ impl Model {
         let (plan, lease) = &self.leases[which];
         let answer = match step {
             Step::Append(_) => store.append(lease, vec![point(2, None)]).await,
-            Step::Finish(_, Status::Failed) => store
-                .finish(lease, Vec::new(), failure(), 0)
-                .await
-                .map(|_| ()),
-            Step::Finish(_, status) => store
-                .finish(lease, Vec::new(), ending(*status), 0)
-                .await
-                .map(|_| ()),
+            Step::Finish(_, Status::Failed) => {
+                store.finish(lease, failure().at(0)).await.map(|_| ())
+            }
+            Step::Finish(_, status) => store.finish(lease, ending(*status).at(0)).await.map(|_| ()),
             _ => store.release(lease).await,
         };
         let (plan, holds) = (*plan, self.holds(which));

@@ -38,7 +38,7 @@ async fn a_deleted_plan_is_gone_for_a_day_and_then_unknown() {
         assert_eq!(lease.plan.id, running);
         let last = store.claim().await.unwrap();
         store
-            .finish(&last, Vec::new(), ending(Status::Succeeded), 0)
+            .finish(&last, ending(Status::Succeeded).at(0))
             .await
             .unwrap();
 
@@ -52,7 +52,7 @@ async fn a_deleted_plan_is_gone_for_a_day_and_then_unknown() {
             Err("lease lost")
         );
         assert_eq!(
-            kind(store.finish(&lease, Vec::new(), failure(), 0).await),
+            kind(store.finish(&lease, failure().at(0)).await),
             Err("lease lost")
         );
         assert_eq!(kind(store.release(&lease).await), Err("lease lost"));
@@ -97,7 +97,7 @@ async fn events_are_read_without_loss_or_repeat_from_any_place() {
             store.append(&lease, batch.collect()).await.unwrap();
         }
         store
-            .finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
+            .finish(&lease, ending(Status::Succeeded).at(0))
             .await
             .unwrap();
 
@@ -212,7 +212,7 @@ async fn whoever_subscribes_and_then_reads_misses_nothing() {
                     .unwrap();
             }
             shared
-                .finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
+                .finish(&lease, ending(Status::Succeeded).at(0))
                 .await
                 .unwrap();
             let all = shared.events(id, 0, usize::MAX).await.unwrap().events;
@@ -233,7 +233,7 @@ async fn plans_are_listed_newest_first_by_status_and_page() {
         }
         let lease = store.claim().await.unwrap();
         store
-            .finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
+            .finish(&lease, ending(Status::Succeeded).at(0))
             .await
             .unwrap();
         let _running = store.claim().await.unwrap();
@@ -310,7 +310,7 @@ async fn the_mean_run_time_is_that_of_the_last_runs_with_a_result() {
                 Status::Cancelled
             };
             store
-                .finish(&lease, Vec::new(), ending(status), store.now_ms())
+                .finish(&lease, ending(status).at(store.now_ms()))
                 .await
                 .unwrap();
         }
@@ -318,7 +318,7 @@ async fn the_mean_run_time_is_that_of_the_last_runs_with_a_result() {
         let lease = store.claim().await.unwrap();
         store.pass_ms(1_000_000);
         store
-            .finish(&lease, Vec::new(), failure(), store.now_ms())
+            .finish(&lease, failure().at(store.now_ms()))
             .await
             .unwrap();
         let unseen = store.submit(submission()).await.unwrap().plan;
@@ -344,12 +344,7 @@ async fn the_mean_run_time_is_that_of_the_last_runs_with_a_result() {
         let lease = store.claim().await.unwrap();
         store.pass_ms(2_300);
         let told = store
-            .finish(
-                &lease,
-                Vec::new(),
-                ending(Status::Succeeded),
-                store.now_ms(),
-            )
+            .finish(&lease, ending(Status::Succeeded).at(store.now_ms()))
             .await
             .unwrap();
         for due_ms in 1..4 {
@@ -369,7 +364,7 @@ async fn a_new_process_queues_what_was_running_and_keeps_the_order() {
         }
         let lease = store.claim().await.unwrap();
         store
-            .finish(&lease, Vec::new(), ending(Status::Succeeded), 0)
+            .finish(&lease, ending(Status::Succeeded).at(0))
             .await
             .unwrap();
         let _first = store.claim().await.unwrap();

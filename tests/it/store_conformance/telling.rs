@@ -30,7 +30,7 @@ async fn an_end_is_due_at_once_and_after_a_restart() {
         assert_eq!(store.due_webhooks(i64::MAX, 10).await.unwrap(), []);
 
         let ended = store
-            .finish(&lease, Vec::new(), ending(Status::Succeeded), 12_000)
+            .finish(&lease, ending(Status::Succeeded).at(12_000))
             .await
             .unwrap();
         assert_eq!(store.due_webhooks(11_999, 10).await.unwrap(), []);
@@ -51,10 +51,7 @@ async fn an_end_is_due_at_once_and_after_a_restart() {
 
         // The third one's is nobody's to tell.
         let lease = store.claim().await.unwrap();
-        store
-            .finish(&lease, Vec::new(), failure(), 12_000)
-            .await
-            .unwrap();
+        store.finish(&lease, failure().at(12_000)).await.unwrap();
         assert_eq!(store.due_webhooks(i64::MAX, 10).await.unwrap().len(), 2);
 
         store.webhook_tried(first, Some(20_000)).await.unwrap();
@@ -77,13 +74,13 @@ async fn a_plan_that_runs_again_ends_once_and_a_deleted_one_tells_nothing() {
         let lost = store.claim().await.unwrap();
         store.reopen().await;
         let late = store
-            .finish(&lost, Vec::new(), ending(Status::Succeeded), 12_000)
+            .finish(&lost, ending(Status::Succeeded).at(12_000))
             .await;
         assert_eq!(kind(late), Err("lease lost"));
         assert_eq!(store.due_webhooks(i64::MAX, 10).await.unwrap(), []);
         let lease = store.claim().await.unwrap();
         store
-            .finish(&lease, Vec::new(), ending(Status::Succeeded), 13_000)
+            .finish(&lease, ending(Status::Succeeded).at(13_000))
             .await
             .unwrap();
         let due = store.due_webhooks(i64::MAX, 10).await.unwrap();

@@ -7,7 +7,7 @@ use async_trait::async_trait;
 use noctule::export::document::Incumbent;
 use noctule::job::{Event, Plan, PlanId, Submission};
 use noctule::store::{
-    DatasetUse, Ending, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Webhook,
+    DatasetUse, End, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Webhook,
 };
 use tokio::sync::watch;
 
@@ -49,15 +49,9 @@ impl Store for FaultyStore {
         self.sound.append(lease, events).await
     }
 
-    async fn finish(
-        &self,
-        lease: &Lease,
-        told: Vec<Event>,
-        ending: Ending,
-        now_ms: i64,
-    ) -> Result<Plan, StoreError> {
+    async fn finish(&self, lease: &Lease, end: End) -> Result<Plan, StoreError> {
         self.stumble()?;
-        self.sound.finish(lease, told, ending, now_ms).await
+        self.sound.finish(lease, end).await
     }
 
     async fn release(&self, lease: &Lease) -> Result<(), StoreError> {

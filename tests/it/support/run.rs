@@ -47,7 +47,7 @@ pub(crate) async fn finish(store: &dyn Store, lease: &Lease, status: Status) {
         document: result(lease.plan.id, stop_reason).to_json(),
     };
     store
-        .finish(lease, Vec::new(), ending, lease.plan.created_ms + 50)
+        .finish(lease, ending.at(lease.plan.created_ms + 50))
         .await
         .expect("the lease holds");
 }
@@ -60,7 +60,7 @@ pub(crate) async fn fail(store: &dyn Store, lease: &Lease) {
     };
     let ended_ms = lease.plan.created_ms + 50;
     store
-        .finish(lease, Vec::new(), Ending::Failed(failure), ended_ms)
+        .finish(lease, Ending::Failed(failure).at(ended_ms))
         .await
         .expect("the lease holds");
 }

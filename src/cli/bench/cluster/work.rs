@@ -11,7 +11,7 @@ use super::Took;
 use crate::export::document::Convergence;
 use crate::job::{self, Event, Submission};
 use crate::store::jetstream::{JetStreamStore, Settings};
-use crate::store::{Ending, Lease, Options, Store, wall_clock};
+use crate::store::{End, Ending, Lease, Options, Store, wall_clock};
 
 /// Callers at a time.
 pub(super) const CALLERS: usize = 32;
@@ -108,10 +108,7 @@ async fn work(
         // As the pool does: the next run does not wait for the end of the one before.
         let conclusion = async {
             match over.take() {
-                Some(lease) => store
-                    .finish(&lease, vec![point()], ending(), wall_clock()())
-                    .await
-                    .map(drop),
+                Some(lease) => store.finish(&lease, end()).await.map(drop),
                 None => Ok(()),
             }
         };
@@ -178,8 +175,8 @@ fn point() -> Event {
     })
 }
 
-fn ending() -> Ending {
-    Ending::Result {
+fn end() -> End {
+    let ending = Ending::Result {
         cancelled: false,
         stop_reason: "iterations".to_owned(),
         feasible: true,
@@ -187,5 +184,9 @@ fn ending() -> Ending {
         evaluations: 40_000,
         iteration: 200,
         document: "r".repeat(RESULT),
+    };
+    End {
+        told: vec![point()],
+        ..ending.at(wall_clock()())
     }
 }

@@ -1,9 +1,9 @@
 //! Positions priced side by side, a block of [`LANES`] at a time.
 //!
-//! Above hills most of the time goes into the heights of legs, so that all positions are first priced as if
-//! they kept them. Where a position matters only if it beats a rival, most are thereby known not to; of the
-//! others those legs are measured of which it is not known how they fare. No price depends on which other
-//! positions are in a block.
+//! Where a position matters only if it beats a rival, most are known not to by their fuel and heights alone;
+//! only the others are priced, in blocks of their own. Above hills most of the time goes into the heights of legs,
+//! so that routes are first priced as if they kept them; of those that may still win, those legs are
+//! measured of which it is not known how they fare. No price depends on which other positions are in a block.
 
 use super::coding::Coding;
 use super::kept::Kept;
@@ -20,8 +20,19 @@ pub(super) struct Blocks<'a, 's> {
     points: Vec<PointRow>,
     /// Below free waypoints.
     ground: Vec<Row>,
+    waiting: Waiting,
     /// Of positions whose rivals break no limit, and of others.
     unmeasured: [Unmeasured; 2],
+}
+
+/// Routes that may be good enough, a block of them at most.
+#[derive(Default)]
+struct Waiting {
+    points: Vec<PointRow>,
+    /// Below free waypoints.
+    ground: Vec<Row>,
+    /// The numbers of their positions.
+    owners: Vec<usize>,
 }
 
 /// Legs of routes that may be good enough, in order.
@@ -82,6 +93,7 @@ impl<'a, 's> Blocks<'a, 's> {
             hilly: pricers.is_hilly(),
             points: Vec::new(),
             ground: Vec::new(),
+            waiting: Waiting::default(),
             unmeasured: [Unmeasured::default(), Unmeasured::default()],
         }
     }
@@ -98,6 +110,7 @@ impl<'a, 's> Blocks<'a, 's> {
         mut may_go_on: impl FnMut(usize) -> bool,
     ) {
         let block = LANES * self.coding.bounds().dimension();
+        let rival = |owner: usize| rivals.map_or(Fitness::WORST, |rivals| rivals[owner]);
         for (idx, positions) in positions.chunks(block).enumerate() {
             let first = idx * LANES;
             let count = LANES.min(fitness.len() - first);
@@ -106,29 +119,50 @@ impl<'a, 's> Blocks<'a, 's> {
                 continue;
             }
             self.decode(positions, count);
-            if !self.hilly {
-                let price = self.pricers.full.first_routes(&self.points, count);
-                for lane in 0..count {
-                    fitness[first + lane] = of_lane(&price, lane);
+            let least = self.pricers.full.least_costs(&self.points, &self.ground);
+            for (lane, &cost) in least.iter().enumerate().take(count) {
+                let owner = first + lane;
+                fitness[owner] = Fitness {
+                    violation: 0.0,
+                    cost,
+                };
+                if fitness[owner].beats(&rival(owner)) {
+                    self.waiting.push(&self.points, &self.ground, lane, owner);
                 }
-                continue;
-            }
-            let price = self
-                .pricers
-                .full
-                .routes_at_best(&self.points, &self.ground, count);
-            for lane in 0..count {
-                let (owner, at_best) = (first + lane, of_lane(&price, lane));
-                let rival = rivals.map_or(Fitness::WORST, |rivals| rivals[owner]);
-                fitness[owner] = at_best;
-                if at_best.beats(&rival) {
-                    let unmeasured = &mut self.unmeasured[usize::from(!rival.is_feasible())];
-                    unmeasured.push(&self.points, lane, owner, self.kept);
+                if self.waiting.owners.len() == LANES {
+                    self.price_waiting(&rival, fitness);
                 }
             }
             self.settle(LEGS_AT_ONCE, fitness);
         }
+        self.price_waiting(&rival, fitness);
         self.settle(1, fitness);
+    }
+
+    /// Price the routes that wait, above hills as if they kept their heights.
+    fn price_waiting(&mut self, rival: &impl Fn(usize) -> Fitness, fitness: &mut [Fitness]) {
+        let Waiting {
+            points,
+            ground,
+            owners,
+        } = &mut self.waiting;
+        if owners.is_empty() {
+            return;
+        }
+        let pricer = &self.pricers.full;
+        let price = if self.hilly {
+            pricer.routes_at_best(points, ground, owners.len())
+        } else {
+            pricer.first_routes(points, owners.len())
+        };
+        for (lane, owner) in owners.drain(..).enumerate() {
+            fitness[owner] = of_lane(&price, lane);
+            let rival = rival(owner);
+            if self.hilly && fitness[owner].beats(&rival) {
+                let unmeasured = &mut self.unmeasured[usize::from(!rival.is_feasible())];
+                unmeasured.push(points, lane, owner, self.kept);
+            }
+        }
     }
 
     /// Measure the legs that wait, if they are at least so many.
@@ -156,6 +190,22 @@ impl<'a, 's> Blocks<'a, 's> {
             &mut self.points,
             &mut self.ground,
         );
+    }
+}
+
+impl Waiting {
+    /// Add the route in lane `lane` of `points`.
+    fn push(&mut self, points: &[PointRow], ground: &[Row], lane: usize, owner: usize) {
+        let place = self.owners.len();
+        self.points.resize(points.len(), points[0]);
+        self.ground.resize(ground.len(), [0.0; LANES]);
+        for (own, row) in self.points.iter_mut().zip(points) {
+            own.set(place, row.get(lane));
+        }
+        for (own, row) in self.ground.iter_mut().zip(ground) {
+            own[place] = row[lane];
+        }
+        self.owners.push(owner);
     }
 }
 
@@ -221,22 +271,28 @@ mod tests {
     use crate::optimizer::Random;
     use crate::planner::coding::Cartesian;
     use crate::planner::moves::Moves;
-    use crate::planner::tests::hilly_scenario;
+    use crate::planner::tests::{hilly_scenario, scenario};
     use crate::planner::{Nobody, plan};
+    use crate::scenario::Scenario;
 
     /// Whatever is known of legs, and against whatever rivals: a position that beats its rival has the
     /// fitness that it has alone, in full, to the bit; no other beats its rival.
     #[test]
     fn a_position_that_beats_its_rival_is_priced_as_alone() {
-        let scenario = hilly_scenario();
-        let model = Model::new(&scenario);
+        for scenario in [hilly_scenario(), scenario()] {
+            hold_to_prices_alone(&scenario);
+        }
+    }
+
+    fn hold_to_prices_alone(scenario: &Scenario) {
+        let model = Model::new(scenario);
         let pricer = Pricer::new(
             &model,
             scenario.planner.quadrature,
             model.tolerance.scaled(0.5),
         );
         let pricers = Pricers::new(pricer.clone());
-        let space = Cartesian::new(&scenario, 6);
+        let space = Cartesian::new(scenario, 6);
         let coding = Coding::Cartesian(space.clone());
         let dimension = coding.bounds().dimension();
         let in_full = |position: &[f64]| {
@@ -245,7 +301,7 @@ mod tests {
             of_lane(&pricer.routes(&points), 0)
         };
         let (mut kept, mut random) = (Kept::of(1), Random::new(5));
-        let moves = Moves::new(&scenario);
+        let moves = Moves::new(scenario);
         let mut positions = vec![0.0; 37 * dimension];
         let mut known = scenario.clone();
         known.planner.waypoints = 6;

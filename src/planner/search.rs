@@ -22,14 +22,16 @@ const PROMISING: f64 = 0.05;
 const COARSE_STEPS: Steps = Steps {
     from: 0.02,
     to: 1e-3,
-    gain: 1e-6,
+    gain: 1e-4,
+    violation_m: f64::INFINITY,
 };
 
 /// Of the polish at the end.
 const LAST_STEPS: Steps = Steps {
     from: 0.01,
     to: 5e-5,
-    gain: 1e-6,
+    gain: 5e-6,
+    violation_m: f64::INFINITY,
 };
 
 /// The algorithm alone, from random routes: the paper's.

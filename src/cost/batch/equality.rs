@@ -268,9 +268,12 @@ proptest! {
         pricer.ground(&points[1..points.len() - 1], &mut ground);
         let at_best = pricer.routes_at_best(&points, &ground, LANES);
         prop_assert_eq!(at_best.cost.map(f64::to_bits), together.cost.map(f64::to_bits));
+        let least = pricer.least_costs(&points, &ground);
+        prop_assert_eq!(least.map(f64::to_bits), scalar.least_costs(&points, &ground).map(f64::to_bits));
         let first = pricer.first_routes(&points, 3);
         for lane in 0..LANES {
             prop_assert!(at_best.violation[lane] <= together.violation[lane]);
+            prop_assert!(least[lane] <= together.cost[lane]);
             prop_assert!(lane >= 3 || bits(&first).map(|row| row[lane]) == bits(&together).map(|row| row[lane]));
         }
         for (lane, route) in routes.iter().enumerate() {
@@ -284,6 +287,7 @@ proptest! {
             });
             prop_assert!(close(together.violation[lane], violation), "{} {violation}", together.violation[lane]);
             prop_assert!(close(together.cost[lane], figures.total), "{} {figures:?}", together.cost[lane]);
+            prop_assert!(close(least[lane], figures.fuel + figures.altitude), "{} {figures:?}", least[lane]);
             // Its neighbours have no part in it.
             let alone = pricer.routes(&rows(&vec![route.clone(); LANES]));
             prop_assert_eq!(bits(&alone).map(|row| row[0]), bits(&together).map(|row| row[lane]));

@@ -159,6 +159,27 @@ impl<'s> Pricer<'s> {
         self.dispatch::<false>(points, ground, count)
     }
 
+    /// What routes cost for their fuel and heights alone: no route costs less, by the same bits. `ground` is
+    /// the elevation below each free waypoint.
+    ///
+    /// # Panics
+    /// With fewer than two points, or where there is not as much ground.
+    #[must_use]
+    pub fn least_costs(&self, points: &[PointRow], ground: &[Row]) -> Row {
+        assert!(
+            points.len() >= 2 && ground.len() + 2 == points.len(),
+            "every free waypoint is above ground"
+        );
+        let mut costs = [0.0; LANES];
+        self.arch.dispatch(Least {
+            pricer: self,
+            points,
+            ground,
+            costs: &mut costs,
+        });
+        costs
+    }
+
     /// Whether there are hills, above which heights take long to measure.
     #[must_use]
     pub fn is_hilly(&self) -> bool {
@@ -262,6 +283,25 @@ impl<'s> Pricer<'s> {
             points,
             elevations: ground,
         });
+    }
+}
+
+struct Least<'a, 's> {
+    pricer: &'a Pricer<'s>,
+    points: &'a [PointRow],
+    ground: &'a [Row],
+    costs: &'a mut Row,
+}
+
+impl WithSimd for Least<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        for part in 0..parts::<S>() {
+            let cost = self.pricer.least_cost(simd, part, self.points, self.ground);
+            cost.store(self.costs, part);
+        }
     }
 }
 

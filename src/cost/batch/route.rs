@@ -103,6 +103,28 @@ impl Pricer<'_> {
         (violation, self.flown(length, exposure) + altitude)
     }
 
+    /// Cost of one part of the routes but for their exposure, summed as by `route`.
+    #[inline(always)]
+    pub(super) fn least_cost<S: Simd>(
+        &self,
+        simd: S,
+        part: usize,
+        points: &[PointRow],
+        ground: &[Row],
+    ) -> Lane<S> {
+        let zero = Lane::splat(simd, 0.0);
+        let (mut length, mut off_middle) = (zero, zero);
+        for (leg_idx, rows) in points.windows(2).enumerate() {
+            let leg = Leg::new(simd, part, [&rows[0], &rows[1]]);
+            length = length + leg.length;
+            if let Some(ground) = ground.get(leg_idx) {
+                off_middle = off_middle + self.off_middle(&leg, Lane::load(simd, ground, part));
+            }
+        }
+        let altitude = off_middle * self.model.scenario.weights.altitude;
+        self.flown(length, zero) + altitude
+    }
+
     /// Violation and cost of one leg by itself, but for the violation of `suspects`; its lanes have
     /// the slots from `slot` on. Without `HEIGHTS` it is not asked for those that it keeps, without `FLIGHT`
     /// for nothing else.

@@ -7,10 +7,11 @@
 use super::super::price::PRICED_FROM;
 use super::clear::ClearWays;
 use super::turns::Turns;
-use super::ways::{CHOICES, Each, Leg, Waypoint, Ways, count};
-use crate::cost::batch::{LANES, PointRow, Price, Pricer};
+use super::ways::{CHOICES, Leg, Waypoint, Ways, count};
+use crate::cost::batch::{LANES, PointRow, Price, Pricer, Row};
 use crate::cost::{Model, Tolerance};
 use crate::geometry::{LEVEL, Point2, Point3, Vector2};
+use crate::optimizer::Fitness;
 
 /// To join the legs again costs more than to measure a few that may be asked for next.
 const AT_ONCE: usize = 3 * LANES;
@@ -44,6 +45,9 @@ pub(super) struct Lattice<'m, 's> {
     hilly: bool,
     pub(super) legs_priced: u64,
     waypoints: Vec<Waypoint>,
+    /// Where the new places of each free waypoint lie, and the elevation of the ground there.
+    around: Vec<PointRow>,
+    ground: Vec<Row>,
     /// Between the places of neighbours, in order.
     legs: Vec<Leg>,
     ways: Ways,
@@ -70,6 +74,8 @@ impl<'m, 's> Lattice<'m, 's> {
             steepest: libm::tan(model.scenario.vehicle.max_climb_deg.to_radians()),
             legs_priced: 0,
             waypoints: Vec::new(),
+            around: Vec::new(),
+            ground: Vec::new(),
             legs: Vec::new(),
             ways: Ways::new(model, tolerance),
             clear: ClearWays::new(Turns::new(model, tolerance)),
@@ -81,24 +87,34 @@ impl<'m, 's> Lattice<'m, 's> {
         }
     }
 
-    /// Move the waypoints of `route`, which may be `feasible`, to the best combination of places one
-    /// `step` away; `turn` tells one sweep from the next. Whether any moved.
+    /// The fitness of `route`, within rounding.
+    pub(super) fn price(&mut self, route: &[Point3]) -> Fitness {
+        self.from.clear();
+        self.from
+            .extend(route.iter().map(|&point| PointRow::splat(point)));
+        let price = self.pricer.first_routes(&self.from, 1);
+        Fitness {
+            violation: price.violation[0],
+            cost: price.cost[0],
+        }
+    }
+
+    /// Move the waypoints of `route` to the best combination of places one `step` away; `turn` tells one
+    /// sweep from the next. Of a route that is not `feasible`, a unit of violation costs `rate`. Whether any
+    /// waypoint moved.
     pub(super) fn sweep(
         &mut self,
         route: &mut [Point3],
         feasible: bool,
+        rate: f64,
         step: f64,
         turn: usize,
     ) -> bool {
         let last = route.len() - 1;
-        self.waypoints.clear();
-        for idx in 0..=last {
-            let waypoint = self.waypoint(route, idx, step, turn);
-            self.waypoints.push(waypoint);
-        }
+        self.look_around(route, step, turn);
         if !(feasible && self.find_clear(last)) {
             self.price_legs(last, false);
-            self.ways.reach(&self.legs);
+            self.ways.reach(&mut self.legs, rate);
             self.ways.trace_back(&mut self.chosen);
         }
         let mut moved = false;
@@ -127,22 +143,54 @@ impl<'m, 's> Lattice<'m, 's> {
         false
     }
 
-    fn waypoint(&self, route: &[Point3], idx: usize, step: f64, turn: usize) -> Waypoint {
-        let own = route[idx];
-        let mut waypoint = Waypoint {
+    /// Find the places of every waypoint of `route`.
+    fn look_around(&mut self, route: &[Point3], step: f64, turn: usize) {
+        self.waypoints.clear();
+        self.waypoints.extend(route.iter().map(|&own| Waypoint {
             own,
             new: PointRow::splat(own),
             violation: [0.0; CHOICES],
             cost: [0.0; CHOICES],
+        }));
+        let last = route.len() - 1;
+        self.around.clear();
+        for idx in 1..last {
+            let places = self.places(route, idx, step, turn);
+            self.around.push(places);
+        }
+        self.pricer.ground(&self.around, &mut self.ground);
+        for (free, &own) in route[1..last].iter().enumerate() {
+            self.waypoints[free + 1] = self.waypoint(own, free, step, turn);
+        }
+    }
+
+    /// At `own`, with the places of free waypoint number `free` raised to their heights.
+    fn waypoint(&self, own: Point3, free: usize, step: f64, turn: usize) -> Waypoint {
+        let scenario = self.model.scenario;
+        let band = scenario.altitude;
+        let middle = 0.5 * (band.min + band.max);
+        let below = scenario.terrain.elevation(own.xy());
+        let height = own.z - below;
+        let mut waypoint = Waypoint {
+            own,
+            new: self.around[free],
+            violation: [0.0; CHOICES],
+            cost: [0.0; CHOICES],
         };
-        if idx > 0 && idx + 1 < route.len() {
-            let (new, ground) = self.places(route, idx, step, turn);
-            waypoint.new = new;
-            for (place, ground) in ground.into_iter().enumerate() {
-                let point = waypoint.place(place);
-                let (violation, cost) = self.model.waypoint_above(point, ground, self.tolerance);
-                (waypoint.violation[place], waypoint.cost[place]) = (violation, cost);
+        let price =
+            |point: Point3, ground: f64| self.model.waypoint_above(point, ground, self.tolerance);
+        (waypoint.violation[0], waypoint.cost[0]) = price(own, below);
+        for (lane, [.., rise]) in PATTERNS[turn % 2].into_iter().enumerate() {
+            let mut raised = height + rise * step;
+            // F3 has its kink at the middle of the band: no step may miss it.
+            if (height - middle) * (raised - middle) < 0.0 {
+                raised = middle;
             }
+            let ground = self.ground[free][lane];
+            let at = waypoint.new.get(lane).xy();
+            let point = self.reachable(at, ground + raised.clamp(band.min, band.max));
+            waypoint.new.set(lane, point);
+            (waypoint.violation[lane + 1], waypoint.cost[lane + 1]) = price(point, ground);
         }
         waypoint
     }
@@ -261,8 +309,8 @@ impl<'m, 's> Lattice<'m, 's> {
         }
     }
 
-    /// New places of waypoint `idx`, and the elevation of the ground at all. Frames follow the legs before, after and between by turns.
-    fn places(&self, route: &[Point3], idx: usize, step: f64, turn: usize) -> (PointRow, Each) {
+    /// Where the new places of waypoint `idx` lie. Frames follow the legs before, after and between by turns.
+    fn places(&self, route: &[Point3], idx: usize, step: f64, turn: usize) -> PointRow {
         let here = route[idx];
         let (before, after) = (route[idx - 1].xy(), route[idx + 1].xy());
         let way = match turn % 3 {
@@ -277,27 +325,13 @@ impl<'m, 's> Lattice<'m, 's> {
             way / length
         };
         let across = Vector2::new(-along.y, along.x);
-        let scenario = self.model.scenario;
-        let band = scenario.altitude;
-        let middle = 0.5 * (band.min + band.max);
-        let mut grounds = [scenario.terrain.elevation(here.xy()); CHOICES];
-        let height = here.z - grounds[0];
         let mut places = PointRow::splat(here);
-        for (lane, [a, c, rise]) in PATTERNS[turn % 2].into_iter().enumerate() {
-            let at = scenario
-                .area
-                .nearest(here.xy() + along * (a * step) + across * (c * step));
-            let mut raised = height + rise * step;
-            // F3 has its kink at the middle of the band: no step may miss it.
-            if (height - middle) * (raised - middle) < 0.0 {
-                raised = middle;
-            }
-            let ground = scenario.terrain.elevation(at);
-            grounds[lane + 1] = ground;
-            let z = ground + raised.clamp(band.min, band.max);
-            places.set(lane, self.reachable(at, z));
+        for (lane, [a, c, _]) in PATTERNS[turn % 2].into_iter().enumerate() {
+            let at = here.xy() + along * (a * step) + across * (c * step);
+            let at = self.model.scenario.area.nearest(at);
+            (places.x[lane], places.y[lane]) = (at.x, at.y);
         }
-        (places, grounds)
+        places
     }
 
     /// `z`, or the height nearest to it that can be climbed to from the start and from the target.
@@ -334,8 +368,11 @@ mod tests {
                 let step = 60.0 / (1.0 + turn as f64);
                 let mut other = route.clone();
                 let feasible = price(&model, &route).is_feasible();
-                let moved = quick.sweep(&mut route, feasible, step, turn);
-                assert_eq!(moved, thorough.sweep(&mut other, false, step, turn));
+                let moved = quick.sweep(&mut route, feasible, f64::INFINITY, step, turn);
+                assert_eq!(
+                    moved,
+                    thorough.sweep(&mut other, false, f64::INFINITY, step, turn)
+                );
                 assert_eq!(route, other, "seed {seed}, turn {turn}");
                 moves += usize::from(feasible && moved);
             }

@@ -5,12 +5,12 @@ mod lattice;
 mod turns;
 mod ways;
 
-use super::price::price;
 use super::{Stop, same, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
 use lattice::Lattice;
+use ways::paid;
 
 /// How far a descent goes.
 #[derive(Debug, Clone, Copy)]
@@ -21,7 +21,18 @@ pub(super) struct Steps {
     pub(super) to: f64,
     /// A gain below this share of the cost is none.
     pub(super) gain: f64,
+    /// What a metre or degree beyond a limit costs at the greatest step, in metres flown. It grows as
+    /// the step shrinks, and at the least one no cost makes up for it: a short way that breaks limits is
+    /// so mended where it is, not led round everything that makes way for it.
+    pub(super) violation_m: f64,
 }
+
+/// By which a route may still become cheaper, as a share, when the greatest step gains no more; at
+/// half that step half as much.
+const HOPE: f64 = 0.25;
+
+/// By which a violation becomes dearer as the step is halved.
+const DEARER: f64 = 8.0;
 
 /// Polishes routes of one scenario.
 pub(super) struct Polish<'m, 's> {
@@ -51,29 +62,35 @@ impl<'m, 's> Polish<'m, 's> {
     }
 
     /// As [`Polish::descend`]; `None` as soon as the route has become the same as one of `known` that
-    /// it does not beat.
+    /// it does not beat, or is too dear to become as good as one.
     pub(super) fn descend_unless_known(
         &mut self,
         route: &mut Vec<Point3>,
-        Steps { from, to, gain }: Steps,
+        steps: Steps,
         known: &[(Fitness, Vec<Point3>)],
     ) -> Option<Fitness> {
         let scenario = self.model.scenario;
         let way = (scenario.target - scenario.start).norm();
-        let mut best = price(self.model, route);
-        let (mut step, mut kind, mut failed) = (from * way, 0, 0);
-        while step > to * way && why_stop(scenario, self.stop).is_none() {
+        let mut best = self.lattice.price(route);
+        let mut rate = steps.violation_m * self.metre();
+        let (mut step, mut kind, mut failed) = (steps.from * way, 0, 0);
+        while step > steps.to * way && why_stop(scenario, self.stop).is_none() {
+            let is_last = 0.5 * step <= steps.to * way;
+            if is_last || rate <= 0.0 || best.is_feasible() {
+                rate = f64::INFINITY;
+            }
             let mut trial = route.clone();
             let mut better = false;
             if self
                 .lattice
-                .sweep(&mut trial, best.is_feasible(), step, kind)
+                .sweep(&mut trial, best.is_feasible(), rate, step, kind)
             {
-                let exact = price(self.model, &trial);
-                if exact.beats(&best) {
-                    better = exact.violation < best.violation
-                        || best.cost - exact.cost > gain * best.cost;
-                    best = exact;
+                let next = self.lattice.price(&trial);
+                let (new, old) = (paid(next, rate), paid(best, rate));
+                if new.beats(&old) {
+                    better = new.violation < old.violation
+                        || old.cost - new.cost > steps.gain * old.cost;
+                    best = next;
                     *route = trial;
                     let is_known = |(fitness, other): &(Fitness, Vec<Point3>)| {
                         !best.beats(fitness) && same(scenario, route, other)
@@ -86,10 +103,24 @@ impl<'m, 's> Polish<'m, 's> {
             kind += 1;
             failed = if better { 0 } else { failed + 1 };
             if failed >= 2 {
+                let hope = 1.0 + HOPE * step / (steps.from * way);
+                let is_out_of_reach = |(fitness, _): &(Fitness, Vec<Point3>)| {
+                    fitness.is_feasible() && best.cost > fitness.cost * hope
+                };
+                if known.iter().any(is_out_of_reach) {
+                    return None;
+                }
                 step *= 0.5;
+                rate *= DEARER;
                 failed = 0;
             }
         }
         Some(best)
+    }
+
+    /// What a metre flown costs.
+    fn metre(&self) -> f64 {
+        let scenario = self.model.scenario;
+        scenario.weights.fuel * scenario.vehicle.fuel_per_km / 1000.0
     }
 }

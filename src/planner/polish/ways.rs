@@ -48,9 +48,23 @@ pub(super) fn count(idx: usize, last: usize) -> usize {
     if idx == 0 || idx == last { 1 } else { CHOICES }
 }
 
+/// `fitness` with a cost of `rate` in place of each unit of violation, if it is finite.
+pub(super) fn paid(fitness: Fitness, rate: f64) -> Fitness {
+    if rate.is_finite() {
+        Fitness {
+            violation: 0.0,
+            cost: fitness.cost + rate * fitness.violation,
+        }
+    } else {
+        fitness
+    }
+}
+
 /// Joins legs to ways.
 pub(super) struct Ways {
     turns: Turns,
+    /// What a unit of violation costs; infinite where no cost makes up for it.
+    rate: f64,
     /// By leg.
     reached: Vec<Reached>,
 }
@@ -68,13 +82,19 @@ impl Ways {
     pub(super) fn new(model: &Model, tolerance: Tolerance) -> Self {
         Self {
             turns: Turns::new(model, tolerance),
+            rate: f64::INFINITY,
             reached: Vec::new(),
         }
     }
 
-    /// Find the best way to the end of every one of `legs` between places.
-    pub(super) fn reach(&mut self, legs: &[Leg]) {
+    /// Find the best way to the end of every one of `legs` between places, where a unit of violation costs
+    /// `rate`.
+    pub(super) fn reach(&mut self, legs: &mut [Leg], rate: f64) {
+        self.rate = rate;
         self.reached.clear();
+        for leg in legs.iter_mut() {
+            leg.pay(rate);
+        }
         for leg_idx in 0..legs.len() {
             let mut reached = Reached {
                 violation: legs[leg_idx].violation,
@@ -118,10 +138,11 @@ impl Ways {
                 let mut best = (Fitness::WORST, 0);
                 for from in order.all() {
                     let mut turned = price(from);
-                    if turned.violation > best.0.violation {
+                    if !turned.beats(&best.0) {
                         break;
                     }
                     turned.violation += turns.excess(way(from), onto);
+                    turned = paid(turned, self.rate);
                     if turned.beats(&best.0) {
                         best = (turned, from);
                     }
@@ -212,6 +233,18 @@ impl Leg {
         east: EMPTY,
         north: EMPTY,
     };
+
+    /// Put a cost of `rate` in place of each unit of violation, if it is finite.
+    fn pay(&mut self, rate: f64) {
+        let violations = self.violation.iter_mut().flatten();
+        for (violation, cost) in violations.zip(self.cost.iter_mut().flatten()) {
+            let own = Fitness {
+                violation: *violation,
+                cost: *cost,
+            };
+            (*violation, *cost) = (paid(own, rate).violation, paid(own, rate).cost);
+        }
+    }
 
     /// Add what the places of `b` cost, and the ways from those of `a`, of which so many count.
     pub(super) fn finish(&mut self, a: &Waypoint, b: &Waypoint, count: usize) {

@@ -2,9 +2,11 @@
 
 mod count;
 mod known;
+mod net;
 mod over;
 mod roadmap;
 mod tangents;
+mod trails;
 
 pub(super) use count::{spread, with_waypoints};
 
@@ -18,9 +20,13 @@ use crate::scenario::{Scenario, Seeding, WarmStart};
 use crate::seeding::{Obstacles, Outline, TautString, steep_ground, taut_strings_until};
 use crate::terrain::Terrain;
 use crate::threat::Threat;
+use net::Found;
 
 /// Strings taken from each scene of obstacles.
 const STRINGS: usize = 5;
+
+/// Where mountains are obstacles, too: a net of places finds ways through them as well.
+const STRINGS_ROUND_MOUNTAINS: usize = 2;
 
 /// Routes to start from at most.
 const STARTS: usize = 16;
@@ -32,7 +38,7 @@ const COARSE: usize = 4;
 const COARSE_OVER_HILLS: usize = 7;
 
 /// Free waypoints of a coarse route at most.
-const MOST_COARSE: usize = 12;
+const MOST_COARSE: usize = 20;
 
 /// Routes taken from the net of places.
 const OVERLAND: usize = 8;
@@ -40,11 +46,15 @@ const OVERLAND: usize = 8;
 /// A start this much dearer than the best, as a share, is not worth refining.
 const HOPELESS: f64 = 0.08;
 
+/// A start that breaks a limit may well cost more than the best as it is, but not so many times more.
+const ABSURD: f64 = 3.0;
+
 /// By which a start is pulled into place.
 const ROUGH_STEPS: Steps = Steps {
     from: 0.03,
     to: 0.005,
-    gain: 1e-6,
+    gain: 5e-4,
+    violation_m: 10.0,
 };
 
 /// A known route is in place but for what has changed; the polish at the end goes on with it.
@@ -72,9 +82,9 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
         shapes.extend(along_strings(model, stop));
         // Who brings a route has been over the hills already.
         if !warm {
-            let net = roadmap::routes(model, OVERLAND);
-            shapes.extend(net.routes);
-            legs_priced = net.legs_priced;
+            let found = over_ground(model);
+            shapes.extend(found.routes);
+            legs_priced = found.legs_priced;
         }
     }
     if shapes.is_empty() {
@@ -138,8 +148,8 @@ fn refine(
     let mut dear = Vec::new();
     for (fitness, mut route) in priced.drain(..) {
         let is_dear = fitness.cost > best.cost * (1.0 + hopeless);
-        // With a good route at hand, one that breaks a limit need not be tried either.
-        if best.is_feasible() && is_dear && (fitness.is_feasible() || is_known) {
+        let is_absurd = fitness.cost > best.cost * ABSURD;
+        if best.is_feasible() && (is_absurd || is_dear && (fitness.is_feasible() || is_known)) {
             dear.push((fitness, route));
             continue;
         }
@@ -192,31 +202,28 @@ fn along_strings(model: &Model, stop: &dyn Stop) -> Vec<Vec<Point3>> {
     let everything = |_: usize, _: &Threat| true;
     let in_the_way = |_: usize, threat: &Threat| !over::passable(scenario, threat);
     let mut shapes = Vec::new();
-    let mut follow = |obstacles: &Obstacles| {
-        for string in taut_strings_until(obstacles, STRINGS, &is_over).strings {
+    let mut follow = |obstacles: &Obstacles, count: usize| {
+        for string in taut_strings_until(obstacles, count, &is_over).strings {
             shapes.push(along(model, &string));
         }
     };
-    follow(&Obstacles::soft(scenario, everything));
-    follow(&Obstacles::hard(scenario, everything));
+    follow(&Obstacles::soft(scenario, everything), STRINGS);
+    follow(&Obstacles::hard(scenario, everything), STRINGS);
     if scenario
         .threats
         .iter()
         .any(|threat| over::passable(scenario, threat))
     {
-        follow(&Obstacles::soft(scenario, in_the_way));
-        follow(&Obstacles::hard(scenario, in_the_way));
+        follow(&Obstacles::soft(scenario, in_the_way), STRINGS);
+        follow(&Obstacles::hard(scenario, in_the_way), STRINGS);
     }
     if !matches!(scenario.terrain, Terrain::Flat(_)) {
         let steep = steep_ground(scenario);
         if !steep.is_empty() {
             let outlines = scenario.threats.iter().map(Outline::soft).chain(steep);
             let ends = [scenario.start.xy(), scenario.target.xy()];
-            follow(&Obstacles::new(
-                outlines.map(Some),
-                ends,
-                Some(scenario.area),
-            ));
+            let obstacles = Obstacles::new(outlines.map(Some), ends, Some(scenario.area));
+            follow(&obstacles, STRINGS_ROUND_MOUNTAINS);
         }
     }
     // Straight ahead, for when crossing soft zones is worth it.
@@ -224,24 +231,41 @@ fn along_strings(model: &Model, stop: &dyn Stop) -> Vec<Vec<Point3>> {
     shapes
 }
 
+/// Routes over the ground: through a fine net only where the coarse one has none that can be flown as it is.
+fn over_ground(model: &Model) -> Found {
+    let scenario = model.scenario;
+    let mut found = roadmap::routes(model, OVERLAND);
+    let can_be_flown = |route: &Vec<Point3>| {
+        route.len() - 2 <= scenario.planner.waypoints && price(model, route).is_feasible()
+    };
+    let is_hilly = !matches!(scenario.terrain, Terrain::Flat(_));
+    if is_hilly && !found.routes.iter().any(can_be_flown) {
+        let trails = trails::routes(model, OVERLAND);
+        found.routes.extend(trails.routes);
+        found.legs_priced += trails.legs_priced;
+    }
+    found
+}
+
 /// The route along `string`, in the middle of the band where it can be reached.
 fn along(model: &Model, string: &TautString) -> Vec<Point3> {
     let scenario = model.scenario;
     let corners = tangents::corners(scenario, string, scenario.planner.waypoints.min(COARSE));
     let mut route = vec![scenario.start];
-    route.extend(corners.iter().map(|&corner| lifted(scenario, corner)));
+    route.extend(corners.iter().map(|&corner| lifted(scenario, corner, 0.5)));
     route.push(scenario.target);
     over::lift(model, &mut route);
     route
 }
 
-/// `point` in the middle of the band, or as near to it as the vehicle can climb from the start and
-/// to the target.
-fn lifted(scenario: &Scenario, point: Point2) -> Point3 {
+/// `point` at that `share` of the band's height, or as near to it as the vehicle can climb from the
+/// start and to the target.
+fn lifted(scenario: &Scenario, point: Point2, share: f64) -> Point3 {
     let band = scenario.altitude;
     let point = scenario.area.nearest(point);
     let steepest = libm::tan(scenario.vehicle.max_climb_deg.to_radians()) * (1.0 - 1e-9);
-    let mut z = scenario.terrain.elevation(point) + 0.5 * (band.min + band.max);
+    let height = band.min + share * (band.max - band.min);
+    let mut z = scenario.terrain.elevation(point) + height;
     for end in [scenario.start, scenario.target] {
         let reach = (point - end.xy()).norm() * steepest;
         z = z.clamp(end.z - reach, end.z + reach);

@@ -5,9 +5,10 @@
 //! the cheapest chains from start to target are found; turns alone are not looked at.
 
 use super::lifted;
+use super::net::{self, Found, Tree};
 use crate::cost::Model;
-use crate::cost::batch::{LANES, PointRow, Price, Pricer};
-use crate::geometry::{Point2, Point3, Vector2};
+use crate::cost::batch::{LANES, Price, Pricer};
+use crate::geometry::Point3;
 use crate::planner::price::PRICED_FROM;
 use crate::terrain::Terrain;
 
@@ -23,85 +24,30 @@ const DETOUR: f64 = 1.4;
 /// What a waypoint must gain, as a share of the direct way's fuel.
 const WORTH: f64 = 1e-4;
 
-/// What the net gave.
-pub(super) struct Net {
-    /// Routes that differ, the cheapest first.
-    pub(super) routes: Vec<Vec<Point3>>,
-    /// Legs priced for it.
-    pub(super) legs_priced: u64,
-}
-
 /// Up to `count` routes that differ.
-pub(super) fn routes(model: &Model, count: usize) -> Net {
+pub(super) fn routes(model: &Model, count: usize) -> Found {
     let places = places(model);
     let legs_priced = (places.len() * (places.len() - 1) / 2) as u64;
     let mut legs = Legs::new(model, &places);
-    let target = places.len() - 1;
-    let (from_start, before) = cheapest(&mut legs, 0);
-    let (to_target, after) = cheapest(&mut legs, target);
-    // The cheapest route over each place; neighbours of a route's own places give it again.
-    let mut over: Vec<(f64, usize)> = (0..places.len())
-        .map(|place| (from_start[place] + to_target[place], place))
-        .filter(|(cost, _)| cost.is_finite())
-        .collect();
-    over.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
-    let mut routes: Vec<Vec<Point3>> = Vec::new();
-    for (_, place) in over {
-        let mut chain = trace(&before, place);
-        chain.reverse();
-        chain.extend(trace(&after, place).into_iter().skip(1));
-        let route: Vec<Point3> = chain.into_iter().map(|idx| places[idx]).collect();
-        if !routes.iter().any(|other| near(model, &route, other)) {
-            routes.push(route);
-        }
-        if routes.len() == count {
-            break;
-        }
-    }
-    Net {
-        routes,
+    let trees = [0, places.len() - 1].map(|end| legs.cheapest(end));
+    Found {
+        routes: net::chains(model, &places, &trees, count),
         legs_priced,
     }
 }
 
-/// Start, a hexagonal net, target.
+/// Start, a net of spots in the middle of the band, target.
 fn places(model: &Model) -> Vec<Point3> {
     let scenario = model.scenario;
-    let (start, target) = (scenario.start.xy(), scenario.target.xy());
-    let way = target - start;
-    let direct = way.norm();
-    let along = way / direct;
-    let across = Vector2::new(-along.y, along.x);
-    // An ellipse with both ends as its foci.
-    let (long, wide) = (
-        0.5 * DETOUR * direct,
-        0.5 * direct * (DETOUR * DETOUR - 1.0).sqrt(),
-    );
     let count = match scenario.terrain {
         Terrain::Flat(_) => PLACES,
         Terrain::Peaks(_) | Terrain::Grid(_) | Terrain::Dem(_) => PLACES_OVER_HILLS,
     };
-    let step = (std::f64::consts::PI * long * wide / (0.866 * count as f64)).sqrt();
-    let middle = nalgebra::center(&start, &target);
-    let mut places = vec![scenario.start];
-    let (rows, columns) = ((wide / (0.866 * step)).floor(), (long / step).ceil());
-    let mut row = -rows;
-    while row <= rows {
-        let shift = if row.rem_euclid(2.0) < 0.5 { 0.0 } else { 0.5 };
-        let mut column = -columns;
-        while column <= columns {
-            let (x, y) = ((column + shift) * step, row * 0.866 * step);
-            let at: Point2 = middle + along * x + across * y;
-            let inside = (x / long) * (x / long) + (y / wide) * (y / wide) <= 1.0;
-            if inside && scenario.area.contains(at) {
-                places.push(lifted(scenario, at));
-            }
-            column += 1.0;
-        }
-        row += 1.0;
-    }
-    places.push(scenario.target);
-    places
+    let spots = net::spots(scenario, count, DETOUR).points.into_iter();
+    std::iter::once(scenario.start)
+        .chain(spots.map(|spot| lifted(scenario, spot, 0.5)))
+        .chain([scenario.target])
+        .collect()
 }
 
 /// The legs between places.
@@ -120,18 +66,16 @@ impl<'p, 's> Legs<'p, 's> {
         let tolerance = model.tolerance.scaled(PRICED_FROM);
         let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).verdicts();
         let count = places.len();
-        let mut pairs = Pairs::default();
-        for a in 0..count {
-            for b in a + 1..count {
-                pairs.push(places, (a, b));
-            }
-        }
-        let mut prices = vec![Price::ZERO; pairs.from.len()];
+        let ends: Vec<(usize, usize)> = (0..count)
+            .flat_map(|a| (a + 1..count).map(move |b| (a, b)))
+            .collect();
+        let [from, to] = net::rows(places, &ends);
+        let mut prices = vec![Price::ZERO; from.len()];
         let hilly = !matches!(scenario.terrain, Terrain::Flat(_));
         if hilly {
-            pricer.legs_at_best(&pairs.from, &pairs.to, &mut prices);
+            pricer.legs_at_best(&from, &to, &mut prices);
         } else {
-            pricer.legs(&pairs.from, &pairs.to, &mut prices);
+            pricer.legs(&from, &to, &mut prices);
         }
         let own: Vec<(f64, f64)> = places
             .iter()
@@ -140,7 +84,7 @@ impl<'p, 's> Legs<'p, 's> {
         let direct = (scenario.target - scenario.start).norm();
         let worth = WORTH * direct * scenario.weights.fuel * scenario.vehicle.fuel_per_km / 1000.0;
         let mut costs = vec![vec![f64::INFINITY; count]; count];
-        for (idx, &(a, b)) in pairs.ends.iter().enumerate() {
+        for (idx, &(a, b)) in ends.iter().enumerate() {
             let (price, lane) = (&prices[idx / LANES], idx % LANES);
             if price.violation[lane] > 0.0 {
                 continue;
@@ -166,128 +110,83 @@ impl<'p, 's> Legs<'p, 's> {
 
     /// Measure the heights of the legs from `before` to `place`.
     fn measure(&mut self, before: &[usize], place: usize) {
-        let mut pairs = Pairs::default();
-        for &other in before {
-            pairs.push(self.places, (other.min(place), other.max(place)));
-        }
-        let mut prices = vec![Price::ZERO; pairs.from.len()];
+        let ends: Vec<(usize, usize)> = before
+            .iter()
+            .map(|&other| (other.min(place), other.max(place)))
+            .collect();
+        let [from, to] = net::rows(self.places, &ends);
+        let mut prices = vec![Price::ZERO; from.len()];
         self.pricer
-            .heights_of_legs(&pairs.from, &pairs.to, pairs.ends.len(), &mut prices);
-        for (idx, &(a, b)) in pairs.ends.iter().enumerate() {
+            .heights_of_legs(&from, &to, ends.len(), &mut prices);
+        for (idx, &(a, b)) in ends.iter().enumerate() {
             (self.measured[a][b], self.measured[b][a]) = (true, true);
             if prices[idx / LANES].violation[idx % LANES] > 0.0 {
                 (self.costs[a][b], self.costs[b][a]) = (f64::INFINITY, f64::INFINITY);
             }
         }
     }
-}
 
-/// Legs side by side.
-#[derive(Default)]
-struct Pairs {
-    from: Vec<PointRow>,
-    to: Vec<PointRow>,
-    /// Numbers of the places of each.
-    ends: Vec<(usize, usize)>,
-}
-
-impl Pairs {
-    fn push(&mut self, places: &[Point3], (a, b): (usize, usize)) {
-        let lane = self.ends.len() % LANES;
-        if lane == 0 {
-            self.from.push(PointRow::splat(places[a]));
-            self.to.push(PointRow::splat(places[b]));
-        }
-        let row = self.from.len() - 1;
-        self.from[row].set(lane, places[a]);
-        self.to[row].set(lane, places[b]);
-        self.ends.push((a, b));
-    }
-}
-
-/// Of the cheapest chains of `legs` from `source`: what each costs, and the place before its last.
-///
-/// A leg is measured when the cheapest chain to a place is about to end with it: others are no part of
-/// any. If it breaks a limit, the place waits for its next best chain.
-fn cheapest(legs: &mut Legs, source: usize) -> (Vec<f64>, Vec<usize>) {
-    let count = legs.places.len();
-    let mut costs = vec![f64::INFINITY; count];
-    let mut before: Vec<usize> = (0..count).collect();
-    let mut open = vec![true; count];
-    let mut closed = Vec::with_capacity(count);
-    costs[source] = 0.0;
-    while closed.len() < count {
-        let nearest = (0..count).filter(|&place| open[place]);
-        let Some(place) = nearest.min_by(|&a, &b| costs[a].total_cmp(&costs[b])) else {
-            break;
-        };
-        let last = before[place];
-        if last != place && !legs.measured[last][place] {
-            legs.measure(&likeliest(legs, &closed, &costs, place), place);
-            if legs.costs[last][place].is_infinite() {
-                (costs[place], before[place]) = (f64::INFINITY, place);
-                for &other in &closed {
-                    let cost = costs[other] + legs.costs[other][place];
-                    if cost < costs[place] {
-                        (costs[place], before[place]) = (cost, other);
+    /// The cheapest chains from `source`.
+    ///
+    /// A leg is measured when the cheapest chain to a place is about to end with it: others are no part of
+    /// any. If it breaks a limit, the place waits for its next best chain.
+    fn cheapest(&mut self, source: usize) -> Tree {
+        let count = self.places.len();
+        let mut tree = Tree::from(source, count);
+        let (costs, before) = (&mut tree.costs, &mut tree.before);
+        let mut open = vec![true; count];
+        let mut closed = Vec::with_capacity(count);
+        while closed.len() < count {
+            let nearest = (0..count).filter(|&place| open[place]);
+            let Some(place) = nearest.min_by(|&a, &b| costs[a].total_cmp(&costs[b])) else {
+                break;
+            };
+            let last = before[place];
+            if last != place && !self.measured[last][place] {
+                self.measure(&self.likeliest(&closed, costs, place), place);
+                if self.costs[last][place].is_infinite() {
+                    (costs[place], before[place]) = (f64::INFINITY, place);
+                    for &other in &closed {
+                        let cost = costs[other] + self.costs[other][place];
+                        if cost < costs[place] {
+                            (costs[place], before[place]) = (cost, other);
+                        }
                     }
+                    continue;
                 }
+            }
+            open[place] = false;
+            closed.push(place);
+            for next in 0..count {
+                let cost = costs[place] + self.costs[place][next];
+                if cost < costs[next] {
+                    costs[next] = cost;
+                    before[next] = place;
+                }
+            }
+        }
+        tree
+    }
+
+    /// Of the places that are `closed`, the few by which `place` is reached cheapest by a leg not yet
+    /// measured: as many as are measured at once.
+    fn likeliest(&self, closed: &[usize], costs: &[f64], place: usize) -> Vec<usize> {
+        let mut few: Vec<(f64, usize)> = Vec::with_capacity(LANES + 1);
+        for &other in closed {
+            let cost = costs[other] + self.costs[other][place];
+            let worst = few.last().map_or(f64::INFINITY, |last| last.0);
+            if self.measured[other][place]
+                || cost.is_infinite()
+                || (few.len() == LANES && cost >= worst)
+            {
                 continue;
             }
+            let at = few.partition_point(|(less, _)| *less <= cost);
+            few.insert(at, (cost, other));
+            few.truncate(LANES);
         }
-        open[place] = false;
-        closed.push(place);
-        for next in 0..count {
-            let cost = costs[place] + legs.costs[place][next];
-            if cost < costs[next] {
-                costs[next] = cost;
-                before[next] = place;
-            }
-        }
+        few.into_iter().map(|(_, other)| other).collect()
     }
-    (costs, before)
-}
-
-/// Of the places that are `closed`, the few by which `place` is reached cheapest by a leg not yet measured:
-/// as many as are measured at once.
-fn likeliest(legs: &Legs, closed: &[usize], costs: &[f64], place: usize) -> Vec<usize> {
-    let mut few: Vec<(f64, usize)> = Vec::with_capacity(LANES + 1);
-    for &other in closed {
-        let cost = costs[other] + legs.costs[other][place];
-        let worst = few.last().map_or(f64::INFINITY, |last| last.0);
-        if legs.measured[other][place]
-            || cost.is_infinite()
-            || (few.len() == LANES && cost >= worst)
-        {
-            continue;
-        }
-        let at = few.partition_point(|(less, _)| *less <= cost);
-        few.insert(at, (cost, other));
-        few.truncate(LANES);
-    }
-    few.into_iter().map(|(_, other)| other).collect()
-}
-
-/// From `place` back to where all chains begin.
-fn trace(before: &[usize], mut place: usize) -> Vec<usize> {
-    let mut chain = vec![place];
-    while before[place] != place {
-        place = before[place];
-        chain.push(place);
-    }
-    chain
-}
-
-/// Whether every waypoint of `route` lies near to a leg of `other`.
-fn near(model: &Model, route: &[Point3], other: &[Point3]) -> bool {
-    let reach = 2.0 * super::super::SAME * (model.scenario.target - model.scenario.start).norm();
-    route.iter().all(|point| {
-        other.windows(2).any(|ends| {
-            let way = ends[1] - ends[0];
-            let share = ((point - ends[0]).dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
-            (ends[0] + way * share - point).norm() <= reach
-        })
-    })
 }
 
 #[cfg(test)]
@@ -307,11 +206,13 @@ mod tests {
             early.measure(&all[..place], place);
         }
         for source in [0, places.len() - 1] {
-            let (costs, before) = cheapest(&mut late, source);
-            let (expected, expected_before) = cheapest(&mut early, source);
-            let bits = |costs: &[f64]| costs.iter().map(|cost| cost.to_bits()).collect::<Vec<_>>();
-            assert_eq!(bits(&costs), bits(&expected));
-            assert_eq!(before, expected_before);
+            let (found, expected) = (late.cheapest(source), early.cheapest(source));
+            let bits = |tree: &Tree| {
+                let costs = tree.costs.iter();
+                costs.map(|cost| cost.to_bits()).collect::<Vec<_>>()
+            };
+            assert_eq!(bits(&found), bits(&expected));
+            assert_eq!(found.before, expected.before);
         }
         let measured = late
             .measured

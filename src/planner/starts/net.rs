@@ -1,0 +1,143 @@
+//! What ways over the ground have in common: a net of spots, and the cheapest chains through it.
+
+use crate::cost::Model;
+use crate::cost::batch::{LANES, PointRow};
+use crate::geometry::{Point2, Point3, Vector2};
+use crate::scenario::Scenario;
+
+/// What a net gave.
+pub(super) struct Found {
+    /// Routes that differ, the cheapest first.
+    pub(super) routes: Vec<Vec<Point3>>,
+    /// Legs priced for them.
+    pub(super) legs_priced: u64,
+}
+
+/// A hexagonal net.
+pub(super) struct Spots {
+    pub(super) points: Vec<Point2>,
+    /// From each to the next, metres.
+    pub(super) step: f64,
+}
+
+/// About `count` spots over all points of which the way over them from start to target is at most
+/// `detour` times the direct one, within the area.
+pub(super) fn spots(scenario: &Scenario, count: usize, detour: f64) -> Spots {
+    let (start, target) = (scenario.start.xy(), scenario.target.xy());
+    let way = target - start;
+    let direct = way.norm();
+    let along = way / direct;
+    let across = Vector2::new(-along.y, along.x);
+    // An ellipse with both ends as its foci.
+    let (long, wide) = (
+        0.5 * detour * direct,
+        0.5 * direct * (detour * detour - 1.0).sqrt(),
+    );
+    let step = (std::f64::consts::PI * long * wide / (0.866 * count as f64)).sqrt();
+    let middle = nalgebra::center(&start, &target);
+    let mut points = Vec::new();
+    let (rows, columns) = ((wide / (0.866 * step)).floor(), (long / step).ceil());
+    let mut row = -rows;
+    while row <= rows {
+        let shift = if row.rem_euclid(2.0) < 0.5 { 0.0 } else { 0.5 };
+        let mut column = -columns;
+        while column <= columns {
+            let (x, y) = ((column + shift) * step, row * 0.866 * step);
+            let at: Point2 = middle + along * x + across * y;
+            let inside = (x / long) * (x / long) + (y / wide) * (y / wide) <= 1.0;
+            if inside && scenario.area.contains(at) {
+                points.push(at);
+            }
+            column += 1.0;
+        }
+        row += 1.0;
+    }
+    Spots { points, step }
+}
+
+/// Legs between `places`, by the numbers of their `ends`: from and to, side by side.
+pub(super) fn rows(places: &[Point3], ends: &[(usize, usize)]) -> [Vec<PointRow>; 2] {
+    let side = |end: fn(&(usize, usize)) -> usize| {
+        let row = |ends: &[(usize, usize)]| {
+            // Lanes that are left over repeat a leg.
+            let mut row = PointRow::splat(places[end(&ends[0])]);
+            for (lane, ends) in ends.iter().enumerate() {
+                row.set(lane, places[end(ends)]);
+            }
+            row
+        };
+        ends.chunks(LANES).map(row).collect()
+    };
+    [side(|ends| ends.0), side(|ends| ends.1)]
+}
+
+/// The cheapest chains from one place to all others.
+pub(super) struct Tree {
+    /// Of each place.
+    pub(super) costs: Vec<f64>,
+    /// The place before it; where there is none, itself.
+    pub(super) before: Vec<usize>,
+}
+
+impl Tree {
+    /// Chains of no leg, from `source` to one of `count` places.
+    pub(super) fn from(source: usize, count: usize) -> Self {
+        let mut costs = vec![f64::INFINITY; count];
+        costs[source] = 0.0;
+        Self {
+            costs,
+            before: (0..count).collect(),
+        }
+    }
+
+    /// From `place` back to where all chains begin.
+    fn trace(&self, mut place: usize) -> Vec<usize> {
+        let mut chain = vec![place];
+        while self.before[place] != place {
+            place = self.before[place];
+            chain.push(place);
+        }
+        chain
+    }
+}
+
+/// Up to `count` chains that differ, the cheapest first, out of the trees from start and target.
+pub(super) fn chains(
+    model: &Model,
+    places: &[Point3],
+    [from_start, from_target]: &[Tree; 2],
+    count: usize,
+) -> Vec<Vec<Point3>> {
+    // The cheapest chain over each place; neighbours of a chain's own places give it again.
+    let mut over: Vec<(f64, usize)> = (0..places.len())
+        .map(|place| (from_start.costs[place] + from_target.costs[place], place))
+        .filter(|(cost, _)| cost.is_finite())
+        .collect();
+    over.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
+    let mut chains: Vec<Vec<Point3>> = Vec::new();
+    for (_, place) in over {
+        let mut chain = from_start.trace(place);
+        chain.reverse();
+        chain.extend(from_target.trace(place).into_iter().skip(1));
+        let chain: Vec<Point3> = chain.into_iter().map(|idx| places[idx]).collect();
+        if !chains.iter().any(|other| is_near(model, &chain, other)) {
+            chains.push(chain);
+        }
+        if chains.len() == count {
+            break;
+        }
+    }
+    chains
+}
+
+/// Whether every waypoint of `chain` lies near to a leg of `other`.
+fn is_near(model: &Model, chain: &[Point3], other: &[Point3]) -> bool {
+    let reach = 2.0 * super::super::SAME * (model.scenario.target - model.scenario.start).norm();
+    chain.iter().all(|point| {
+        other.windows(2).any(|ends| {
+            let way = ends[1] - ends[0];
+            let share = ((point - ends[0]).dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
+            (ends[0] + way * share - point).norm() <= reach
+        })
+    })
+}

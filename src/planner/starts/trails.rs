@@ -1,0 +1,421 @@
+//! Ways over hard ground: through a fine net of places at several heights of the band.
+//!
+//! Where no chain of long legs keeps the limits, the way is found in small steps: every place is joined to
+//! those about it, and some of them are so much lower or higher above the ground that a leg need not climb
+//! as it does. Of the chain that is found, as many waypoints are kept as the route may have.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::lifted;
+use super::net::{self, Found, Spots, Tree};
+use crate::cost::Model;
+use crate::cost::batch::{LANES, Price, Pricer};
+use crate::geometry::Point3;
+use crate::optimizer::Fitness;
+use crate::planner::price::PRICED_FROM;
+
+/// Spots of the net, besides both ends.
+const SPOTS: usize = 1000;
+
+/// Heights of each spot, as shares of the band.
+const HEIGHTS: [f64; 3] = [1.0 / 6.0, 0.5, 5.0 / 6.0];
+
+/// The net covers all points of which the way over them is at most so many times the direct one.
+const DETOUR: f64 = 1.5;
+
+/// Places are joined to those within so many steps of the net.
+const REACH: f64 = 2.1;
+
+/// Up to `count` routes that differ, of at most as many free waypoints as `model` asks for.
+pub(super) fn routes(model: &Model, count: usize) -> Found {
+    let mut net = Net::new(model);
+    let trees = [0, net.places.len() - 1].map(|end| net.cheapest(end));
+    let chains = net::chains(model, &net.places, &trees, count);
+    Found {
+        routes: chains.iter().map(|chain| net.thin(model, chain)).collect(),
+        legs_priced: net.legs_priced,
+    }
+}
+
+/// Places joined by legs.
+struct Net<'s> {
+    places: Vec<Point3>,
+    pricer: Pricer<'s>,
+    /// Of each place.
+    legs: Vec<Vec<Leg>>,
+    legs_priced: u64,
+}
+
+#[derive(Clone, Copy)]
+struct Leg {
+    to: usize,
+    /// Infinite where it breaks a limit.
+    cost: f64,
+    /// Whether it is known to keep its heights.
+    measured: bool,
+}
+
+/// A chain that is about to end at `place`, which it comes to by leg number `leg` of place `via`.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct Arrival {
+    /// The bits of its cost, in the same order.
+    cost: u64,
+    place: usize,
+    via: usize,
+    leg: usize,
+}
+
+impl<'s> Net<'s> {
+    fn new(model: &Model<'s>) -> Self {
+        let scenario = model.scenario;
+        let tolerance = model.tolerance.scaled(PRICED_FROM);
+        let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).verdicts();
+        let spots = net::spots(scenario, SPOTS, DETOUR);
+        let places = places(model, &spots);
+        let mut ends = Vec::new();
+        let reach = REACH * spots.step;
+        for (a, one) in places.iter().enumerate() {
+            for (b, other) in places.iter().enumerate().skip(a + 1) {
+                let (dx, dy) = (other.x - one.x, other.y - one.y);
+                let square = dx * dx + dy * dy;
+                if square <= reach * reach && square > 0.0 {
+                    ends.push((a, b));
+                }
+            }
+        }
+        let [from, to] = net::rows(&places, &ends);
+        let mut prices = vec![Price::ZERO; from.len()];
+        pricer.legs_at_best(&from, &to, &mut prices);
+        // A route has so many waypoints to the metre, not one at every place.
+        let way = (scenario.target - scenario.start).norm();
+        let waypoints = (scenario.planner.waypoints + 1) as f64 / way;
+        let own: Vec<f64> = places
+            .iter()
+            .map(|&place| model.waypoint(place, tolerance).1 * waypoints)
+            .collect();
+        let mut legs = vec![Vec::new(); places.len()];
+        for (idx, &(a, b)) in ends.iter().enumerate() {
+            let (price, lane) = (&prices[idx / LANES], idx % LANES);
+            if price.violation[lane] > 0.0 {
+                continue;
+            }
+            let length = (places[b] - places[a]).norm();
+            let cost = price.cost[lane] + 0.5 * (own[a] + own[b]) * length;
+            for (at, to) in [(a, b), (b, a)] {
+                legs[at].push(Leg {
+                    to,
+                    cost,
+                    measured: false,
+                });
+            }
+        }
+        Self {
+            places,
+            pricer,
+            legs,
+            legs_priced: ends.len() as u64,
+        }
+    }
+
+    /// The cheapest chains from `source`.
+    fn cheapest(&mut self, source: usize) -> Tree {
+        let mut tree = Tree::from(source, self.places.len());
+        let mut closed = vec![false; self.places.len()];
+        let mut open = BinaryHeap::new();
+        closed[source] = true;
+        self.spread(source, 0.0, &closed, &mut open);
+        while let Some(Reverse(first)) = open.pop() {
+            if closed[first.place] {
+                continue;
+            }
+            if self.legs[first.via][first.leg].measured {
+                let cost = f64::from_bits(first.cost);
+                tree.costs[first.place] = cost;
+                tree.before[first.place] = first.via;
+                closed[first.place] = true;
+                self.spread(first.place, cost, &closed, &mut open);
+                continue;
+            }
+            // Those that come next are measured with it.
+            let mut few = vec![first];
+            while few.len() < LANES
+                && let Some(Reverse(next)) = open.peek()
+                && !self.legs[next.via][next.leg].measured
+            {
+                few.extend(open.pop().map(|Reverse(next)| next));
+            }
+            few.retain(|next| !closed[next.place]);
+            self.measure(&few);
+            let good = |next: &Arrival| self.legs[next.via][next.leg].cost.is_finite();
+            open.extend(few.into_iter().filter(good).map(Reverse));
+        }
+        tree
+    }
+
+    /// Add the chains that go on from `place` to those that are `open`.
+    fn spread(
+        &self,
+        place: usize,
+        cost: f64,
+        closed: &[bool],
+        open: &mut BinaryHeap<Reverse<Arrival>>,
+    ) {
+        for (idx, leg) in self.legs[place].iter().enumerate() {
+            if !closed[leg.to] && leg.cost.is_finite() {
+                open.push(Reverse(Arrival {
+                    cost: (cost + leg.cost).to_bits(),
+                    place: leg.to,
+                    via: place,
+                    leg: idx,
+                }));
+            }
+        }
+    }
+
+    /// Measure the heights of the last legs of `few`.
+    fn measure(&mut self, few: &[Arrival]) {
+        let ends: Vec<(usize, usize)> = few
+            .iter()
+            .map(|next| (next.via.min(next.place), next.via.max(next.place)))
+            .collect();
+        let [from, to] = net::rows(&self.places, &ends);
+        let mut prices = vec![Price::ZERO; from.len()];
+        self.pricer
+            .heights_of_legs(&from, &to, ends.len(), &mut prices);
+        for (idx, &(a, b)) in ends.iter().enumerate() {
+            let breaks = prices[idx / LANES].violation[idx % LANES] > 0.0;
+            for (at, to) in [(a, b), (b, a)] {
+                for leg in self.legs[at].iter_mut().filter(|leg| leg.to == to) {
+                    leg.measured = true;
+                    if breaks {
+                        leg.cost = f64::INFINITY;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Of the places of `chain`, those that make the best route of as many free waypoints as may be.
+    fn thin(&mut self, model: &Model, chain: &[Point3]) -> Vec<Point3> {
+        let last = chain.len() - 1;
+        let ends: Vec<(usize, usize)> = (0..last)
+            .flat_map(|a| (a + 1..=last).map(move |b| (a, b)))
+            .collect();
+        let [from, to] = net::rows(chain, &ends);
+        let mut prices = vec![Price::ZERO; from.len()];
+        self.pricer.first_legs(&from, &to, ends.len(), &mut prices);
+        self.legs_priced += ends.len() as u64;
+        let tolerance = model.tolerance.scaled(PRICED_FROM);
+        let own: Vec<(f64, f64)> = chain
+            .iter()
+            .map(|&place| model.waypoint(place, tolerance))
+            .collect();
+        // The best way to each place, by so many legs.
+        let mut best = vec![(Fitness::WORST, 0); chain.len()];
+        best[0] = (
+            Fitness {
+                violation: 0.0,
+                cost: 0.0,
+            },
+            0,
+        );
+        let mut ways = vec![best];
+        for _ in 0..=model.scenario.planner.waypoints.min(last - 1) {
+            let known = &ways[ways.len() - 1];
+            let mut best = vec![(Fitness::WORST, 0); chain.len()];
+            for (idx, &(a, b)) in ends.iter().enumerate() {
+                let (price, lane) = (&prices[idx / LANES], idx % LANES);
+                let at_end = if b == last { (0.0, 0.0) } else { own[b] };
+                let way = Fitness {
+                    violation: known[a].0.violation + price.violation[lane] + at_end.0,
+                    cost: known[a].0.cost + price.cost[lane] + at_end.1,
+                };
+                if known[a].0.cost.is_finite() && way.beats(&best[b].0) {
+                    best[b] = (way, a);
+                }
+            }
+            ways.push(best);
+        }
+        let mut legs = 1;
+        for count in 2..ways.len() {
+            if ways[count][last].0.beats(&ways[legs][last].0) {
+                legs = count;
+            }
+        }
+        let mut route = vec![chain[last]];
+        let mut at = last;
+        for way in ways[1..=legs].iter().rev() {
+            at = way[at].1;
+            route.push(chain[at]);
+        }
+        route.reverse();
+        route
+    }
+}
+
+/// Start, the spots at their heights, target.
+fn places(model: &Model, spots: &Spots) -> Vec<Point3> {
+    let scenario = model.scenario;
+    let over = |&spot| HEIGHTS.map(|share| lifted(scenario, spot, share));
+    std::iter::once(scenario.start)
+        .chain(spots.points.iter().flat_map(over))
+        .chain([scenario.target])
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::roadmap;
+    use super::*;
+    use crate::geometry::Point2;
+    use crate::planner::price::price;
+    use crate::planner::tests::scenario;
+    use crate::scenario::{AltitudeBand, Scenario};
+    use crate::terrain::{Peak, Peaks, Terrain};
+    use crate::threat::{Cylinder, Shape, Threat};
+
+    /// Height, centre and spread of twenty mountains, metres.
+    const MOUNTAINS: [[f64; 5]; 20] = [
+        [216.0, 132.0, 318.0, 71.0, 124.0],
+        [228.0, 889.0, 160.0, 89.0, 86.0],
+        [87.0, 750.0, 117.0, 68.0, 123.0],
+        [151.0, 132.0, 422.0, 117.0, 72.0],
+        [249.0, 574.0, 279.0, 109.0, 70.0],
+        [225.0, 226.0, 284.0, 127.0, 71.0],
+        [133.0, 259.0, 781.0, 80.0, 130.0],
+        [247.0, 181.0, 365.0, 54.0, 90.0],
+        [159.0, 753.0, 678.0, 125.0, 60.0],
+        [215.0, 290.0, 691.0, 99.0, 63.0],
+        [143.0, 317.0, 491.0, 125.0, 111.0],
+        [159.0, 814.0, 856.0, 121.0, 72.0],
+        [291.0, 847.0, 602.0, 78.0, 118.0],
+        [88.0, 232.0, 534.0, 51.0, 112.0],
+        [156.0, 830.0, 489.0, 102.0, 125.0],
+        [161.0, 644.0, 520.0, 90.0, 51.0],
+        [102.0, 660.0, 244.0, 69.0, 103.0],
+        [198.0, 792.0, 551.0, 89.0, 78.0],
+        [199.0, 809.0, 449.0, 87.0, 111.0],
+        [290.0, 212.0, 261.0, 82.0, 96.0],
+    ];
+
+    /// Slopes of twice what the vehicle climbs, 20 to 120 m above which it must keep.
+    fn mountains() -> Scenario {
+        let mut scenario = scenario();
+        scenario.terrain = Terrain::Peaks(Peaks {
+            base: 0.0,
+            peaks: MOUNTAINS
+                .map(|[height, x, y, along, across]| Peak {
+                    center: Point2::new(x, y),
+                    height,
+                    spread: Point2::new(along, across),
+                })
+                .to_vec(),
+        });
+        let threats = [
+            [870.0, 608.0, 44.0],
+            [376.0, 483.0, 43.0],
+            [294.0, 377.0, 41.0],
+            [401.0, 644.0, 58.0],
+            [720.0, 539.0, 37.0],
+            [584.0, 515.0, 40.0],
+        ];
+        let threat = |[x, y, radius]: [f64; 3]| Threat {
+            name: None,
+            shape: Shape::Cylinder(Cylinder {
+                center: Point2::new(x, y),
+                radius,
+                influence: radius + 30.0,
+            }),
+            base: None,
+            top: None,
+        };
+        scenario.threats = threats.map(threat).to_vec();
+        for (end, x, y) in [
+            (&mut scenario.start, 200.0, 200.0),
+            (&mut scenario.target, 800.0, 800.0),
+        ] {
+            let ground = scenario.terrain.elevation(Point2::new(x, y));
+            *end = Point3::new(x, y, ground + 70.0);
+        }
+        scenario.altitude = AltitudeBand {
+            min: 20.0,
+            max: 120.0,
+        };
+        scenario.vehicle.max_climb_deg = 35.0;
+        scenario.planner.waypoints = 12;
+        scenario
+    }
+
+    /// Where the coarse net has no way at all, the fine one has several that can be flown as they are.
+    #[test]
+    fn a_way_is_found_through_steep_mountains() {
+        let scenario = mountains();
+        let model = Model::new(&scenario);
+        let can_be_flown = |route: &&Vec<Point3>| price(&model, route).is_feasible();
+        let coarse = roadmap::routes(&model, 8).routes;
+        assert_eq!(coarse.iter().filter(can_be_flown).count(), 0);
+        let fine = routes(&model, 8).routes;
+        assert!(fine.iter().filter(can_be_flown).count() > 0);
+        for route in &fine {
+            assert!(route.len() <= 14);
+            assert_eq!(
+                (route[0], route[route.len() - 1]),
+                (scenario.start, scenario.target)
+            );
+        }
+    }
+
+    /// Of a chain those places are kept that make the best route there is through them.
+    #[test]
+    fn a_chain_is_thinned_to_the_best_of_its_places() {
+        let mut scenario = scenario();
+        scenario.planner.waypoints = 2;
+        let model = Model::new(&scenario);
+        let place = |share: f64, aside: f64| {
+            let way = scenario.target - scenario.start;
+            scenario.start + way * share + nalgebra::Vector3::new(-aside, aside, 60.0)
+        };
+        let between = [
+            place(0.15, 130.0),
+            place(0.3, 170.0),
+            place(0.5, 150.0),
+            place(0.6, 140.0),
+            place(0.8, 110.0),
+        ];
+        let mut chain = vec![scenario.start];
+        chain.extend(between);
+        chain.push(scenario.target);
+        let thin = Net::new(&model).thin(&model, &chain);
+        assert!((3..=4).contains(&thin.len()));
+        // Turns apart, which join two legs.
+        let legs = |route: &[Point3]| {
+            let tolerance = model.tolerance.scaled(PRICED_FROM);
+            let quadrature = scenario.planner.quadrature;
+            let mut sum = Fitness {
+                violation: 0.0,
+                cost: 0.0,
+            };
+            for ends in route.windows(2) {
+                let (violation, cost) = model.leg(ends[0], ends[1], quadrature, tolerance);
+                let own = model.waypoint(ends[1], tolerance);
+                let own = if ends[1] == scenario.target {
+                    (0.0, 0.0)
+                } else {
+                    own
+                };
+                sum.violation += violation + own.0;
+                sum.cost += cost + own.1;
+            }
+            sum
+        };
+        let found = legs(&thin);
+        for a in 1..6 {
+            assert!(!legs(&[chain[0], chain[a], chain[6]]).beats(&found));
+            for b in a + 1..6 {
+                let other = legs(&[chain[0], chain[a], chain[b], chain[6]]);
+                assert!(other.cost >= found.cost - 1e-9 || other.violation >= found.violation);
+            }
+        }
+    }
+}

@@ -134,13 +134,12 @@ impl<'p, 's> Legs<'p, 's> {
         let count = self.places.len();
         let mut tree = Tree::from(source, count);
         let (costs, before) = (&mut tree.costs, &mut tree.before);
-        let mut open = vec![true; count];
+        let mut open: Vec<usize> = (0..count).collect();
         let mut closed = Vec::with_capacity(count);
-        while closed.len() < count {
-            let nearest = (0..count).filter(|&place| open[place]);
-            let Some(place) = nearest.min_by(|&a, &b| costs[a].total_cmp(&costs[b])) else {
-                break;
-            };
+        while let Some(nearest) =
+            (0..open.len()).min_by(|&a, &b| costs[open[a]].total_cmp(&costs[open[b]]))
+        {
+            let place = open[nearest];
             let last = before[place];
             if last != place && !self.measured[last][place] {
                 self.measure(&self.likeliest(&closed, costs, place), place);
@@ -155,10 +154,11 @@ impl<'p, 's> Legs<'p, 's> {
                     continue;
                 }
             }
-            open[place] = false;
+            open.remove(nearest);
             closed.push(place);
-            for next in 0..count {
-                let cost = costs[place] + self.costs[place][next];
+            let row = &self.costs[place];
+            for &next in &open {
+                let cost = costs[place] + row[next];
                 if cost < costs[next] {
                     costs[next] = cost;
                     before[next] = place;
@@ -172,18 +172,19 @@ impl<'p, 's> Legs<'p, 's> {
     /// measured: as many as are measured at once.
     fn likeliest(&self, closed: &[usize], costs: &[f64], place: usize) -> Vec<usize> {
         let mut few: Vec<(f64, usize)> = Vec::with_capacity(LANES + 1);
+        let (legs, measured) = (&self.costs[place], &self.measured[place]);
+        let mut worst = f64::INFINITY;
         for &other in closed {
-            let cost = costs[other] + self.costs[other][place];
-            let worst = few.last().map_or(f64::INFINITY, |last| last.0);
-            if self.measured[other][place]
-                || cost.is_infinite()
-                || (few.len() == LANES && cost >= worst)
-            {
+            let cost = costs[other] + legs[other];
+            if cost >= worst || measured[other] {
                 continue;
             }
             let at = few.partition_point(|(less, _)| *less <= cost);
             few.insert(at, (cost, other));
             few.truncate(LANES);
+            if let Some(last) = few.get(LANES - 1) {
+                worst = last.0;
+            }
         }
         few.into_iter().map(|(_, other)| other).collect()
     }

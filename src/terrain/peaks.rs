@@ -334,11 +334,11 @@ mod tests {
         #[test]
         fn the_range_holds_every_sample_and_is_reached(
             x0 in 0.0..1000.0f64, y0 in 0.0..1000.0f64, x1 in 0.0..1000.0f64, y1 in 0.0..1000.0f64,
-            z0 in 0.0..300.0f64, z1 in 0.0..300.0f64, t0 in 0.0..0.5f64, t1 in 0.5..1.0f64, size in 0..3,
+            z0 in 0.0..300.0f64, z1 in 0.0..300.0f64, t0 in 0.0..0.5f64, t1 in 0.5..1.0f64, size in 0..3_usize,
         ) {
             let peaks = range_of_hills();
             let (a, way) = (Point3::new(x0, y0, z0), Point3::new(x1, y1, z1));
-            let leg = Segment { a, b: a + (way - a) * [1.0, 0.1, 0.005][size as usize] };
+            let leg = Segment { a, b: a + (way - a) * [1.0, 0.1, 0.005][size] };
             let range = peaks.height_range(&leg, (t0, t1));
             let mut seen = HeightRange::EMPTY;
             for i in 0..=8000 {

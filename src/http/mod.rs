@@ -204,6 +204,7 @@ fn assemble<T: 'static>(
     nowhere: impl Handler<T, AppState>,
 ) -> Router {
     let (access, cors) = (state.access.clone(), state.cors.clone());
+    let instruments = state.instruments.clone();
     let router = routes
         .into_iter()
         .fold(Router::new(), |router, route| {
@@ -212,8 +213,8 @@ fn assemble<T: 'static>(
         })
         .method_not_allowed_fallback(async || Problem::MethodNotAllowed)
         .fallback(nowhere)
-        .with_state(state.clone());
-    wrap(router, &cors, state.instruments.clone())
+        .with_state(state);
+    wrap(router, &cors, instruments)
 }
 
 /// Streams are not: what is told must leave at once.

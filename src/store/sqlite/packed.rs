@@ -182,7 +182,7 @@ mod tests {
         let (lat, lon, alt) = (48.1, -11.5, 520.25);
         let events = [
             point(None),
-            point(Some(489.446_666_985_706_97)),
+            point(Some(1.0 / 3.0)),
             route(vec![]),
             route(vec![Position::Local { x, y, z }; 12]),
             route(vec![Position::Geodetic { lat, lon, alt }; 2]),

@@ -125,6 +125,8 @@ async fn answer(
         .max_concurrent_streams(256);
     let connection = async move {
         tokio::select! {
+            // Who has asked already is answered.
+            biased;
             http1 = speaks_http1(&stream) => if http1 {
                 builder = builder.http1_only();
             },

@@ -11,6 +11,7 @@ FROM rust:1-slim-bookworm AS builder
 WORKDIR /build
 
 # The libraries alone, so that this layer is built again only when they change.
+COPY .cargo .cargo
 COPY Cargo.toml Cargo.lock ./
 RUN mkdir src benches \
     && touch src/lib.rs \

@@ -19,7 +19,7 @@ use self::ending::{Signals, Times};
 use super::{access, exit};
 use crate::config::{self, Config, Flags};
 use crate::http::webhook::{self, Secret, Sender};
-use crate::http::{self, AppState, Capacity, InFlight, Origins, Phase, Terrains};
+use crate::http::{self, Capacity, InFlight, Origins, Parts, Phase, Terrains};
 use crate::job::Failure;
 use crate::planner;
 use crate::scenario::json::{self, Refusal, Rules};
@@ -84,7 +84,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         .filter(|_| config.role.serves())
         .map(|settings| Sender::start(store.clone(), settings));
     let (phase, watched) = watch::channel(Phase::Serving);
-    let state = AppState {
+    let parts = Parts {
         store: store.clone(),
         rules,
         terrains: Terrains::new(catalogue),
@@ -102,9 +102,9 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         instruments: instruments.clone(),
     };
     let router = if config.role.serves() {
-        http::router(state)
+        http::router(parts.into())
     } else {
-        http::upkeep_router(state)
+        http::upkeep_router(parts.into())
     };
     access::reload_on_hangup(config, access)?;
     announce(&listener)?;

@@ -60,10 +60,10 @@ pub(super) async fn follow(
     let feed = Feed::new(state.store.clone(), state.phase.clone(), id, after, rate_hz);
     let stream = Stream {
         feed,
-        store: state.store,
+        store: state.store.clone(),
         _permit: permit,
         _counted: state.instruments.metrics.stream(),
-        access: state.access,
+        access: state.access.clone(),
         key: caller.key,
         span: Span::current(),
     };

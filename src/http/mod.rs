@@ -36,6 +36,7 @@ mod tickets;
 mod warm_start;
 pub mod webhook;
 
+use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -45,6 +46,7 @@ use axum::http::Uri;
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::{self, MethodRouter};
 use tokio::sync::watch;
+use tower::ServiceBuilder;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::CompressionLayer;
 use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
@@ -60,9 +62,34 @@ use crate::telemetry::Instruments;
 use auth::{Access, Needs};
 use problem::Problem;
 
-/// What every handler can reach.
+/// What every handler can reach; cheap to clone, for each request does.
 #[derive(Clone)]
-pub struct AppState {
+pub struct AppState(Arc<Parts>);
+
+impl From<Parts> for AppState {
+    fn from(parts: Parts) -> Self {
+        Self(Arc::new(parts))
+    }
+}
+
+impl Deref for AppState {
+    type Target = Parts;
+
+    fn deref(&self) -> &Parts {
+        &self.0
+    }
+}
+
+/// Changes this one, not its clones.
+impl DerefMut for AppState {
+    fn deref_mut(&mut self) -> &mut Parts {
+        Arc::make_mut(&mut self.0)
+    }
+}
+
+/// What the service is made of.
+#[derive(Clone)]
+pub struct Parts {
     /// Where plans are kept.
     pub store: Arc<dyn Store>,
     /// What a scenario is held to.
@@ -177,6 +204,7 @@ fn assemble<T: 'static>(
     nowhere: impl Handler<T, AppState>,
 ) -> Router {
     let (access, cors) = (state.access.clone(), state.cors.clone());
+    let instruments = state.instruments.clone();
     let router = routes
         .into_iter()
         .fold(Router::new(), |router, route| {
@@ -185,8 +213,8 @@ fn assemble<T: 'static>(
         })
         .method_not_allowed_fallback(async || Problem::MethodNotAllowed)
         .fallback(nowhere)
-        .with_state(state.clone());
-    wrap(router, &cors, state.instruments)
+        .with_state(state);
+    wrap(router, &cors, instruments)
 }
 
 /// Streams are not: what is told must leave at once.
@@ -199,12 +227,14 @@ fn worth_compressing() -> impl Predicate {
 
 /// What goes round every handler.
 fn wrap(router: Router, cors: &Origins, instruments: Arc<Instruments>) -> Router {
-    router
-        .layer(from_fn(auth::refuse_keys_in_urls))
-        .layer(CompressionLayer::new().compress_when(worth_compressing()))
-        .layer(CatchPanicLayer::custom(problem::after_panic))
-        .layer(cors.layer())
+    // The outermost first. One stack, for the router puts what it is given in a box of its own for each request.
+    let layers = ServiceBuilder::new()
         .layer(from_fn_with_state(instruments, request_id::assign))
+        .layer(cors.layer())
+        .layer(CatchPanicLayer::custom(problem::after_panic))
+        .layer(CompressionLayer::new().compress_when(worth_compressing()))
+        .layer(from_fn(auth::refuse_keys_in_urls));
+    router.layer(layers)
 }
 
 fn get<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {

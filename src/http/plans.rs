@@ -312,16 +312,17 @@ pub(super) async fn show(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     Params::read(&uri, &[])?;
-    caller.plan(&*state.store, id).await?;
+    let mut plan = caller.plan(&*state.store, id).await?;
     let wait = Wait::of(&headers);
     let known = KnownTags::of(&headers);
-    let patience = wait.map_or(Duration::ZERO, Wait::duration);
-    // Who knows a version waits for another one; who knows none waits for the end.
-    let plan = wait_for(&state, id, patience, |plan| match &known {
-        Some(known) => !known.contain(&etag(plan)),
-        None => plan.status.is_final(),
-    })
-    .await?;
+    if let Some(wait) = wait {
+        // Who knows a version waits for another one; who knows none waits for the end.
+        plan = wait_for(&state, id, wait.duration(), |plan| match &known {
+            Some(known) => !known.contain(&etag(plan)),
+            None => plan.status.is_final(),
+        })
+        .await?;
+    }
 
     let tag = etag(&plan);
     let mut response = if known.is_some_and(|known| known.contain(&tag)) {
@@ -421,7 +422,7 @@ async fn wait_for(
     loop {
         changes.mark_unchanged();
         let plan = state.store.get(id).await?;
-        if enough(&plan) || patience.is_zero() {
+        if enough(&plan) {
             return Ok(plan);
         }
         tokio::select! {

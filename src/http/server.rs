@@ -39,6 +39,9 @@ pub struct Settings {
 /// Pause after a failed accept, such as when file descriptors run out.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
+/// What an HTTP/2 connection begins with, RFC 9113 section 3.4.
+const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
+
 /// Answer on `listener` until the phase is [`Phase::Stopping`], then let open connections finish
 /// their answers.
 pub async fn serve(
@@ -60,6 +63,7 @@ pub async fn serve(
                     stream,
                     router.clone(),
                     connections.watcher(),
+                    phase.clone(),
                     settings.head_timeout,
                 );
                 let counted = settings.instruments.metrics.connection();
@@ -94,7 +98,13 @@ async fn accept(
 }
 
 /// Answer the requests of one connection.
-async fn answer(stream: TcpStream, router: Router, watcher: Watcher, head_timeout: Duration) {
+async fn answer(
+    stream: TcpStream,
+    router: Router,
+    watcher: Watcher,
+    mut phase: watch::Receiver<Phase>,
+    head_timeout: Duration,
+) {
     let begun = Arc::new(AtomicBool::new(false));
     let service = {
         let begun = begun.clone();
@@ -113,15 +123,37 @@ async fn answer(stream: TcpStream, router: Router, watcher: Watcher, head_timeou
         .timer(TokioTimer::new())
         .keep_alive_interval(head_timeout)
         .max_concurrent_streams(256);
-    let connection =
-        builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
-    let connection = watcher.watch(connection.into_owned());
+    let connection = async move {
+        tokio::select! {
+            // Who has asked already is answered.
+            biased;
+            http1 = speaks_http1(&stream) => if http1 {
+                builder = builder.http1_only();
+            },
+            () = stopping(&mut phase) => return Ok(()),
+        }
+        drop(phase);
+        let connection =
+            builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
+        watcher.watch(connection.into_owned()).await
+    };
     tokio::select! {
         ended = connection => if let Err(error) = ended {
             tracing::debug!(%error, "a connection broke off");
         },
         () = never_began(&begun, head_timeout) => tracing::debug!("a connection sent no request"),
     }
+}
+
+/// Whether the first bytes are the beginning of no HTTP/2; hyper finds out about the rest.
+///
+/// It could about all, but then reads what it has looked at apart from what follows, and keeps a buffer
+/// twice as large for as long as the connection lives.
+async fn speaks_http1(stream: &TcpStream) -> bool {
+    let mut first = [0; PREFACE.len()];
+    // What cannot be looked at cannot be read either.
+    let length = stream.peek(&mut first).await.unwrap_or(0);
+    !PREFACE.starts_with(&first[..length])
 }
 
 /// Until it is clear that no first request comes. hyper's own timer starts only after the protocol

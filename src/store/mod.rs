@@ -20,7 +20,7 @@ use crate::job::{Event, Failure, NumberedEvent, Owner, Plan, PlanId, Status, Sub
 
 /// The queue, the records, the documents and the events of all plans.
 ///
-/// Every method that changes something returns after the change is durable.
+/// Every method that changes something returns after the change is durable, but for [`Store::claim_early`].
 #[async_trait]
 pub trait Store: Send + Sync + 'static {
     /// Put a plan at the end of the queue; its first event is its `queued` status. A submission
@@ -41,6 +41,16 @@ pub trait Store: Send + Sync + 'static {
     /// # Errors
     /// [`StoreError::Unavailable`] when the store fails or is closed meanwhile.
     async fn claim(&self) -> Result<Lease, StoreError>;
+
+    /// As [`Store::claim`], but the lease may come before the claim is durable, or seen by anybody: a run
+    /// may begin while the disk is being waited for, since one that is forgotten is only run again. If
+    /// the claim fails after all, the lease is lost: whatever is written under it, is refused.
+    ///
+    /// # Errors
+    /// As [`Store::claim`].
+    async fn claim_early(&self) -> Result<Lease, StoreError> {
+        self.claim().await
+    }
 
     /// Add what a run tells; convergence points also move the record's progress.
     ///
@@ -252,7 +262,7 @@ pub struct Tombstone {
     pub expired: bool,
 }
 
-/// The right to run one plan, from [`Store::claim`] to [`Store::finish`] or [`Store::release`].
+/// The right to run one plan, from [`Store::claim`] or [`Store::claim_early`] to [`Store::finish`] or [`Store::release`].
 #[derive(Debug, Clone)]
 pub struct Lease {
     /// The record at the time of the claim.

@@ -58,6 +58,15 @@ impl Reopening {
         self.state.borrow().clone()
     }
 
+    /// The store, as soon as it is open.
+    async fn opened(&self) -> State {
+        let mut state = self.state.clone();
+        let opened = state.wait_for(Result::is_ok).await;
+        opened
+            .map_err(|_| StoreError::unavailable("the store is closed"))?
+            .clone()
+    }
+
     /// Pass an answer on, and have the store opened anew when it says that it is damaged.
     fn heed<T>(
         &self,
@@ -135,12 +144,13 @@ impl Store for Reopening {
 
     /// Waits for the store to be open, too.
     async fn claim(&self) -> Result<Lease, StoreError> {
-        let mut state = self.state.clone();
-        let opened = state.wait_for(Result::is_ok).await;
-        let store = opened
-            .map_err(|_| StoreError::unavailable("the store is closed"))?
-            .clone()?;
+        let store = self.opened().await?;
         self.heed(&store, store.claim().await)
+    }
+
+    async fn claim_early(&self) -> Result<Lease, StoreError> {
+        let store = self.opened().await?;
+        self.heed(&store, store.claim_early().await)
     }
 
     async fn append(&self, lease: &Lease, events: Vec<Event>) -> Result<(), StoreError> {

@@ -50,8 +50,11 @@ pub fn name_plan(plan: Uuid) {
 
 /// What the exported span of a request says of its answer.
 pub fn answered(span: &Span, method: &str, route: Option<&str>, status: u16) {
-    let route = route.unwrap_or("unmatched").to_owned();
     let context = span.context();
+    if !context.has_active_span() {
+        return;
+    }
+    let route = route.unwrap_or("unmatched").to_owned();
     context.span().update_name(format!("{method} {route}"));
     span.set_attribute("http.request.method", method.to_owned());
     span.set_attribute("http.route", route);

@@ -130,7 +130,7 @@ impl Slot {
         let mut pause = Pause::default();
         let mut over = None;
         loop {
-            // The next run does not wait until the disk has the end of the one before.
+            // The next run does not wait until the disk has the end of the one before, nor its own beginning.
             let conclusion = async {
                 if let Some(over) = over.take() {
                     self.conclude(over).await;
@@ -170,7 +170,7 @@ impl Slot {
         tokio::select! {
             biased;
             () = reached(self.phase.clone(), Phase::Draining) => None,
-            claim = self.store.claim() => Some(claim),
+            claim = self.store.claim_early() => Some(claim),
         }
     }
 }

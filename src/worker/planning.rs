@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use tokio::sync::{mpsc, oneshot, watch};
 use tracing::Span;
 
+use super::run::BATCH;
 use super::{Engine, Unplanned};
 use crate::export::document::ResultDocument;
 use crate::job::{Event, Failure, Plan};
@@ -61,8 +62,8 @@ impl StopFlag {
 pub(super) struct Reports {
     /// To be stored.
     pub(super) events: mpsc::Sender<Event>,
-    /// Dropped when nothing more is told.
-    pub(super) _telling: watch::Sender<()>,
+    /// Ticks after each [`BATCH`] of them; dropped when nothing more is told.
+    pub(super) telling: watch::Sender<()>,
     /// Shared with those who may stop it.
     pub(super) stop: Arc<StopFlag>,
     /// For the operator.
@@ -103,6 +104,7 @@ fn plan_to_its_end(
     let stop = Arc::clone(&reports.stop);
     let mut teller = Teller {
         reports,
+        told: 0,
         iterations: 0,
         evaluations: 0,
     };
@@ -182,15 +184,21 @@ fn panicked(payload: &(dyn Any + Send)) -> Ending {
 /// Hands events on; waits when they come faster than they can be stored.
 struct Teller {
     reports: Reports,
+    /// Events so far.
+    told: usize,
     /// Counted so far.
     iterations: u64,
     evaluations: u64,
 }
 
 impl Teller {
-    fn tell(&self, event: Event) {
+    fn tell(&mut self, event: Event) {
         if self.reports.events.blocking_send(event).is_err() {
             self.reports.stop.raise(Reason::Abandoned);
+        }
+        self.told += 1;
+        if self.told.is_multiple_of(BATCH) {
+            self.reports.telling.send_replace(());
         }
     }
 

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::{mpsc, watch};
-use tokio::time::Instant;
 use tracing::{Instrument as _, Span};
 
 use super::planning::{self, Reason, Reports, StopFlag};
@@ -17,14 +16,11 @@ use crate::telemetry::metrics::Ended;
 /// Events on their way from the planning thread; when there are more, it waits.
 const ON_THE_WAY: usize = 1024;
 
-/// Events stored in one step, at most.
-const BATCH: usize = 512;
+/// Events are stored as soon as there are so many,
+pub(super) const BATCH: usize = 512;
 
-/// Events are stored at the latest so long after they happened.
+/// and at the latest so long after they happened: waking up for each costs more than storing it.
 const DELAY: Duration = Duration::from_millis(50);
-
-/// Events of so long are taken at once: waking up for each of them costs more than storing it.
-const GATHERING: Duration = Duration::from_millis(5);
 
 /// A run that is over, but not yet in the store.
 pub(super) struct Over {
@@ -50,12 +46,12 @@ impl Slot {
         }
         let stop = Arc::new(StopFlag::default());
         let (events, told) = mpsc::channel(ON_THE_WAY);
-        let (telling, silent) = watch::channel(());
+        let (telling, news) = watch::channel(());
         let thread_name = format!("planner-{}", self.number);
         let engine = Arc::clone(&self.engine);
         let reports = Reports {
             events,
-            _telling: telling,
+            telling,
             stop: Arc::clone(&stop),
             instruments: Arc::clone(&self.instruments),
         };
@@ -70,7 +66,7 @@ impl Slot {
             }
         };
         let rest = tokio::select! {
-            rest = self.keep_events(&lease, told, silent) => rest,
+            rest = self.keep_events(&lease, told, news) => rest,
             never = stop_when_asked(&lease, self.phase.clone(), &stop) => match never {},
         };
         let rest = rest.unwrap_or_else(|| {
@@ -106,38 +102,29 @@ impl Slot {
         conclusion.instrument(span).await;
     }
 
-    /// Store events until there are no more, of which `silent` tells by losing its sender; returns the
-    /// last of them, which go with the end, and `None` when storing them became pointless.
+    /// Store events until there are no more; returns the last of them, which go with the end, and `None`
+    /// when storing them became pointless. `news` ticks when there are many, and loses its sender after the last.
     async fn keep_events(
         &self,
         lease: &Lease,
         mut told: mpsc::Receiver<Event>,
-        mut silent: watch::Receiver<()>,
+        mut news: watch::Receiver<()>,
     ) -> Option<Vec<Event>> {
-        let mut batch = Vec::new();
-        let mut due = Instant::now();
         loop {
-            let was_empty = batch.is_empty();
-            let room = BATCH - batch.len();
-            let more = tokio::select! {
-                count = told.recv_many(&mut batch, room) => Some(count > 0),
-                () = tokio::time::sleep_until(due), if !was_empty => None,
-            };
-            if was_empty {
-                due = Instant::now() + DELAY;
+            let mut batch = Vec::new();
+            told.recv_many(&mut batch, BATCH).await;
+            tokio::select! {
+                _ = news.changed() => {}
+                () = tokio::time::sleep(DELAY) => {}
             }
-            if more == Some(true) && batch.len() < BATCH {
-                tokio::select! {
-                    _ = silent.changed() => {}
-                    () = tokio::time::sleep(GATHERING) => {}
-                }
-                continue;
+            let was_last = told.is_closed();
+            while let Ok(event) = told.try_recv() {
+                batch.push(event);
             }
-            if more == Some(false) {
+            if was_last {
                 return Some(batch);
             }
-            let events = std::mem::take(&mut batch);
-            let append = || self.store.append(lease, events.clone());
+            let append = || self.store.append(lease, batch.clone());
             self.persist("events", append).await?;
         }
     }

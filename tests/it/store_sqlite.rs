@@ -60,7 +60,7 @@ async fn a_newer_schema_is_refused_and_left_alone() {
     drop(database);
     let message = refusal(directory.path());
     assert!(
-        message.contains("schema version 99") && message.contains("up to 4"),
+        message.contains("schema version 99") && message.contains("up to 5"),
         "{message}"
     );
     let database = rusqlite::Connection::open(&file).unwrap();
@@ -234,4 +234,81 @@ async fn a_file_of_the_first_version_is_brought_up_and_goes_on() {
     let store = SqliteStore::open(directory.path(), keep_none).unwrap();
     assert_eq!(store.sweep(wall_clock()()).await.unwrap(), 3);
     assert_eq!(store.list(all).await.unwrap().len(), 1);
+}
+
+/// A run may begin before its claim is durable; here the disk then refuses the claim.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_early_lease_whose_claim_fails_is_lost() {
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let id = store.submit(submission()).await.unwrap().plan.id;
+    let database = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
+    // Broken as late as can be: at the commit itself.
+    database
+        .execute_batch(
+            "CREATE TABLE broken (of INTEGER REFERENCES plans (seq) DEFERRABLE INITIALLY DEFERRED);
+             CREATE TRIGGER break AFTER UPDATE OF attempt ON plans BEGIN INSERT INTO broken VALUES (-1); END;",
+        )
+        .unwrap();
+    let void = store.claim_early().await.unwrap();
+    assert_eq!((void.plan.id, void.plan.status), (id, Status::Running));
+    // The next write comes after the one that fails.
+    store.health().await.unwrap();
+    assert_eq!(store.get(id).await.unwrap().status, Status::Queued);
+    let lost = store.append(&void, vec![point(1, None)]).await;
+    assert!(matches!(lost, Err(StoreError::LeaseLost(plan)) if plan == id));
+
+    database.execute_batch("DROP TRIGGER break").unwrap();
+    let lease = store.claim_early().await.unwrap();
+    let lost = store
+        .finish(&void, ending(Status::Succeeded).at(12_000))
+        .await;
+    assert!(matches!(lost, Err(StoreError::LeaseLost(plan)) if plan == id));
+    let ended = store
+        .finish(&lease, ending(Status::Succeeded).at(12_000))
+        .await
+        .unwrap();
+    assert_eq!(ended.status, Status::Succeeded);
+    let told = store.events(id, 0, 100).await.unwrap().events;
+    let ids: Vec<u64> = told.iter().map(|event| event.id).collect();
+    assert_eq!(ids, [1, 2, 3, 4], "nothing remains of the void run");
+}
+
+/// Of those that share a transaction, what fails after it has written is refused alone.
+#[tokio::test(flavor = "multi_thread")]
+async fn one_that_fails_half_done_leaves_nothing_and_spoils_nobody() {
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let database = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
+    database
+        .execute_batch(
+            "CREATE TRIGGER break BEFORE INSERT ON scenarios WHEN NEW.document = 'bad' \
+             BEGIN SELECT raise(ABORT, 'no such document'); END",
+        )
+        .unwrap();
+    let tries = (0..100).map(|nth| {
+        let mut submission = submission();
+        if nth % 10 == 0 {
+            submission.scenario = "bad".to_owned();
+        }
+        store.submit(submission)
+    });
+    let answers = futures_util::future::join_all(tries).await;
+    for (nth, answer) in answers.iter().enumerate() {
+        assert_eq!(answer.is_err(), nth % 10 == 0, "{nth}: {answer:?}");
+    }
+    assert_eq!(store.stats().await.unwrap().queued, 90);
+    let positions = answers
+        .into_iter()
+        .flatten()
+        .map(|submitted| submitted.plan.queue_position);
+    assert!(positions.eq((1..=90).map(Some)));
+    let orphans: i64 = database
+        .query_row(
+            "SELECT (SELECT count(*) FROM plans) + (SELECT count(*) FROM events) - 180",
+            [],
+            |row| row.get(0),
+        )
+        .unwrap();
+    assert_eq!(orphans, 0);
 }

@@ -3,8 +3,10 @@
 //! Every acknowledged change is on the disk (WAL, `synchronous = FULL`); what was being run when a
 //! process died is queued again when the next one opens the file.
 
+mod claims;
 mod idempotency;
 mod operations;
+mod packed;
 mod read;
 mod records;
 mod removal;
@@ -24,6 +26,7 @@ use async_trait::async_trait;
 use rusqlite::{Connection, ErrorCode};
 use tokio::sync::watch;
 
+use self::claims::When;
 use self::read::Readers;
 use self::records::Records;
 use self::writer::Writer;
@@ -134,7 +137,11 @@ impl Store for SqliteStore {
     }
 
     async fn claim(&self) -> Result<Lease, StoreError> {
-        self.writer.claim().await
+        self.writer.claim(When::Durable).await
+    }
+
+    async fn claim_early(&self) -> Result<Lease, StoreError> {
+        self.writer.claim(When::Chosen).await
     }
 
     async fn append(&self, lease: &Lease, events: Vec<Event>) -> Result<(), StoreError> {

@@ -7,7 +7,7 @@ use tokio::sync::watch;
 
 use super::read::missing;
 use super::row::PlanRow;
-use super::transaction::{Effect, Transaction};
+use super::transaction::{Batch, Effect, Transaction};
 use super::{idempotency, removal, webhooks};
 use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Status, Submission};
@@ -38,20 +38,16 @@ pub(super) fn submit(
         bytes: submission.scenario.len() as u64,
         plan: Plan::accepted(submission, tx.queued + 1),
     };
-    row.insert(tx.connection)?;
+    let status = Event::Status(Box::new(row.plan.clone()));
+    let told = Batch::of(&mut row, &[status])?;
+    row.insert(tx.connection, submission.dataset.as_deref())?;
+    tx.keep(&row, &told)?;
     tx.connection
         .prepare_cached("INSERT INTO scenarios (plan_seq, document) VALUES (?1, ?2)")?
         .execute(params![row.seq, submission.scenario])?;
-    if let Some(dataset) = &submission.dataset {
-        tx.connection
-            .prepare_cached("UPDATE plans SET dataset = ?1 WHERE seq = ?2")?
-            .execute(params![dataset, row.seq])?;
-    }
     idempotency::remember(tx, submission)?;
     webhooks::keep(tx, row.seq, submission)?;
     tx.queued += 1;
-    tell_status(tx, &mut row)?;
-    row.update_progress(tx.connection)?;
     Ok(Submitted {
         plan: row.plan,
         replayed: false,
@@ -82,7 +78,8 @@ pub(super) fn claim(tx: &mut Transaction<'_>) -> Result<Option<Lease>, StoreErro
         return Ok(None);
     };
     row.plan.start(tx.now_ms())?;
-    row.attempt += 1;
+    // A claim that came to nothing after its lease was given out must not be taken for this one.
+    row.attempt = row.attempt.max(tx.void_attempt) + 1;
     tx.queued -= 1;
     tell_status(tx, &mut row)?;
     row.update(tx.connection)?;

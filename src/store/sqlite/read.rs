@@ -1,12 +1,14 @@
 //! What is asked of the store, over a few read-only connections beside the writer's.
 
+use std::error::Error;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use rusqlite::types::Value;
+use rusqlite::types::{Value, ValueRef};
 use rusqlite::{Connection, OpenFlags, OptionalExtension, params_from_iter};
 use tokio::sync::Semaphore;
 
+use super::packed;
 use super::row::{COLUMNS, PlanRow};
 use super::{BUSY_TIMEOUT, closed};
 use crate::export::document::Incumbent;
@@ -193,6 +195,14 @@ fn queue(connection: &Connection) -> rusqlite::Result<Vec<i64>> {
         .collect()
 }
 
+/// The events of a row.
+fn batch(text: ValueRef<'_>, packed: ValueRef<'_>) -> Result<Vec<Event>, Box<dyn Error>> {
+    Ok(match packed.as_blob_or_null()? {
+        Some(bytes) => packed::unpack(bytes)?,
+        None => serde_json::from_str(text.as_str()?)?,
+    })
+}
+
 pub(super) fn events(
     connection: &Connection,
     id: PlanId,
@@ -209,7 +219,7 @@ pub(super) fn events(
     };
     let after = i64::try_from(after).unwrap_or(i64::MAX);
     let mut statement = connection.prepare_cached(
-        "SELECT first_id, batch FROM events WHERE plan_seq = ?1 AND last_id > ?2 ORDER BY last_id",
+        "SELECT first_id, batch, packed FROM events WHERE plan_seq = ?1 AND last_id > ?2 ORDER BY last_id",
     )?;
     let mut rows = statement.query([seq, after])?;
     let mut events = Vec::new();
@@ -217,8 +227,7 @@ pub(super) fn events(
         && let Some(row) = rows.next()?
     {
         let first_id: i64 = row.get(0)?;
-        let batch: String = row.get(1)?;
-        let batch: Vec<Event> = serde_json::from_str(&batch)
+        let batch = batch(row.get_ref(1)?, row.get_ref(2)?)
             .map_err(|error| StoreError::unavailable(format!("events of plan {id}: {error}")))?;
         let numbered = (first_id..).zip(batch).filter(|(id, _)| *id > after);
         events.extend(numbered.map(|(id, event)| NumberedEvent {

@@ -91,14 +91,18 @@ impl PlanRow {
     }
 
     /// Add it to the table; its `seq` is given by the table.
-    pub(super) fn insert(&mut self, connection: &Connection) -> rusqlite::Result<()> {
+    pub(super) fn insert(
+        &mut self,
+        connection: &Connection,
+        dataset: Option<&str>,
+    ) -> rusqlite::Result<()> {
         let plan = &self.plan;
         connection
             .prepare_cached(
                 "INSERT INTO plans (id, owner, name, status, progress, iteration, iterations, evaluations, \
-                 algorithm, seed, created_ms, cancel_requested, revision, attempt, last_event, bytes) \
+                 algorithm, seed, created_ms, cancel_requested, revision, attempt, last_event, bytes, dataset) \
                  VALUES (:id, :owner, :name, :status, :progress, :iteration, :iterations, :evaluations, \
-                 :algorithm, :seed, :created_ms, :cancel_requested, :revision, :attempt, :last_event, :bytes)",
+                 :algorithm, :seed, :created_ms, :cancel_requested, :revision, :attempt, :last_event, :bytes, :dataset)",
             )?
             .execute(named_params! {
                 ":id": plan.id.to_string(),
@@ -117,6 +121,7 @@ impl PlanRow {
                 ":attempt": self.attempt.cast_signed(),
                 ":last_event": self.last_event.cast_signed(),
                 ":bytes": self.bytes.cast_signed(),
+                ":dataset": dataset,
             })?;
         self.seq = connection.last_insert_rowid();
         Ok(())

@@ -112,6 +112,9 @@ CREATE INDEX webhooks_due ON webhooks (due_ms) WHERE due_ms IS NOT NULL;
 ALTER TABLE plans ADD COLUMN dataset TEXT; -- what stands for the dataset that it is planned over
 CREATE INDEX plans_by_dataset ON plans (dataset, status) WHERE dataset IS NOT NULL;
 ",
+    "
+ALTER TABLE events ADD COLUMN packed BLOB; -- what a search tells, as bytes; batch is empty then
+",
 ];
 
 /// Bring the file up to this version; refuse those of a newer one.

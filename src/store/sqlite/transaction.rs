@@ -1,8 +1,9 @@
-//! The writer's transaction: many operations, each in a savepoint of its own.
+//! The writer's transaction: many operations.
 
 use rusqlite::{Connection, params};
 use tokio::sync::watch;
 
+use super::packed;
 use super::row::PlanRow;
 use crate::job::{Event, PlanId};
 use crate::store::{Options, StoreError};
@@ -16,10 +17,12 @@ pub(super) struct Transaction<'a> {
     pub(super) options: &'a Options,
     /// Plans queued, what this transaction did included.
     pub(super) queued: u64,
+    /// No claim that came to nothing had a greater attempt.
+    pub(super) void_attempt: u64,
     /// What the world is told once it is durable.
     pub(super) effects: Vec<Effect>,
-    /// The failure after which `SQLite` gave up the whole transaction.
-    pub(super) lost: Option<String>,
+    /// The failure after which it cannot be committed.
+    pub(super) spoiled: Option<StoreError>,
 }
 
 /// What the world is told once a change is durable.
@@ -35,42 +38,31 @@ pub(super) enum Effect {
 }
 
 impl Transaction<'_> {
-    /// Do `work` wholly or not at all, without harm to the rest of the transaction.
-    pub(super) fn savepoint<T>(
+    /// Do `work` wholly or not at all: when it fails after it has changed something, the whole transaction
+    /// is spoiled, does nothing more and cannot be committed. That is rare, and cheaper than to be able to
+    /// take back each step.
+    pub(super) fn step<T>(
         &mut self,
         work: impl FnOnce(&mut Self) -> Result<T, StoreError>,
     ) -> Result<T, StoreError> {
-        self.still_open()?;
-        self.run("SAVEPOINT operation")?;
+        self.sound()?;
+        let changes = self.connection.total_changes();
         let (queued, n_effects) = (self.queued, self.effects.len());
         let result = work(self);
         if let Err(error) = &result {
             self.queued = queued;
             self.effects.truncate(n_effects);
-            if self.connection.is_autocommit() {
-                self.lost = Some(error.to_string());
-                return result;
+            // After some failures, such as a full disk, SQLite ends the transaction by itself.
+            if self.connection.is_autocommit() || self.connection.total_changes() != changes {
+                self.spoiled = Some(error.clone());
             }
-            self.run("ROLLBACK TO operation")?;
         }
-        self.run("RELEASE operation")?;
         result
     }
 
-    /// `SQLite` ends the whole transaction by itself after some failures, such as a full disk.
-    pub(super) fn still_open(&self) -> Result<(), StoreError> {
-        if self.connection.is_autocommit() {
-            let cause = self.lost.as_deref().unwrap_or("unknown");
-            return Err(StoreError::unavailable(format!(
-                "the transaction was lost: {cause}"
-            )));
-        }
-        Ok(())
-    }
-
-    fn run(&self, sql: &str) -> Result<(), StoreError> {
-        self.connection.prepare_cached(sql)?.execute([])?;
-        Ok(())
+    /// Fails with what spoiled it.
+    pub(super) fn sound(&self) -> Result<(), StoreError> {
+        self.spoiled.clone().map_or(Ok(()), Err)
     }
 
     /// Now, milliseconds since 1970.
@@ -82,25 +74,21 @@ impl Transaction<'_> {
     /// the row.
     pub(super) fn tell(&mut self, row: &mut PlanRow, events: &[Event]) -> Result<(), StoreError> {
         for batch in events.chunks(BATCH) {
-            let first_id = row.last_event + 1;
-            row.last_event += batch.len() as u64;
-            let text = serde_json::to_string(batch).map_err(|error| {
-                StoreError::unavailable(format!("events of plan {}: {error}", row.plan.id))
-            })?;
-            row.bytes += text.len() as u64;
-            self.connection
-                .prepare_cached(
-                    "INSERT INTO events (plan_seq, last_id, first_id, batch) VALUES (?1, ?2, ?3, ?4)",
-                )?
-                .execute(params![
-                    row.seq,
-                    row.last_event.cast_signed(),
-                    first_id.cast_signed(),
-                    text
-                ])?;
+            let batch = Batch::of(row, batch)?;
+            self.keep(row, &batch)?;
         }
-        self.effects.push(Effect::Changed(row.plan.id));
         self.forget(row)
+    }
+
+    /// Write a batch of events; the plan's row must be there.
+    pub(super) fn keep(&mut self, row: &PlanRow, batch: &Batch) -> Result<(), StoreError> {
+        self.connection
+            .prepare_cached(
+                "INSERT INTO events (plan_seq, last_id, first_id, batch, packed) VALUES (?1, ?2, ?3, ?4, ?5)",
+            )?
+            .execute(params![row.seq, batch.last_id, batch.first_id, batch.text, batch.packed])?;
+        self.effects.push(Effect::Changed(row.plan.id));
+        Ok(())
     }
 
     /// Whole batches at once, and only when there are half as many again as are to be kept: so that
@@ -114,7 +102,7 @@ impl Transaction<'_> {
         let (last_id, bytes): (Option<i64>, Option<i64>) = self
             .connection
             .prepare_cached(
-                "SELECT max(last_id), sum(octet_length(batch)) FROM events \
+                "SELECT max(last_id), sum(octet_length(batch) + coalesce(octet_length(packed), 0)) FROM events \
                  WHERE plan_seq = ?1 AND last_id <= ?2",
             )?
             .query_row([row.seq, oldest], |sums| Ok((sums.get(0)?, sums.get(1)?)))?;
@@ -126,5 +114,35 @@ impl Transaction<'_> {
             row.bytes = row.bytes.saturating_sub(bytes.cast_unsigned());
         }
         Ok(())
+    }
+}
+
+/// A row of the table of events.
+pub(super) struct Batch {
+    first_id: i64,
+    last_id: i64,
+    text: String,
+    packed: Option<Vec<u8>>,
+}
+
+impl Batch {
+    /// The next events of a plan, counted in its row.
+    pub(super) fn of(row: &mut PlanRow, events: &[Event]) -> Result<Self, StoreError> {
+        let packed = packed::pack(events);
+        let text = match packed {
+            Some(_) => String::new(),
+            None => serde_json::to_string(events).map_err(|error| {
+                StoreError::unavailable(format!("events of plan {}: {error}", row.plan.id))
+            })?,
+        };
+        let first_id = row.last_event + 1;
+        row.last_event += events.len() as u64;
+        row.bytes += (text.len() + packed.as_ref().map_or(0, Vec::len)) as u64;
+        Ok(Self {
+            first_id: first_id.cast_signed(),
+            last_id: row.last_event.cast_signed(),
+            text,
+            packed,
+        })
     }
 }

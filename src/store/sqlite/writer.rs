@@ -10,6 +10,7 @@ use std::thread::JoinHandle;
 use rusqlite::Connection;
 use tokio::sync::{oneshot, watch};
 
+use super::claims::{Claimer, Claims, When};
 use super::closed;
 use super::records::Records;
 use super::transaction::{Effect, Transaction};
@@ -21,16 +22,58 @@ use crate::store::{Lease, Options, StoreError};
 /// Operations in one transaction, at most.
 const BATCH: usize = 256;
 
-/// Runs in the transaction, or learns that there is none; what it returns is called after the commit.
-type Operation = Box<dyn FnOnce(Option<&mut Transaction<'_>>) -> Answer + Send>;
+/// What is done in a transaction, and answered after its commit.
+pub(super) trait Operation: Send {
+    /// Do it; once more when the transaction came to nothing.
+    fn run(&mut self, tx: &mut Transaction<'_>);
 
-/// Told whether the transaction became durable, or why not.
-type Answer = Box<dyn FnOnce(Result<(), &StoreError>)>;
+    /// What was done last is durable, or is not.
+    fn answer(self: Box<Self>, durable: Result<(), &StoreError>);
+}
 
-type Claimer = oneshot::Sender<Result<Delivery, StoreError>>;
+/// A step of the store, and who is told what came of it.
+struct Change<T, W, A> {
+    work: W,
+    done: Result<T, StoreError>,
+    answer: A,
+}
 
-enum Message {
-    Change(Operation),
+/// `work`, whose outcome `answer` is called with once it is durable.
+pub(super) fn operation<T, W, A>(work: W, answer: A) -> Box<dyn Operation>
+where
+    T: Send + 'static,
+    W: Fn(&mut Transaction<'_>) -> Result<T, StoreError> + Send + 'static,
+    A: FnOnce(Result<T, StoreError>) + Send + 'static,
+{
+    Box::new(Change {
+        work,
+        done: Err(closed()),
+        answer,
+    })
+}
+
+impl<T, W, A> Operation for Change<T, W, A>
+where
+    T: Send,
+    W: Fn(&mut Transaction<'_>) -> Result<T, StoreError> + Send,
+    A: FnOnce(Result<T, StoreError>) + Send,
+{
+    fn run(&mut self, tx: &mut Transaction<'_>) {
+        self.done = tx.step(&self.work);
+    }
+
+    fn answer(self: Box<Self>, durable: Result<(), &StoreError>) {
+        let outcome = match durable {
+            Ok(()) => self.done,
+            Err(error) => Err(error.clone()),
+        };
+        (self.answer)(outcome);
+    }
+}
+
+/// What the thread is sent.
+pub(super) enum Message {
+    Change(Box<dyn Operation>),
     Claim(Claimer),
     Close(oneshot::Sender<()>),
 }
@@ -60,6 +103,7 @@ impl Writer {
             waiting: VecDeque::new(),
             leases: HashMap::new(),
             queued: 0,
+            void_attempt: 0,
         };
         desk.recover()?;
         let thread = std::thread::Builder::new()
@@ -85,27 +129,20 @@ impl Writer {
     pub(super) async fn change<T, W>(&self, work: W) -> Result<T, StoreError>
     where
         T: Send + 'static,
-        W: FnOnce(&mut Transaction<'_>) -> Result<T, StoreError> + Send + 'static,
+        W: Fn(&mut Transaction<'_>) -> Result<T, StoreError> + Send + 'static,
     {
         let (reply, answer) = oneshot::channel();
-        self.send(Message::Change(Box::new(move |tx| {
-            let done = tx.map_or_else(|| Err(closed()), |tx| tx.savepoint(work));
-            Box::new(move |durable| {
-                let outcome = match durable {
-                    Ok(()) => done,
-                    Err(error) => Err(error.clone()),
-                };
-                // Nobody waits when the caller was dropped; the change stands all the same.
-                reply.send(outcome).ok();
-            })
+        self.send(Message::Change(operation(work, move |outcome| {
+            // Nobody waits when the caller was dropped; the change stands all the same.
+            reply.send(outcome).ok();
         })))?;
         answer.await.map_err(|_| closed())?
     }
 
     /// Wait for a plan to run.
-    pub(super) async fn claim(&self) -> Result<Lease, StoreError> {
+    pub(super) async fn claim(&self, when: When) -> Result<Lease, StoreError> {
         let (reply, answer) = oneshot::channel();
-        self.send(Message::Claim(reply))?;
+        self.send(Message::Claim(Claimer { when, reply }))?;
         let delivery = answer.await.map_err(|_| closed())??;
         Ok(delivery.accept())
     }
@@ -139,42 +176,6 @@ impl Drop for Writer {
     }
 }
 
-/// A lease on its way to a claimer. If nobody takes it out, its plan goes back to the queue.
-struct Delivery {
-    lease: Option<Lease>,
-    messages: Sender<Message>,
-}
-
-impl Delivery {
-    fn accept(mut self) -> Lease {
-        self.lease.take().expect("a lease is taken out once")
-    }
-}
-
-impl Drop for Delivery {
-    fn drop(&mut self) {
-        let Some(lease) = self.lease.take() else {
-            return;
-        };
-        let (id, attempt) = (lease.plan.id, lease.attempt);
-        let give_back: Operation = Box::new(move |tx| {
-            let done = tx.map_or_else(
-                || Err(closed()),
-                |tx| tx.savepoint(|tx| operations::release(tx, id, attempt)),
-            );
-            Box::new(move |durable| {
-                // A plan that was deleted meanwhile is nobody's loss.
-                if let Err(error) = done.and(durable.map_err(StoreError::clone))
-                    && !matches!(error, StoreError::LeaseLost(_))
-                {
-                    tracing::error!(plan_id = %id, %error, "an undelivered plan stays claimed until the next start");
-                }
-            })
-        });
-        self.messages.send(Message::Change(give_back)).ok();
-    }
-}
-
 /// What the thread has in front of it.
 struct Desk {
     connection: Connection,
@@ -188,6 +189,8 @@ struct Desk {
     leases: HashMap<PlanId, watch::Sender<bool>>,
     /// Plans queued, as committed.
     queued: u64,
+    /// The greatest attempt whose lease was given out and whose claim was then not committed.
+    void_attempt: u64,
 }
 
 impl Desk {
@@ -202,7 +205,7 @@ impl Desk {
             .cast_unsigned();
         let now_ms = (self.options.clock)();
         self.commit(|tx, _| {
-            tx.savepoint(|tx| {
+            tx.step(|tx| {
                 removal::bury_for_good(tx, now_ms)?;
                 operations::recover(tx)
             })
@@ -232,55 +235,39 @@ impl Desk {
         }
     }
 
-    fn serve_batch(&mut self, batch: Vec<Operation>) {
-        self.waiting.retain(|claimer| !claimer.is_closed());
+    fn serve_batch(&mut self, mut batch: Vec<Box<dyn Operation>>) {
+        self.waiting.retain(|claimer| !claimer.reply.is_closed());
         if batch.is_empty() && (self.queued == 0 || self.waiting.is_empty()) {
             return;
         }
-        let mut batch = batch.into_iter();
-        let mut answers = Vec::new();
-        let mut claims = Vec::new();
+        let mut claims = Claims::new(self.messages.clone());
+        let mut spoiled = false;
         let durable = self.commit(|tx, waiting| {
-            answers.extend(batch.by_ref().map(|operation| operation(Some(&mut *tx))));
-            while tx.queued > 0
-                && let Some(claimer) = waiting.pop_front()
-            {
-                claims.push((claimer, tx.savepoint(operations::claim)));
+            // Whoever can be given a plan need not wait until all else is written.
+            claims.serve(tx, waiting);
+            for operation in &mut batch {
+                operation.run(tx);
             }
+            claims.serve(tx, waiting);
+            spoiled = tx.sound().is_err();
         });
-        if let Err(error) = &durable {
-            tracing::error!(%error, operations = answers.len() + batch.len(), "a write failed");
+        if durable.is_err() {
+            self.void_attempt = self.void_attempt.max(claims.early_attempt);
         }
-        // Whatever did not get its transaction is told so.
-        answers.extend(batch.map(|operation| operation(None)));
-        for answer in answers {
-            answer(durable.as_ref().copied());
-        }
-        for (claimer, claim) in claims {
-            self.answer_claim(claimer, claim, durable.as_ref().copied());
-        }
-    }
-
-    fn answer_claim(
-        &mut self,
-        claimer: Claimer,
-        claim: Result<Option<Lease>, StoreError>,
-        durable: Result<(), &StoreError>,
-    ) {
-        let answer = match (durable, claim) {
-            (Ok(()), Ok(None)) => {
-                self.waiting.push_back(claimer);
-                return;
+        claims.answer(durable.as_ref().copied());
+        if spoiled && batch.len() > 1 {
+            // What one of them did must not be the others' failure.
+            for operation in batch {
+                self.serve_batch(vec![operation]);
             }
-            (Ok(()), Ok(Some(lease))) => Ok(Delivery {
-                lease: Some(lease),
-                messages: self.messages.clone(),
-            }),
-            (Ok(()), Err(error)) => Err(error),
-            (Err(error), _) => Err(error.clone()),
-        };
-        // What cannot be delivered goes back to the queue when it is dropped.
-        drop(claimer.send(answer));
+            return;
+        }
+        if let Err(error) = &durable {
+            tracing::error!(%error, operations = batch.len(), "a write failed");
+        }
+        for operation in batch {
+            operation.answer(durable.as_ref().copied());
+        }
     }
 
     /// Run `work` in a transaction, make it durable, and tell whom it concerns.
@@ -295,8 +282,9 @@ impl Desk {
             connection: &self.connection,
             options: &self.options,
             queued: self.queued,
+            void_attempt: self.void_attempt,
             effects: Vec::new(),
-            lost: None,
+            spoiled: None,
         };
         let result = work(&mut tx, &mut self.waiting);
         let changed = tx.effects.iter().filter_map(|effect| match effect {
@@ -304,7 +292,7 @@ impl Desk {
             _ => None,
         });
         self.records.begin(changed);
-        let committed = tx.still_open().and_then(|()| {
+        let committed = tx.sound().and_then(|()| {
             tx.connection.prepare_cached("COMMIT")?.execute([])?;
             Ok(())
         });

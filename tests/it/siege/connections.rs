@@ -103,6 +103,38 @@ async fn slow_and_silent_callers_are_let_go_while_others_are_served() {
     println!("the longest wait for /readyz: {longest:.1?}");
 }
 
+/// Whole or byte by byte, the first of which may be those of either.
+#[tokio::test(flavor = "multi_thread")]
+async fn both_versions_of_http_are_spoken_however_they_come() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &["--workers", "1"]);
+    // An empty SETTINGS frame after the preface; the service's own begins with its length and type.
+    let http2: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\x04\0\0\0\0\0";
+    let get: &[u8] = b"GET /livez HTTP/1.1\r\nhost: x\r\n\r\n";
+    let put: &[u8] = b"PUT /livez HTTP/1.1\r\nhost: x\r\ncontent-length: 0\r\n\r\n";
+    for (said, answer) in [
+        (http2, &b"\x04"[..]),
+        (get, b"/1.1 200"),
+        (put, b"/1.1 405"),
+    ] {
+        for piece in [said.len(), 1] {
+            let mut stream = TcpStream::connect(service.address())
+                .await
+                .expect("connected");
+            stream.set_nodelay(true).expect("set");
+            for piece in said.chunks(piece) {
+                stream.write_all(piece).await.expect("sent");
+                tokio::task::yield_now().await;
+            }
+            let mut first = [0; 12];
+            let read = tokio::time::timeout(PATIENCE, stream.read_exact(&mut first)).await;
+            read.expect("in time").expect("an answer");
+            let place = if answer.len() == 1 { 3 } else { 4 };
+            assert!(first[place..].starts_with(answer), "{first:?}");
+        }
+    }
+}
+
 /// For a connection with an open stream. hyper alone keeps two buffers of 8 KiB for each.
 const MOST_KIB: f64 = 28.0;
 

@@ -5,7 +5,7 @@ use futures_util::future::join_all;
 use noctule::job::{Event, Status};
 use noctule::store::ListQuery;
 
-use crate::support::plans::{history, kind, point, submission, until};
+use crate::support::plans::{ending, history, kind, point, statuses, submission, until};
 use crate::support::stores::on_every_backend;
 
 const ALL: ListQuery = ListQuery {
@@ -85,6 +85,30 @@ async fn the_queue_is_full_at_its_limit_and_has_room_after_a_claim() {
         let youngest = store.list(waiting).await.unwrap()[0].id;
         store.delete(youngest, 0).await.unwrap();
         assert_eq!(kind(store.submit(submission()).await), Ok(()));
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_early_lease_runs_its_plan() {
+    on_every_backend(10, async |store| {
+        let waiting = store.claim_early();
+        let first = store.submit(submission()).await.unwrap().plan.id;
+        let second = store.submit(submission()).await.unwrap().plan.id;
+        let leases = [waiting.await.unwrap(), store.claim_early().await.unwrap()];
+        assert_eq!(leases.clone().map(|lease| lease.plan.id), [first, second]);
+        // What comes next finds the claim, however late it became durable.
+        store
+            .append(&leases[0], vec![point(1, None)])
+            .await
+            .unwrap();
+        let ended = store.finish(&leases[0], ending(Status::Succeeded).at(12_000));
+        assert_eq!(ended.await.unwrap().status, Status::Succeeded);
+        let told = history(&**store, first).await;
+        let expected = [Status::Queued, Status::Running, Status::Succeeded];
+        assert_eq!(statuses(&told), expected);
+        store.request_cancel(second, 13_000).await.unwrap();
+        assert!(*leases[1].cancel.borrow(), "whoever runs it is told");
     })
     .await;
 }

@@ -44,6 +44,11 @@ impl Store for FaultyStore {
         self.sound.claim().await
     }
 
+    async fn claim_early(&self) -> Result<Lease, StoreError> {
+        self.stumble()?;
+        self.sound.claim_early().await
+    }
+
     async fn append(&self, lease: &Lease, events: Vec<Event>) -> Result<(), StoreError> {
         self.stumble()?;
         self.sound.append(lease, events).await

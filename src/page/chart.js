@@ -91,8 +91,9 @@ export class Chart {
     if (!all.length) return [0, 1];
     const best = plot.data.slice(3).flat().filter(Number.isFinite);
     const mean = plot.data[2].filter(Number.isFinite).sort((a, b) => a - b);
-    const low = Math.min(...all);
-    const high = Math.max(...(best.length ? best : all), mean[Math.floor(mean.length * 0.75)] ?? -Infinity);
+    // One by one: a long search has more points than a call can have arguments.
+    const low = all.reduce((a, b) => Math.min(a, b));
+    const high = (best.length ? best : all).reduce((a, b) => Math.max(a, b), mean[Math.floor(mean.length * 0.75)] ?? -Infinity);
     const room = Math.max((high - low) * 0.08, Math.abs(high) * 1e-4);
     return [low - room, high + room];
   }

@@ -117,7 +117,9 @@ export async function choose(page, name, values = {}) {
 /** Types into the field of a pointer, opening what it is in. */
 export async function fill(page, pointer, value) {
   const field = page.locator(`[data-pointer="${pointer}"]`);
-  await field.evaluate((node) => { for (let at = node; at; at = at.parentElement) if (at.tagName === 'DETAILS') at.open = true; });
+  await field.waitFor({ state: 'attached' });
+  // In one step: the form may be built anew between two.
+  await page.evaluate((selector) => { for (let at = document.querySelector(selector); at; at = at.parentElement) if (at.tagName === 'DETAILS') at.open = true; }, `[data-pointer="${pointer}"]`);
   await field.fill(String(value));
 }
 

@@ -156,7 +156,7 @@ test('a search of milliseconds has its whole history, also when its plan is open
   await page.keyboard.press('ArrowRight');
   await page.waitForFunction(() => globalThis.noctule.scene().routes.some((one) => one.name === 'then'));
   assert.match(await page.textContent('#watch output'), /^iteration 1: /);
-  assert.ok(await page.locator('#chart .u-cursor-pt').first().isVisible(), 'the chart is marked there');
+  await page.locator('#chart .u-cursor-pt').first().waitFor();
   await page.keyboard.press('Tab');
   await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 1);
   // All of it once more, and the result at its end.
@@ -184,6 +184,24 @@ test('a search that starts over is shown from its new beginning', async () => {
   await page.waitForFunction(() => globalThis.noctule.history().points > 0);
   await page.waitForTimeout(300);
   assert.deepEqual(await page.evaluate(() => globalThis.noctule.history()), { points: 1, incumbents: 1 });
+  await page.click('#cancel');
+  await page.done();
+});
+
+test('a search of very many iterations is drawn', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  await choose(page, 'paper-4', LONG);
+  await page.route('**/events?*', async (route) => {
+    const status = await ask(site.url, new URL(route.request().url()).pathname.replace('/events', ''));
+    const event = (kind, data) => `event: ${kind}\ndata: ${JSON.stringify(data)}\n\n`;
+    const told = Array.from({ length: 80000 }, (_, iteration) => event('convergence', { iteration, best_cost: 500, mean_cost: 600, feasible_fraction: 1 }));
+    await route.fulfill({ contentType: 'text/event-stream', body: `retry: 60000\n\n${event('status', { ...status, status: 'running' })}${told.join('')}` });
+  });
+  await page.click('#plan');
+  await page.waitForFunction(() => globalThis.noctule.history().points === 80000);
+  await page.waitForFunction(() => /best 500/.test(document.getElementById('legend').textContent));
+  await page.waitForTimeout(300);
   await page.click('#cancel');
   await page.done();
 });

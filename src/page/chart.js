@@ -12,6 +12,7 @@ export class Chart {
   #plot = null;
   #shown = { points: [], bound: null, others: [], color: null };
   #shape = '';
+  #marked = null;
   #marking = false;
 
   /** `pointed(iteration)` is told where the pointer is; null where it is not. */
@@ -34,6 +35,7 @@ export class Chart {
 
   /** Marks an iteration; null for none. */
   mark(iteration) {
+    this.#marked = iteration;
     if (!this.#plot) return;
     this.#marking = true;
     this.#plot.setCursor(iteration === null ? { left: -10, top: -10 } : { left: this.#plot.valToPos(iteration, 'x'), top: 0 });
@@ -76,6 +78,8 @@ export class Chart {
       axes: [{ ...axis, size: 24, gap: 4 }, { ...axis, size: 52, gap: 6, values: (_, ticks) => ticks.map((tick) => tick.toLocaleString('en')) }],
       series: [{}, ...series.map(({ label, stroke, width, dash }) => ({ label, stroke, width, dash, spanGaps: true, points: { show: false } }))],
       hooks: {
+        // What is drawn anew has forgotten its mark.
+        draw: [() => this.#marked !== null && this.mark(this.#marked)],
         setCursor: [(plot) => {
           if (this.#marking) return;
           const at = plot.cursor.idx;

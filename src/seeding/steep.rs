@@ -8,7 +8,6 @@ use nalgebra::Vector2;
 use super::{Outline, OutlineShape};
 use crate::geometry::Point2;
 use crate::scenario::Scenario;
-use crate::terrain::Terrain;
 
 /// Cells along the longer side of the area.
 const CELLS: f64 = 32.0;
@@ -21,7 +20,7 @@ const EXTENTS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 /// cells of a coarse lattice within the rim cannot be reached, and are left out.
 #[must_use]
 pub fn steep_ground(scenario: &Scenario) -> Vec<Outline> {
-    if let Terrain::Flat(_) = scenario.terrain {
+    if scenario.terrain.is_flat() {
         return Vec::new();
     }
     let area = scenario.area;

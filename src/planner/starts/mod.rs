@@ -6,6 +6,7 @@ mod net;
 mod over;
 mod roadmap;
 mod tangents;
+mod thin;
 mod trails;
 
 pub(super) use count::{spread, with_waypoints};
@@ -18,7 +19,6 @@ use crate::geometry::{Point2, Point3};
 use crate::optimizer::Fitness;
 use crate::scenario::{Scenario, Seeding, WarmStart};
 use crate::seeding::{Obstacles, Outline, TautString, steep_ground, taut_strings_until};
-use crate::terrain::Terrain;
 use crate::threat::Threat;
 use net::Found;
 
@@ -181,9 +181,10 @@ fn bends(model: &Model, shapes: &[Vec<Point3>]) -> usize {
                 if next.beats(&best) { next } else { best }
             },
         );
-    let least = match model.scenario.terrain {
-        Terrain::Flat(_) => COARSE,
-        Terrain::Peaks(_) | Terrain::Grid(_) | Terrain::Dem(_) => COARSE_OVER_HILLS,
+    let least = if model.scenario.terrain.is_flat() {
+        COARSE
+    } else {
+        COARSE_OVER_HILLS
     };
     priced()
         .filter(|(fitness, _)| {
@@ -217,7 +218,7 @@ fn along_strings(model: &Model, stop: &dyn Stop) -> Vec<Vec<Point3>> {
         follow(&Obstacles::soft(scenario, in_the_way), STRINGS);
         follow(&Obstacles::hard(scenario, in_the_way), STRINGS);
     }
-    if !matches!(scenario.terrain, Terrain::Flat(_)) {
+    if !scenario.terrain.is_flat() {
         let steep = steep_ground(scenario);
         if !steep.is_empty() {
             let outlines = scenario.threats.iter().map(Outline::soft).chain(steep);
@@ -238,8 +239,7 @@ fn over_ground(model: &Model) -> Found {
     let can_be_flown = |route: &Vec<Point3>| {
         route.len() - 2 <= scenario.planner.waypoints && price(model, route).is_feasible()
     };
-    let is_hilly = !matches!(scenario.terrain, Terrain::Flat(_));
-    if is_hilly && !found.routes.iter().any(can_be_flown) {
+    if !scenario.terrain.is_flat() && !found.routes.iter().any(can_be_flown) {
         let trails = trails::routes(model, OVERLAND);
         found.routes.extend(trails.routes);
         found.legs_priced += trails.legs_priced;

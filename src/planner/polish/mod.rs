@@ -29,7 +29,7 @@ pub(super) struct Steps {
 
 /// By which a route may still become cheaper, as a share, when the greatest step gains no more; at
 /// half that step half as much.
-const HOPE: f64 = 0.25;
+const HOPE: f64 = 0.12;
 
 /// By which a violation becomes dearer as the step is halved.
 const DEARER: f64 = 8.0;

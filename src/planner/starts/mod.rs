@@ -43,11 +43,8 @@ const MOST_COARSE: usize = 20;
 /// Routes taken from the net of places.
 const OVERLAND: usize = 8;
 
-/// A start this much dearer than the best, as a share, is not worth refining.
+/// A start this much dearer than the best one refined, as a share, is not worth refining.
 const HOPELESS: f64 = 0.08;
-
-/// A start that breaks a limit may well cost more than the best as it is, but not so many times more.
-const ABSURD: f64 = 3.0;
 
 /// By which a start is pulled into place.
 const ROUGH_STEPS: Steps = Steps {
@@ -124,7 +121,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
 }
 
 /// Pull the routes that may still win roughly into place, and leave out those that end up where
-/// another one is. What one that breaks a limit will cost cannot be told before.
+/// another one is. One that breaks limits is not going to be cheaper without.
 fn refine(
     model: &Model,
     priced: &mut Vec<(Fitness, Vec<Point3>)>,
@@ -147,9 +144,7 @@ fn refine(
     let mut refined: Vec<(Fitness, Vec<Point3>)> = Vec::new();
     let mut dear = Vec::new();
     for (fitness, mut route) in priced.drain(..) {
-        let is_dear = fitness.cost > best.cost * (1.0 + hopeless);
-        let is_absurd = fitness.cost > best.cost * ABSURD;
-        if best.is_feasible() && (is_absurd || is_dear && (fitness.is_feasible() || is_known)) {
+        if best.is_feasible() && fitness.cost > best.cost * (1.0 + hopeless) {
             dear.push((fitness, route));
             continue;
         }

@@ -163,25 +163,22 @@ fn refine(
 
 /// Bends of the routes that may still win, at most.
 fn bends(model: &Model, shapes: &[Vec<Point3>]) -> usize {
-    let priced = || {
-        shapes
-            .iter()
-            .map(|route| (price(model, route), route.len() - 2))
-    };
-    let best = priced()
-        .map(|(fitness, _)| fitness)
-        .fold(
-            Fitness::WORST,
-            |best, next| {
-                if next.beats(&best) { next } else { best }
-            },
-        );
+    let priced: Vec<(Fitness, usize)> = shapes
+        .iter()
+        .map(|route| (price(model, route), route.len() - 2))
+        .collect();
+    let best = priced
+        .iter()
+        .map(|(fitness, _)| *fitness)
+        .min_by(Fitness::rank)
+        .unwrap_or(Fitness::WORST);
     let least = if model.scenario.terrain.is_flat() {
         COARSE
     } else {
         COARSE_OVER_HILLS
     };
-    priced()
+    priced
+        .into_iter()
         .filter(|(fitness, _)| {
             fitness.violation <= best.violation && fitness.cost <= best.cost * (1.0 + HOPELESS)
         })

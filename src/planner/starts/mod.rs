@@ -111,11 +111,11 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     // The known route goes first, so that others are refined only where they are cheaper as they are.
     let others = usize::from(warm);
     priced[others..].sort_by(|one, other| one.0.rank(&other.0));
-    priced.truncate(STARTS);
     if settings.polish {
         let hopeless = if warm { 0.0 } else { HOPELESS };
         refine(model, &mut priced, hopeless, stop, &mut starts.evaluations);
     }
+    priced.truncate(STARTS);
     starts.routes = priced.into_iter().map(|(_, route)| route).collect();
     Some(starts)
 }
@@ -147,6 +147,9 @@ fn refine(
         if best.is_feasible() && fitness.cost > best.cost * (1.0 + hopeless) {
             dear.push((fitness, route));
             continue;
+        }
+        if refined.len() == STARTS {
+            break;
         }
         if let Some(fitness) = polish.descend_unless_known(&mut route, steps, &refined) {
             if fitness.beats(&best) {

@@ -234,7 +234,7 @@ fn over_ground(model: &Model) -> Found {
     let can_be_flown = |route: &Vec<Point3>| {
         route.len() - 2 <= scenario.planner.waypoints && price(model, route).is_feasible()
     };
-    if !scenario.terrain.is_flat() && !found.routes.iter().any(can_be_flown) {
+    if !found.routes.iter().any(can_be_flown) {
         let trails = trails::routes(model, OVERLAND);
         found.routes.extend(trails.routes);
         found.legs_priced += trails.legs_priced;

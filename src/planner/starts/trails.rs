@@ -1,8 +1,9 @@
-//! Ways over hard ground: through a fine net of places at several heights of the band.
+//! Ways where there are few: through a fine net of places, over hills at several heights of the band.
 //!
-//! Where no chain of long legs keeps the limits, the way is found in small steps: every place is joined to
-//! those about it, and some of them are so much lower or higher above the ground that a leg need not climb
-//! as it does. Of the chain that is found, as many waypoints are kept as the route may have.
+//! Where no chain of long legs keeps the limits, over hard ground or among crowded threats, the way is found in
+//! small steps: every place is joined to those about it, and over hills some of them are so much lower or higher
+//! above the ground that a leg need not climb as it does. Of the chain that is found, as many waypoints are kept as
+//! the route may have.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -19,7 +20,8 @@ use crate::planner::price::PRICED_FROM;
 const SPOTS: usize = 1000;
 
 /// Heights of each spot, as shares of the band.
-const HEIGHTS: [f64; 3] = [1.0 / 6.0, 0.5, 5.0 / 6.0];
+const HEIGHTS: [f64; 1] = [0.5];
+const HEIGHTS_OVER_HILLS: [f64; 3] = [1.0 / 6.0, 0.5, 5.0 / 6.0];
 
 /// The net covers all points of which the way over them is at most so many times the direct one.
 const DETOUR: f64 = 1.5;
@@ -205,7 +207,16 @@ impl<'s> Net<'s> {
 /// Start, the spots at their heights, target.
 fn places(model: &Model, spots: &Spots) -> Vec<Point3> {
     let scenario = model.scenario;
-    let over = |&spot| HEIGHTS.map(|share| lifted(scenario, spot, share));
+    let heights: &[f64] = if scenario.terrain.is_flat() {
+        &HEIGHTS
+    } else {
+        &HEIGHTS_OVER_HILLS
+    };
+    let over = |&spot| {
+        heights
+            .iter()
+            .map(move |&share| lifted(scenario, spot, share))
+    };
     std::iter::once(scenario.start)
         .chain(spots.points.iter().flat_map(over))
         .chain([scenario.target])
@@ -217,6 +228,7 @@ mod tests {
     use super::super::roadmap;
     use super::*;
     use crate::geometry::Point2;
+    use crate::optimizer::Fitness;
     use crate::planner::price::price;
     use crate::planner::tests::{radar, scenario};
     use crate::scenario::{AltitudeBand, Scenario};
@@ -300,5 +312,35 @@ mod tests {
                 (scenario.start, scenario.target)
             );
         }
+    }
+
+    /// Among discs in staggered rows the coarse net has no way that can be flown, and the fine one better ones.
+    #[test]
+    fn a_way_is_found_through_a_crowd() {
+        let mut scenario = scenario();
+        scenario.threats = (0..9)
+            .flat_map(|row| (0..8).map(move |column| (f64::from(row), f64::from(column))))
+            .map(|(row, column)| {
+                let shift = if row % 2.0 > 0.5 { 50.0 } else { 0.0 };
+                radar(110.0 + 100.0 * column + shift, 100.0 + 87.0 * row, 28.0)
+            })
+            .filter(|threat| {
+                let crate::threat::Shape::Cylinder(disc) = &threat.shape else {
+                    return false;
+                };
+                [scenario.start, scenario.target]
+                    .iter()
+                    .all(|end| (end.xy() - disc.center).norm() > 70.0)
+            })
+            .collect();
+        scenario.planner.waypoints = 8;
+        let model = Model::new(&scenario);
+        let best = |found: Found| {
+            let priced = found.routes.iter().map(|route| price(&model, route));
+            priced.min_by(Fitness::rank).expect("a route")
+        };
+        let [coarse, fine] = [roadmap::routes(&model, 8), routes(&model, 8)].map(best);
+        assert!(!coarse.is_feasible());
+        assert!(fine.beats(&coarse), "{coarse:?} {fine:?}");
     }
 }

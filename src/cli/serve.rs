@@ -102,9 +102,9 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         instruments: instruments.clone(),
     };
     let router = if config.role.serves() {
-        http::router(parts.into())
+        http::router(parts)
     } else {
-        http::upkeep_router(parts.into())
+        http::upkeep_router(parts)
     };
     access::reload_on_hangup(config, access)?;
     announce(&listener)?;

@@ -16,6 +16,7 @@ mod threat;
 
 pub use band::Section;
 pub use constraint::{Breach, Constraint, Tolerance};
+pub use fuel::metre;
 pub use heading::turns;
 
 use crate::geometry::{Point3, Segment};

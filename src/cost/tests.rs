@@ -1,6 +1,6 @@
 use super::*;
 use crate::geometry::{Point2, Rect};
-use crate::scenario::{AltitudeBand, Frame, PlannerSettings, Seeding, Smoothing, Vehicle, Weights};
+use crate::scenario::{AltitudeBand, Frame, PlannerSettings, Vehicle, Weights};
 use crate::terrain::{Flat, Terrain};
 use crate::threat::{Cylinder, Shape, Threat};
 
@@ -42,25 +42,7 @@ fn scenario() -> Scenario {
             threat: 3.0,
             altitude: 2.0,
         },
-        planner: PlannerSettings {
-            algorithm: String::new(),
-            waypoints: 1,
-            population: 2,
-            iterations: 1,
-            seed: 0,
-            time_limit_ms: None,
-            seeding: Seeding::Random,
-            polish: false,
-            warm_start: None,
-            smoothing: Smoothing {
-                degree: 3,
-                spacing: 5.0,
-            },
-            quadrature: Quadrature::Integral,
-            gap: 0.0,
-            threads: 1,
-            parameters: std::collections::BTreeMap::new(),
-        },
+        planner: PlannerSettings::plain(),
     }
 }
 

@@ -36,7 +36,7 @@ mod tickets;
 mod warm_start;
 pub mod webhook;
 
-use std::ops::{Deref, DerefMut};
+use std::ops::Deref;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -69,24 +69,11 @@ use problem::Problem;
 #[derive(Clone)]
 pub struct AppState(Arc<Parts>);
 
-impl From<Parts> for AppState {
-    fn from(parts: Parts) -> Self {
-        Self(Arc::new(parts))
-    }
-}
-
 impl Deref for AppState {
     type Target = Parts;
 
     fn deref(&self) -> &Parts {
         &self.0
-    }
-}
-
-/// Changes this one, not its clones.
-impl DerefMut for AppState {
-    fn deref_mut(&mut self) -> &mut Parts {
-        Arc::make_mut(&mut self.0)
     }
 }
 
@@ -186,28 +173,28 @@ pub fn routes() -> Vec<Route> {
 }
 
 /// The service: every route, every refusal a problem, every answer with its request's id.
-pub fn router(state: AppState) -> Router {
+pub fn router(parts: Parts) -> Router {
     let nowhere = async |uri: Uri| Problem::NoSuchResource(uri.path().to_owned());
-    assemble(state, routes(), nowhere)
+    assemble(parts, routes(), nowhere)
 }
 
 /// A node that only runs plans: the routes of those who look after it, and no word of plans.
-pub fn upkeep_router(state: AppState) -> Router {
+pub fn upkeep_router(parts: Parts) -> Router {
     const UPKEEP: [&str; 4] = ["/livez", "/readyz", "/metrics", "/version"];
     let mut routes = routes();
     routes.retain(|route| UPKEEP.contains(&route.path));
     let nowhere = async |uri: Uri| Problem::NotServedHere(uri.path().to_owned());
-    assemble(state, routes, nowhere)
+    assemble(parts, routes, nowhere)
 }
 
 /// These routes, and what is said where there is none.
 fn assemble<T: 'static>(
-    state: AppState,
+    parts: Parts,
     routes: Vec<Route>,
     nowhere: impl Handler<T, AppState>,
 ) -> Router {
-    let (access, cors) = (state.access.clone(), state.cors.clone());
-    let instruments = state.instruments.clone();
+    let (access, cors) = (parts.access.clone(), parts.cors.clone());
+    let instruments = parts.instruments.clone();
     let router = routes
         .into_iter()
         .fold(Router::new(), |router, route| {
@@ -216,7 +203,7 @@ fn assemble<T: 'static>(
         })
         .method_not_allowed_fallback(async || Problem::MethodNotAllowed)
         .fallback(nowhere)
-        .with_state(state);
+        .with_state(AppState(Arc::new(parts)));
     wrap(router, &cors, instruments)
 }
 

@@ -247,11 +247,12 @@ impl TmsSba {
         let stagnant = (0..dimension).all(|dim| {
             (self.swarm.position(worst)[dim] - mean[dim]).abs() <= STAGNATION * bounds.range(dim)
         });
-        if stagnant && objective.walks() {
-            // Walks lead out of where the swarm has settled, to routes that can be flown; few of those drawn
-            // about the mean could.
-        } else if stagnant {
-            self.reinitialise(objective, &mean);
+        if stagnant {
+            // An objective's own walks lead out of where the swarm has settled, to routes that can be flown; few of
+            // those drawn about the mean could.
+            if !objective.walks() {
+                self.reinitialise(objective, &mean);
+            }
         } else {
             let mut fitness = [Fitness::WORST];
             self.swarm.price(objective, &mean, &mut fitness);

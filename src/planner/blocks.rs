@@ -6,9 +6,8 @@
 //! measured of which it is not known how they fare. No price depends on which other positions are in a block.
 
 use super::coding::Coding;
-use super::kept::Kept;
+use super::kept::{End, Kept};
 use crate::cost::batch::{LANES, PointRow, Price, Pricer, Row};
-use crate::geometry::Point3;
 use crate::optimizer::Fitness;
 
 /// Prices positions of one coding.
@@ -47,8 +46,8 @@ struct Unmeasured {
 }
 
 struct Leg {
-    a: Point3,
-    b: Point3,
+    from: End,
+    to: End,
     /// The number of its position.
     owner: usize,
     /// Its violation, where that is known.
@@ -212,9 +211,13 @@ impl Waiting {
 impl Unmeasured {
     /// Add the legs of the route in lane `lane` of `points`, but for those that are `kept`.
     fn push(&mut self, points: &[PointRow], lane: usize, owner: usize, kept: &Kept) {
-        for ends in points.windows(2) {
-            let (a, b) = (ends[0].get(lane), ends[1].get(lane));
-            let known = kept.violation(a, b);
+        let end = |row: &PointRow| (row.get(lane), End::at(row.get(lane)));
+        let mut before = end(&points[0]);
+        for row in &points[1..] {
+            let next = end(row);
+            let ((a, from), (b, to)) = (before, next);
+            before = next;
+            let known = kept.violation(from, to);
             if known.is_some_and(|violation| violation <= 0.0) {
                 continue;
             }
@@ -230,7 +233,12 @@ impl Unmeasured {
                 }
                 self.unknown += 1;
             }
-            self.legs.push(Leg { a, b, owner, known });
+            self.legs.push(Leg {
+                from,
+                to,
+                owner,
+                known,
+            });
         }
     }
 
@@ -240,12 +248,18 @@ impl Unmeasured {
         self.prices.resize(self.from.len(), Price::ZERO);
         pricer.heights_of_legs(&self.from, &self.to, self.unknown, &mut self.prices);
         let mut measured = 0;
-        for Leg { a, b, owner, known } in self.legs.drain(..) {
+        for Leg {
+            from,
+            to,
+            owner,
+            known,
+        } in self.legs.drain(..)
+        {
             let violation = known.unwrap_or_else(|| {
                 let violation = self.prices[measured / LANES].violation[measured % LANES];
                 measured += 1;
                 if exact || violation <= 0.0 {
-                    kept.note(a, b, violation);
+                    kept.note(from, to, violation);
                 }
                 violation
             });

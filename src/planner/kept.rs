@@ -10,18 +10,33 @@ use crate::geometry::Point3;
 const FEWEST: usize = 1 << 10;
 const MOST: usize = 1 << 16;
 
-/// The bits of both ends.
-type Ends = [u64; 6];
+/// An end of a leg: its bits, and those mixed into one number, once for both legs that it joins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct End {
+    bits: [u64; 3],
+    mixed: u64,
+}
 
 /// No leg has it: no coordinate is such a number.
-const NONE: Ends = [u64::MAX; 6];
+const NONE: [u64; 6] = [u64::MAX; 6];
 
 /// An odd number whose bits are spread evenly.
 const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
 
+impl End {
+    pub(super) fn at(point: Point3) -> Self {
+        let bits = [point.x, point.y, point.z].map(f64::to_bits);
+        let mixed = bits.iter().fold(0_u64, |mixed, bits| {
+            (mixed.rotate_left(29) ^ bits).wrapping_mul(FACTOR)
+        });
+        Self { bits, mixed }
+    }
+}
+
 /// Each leg has one place; of those that share it the last is known.
 pub(super) struct Kept {
-    places: Vec<(Ends, f64)>,
+    /// The bits of both ends, and the violation.
+    places: Vec<([u64; 6], f64)>,
 }
 
 impl Kept {
@@ -34,29 +49,24 @@ impl Kept {
     }
 
     /// The violation of the leg from `a` to `b`, if it is known.
-    pub(super) fn violation(&self, a: Point3, b: Point3) -> Option<f64> {
-        let ends = ends(a, b);
-        let (known, violation) = self.places[self.place(&ends)];
-        (known == ends).then_some(violation)
+    pub(super) fn violation(&self, a: End, b: End) -> Option<f64> {
+        let (known, violation) = &self.places[self.place(a, b)];
+        let differs = |differs: u64, (known, bits): (&u64, &u64)| differs | (known ^ bits);
+        let ends = a.bits.iter().chain(&b.bits);
+        (known.iter().zip(ends).fold(0, differs) == 0).then_some(*violation)
     }
 
     /// Remember the violation of the leg from `a` to `b`.
-    pub(super) fn note(&mut self, a: Point3, b: Point3, violation: f64) {
-        let ends = ends(a, b);
-        let place = self.place(&ends);
-        self.places[place] = (ends, violation);
+    pub(super) fn note(&mut self, a: End, b: End, violation: f64) {
+        let place = self.place(a, b);
+        let ([ax, ay, az], [bx, by, bz]) = (a.bits, b.bits);
+        self.places[place] = ([ax, ay, az, bx, by, bz], violation);
     }
 
-    fn place(&self, ends: &Ends) -> usize {
-        let mixed = ends.iter().fold(0_u64, |mixed, bits| {
-            (mixed.rotate_left(29) ^ bits).wrapping_mul(FACTOR)
-        });
+    fn place(&self, a: End, b: End) -> usize {
+        let mixed = (a.mixed.rotate_left(29) ^ b.mixed).wrapping_mul(FACTOR);
         (mixed >> 32) as usize & (self.places.len() - 1)
     }
-}
-
-fn ends(a: Point3, b: Point3) -> Ends {
-    [a.x, a.y, a.z, b.x, b.y, b.z].map(f64::to_bits)
 }
 
 #[cfg(test)]
@@ -67,16 +77,17 @@ mod tests {
     fn a_leg_is_known_by_every_bit_of_both_ends() {
         let mut kept = Kept::of(100);
         let point = |x: f64| Point3::new(x, 2.0 * x, 3.0);
+        let violation = |kept: &Kept, a, b| kept.violation(End::at(a), End::at(b));
         for idx in 0..20 {
             let (a, b) = (point(f64::from(idx)), point(f64::from(idx) + 0.5));
-            assert_eq!(kept.violation(a, b), None);
-            kept.note(a, b, f64::from(idx));
-            assert_eq!(kept.violation(a, b), Some(f64::from(idx)));
-            assert_eq!(kept.violation(b, a), None);
+            assert_eq!(violation(&kept, a, b), None);
+            kept.note(End::at(a), End::at(b), f64::from(idx));
+            assert_eq!(violation(&kept, a, b), Some(f64::from(idx)));
+            assert_eq!(violation(&kept, b, a), None);
             for axis in 0..3 {
                 let mut other = b;
                 other[axis] = other[axis].next_up();
-                assert_eq!(kept.violation(a, other), None);
+                assert_eq!(violation(&kept, a, other), None);
             }
         }
     }

@@ -1,8 +1,6 @@
 use super::*;
 use crate::geometry::{Point2, Rect};
-use crate::scenario::{
-    AltitudeBand, Frame, PlannerSettings, Seeding, Smoothing, Vehicle, WarmStart, Weights,
-};
+use crate::scenario::{AltitudeBand, Frame, PlannerSettings, Seeding, Vehicle, WarmStart, Weights};
 use crate::terrain::{Flat, Peak, Peaks, Terrain};
 use crate::threat::{Cylinder, Shape, Threat};
 
@@ -30,9 +28,9 @@ pub(super) fn hilly_scenario() -> Scenario {
     scenario
 }
 
-/// Three radars on flat ground, as in the first scenario of the paper.
-pub(super) fn scenario() -> Scenario {
-    let radar = |x, y, radius| Threat {
+/// With a soft zone of 30 m.
+pub(super) fn radar(x: f64, y: f64, radius: f64) -> Threat {
+    Threat {
         name: Some(format!("radar at {x}, {y}")),
         shape: Shape::Cylinder(Cylinder {
             center: Point2::new(x, y),
@@ -41,7 +39,11 @@ pub(super) fn scenario() -> Scenario {
         }),
         base: None,
         top: None,
-    };
+    }
+}
+
+/// Three radars on flat ground, as in the first scenario of the paper.
+pub(super) fn scenario() -> Scenario {
     Scenario {
         frame: Frame::Local,
         name: None,
@@ -74,23 +76,11 @@ pub(super) fn scenario() -> Scenario {
             altitude: 1.0,
         },
         planner: PlannerSettings {
-            algorithm: "tms-sba".to_owned(),
             waypoints: 10,
             population: 60,
             iterations: 60,
             seed: 7,
-            time_limit_ms: None,
-            seeding: Seeding::Random,
-            polish: false,
-            warm_start: None,
-            smoothing: Smoothing {
-                degree: 3,
-                spacing: 5.0,
-            },
-            quadrature: Quadrature::Integral,
-            gap: 0.0,
-            threads: 1,
-            parameters: std::collections::BTreeMap::new(),
+            ..PlannerSettings::plain()
         },
     }
 }

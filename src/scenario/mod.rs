@@ -121,6 +121,32 @@ impl PlannerSettings {
     }
 }
 
+#[cfg(test)]
+impl PlannerSettings {
+    /// The algorithm alone, as in the paper, at its least size.
+    pub(crate) fn plain() -> Self {
+        Self {
+            algorithm: "tms-sba".to_owned(),
+            waypoints: 1,
+            population: 2,
+            iterations: 1,
+            seed: 0,
+            time_limit_ms: None,
+            seeding: Seeding::Random,
+            polish: false,
+            warm_start: None,
+            smoothing: Smoothing {
+                degree: 3,
+                spacing: 5.0,
+            },
+            quadrature: Quadrature::Integral,
+            gap: 0.0,
+            threads: 1,
+            parameters: BTreeMap::new(),
+        }
+    }
+}
+
 /// Where the first bats come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seeding {

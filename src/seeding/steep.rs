@@ -8,47 +8,49 @@ use nalgebra::Vector2;
 use super::{Outline, OutlineShape};
 use crate::geometry::Point2;
 use crate::scenario::Scenario;
-use crate::terrain::Terrain;
 
 /// Cells along the longer side of the area.
-const CELLS: f64 = 32.0;
+const CELLS: usize = 32;
 
-/// Half extents, in cells, over which a rise is measured.
-const EXTENTS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
+/// Half extents, in half cells, over which a rise is measured.
+const EXTENTS: [usize; 4] = [1, 2, 4, 8];
+
+/// The greatest of them: so far beyond the area the ground is looked at, too.
+const MARGIN: usize = EXTENTS[EXTENTS.len() - 1];
 
 /// A disc over each cell at the rim of what cannot be crossed uphill: over some extent round it the
 /// ground rises by more than the steepest climb and the height of the altitude band together. The
 /// cells of a coarse lattice within the rim cannot be reached, and are left out.
 #[must_use]
 pub fn steep_ground(scenario: &Scenario) -> Vec<Outline> {
-    if let Terrain::Flat(_) = scenario.terrain {
+    if scenario.terrain.is_flat() {
         return Vec::new();
     }
     let area = scenario.area;
     let size = area.max - area.min;
-    let cell = size.x.max(size.y) / CELLS;
+    let cell = size.x.max(size.y) / CELLS as f64;
     if cell <= 0.0 {
         return Vec::new();
     }
-    let along = |length: f64| {
-        (0..)
-            .map(f64::from)
-            .take_while(move |&idx| idx < (length / cell).ceil().max(1.0))
+    let cells = |length: f64| {
+        let covers = |count: &usize| *count as f64 * cell >= length;
+        (1..CELLS).find(covers).unwrap_or(CELLS)
     };
-    let center = |column: f64, row: f64| area.min + Vector2::new(column + 0.5, row + 0.5) * cell;
-    let steep: Vec<Vec<bool>> = along(size.y)
+    let (columns, rows) = (cells(size.x), cells(size.y));
+    let ground = Ground::new(scenario, 0.5 * cell, [columns, rows]);
+    let steep: Vec<Vec<bool>> = (0..rows)
         .map(|row| {
-            along(size.x)
-                .map(|column| is_steep(scenario, center(column, row), cell))
+            (0..columns)
+                .map(|column| ground.is_steep(column, row))
                 .collect()
         })
         .collect();
     let mut outlines = Vec::new();
-    for (row, y) in along(size.y).enumerate() {
-        for (column, x) in along(size.x).enumerate() {
+    for row in 0..rows {
+        for column in 0..columns {
             if steep[row][column] && !is_enclosed(&steep, row, column) {
                 outlines.push(Outline {
-                    shape: OutlineShape::Disc(center(x, y)),
+                    shape: OutlineShape::Disc(ground.center(column, row)),
                     // As wide as the cell is from corner to corner: no gap is left between two.
                     radius: 0.5 * cell * std::f64::consts::SQRT_2,
                     core: 0.0,
@@ -57,6 +59,65 @@ pub fn steep_ground(scenario: &Scenario) -> Vec<Outline> {
         }
     }
     outlines
+}
+
+/// The elevation at all corners, middles of sides and centers of cells.
+struct Ground<'s> {
+    scenario: &'s Scenario,
+    /// From one of them to the next, metres.
+    step: f64,
+    /// Row by row, [`MARGIN`] on each side.
+    elevations: Vec<Vec<f64>>,
+}
+
+impl<'s> Ground<'s> {
+    fn new(scenario: &'s Scenario, step: f64, [columns, rows]: [usize; 2]) -> Self {
+        let along = |cells: usize| (0..=2 * (cells + MARGIN)).map(|idx| idx as f64 - MARGIN as f64);
+        let elevation = |column: f64, row: f64| {
+            let at = scenario.area.min + Vector2::new(column, row) * step;
+            scenario.terrain.elevation(at)
+        };
+        let row = |row: f64| {
+            along(columns)
+                .map(|column| elevation(column, row))
+                .collect()
+        };
+        Self {
+            scenario,
+            step,
+            elevations: along(rows).map(row).collect(),
+        }
+    }
+
+    fn center(&self, column: usize, row: usize) -> Point2 {
+        self.scenario.area.min
+            + Vector2::new(column as f64 + 0.5, row as f64 + 0.5) * (2.0 * self.step)
+    }
+
+    /// Whether a cell lies on ground that rises faster than can be climbed.
+    fn is_steep(&self, column: usize, row: usize) -> bool {
+        let climb = libm::tan(self.scenario.vehicle.max_climb_deg.to_radians());
+        let band = self.scenario.altitude;
+        let center = self.center(column, row);
+        let (column, row) = (MARGIN + 2 * column + 1, MARGIN + 2 * row + 1);
+        EXTENTS.iter().any(|&extent| {
+            let east =
+                self.elevations[row][column + extent] - self.elevations[row][column - extent];
+            let north =
+                self.elevations[row + extent][column] - self.elevations[row - extent][column];
+            let half = extent as f64 * self.step;
+            let uphill = Vector2::new(east, north);
+            let steepness = uphill.norm();
+            let impassable = 2.0 * half * climb + (band.max - band.min);
+            // Straight uphill the rise is not much more than along both axes together.
+            if steepness <= 0.5 * impassable {
+                return false;
+            }
+            let way = uphill * (half / steepness);
+            let elevation = |away: Vector2<f64>| self.scenario.terrain.elevation(center + away);
+            elevation(way) - elevation(-way) > impassable
+        })
+    }
 }
 
 /// Whether all eight neighbours of a cell are steep.
@@ -68,25 +129,6 @@ fn is_enclosed(steep: &[Vec<bool>], row: usize, column: usize) -> bool {
         rows.all(|row| {
             around(column).is_some_and(|mut columns| columns.all(|column| is_steep(row, column)))
         })
-    })
-}
-
-fn is_steep(scenario: &Scenario, center: Point2, cell: f64) -> bool {
-    let ground = |away: Vector2<f64>| scenario.terrain.elevation(center + away);
-    let climb = libm::tan(scenario.vehicle.max_climb_deg.to_radians());
-    let slack = scenario.altitude.max - scenario.altitude.min;
-    EXTENTS.iter().any(|extent| {
-        let half = extent * cell;
-        let (east, north) = (Vector2::x() * half, Vector2::y() * half);
-        let uphill = Vector2::new(ground(east) - ground(-east), ground(north) - ground(-north));
-        let steepness = uphill.norm();
-        let impassable = 2.0 * half * climb + slack;
-        // Straight uphill the rise is not much more than along both axes together.
-        if steepness <= 0.5 * impassable {
-            return false;
-        }
-        let way = uphill * (half / steepness);
-        ground(way) - ground(-way) > impassable
     })
 }
 

@@ -4,10 +4,17 @@
 //! step durable before it answers. Deliberately absent: what a plan means, and who may see it.
 
 mod changes;
+mod end;
+mod error;
 pub mod jetstream;
 pub mod measured;
+mod options;
 pub mod reopening;
 pub mod sqlite;
+
+pub use end::{End, Ending};
+pub use error::{StoreError, Trouble};
+pub use options::{Clock, Options, Retention, wall_clock};
 
 use std::sync::Arc;
 
@@ -15,8 +22,7 @@ use async_trait::async_trait;
 use tokio::sync::watch;
 
 use crate::export::document::Incumbent;
-use crate::job::state::Refused;
-use crate::job::{Event, Failure, NumberedEvent, Owner, Plan, PlanId, Status, Submission};
+use crate::job::{Event, NumberedEvent, Owner, Plan, PlanId, Status, Submission};
 
 /// The queue, the records, the documents and the events of all plans.
 ///
@@ -161,56 +167,6 @@ pub const IDEMPOTENCY_MS: i64 = 24 * 60 * 60 * 1_000;
 /// Plans that one [`Store::sweep`] removes at most, so that nobody waits long behind it.
 pub const SWEEP: usize = 256;
 
-/// Tells the time: milliseconds since 1970.
-pub type Clock = Arc<dyn Fn() -> i64 + Send + Sync>;
-
-/// The machine's clock.
-#[must_use]
-pub fn wall_clock() -> Clock {
-    Arc::new(|| {
-        let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-        i64::try_from(since.unwrap_or_default().as_millis()).unwrap_or(i64::MAX)
-    })
-}
-
-/// What a store is opened with.
-#[derive(Clone)]
-pub struct Options {
-    /// As many plans may wait; see [`StoreError::QueueFull`].
-    pub queue_limit: u64,
-    /// Of claims, tombstones and recovery.
-    pub clock: Clock,
-    /// How long plans are kept.
-    pub retention: Retention,
-    /// Events kept of each plan; of a longer history the oldest are forgotten.
-    pub events_kept: u64,
-}
-
-impl Options {
-    /// For `queue_limit` waiting plans, with no other limit, on the machine's clock.
-    #[must_use]
-    pub fn new(queue_limit: u64) -> Self {
-        Self {
-            queue_limit,
-            clock: wall_clock(),
-            retention: Retention::default(),
-            events_kept: u64::MAX,
-        }
-    }
-}
-
-/// How long ended plans are kept: until the first of these limits; `None` is no limit.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Retention {
-    /// From the end of a plan, milliseconds. It becomes the plan's `expires_ms` when it ends, and
-    /// that stands whatever is set later.
-    pub age_ms: Option<i64>,
-    /// Ended plans kept.
-    pub plans: Option<u64>,
-    /// Bytes of their documents and events.
-    pub bytes: Option<u64>,
-}
-
 /// The answer to a submission.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Submitted {
@@ -275,89 +231,6 @@ pub struct Lease {
     pub cancel: watch::Receiver<bool>,
 }
 
-/// How a run ended.
-#[derive(Debug, Clone)]
-pub enum Ending {
-    /// With a result.
-    Result {
-        /// Whether it was asked to stop; such a plan is `cancelled`, any other `succeeded`.
-        cancelled: bool,
-        /// Why the search ended.
-        stop_reason: String,
-        /// Whether the route meets every constraint.
-        feasible: bool,
-        /// Of the route when feasible.
-        best_cost: Option<f64>,
-        /// Routes priced.
-        evaluations: u64,
-        /// Iterations done.
-        iteration: u64,
-        /// The result document.
-        document: String,
-    },
-    /// Without one.
-    Failed(Failure),
-}
-
-impl Ending {
-    /// At that time, with nothing told since the last [`Store::append`].
-    #[must_use]
-    pub fn at(self, at_ms: i64) -> End {
-        End {
-            told: Vec::new(),
-            ending: self,
-            at_ms,
-        }
-    }
-}
-
-/// The end of a run.
-#[derive(Debug, Clone)]
-pub struct End {
-    /// What the run told since the last [`Store::append`].
-    pub told: Vec<Event>,
-    /// How it ended.
-    pub ending: Ending,
-    /// When, milliseconds since 1970.
-    pub at_ms: i64,
-}
-
-impl End {
-    /// Change the record as this end does; the result document is left to the store.
-    ///
-    /// # Errors
-    /// [`Refused`] when the plan is not running.
-    fn apply(&self, plan: &mut Plan) -> Result<(), Refused> {
-        plan.advance(&self.told);
-        match &self.ending {
-            Ending::Result {
-                cancelled,
-                stop_reason,
-                feasible,
-                best_cost,
-                evaluations,
-                iteration,
-                document: _,
-            } => {
-                let status = if *cancelled {
-                    Status::Cancelled
-                } else {
-                    Status::Succeeded
-                };
-                plan.end(status, self.at_ms)?;
-                plan.stop_reason = Some(stop_reason.clone());
-                plan.feasible = Some(*feasible);
-                plan.best_cost = *best_cost;
-                plan.progress = 1.0;
-                plan.iteration = *iteration;
-                plan.evaluations = *evaluations;
-                Ok(())
-            }
-            Ending::Failed(failure) => plan.fail(failure.clone(), self.at_ms),
-        }
-    }
-}
-
 /// What [`Store::list`] returns.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ListQuery {
@@ -384,75 +257,4 @@ pub struct Stats {
     pub mean_run_ms: Option<f64>,
     /// Plans that all nodes of the store together run at the same time; `None` when one process alone uses it.
     pub slots: Option<usize>,
-}
-
-/// Why a store did not do what it was asked.
-#[derive(Debug, Clone, thiserror::Error)]
-pub enum StoreError {
-    /// There never was such a plan, or its tombstone has expired.
-    #[error("no plan {0}")]
-    NotFound(PlanId),
-    /// It was removed, less than a day ago.
-    #[error("plan {} is gone", .0.id)]
-    Gone(Tombstone),
-    /// As many plans are queued as the store was opened for.
-    #[error("the queue holds {queued} plans, its limit")]
-    QueueFull {
-        /// How many.
-        queued: u64,
-    },
-    /// The owner has as many active plans as the submission allows.
-    #[error("the owner has {active} active plans, the quota")]
-    QuotaReached {
-        /// How many.
-        active: u64,
-    },
-    /// The idempotency key came with another body before.
-    #[error("the idempotency key was used with another body")]
-    KeyReused,
-    /// The plan ended, was deleted or was claimed by another worker.
-    #[error("plan {0} is no longer this worker's to run")]
-    LeaseLost(PlanId),
-    /// Another process uses the data directory.
-    #[error("data directory {0} is in use by another process")]
-    InUse(std::path::PathBuf),
-    /// It cannot be read or written now.
-    #[error("store unavailable: {detail}")]
-    Unavailable {
-        /// What an operator would look at first.
-        trouble: Trouble,
-        /// For the log.
-        detail: String,
-    },
-}
-
-impl StoreError {
-    /// For no reason that has a name.
-    pub fn unavailable(detail: impl Into<String>) -> Self {
-        Self::Unavailable {
-            trouble: Trouble::Other,
-            detail: detail.into(),
-        }
-    }
-}
-
-impl From<Refused> for StoreError {
-    fn from(refused: Refused) -> Self {
-        Self::unavailable(refused.to_string())
-    }
-}
-
-/// Why a store is unavailable.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Trouble {
-    /// There is no room on the disk.
-    Full,
-    /// The directory or its files cannot be written or made.
-    ReadOnly,
-    /// What is in the file is not what was written.
-    Damaged,
-    /// The file was written by a newer version of the program.
-    Newer,
-    /// See the log.
-    Other,
 }

@@ -69,6 +69,12 @@ impl HeightRange {
 }
 
 impl Terrain {
+    /// Whether the ground is level everywhere, so that heights above it need no measuring.
+    #[must_use]
+    pub fn is_flat(&self) -> bool {
+        matches!(self, Self::Flat(_))
+    }
+
     /// Elevation of the ground at `point`, metres in the frame. Beyond the edge of a grid or a file, that of the
     /// edge; no waypoint may lie there.
     #[must_use]

@@ -6,7 +6,7 @@ use super::leg::{Leg, Point};
 use super::suspects::Suspects;
 use super::threats::Candidates;
 use super::{PointRow, Pricer, Row};
-use crate::cost::fuel;
+use crate::cost::metre;
 use crate::cost::threat::SHARE;
 use crate::geometry::lane::{Lane, Mask};
 use crate::scenario::Scenario;
@@ -159,8 +159,7 @@ impl Pricer<'_> {
     #[inline(always)]
     fn flown<S: Simd>(&self, length: Lane<S>, exposure: Lane<S>) -> Lane<S> {
         let scenario = self.model.scenario;
-        let metre = scenario.weights.fuel * fuel::fuel(&scenario.vehicle, 1.0);
-        length * metre + exposure * (scenario.weights.threat * SHARE)
+        length * metre(scenario) + exposure * (scenario.weights.threat * SHARE)
     }
 
     /// Where a leg may be too short or too steep.

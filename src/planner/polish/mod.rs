@@ -6,7 +6,7 @@ mod turns;
 mod ways;
 
 use super::{Stop, same, why_stop};
-use crate::cost::Model;
+use crate::cost::{Model, metre};
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
 use lattice::Lattice;
@@ -29,7 +29,7 @@ pub(super) struct Steps {
 
 /// By which a route may still become cheaper, as a share, when the greatest step gains no more; at
 /// half that step half as much.
-const HOPE: f64 = 0.25;
+const HOPE: f64 = 0.12;
 
 /// By which a violation becomes dearer as the step is halved.
 const DEARER: f64 = 8.0;
@@ -72,7 +72,7 @@ impl<'m, 's> Polish<'m, 's> {
         let scenario = self.model.scenario;
         let way = (scenario.target - scenario.start).norm();
         let mut best = self.lattice.price(route);
-        let mut rate = steps.violation_m * self.metre();
+        let mut rate = steps.violation_m * metre(scenario);
         let (mut step, mut kind, mut failed) = (steps.from * way, 0, 0);
         while step > steps.to * way && why_stop(scenario, self.stop).is_none() {
             let is_last = 0.5 * step <= steps.to * way;
@@ -116,11 +116,5 @@ impl<'m, 's> Polish<'m, 's> {
             }
         }
         Some(best)
-    }
-
-    /// What a metre flown costs.
-    fn metre(&self) -> f64 {
-        let scenario = self.model.scenario;
-        scenario.weights.fuel * scenario.vehicle.fuel_per_km / 1000.0
     }
 }

@@ -6,6 +6,7 @@ mod net;
 mod over;
 mod roadmap;
 mod tangents;
+mod thin;
 mod trails;
 
 pub(super) use count::{spread, with_waypoints};
@@ -18,7 +19,6 @@ use crate::geometry::{Point2, Point3};
 use crate::optimizer::Fitness;
 use crate::scenario::{Scenario, Seeding, WarmStart};
 use crate::seeding::{Obstacles, Outline, TautString, steep_ground, taut_strings_until};
-use crate::terrain::Terrain;
 use crate::threat::Threat;
 use net::Found;
 
@@ -43,11 +43,8 @@ const MOST_COARSE: usize = 20;
 /// Routes taken from the net of places.
 const OVERLAND: usize = 8;
 
-/// A start this much dearer than the best, as a share, is not worth refining.
+/// A start this much dearer than the best one refined, as a share, is not worth refining.
 const HOPELESS: f64 = 0.08;
-
-/// A start that breaks a limit may well cost more than the best as it is, but not so many times more.
-const ABSURD: f64 = 3.0;
 
 /// By which a start is pulled into place.
 const ROUGH_STEPS: Steps = Steps {
@@ -114,17 +111,17 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     // The known route goes first, so that others are refined only where they are cheaper as they are.
     let others = usize::from(warm);
     priced[others..].sort_by(|one, other| one.0.rank(&other.0));
-    priced.truncate(STARTS);
     if settings.polish {
         let hopeless = if warm { 0.0 } else { HOPELESS };
         refine(model, &mut priced, hopeless, stop, &mut starts.evaluations);
     }
+    priced.truncate(STARTS);
     starts.routes = priced.into_iter().map(|(_, route)| route).collect();
     Some(starts)
 }
 
 /// Pull the routes that may still win roughly into place, and leave out those that end up where
-/// another one is. What one that breaks a limit will cost cannot be told before.
+/// another one is. One that breaks limits is not going to be cheaper without.
 fn refine(
     model: &Model,
     priced: &mut Vec<(Fitness, Vec<Point3>)>,
@@ -147,11 +144,12 @@ fn refine(
     let mut refined: Vec<(Fitness, Vec<Point3>)> = Vec::new();
     let mut dear = Vec::new();
     for (fitness, mut route) in priced.drain(..) {
-        let is_dear = fitness.cost > best.cost * (1.0 + hopeless);
-        let is_absurd = fitness.cost > best.cost * ABSURD;
-        if best.is_feasible() && (is_absurd || is_dear && (fitness.is_feasible() || is_known)) {
+        if best.is_feasible() && fitness.cost > best.cost * (1.0 + hopeless) {
             dear.push((fitness, route));
             continue;
+        }
+        if refined.len() == STARTS {
+            break;
         }
         if let Some(fitness) = polish.descend_unless_known(&mut route, steps, &refined) {
             if fitness.beats(&best) {
@@ -168,24 +166,22 @@ fn refine(
 
 /// Bends of the routes that may still win, at most.
 fn bends(model: &Model, shapes: &[Vec<Point3>]) -> usize {
-    let priced = || {
-        shapes
-            .iter()
-            .map(|route| (price(model, route), route.len() - 2))
+    let priced: Vec<(Fitness, usize)> = shapes
+        .iter()
+        .map(|route| (price(model, route), route.len() - 2))
+        .collect();
+    let best = priced
+        .iter()
+        .map(|(fitness, _)| *fitness)
+        .min_by(Fitness::rank)
+        .unwrap_or(Fitness::WORST);
+    let least = if model.scenario.terrain.is_flat() {
+        COARSE
+    } else {
+        COARSE_OVER_HILLS
     };
-    let best = priced()
-        .map(|(fitness, _)| fitness)
-        .fold(
-            Fitness::WORST,
-            |best, next| {
-                if next.beats(&best) { next } else { best }
-            },
-        );
-    let least = match model.scenario.terrain {
-        Terrain::Flat(_) => COARSE,
-        Terrain::Peaks(_) | Terrain::Grid(_) | Terrain::Dem(_) => COARSE_OVER_HILLS,
-    };
-    priced()
+    priced
+        .into_iter()
         .filter(|(fitness, _)| {
             fitness.violation <= best.violation && fitness.cost <= best.cost * (1.0 + HOPELESS)
         })
@@ -217,7 +213,7 @@ fn along_strings(model: &Model, stop: &dyn Stop) -> Vec<Vec<Point3>> {
         follow(&Obstacles::soft(scenario, in_the_way), STRINGS);
         follow(&Obstacles::hard(scenario, in_the_way), STRINGS);
     }
-    if !matches!(scenario.terrain, Terrain::Flat(_)) {
+    if !scenario.terrain.is_flat() {
         let steep = steep_ground(scenario);
         if !steep.is_empty() {
             let outlines = scenario.threats.iter().map(Outline::soft).chain(steep);
@@ -238,8 +234,7 @@ fn over_ground(model: &Model) -> Found {
     let can_be_flown = |route: &Vec<Point3>| {
         route.len() - 2 <= scenario.planner.waypoints && price(model, route).is_feasible()
     };
-    let is_hilly = !matches!(scenario.terrain, Terrain::Flat(_));
-    if is_hilly && !found.routes.iter().any(can_be_flown) {
+    if !scenario.terrain.is_flat() && !found.routes.iter().any(can_be_flown) {
         let trails = trails::routes(model, OVERLAND);
         found.routes.extend(trails.routes);
         found.legs_priced += trails.legs_priced;

@@ -6,11 +6,10 @@
 
 use super::lifted;
 use super::net::{self, Found, Tree};
-use crate::cost::Model;
 use crate::cost::batch::{LANES, Price, Pricer};
+use crate::cost::{Model, metre};
 use crate::geometry::Point3;
 use crate::planner::price::PRICED_FROM;
-use crate::terrain::Terrain;
 
 /// Places of the net, besides both ends, on level ground.
 const PLACES: usize = 160;
@@ -39,9 +38,10 @@ pub(super) fn routes(model: &Model, count: usize) -> Found {
 /// Start, a net of spots in the middle of the band, target.
 fn places(model: &Model) -> Vec<Point3> {
     let scenario = model.scenario;
-    let count = match scenario.terrain {
-        Terrain::Flat(_) => PLACES,
-        Terrain::Peaks(_) | Terrain::Grid(_) | Terrain::Dem(_) => PLACES_OVER_HILLS,
+    let count = if scenario.terrain.is_flat() {
+        PLACES
+    } else {
+        PLACES_OVER_HILLS
     };
     let spots = net::spots(scenario, count, DETOUR).points.into_iter();
     std::iter::once(scenario.start)
@@ -71,7 +71,7 @@ impl<'p, 's> Legs<'p, 's> {
             .collect();
         let [from, to] = net::rows(places, &ends);
         let mut prices = vec![Price::ZERO; from.len()];
-        let hilly = !matches!(scenario.terrain, Terrain::Flat(_));
+        let hilly = pricer.is_hilly();
         if hilly {
             pricer.legs_at_best(&from, &to, &mut prices);
         } else {
@@ -82,7 +82,7 @@ impl<'p, 's> Legs<'p, 's> {
             .map(|&place| model.waypoint(place, tolerance))
             .collect();
         let direct = (scenario.target - scenario.start).norm();
-        let worth = WORTH * direct * scenario.weights.fuel * scenario.vehicle.fuel_per_km / 1000.0;
+        let worth = WORTH * direct * metre(scenario);
         let mut costs = vec![vec![f64::INFINITY; count]; count];
         for (idx, &(a, b)) in ends.iter().enumerate() {
             let (price, lane) = (&prices[idx / LANES], idx % LANES);

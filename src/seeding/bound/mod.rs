@@ -13,7 +13,7 @@ use std::cell::Cell;
 
 use super::obstacles::Obstacles;
 use super::taut::{Limits, taut_strings_within};
-use crate::cost::Tolerance;
+use crate::cost::{Tolerance, metre};
 use crate::geometry::Point3;
 use crate::scenario::{Quadrature, Scenario};
 use event::{Event, Kind};
@@ -52,7 +52,7 @@ impl Prices {
             Quadrature::Paper => 0.0,
         };
         Self {
-            fuel: scenario.weights.fuel * scenario.vehicle.fuel_per_km / 1000.0,
+            fuel: metre(scenario),
             exposure,
             tolerance: Tolerance::of(scenario).length_m,
             ends: [scenario.start, scenario.target],

@@ -30,11 +30,10 @@ enum Packed {
 
 /// In one of the two frames.
 #[derive(Serialize, Deserialize)]
-enum Waypoints {
-    /// x, y, z.
-    Local(Vec<[f64; 3]>),
-    /// Latitude, longitude, altitude.
-    Geodetic(Vec<[f64; 3]>),
+struct Waypoints {
+    geodetic: bool,
+    /// x, y, z, or latitude, longitude, altitude.
+    points: Vec<[f64; 3]>,
 }
 
 /// The events as bytes; `None` when there are others among them.
@@ -79,16 +78,16 @@ impl Packed {
 impl Waypoints {
     /// `None` when they are of two frames.
     fn of(positions: &[Position]) -> Option<Self> {
-        let local = positions.iter().map(|position| match *position {
-            Position::Local { x, y, z } => Some([x, y, z]),
-            Position::Geodetic { .. } => None,
-        });
-        let geodetic = positions.iter().map(|position| match *position {
-            Position::Geodetic { lat, lon, alt } => Some([lat, lon, alt]),
-            Position::Local { .. } => None,
-        });
-        let local = local.collect::<Option<_>>().map(Self::Local);
-        local.or_else(|| geodetic.collect::<Option<_>>().map(Self::Geodetic))
+        let is_geodetic = |position: &Position| matches!(position, Position::Geodetic { .. });
+        let geodetic = positions.first().is_some_and(is_geodetic);
+        let point = |position: &Position| {
+            (is_geodetic(position) == geodetic).then_some(match *position {
+                Position::Local { x, y, z } => [x, y, z],
+                Position::Geodetic { lat, lon, alt } => [lat, lon, alt],
+            })
+        };
+        let points = positions.iter().map(point).collect::<Option<_>>()?;
+        Some(Self { geodetic, points })
     }
 }
 
@@ -130,17 +129,23 @@ impl From<Packed> for Event {
 }
 
 impl From<Waypoints> for Vec<Position> {
-    fn from(waypoints: Waypoints) -> Self {
-        match waypoints {
-            Waypoints::Local(points) => points
-                .into_iter()
-                .map(|[x, y, z]| Position::Local { x, y, z })
-                .collect(),
-            Waypoints::Geodetic(points) => points
-                .into_iter()
-                .map(|[lat, lon, alt]| Position::Geodetic { lat, lon, alt })
-                .collect(),
-        }
+    fn from(Waypoints { geodetic, points }: Waypoints) -> Self {
+        let position = |[first, second, third]: [f64; 3]| {
+            if geodetic {
+                Position::Geodetic {
+                    lat: first,
+                    lon: second,
+                    alt: third,
+                }
+            } else {
+                Position::Local {
+                    x: first,
+                    y: second,
+                    z: third,
+                }
+            }
+        };
+        points.into_iter().map(position).collect()
     }
 }
 

@@ -12,7 +12,7 @@ use http_body_util::BodyExt as _;
 use noctule::catalogue::Directories;
 use noctule::http::auth::{Access, Keys, Settings};
 use noctule::http::webhook;
-use noctule::http::{self, AppState, Capacity, InFlight, Origins, Parts, Phase, Terrains};
+use noctule::http::{self, Capacity, InFlight, Origins, Parts, Phase, Terrains};
 use noctule::planner;
 use noctule::scenario::limits::Limits;
 use noctule::store::measured::MeasuredStore;
@@ -29,7 +29,7 @@ use super::stores::{Backend, Place};
 /// A service whose only worker is the test.
 pub(crate) struct Api {
     pub(crate) store: Arc<dyn Store>,
-    pub(crate) state: AppState,
+    pub(crate) state: Parts,
     pub(crate) router: Router,
     pub(crate) phase: watch::Sender<Phase>,
     pub(crate) clock: watch::Sender<Option<i64>>,
@@ -139,7 +139,7 @@ impl Api {
             body_bytes: 4096,
             ..Limits::default()
         };
-        let state = AppState::from(Parts {
+        let state = Parts {
             store: store.clone(),
             rules: Arc::new(planner::rules(limits).with_datasets(catalogue.clone())),
             terrains: Terrains::new(catalogue),
@@ -152,7 +152,7 @@ impl Api {
             cors: Origins::read(&origins).expect("origins"),
             phase: watched,
             instruments,
-        });
+        };
         Self {
             router: http::router(state.clone()),
             store,

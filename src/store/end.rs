@@ -1,0 +1,87 @@
+//! How a run ends, and what that makes of its plan's record.
+
+use crate::job::state::Refused;
+use crate::job::{Event, Failure, Plan, Status};
+
+/// How a run ended.
+#[derive(Debug, Clone)]
+pub enum Ending {
+    /// With a result.
+    Result {
+        /// Whether it was asked to stop; such a plan is `cancelled`, any other `succeeded`.
+        cancelled: bool,
+        /// Why the search ended.
+        stop_reason: String,
+        /// Whether the route meets every constraint.
+        feasible: bool,
+        /// Of the route when feasible.
+        best_cost: Option<f64>,
+        /// Routes priced.
+        evaluations: u64,
+        /// Iterations done.
+        iteration: u64,
+        /// The result document.
+        document: String,
+    },
+    /// Without one.
+    Failed(Failure),
+}
+
+impl Ending {
+    /// At that time, with nothing told since the last [`Store::append`](super::Store::append).
+    #[must_use]
+    pub fn at(self, at_ms: i64) -> End {
+        End {
+            told: Vec::new(),
+            ending: self,
+            at_ms,
+        }
+    }
+}
+
+/// The end of a run.
+#[derive(Debug, Clone)]
+pub struct End {
+    /// What the run told since the last [`Store::append`](super::Store::append).
+    pub told: Vec<Event>,
+    /// How it ended.
+    pub ending: Ending,
+    /// When, milliseconds since 1970.
+    pub at_ms: i64,
+}
+
+impl End {
+    /// Change the record as this end does; the result document is left to the store.
+    ///
+    /// # Errors
+    /// [`Refused`] when the plan is not running.
+    pub(super) fn apply(&self, plan: &mut Plan) -> Result<(), Refused> {
+        plan.advance(&self.told);
+        match &self.ending {
+            Ending::Result {
+                cancelled,
+                stop_reason,
+                feasible,
+                best_cost,
+                evaluations,
+                iteration,
+                document: _,
+            } => {
+                let status = if *cancelled {
+                    Status::Cancelled
+                } else {
+                    Status::Succeeded
+                };
+                plan.end(status, self.at_ms)?;
+                plan.stop_reason = Some(stop_reason.clone());
+                plan.feasible = Some(*feasible);
+                plan.best_cost = *best_cost;
+                plan.progress = 1.0;
+                plan.iteration = *iteration;
+                plan.evaluations = *evaluations;
+                Ok(())
+            }
+            Ending::Failed(failure) => plan.fail(failure.clone(), self.at_ms),
+        }
+    }
+}

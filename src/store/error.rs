@@ -1,0 +1,76 @@
+//! Why a store does not do what it is asked.
+
+use super::Tombstone;
+use crate::job::PlanId;
+use crate::job::state::Refused;
+
+/// Why a store did not do what it was asked.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum StoreError {
+    /// There never was such a plan, or its tombstone has expired.
+    #[error("no plan {0}")]
+    NotFound(PlanId),
+    /// It was removed, less than a day ago.
+    #[error("plan {} is gone", .0.id)]
+    Gone(Tombstone),
+    /// As many plans are queued as the store was opened for.
+    #[error("the queue holds {queued} plans, its limit")]
+    QueueFull {
+        /// How many.
+        queued: u64,
+    },
+    /// The owner has as many active plans as the submission allows.
+    #[error("the owner has {active} active plans, the quota")]
+    QuotaReached {
+        /// How many.
+        active: u64,
+    },
+    /// The idempotency key came with another body before.
+    #[error("the idempotency key was used with another body")]
+    KeyReused,
+    /// The plan ended, was deleted or was claimed by another worker.
+    #[error("plan {0} is no longer this worker's to run")]
+    LeaseLost(PlanId),
+    /// Another process uses the data directory.
+    #[error("data directory {0} is in use by another process")]
+    InUse(std::path::PathBuf),
+    /// It cannot be read or written now.
+    #[error("store unavailable: {detail}")]
+    Unavailable {
+        /// What an operator would look at first.
+        trouble: Trouble,
+        /// For the log.
+        detail: String,
+    },
+}
+
+impl StoreError {
+    /// For no reason that has a name.
+    pub fn unavailable(detail: impl Into<String>) -> Self {
+        Self::Unavailable {
+            trouble: Trouble::Other,
+            detail: detail.into(),
+        }
+    }
+}
+
+impl From<Refused> for StoreError {
+    fn from(refused: Refused) -> Self {
+        Self::unavailable(refused.to_string())
+    }
+}
+
+/// Why a store is unavailable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Trouble {
+    /// There is no room on the disk.
+    Full,
+    /// The directory or its files cannot be written or made.
+    ReadOnly,
+    /// What is in the file is not what was written.
+    Damaged,
+    /// The file was written by a newer version of the program.
+    Newer,
+    /// See the log.
+    Other,
+}

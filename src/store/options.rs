@@ -1,0 +1,53 @@
+//! What a store is opened with.
+
+use std::sync::Arc;
+
+/// Tells the time: milliseconds since 1970.
+pub type Clock = Arc<dyn Fn() -> i64 + Send + Sync>;
+
+/// The machine's clock.
+#[must_use]
+pub fn wall_clock() -> Clock {
+    Arc::new(|| {
+        let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+        i64::try_from(since.unwrap_or_default().as_millis()).unwrap_or(i64::MAX)
+    })
+}
+
+/// What a store is opened with.
+#[derive(Clone)]
+pub struct Options {
+    /// As many plans may wait; see [`StoreError::QueueFull`](super::StoreError::QueueFull).
+    pub queue_limit: u64,
+    /// Of claims, tombstones and recovery.
+    pub clock: Clock,
+    /// How long plans are kept.
+    pub retention: Retention,
+    /// Events kept of each plan; of a longer history the oldest are forgotten.
+    pub events_kept: u64,
+}
+
+impl Options {
+    /// For `queue_limit` waiting plans, with no other limit, on the machine's clock.
+    #[must_use]
+    pub fn new(queue_limit: u64) -> Self {
+        Self {
+            queue_limit,
+            clock: wall_clock(),
+            retention: Retention::default(),
+            events_kept: u64::MAX,
+        }
+    }
+}
+
+/// How long ended plans are kept: until the first of these limits; `None` is no limit.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Retention {
+    /// From the end of a plan, milliseconds. It becomes the plan's `expires_ms` when it ends, and
+    /// that stands whatever is set later.
+    pub age_ms: Option<i64>,
+    /// Ended plans kept.
+    pub plans: Option<u64>,
+    /// Bytes of their documents and events.
+    pub bytes: Option<u64>,
+}

@@ -377,6 +377,22 @@ mod tests {
         }
     }
 
+    #[test]
+    fn other_programs_are_held_to_the_states_there_are() {
+        let directory = tempfile::TempDir::new().expect("a temporary directory");
+        let file = directory.path().join(DATABASE);
+        drop(open_database(&file).expect("the directory can be written"));
+        let other = Connection::open(&file).expect("nobody has locked it");
+        let insertion = other.execute(
+            "INSERT INTO plans (id, status, progress, iteration, iterations, evaluations, algorithm, \
+             seed, created_ms, cancel_requested, revision, attempt, last_event) \
+             VALUES ('x', 'paused', 0, 0, 1, 0, 'sba', 1, 0, 0, 1, 0, 0)",
+            [],
+        );
+        let refusal = insertion.expect_err("no plan is paused").to_string();
+        assert!(refusal.contains("CHECK"), "{refusal}");
+    }
+
     #[tokio::test]
     async fn a_full_disk_refuses_what_has_no_room_and_spoils_nothing() {
         let directory = tempfile::TempDir::new().expect("a temporary directory");

@@ -176,13 +176,17 @@ impl Feed {
             .held_since
             .zip(self.throttle.window_ms())
             .map(|(since, window_ms)| since + Duration::from_secs_f64(window_ms / 1000.0));
+        let silent = Instant::now() + SILENCE;
+        let (deadline, woken) = match window_closes {
+            Some(closes) if closes <= silent => (closes, Woken::WindowClosed),
+            _ => (silent, Woken::Silence),
+        };
         tokio::select! {
             changed = self.changes.changed() => match changed {
                 Ok(()) => Woken::Changed,
                 Err(_) => Woken::Closed,
             },
-            () = sleep_until(window_closes) => Woken::WindowClosed,
-            () = tokio::time::sleep(SILENCE) => Woken::Silence,
+            () = tokio::time::sleep_until(deadline) => woken,
             () = stopping(&mut self.phase) => Woken::Stopping,
         }
     }
@@ -195,11 +199,4 @@ enum Woken {
     Silence,
     Stopping,
     Closed,
-}
-
-async fn sleep_until(deadline: Option<Instant>) {
-    match deadline {
-        Some(deadline) => tokio::time::sleep_until(deadline).await,
-        None => std::future::pending().await,
-    }
 }

@@ -41,15 +41,18 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
+use axum::body::Body;
 use axum::handler::Handler;
-use axum::http::Uri;
+use axum::http::{Uri, header};
 use axum::middleware::{from_fn, from_fn_with_state};
+use axum::response::Response;
 use axum::routing::{self, MethodRouter};
 use tokio::sync::watch;
 use tower::ServiceBuilder;
+use tower::util::MapResponseLayer;
 use tower_http::catch_panic::CatchPanicLayer;
-use tower_http::compression::CompressionLayer;
 use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
+use tower_http::compression::{CompressionBody, CompressionLayer};
 
 pub use browser::Origins;
 pub use idempotency::InFlight;
@@ -212,6 +215,18 @@ fn worth_compressing() -> impl Predicate {
         .and(plain("application/x-ndjson"))
 }
 
+/// Room for a compressor is given to what is compressed alone: else every open stream holds it.
+fn unwrap_uncompressed(answer: Response<CompressionBody<Body>>) -> Response {
+    let as_it_came = !answer.headers().contains_key(header::CONTENT_ENCODING);
+    answer.map(|body| {
+        if as_it_came {
+            body.into_inner()
+        } else {
+            Body::new(body)
+        }
+    })
+}
+
 /// What goes round every handler.
 fn wrap(router: Router, cors: &Origins, instruments: Arc<Instruments>) -> Router {
     // The outermost first. One stack, for the router puts what it is given in a box of its own for each request.
@@ -219,6 +234,7 @@ fn wrap(router: Router, cors: &Origins, instruments: Arc<Instruments>) -> Router
         .layer(from_fn_with_state(instruments, request_id::assign))
         .layer(cors.layer())
         .layer(CatchPanicLayer::custom(problem::after_panic))
+        .layer(MapResponseLayer::new(unwrap_uncompressed))
         .layer(CompressionLayer::new().compress_when(worth_compressing()))
         .layer(from_fn(auth::refuse_keys_in_urls));
     router.layer(layers)

@@ -11,8 +11,9 @@ use std::time::Duration;
 use axum::Router;
 use axum::extract::Request;
 use hyper::body::Incoming;
+use hyper::server::conn::http1;
 use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
-use hyper_util::server::conn::auto::Builder;
+use hyper_util::server::conn::auto;
 use hyper_util::server::graceful::{GracefulShutdown, Watcher};
 use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
@@ -105,15 +106,49 @@ async fn answer(
     mut phase: watch::Receiver<Phase>,
     head_timeout: Duration,
 ) {
+    let http1 = tokio::select! {
+        // Who has asked already is answered.
+        biased;
+        http1 = speaks_http1(&stream) => http1,
+        () = stopping(&mut phase) => return,
+        () = tokio::time::sleep(head_timeout) => {
+            tracing::debug!("a connection sent nothing");
+            return;
+        }
+    };
+    drop(phase);
+    if http1 {
+        let mut builder = http1::Builder::new();
+        builder
+            .timer(TokioTimer::new())
+            .header_read_timeout(head_timeout);
+        // Without what the other version needs: whatever is held here, every open stream holds.
+        let service = TowerToHyperService::new(router);
+        let connection = builder.serve_connection(TokioIo::new(stream), service);
+        if let Err(error) = watcher.watch(connection).await {
+            tracing::debug!(%error, "a connection broke off");
+        }
+    } else {
+        Box::pin(answer_either(stream, router, watcher, head_timeout)).await;
+    }
+}
+
+/// Answer the requests of a connection that may be one of HTTP/2.
+async fn answer_either(
+    stream: TcpStream,
+    router: Router,
+    watcher: Watcher,
+    head_timeout: Duration,
+) {
     let begun = Arc::new(AtomicBool::new(false));
     let service = {
         let begun = begun.clone();
         router.map_request(move |request: Request<Incoming>| {
             begun.store(true, Ordering::Relaxed);
-            request.map(axum::body::Body::new)
+            request
         })
     };
-    let mut builder = Builder::new(TokioExecutor::new());
+    let mut builder = auto::Builder::new(TokioExecutor::new());
     builder
         .http1()
         .timer(TokioTimer::new())
@@ -123,22 +158,10 @@ async fn answer(
         .timer(TokioTimer::new())
         .keep_alive_interval(head_timeout)
         .max_concurrent_streams(256);
-    let connection = async move {
-        tokio::select! {
-            // Who has asked already is answered.
-            biased;
-            http1 = speaks_http1(&stream) => if http1 {
-                builder = builder.http1_only();
-            },
-            () = stopping(&mut phase) => return Ok(()),
-        }
-        drop(phase);
-        let connection =
-            builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
-        watcher.watch(connection.into_owned()).await
-    };
+    let connection =
+        builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
     tokio::select! {
-        ended = connection => if let Err(error) = ended {
+        ended = watcher.watch(connection.into_owned()) => if let Err(error) = ended {
             tracing::debug!(%error, "a connection broke off");
         },
         () = never_began(&begun, head_timeout) => tracing::debug!("a connection sent no request"),
@@ -147,8 +170,8 @@ async fn answer(
 
 /// Whether the first bytes are the beginning of no HTTP/2; hyper finds out about the rest.
 ///
-/// It could about all, but then reads what it has looked at apart from what follows, and keeps a buffer
-/// twice as large for as long as the connection lives.
+/// It could about all, but then reads what it has looked at apart from what follows, keeps a buffer twice as
+/// large for as long as the connection lives, and room for what either version needs.
 async fn speaks_http1(stream: &TcpStream) -> bool {
     let mut first = [0; PREFACE.len()];
     // What cannot be looked at cannot be read either.

@@ -148,9 +148,14 @@ impl Access {
 
     /// Until the key is none any more; for who has none, for ever.
     pub(super) async fn withdrawn(&self, key: Option<Digest>) {
-        let Some(key) = key else {
-            return std::future::pending().await;
-        };
+        match key {
+            // Streams without a key are not to keep room for this.
+            Some(key) => Box::pin(self.withdrawn_from(key)).await,
+            None => std::future::pending().await,
+        }
+    }
+
+    async fn withdrawn_from(&self, key: Digest) {
         let mut keys = self.0.keys.subscribe();
         loop {
             let now = Timestamp::now();

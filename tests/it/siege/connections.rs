@@ -136,7 +136,7 @@ async fn both_versions_of_http_are_spoken_however_they_come() {
 }
 
 /// For a connection with an open stream. hyper alone keeps two buffers of 8 KiB for each.
-const MOST_KIB: f64 = 28.0;
+const MOST_KIB: f64 = 22.0;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn an_idle_stream_costs_little_memory() {

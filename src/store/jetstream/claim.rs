@@ -11,6 +11,7 @@ use tokio::time::Instant;
 use super::connect::plan_of;
 use super::lane::Version;
 use super::leases::Job;
+use super::orphans::Orphan;
 use super::record::{Record, State};
 use super::steps::Change;
 use super::view::Standing;
@@ -21,14 +22,8 @@ use crate::store::{Lease, StoreError};
 /// Runs of a plan whose workers were lost, after which it is taken to be the reason.
 const LOST_RUNS: u32 = 5;
 
-/// A job may be seen so long before its record.
-const RECORD_PATIENCE: Duration = Duration::from_millis(500);
-
-/// A job without a record comes again after so long,
-const ORPHAN_PAUSE: Duration = Duration::from_secs(2);
-
-/// and is nobody's after so many times.
-const ORPHANED_AFTER: i64 = 30;
+/// A job may be seen before its record; for so long a claim waits.
+const RECORD_PATIENCE: Duration = Duration::from_millis(100);
 
 /// Tries at lanes whose jobs others took faster.
 const TRIES: usize = 4;
@@ -163,7 +158,6 @@ impl JetStream {
     }
 
     async fn try_to_begin(&self, job: Message) -> Result<Option<Lease>, StoreError> {
-        let deliveries = job.info().map_or(1, |info| info.delivered);
         let (message, acker) = job.split();
         let job = Job::new(acker);
         let Some(id) = plan_of(&message.subject) else {
@@ -182,14 +176,15 @@ impl JetStream {
                     return Ok(None);
                 }
             },
-            Err(StoreError::NotFound(_)) if deliveries > ORPHANED_AFTER => {
-                tracing::info!(plan = %id, "a job that was never accepted is thrown away");
-                self.servers.remove_documents(id, &[]).await?;
-                answer(&job, AckKind::Ack).await;
-                return Ok(None);
-            }
             Err(StoreError::NotFound(_)) => {
-                answer(&job, AckKind::Nak(Some(ORPHAN_PAUSE))).await;
+                match self.orphans.miss(id) {
+                    Orphan::Waits(pause) => answer(&job, AckKind::Nak(Some(pause))).await,
+                    Orphan::Nobodys => {
+                        tracing::info!(plan = %id, "a job that was never accepted is thrown away");
+                        self.servers.remove_documents(id, &[]).await?;
+                        answer(&job, AckKind::Ack).await;
+                    }
+                }
                 return Ok(None);
             }
             Err(error) => {
@@ -206,15 +201,21 @@ impl JetStream {
         Ok(None)
     }
 
-    /// Jobs are written before records.
+    /// Jobs are written before records; who has been waited for once is not waited for again.
     async fn record_of_job(&self, id: PlanId) -> Result<Standing, StoreError> {
+        let is_late = self.orphans.is_known(id);
         let until = Instant::now() + RECORD_PATIENCE;
         loop {
             match self.plans().standing(id).await {
-                Err(StoreError::NotFound(_)) if Instant::now() < until => {
+                Err(StoreError::NotFound(_)) if !is_late && Instant::now() < until => {
                     tokio::time::sleep(BREATH).await;
                 }
-                answer => return answer,
+                answer => {
+                    if is_late && answer.is_ok() {
+                        self.orphans.found(id);
+                    }
+                    return answer;
+                }
             }
         }
     }

@@ -19,7 +19,7 @@ use crate::store::{IDEMPOTENCY_MS, Options, StoreError};
 const OLDEST_SERVER: &str = "2.12.0";
 
 /// A server that says nothing for so long is taken for lost.
-const PATIENCE: Duration = Duration::from_secs(5);
+pub(super) const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Jobs beyond the queue's limit that the stream has room for: those that are being run.
 const RUNNING: i64 = 4_096;

@@ -9,6 +9,7 @@ use async_nats::jetstream::{AckKind, Message};
 use futures_util::StreamExt as _;
 
 use super::JetStream;
+use super::connect::PATIENCE;
 use super::lane::Lane;
 use super::trouble::{failed, refused};
 use crate::store::StoreError;
@@ -52,14 +53,20 @@ impl JetStream {
     async fn fetch_any(&self, lane: &Lane) -> Result<Option<Message>, StoreError> {
         let what = || format!("lane {}", lane.name());
         let consumer = self.consumer(lane).await?;
-        let fetched = match consumer.fetch().max_messages(1).messages().await {
-            Ok(mut batch) => batch
-                .next()
-                .await
-                .transpose()
-                .map_err(|error| refused(&what(), &error)),
-            Err(error) => Err(failed(&what(), &error)),
+        let asked = async {
+            match consumer.fetch().max_messages(1).messages().await {
+                Ok(mut batch) => batch
+                    .next()
+                    .await
+                    .transpose()
+                    .map_err(|error| refused(&what(), &error)),
+                Err(error) => Err(failed(&what(), &error)),
+            }
         };
+        // A server that is lost while it is asked never answers.
+        let fetched = tokio::time::timeout(PATIENCE, asked)
+            .await
+            .unwrap_or_else(|_| Err(refused(&what(), "no server answered")));
         if fetched.is_err() {
             // It may have been removed, for nobody asked it for long.
             self.consumers().remove(lane);

@@ -16,6 +16,7 @@ mod known;
 mod lane;
 mod leases;
 mod nodes;
+mod orphans;
 mod record;
 mod removal;
 mod runs;
@@ -46,6 +47,7 @@ use self::connect::Servers;
 use self::follow::Reading;
 use self::lane::Lane;
 use self::leases::Leases;
+use self::orphans::Orphans;
 use self::steps::Plans;
 use self::view::View;
 use super::{
@@ -80,6 +82,7 @@ struct JetStream {
     /// Whose turn it is to claim.
     turn: tokio::sync::Mutex<()>,
     last_patrol: Mutex<Option<Instant>>,
+    orphans: Orphans,
     all_slots: AtomicUsize,
     /// Ends that this node tells.
     telling: Mutex<BTreeSet<PlanId>>,
@@ -123,6 +126,7 @@ impl JetStreamStore {
             consumers: Mutex::default(),
             turn: tokio::sync::Mutex::default(),
             last_patrol: Mutex::default(),
+            orphans: Orphans::default(),
             telling: Mutex::default(),
             end: watch::Sender::new(false),
         });

@@ -1,0 +1,104 @@
+//! Jobs without a record: the plan is about to be accepted, or never was.
+
+use std::collections::HashMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+use crate::job::PlanId;
+
+/// A submission writes the job first and has given up on the record long before; a job that this node has missed the
+/// record of for so long is nobody's.
+const NOBODYS: Duration = Duration::from_secs(60);
+
+/// A job comes again after so long, at least and at most.
+const SOONEST: Duration = Duration::from_millis(250);
+const LATEST: Duration = Duration::from_secs(15);
+
+/// What is missed longer than this, another node has thrown away.
+const FORGOTTEN: Duration = Duration::from_secs(10 * 60);
+
+/// Since when the record of each job has been missed. The time is this node's own: clocks of nodes may differ, and how
+/// often a job has come says little, for it comes again at once where it is only put in order.
+#[derive(Default)]
+pub(super) struct Orphans {
+    missed: Mutex<HashMap<PlanId, Instant>>,
+}
+
+/// What is to be done with a job without a record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Orphan {
+    /// It comes again after so long: as long again as it has been missed, so that many of them, as the loss of
+    /// a server may leave, soon cost the plans behind them little.
+    Waits(Duration),
+    /// It is thrown away.
+    Nobodys,
+}
+
+impl Orphans {
+    /// The record of this job is missed.
+    pub(super) fn miss(&self, id: PlanId) -> Orphan {
+        let now = Instant::now();
+        let mut missed = self.missed();
+        missed.retain(|_, since| now.duration_since(*since) < FORGOTTEN);
+        let since = *missed.entry(id).or_insert(now);
+        let age = now.duration_since(since);
+        if age < NOBODYS {
+            return Orphan::Waits(age.clamp(SOONEST, LATEST));
+        }
+        missed.remove(&id);
+        Orphan::Nobodys
+    }
+
+    /// Whether this job has come without a record before.
+    pub(super) fn is_known(&self, id: PlanId) -> bool {
+        self.missed().contains_key(&id)
+    }
+
+    /// The record of this job is there.
+    pub(super) fn found(&self, id: PlanId) {
+        self.missed().remove(&id);
+    }
+
+    fn missed(&self) -> MutexGuard<'_, HashMap<PlanId, Instant>> {
+        self.missed.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::new_id;
+
+    #[tokio::test(start_paused = true)]
+    async fn a_job_comes_again_ever_later_and_is_nobodys_after_a_minute() {
+        let (orphans, id) = (Orphans::default(), new_id());
+        let mut came = 0;
+        assert!(!orphans.is_known(id));
+        let begun = Instant::now();
+        while let Orphan::Waits(pause) = orphans.miss(id) {
+            assert!(orphans.is_known(id));
+            tokio::time::sleep(pause).await;
+            came += 1;
+        }
+        assert!((60..90).contains(&begun.elapsed().as_secs()));
+        assert!(came < 15, "{came}");
+        assert!(!orphans.is_known(id));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_job_whose_record_came_is_no_orphan() {
+        let (orphans, id, other) = (Orphans::default(), new_id(), new_id());
+        assert_eq!(orphans.miss(id), Orphan::Waits(SOONEST));
+        orphans.miss(other);
+        tokio::time::sleep(NOBODYS).await;
+        orphans.found(id);
+        assert_eq!(orphans.miss(id), Orphan::Waits(SOONEST));
+        assert_eq!(orphans.miss(other), Orphan::Nobodys);
+        // Those that others threw away are forgotten.
+        tokio::time::sleep(FORGOTTEN).await;
+        orphans.miss(other);
+        assert!(!orphans.is_known(id));
+    }
+}

@@ -111,20 +111,18 @@ impl Slot {
         mut news: watch::Receiver<()>,
     ) -> Option<Vec<Event>> {
         loop {
+            let mut batch = Vec::new();
+            told.recv_many(&mut batch, BATCH).await;
             tokio::select! {
                 _ = news.changed() => {}
                 () = tokio::time::sleep(DELAY) => {}
             }
             let was_last = told.is_closed();
-            let mut batch = Vec::new();
             while let Ok(event) = told.try_recv() {
                 batch.push(event);
             }
             if was_last {
                 return Some(batch);
-            }
-            if batch.is_empty() {
-                continue;
             }
             let append = || self.store.append(lease, batch.clone());
             self.persist("events", append).await?;

@@ -99,6 +99,10 @@ impl SqliteStore {
                 detail: format!("database {}: {first}", file.display()),
             });
         }
+        // Until here they hold what was found and what is taken over from earlier versions; of what is written from now
+        // on types allow nothing else. For each row that it holds to a list of five names SQLite makes a table of
+        // them, a quarter of the time of adding a plan's row.
+        connection.pragma_update(None, "ignore_check_constraints", true)?;
         sync_directory(data_dir)?;
         Self::assemble(connection, lock, file, options)
     }
@@ -344,9 +348,6 @@ fn open_database(file: &Path) -> Result<Connection, StoreError> {
     connection.pragma_update(None, "journal_mode", "WAL")?;
     connection.pragma_update(None, "synchronous", "FULL")?;
     connection.pragma_update(None, "foreign_keys", true)?;
-    // They guard the file against other programs; here, types allow nothing else. For each row that it holds to
-    // a list of five names SQLite makes a table of them, a quarter of the time of adding a plan's row.
-    connection.pragma_update(None, "ignore_check_constraints", true)?;
     // Pages of 4 KiB: the log is folded into the database at 16 MiB.
     connection.pragma_update(None, "wal_autocheckpoint", 4_096)?;
     connection.pragma_update(None, "journal_size_limit", 64 * 1_024 * 1_024)?;
@@ -377,20 +378,34 @@ mod tests {
         }
     }
 
+    /// Other programs are held to the states there are; a file in which one is not, is damaged.
     #[test]
-    fn other_programs_are_held_to_the_states_there_are() {
+    fn a_plan_is_in_no_state_that_there_is_not() {
         let directory = tempfile::TempDir::new().expect("a temporary directory");
         let file = directory.path().join(DATABASE);
         drop(open_database(&file).expect("the directory can be written"));
         let other = Connection::open(&file).expect("nobody has locked it");
-        let insertion = other.execute(
-            "INSERT INTO plans (id, status, progress, iteration, iterations, evaluations, algorithm, \
-             seed, created_ms, cancel_requested, revision, attempt, last_event) \
-             VALUES ('x', 'paused', 0, 0, 1, 0, 'sba', 1, 0, 0, 1, 0, 0)",
-            [],
-        );
-        let refusal = insertion.expect_err("no plan is paused").to_string();
+        let insert = || {
+            other.execute(
+                "INSERT INTO plans (id, status, progress, iteration, iterations, evaluations, algorithm, \
+                 seed, created_ms, cancel_requested, revision, attempt, last_event) \
+                 VALUES ('x', 'paused', 0, 0, 1, 0, 'sba', 1, 0, 0, 1, 0, 0)",
+                [],
+            )
+        };
+        let refusal = insert().expect_err("no plan is paused").to_string();
         assert!(refusal.contains("CHECK"), "{refusal}");
+        other
+            .pragma_update(None, "ignore_check_constraints", true)
+            .expect("it can be told not to look");
+        insert().expect("nothing looks now");
+        drop(other);
+        let opened = SqliteStore::open_suspicious(directory.path(), Options::new(1));
+        let Err(StoreError::Unavailable { trouble, detail }) = opened else {
+            panic!("a paused plan is none");
+        };
+        assert_eq!(trouble, Trouble::Damaged);
+        assert!(detail.contains("CHECK"), "{detail}");
     }
 
     #[tokio::test]

@@ -20,6 +20,8 @@ pub(super) struct Blocks<'a, 's> {
     /// Below free waypoints.
     ground: Vec<Row>,
     waiting: Waiting,
+    /// Legs that keep their heights for certain, of the routes that have just been priced.
+    proven: Vec<Row>,
     /// Of positions whose rivals break no limit, and of others.
     unmeasured: [Unmeasured; 2],
 }
@@ -93,6 +95,7 @@ impl<'a, 's> Blocks<'a, 's> {
             points: Vec::new(),
             ground: Vec::new(),
             waiting: Waiting::default(),
+            proven: Vec::new(),
             unmeasured: [Unmeasured::default(), Unmeasured::default()],
         }
     }
@@ -150,7 +153,7 @@ impl<'a, 's> Blocks<'a, 's> {
         }
         let pricer = &self.pricers.full;
         let price = if self.hilly {
-            pricer.routes_at_best(points, ground, owners.len())
+            pricer.routes_at_best(points, ground, owners.len(), &mut self.proven)
         } else {
             pricer.first_routes(points, owners.len())
         };
@@ -159,7 +162,7 @@ impl<'a, 's> Blocks<'a, 's> {
             let rival = rival(owner);
             if self.hilly && fitness[owner].beats(&rival) {
                 let unmeasured = &mut self.unmeasured[usize::from(!rival.is_feasible())];
-                unmeasured.push(points, lane, owner, self.kept);
+                unmeasured.push(points, lane, owner, &self.proven, self.kept);
             }
         }
     }
@@ -209,14 +212,26 @@ impl Waiting {
 }
 
 impl Unmeasured {
-    /// Add the legs of the route in lane `lane` of `points`, but for those that are `kept`.
-    fn push(&mut self, points: &[PointRow], lane: usize, owner: usize, kept: &Kept) {
-        let end = |row: &PointRow| (row.get(lane), End::at(row.get(lane)));
-        let mut before = end(&points[0]);
-        for row in &points[1..] {
-            let next = end(row);
-            let ((a, from), (b, to)) = (before, next);
-            before = next;
+    /// Add the legs of the route in lane `lane` of `points`, but for those that are `proven` or `kept`.
+    fn push(
+        &mut self,
+        points: &[PointRow],
+        lane: usize,
+        owner: usize,
+        proven: &[Row],
+        kept: &Kept,
+    ) {
+        // The end of the leg before, where that was looked at.
+        let mut before = None;
+        for (rows, proven) in points.windows(2).zip(proven) {
+            if proven[lane] > 0.0 {
+                before = None;
+                continue;
+            }
+            let [a, b] = [rows[0].get(lane), rows[1].get(lane)];
+            let from = before.unwrap_or_else(|| End::at(a));
+            let to = End::at(b);
+            before = Some(to);
             let known = kept.violation(from, to);
             if known.is_some_and(|violation| violation <= 0.0) {
                 continue;

@@ -241,6 +241,15 @@ fn bits(price: &Price) -> [[u64; LANES]; 2] {
     ]
 }
 
+/// Between one number and as many as this processor takes at once, if there is such a width.
+fn narrower() -> Arch {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(simd) = pulp::x86::V3::try_new() {
+        return Arch::V3(simd);
+    }
+    Arch::Scalar
+}
+
 fn close(value: f64, expected: f64) -> bool {
     (value - expected).abs() <= 1e-9 * expected.max(1.0)
 }
@@ -260,13 +269,16 @@ proptest! {
         let pricer = Pricer::new(&model, quadrature, tolerance);
         let verdicts = pricer.clone().verdicts();
         let scalar = Pricer { arch: Arch::Scalar, ..pricer.clone() };
+        let narrow = Pricer { arch: narrower(), ..pricer.clone() };
         let routes: Vec<_> = (0..LANES).map(|_| choices.route(&scenario)).collect();
         let points = rows(&routes);
         let together = pricer.routes(&points);
         prop_assert_eq!(bits(&together), bits(&scalar.routes(&points)));
+        prop_assert_eq!(bits(&together), bits(&narrow.routes(&points)));
         let mut ground = Vec::new();
         pricer.ground(&points[1..points.len() - 1], &mut ground);
-        let at_best = pricer.routes_at_best(&points, &ground, LANES);
+        let mut proven = Vec::new();
+        let at_best = pricer.routes_at_best(&points, &ground, LANES, &mut proven);
         prop_assert_eq!(at_best.cost.map(f64::to_bits), together.cost.map(f64::to_bits));
         let least = pricer.least_costs(&points, &ground);
         prop_assert_eq!(least.map(f64::to_bits), scalar.least_costs(&points, &ground).map(f64::to_bits));
@@ -304,6 +316,9 @@ proptest! {
             pricer.legs_at_best(&points[..route.len() - 1], &points[1..], &mut at_best);
             let (from, to) = (&points[..route.len() - 1], &points[1..]);
             pricer.heights_of_legs(from, to, usize::MAX, &mut heights);
+            for (heights, proven) in heights.iter().zip(&proven) {
+                prop_assert!(proven[lane] <= 0.0 || heights.violation[lane] <= 0.0);
+            }
             for ((price, at_best), heights) in prices.iter().zip(&at_best).zip(&heights) {
                 let both = at_best.violation[lane] + heights.violation[lane];
                 prop_assert!(close(both, price.violation[lane]), "{both} {}", price.violation[lane]);

@@ -30,6 +30,8 @@ pub(super) struct Heights {
     /// What may be overlooked, metres.
     pub(super) overlooked: f64,
     surface: Surface,
+    /// The elevation below the start and below the target.
+    pub(super) below_ends: [f64; 2],
 }
 
 /// What lies below.
@@ -76,6 +78,7 @@ impl Heights {
     pub(super) fn of(model: &Model, tolerance: Tolerance) -> Self {
         let band = model.scenario.altitude;
         let slack = OVERLOOKED * tolerance.height_m;
+        let ends = [model.scenario.start, model.scenario.target];
         let floors = model.zones.iter().map(|zone| zone.floor);
         let wide = model.zones.iter().filter(|zone| zone.radius > 0.0);
         Self {
@@ -95,6 +98,7 @@ impl Heights {
                 Terrain::Grid(grid) => Surface::Grid(Pyramid::of(grid)),
                 Terrain::Dem(_) => Surface::Dem,
             },
+            below_ends: ends.map(|end| model.scenario.terrain.elevation(end.xy())),
         }
     }
 }
@@ -152,17 +156,40 @@ impl Heights {
 }
 
 impl Pricer<'_> {
-    /// Beyond the band or below the ground. What takes longer to find is left to `suspects`, for the slots
-    /// from `slot` on.
+    /// Where its heights above ground at both `ends` are enough to prove that a leg keeps what is asked of it.
+    #[inline(always)]
+    pub(super) fn proven<S: Simd>(&self, leg: &Leg<S>, ends: [Lane<S>; 2]) -> Mask<S> {
+        self.proven_by(leg, ends, &self.inside(leg))
+    }
+
+    #[inline(always)]
+    fn proven_by<S: Simd>(&self, leg: &Leg<S>, ends: [Lane<S>; 2], inside: &Inside<S>) -> Mask<S> {
+        match &self.heights.surface {
+            Surface::Peaks(massif) => {
+                let strays = massif.swing.along(leg);
+                self.heights.within(ends, strays, inside, [0.0, 1.0]) & !inside.unclear
+            }
+            Surface::Flat(_) | Surface::Grid(_) | Surface::Dem => leg.level.lt(leg.level),
+        }
+    }
+
+    /// Beyond the band or below the ground; `ends` are the heights above it at both ends, where they are known.
+    /// What takes longer to find is left to `suspects`, for the slots from `slot` on.
     #[inline(always)]
     pub(super) fn heights<S: Simd>(
         &self,
         leg: &Leg<S>,
+        ends: Option<[Lane<S>; 2]>,
         slot: usize,
         suspects: &mut Suspects,
     ) -> Lane<S> {
         let inside = self.inside(leg);
         let none = leg.splat(0.0);
+        if let Some(ends) = ends
+            && self.proven_by(leg, ends, &inside).all()
+        {
+            return none;
+        }
         let outlook = match &self.heights.surface {
             Surface::Flat(elevation) => {
                 let ends = [leg.a.z - *elevation, leg.b.z - *elevation];

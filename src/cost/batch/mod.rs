@@ -15,6 +15,7 @@ mod pyramid;
 mod route;
 mod stretch;
 mod suspects;
+mod swing;
 mod threats;
 
 pub use crate::geometry::lane::{LANES, Row};
@@ -140,23 +141,31 @@ impl<'s> Pricer<'s> {
     /// With fewer than two points.
     #[must_use]
     pub fn first_routes(&self, points: &[PointRow], count: usize) -> Price {
-        self.dispatch::<true>(points, &[], count)
+        self.dispatch::<true>(points, &[], count, &mut [])
     }
 
     /// As [`Pricer::first_routes`], did every leg keep the heights that are asked of it: above hills, where
     /// those take longest to measure, this tells of most routes that they are not good enough. No
     /// violation is more than that by `routes`, and the costs are the same bits. `ground` is the elevation
-    /// below each free waypoint.
+    /// below each free waypoint. In `proven`, a row for each leg, is 1 where its heights above ground at both
+    /// ends prove that a leg keeps them; elsewhere 0.
     ///
     /// # Panics
     /// With fewer than two points, or where there is not as much ground.
     #[must_use]
-    pub fn routes_at_best(&self, points: &[PointRow], ground: &[Row], count: usize) -> Price {
+    pub fn routes_at_best(
+        &self,
+        points: &[PointRow],
+        ground: &[Row],
+        count: usize,
+        proven: &mut Vec<Row>,
+    ) -> Price {
         assert!(
             ground.len() + 2 == points.len(),
             "every free waypoint is above ground"
         );
-        self.dispatch::<false>(points, ground, count)
+        proven.resize(ground.len() + 1, [0.0; LANES]);
+        self.dispatch::<false>(points, ground, count, proven)
     }
 
     /// What routes cost for their fuel and heights alone: no route costs less, by the same bits. `ground` is
@@ -191,6 +200,7 @@ impl<'s> Pricer<'s> {
         points: &[PointRow],
         ground: &[Row],
         count: usize,
+        proven: &mut [Row],
     ) -> Price {
         assert!(points.len() >= 2, "a route has a start and a target");
         let mut price = Price::ZERO;
@@ -199,6 +209,7 @@ impl<'s> Pricer<'s> {
             points,
             ground,
             count,
+            proven,
             price: &mut price,
         });
         price
@@ -331,6 +342,8 @@ struct Routes<'a, 's, const HEIGHTS: bool> {
     /// Of the free waypoints; known where heights are left out.
     ground: &'a [Row],
     count: usize,
+    /// See [`Pricer::routes_at_best`].
+    proven: &'a mut [Row],
     price: &'a mut Price,
 }
 
@@ -347,6 +360,7 @@ impl<const HEIGHTS: bool> WithSimd for Routes<'_, '_, HEIGHTS> {
                 self.points,
                 self.ground,
                 &mut suspects,
+                self.proven,
             );
             violation.store(&mut self.price.violation, part);
             cost.store(&mut self.price.cost, part);

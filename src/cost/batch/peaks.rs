@@ -9,6 +9,7 @@ use pulp::Simd;
 
 use super::heights::{Heights, Inside};
 use super::leg::{Leg, Point};
+use super::swing::Swing;
 use crate::geometry::Point2;
 use crate::geometry::lane::{Lane, Mask};
 use crate::terrain::{NEGLIGIBLE, Peak, Peaks};
@@ -37,6 +38,7 @@ pub(super) struct Massif {
     pub(super) peaks: Vec<Mountain>,
     /// By how much the ground may be higher or lower than a proof's sum.
     allowed: f64,
+    pub(super) swing: Swing,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -82,6 +84,7 @@ impl Massif {
             base: peaks.base,
             peaks: peaks.peaks.iter().map(mountain).collect(),
             allowed: ALLOWED * highest.sum::<f64>(),
+            swing: Swing::of(peaks),
         }
     }
 

@@ -63,6 +63,7 @@ impl Pricer<'_> {
         points: &[PointRow],
         ground: &[Row],
         suspects: &mut Suspects,
+        proven: &mut [Row],
     ) -> (Lane<S>, Lane<S>) {
         let zero = Lane::splat(simd, 0.0);
         let (mut length, mut exposure, mut violation, mut off_middle) = (zero, zero, zero, zero);
@@ -72,25 +73,35 @@ impl Pricer<'_> {
             level: zero,
         };
         let mut candidates = Candidates::default();
+        let [start, target] = self.heights.below_ends;
+        let below_point = |idx: usize| match idx {
+            _ if HEIGHTS => self.elevation(simd, part, &points[idx]),
+            0 => zero.with(start),
+            _ if idx + 1 == points.len() => zero.with(target),
+            _ => Lane::load(simd, &ground[idx - 1], part),
+        };
+        let mut below = below_point(0);
         for (leg_idx, rows) in points.windows(2).enumerate() {
             let leg = Leg::new(simd, part, [&rows[0], &rows[1]]);
             length = length + leg.length;
             self.threats(&leg, &mut candidates, &mut exposure, &mut violation);
+            let free = leg_idx + 2 < points.len();
+            let below_a = std::mem::replace(&mut below, below_point(leg_idx + 1));
+            let ends = [leg.a.z - below_a, leg.b.z - below];
             if HEIGHTS {
                 let slot = part * S::F64_LANES;
-                violation = violation + self.heights(&leg, slot, suspects);
+                violation = violation + self.heights(&leg, Some(ends), slot, suspects);
+            } else {
+                let proven = &mut proven[leg_idx];
+                self.proven(&leg, ends)
+                    .keep(zero.with(1.0))
+                    .store(proven, part);
             }
             let (near, sharp) = self.turn(&leg, &mut heading);
             let mut suspect = near | self.may_break_limits(&leg);
-            let free = leg_idx + 2 < points.len();
             if free {
                 suspect = suspect | self.outside(leg.b);
-                let ground = if HEIGHTS {
-                    self.elevation(simd, part, &rows[1])
-                } else {
-                    Lane::load(simd, &ground[leg_idx], part)
-                };
-                off_middle = off_middle + self.off_middle(&leg, ground);
+                off_middle = off_middle + self.off_middle(&leg, below);
             }
             if suspect.any() {
                 violation = violation + self.leg_limits(&leg) + self.turn_limit(near, sharp);
@@ -144,7 +155,7 @@ impl Pricer<'_> {
             self.threats(&leg, &mut candidates, &mut exposure, &mut violation);
         }
         if HEIGHTS {
-            violation = violation + self.heights(&leg, slot, suspects);
+            violation = violation + self.heights(&leg, None, slot, suspects);
         }
         if !FLIGHT {
             return (violation, exposure);

@@ -171,6 +171,12 @@ impl<S: Simd> Mask<S> {
         self.simd.first_true_m64s(self.values) < S::F64_LANES
     }
 
+    /// Whether it holds in every lane.
+    #[inline(always)]
+    pub(crate) fn all(self) -> bool {
+        !(!self).any()
+    }
+
     /// In memory; false beyond the lanes that this has.
     #[inline(always)]
     pub(crate) fn row(self) -> [bool; LANES] {

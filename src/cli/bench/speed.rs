@@ -18,6 +18,7 @@ use crate::cost::batch::{LANES, PointRow, Pricer};
 use crate::optimizer::{self, Fitness, Objective, Random, Settings};
 use crate::planner::{self, Nobody};
 use crate::scenario::{Scenario, Seeding};
+use crate::terrain::{Flat, Terrain};
 
 #[derive(Args)]
 pub(in crate::cli) struct Arguments {
@@ -68,10 +69,12 @@ pub(super) fn measure(arguments: &Arguments, cases: &[Case]) -> anyhow::Result<R
             batch,
         })
     };
-    let by_scenario: Vec<Row> = cases
-        .iter()
-        .map(|case| row(Cell::text(&case.name), case.with(&planner(10)), POPULATION))
-        .collect::<Result<_, _>>()?;
+    let mut by_scenario: Vec<Row> = Vec::new();
+    for case in cases {
+        let whole = row(Cell::text(&case.name), case.with(&planner(10)), POPULATION)?;
+        let level = levelled(&case.name, &whole);
+        by_scenario.extend(std::iter::once(whole).chain(level));
+    }
     let by_waypoints: Vec<Row> = WAYPOINTS
         .iter()
         .map(|&size| row(Cell::count(size), ground.with(&planner(size)), POPULATION))
@@ -93,7 +96,7 @@ pub(super) fn measure(arguments: &Arguments, cases: &[Case]) -> anyhow::Result<R
         (
             "scenarios",
             "Scenarios",
-            "N = 10, population 200.",
+            "N = 10, population 200. Where there are hills, once more as if the ground were level.",
             "scenario",
             by_scenario,
         ),
@@ -147,6 +150,22 @@ pub(super) fn measure(arguments: &Arguments, cases: &[Case]) -> anyhow::Result<R
         tables: done,
         raw: Vec::new(),
         drawings: Vec::new(),
+    })
+}
+
+/// The same without its hills, if it has any.
+fn levelled(name: &str, row: &Row) -> Option<Row> {
+    let mut scenario = row.scenario.clone();
+    if scenario.terrain.is_flat() {
+        return None;
+    }
+    scenario.terrain = Terrain::Flat(Flat {
+        elevation: scenario.terrain.elevation(scenario.start.xy()),
+    });
+    Some(Row {
+        label: Cell::text(&format!("{name}, levelled")),
+        scenario,
+        batch: row.batch,
     })
 }
 

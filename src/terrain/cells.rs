@@ -86,11 +86,16 @@ impl<Z: Copy + Into<f64>> Cells<'_, Z> {
         )
     }
 
+    #[inline]
     fn patch_at(&self, column: usize, row: usize) -> Patch {
         let first = row * self.columns + column;
-        let z = |idx: usize| -> f64 { self.elevations[idx].into() };
-        let [z00, z10] = [z(first), z(first + 1)];
-        let [z01, z11] = [z(first + self.columns), z(first + self.columns + 1)];
+        let pair = |first: usize| {
+            let [west, east] = *self.elevations[first..]
+                .first_chunk::<2>()
+                .expect("a cell lies between two nodes of a row");
+            [west.into(), east.into()]
+        };
+        let ([z00, z10], [z01, z11]) = (pair(first), pair(first + self.columns));
         Patch {
             column: column as f64,
             row: row as f64,

@@ -270,7 +270,9 @@ impl Dem {
         let closer = |[u0, u1]: [f64; 2], range: &mut HeightRange| {
             let part = [u0, u1].map(|u| s0 + (s1 - s0) * u);
             if level_idx == 0 {
-                *range = range.join(self.exactly(way, part));
+                if beyond(range, self.roughly(way, part)) > 0.0 {
+                    *range = range.join(self.exactly(way, part));
+                }
             } else {
                 self.descend(way, level_idx - 1, part, band, range);
             }
@@ -297,6 +299,16 @@ impl Dem {
                 closer(part, range);
             }
         });
+    }
+
+    /// What least and greatest height over the part `[s0, s1]` of `way` may be, at the utmost, by the cells
+    /// under the straight way between its places.
+    fn roughly(&self, way: &Way, [s0, s1]: [f64; 2]) -> HeightRange {
+        let HeightRange { min, max } = self.cells().height_range(way.at(s0), way.at(s1));
+        HeightRange {
+            min: min - way.slack,
+            max: max + way.slack,
+        }
     }
 
     /// Least and greatest height over the part `[s0, s1]` of `way`, by chords.

@@ -16,7 +16,7 @@ pub(super) struct Way {
 impl Way {
     /// On the straight way between the places.
     #[inline]
-    fn at(&self, share: f64) -> Place {
+    pub(super) fn at(&self, share: f64) -> Place {
         let [from, to] = self.places;
         std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * share)
     }

@@ -216,6 +216,9 @@ fn reign(features: &[Feature], nearest: &Feature, middle: f64, window: (f64, f64
     };
     let (mut ends_here, mut begins_here) = (false, false);
     for rival in features {
+        if rival.valid.1 < window.0 || rival.valid.0 > window.1 {
+            continue;
+        }
         let ahead = rival.squared.minus(&nearest.squared);
         for root in ahead.roots().into_iter().flatten() {
             if root < rival.valid.0 || root > rival.valid.1 {

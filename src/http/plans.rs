@@ -138,11 +138,11 @@ async fn answer(
         (header::LOCATION, address),
         (PREFERENCE_APPLIED, wait.applied()),
     ];
-    Ok((ended, Json(StatusDocument::from(plan))).into_response())
+    Ok((ended, StatusDocument::from(plan)).into_response())
 }
 
 fn accepted(plan: Plan, address: HeaderValue) -> Response {
-    let document = Json(StatusDocument::from(plan));
+    let document = StatusDocument::from(plan);
     (
         StatusCode::ACCEPTED,
         [(header::LOCATION, address)],
@@ -342,11 +342,11 @@ pub(super) async fn show(
 
 async fn shown(state: &AppState, plan: Plan) -> Result<Response, Problem> {
     if plan.status.is_final() {
-        return Ok(Json(StatusDocument::from(plan)).into_response());
+        return Ok(StatusDocument::from(plan).into_response());
     }
     let seconds = retry::for_end(&plan, &state.store.stats().await?, state.capacity);
     let retry_after = [(header::RETRY_AFTER, HeaderValue::from(seconds))];
-    Ok((retry_after, Json(StatusDocument::from(plan))).into_response())
+    Ok((retry_after, StatusDocument::from(plan)).into_response())
 }
 
 /// The entity tags of `If-None-Match`.
@@ -388,7 +388,7 @@ pub(super) async fn cancel(
     } else {
         StatusCode::ACCEPTED
     };
-    Ok((status, Json(StatusDocument::from(plan))).into_response())
+    Ok((status, StatusDocument::from(plan)).into_response())
 }
 
 /// `DELETE /plans/{id}`.

@@ -1,8 +1,9 @@
 //! The status document: a plan's record as callers see it.
 
-use axum::http::HeaderValue;
+use axum::http::{HeaderValue, header};
+use axum::response::{IntoResponse, Response};
 use jiff::Timestamp;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::problem::FailureDocument;
 use crate::job::{Plan, PlanId};
@@ -24,10 +25,10 @@ pub(super) struct StatusDocument {
     cancel_requested: bool,
     algorithm: String,
     seed: u64,
-    created_at: String,
-    started_at: Option<String>,
-    finished_at: Option<String>,
-    expires_at: Option<String>,
+    created_at: Time,
+    started_at: Option<Time>,
+    finished_at: Option<Time>,
+    expires_at: Option<Time>,
     error: Option<FailureDocument>,
     links: Links,
 }
@@ -35,11 +36,11 @@ pub(super) struct StatusDocument {
 #[derive(Debug, Serialize)]
 struct Links {
     #[serde(rename = "self")]
-    this: String,
-    result: String,
-    events: String,
-    scenario: String,
-    cancel: String,
+    this: Link,
+    result: Link,
+    events: Link,
+    scenario: Link,
+    cancel: Link,
 }
 
 impl From<Plan> for StatusDocument {
@@ -59,26 +60,50 @@ impl From<Plan> for StatusDocument {
             cancel_requested: plan.cancel_requested,
             algorithm: plan.algorithm,
             seed: plan.seed,
-            created_at: rfc3339(plan.created_ms),
-            started_at: plan.started_ms.map(rfc3339),
-            finished_at: plan.finished_ms.map(rfc3339),
-            expires_at: plan.expires_ms.map(rfc3339),
+            created_at: Time(plan.created_ms),
+            started_at: plan.started_ms.map(Time),
+            finished_at: plan.finished_ms.map(Time),
+            expires_at: plan.expires_ms.map(Time),
             error: plan.error.map(Into::into),
             links: Links::of(plan.id),
         }
     }
 }
 
+/// Most documents have room in so many bytes.
+const ROOM: usize = 1_024;
+
+impl IntoResponse for StatusDocument {
+    fn into_response(self) -> Response {
+        let mut text = Vec::with_capacity(ROOM);
+        serde_json::to_writer(&mut text, &self).expect("its keys are texts");
+        ([(header::CONTENT_TYPE, "application/json")], text).into_response()
+    }
+}
+
 impl Links {
     fn of(id: PlanId) -> Self {
-        let this = location(id);
+        let link = |to| Link { id, to };
         Self {
-            result: format!("{this}/result"),
-            events: format!("{this}/events"),
-            scenario: format!("{this}/scenario"),
-            cancel: format!("{this}/cancel"),
-            this,
+            this: link(""),
+            result: link("/result"),
+            events: link("/events"),
+            scenario: link("/scenario"),
+            cancel: link("/cancel"),
         }
+    }
+}
+
+/// The address of something of a plan.
+#[derive(Debug)]
+struct Link {
+    id: PlanId,
+    to: &'static str,
+}
+
+impl Serialize for Link {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(&format_args!("/plans/{}{}", self.id, self.to))
     }
 }
 
@@ -95,10 +120,15 @@ pub(super) fn etag(plan: &Plan) -> HeaderValue {
         .expect("digits are visible ASCII")
 }
 
-/// UTC with milliseconds.
-fn rfc3339(ms: i64) -> String {
-    let time = Timestamp::from_millisecond(ms).unwrap_or(Timestamp::UNIX_EPOCH);
-    format!("{time:.3}")
+/// Milliseconds since 1970, written as UTC.
+#[derive(Debug)]
+struct Time(i64);
+
+impl Serialize for Time {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let time = Timestamp::from_millisecond(self.0).unwrap_or(Timestamp::UNIX_EPOCH);
+        serializer.collect_str(&format_args!("{time:.3}"))
+    }
 }
 
 #[cfg(test)]
@@ -107,7 +137,12 @@ mod tests {
 
     #[test]
     fn times_are_utc_with_milliseconds() {
-        assert_eq!(rfc3339(1_700_000_000_123), "2023-11-14T22:13:20.123Z");
-        assert_eq!(rfc3339(0), "1970-01-01T00:00:00.000Z");
+        for (ms, expected) in [
+            (1_700_000_000_123, "2023-11-14T22:13:20.123Z"),
+            (0, "1970-01-01T00:00:00.000Z"),
+        ] {
+            let written = serde_json::to_value(Time(ms)).expect("a text");
+            assert_eq!(written, expected);
+        }
     }
 }

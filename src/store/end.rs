@@ -1,5 +1,7 @@
 //! How a run ends, and what that makes of its plan's record.
 
+use std::sync::Arc;
+
 use crate::job::state::Refused;
 use crate::job::{Event, Failure, Plan, Status};
 
@@ -30,17 +32,25 @@ pub enum Ending {
 impl Ending {
     /// At that time, with nothing told since the last [`Store::append`](super::Store::append).
     #[must_use]
-    pub fn at(self, at_ms: i64) -> End {
-        End {
-            told: Vec::new(),
-            ending: self,
+    pub fn at(self, at_ms: i64) -> Arc<End> {
+        self.after(Vec::new(), at_ms)
+    }
+
+    /// At that time, `told` since the last [`Store::append`](super::Store::append). Shared, for a store that
+    /// fails is asked again.
+    #[must_use]
+    pub fn after(self, told: Vec<Event>, at_ms: i64) -> Arc<End> {
+        let ending = self;
+        Arc::new(End {
+            told,
+            ending,
             at_ms,
-        }
+        })
     }
 }
 
 /// The end of a run.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct End {
     /// What the run told since the last [`Store::append`](super::Store::append).
     pub told: Vec<Event>,

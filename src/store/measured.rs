@@ -71,7 +71,7 @@ impl Store for MeasuredStore {
             .await
     }
 
-    async fn finish(&self, lease: &Lease, end: End) -> Result<Plan, StoreError> {
+    async fn finish(&self, lease: &Lease, end: Arc<End>) -> Result<Plan, StoreError> {
         self.measured("finish", self.store.finish(lease, end)).await
     }
 

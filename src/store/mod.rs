@@ -68,7 +68,7 @@ pub trait Store: Send + Sync + 'static {
     ///
     /// # Errors
     /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.
-    async fn finish(&self, lease: &Lease, end: End) -> Result<Plan, StoreError>;
+    async fn finish(&self, lease: &Lease, end: Arc<End>) -> Result<Plan, StoreError>;
 
     /// Give a plan back, to its old place in the queue, which is the head: running -> queued. Its
     /// next run begins again from its seed. When its end has been asked for, it is cancelled

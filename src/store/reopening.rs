@@ -158,7 +158,7 @@ impl Store for Reopening {
         self.heed(&store, store.append(lease, events).await)
     }
 
-    async fn finish(&self, lease: &Lease, end: End) -> Result<Plan, StoreError> {
+    async fn finish(&self, lease: &Lease, end: Arc<End>) -> Result<Plan, StoreError> {
         let store = self.store()?;
         self.heed(&store, store.finish(lease, end).await)
     }

@@ -1,7 +1,7 @@
 //! The pool: takes plans off the queue, runs a bounded number of them at a time, writes down what
 //! they tell and how they end.
 //!
-//! Planning has threads of its own, one a plan, so that it never holds up those that serve.
+//! Planning has threads of its own, one a slot, so that it never holds up those that serve.
 //! Deliberately absent: what planning is, and how anybody learns of its progress.
 
 mod planning;
@@ -17,6 +17,7 @@ use tracing::Instrument as _;
 
 pub use sweeper::Sweeper;
 
+use self::planning::Thread;
 use self::run::Over;
 
 use crate::job::Failure;
@@ -128,15 +129,17 @@ struct Slot {
 impl Slot {
     async fn serve(self) {
         let mut pause = Pause::default();
+        let mut thread = None;
         let mut over = None;
         loop {
             // The next run does not wait until the disk has the end of the one before, nor its own beginning.
+            // Its claim goes first, and the end right behind it: so the store can take both in one step.
             let conclusion = async {
                 if let Some(over) = over.take() {
                     self.conclude(over).await;
                 }
             };
-            let ((), next) = tokio::join!(conclusion, self.run_next());
+            let (next, ()) = tokio::join!(biased; self.run_next(&mut thread), conclusion);
             match next {
                 None => return,
                 Some(Ok(next)) => {
@@ -155,14 +158,17 @@ impl Slot {
     }
 
     /// Claim a plan and run it; `None` when no more are to be.
-    async fn run_next(&self) -> Option<Result<Option<Over>, StoreError>> {
+    async fn run_next(
+        &self,
+        thread: &mut Option<Thread>,
+    ) -> Option<Result<Option<Over>, StoreError>> {
         let lease = match self.claim().await? {
             Ok(lease) => lease,
             Err(error) => return Some(Err(error)),
         };
         let plan = lease.plan.id;
         let span = spans::of_run(plan, self.instruments.origins.of(plan).as_ref());
-        Some(Ok(self.run(lease).instrument(span).await))
+        Some(Ok(self.run(lease, thread).instrument(span).await))
     }
 
     /// The next plan to run; `None` when no more are to be.

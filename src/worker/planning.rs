@@ -1,4 +1,4 @@
-//! The thread that plans: it calls the engine, hands on what it tells, and makes its ending.
+//! The threads that plan: each calls the engine, hands on what it tells, and makes its ending.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use tokio::sync::mpsc::error::TrySendError;
 use tokio::sync::{mpsc, oneshot, watch};
 use tracing::Span;
 
@@ -70,44 +71,82 @@ pub(super) struct Reports {
     pub(super) instruments: Arc<Instruments>,
 }
 
-/// Start planning on a thread of its own, within the span of the caller. The ending comes after the
-/// last event; `None` is that of a plan that must go back to the queue.
-///
-/// # Errors
-/// When the machine has no thread left.
-pub(super) fn start(
-    thread_name: String,
-    engine: Engine,
-    lease: &Lease,
+/// A thread that plans one plan after the other, and ends when this is dropped.
+pub(super) struct Thread {
+    tasks: std::sync::mpsc::Sender<Task>,
+}
+
+/// A plan to be planned.
+struct Task {
+    plan: Plan,
+    scenario: Arc<str>,
     reports: Reports,
-) -> std::io::Result<oneshot::Receiver<Option<Ending>>> {
-    let (ended, ending) = oneshot::channel();
-    let (plan, scenario) = (lease.plan.clone(), Arc::clone(&lease.scenario));
-    let span = Span::current();
-    thread::Builder::new().name(thread_name).spawn(move || {
-        let _within = span.enter();
+    span: Span,
+    ended: oneshot::Sender<Option<Ending>>,
+}
+
+impl Thread {
+    /// # Errors
+    /// When the machine has no thread left.
+    pub(super) fn start(name: String, engine: Engine) -> std::io::Result<Self> {
+        let (tasks, inbox) = std::sync::mpsc::channel::<Task>();
+        thread::Builder::new().name(name).spawn(move || {
+            for task in inbox {
+                task.run(&engine);
+            }
+        })?;
+        Ok(Self { tasks })
+    }
+
+    /// Plan the plan of `lease` within the span of the caller. `None` is the ending of one that must go
+    /// back to the queue.
+    pub(super) fn plan(
+        &self,
+        lease: &Lease,
+        reports: Reports,
+    ) -> oneshot::Receiver<Option<Ending>> {
+        let (ended, ending) = oneshot::channel();
+        let task = Task {
+            plan: lease.plan.clone(),
+            scenario: Arc::clone(&lease.scenario),
+            reports,
+            span: Span::current(),
+            ended,
+        };
+        let taken = self.tasks.send(task);
+        taken.expect("the thread outlives panics of the engine");
+        ending
+    }
+}
+
+impl Task {
+    fn run(self, engine: &Engine) {
+        let _within = self.span.enter();
+        let mut teller = Teller {
+            reports: self.reports,
+            told: 0,
+            iterations: 0,
+            evaluations: 0,
+        };
         let end = catch_unwind(AssertUnwindSafe(|| {
-            plan_to_its_end(&engine, &plan, &scenario, reports)
+            plan_to_its_end(engine, &self.plan, &self.scenario, &mut teller)
         }));
         // Nobody listens when the pool was dropped.
-        let _ = ended.send(end.unwrap_or_else(|payload| Some(panicked(&*payload))));
-    })?;
-    Ok(ending)
+        let _ = self
+            .ended
+            .send(end.unwrap_or_else(|payload| Some(panicked(&*payload))));
+        // Who is woken by the end of the telling finds the ending there.
+        drop(teller);
+    }
 }
 
 fn plan_to_its_end(
     engine: &Engine,
     plan: &Plan,
     scenario: &str,
-    reports: Reports,
+    teller: &mut Teller,
 ) -> Option<Ending> {
-    let stop = Arc::clone(&reports.stop);
-    let mut teller = Teller {
-        reports,
-        told: 0,
-        iterations: 0,
-        evaluations: 0,
-    };
+    let stop = Arc::clone(&teller.reports.stop);
     let asked = Instant::now();
     let mut pause = PAUSES[0];
     loop {
@@ -116,7 +155,7 @@ fn plan_to_its_end(
             began: Instant::now(),
             stop: Arc::clone(&stop),
         };
-        match engine(scenario, &mut teller, &watch) {
+        match engine(scenario, teller, &watch) {
             Ok(outcome) => {
                 teller.ended(&outcome);
                 return Some(ending(&outcome, plan, scenario, watch.elapsed_ms()));
@@ -193,7 +232,12 @@ struct Teller {
 
 impl Teller {
     fn tell(&mut self, event: Event) {
-        if self.reports.events.blocking_send(event).is_err() {
+        // To wait is set up at a price, and there is room but for a search that outruns the disk.
+        let sent = match self.reports.events.try_send(event) {
+            Err(TrySendError::Full(event)) => self.reports.events.blocking_send(event).is_ok(),
+            sent => sent.is_ok(),
+        };
+        if !sent {
             self.reports.stop.raise(Reason::Abandoned);
         }
         self.told += 1;

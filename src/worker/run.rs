@@ -7,10 +7,10 @@ use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tracing::{Instrument as _, Span};
 
-use super::planning::{self, Reason, Reports, StopFlag};
+use super::planning::{Reason, Reports, StopFlag, Thread};
 use super::{Pause, Phase, Slot, reached};
 use crate::job::Event;
-use crate::store::{End, Ending, Lease, StoreError};
+use crate::store::{Ending, Lease, StoreError};
 use crate::telemetry::metrics::Ended;
 
 /// Events on their way from the planning thread; when there are more, it waits.
@@ -33,8 +33,9 @@ pub(super) struct Over {
 }
 
 impl Slot {
-    /// Run the plan and store what it tells; the caller concludes it.
-    pub(super) async fn run(&self, lease: Lease) -> Option<Over> {
+    /// Run the plan on `thread`, which is started when there is none yet, and store what it tells; the
+    /// caller concludes it.
+    pub(super) async fn run(&self, lease: Lease, thread: &mut Option<Thread>) -> Option<Over> {
         tracing::info!(
             worker = self.number,
             attempt = lease.attempt,
@@ -47,16 +48,14 @@ impl Slot {
         let stop = Arc::new(StopFlag::default());
         let (events, told) = mpsc::channel(ON_THE_WAY);
         let (telling, news) = watch::channel(());
-        let thread_name = format!("planner-{}", self.number);
-        let engine = Arc::clone(&self.engine);
         let reports = Reports {
             events,
             telling,
             stop: Arc::clone(&stop),
             instruments: Arc::clone(&self.instruments),
         };
-        let ending = match planning::start(thread_name, engine, &lease, reports) {
-            Ok(ending) => ending,
+        let ending = match self.planning(thread) {
+            Ok(thread) => thread.plan(&lease, reports),
             Err(error) => {
                 tracing::error!(%error, "no thread to plan on; the plan goes back to the queue");
                 self.give_back(&lease).await;
@@ -85,6 +84,15 @@ impl Slot {
         })
     }
 
+    /// The thread that this slot plans on.
+    fn planning<'t>(&self, thread: &'t mut Option<Thread>) -> std::io::Result<&'t Thread> {
+        let started = match thread.take() {
+            Some(started) => started,
+            None => Thread::start(format!("planner-{}", self.number), Arc::clone(&self.engine))?,
+        };
+        Ok(thread.insert(started))
+    }
+
     /// End a plan whose run is over, or give it back.
     pub(super) async fn conclude(&self, over: Over) {
         let Over {
@@ -110,9 +118,8 @@ impl Slot {
         mut told: mpsc::Receiver<Event>,
         mut news: watch::Receiver<()>,
     ) -> Option<Vec<Event>> {
+        let mut batch = Vec::new();
         loop {
-            let mut batch = Vec::new();
-            told.recv_many(&mut batch, BATCH).await;
             tokio::select! {
                 _ = news.changed() => {}
                 () = tokio::time::sleep(DELAY) => {}
@@ -124,24 +131,20 @@ impl Slot {
             if was_last {
                 return Some(batch);
             }
-            let append = || self.store.append(lease, batch.clone());
+            if batch.is_empty() {
+                // A quiet search wakes nobody, and neither does the first event of a short one.
+                told.recv_many(&mut batch, 1).await;
+                continue;
+            }
+            let events = std::mem::take(&mut batch);
+            let append = || self.store.append(lease, events.clone());
             self.persist("events", append).await?;
         }
     }
 
     async fn finish(&self, lease: &Lease, told: Vec<Event>, ending: Ending) {
-        let finish = || {
-            let (told, ending) = (told.clone(), ending.clone());
-            let at_ms = (self.clock)();
-            self.store.finish(
-                lease,
-                End {
-                    told,
-                    ending,
-                    at_ms,
-                },
-            )
-        };
+        let end = ending.after(told, (self.clock)());
+        let finish = || self.store.finish(lease, Arc::clone(&end));
         if let Some(plan) = self.persist("ending", finish).await {
             let run_ms = plan
                 .finished_ms

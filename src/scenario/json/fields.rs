@@ -71,12 +71,12 @@ impl<'a> At<'a> {
 pub(super) struct Fields<'a> {
     pub(super) path: &'a Path<'a>,
     names: &'static [&'static str],
-    found: Vec<Option<&'a Node>>,
+    found: Vec<Option<&'a Node<'a>>>,
 }
 
 impl<'a> Fields<'a> {
     /// The value of an allowed field, if the document has it.
-    pub(super) fn find(&self, name: &str) -> Option<&'a Node> {
+    pub(super) fn find(&self, name: &str) -> Option<&'a Node<'a>> {
         let slot = self.names.iter().position(|known| *known == name);
         self.found[slot.expect("readers ask for the fields that they allow")]
     }

@@ -125,7 +125,7 @@ fn shrink(lat: f64) -> f64 {
     libm::cos(lat.to_radians()).max(0.01)
 }
 
-fn items(node: Option<&Node>) -> &[Node] {
+fn items<'a>(node: Option<&'a Node<'a>>) -> &'a [Node<'a>] {
     match node {
         Some(Node::Array(items)) => items,
         _ => &[],

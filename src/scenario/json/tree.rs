@@ -3,6 +3,7 @@
 //!
 //! Deliberately absent: what any field means.
 
+use std::borrow::Cow;
 use std::fmt;
 
 use serde::de::{Deserialize, DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
@@ -11,9 +12,10 @@ use serde_json::Number;
 use super::fault::Refusal;
 use super::path::escape;
 
-/// A JSON value, 24 bytes; arrays of numbers take 8 bytes an item, so that a grid stays small.
+/// A JSON value, 24 bytes; arrays of numbers take 8 bytes an item, so that a grid stays small. Keys stay
+/// in the text where they can: they are most of the texts in a document.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Node {
+pub(super) enum Node<'t> {
     Null,
     Bool(bool),
     /// Finite.
@@ -22,14 +24,14 @@ pub(super) enum Node {
     /// An array of numbers only, or an empty one.
     Numbers(Box<[f64]>),
     /// Any other array.
-    Array(Box<[Node]>),
+    Array(Box<[Node<'t>]>),
     /// Entries in document order, duplicate keys included.
-    Object(Box<[(Box<str>, Node)]>),
+    Object(Box<[(Cow<'t, str>, Node<'t>)]>),
 }
 
-impl Node {
+impl<'t> Node<'t> {
     /// The first entry of this name, when this is an object that has one.
-    pub(super) fn get(&self, key: &str) -> Option<&Node> {
+    pub(super) fn get(&self, key: &str) -> Option<&Node<'t>> {
         match self {
             Node::Object(entries) => entries
                 .iter()
@@ -45,7 +47,7 @@ impl Node {
 /// # Errors
 /// [`Refusal::Syntax`] for anything that is not JSON, nesting deeper than 127, and numbers that
 /// no 64-bit float can hold.
-pub(super) fn parse(text: &[u8]) -> Result<Node, Refusal> {
+pub(super) fn parse(text: &[u8]) -> Result<Node<'_>, Refusal> {
     let mut trail = Vec::new();
     let mut reader = serde_json::Deserializer::from_slice(text);
     Element { trail: &mut trail }
@@ -55,58 +57,58 @@ pub(super) fn parse(text: &[u8]) -> Result<Node, Refusal> {
 }
 
 /// One step from the root to the value being parsed.
-enum Step {
-    Key(Box<str>),
+enum Step<'t> {
+    Key(Cow<'t, str>),
     Index(usize),
 }
 
 /// Parses one value; steps are taken off the trail on success only, so that after an error the
 /// trail still leads to its place.
-struct Element<'a> {
-    trail: &'a mut Vec<Step>,
+struct Element<'a, 't> {
+    trail: &'a mut Vec<Step<'t>>,
 }
 
-impl<'de> DeserializeSeed<'de> for Element<'_> {
-    type Value = Node;
+impl<'de> DeserializeSeed<'de> for Element<'_, 'de> {
+    type Value = Node<'de>;
 
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Node, D::Error> {
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Node<'de>, D::Error> {
         deserializer.deserialize_any(self)
     }
 }
 
-impl<'de> Visitor<'de> for Element<'_> {
-    type Value = Node;
+impl<'de> Visitor<'de> for Element<'_, 'de> {
+    type Value = Node<'de>;
 
     fn expecting(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         out.write_str("a JSON value")
     }
 
-    fn visit_unit<E>(self) -> Result<Node, E> {
+    fn visit_unit<E>(self) -> Result<Node<'de>, E> {
         Ok(Node::Null)
     }
 
-    fn visit_bool<E>(self, value: bool) -> Result<Node, E> {
+    fn visit_bool<E>(self, value: bool) -> Result<Node<'de>, E> {
         Ok(Node::Bool(value))
     }
 
-    fn visit_u64<E>(self, value: u64) -> Result<Node, E> {
+    fn visit_u64<E>(self, value: u64) -> Result<Node<'de>, E> {
         Ok(Node::Number(value.into()))
     }
 
-    fn visit_i64<E>(self, value: i64) -> Result<Node, E> {
+    fn visit_i64<E>(self, value: i64) -> Result<Node<'de>, E> {
         Ok(Node::Number(value.into()))
     }
 
-    fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<Node, E> {
+    fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<Node<'de>, E> {
         let number = Number::from_f64(value).ok_or_else(|| E::custom("number out of range"))?;
         Ok(Node::Number(number))
     }
 
-    fn visit_str<E>(self, value: &str) -> Result<Node, E> {
+    fn visit_str<E>(self, value: &str) -> Result<Node<'de>, E> {
         Ok(Node::Text(value.into()))
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Node, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Node<'de>, A::Error> {
         let mut numbers = Vec::new();
         let mut items = Vec::new();
         self.trail.push(Step::Index(0));
@@ -136,7 +138,7 @@ impl<'de> Visitor<'de> for Element<'_> {
         }
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Node, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Node<'de>, A::Error> {
         let mut entries = Vec::new();
         while let Some(Key(key)) = map.next_key()? {
             self.trail.push(Step::Key(key));
@@ -152,11 +154,30 @@ impl<'de> Visitor<'de> for Element<'_> {
 }
 
 /// A key, taken as text whatever else it may look like.
-struct Key(Box<str>);
+struct Key<'t>(Cow<'t, str>);
 
-impl<'de> Deserialize<'de> for Key {
+impl<'de> Deserialize<'de> for Key<'de> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Box::<str>::deserialize(deserializer).map(Key)
+        deserializer.deserialize_str(KeyVisitor).map(Key)
+    }
+}
+
+struct KeyVisitor;
+
+impl<'de> Visitor<'de> for KeyVisitor {
+    type Value = Cow<'de, str>;
+
+    fn expecting(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str("a key")
+    }
+
+    fn visit_borrowed_str<E>(self, key: &'de str) -> Result<Cow<'de, str>, E> {
+        Ok(Cow::Borrowed(key))
+    }
+
+    /// With escapes in it.
+    fn visit_str<E>(self, key: &str) -> Result<Cow<'de, str>, E> {
+        Ok(Cow::Owned(key.to_owned()))
     }
 }
 
@@ -179,7 +200,7 @@ pub(super) fn whole_or_float(number: f64) -> Number {
     }
 }
 
-fn refuse(text: &[u8], trail: &[Step], error: &serde_json::Error) -> Refusal {
+fn refuse(text: &[u8], trail: &[Step<'_>], error: &serde_json::Error) -> Refusal {
     let (line, column) = (error.line().max(1), error.column().max(1));
     Refusal::Syntax {
         line,
@@ -190,7 +211,7 @@ fn refuse(text: &[u8], trail: &[Step], error: &serde_json::Error) -> Refusal {
 }
 
 /// The trail as a JSON pointer, cut where a hostile key would make it long.
-fn pointer(trail: &[Step]) -> String {
+fn pointer(trail: &[Step<'_>]) -> String {
     const MAX_CHARS: usize = 500;
     let mut pointer = String::new();
     for step in trail {

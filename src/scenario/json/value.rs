@@ -10,7 +10,7 @@ use super::tree::{Node, float, whole_or_float};
 /// A value and where it stands.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct At<'a> {
-    pub(super) node: &'a Node,
+    pub(super) node: &'a Node<'a>,
     pub(super) path: &'a Path<'a>,
 }
 

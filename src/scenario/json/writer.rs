@@ -12,10 +12,15 @@ use crate::threat::{Shape, Threat};
 
 use super::tree::whole_or_float;
 
+/// Most documents have room in so many bytes.
+const ROOM: usize = 2_048;
+
 /// The accepted document as compact JSON; reading it gives an equal scenario.
 pub(super) fn write(scenario: &Scenario) -> String {
-    serde_json::to_string(&Document::from(scenario))
-        .expect("wire structs have text keys and finite numbers")
+    let mut text = Vec::with_capacity(ROOM);
+    serde_json::to_writer(&mut text, &Document::from(scenario))
+        .expect("wire structs have text keys and finite numbers");
+    String::from_utf8(text).expect("JSON is UTF-8")
 }
 
 /// A number, written `3` rather than `3.0`.

@@ -186,7 +186,7 @@ impl Store for JetStreamStore {
             .await
     }
 
-    async fn finish(&self, lease: &Lease, end: End) -> Result<Plan, StoreError> {
+    async fn finish(&self, lease: &Lease, end: Arc<End>) -> Result<Plan, StoreError> {
         self.open_store()?
             .finish(lease.plan.id, lease.attempt, &end)
             .await

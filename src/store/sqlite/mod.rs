@@ -155,7 +155,7 @@ impl Store for SqliteStore {
             .await
     }
 
-    async fn finish(&self, lease: &Lease, end: End) -> Result<Plan, StoreError> {
+    async fn finish(&self, lease: &Lease, end: Arc<End>) -> Result<Plan, StoreError> {
         let (id, attempt) = (lease.plan.id, lease.attempt);
         self.writer
             .change(move |tx| operations::finish(tx, id, attempt, &end))

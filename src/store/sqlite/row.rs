@@ -1,10 +1,11 @@
 //! A plan's row, to and from columns.
 
-use rusqlite::{Connection, OptionalExtension, Row, named_params};
+use rusqlite::types::{FromSql, Type};
+use rusqlite::{Connection, OptionalExtension, Row, params};
 
 use crate::job::{Failure, Plan, PlanId, Status};
 
-/// The columns that [`PlanRow::read`] wants.
+/// The columns that [`PlanRow::read`] wants, in their order there.
 pub(super) const COLUMNS: &str = "seq, id, owner, name, status, stop_reason, feasible, best_cost, progress, \
      iteration, iterations, evaluations, algorithm, seed, created_ms, started_ms, finished_ms, expires_ms, \
      cancel_requested, error_kind, error_detail, revision, attempt, last_event, \
@@ -26,36 +27,39 @@ pub(super) struct PlanRow {
 
 impl PlanRow {
     pub(super) fn read(row: &Row<'_>) -> rusqlite::Result<Self> {
+        // In the order of the columns: looking a name up compares it with all before it.
+        let mut row = Cells { row, next: 0 };
+        let seq = row.take()?;
         let plan = Plan {
-            id: text(row, "id", |id| PlanId::parse_str(id).ok())?,
-            owner: row.get("owner")?,
-            name: row.get("name")?,
-            status: text(row, "status", Status::from_name)?,
-            stop_reason: row.get("stop_reason")?,
-            feasible: row.get("feasible")?,
-            best_cost: row.get("best_cost")?,
-            progress: row.get("progress")?,
-            iteration: count(row, "iteration")?,
-            iterations: count(row, "iterations")?,
-            evaluations: count(row, "evaluations")?,
+            id: row.text("id", |id| PlanId::parse_str(id).ok())?,
+            owner: row.take()?,
+            name: row.take()?,
+            status: row.text("status", Status::from_name)?,
+            stop_reason: row.take()?,
+            feasible: row.take()?,
+            best_cost: row.take()?,
+            progress: row.take()?,
+            iteration: row.count()?,
+            iterations: row.count()?,
+            evaluations: row.count()?,
             queue_position: None,
-            algorithm: row.get("algorithm")?,
-            seed: count(row, "seed")?,
-            created_ms: row.get("created_ms")?,
-            started_ms: row.get("started_ms")?,
-            finished_ms: row.get("finished_ms")?,
-            expires_ms: row.get("expires_ms")?,
-            cancel_requested: row.get("cancel_requested")?,
-            error: error(row)?,
-            revision: count(row, "revision")?,
+            algorithm: row.take()?,
+            seed: row.count()?,
+            created_ms: row.take()?,
+            started_ms: row.take()?,
+            finished_ms: row.take()?,
+            expires_ms: row.take()?,
+            cancel_requested: row.take()?,
+            error: row.failure()?,
+            revision: row.count()?,
         };
         Ok(Self {
-            seq: row.get("seq")?,
-            attempt: count(row, "attempt")?,
-            last_event: count(row, "last_event")?,
-            forgotten: count(row, "forgotten")?,
-            bytes: count(row, "bytes")?,
+            seq,
             plan,
+            attempt: row.count()?,
+            last_event: row.count()?,
+            forgotten: row.count()?,
+            bytes: row.count()?,
         })
     }
 
@@ -68,17 +72,16 @@ impl PlanRow {
         row.map(|row| row.placed(connection)).transpose()
     }
 
-    /// The row at the head of the queue. Left to itself, the database would take the index by
-    /// status and sort the whole queue.
+    /// The row at the head of the queue, whose place is the first. Left to itself, the database would take
+    /// the index by status and sort the whole queue.
     pub(super) fn head(connection: &Connection) -> rusqlite::Result<Option<Self>> {
-        let row = connection
+        connection
             .prepare_cached(&format!(
                 "SELECT {COLUMNS} FROM plans INDEXED BY plans_queue WHERE status = 'queued' \
                  ORDER BY seq LIMIT 1"
             ))?
             .query_row([], Self::read)
-            .optional()?;
-        row.map(|row| row.placed(connection)).transpose()
+            .optional()
     }
 
     /// With its place in the queue.
@@ -101,55 +104,53 @@ impl PlanRow {
             .prepare_cached(
                 "INSERT INTO plans (id, owner, name, status, progress, iteration, iterations, evaluations, \
                  algorithm, seed, created_ms, cancel_requested, revision, attempt, last_event, bytes, dataset) \
-                 VALUES (:id, :owner, :name, :status, :progress, :iteration, :iterations, :evaluations, \
-                 :algorithm, :seed, :created_ms, :cancel_requested, :revision, :attempt, :last_event, :bytes, :dataset)",
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17)",
             )?
-            .execute(named_params! {
-                ":id": plan.id.to_string(),
-                ":owner": plan.owner,
-                ":name": plan.name,
-                ":status": plan.status.name(),
-                ":progress": plan.progress,
-                ":iteration": plan.iteration.cast_signed(),
-                ":iterations": plan.iterations.cast_signed(),
-                ":evaluations": plan.evaluations.cast_signed(),
-                ":algorithm": plan.algorithm,
-                ":seed": plan.seed.cast_signed(),
-                ":created_ms": plan.created_ms,
-                ":cancel_requested": plan.cancel_requested,
-                ":revision": plan.revision.cast_signed(),
-                ":attempt": self.attempt.cast_signed(),
-                ":last_event": self.last_event.cast_signed(),
-                ":bytes": self.bytes.cast_signed(),
-                ":dataset": dataset,
-            })?;
+            .execute(params![
+                plan.id.to_string(),
+                plan.owner,
+                plan.name,
+                plan.status.name(),
+                plan.progress,
+                plan.iteration.cast_signed(),
+                plan.iterations.cast_signed(),
+                plan.evaluations.cast_signed(),
+                plan.algorithm,
+                plan.seed.cast_signed(),
+                plan.created_ms,
+                plan.cancel_requested,
+                plan.revision.cast_signed(),
+                self.attempt.cast_signed(),
+                self.last_event.cast_signed(),
+                self.bytes.cast_signed(),
+                dataset,
+            ])?;
         self.seq = connection.last_insert_rowid();
         Ok(())
     }
 
-    /// Write what changes within a state. No index of active plans has these columns, so this alone is
-    /// cheaper than [`PlanRow::update`].
+    /// Write what changes within a state. No index of active plans has these columns, so this is cheaper
+    /// than [`PlanRow::update`].
     pub(super) fn update_progress(&self, connection: &Connection) -> rusqlite::Result<()> {
         let plan = &self.plan;
         connection
             .prepare_cached(
-                "UPDATE plans SET feasible = :feasible, best_cost = :best_cost, \
-                 progress = :progress, iteration = :iteration, evaluations = :evaluations, \
-                 revision = :revision, last_event = :last_event, forgotten = :forgotten, \
-                 bytes = :bytes WHERE seq = :seq",
+                "UPDATE plans SET feasible = ?2, best_cost = ?3, progress = ?4, iteration = ?5, \
+                 evaluations = ?6, revision = ?7, last_event = ?8, forgotten = ?9, bytes = ?10 \
+                 WHERE seq = ?1",
             )?
-            .execute(named_params! {
-                ":feasible": plan.feasible,
-                ":best_cost": plan.best_cost,
-                ":progress": plan.progress,
-                ":iteration": plan.iteration.cast_signed(),
-                ":evaluations": plan.evaluations.cast_signed(),
-                ":revision": plan.revision.cast_signed(),
-                ":last_event": self.last_event.cast_signed(),
-                ":forgotten": self.forgotten.cast_signed(),
-                ":bytes": self.bytes.cast_signed(),
-                ":seq": self.seq,
-            })?;
+            .execute(params![
+                self.seq,
+                plan.feasible,
+                plan.best_cost,
+                plan.progress,
+                plan.iteration.cast_signed(),
+                plan.evaluations.cast_signed(),
+                plan.revision.cast_signed(),
+                self.last_event.cast_signed(),
+                self.forgotten.cast_signed(),
+                self.bytes.cast_signed(),
+            ])?;
         Ok(())
     }
 
@@ -159,24 +160,34 @@ impl PlanRow {
         let error = plan.error.as_ref();
         connection
             .prepare_cached(
-                "UPDATE plans SET status = :status, stop_reason = :stop_reason, \
-                 started_ms = :started_ms, finished_ms = :finished_ms, expires_ms = :expires_ms, \
-                 cancel_requested = :cancel_requested, error_kind = :error_kind, \
-                 error_detail = :error_detail, attempt = :attempt WHERE seq = :seq",
+                "UPDATE plans SET feasible = ?2, best_cost = ?3, progress = ?4, iteration = ?5, \
+                 evaluations = ?6, revision = ?7, last_event = ?8, forgotten = ?9, bytes = ?10, \
+                 status = ?11, stop_reason = ?12, started_ms = ?13, finished_ms = ?14, expires_ms = ?15, \
+                 cancel_requested = ?16, error_kind = ?17, error_detail = ?18, attempt = ?19 \
+                 WHERE seq = ?1",
             )?
-            .execute(named_params! {
-                ":status": plan.status.name(),
-                ":stop_reason": plan.stop_reason,
-                ":started_ms": plan.started_ms,
-                ":finished_ms": plan.finished_ms,
-                ":expires_ms": plan.expires_ms,
-                ":cancel_requested": plan.cancel_requested,
-                ":error_kind": error.map(|error| &error.kind),
-                ":error_detail": error.map(|error| &error.detail),
-                ":attempt": self.attempt.cast_signed(),
-                ":seq": self.seq,
-            })?;
-        self.update_progress(connection)
+            .execute(params![
+                self.seq,
+                plan.feasible,
+                plan.best_cost,
+                plan.progress,
+                plan.iteration.cast_signed(),
+                plan.evaluations.cast_signed(),
+                plan.revision.cast_signed(),
+                self.last_event.cast_signed(),
+                self.forgotten.cast_signed(),
+                self.bytes.cast_signed(),
+                plan.status.name(),
+                plan.stop_reason,
+                plan.started_ms,
+                plan.finished_ms,
+                plan.expires_ms,
+                plan.cancel_requested,
+                error.map(|error| &error.kind),
+                error.map(|error| &error.detail),
+                self.attempt.cast_signed(),
+            ])?;
+        Ok(())
     }
 }
 
@@ -190,28 +201,40 @@ fn queue_position(connection: &Connection, seq: i64) -> rusqlite::Result<u64> {
     Ok(ahead.cast_unsigned() + 1)
 }
 
-/// Counts are kept bit for bit in `SQLite`'s signed integers.
-fn count(row: &Row<'_>, column: &str) -> rusqlite::Result<u64> {
-    row.get::<_, i64>(column).map(i64::cast_unsigned)
+/// The cells of a row, one after the other.
+struct Cells<'r, 's> {
+    row: &'r Row<'s>,
+    next: usize,
 }
 
-fn error(row: &Row<'_>) -> rusqlite::Result<Option<Failure>> {
-    let kind: Option<String> = row.get("error_kind")?;
-    let detail: Option<String> = row.get("error_detail")?;
-    Ok(kind.map(|kind| Failure {
-        kind,
-        detail: detail.unwrap_or_default(),
-    }))
-}
+impl Cells<'_, '_> {
+    fn take<T: FromSql>(&mut self) -> rusqlite::Result<T> {
+        let cell = self.row.get(self.next);
+        self.next += 1;
+        cell
+    }
 
-fn text<T>(row: &Row<'_>, column: &str, parse: impl Fn(&str) -> Option<T>) -> rusqlite::Result<T> {
-    let value: String = row.get(column)?;
-    parse(&value).ok_or_else(|| {
-        let index = row.as_ref().column_index(column).unwrap_or_default();
-        rusqlite::Error::InvalidColumnType(
-            index,
-            format!("{column} {value:?}"),
-            rusqlite::types::Type::Text,
-        )
-    })
+    /// Counts are kept bit for bit in `SQLite`'s signed integers.
+    fn count(&mut self) -> rusqlite::Result<u64> {
+        self.take().map(i64::cast_unsigned)
+    }
+
+    /// What stands in the column of that name as text.
+    fn text<T>(&mut self, column: &str, parse: impl Fn(&str) -> Option<T>) -> rusqlite::Result<T> {
+        let at = self.next;
+        self.next += 1;
+        let value = self.row.get_ref(at)?.as_str()?;
+        parse(value).ok_or_else(|| {
+            rusqlite::Error::InvalidColumnType(at, format!("{column} {value:?}"), Type::Text)
+        })
+    }
+
+    fn failure(&mut self) -> rusqlite::Result<Option<Failure>> {
+        let kind: Option<String> = self.take()?;
+        let detail: Option<String> = self.take()?;
+        Ok(kind.map(|kind| Failure {
+            kind,
+            detail: detail.unwrap_or_default(),
+        }))
+    }
 }

@@ -8,7 +8,7 @@ use futures_util::TryStreamExt as _;
 use noctule::config::Address;
 use noctule::job::{Event, Status};
 use noctule::store::jetstream::Settings;
-use noctule::store::{End, Store, StoreError};
+use noctule::store::{Store, StoreError};
 
 use super::{open, open_as, turn};
 use crate::support::nats::{Cluster, NatsServer};
@@ -102,16 +102,8 @@ async fn a_run_goes_on_over_the_loss_of_the_leader() {
         cluster.servers[leader].restart();
         until_sound(&*store).await;
     }
-    persist(|| {
-        store.finish(
-            &lease,
-            End {
-                told: vec![point(4, None)],
-                ..ending(Status::Succeeded).at(0)
-            },
-        )
-    })
-    .await;
+    let end = ending(Status::Succeeded).after(vec![point(4, None)], 0);
+    persist(|| store.finish(&lease, end.clone())).await;
     until(&*follower, id, |plan| plan.status == Status::Succeeded).await;
     let told = history(&*follower, id).await;
     assert_eq!(told.len(), 2 + 5 + 2);

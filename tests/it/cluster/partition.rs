@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use noctule::job::{Event, Status};
 use noctule::store::jetstream::JetStreamStore;
-use noctule::store::{End, Options, Store, wall_clock};
+use noctule::store::{Options, Store, wall_clock};
 
 use super::open;
 use crate::support::nats::{self, NatsServer, namespace};
@@ -51,15 +51,8 @@ async fn a_node_that_is_cut_off_loses_its_run_and_catches_up_when_it_is_back() {
     }
     let late = far.finish(&lost, ending(Status::Succeeded).at(0)).await;
     assert_eq!(kind(late), Err("lease lost"));
-    near.finish(
-        &taken,
-        End {
-            told: vec![point(3, None)],
-            ..ending(Status::Succeeded).at(0)
-        },
-    )
-    .await
-    .unwrap();
+    let end = ending(Status::Succeeded).after(vec![point(3, None)], 0);
+    near.finish(&taken, end).await.unwrap();
     until(&*far, id, |plan| plan.status == Status::Succeeded).await;
     let told = history(&*far, id).await;
     // Queued, running, a point; queued and running again; the points; succeeded, the end.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use futures_util::future::join_all;
 use noctule::job::{Event, Status};
-use noctule::store::{End, Ending};
+use noctule::store::Ending;
 
 use crate::support::plans::{ending, failure, history, kind, point, statuses, submission, until};
 use crate::support::stores::on_every_backend;
@@ -18,13 +18,7 @@ async fn what_a_run_tells_last_comes_before_its_end() {
             let told: Vec<_> = (1..=count).map(|nth| point(nth, Some(500.0))).collect();
             store.append(&lease, vec![point(0, None)]).await.unwrap();
             let ended = store
-                .finish(
-                    &lease,
-                    End {
-                        told: told.clone(),
-                        ..failure().at(12_500)
-                    },
-                )
+                .finish(&lease, failure().after(told.clone(), 12_500))
                 .await
                 .unwrap();
             assert_eq!(
@@ -37,15 +31,7 @@ async fn what_a_run_tells_last_comes_before_its_end() {
             assert_eq!(history[3..3 + count], told);
             let end = [Event::Status(Box::new(ended)), Event::End(Status::Failed)];
             assert_eq!(history[3 + count..], end);
-            let late = store
-                .finish(
-                    &lease,
-                    End {
-                        told,
-                        ..failure().at(13_000)
-                    },
-                )
-                .await;
+            let late = store.finish(&lease, failure().after(told, 13_000)).await;
             assert_eq!(kind(late), Err("lease lost"));
         }
     })

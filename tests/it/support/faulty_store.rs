@@ -54,7 +54,7 @@ impl Store for FaultyStore {
         self.sound.append(lease, events).await
     }
 
-    async fn finish(&self, lease: &Lease, end: End) -> Result<Plan, StoreError> {
+    async fn finish(&self, lease: &Lease, end: Arc<End>) -> Result<Plan, StoreError> {
         self.stumble()?;
         self.sound.finish(lease, end).await
     }

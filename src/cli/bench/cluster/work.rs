@@ -175,7 +175,7 @@ fn point() -> Event {
     })
 }
 
-fn end() -> End {
+fn end() -> Arc<End> {
     let ending = Ending::Result {
         cancelled: false,
         stop_reason: "iterations".to_owned(),
@@ -185,8 +185,5 @@ fn end() -> End {
         iteration: 200,
         document: "r".repeat(RESULT),
     };
-    End {
-        told: vec![point()],
-        ..ending.at(wall_clock()())
-    }
+    ending.after(vec![point()], wall_clock()())
 }

@@ -163,7 +163,7 @@ fn levelled(name: &str, row: &Row) -> Option<Row> {
         elevation: scenario.terrain.elevation(scenario.start.xy()),
     });
     Some(Row {
-        label: Cell::text(&format!("{name}, levelled")),
+        label: Cell::text(format!("{name}, levelled")),
         scenario,
         batch: row.batch,
     })

@@ -8,7 +8,7 @@ use crate::geometry::geodesy::{LatLon, LatLonBox, TangentPlane, undulation_m};
 use crate::geometry::{Point2, Point3, Rect};
 use crate::scenario::frame::{self, Datum, Frame, Wgs84};
 
-use super::dataset::Named;
+use super::dataset::{Named, over_grid};
 use super::fault::Faults;
 use super::fields::Fields;
 use super::path::Path;
@@ -69,7 +69,7 @@ impl Chart {
         let earth = |area| Earth::over(area, datum, sketch.mean_alt);
         let area = given.unwrap_or_else(|| match dataset {
             Some(dataset) => dataset.within(sketch.area(), &sketch.ends, earth),
-            None => sketch.area(),
+            None => over_grid(fields, &sketch.ends, earth).unwrap_or_else(|| sketch.area()),
         });
         let earth = earth(area);
         earth.check(faults).then(|| Self::Wgs84(Box::new(earth)))

@@ -1,7 +1,8 @@
 //! `terrain` of kind `dataset`: which one it is, the default area over it, and the ground cut out of it.
+//! The default area over a grid, which lies in the plane, is fitted in the same way.
 
 use crate::geometry::geodesy::{LatLon, LatLonBox, TangentPlane};
-use crate::geometry::{Point2, Point3, Rect};
+use crate::geometry::{Point2, Point3, Rect, Vector2};
 use crate::scenario::limits::Limits;
 use crate::terrain::dem::{Dataset, Degrees, DemError};
 use crate::terrain::{DatasetError, Datasets, Found, Terrain};
@@ -10,6 +11,7 @@ use super::chart::{Chart, Earth};
 use super::fault::Faults;
 use super::fields::{Fields, nearest};
 use super::path::Path;
+use super::sketch;
 use super::tree::Node;
 use super::value::{At, quote};
 
@@ -80,6 +82,51 @@ impl<'a> Named<'a> {
         }
         wanted
     }
+}
+
+/// The default area over a terrain grid: the box of degrees in it. `None` where the terrain is no grid or
+/// cannot be read, is wider than a plane fits, or ends before one of `ends`; its reader says so.
+pub(super) fn over_grid(
+    fields: &Fields<'_>,
+    ends: &[LatLon],
+    earth: impl Fn(LatLonBox) -> Earth,
+) -> Option<LatLonBox> {
+    let terrain = fields.find("terrain")?;
+    if !matches!(terrain.get("kind"), Some(Node::Text(kind)) if &**kind == "grid") {
+        return None;
+    }
+    let origin = sketch::place(terrain.get("origin")?)?;
+    let figure = |name: &str| sketch::number(terrain.get(name)?);
+    let cell = figure("cell")?;
+    let size = Vector2::new(
+        cell * (figure("columns")? - 1.0),
+        cell * (figure("rows")? - 1.0),
+    );
+    if !(size.min() > 0.0 && size.max() <= sketch::MAX_WIDTH_M) {
+        return None;
+    }
+    // A plane near the grid first, and the box that its extent has there.
+    let mut fitted = boxed(
+        [origin.lat, origin.lon],
+        [origin.lat + 1.0 / GRAIN, origin.lon + 1.0 / GRAIN],
+    )?;
+    for round in 0..ROUNDS {
+        let earth = earth(fitted);
+        let min = earth.plane().local(origin);
+        let extent = Rect {
+            min,
+            max: min + size,
+        };
+        let rect = earth.rect();
+        let within = extent.contains(rect.min) && extent.contains(rect.max);
+        if round > 0 && within && ends.iter().all(|end| fitted.contains(*end)) {
+            return Some(fitted);
+        }
+        fitted = inside(extent, earth.plane()).filter(|fitted| {
+            fitted.max.lat.abs().max(fitted.min.lat.abs()) < sketch::MAX_LATITUDE
+        })?;
+    }
+    None
 }
 
 /// What `terrain` says, beside the rest of the document.

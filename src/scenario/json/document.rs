@@ -68,7 +68,15 @@ pub(super) fn document(
     let planner = section(&fields, "planner", &Node::Object(Box::default()), |at| {
         planner(at, &chart, rules, drawn_seed, faults)
     });
-    let place = place(&fields, dataset.as_ref(), &chart, rules, faults);
+    let max_climb_deg = draft.map(|draft| draft.max_climb_deg);
+    let place = place(
+        &fields,
+        dataset.as_ref(),
+        &chart,
+        max_climb_deg,
+        rules,
+        faults,
+    );
     let (place, planner) = (place?, planner?);
     let distance = (place.target - place.start).norm();
     check_samples(
@@ -119,6 +127,7 @@ fn place(
     fields: &Fields<'_>,
     dataset: Option<&Named<'_>>,
     chart: &Chart,
+    max_climb_deg: Option<f64>,
     rules: &Rules,
     faults: &mut Faults,
 ) -> Option<Place> {
@@ -173,7 +182,8 @@ fn place(
     };
     let (start, target, terrain) = (start?, target?, ground?);
     let threats: Vec<Threat> = threats?.into_iter().collect::<Option<_>>()?;
-    let area = given_area?.unwrap_or_else(|| default_area(start, target, &threats, &terrain));
+    let area = given_area?
+        .unwrap_or_else(|| default_area(start, target, max_climb_deg, &threats, &terrain));
     Some(Place {
         start,
         target,
@@ -213,8 +223,14 @@ fn covered(area: Rect, terrain: &Terrain, chart: &Chart, faults: &mut Faults) ->
 
 /// The area of a document that names none: a terrain grid's extent, else the box round the start,
 /// the target and every threat with its soft zone, wider on every side by a quarter of its
-/// diagonal and at least by 10 m.
-fn default_area(start: Point3, target: Point3, threats: &[Threat], terrain: &Terrain) -> Rect {
+/// diagonal and at least by 10 m, or by what the climb takes.
+fn default_area(
+    start: Point3,
+    target: Point3,
+    max_climb_deg: Option<f64>,
+    threats: &[Threat],
+    terrain: &Terrain,
+) -> Rect {
     if let Some(extent) = terrain.extent() {
         return extent;
     }
@@ -224,7 +240,9 @@ fn default_area(start: Point3, target: Point3, threats: &[Threat], terrain: &Ter
         .flat_map(|extent| [extent.min, extent.max])
         .chain([start.xy(), target.xy()]);
     let area = Rect::around(area).expect("start and target are there");
-    let padding = (area.diagonal() / 4.0).max(MIN_PADDING_M);
+    let distance = (target.xy() - start.xy()).norm();
+    let climb = vehicle::climbing_room(target.z - start.z, distance, max_climb_deg);
+    let padding = (area.diagonal() / 4.0).max(MIN_PADDING_M).max(climb);
     area.grown(padding)
 }
 

@@ -6,8 +6,9 @@
 use crate::geometry::geodesy::{LatLon, LatLonBox, wrapped};
 
 use super::fields::Fields;
-use super::ranges::{COORDINATE, LATITUDE, LONGITUDE};
+use super::ranges::{CLIMB, COORDINATE, LATITUDE, LONGITUDE};
 use super::tree::{Node, float};
+use super::vehicle::climbing_room;
 
 /// Latitudes beyond are refused, degrees.
 pub(super) const MAX_LATITUDE: f64 = 89.0;
@@ -30,6 +31,8 @@ pub(super) struct Sketch {
     pub(super) ends: Vec<LatLon>,
     /// Between start and target, metres above the datum; 0 where neither can be read.
     pub(super) mean_alt: f64,
+    /// How far a route that climbs from start to target must reach beyond them, metres.
+    climb_m: f64,
     /// Longitudes are counted from here, so that the antimeridian is nothing special.
     reference: f64,
     south: f64,
@@ -68,6 +71,7 @@ impl Sketch {
         let ends: Vec<LatLon> = ends.into_iter().filter_map(|end| place(end?)).collect();
         let reference = places.first().map_or(0.0, |(place, _)| place.lon);
         let mut sketch = Self {
+            climb_m: climb(fields, &ends, &alts),
             ends,
             mean_alt: alts.iter().sum::<f64>() / alts.len().max(1) as f64,
             reference,
@@ -97,14 +101,15 @@ impl Sketch {
 
     /// The area of a document that names none: the box round the start, the target and every threat
     /// with its soft zone, wider on every side by a quarter of its diagonal and at least by 10 m,
-    /// as far as the widest area allows.
+    /// or by what the climb takes, as far as the widest area allows.
     pub(super) fn area(&self) -> LatLonBox {
         let shrink = shrink(f64::midpoint(self.south, self.north));
         let height = (self.north - self.south) * DEGREE_M;
         let width = (self.east - self.west) * DEGREE_M * shrink;
         let room = (FITTING * MAX_WIDTH_M - height.max(width)) / 2.0;
         let diagonal = (width * width + height * height).sqrt();
-        let padding = (diagonal / 4.0).min(room).max(MIN_PADDING_M) / DEGREE_M;
+        let padding = (diagonal / 4.0).max(self.climb_m).min(room);
+        let padding = padding.max(MIN_PADDING_M) / DEGREE_M;
         let down = |degrees: f64| (degrees * GRAIN).floor() / GRAIN;
         let up = |degrees: f64| (degrees * GRAIN).ceil() / GRAIN;
         LatLonBox {
@@ -120,6 +125,24 @@ impl Sketch {
     }
 }
 
+/// [`climbing_room`] between `ends` at `alts`; nothing where one of them cannot be read.
+fn climb(fields: &Fields<'_>, ends: &[LatLon], alts: &[f64]) -> f64 {
+    let (&[start, target], &[from, to]) = (ends, alts) else {
+        return 0.0;
+    };
+    let north = target.lat - start.lat;
+    let east = wrapped(target.lon - start.lon) * shrink(start.lat);
+    let max_climb_deg = fields
+        .find("vehicle")
+        .and_then(|vehicle| number(vehicle.get("max_climb_deg")?))
+        .filter(|climb| CLIMB.contains(*climb));
+    climbing_room(
+        to - from,
+        libm::hypot(north, east) * DEGREE_M,
+        max_climb_deg,
+    )
+}
+
 /// Metres of a degree of longitude over those of a degree of latitude, about; never nothing.
 fn shrink(lat: f64) -> f64 {
     libm::cos(lat.to_radians()).max(0.01)
@@ -132,13 +155,15 @@ fn items<'a>(node: Option<&'a Node<'a>>) -> &'a [Node<'a>] {
     }
 }
 
-fn place(node: &Node) -> Option<LatLon> {
+/// `{"lat", "lon"}` within their ranges.
+pub(super) fn place(node: &Node) -> Option<LatLon> {
     let lat = number(node.get("lat")?)?;
     let lon = number(node.get("lon")?)?;
     (LATITUDE.contains(lat) && LONGITUDE.contains(lon)).then_some(LatLon { lat, lon })
 }
 
-fn number(node: &Node) -> Option<f64> {
+/// The figure, of any size.
+pub(super) fn number(node: &Node) -> Option<f64> {
     match node {
         Node::Number(number) => Some(float(number)),
         _ => None,

@@ -17,11 +17,14 @@ const DEFAULT_WEIGHTS: Weights = Weights {
     altitude: 1.0,
 };
 
+/// Room for climbing makes no area wider than coordinates may be, metres.
+const MOST_ROOM_M: f64 = 1e7;
+
 /// A vehicle whose shortest leg may still depend on the rest of the document.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct VehicleDraft {
     max_turn_deg: f64,
-    max_climb_deg: f64,
+    pub(super) max_climb_deg: f64,
     min_leg: Option<f64>,
     cruise_speed: f64,
     fuel_per_km: f64,
@@ -49,6 +52,20 @@ impl VehicleDraft {
             cruise_speed: self.cruise_speed,
             fuel_per_km: self.fuel_per_km,
         }
+    }
+}
+
+/// How far a default area must reach beyond everything, in metres, for a route to be
+/// no steeper than `max_climb_deg` (left out, the default) that must rise so much over so great a
+/// distance: none where the straight way is not steeper, else half of the way over ground that the
+/// climb takes, for going out and coming back.
+pub(super) fn climbing_room(rise_m: f64, distance_m: f64, max_climb_deg: Option<f64>) -> f64 {
+    let max_climb_deg = max_climb_deg.unwrap_or(DEFAULT_MAX_CLIMB_DEG);
+    let over_ground = rise_m.abs() / libm::tan(max_climb_deg.to_radians());
+    if over_ground > distance_m {
+        (0.5 * over_ground).min(MOST_ROOM_M)
+    } else {
+        0.0
     }
 }
 

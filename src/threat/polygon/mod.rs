@@ -106,7 +106,7 @@ impl Polygon {
     /// Least distance of the part `window` of `leg` to the ring, metres; where the leg enters, the
     /// greatest depth that it reaches, negative.
     pub(super) fn clearance(&self, leg: &Segment, window: (f64, f64)) -> f64 {
-        clearance_of(&self.pieces(leg, window), leg)
+        clearance_of(&self.pieces(leg, window), leg, &self.vertices)
     }
 
     /// Integral of `T` over the part `window` of `leg`: `margin - distance` outside the ring up to
@@ -119,7 +119,7 @@ impl Polygon {
     /// Clearance and exposure of the part `window` of `leg`.
     pub(super) fn encounter(&self, leg: &Segment, window: (f64, f64)) -> (f64, f64) {
         let pieces = self.pieces(leg, window);
-        let clearance = clearance_of(&pieces, leg);
+        let clearance = clearance_of(&pieces, leg, &self.vertices);
         let exposure = if self.margin <= 0.0 {
             0.0
         } else if leg.horizontal_length() < LEVEL {
@@ -167,23 +167,18 @@ impl Polygon {
     /// The part `window` of `leg` in order, cut where the nearest feature of the ring changes and
     /// where the leg crosses the ring.
     fn pieces(&self, leg: &Segment, window: (f64, f64)) -> Vec<Piece> {
+        let features = nearest::features(&self.vertices, leg);
         let mut pieces = Vec::new();
-        cut(
-            &nearest::features(&self.vertices, leg),
-            window,
-            leg.horizontal_length(),
-            &mut pieces,
-        );
-        let hair = 1e-6 * (1.0 + leg.horizontal_length());
-        let (mut inside, mut at_ring) = (false, true);
-        for piece in &mut pieces {
-            let (d0, d1) = piece.end_distances(leg);
-            // Only where it meets the ring does a leg change sides.
-            if at_ring || d0 < hair {
-                inside = self.contains(leg.at(0.5 * (piece.t0 + piece.t1)).xy());
+        cut(&features, window, leg.horizontal_length(), &mut pieces);
+        // Sides are not told by the nearest features: where edges are nearly in line, rounding may
+        // take one for another beside a vertex, and with it the crossing.
+        let crossings = nearest::crossings(&features, window);
+        let mut from = window.0;
+        for to in crossings.into_iter().chain([window.1]) {
+            if self.contains(leg.at(0.5 * (from + to)).xy()) {
+                nearest::mark_inside(&mut pieces, (from, to));
             }
-            piece.inside = inside;
-            at_ring = d1 < hair;
+            from = to;
         }
         pieces
     }

@@ -127,13 +127,59 @@ impl Piece {
     }
 }
 
-pub(super) fn clearance_of(pieces: &[Piece], leg: &Segment) -> f64 {
-    // Inside, distance grows convexly on each piece, so that its ends hold the greatest depth.
-    let depth = pieces
+/// Where in `window` the leg crosses edges, in order; an edge counts as a hair longer than it is.
+pub(super) fn crossings(features: &[Feature], window: (f64, f64)) -> Vec<f64> {
+    let mut crossings: Vec<f64> = features
         .iter()
-        .filter(|piece| piece.inside)
+        .filter_map(|feature| match feature.kind {
+            Kind::Edge { at_start, gain } => {
+                let (t, (from, to)) = (-at_start / gain, feature.valid);
+                (t >= from - NO_TIME && t <= to + NO_TIME).then_some(t)
+            }
+            Kind::Vertex(_) => None,
+        })
+        .filter(|&t| t > window.0 && t < window.1)
+        .collect();
+    crossings.sort_by(f64::total_cmp);
+    crossings
+}
+
+/// The part `(from, to)` of the leg lies within the ring.
+pub(super) fn mark_inside(pieces: &mut Vec<Piece>, (from, to): (f64, f64)) {
+    let mut cut_at = |t: f64| {
+        let within = |piece: &Piece| piece.t0 + SHORTEST_PIECE < t && t < piece.t1 - SHORTEST_PIECE;
+        if let Some(idx) = pieces.iter().position(within) {
+            let later = Piece {
+                t0: t,
+                ..pieces[idx]
+            };
+            pieces[idx].t1 = t;
+            pieces.insert(idx + 1, later);
+        }
+    };
+    cut_at(from);
+    cut_at(to);
+    for piece in pieces {
+        let middle = 0.5 * (piece.t0 + piece.t1);
+        piece.inside |= from < middle && middle < to;
+    }
+}
+
+/// The clearance of `pieces` of `leg` from the ring through `vertices`.
+pub(super) fn clearance_of(pieces: &[Piece], leg: &Segment, vertices: &[Point2]) -> f64 {
+    // Inside, distance grows convexly on each piece, so that its ends hold the greatest depth.
+    let within = || pieces.iter().filter(|piece| piece.inside);
+    let depth = within()
         .map(|piece| piece.end_distances(leg))
         .fold(0.0, |depth: f64, (d0, d1)| depth.max(d0).max(d1));
+    // From edge to edge of a ring so sharp or so small that no piece ends between.
+    let depth = if depth > 0.0 {
+        depth
+    } else {
+        within()
+            .map(|piece| ring::distance(vertices, leg.at(0.5 * (piece.t0 + piece.t1)).xy()))
+            .fold(0.0, f64::max)
+    };
     if depth > 0.0 {
         return -depth;
     }

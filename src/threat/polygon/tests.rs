@@ -71,6 +71,48 @@ fn a_tie_at_the_middle_is_seen() {
     assert!((exposure - 16.0).abs() < 1e-9, "{exposure}");
 }
 
+/// A square with vertices in the middle of its sides, bent by so little as a plane on the earth
+/// bends parallels: a leg that goes in beside a vertex and out is seen however it lies.
+#[test]
+fn sides_that_are_nearly_straight_are_not_entered_unseen() {
+    for bend in [1e-9, 1e-8, 1e-7, 1e-6, 1e-5] {
+        let corners = [
+            [0.0, 0.0],
+            [5.0, bend],
+            [10.0, 0.0],
+            [10.0 - bend, 5.0],
+            [10.0, 10.0],
+            [5.0, 10.0 + bend],
+            [0.0, 10.0],
+            [-bend, 5.0],
+        ];
+        let square = ring(&corners, 1.0);
+        for (step, corner) in (0..1000).zip(corners.iter().cycle()) {
+            let step = f64::from(step);
+            let angle = 0.618 * step;
+            let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+            let beside = libm::pow(10.0, -2.0 - 10.0 * (0.382 * step).fract());
+            let [x, y] = [
+                corner[0] + beside * libm::cos(step),
+                corner[1] + beside * libm::sin(step),
+            ];
+            let (before, after) = (1.0 + (7.1 * step) % 29.0, 1.0 + (3.3 * step) % 29.0);
+            let leg = leg(
+                [x - before * cos, y - before * sin, 0.0],
+                [x + after * cos, y + after * sin, 0.0],
+            );
+            let deepest = (0..=200)
+                .map(|share| -square.distance(leg.at(f64::from(share) / 200.0).xy()))
+                .fold(0.0, f64::max);
+            let depth = (-square.clearance(&leg, (0.0, 1.0))).max(0.0);
+            assert!(
+                depth >= deepest - 1e-6,
+                "bend {bend}, step {step}: {depth} of {deepest}"
+            );
+        }
+    }
+}
+
 fn star() -> Polygon {
     ring(
         &[

@@ -129,6 +129,47 @@ fn every_code_has_a_case_and_a_row_in_the_docs() {
     );
 }
 
+/// A target that is steeper above the start than the vehicle climbs needs room for a detour.
+#[test]
+fn a_default_area_has_room_for_the_climb() {
+    let area = |target: &str, climb: &str| {
+        let text = format!(
+            r#"{{"start":{{"x":0,"y":0,"z":0}},"target":{target},"altitude":{{"min":0,"max":200}},
+            "terrain":{{"kind":"flat","elevation":-500}},"vehicle":{{"max_climb_deg":{climb}}}}}"#
+        );
+        let area = read(&text).expect("no fault").area;
+        [area.min.x, area.min.y, area.max.x, area.max.y]
+    };
+    let check = |target, climb, expected: [f64; 4]| {
+        for (actual, expected) in area(target, climb).into_iter().zip(expected) {
+            assert!(
+                (actual - expected).abs() < 1e-6,
+                "{target} {climb}: {actual} {expected}"
+            );
+        }
+    };
+    // As steep as the vehicle: a quarter of the box.
+    check(
+        r#"{"x":100,"y":0,"z":100}"#,
+        "45.001",
+        [-25.0, -25.0, 125.0, 25.0],
+    );
+    // Half of the 300 m over ground that the climb takes, on every side.
+    check(
+        r#"{"x":100,"y":0,"z":300}"#,
+        "45",
+        [-150.0, -150.0, 250.0, 150.0],
+    );
+    check(
+        r#"{"x":100,"y":0,"z":-300}"#,
+        "45",
+        [-150.0, -150.0, 250.0, 150.0],
+    );
+    // However slowly it climbs, the document that is written is accepted again.
+    let far = area(r#"{"x":100,"y":0,"z":1000}"#, "1e-9");
+    assert!(far.iter().all(|coordinate| coordinate.abs() < 1e8));
+}
+
 #[test]
 fn the_least_document_is_filled_with_the_defaults() {
     let scenario = read(LEAST).expect("it says all that is needed");

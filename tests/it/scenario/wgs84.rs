@@ -168,6 +168,48 @@ fn the_antimeridian_is_nothing_special() {
 }
 
 /// What is set where, and the one fault it makes.
+/// Without an area, waypoints may be wherever the grid is, and the document that says so is accepted as it is.
+#[test]
+fn the_default_area_over_a_grid_is_all_of_it() {
+    for (lat, lon) in [(36.4_f64, -84.45_f64), (-70.0, 179.9), (0.001, 8.5)] {
+        let mut gridded = document();
+        gridded["threats"] = json!([]);
+        gridded["planner"] = json!({});
+        gridded["terrain"] = json!({
+            "kind": "grid", "origin": {"lat": lat, "lon": lon}, "cell": 4000, "columns": 6, "rows": 4,
+            "elevations": vec![300; 24],
+        });
+        let place = |north: f64, east: f64| {
+            let east = lon + east / 111_320.0 / libm::cos(lat.to_radians());
+            let east = (east + 180.0).rem_euclid(360.0) - 180.0;
+            json!({"lat": lat + north / 111_320.0, "lon": east, "alt": 420})
+        };
+        gridded["start"] = place(2000.0, 3000.0);
+        gridded["target"] = place(9000.0, 14_000.0);
+        let scenario = accepted(&gridded);
+        let size = scenario.area.max - scenario.area.min;
+        assert!((20_000.0 - size.x) < 200.0 && size.x <= 20_000.0, "{size}");
+        assert!((12_000.0 - size.y) < 200.0 && size.y <= 12_000.0, "{size}");
+        let written: Value = serde_json::from_str(&json::write(&scenario)).expect("JSON");
+        assert_eq!(accepted(&written), scenario);
+    }
+}
+
+#[test]
+fn the_default_area_has_room_for_a_climb_that_is_steeper_than_the_vehicle() {
+    let mut steep = document();
+    steep["threats"] = json!([]);
+    steep["planner"] = json!({});
+    steep["start"] = json!({"lat": 36.5, "lon": -84.35, "alt": 420});
+    steep["target"] = json!({"lat": 36.501, "lon": -84.35, "alt": 1420});
+    steep["vehicle"] = json!({"max_climb_deg": 30});
+    let scenario = accepted(&steep);
+    let way_over_ground = 1000.0 / libm::tan(30.0_f64.to_radians());
+    assert!(scenario.area.max.x - scenario.target.x > 0.49 * way_over_ground);
+    steep["vehicle"] = json!({"max_climb_deg": 89});
+    assert!(accepted(&steep).area.diagonal() < 300.0);
+}
+
 #[test]
 fn what_no_plane_fits_is_refused() {
     let cases = [

@@ -97,6 +97,7 @@ async fn written(
             HeaderValue::from_static(format.media_type),
         ),
         (header::CONTENT_DISPOSITION, disposition(plan, format)),
+        (header::VARY, HeaderValue::from_static("accept")),
     ];
     Ok((headers, document).into_response())
 }

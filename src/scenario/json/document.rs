@@ -77,14 +77,15 @@ pub(super) fn document(
         rules,
         faults,
     );
-    let (place, planner) = (place?, planner?);
+    let (place, mut planner) = (place?, planner?);
     let distance = (place.target - place.start).norm();
-    check_samples(
-        distance,
-        planner.smoothing.spacing,
-        rules.limits.path_samples,
-        faults,
-    );
+    let limit = rules.limits.path_samples;
+    if names_spacing(&fields) {
+        check_samples(distance, planner.smoothing.spacing, limit, faults);
+    } else if samples(distance, planner.smoothing.spacing) > limit as f64 {
+        // Nobody is refused for what nobody asked: the straight way then makes half of the limit.
+        planner.smoothing.spacing = 2.0 * distance / limit as f64;
+    }
     Some(Scenario {
         name: name?,
         frame: chart.finish(),
@@ -246,9 +247,21 @@ fn default_area(
     area.grown(padding)
 }
 
+fn names_spacing(fields: &Fields<'_>) -> bool {
+    let smoothing = fields
+        .find("planner")
+        .and_then(|planner| planner.get("smoothing"));
+    smoothing.is_some_and(|smoothing| smoothing.get("spacing").is_some())
+}
+
+/// Of the straight way from start to target.
+fn samples(distance: f64, spacing: f64) -> f64 {
+    (distance / spacing).ceil() + 1.0
+}
+
 /// The straight way from start to target must not already make more samples than the server takes.
 fn check_samples(distance: f64, spacing: f64, limit: usize, faults: &mut Faults) {
-    let samples = (distance / spacing).ceil() + 1.0;
+    let samples = samples(distance, spacing);
     if samples > limit as f64 {
         let planner = Path::Key(&Path::Root, "planner");
         let smoothing = Path::Key(&planner, "smoothing");

@@ -129,6 +129,20 @@ fn every_code_has_a_case_and_a_row_in_the_docs() {
     );
 }
 
+/// So far apart that samples every 5 m would be more than the server takes.
+#[test]
+fn a_default_spacing_is_never_refused() {
+    let spacing = |x: u32| {
+        let text = format!(
+            r#"{{"start":{{"x":0,"y":0,"z":50}},"target":{{"x":{x},"y":0,"z":50}},"altitude":{{"min":0,"max":100}}}}"#
+        );
+        read(&text).expect("no fault").planner.smoothing.spacing
+    };
+    for (x, expected) in [(1_000, 5.0), (249_990, 5.0), (300_000, 12.0)] {
+        assert!((spacing(x) - expected).abs() < 1e-12, "{x}: {}", spacing(x));
+    }
+}
+
 /// A target that is steeper above the start than the vehicle climbs needs room for a detour.
 #[test]
 fn a_default_area_has_room_for_the_climb() {

@@ -74,19 +74,24 @@ impl Pricer<'_> {
         };
         let mut candidates = Candidates::default();
         let [start, target] = self.heights.below_ends;
-        let below_point = |idx: usize| match idx {
-            _ if HEIGHTS => self.elevation(simd, part, &points[idx]),
-            0 => zero.with(start),
-            _ if idx + 1 == points.len() => zero.with(target),
-            _ => Lane::load(simd, &ground[idx - 1], part),
+        let mut below = if HEIGHTS {
+            self.elevation(simd, part, &points[0])
+        } else {
+            zero.with(start)
         };
-        let mut below = below_point(0);
         for (leg_idx, rows) in points.windows(2).enumerate() {
             let leg = Leg::new(simd, part, [&rows[0], &rows[1]]);
             length = length + leg.length;
             self.threats(&leg, &mut candidates, &mut exposure, &mut violation);
             let free = leg_idx + 2 < points.len();
-            let below_a = std::mem::replace(&mut below, below_point(leg_idx + 1));
+            let below_a = below;
+            below = if HEIGHTS {
+                self.elevation(simd, part, &rows[1])
+            } else if free {
+                Lane::load(simd, &ground[leg_idx], part)
+            } else {
+                zero.with(target)
+            };
             let ends = [leg.a.z - below_a, leg.b.z - below];
             if HEIGHTS {
                 let slot = part * S::F64_LANES;

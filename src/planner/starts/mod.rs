@@ -1,5 +1,6 @@
 //! Routes to start from: along taut strings round the threats, and along a route that is known.
 
+mod climbs;
 mod count;
 mod known;
 mod net;
@@ -75,10 +76,12 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let warm = known.is_some();
     let mut legs_priced = 0;
     let mut shapes: Vec<Vec<Point3>> = known.into_iter().collect();
+    let mut climbs = Vec::new();
     if settings.seeding == Seeding::Tangent {
         shapes.extend(along_strings(model, stop));
         // Who brings a route has been over the hills already.
         if !warm {
+            climbs = climbs::routes(model);
             let found = over_ground(model);
             shapes.extend(found.routes);
             legs_priced = found.legs_priced;
@@ -87,8 +90,14 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     if shapes.is_empty() {
         return None;
     }
+    // Where the way must be made longer, spare waypoints are dear on the others.
+    let mut low = false;
+    if !climbs.is_empty() {
+        shapes.append(&mut climbs);
+        (shapes, low) = climbs::promising(model, shapes);
+    }
     // A known route keeps its bends; a string needs but as many waypoints as it has.
-    let coarse = if warm {
+    let coarse = if warm || low {
         settings.waypoints
     } else {
         bends(model, &shapes).min(settings.waypoints)

@@ -1,0 +1,229 @@
+//! Longer ways, where the direct one is too short to climb: out and back, round about, to and fro.
+//!
+//! A vehicle that climbs by so many degrees needs so many metres of way to reach the middle of the altitude band, or
+//! even the target. Where start and target are nearer to each other than that, the cheapest chains of legs through
+//! a few places are found along which it gets there, by what each leg costs and how far from that height the bends
+//! at its end are. One search begins at the start and one at the target; they meet where both have climbed.
+
+mod places;
+mod ways;
+
+use crate::cost::Model;
+use crate::geometry::Point3;
+use crate::optimizer::Fitness;
+use crate::planner::price::price;
+use crate::scenario::Scenario;
+use ways::Ways;
+
+/// How far to climb, as shares of what lies between the middle of the band and that end of the route which is
+/// nearer to it; the first at which the searches meet is taken.
+const SHARES: [f64; 5] = [1.0, 0.75, 0.5, 0.25, 0.0];
+
+/// How long ways are, as a share of what the climb takes, and how much room there is at the area's edge, as a
+/// multiple of the radius of a bend: ways that can be flown as they are, and tighter ones for the polish to stretch.
+const TRIES: [(f64, f64); 2] = [(1.0, 2.0), (0.97, 1.0)];
+
+/// Of the waypoints, the share for which there is room at the height.
+const LEVEL: f64 = 0.7;
+
+/// Ways are longer than they must be by this share, and turns less sharp.
+const SLACK: f64 = 1e-6;
+
+/// A route this much dearer than the best, as a share, is left out.
+const DEAR: f64 = 0.16;
+
+/// Where spare waypoints cost more than this share of the best route, its climb is not to be searched with fewer.
+const LOW: f64 = 0.1;
+
+/// What a way has to reach.
+#[derive(Clone, Copy)]
+struct Climb {
+    /// Above ground, metres.
+    height: f64,
+    /// Along the ground from start and from target to there, metres.
+    needed: [f64; 2],
+    /// What the target's being higher than the start, or lower, takes more than that.
+    more: f64,
+}
+
+/// Routes that are long enough to climb, of no more waypoints than `model` asks for; none where the direct way is
+/// long enough.
+pub(super) fn routes(model: &Model) -> Vec<Vec<Point3>> {
+    let scenario = model.scenario;
+    let direct = (scenario.target - scenario.start).xy().norm();
+    let is_longer = |climb: &Climb| climb.length() > direct;
+    if !is_longer(&Climb::by(scenario, SHARES[0])) {
+        return Vec::new();
+    }
+    let find = |climb| {
+        let tries = TRIES.into_iter();
+        let ways = tries.flat_map(|(near, room)| Ways::new(model, climb, room).routes(near));
+        ways.collect::<Vec<_>>()
+    };
+    SHARES
+        .into_iter()
+        .map(|share| Climb::by(scenario, share))
+        .filter(is_longer)
+        .map(find)
+        .find(|routes| !routes.is_empty())
+        .unwrap_or_default()
+}
+
+/// Those of `shapes` that may still win once they have all their waypoints, and whether these are too low to be
+/// left out in a coarse search.
+pub(super) fn promising(model: &Model, shapes: Vec<Vec<Point3>>) -> (Vec<Vec<Point3>>, bool) {
+    let mut worth: Vec<(Worth, Vec<Point3>)> = shapes
+        .into_iter()
+        .map(|shape| {
+            let waypoints = model.scenario.planner.waypoints.min(shape.len() - 2);
+            let route = super::with_waypoints(model, shape, waypoints);
+            (Worth::of(model, &route), route)
+        })
+        .collect();
+    worth.sort_by(|(one, _), (other, _)| one.fitness.rank(&other.fitness));
+    let Some((best, _)) = worth.first() else {
+        return (Vec::new(), false);
+    };
+    let (most, low) = (
+        best.fitness.cost * (1.0 + DEAR),
+        best.spare > LOW * best.fitness.cost,
+    );
+    worth.retain(|(worth, _)| worth.fitness.cost <= most);
+    (worth.into_iter().map(|(_, route)| route).collect(), low)
+}
+
+/// What a route is worth with all its waypoints.
+struct Worth {
+    fitness: Fitness,
+    /// Share of its cost for the waypoints that are not there yet, each where it is cheapest.
+    spare: f64,
+}
+
+impl Worth {
+    fn of(model: &Model, route: &[Point3]) -> Self {
+        let middles = route
+            .windows(2)
+            .map(|ends| nalgebra::center(&ends[0], &ends[1]));
+        let least = route[1..route.len() - 1]
+            .iter()
+            .copied()
+            .chain(middles)
+            .map(|at| model.waypoint(at, model.tolerance).1)
+            .fold(f64::INFINITY, f64::min);
+        let mut fitness = price(model, route);
+        let spare = (model.scenario.planner.waypoints + 2 - route.len()) as f64 * least;
+        fitness.cost += spare;
+        Self { fitness, spare }
+    }
+}
+
+impl Climb {
+    fn by(scenario: &Scenario, share: f64) -> Self {
+        let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max);
+        let own = [scenario.start, scenario.target]
+            .map(|end| end.z - scenario.terrain.elevation(end.xy()));
+        let nearer = own
+            .into_iter()
+            .min_by(|one, other| (one - middle).abs().total_cmp(&(other - middle).abs()))
+            .expect("two ends");
+        let height = nearer + share * (middle - nearer);
+        // Waypoints up there keep their distance from each other.
+        let level = LEVEL * scenario.planner.waypoints as f64 * scenario.vehicle.min_leg;
+        let climb = |rise: f64| rise.abs() / steepest(scenario) * (1.0 + SLACK);
+        let needed = own.map(|own| climb(own - height) + 0.5 * level);
+        let least = climb(scenario.target.z - scenario.start.z);
+        Self {
+            height,
+            needed,
+            more: (least - needed[0] - needed[1]).max(0.0),
+        }
+    }
+
+    /// From start to target, along the ground.
+    fn length(&self) -> f64 {
+        self.needed[0] + self.needed[1] + self.more
+    }
+}
+
+/// Tangent of the steepest climb that is planned with.
+fn steepest(scenario: &Scenario) -> f64 {
+    libm::tan(scenario.vehicle.max_climb_deg.to_radians()) * (1.0 - 1e-9)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Point2, Rect};
+    use crate::planner::tests::scenario;
+    use crate::planner::{Nobody, plan};
+    use crate::scenario::Seeding;
+
+    /// Over level ground in a band of 400 m: so far from start to target, so much higher, at most so steep and so sharp.
+    fn steep([distance, rise, climb, turn]: [f64; 4], waypoints: usize) -> Scenario {
+        let mut scenario = scenario();
+        scenario.threats.clear();
+        scenario.start = Point3::new(0.0, 0.0, 0.0);
+        scenario.target = Point3::new(distance, 0.0, rise);
+        scenario.area = Rect {
+            min: Point2::new(-100.0, -100.0),
+            max: Point2::new(distance + 100.0, 100.0),
+        };
+        scenario.altitude.max = 400.0;
+        scenario.vehicle.max_climb_deg = climb;
+        scenario.vehicle.max_turn_deg = turn;
+        scenario.vehicle.min_leg = distance.hypot(rise) / (10.0 * (waypoints + 1) as f64);
+        scenario.planner.seeding = Seeding::Tangent;
+        scenario.planner.polish = true;
+        scenario.planner.waypoints = waypoints;
+        scenario.planner.iterations = 20;
+        scenario.planner.population = 20;
+        scenario
+    }
+
+    #[test]
+    fn a_way_that_is_long_enough_is_left_alone() {
+        for shape in [[900.0, 0.0, 45.0, 60.0], [400.0, 200.0, 45.0, 60.0]] {
+            assert!(routes(&Model::new(&steep(shape, 10))).is_empty());
+        }
+    }
+
+    /// Straight up and over, on four shapes of ground, the way is long enough, and can be flown as it is.
+    #[test]
+    fn longer_ways_climb_and_keep_every_limit() {
+        for (shape, waypoints) in [
+            ([30.0, 0.0, 45.0, 60.0], 10),
+            ([100.0, 300.0, 45.0, 60.0], 12),
+            ([500.0, 200.0, 15.0, 60.0], 10),
+            ([30.0, 200.0, 20.0, 45.0], 20),
+        ] {
+            let scenario = steep(shape, waypoints);
+            let model = Model::new(&scenario);
+            let routes = routes(&model);
+            let flown = |route: &&Vec<Point3>| price(&model, route).is_feasible();
+            assert!(routes.iter().any(|route| flown(&route)), "{shape:?}");
+            for route in &routes {
+                assert!(route.len() <= waypoints + 2, "{shape:?}");
+                let ends = (route[0], route[route.len() - 1]);
+                assert_eq!(ends, (scenario.start, scenario.target));
+            }
+        }
+    }
+
+    /// The plans, not only where they start; with what each must not cost more than.
+    #[test]
+    fn steep_climbs_are_planned() {
+        for (shape, waypoints, most) in [
+            ([30.0, 0.0, 45.0, 60.0], 10, 600.0),
+            ([100.0, 300.0, 30.0, 60.0], 10, 550.0),
+            ([500.0, 200.0, 15.0, 60.0], 10, 540.0),
+            ([500.0, 200.0, 15.0, 60.0], 30, 610.0),
+            ([30.0, 200.0, 20.0, 45.0], 20, 1150.0),
+        ] {
+            let scenario = steep(shape, waypoints);
+            let outcome = plan(&scenario, &mut Nobody, &Nobody);
+            assert!(outcome.feasible, "{shape:?}");
+            let total = outcome.cost.total;
+            assert!(total < most, "{shape:?}, {waypoints}: {total}");
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! The whole document: its sections, and what they must be to each other.
 
 use crate::geometry::{Point3, Rect};
-use crate::scenario::Scenario;
+use crate::scenario::{AltitudeBand, Scenario};
 use crate::terrain::Terrain;
 use crate::threat::Threat;
 
@@ -73,6 +73,7 @@ pub(super) fn document(
         &fields,
         dataset.as_ref(),
         &chart,
+        altitude,
         max_climb_deg,
         rules,
         faults,
@@ -128,6 +129,7 @@ fn place(
     fields: &Fields<'_>,
     dataset: Option<&Named<'_>>,
     chart: &Chart,
+    altitude: Option<AltitudeBand>,
     max_climb_deg: Option<f64>,
     rules: &Rules,
     faults: &mut Faults,
@@ -183,8 +185,9 @@ fn place(
     };
     let (start, target, terrain) = (start?, target?, ground?);
     let threats: Vec<Threat> = threats?.into_iter().collect::<Option<_>>()?;
-    let area = given_area?
-        .unwrap_or_else(|| default_area(start, target, max_climb_deg, &threats, &terrain));
+    let area = given_area?.unwrap_or_else(|| {
+        default_area([start, target], altitude, max_climb_deg, &threats, &terrain)
+    });
     Some(Place {
         start,
         target,
@@ -224,10 +227,10 @@ fn covered(area: Rect, terrain: &Terrain, chart: &Chart, faults: &mut Faults) ->
 
 /// The area of a document that names none: a terrain grid's extent, else the box round the start,
 /// the target and every threat with its soft zone, wider on every side by a quarter of its
-/// diagonal and at least by 10 m, or by what the climb takes.
+/// diagonal and at least by 10 m, or by what the climb to the middle of the band takes.
 fn default_area(
-    start: Point3,
-    target: Point3,
+    [start, target]: [Point3; 2],
+    altitude: Option<AltitudeBand>,
     max_climb_deg: Option<f64>,
     threats: &[Threat],
     terrain: &Terrain,
@@ -242,8 +245,14 @@ fn default_area(
         .chain([start.xy(), target.xy()]);
     let area = Rect::around(area).expect("start and target are there");
     let distance = (target.xy() - start.xy()).norm();
-    let climb = vehicle::climbing_room(target.z - start.z, distance, max_climb_deg);
-    let padding = (area.diagonal() / 4.0).max(MIN_PADDING_M).max(climb);
+    let middle = |end: Point3| {
+        altitude.map_or(end.z, |band| {
+            terrain.elevation(end.xy()) + f64::midpoint(band.min, band.max)
+        })
+    };
+    let climb = vehicle::climb_through([start.z, target.z], [middle(start), middle(target)]);
+    let room = vehicle::climbing_room(climb, distance, max_climb_deg);
+    let padding = (area.diagonal() / 4.0).max(MIN_PADDING_M).max(room);
     area.grown(padding)
 }
 

@@ -6,9 +6,9 @@
 use crate::geometry::geodesy::{LatLon, LatLonBox, wrapped};
 
 use super::fields::Fields;
-use super::ranges::{CLIMB, COORDINATE, LATITUDE, LONGITUDE};
+use super::ranges::{ALTITUDE, CLIMB, COORDINATE, LATITUDE, LONGITUDE};
 use super::tree::{Node, float};
-use super::vehicle::climbing_room;
+use super::vehicle::{climb_through, climbing_room};
 
 /// Latitudes beyond are refused, degrees.
 pub(super) const MAX_LATITUDE: f64 = 89.0;
@@ -31,7 +31,7 @@ pub(super) struct Sketch {
     pub(super) ends: Vec<LatLon>,
     /// Between start and target, metres above the datum; 0 where neither can be read.
     pub(super) mean_alt: f64,
-    /// How far a route that climbs from start to target must reach beyond them, metres.
+    /// How far a route that climbs to the middle of the band must reach beyond start and target, metres.
     climb_m: f64,
     /// Longitudes are counted from here, so that the antimeridian is nothing special.
     reference: f64,
@@ -136,11 +136,28 @@ fn climb(fields: &Fields<'_>, ends: &[LatLon], alts: &[f64]) -> f64 {
         .find("vehicle")
         .and_then(|vehicle| number(vehicle.get("max_climb_deg")?))
         .filter(|climb| CLIMB.contains(*climb));
-    climbing_room(
-        to - from,
-        libm::hypot(north, east) * DEGREE_M,
-        max_climb_deg,
-    )
+    let climb_m = match level_middle(fields) {
+        Some(middle) => climb_through([from, to], [middle, middle]),
+        None => (to - from).abs(),
+    };
+    climbing_room(climb_m, libm::hypot(north, east) * DEGREE_M, max_climb_deg)
+}
+
+/// The middle of the altitude band in the frame, over ground that is level.
+fn level_middle(fields: &Fields<'_>) -> Option<f64> {
+    let band = fields.find("altitude")?;
+    let end = |name: &str| number(band.get(name)?).filter(|end| ALTITUDE.contains(*end));
+    let ground = match fields.find("terrain") {
+        None => 0.0,
+        Some(terrain) => match terrain.get("kind")? {
+            Node::Text(kind) if **kind == *"flat" => {
+                let elevation = terrain.get("elevation").map_or(Some(0.0), number);
+                elevation.filter(|elevation| COORDINATE.contains(*elevation))?
+            }
+            _ => return None,
+        },
+    };
+    Some(ground + f64::midpoint(end("min")?, end("max")?))
 }
 
 /// Metres of a degree of longitude over those of a degree of latitude, about; never nothing.

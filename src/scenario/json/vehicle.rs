@@ -55,18 +55,25 @@ impl VehicleDraft {
     }
 }
 
-/// How far a default area must reach beyond everything, in metres, for a route to be
-/// no steeper than `max_climb_deg` (left out, the default) that must rise so much over so great a
-/// distance: none where the straight way is not steeper, else half of the way over ground that the
-/// climb takes, for going out and coming back.
-pub(super) fn climbing_room(rise_m: f64, distance_m: f64, max_climb_deg: Option<f64>) -> f64 {
+/// How far a default area must reach beyond everything, in metres, for a route over so great a
+/// distance to climb and descend by `climb_m` in all, no steeper than `max_climb_deg` (left out, the
+/// default): none where the straight way is long enough, else half of the way over ground that
+/// it takes, for going out and coming back.
+pub(super) fn climbing_room(climb_m: f64, distance_m: f64, max_climb_deg: Option<f64>) -> f64 {
     let max_climb_deg = max_climb_deg.unwrap_or(DEFAULT_MAX_CLIMB_DEG);
-    let over_ground = rise_m.abs() / libm::tan(max_climb_deg.to_radians());
+    let over_ground = climb_m / libm::tan(max_climb_deg.to_radians());
     if over_ground > distance_m {
         (0.5 * over_ground).min(MOST_ROOM_M)
     } else {
         0.0
     }
+}
+
+/// Metres to climb and descend from one height to another, by way of the `middle` of the altitude
+/// band over each, all in one frame.
+pub(super) fn climb_through(ends: [f64; 2], middle: [f64; 2]) -> f64 {
+    let by_the_middle = (middle[0] - ends[0]).abs() + (middle[1] - ends[1]).abs();
+    by_the_middle.max((ends[1] - ends[0]).abs())
 }
 
 /// `{"max_turn_deg", "max_climb_deg", "min_leg", "cruise_speed", "fuel_per_km"}`, all optional.

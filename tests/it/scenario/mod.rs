@@ -143,12 +143,13 @@ fn a_default_spacing_is_never_refused() {
     }
 }
 
-/// A target that is steeper above the start than the vehicle climbs needs room for a detour.
+/// A target that is steeper above the start than the vehicle climbs needs room for a detour, and so does the middle of
+/// the band over ends that are near to each other.
 #[test]
 fn a_default_area_has_room_for_the_climb() {
     let area = |target: &str, climb: &str| {
         let text = format!(
-            r#"{{"start":{{"x":0,"y":0,"z":0}},"target":{target},"altitude":{{"min":0,"max":200}},
+            r#"{{"start":{{"x":0,"y":0,"z":0}},"target":{target},"altitude":{{"min":400,"max":700}},
             "terrain":{{"kind":"flat","elevation":-500}},"vehicle":{{"max_climb_deg":{climb}}}}}"#
         );
         let area = read(&text).expect("no fault").area;
@@ -174,11 +175,13 @@ fn a_default_area_has_room_for_the_climb() {
         "45",
         [-150.0, -150.0, 250.0, 150.0],
     );
+    // The middle of the band is at 50 m: up to there, and down.
     check(
         r#"{"x":100,"y":0,"z":-300}"#,
         "45",
-        [-150.0, -150.0, 250.0, 150.0],
+        [-200.0, -200.0, 300.0, 200.0],
     );
+    check(r#"{"x":30,"y":0,"z":0}"#, "45", [-50.0, -50.0, 80.0, 50.0]);
     // However slowly it climbs, the document that is written is accepted again.
     let far = area(r#"{"x":100,"y":0,"z":1000}"#, "1e-9");
     assert!(far.iter().all(|coordinate| coordinate.abs() < 1e8));

@@ -17,7 +17,10 @@ use ways::Ways;
 
 /// How far to climb, as shares of what lies between the middle of the band and that end of the route which is
 /// nearer to it; the first at which the searches meet is taken.
-const SHARES: [f64; 5] = [1.0, 0.75, 0.5, 0.25, 0.0];
+const SHARES: [f64; 4] = [1.0, 0.75, 0.5, 0.25];
+
+/// No farther than from one end to the other.
+const BETWEEN: f64 = 0.0;
 
 /// How long ways are, as a share of what the climb takes, and how much room there is at the area's edge, as a
 /// multiple of the radius of a bend: ways that can be flown as they are, and tighter ones for the polish to stretch.
@@ -51,22 +54,25 @@ struct Climb {
 pub(super) fn routes(model: &Model) -> Vec<Vec<Point3>> {
     let scenario = model.scenario;
     let direct = (scenario.target - scenario.start).xy().norm();
-    let is_longer = |climb: &Climb| climb.length() > direct;
-    if !is_longer(&Climb::by(scenario, SHARES[0])) {
-        return Vec::new();
-    }
-    let find = |climb| {
-        let tries = TRIES.into_iter();
-        let ways = tries.flat_map(|(near, room)| Ways::new(model, climb, room).routes(near));
-        ways.collect::<Vec<_>>()
+    let find = |share: f64| {
+        let climb = Climb::by(scenario, share);
+        let tries = TRIES
+            .into_iter()
+            .filter(|_| climb.length() > direct)
+            .flat_map(|(near, room)| Ways::new(model, climb, room).routes(near));
+        tries.collect::<Vec<_>>()
     };
-    SHARES
-        .into_iter()
-        .map(|share| Climb::by(scenario, share))
-        .filter(is_longer)
-        .map(find)
-        .find(|routes| !routes.is_empty())
-        .unwrap_or_default()
+    let mut routes = find(BETWEEN);
+    if scenario.weights.altitude > 0.0 {
+        let higher = SHARES.into_iter().map(find);
+        routes.extend(
+            higher
+                .into_iter()
+                .find(|routes| !routes.is_empty())
+                .unwrap_or_default(),
+        );
+    }
+    routes
 }
 
 /// Those of `shapes` that may still win once they have all their waypoints, and whether these are too low to be

@@ -184,6 +184,8 @@ pub enum Expected {
     Nothing,
     /// One of these contents.
     OneOf(Vec<String>),
+    /// Nothing, or none of these contents.
+    NoneOf(Vec<String>),
 }
 
 /// What came of keeping a file.

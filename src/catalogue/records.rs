@@ -34,6 +34,9 @@ impl Name {
             {
                 return Err(CatalogueError::Changed { name });
             }
+            (Expected::NoneOf(sums), Some(before)) if sums.contains(&before.sha256) => {
+                return Err(CatalogueError::Changed { name });
+            }
             _ => {}
         }
         if before.is_some_and(|before| !naming.by.covers(before.owner.as_ref())) {

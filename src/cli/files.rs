@@ -95,12 +95,20 @@ pub(super) fn read(file: &Path) -> anyhow::Result<Vec<u8>> {
 /// Write a document as lines; `None` is standard output.
 pub(super) fn write(out: Option<&Path>, document: &str) -> anyhow::Result<()> {
     let document = document.strip_suffix('\n').unwrap_or(document);
-    let written = match out {
-        Some(file) => fs::write(file, format!("{document}\n")),
-        None => writeln!(io::stdout().lock(), "{document}"),
-    };
-    written.with_context(|| match out {
-        Some(file) => format!("cannot write {}", file.display()),
-        None => "cannot write to standard output".to_owned(),
-    })
+    let lines = format!("{document}\n");
+    match out {
+        Some(file) => {
+            fs::write(file, lines).with_context(|| format!("cannot write {}", file.display()))
+        }
+        None => print(&lines),
+    }
+}
+
+/// Write to standard output. Who reads no further, as `head` does, has what they want.
+pub(super) fn print(text: &str) -> anyhow::Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        written => written.context("cannot write to standard output"),
+    }
 }

@@ -16,7 +16,7 @@ use tokio::sync::watch;
 use tokio::time::Instant;
 
 use self::ending::{Signals, Times};
-use super::{access, exit};
+use super::{access, exit, files};
 use crate::config::{self, Config, Flags};
 use crate::http::webhook::{self, Secret, Sender};
 use crate::http::{self, Capacity, InFlight, Origins, Parts, Phase, Terrains};
@@ -40,7 +40,9 @@ pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
     let loaded = config::load(flags, |name| std::env::var_os(name))
         .map_err(|faults| anyhow!("wrong configuration\n  {}", faults.join("\n  ")))?;
     if flags.print_config {
-        return Ok(loaded.write_toml(&mut std::io::stdout().lock())?);
+        let mut text = Vec::new();
+        loaded.write_toml(&mut text)?;
+        return files::print(&String::from_utf8_lossy(&text));
     }
     start(&loaded.config)
 }

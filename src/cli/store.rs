@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 
-use super::exit;
+use super::{exit, files};
 use crate::config::Config;
 use crate::store::sqlite::upkeep;
 
@@ -64,17 +64,16 @@ pub(super) fn run(command: Command) -> anyhow::Result<u8> {
         Command::Backup { place, file } => {
             let instead = "nats stream backup, or nats account backup, copies what they keep (docs/OPERATIONS.md)";
             upkeep::backup(&place.data_dir(instead)?, &file)?;
-            println!("written to {}", file.display());
+            files::print(&format!("written to {}\n", file.display()))?;
             Ok(exit::DONE)
         }
         Command::Check { place } => {
             let instead = "nats server check jetstream, and nats stream report, say how they are (docs/OPERATIONS.md)";
             let findings = upkeep::check(&place.data_dir(instead)?)?;
-            for fault in &findings.faults {
-                println!("{fault}");
-            }
             let (plans, faults) = (findings.plans, findings.faults.len());
-            println!("{plans} plans, {faults} faults");
+            let mut lines = findings.faults;
+            lines.push(format!("{plans} plans, {faults} faults\n"));
+            files::print(&lines.join("\n"))?;
             Ok(if faults == 0 {
                 exit::DONE
             } else {

@@ -1,14 +1,14 @@
 //! `noctule terrain`: what a file of elevations holds, and the elevations in it.
 
 use std::fmt::Write as _;
-use std::io::{self, Read, Write};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 
-use super::exit;
+use super::{exit, files};
 use crate::geometry::geodesy::LatLon;
 use crate::terrain::dem::{self, Dataset, Declared, Degrees, Metadata, SampleType};
 
@@ -55,9 +55,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<u8> {
         Command::Info { file } => info(&file.open()?)?,
         Command::Sample { file, points } => sample(&file.open()?, points)?,
     };
-    io::stdout()
-        .write_all(text.as_bytes())
-        .context("cannot write to standard output")?;
+    files::print(&text)?;
     Ok(exit::DONE)
 }
 

@@ -54,6 +54,9 @@ pub(super) struct Feed {
     phase: watch::Receiver<Phase>,
     /// Since when the throttle holds something back.
     held_since: Option<Instant>,
+    /// Whether anything has come after the event that the reader named; who names one that the plan
+    /// never had would wait for ever.
+    heard: bool,
     /// Pages that may still be read once the service stops.
     last_pages: usize,
     over: bool,
@@ -76,6 +79,7 @@ impl Feed {
             throttle: Throttle::new(rate_hz),
             phase,
             held_since: None,
+            heard: after == 0,
             last_pages: LAST_PAGES,
             over: false,
         }
@@ -93,6 +97,7 @@ impl Feed {
             // Looked at before the store: what was told until then will still be read.
             let stopping = *self.phase.borrow() == Phase::Stopping;
             self.changes.mark_unchanged();
+            let ended = !self.heard && self.has_ended().await;
             let page = match self.store.events(self.id, self.after, PAGE).await {
                 Ok(page) => page,
                 Err(StoreError::Gone(_) | StoreError::NotFound(_)) => break,
@@ -105,6 +110,10 @@ impl Feed {
                 return self.skip(page.forgotten).await;
             }
             let quiet = page.events.is_empty();
+            self.heard |= !quiet;
+            if quiet && ended {
+                break;
+            }
             self.take(page.events, &mut out);
             if stopping && !self.over {
                 if quiet || self.last_pages == 0 {
@@ -157,6 +166,11 @@ impl Feed {
             id: forgotten,
             event: Event::Status(Box::new(plan)),
         }]))
+    }
+
+    async fn has_ended(&self) -> bool {
+        let plan = self.store.get(self.id).await;
+        plan.is_ok_and(|plan| plan.status.is_final())
     }
 
     fn take(&mut self, page: Vec<NumberedEvent>, out: &mut Vec<NumberedEvent>) {

@@ -43,7 +43,7 @@ use std::time::Duration;
 use axum::Router;
 use axum::body::Body;
 use axum::handler::Handler;
-use axum::http::{Uri, header};
+use axum::http::{StatusCode, Uri, header};
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::Response;
 use axum::routing::{self, MethodRouter};
@@ -215,8 +215,20 @@ fn worth_compressing() -> impl Predicate {
         .and(plain("application/x-ndjson"))
 }
 
-/// Room for a compressor is given to what is compressed alone: else every open stream holds it.
-fn unwrap_uncompressed(answer: Response<CompressionBody<Body>>) -> Response {
+/// Which status an answer has, in a place where compression leaves it alone.
+fn note_status(mut answer: Response) -> Response {
+    let status = answer.status();
+    answer.extensions_mut().insert(status);
+    answer
+}
+
+/// Room for a compressor is given to what is compressed alone: else every open stream holds it. To a
+/// caller who takes no coding that there is, compression would say 406 when all has been done: they get
+/// the answer as it is.
+fn unwrap_uncompressed(mut answer: Response<CompressionBody<Body>>) -> Response {
+    if let Some(status) = answer.extensions_mut().remove::<StatusCode>() {
+        *answer.status_mut() = status;
+    }
     let as_it_came = !answer.headers().contains_key(header::CONTENT_ENCODING);
     answer.map(|body| {
         if as_it_came {
@@ -236,6 +248,7 @@ fn wrap(router: Router, cors: &Origins, instruments: Arc<Instruments>) -> Router
         .layer(CatchPanicLayer::custom(problem::after_panic))
         .layer(MapResponseLayer::new(unwrap_uncompressed))
         .layer(CompressionLayer::new().compress_when(worth_compressing()))
+        .layer(MapResponseLayer::new(note_status))
         .layer(from_fn(auth::refuse_keys_in_urls));
     router.layer(layers)
 }

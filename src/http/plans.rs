@@ -23,7 +23,7 @@ use super::prefer::{PREFERENCE_APPLIED, Wait};
 use super::problem::Problem;
 use super::status::{StatusDocument, etag, location};
 use super::{AppState, Phase, body, off_thread, retry, warm_start, webhook};
-use crate::job::{self, Plan, PlanId, Status, Submission};
+use crate::job::{self, Idempotency, Plan, PlanId, Status, Submission};
 use crate::scenario::json;
 use crate::store::{ListQuery, StoreError, Submitted};
 use crate::telemetry::{Origin, spans};
@@ -54,15 +54,22 @@ pub(super) async fn submit(
     let once = state.in_flight.begin(&caller, &headers)?;
     let bytes = body::read_json(&state, &headers, body).await?;
     let idempotency = once.as_ref().map(|once| once.with(&bytes));
-    let submission = Submission {
-        webhook,
-        idempotency,
-        ..accept(&state, &caller, bytes).await?
+    let Submitted { plan, replayed } = match accept(&state, &caller, bytes).await {
+        Ok(submission) if validate_only => return Ok(valid(&submission)),
+        Ok(submission) => {
+            let submission = Submission {
+                webhook,
+                idempotency,
+                ..submission
+            };
+            hand_in(&state, origin, submission).await?
+        }
+        // What it names may have gone since it was accepted.
+        Err(refusal) if !validate_only => repeated(&state, &caller, idempotency)
+            .await?
+            .ok_or(refusal)?,
+        Err(refusal) => return Err(refusal),
     };
-    if validate_only {
-        return Ok(valid(&submission));
-    }
-    let Submitted { plan, replayed } = hand_in(&state, origin, submission).await?;
     drop(once);
 
     let address = HeaderValue::from_str(&location(plan.id)).expect("an id is visible ASCII");
@@ -73,6 +80,27 @@ pub(super) async fn submit(
             .insert(IDEMPOTENCY_REPLAYED, HeaderValue::from_static("true"));
     }
     Ok(answer)
+}
+
+/// The plan of a request that came before.
+async fn repeated(
+    state: &AppState,
+    caller: &Caller,
+    idempotency: Option<Idempotency>,
+) -> Result<Option<Submitted>, Problem> {
+    let Some(idempotency) = idempotency else {
+        return Ok(None);
+    };
+    let owner = caller.owner.as_ref();
+    let plan = state.store.repeated(owner, &idempotency).await?;
+    Ok(plan.map(|plan| {
+        spans::name_plan(plan.id);
+        tracing::info!("accepted before");
+        Submitted {
+            plan,
+            replayed: true,
+        }
+    }))
 }
 
 /// Make a plan durable, or say when there may be room for it.

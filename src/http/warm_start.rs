@@ -8,6 +8,7 @@ use super::caller::Caller;
 use super::problem::Problem;
 use crate::export::document::{FrameDocument, Position};
 use crate::geometry::Point3;
+use crate::geometry::geodesy::LatLon;
 use crate::job::PlanId;
 use crate::scenario::frame::{Datum, Frame};
 use crate::scenario::json::Fault;
@@ -21,21 +22,30 @@ struct Route {
 }
 
 impl Route {
-    /// Its waypoints in the local plane of `frame`; `None` when they are of another kind of frame.
-    fn within(&self, frame: &Frame) -> Option<Vec<Point3>> {
+    /// Its waypoints in the local plane of `frame`, or why they cannot lie there.
+    fn within(&self, frame: &Frame) -> Result<Vec<Point3>, &'static str> {
+        const ANOTHER: &str = "that plan's route is in another frame";
         let points = self.waypoints.iter();
         let points: Option<Vec<_>> = points.map(|position| position.within(frame)).collect();
+        let points = points.ok_or(ANOTHER)?;
         let Some(wgs84) = frame.wgs84() else {
-            return points;
+            return Ok(points);
         };
-        let datum = &self.frame.as_ref()?.altitude_datum;
+        let reached = |position: &Position| match *position {
+            Position::Geodetic { lat, lon, .. } => wgs84.reaches(LatLon { lat, lon }),
+            Position::Local { .. } => true,
+        };
+        if !self.waypoints.iter().all(reached) {
+            return Err("that plan's route is too far from this scenario's area");
+        }
+        let datum = &self.frame.as_ref().ok_or(ANOTHER)?.altitude_datum;
         let lift = match (datum.as_str(), wgs84.datum) {
             ("msl", Datum::Ellipsoid) => wgs84.undulation_m,
             ("ellipsoid", Datum::Msl) => -wgs84.undulation_m,
             _ => 0.0,
         };
         let lifted = |point: Point3| Point3::new(point.x, point.y, point.z + lift);
-        Some(points?.into_iter().map(lifted).collect())
+        Ok(points.into_iter().map(lifted).collect())
     }
 }
 
@@ -68,8 +78,7 @@ pub(super) async fn resolve(
         tracing::error!(warm_start_plan_id = %plan, %error, "a stored result cannot be read");
         Problem::Internal
     })?;
-    let points = route.within(&scenario.frame);
-    let points = points.ok_or_else(|| unknown("that plan's route is in another frame"))?;
+    let points = route.within(&scenario.frame).map_err(unknown)?;
     scenario.planner.warm_start = Some(WarmStart::Waypoints(points));
     Ok(())
 }

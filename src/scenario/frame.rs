@@ -34,6 +34,9 @@ pub struct Wgs84 {
     written: BTreeMap<[u64; 2], LatLon>,
 }
 
+/// Places farther than this from the middle of an area in degrees are not laid onto its plane, metres.
+pub(super) const MAX_REACH_M: f64 = 500e3;
+
 /// What an altitude is above.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Datum {
@@ -112,6 +115,12 @@ impl Wgs84 {
     pub fn local(&self, geodetic: Geodetic) -> Point3 {
         let point = self.plane.local(geodetic.place);
         Point3::new(point.x, point.y, geodetic.alt)
+    }
+
+    /// Whether `place` is near enough for a document of this frame to name it.
+    #[must_use]
+    pub fn reaches(&self, place: LatLon) -> bool {
+        self.plane.origin().distance_m(place) <= MAX_REACH_M
     }
 
     /// An altitude of the request as metres above mean sea level.

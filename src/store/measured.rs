@@ -10,7 +10,7 @@ use super::{
     DatasetUse, End, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Webhook,
 };
 use crate::export::document::Incumbent;
-use crate::job::{Event, Plan, PlanId, Submission};
+use crate::job::{Event, Idempotency, Owner, Plan, PlanId, Submission};
 use crate::telemetry::Instruments;
 
 /// Does what the wrapped store does, and reports how long it took.
@@ -54,6 +54,15 @@ impl MeasuredStore {
 impl Store for MeasuredStore {
     async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError> {
         self.measured("submit", self.store.submit(submission)).await
+    }
+
+    async fn repeated(
+        &self,
+        owner: Option<&Owner>,
+        idempotency: &Idempotency,
+    ) -> Result<Option<Plan>, StoreError> {
+        let repeated = self.store.repeated(owner, idempotency);
+        self.measured("repeated", repeated).await
     }
 
     /// Not timed: it waits for a plan.

@@ -22,7 +22,7 @@ use async_trait::async_trait;
 use tokio::sync::watch;
 
 use crate::export::document::Incumbent;
-use crate::job::{Event, NumberedEvent, Owner, Plan, PlanId, Status, Submission};
+use crate::job::{Event, Idempotency, NumberedEvent, Owner, Plan, PlanId, Status, Submission};
 
 /// The queue, the records, the documents and the events of all plans.
 ///
@@ -39,6 +39,17 @@ pub trait Store: Send + Sync + 'static {
     /// [`StoreError::KeyReused`] when its idempotency key came with another body,
     /// [`StoreError::Gone`] when the plan of the first one was deleted.
     async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError>;
+
+    /// What [`Store::submit`] would answer to a repetition, for one that can be read no more because what it
+    /// names has gone since; `None` when the key has not been seen within [`IDEMPOTENCY_MS`].
+    ///
+    /// # Errors
+    /// [`StoreError::KeyReused`], [`StoreError::Gone`].
+    async fn repeated(
+        &self,
+        owner: Option<&Owner>,
+        idempotency: &Idempotency,
+    ) -> Result<Option<Plan>, StoreError>;
 
     /// Wait for the plan at the head of the queue and take it: queued -> running, at the time that
     /// the store's clock shows then. Dropping the future before it is done takes nothing; what was on its way

@@ -15,7 +15,7 @@ use super::{
     Webhook,
 };
 use crate::export::document::Incumbent;
-use crate::job::{Event, Plan, PlanId, Submission};
+use crate::job::{Event, Idempotency, Owner, Plan, PlanId, Submission};
 
 /// Opens the store; `true` asks it to look for damage first. May block.
 pub type Open = Arc<dyn Fn(bool) -> Result<Arc<dyn Store>, StoreError> + Send + Sync>;
@@ -143,6 +143,15 @@ impl Store for Reopening {
     }
 
     /// Waits for the store to be open, too.
+    async fn repeated(
+        &self,
+        owner: Option<&Owner>,
+        idempotency: &Idempotency,
+    ) -> Result<Option<Plan>, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.repeated(owner, idempotency).await)
+    }
+
     async fn claim(&self) -> Result<Lease, StoreError> {
         let store = self.opened().await?;
         self.heed(&store, store.claim().await)

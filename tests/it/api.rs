@@ -512,6 +512,13 @@ async fn bodies_may_come_and_go_as_gzip() {
         .expect("gzip");
     assert_eq!(unpacked, plain.body);
 
+    // What has been done is told, and refused, in no coding where none is taken.
+    let none = [("accept-encoding", "identity;q=0")];
+    let answer = api.get_with(&result, &none).await;
+    assert_eq!((answer.status, answer.body), (StatusCode::OK, plain.body));
+    let nowhere = api.get_with("/nothing", &none).await;
+    nowhere.expect_problem(404, "not-found");
+
     // Nothing comes between a stream and its reader.
     let events = format!("{}/events", accepted.header("location"));
     let told = api.get_with(&events, &[("accept-encoding", "gzip")]).await;

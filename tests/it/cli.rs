@@ -5,7 +5,7 @@ use std::fs;
 use serde_json::{Value, json};
 
 use crate::support::description::check_schema;
-use crate::support::process::{Service, run};
+use crate::support::process::{Service, noctule, run};
 use crate::support::scenario;
 
 #[test]
@@ -187,4 +187,39 @@ async fn a_ready_service_is_healthy() {
     assert_eq!(elsewhere.status.code(), Some(1));
     let reason = String::from_utf8(elsewhere.stderr).expect("UTF-8");
     assert!(reason.contains("answers 404"), "{reason}");
+}
+
+/// As `| head -1` leaves it.
+#[test]
+fn a_reader_who_has_read_enough_is_no_failure() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    drop(Service::start(directory.path(), &[]));
+    let data_dir = directory.path().to_str().expect("UTF-8");
+    let file = directory.path().join("scenario.json");
+    fs::write(&file, scenario().to_string()).expect("written");
+    let file = file.to_str().expect("UTF-8");
+    let dataset = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/scenarios/terrain/jacksboro.tif"
+    );
+    for arguments in [
+        &["plan", file][..],
+        &["terrain", "info", dataset],
+        &["store", "check", "--data-dir", data_dir],
+        &["serve", "--print-config"],
+    ] {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let ended = noctule()
+            .args(arguments)
+            .stdout(writer)
+            .output()
+            .expect("the binary ends");
+        let told = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(
+            (ended.status.code(), &*told),
+            (Some(0), ""),
+            "{arguments:?}"
+        );
+    }
 }

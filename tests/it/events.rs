@@ -1,5 +1,7 @@
 //! Event streams over a real connection: order, resumption, thinning, the end.
 
+use std::time::Duration;
+
 use axum::http::StatusCode;
 use futures_util::future::join_all;
 use noctule::http::Phase;
@@ -181,6 +183,21 @@ async fn a_live_stream_that_is_cut_resumes() {
             .await,
         );
         assert_eq!(read, plan.read("?rate=0").await);
+    })
+    .await;
+}
+
+/// As after a restore from an older copy: nobody waits for what will never come.
+#[tokio::test]
+async fn a_reader_who_names_an_event_that_never_was_is_let_go_at_the_end() {
+    for_every_backend(async |backend| {
+        let plan = Followed::on(backend).await;
+        let store = &plan.api.store;
+        let lease = store.claim().await.expect("a queued plan");
+        let ahead = Stream::open(plan.events("?last_event_id=1000")).await;
+        run::finish(&**store, &lease, Status::Succeeded).await;
+        let rest = tokio::time::timeout(Duration::from_secs(60), ahead.rest());
+        assert_eq!(events(&rest.await.expect("it ends")), []);
     })
     .await;
 }

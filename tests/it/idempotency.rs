@@ -54,6 +54,34 @@ async fn the_same_request_gets_the_same_plan_however_it_stands() {
     .await;
 }
 
+/// Nothing of it can be accepted any more, but it was.
+#[tokio::test]
+async fn a_repetition_gets_its_plan_though_what_it_names_has_gone() {
+    for_every_backend(async |backend| {
+        let api = Api::on(backend, Options::new(1_000)).await;
+        let known = api.submit().await;
+        run::complete(&*api.store, Vec::new()).await;
+        let mut warm = scenario();
+        let id = known.rsplit('/').next().expect("an id");
+        warm["planner"]["warm_start"] = serde_json::json!({"plan_id": id});
+        let first = post(&api, "k", warm.to_string()).await;
+        assert_eq!(first.status, StatusCode::ACCEPTED);
+        api.delete(&known).await;
+
+        let again = post(&api, "k", warm.to_string()).await;
+        assert_eq!(again.status, StatusCode::ACCEPTED, "{again:?}");
+        assert_eq!(again.header("idempotency-replayed"), "true");
+        assert_eq!(again.json(), first.json());
+        post(&api, "other", warm.to_string())
+            .await
+            .expect_problem(422, "invalid-scenario");
+        post(&api, "k", "{".to_owned())
+            .await
+            .expect_problem(422, "idempotency-key-reused");
+    })
+    .await;
+}
+
 #[tokio::test]
 async fn a_refused_request_leaves_its_key_free() {
     for_every_backend(async |backend| {

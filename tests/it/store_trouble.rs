@@ -132,6 +132,17 @@ async fn a_damaged_file_is_told_and_its_backup_can_be_put_back() {
     service.submit(&scenario()).await;
 }
 
+#[test]
+fn what_is_no_store_has_no_backup() {
+    let directory = TempDir::new().unwrap();
+    std::fs::write(directory.path().join("noctule.db"), "").unwrap();
+    let backup = directory.path().join("backup.db");
+    let paths = [directory.path(), &backup].map(|path| path.to_str().unwrap());
+    let refused = run(&["store", "backup", "--data-dir", paths[0], paths[1]], "");
+    assert_eq!(refused.status.code(), Some(1), "{refused:?}");
+    assert!(!backup.exists());
+}
+
 /// Damage that shows only when the page in question is read.
 #[tokio::test(flavor = "multi_thread")]
 async fn damage_that_is_met_on_the_way_closes_the_store_until_it_is_mended() {

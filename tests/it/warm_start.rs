@@ -175,3 +175,34 @@ async fn a_search_does_not_lose_the_route_it_starts_from() {
         "the budget alone finds no such route"
     );
 }
+
+/// A route in degrees, as another scenario in degrees may start from it: near enough for its plane.
+#[tokio::test]
+async fn a_route_on_another_part_of_the_earth_is_no_start() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &[]);
+    let around = |lat: f64, lon: f64, start: Value| {
+        json!({
+            "frame": "wgs84",
+            "start": {"lat": lat, "lon": lon, "alt": 50},
+            "target": {"lat": lat + 0.01, "lon": lon + 0.01, "alt": 50},
+            "altitude": {"min": 0, "max": 100},
+            "planner": {"population": 4, "iterations": 2, "warm_start": start},
+        })
+    };
+    let first = service.submit(&around(47.4, 8.5, Value::Null)).await;
+    service.ended(&first).await;
+    let from_it = json!({"plan_id": id_of(&first)});
+
+    for (lat, lon) in [(-33.9, 151.2), (-47.4, -171.5), (53.0, 8.5)] {
+        let far = around(lat, lon, from_it.clone());
+        let refused = service.post(&far).await;
+        assert_eq!(refused.status(), 422, "{lat}, {lon}");
+        let problem: Value = refused.json().await.expect("JSON");
+        let detail = problem["errors"][0]["detail"].as_str().expect("a text");
+        let why = "that plan's route is too far from this scenario's area";
+        assert!(detail.ends_with(why), "{detail}");
+    }
+    let near = service.submit(&around(47.6, 8.5, from_it)).await;
+    assert_eq!(service.ended(&near).await["status"], "succeeded");
+}

@@ -175,6 +175,17 @@ async fn an_end_is_told_once_and_signed() {
 }
 
 #[tokio::test]
+async fn an_address_of_a_host_and_a_query_is_called() {
+    let mut receiver = Receiver::new(&[]).await;
+    let api = Api::with_webhooks(settings(true));
+    let _sender = Sender::start(api.store.clone(), settings(true));
+    let url = receiver.url.replace("/hook?", "?");
+    assert_eq!(submit(&api, &url).await.status, 202);
+    run::complete(&*api.store, Vec::new()).await;
+    assert_eq!(receiver.next().await.uri, "/?x=1");
+}
+
+#[tokio::test]
 async fn what_is_not_heard_is_told_again_and_redirects_lead_nowhere() {
     let api = Api::with_webhooks(settings(true));
     let mut receiver = Receiver::new(&[307]).await;

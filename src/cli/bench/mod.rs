@@ -104,9 +104,9 @@ fn report(
     write(&report, common.out.as_deref(), name).context("cannot write the report")
 }
 
-fn write(report: &Report, out: Option<&Path>, name: &str) -> std::io::Result<()> {
+fn write(report: &Report, out: Option<&Path>, name: &str) -> anyhow::Result<()> {
     match out {
-        Some(directory) => report.save(directory, name),
+        Some(directory) => Ok(report.save(directory, name)?),
         None => report.print(),
     }
 }

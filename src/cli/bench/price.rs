@@ -59,9 +59,16 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         })?;
         let prices = price(&pricer, &scenario, &routes, arguments.above_ground);
         // Whoever asks waits for the whole line.
-        writeln!(out, "{}", serde_json::to_string(&prices)?)
-            .and_then(|()| out.flush())
-            .context("cannot write to standard output")?;
+        let written =
+            writeln!(out, "{}", serde_json::to_string(&prices)?).and_then(|()| out.flush());
+        if written
+            .as_ref()
+            .is_err_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+        {
+            // Nobody asks any more.
+            break;
+        }
+        written.context("cannot write to standard output")?;
     }
     Ok(())
 }

@@ -1,10 +1,11 @@
 //! What a measurement hands over: pages for people, tables for programs, drawings.
 
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 
 use super::table::Table;
+use crate::cli::files;
 
 /// A finished measurement.
 pub(super) struct Report {
@@ -43,8 +44,8 @@ impl Report {
     }
 
     /// Write the page alone to standard output.
-    pub(super) fn print(&self) -> io::Result<()> {
-        io::stdout().lock().write_all(self.to_markdown().as_bytes())
+    pub(super) fn print(&self) -> anyhow::Result<()> {
+        files::print(&self.to_markdown())
     }
 
     fn to_markdown(&self) -> String {

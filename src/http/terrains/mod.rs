@@ -204,18 +204,22 @@ fn read_format(name: &str) -> Result<Format, Problem> {
 fn expected(headers: &HeaderMap) -> Expected {
     let tags = |name| -> Vec<String> {
         let values = headers.get_all(name).iter();
-        let values = values.filter_map(|value| value.to_str().ok());
-        let tags = values.flat_map(|value| value.split(','));
+        // What cannot be read is a tag, too: one that nothing has.
+        let values = values.map(|value| String::from_utf8_lossy(value.as_bytes()));
+        let tags = values.flat_map(|value| value.split(',').map(str::to_owned).collect::<Vec<_>>());
         tags.map(|tag| tag.trim().trim_matches('"').to_owned())
             .collect()
     };
     let (matching, other) = (tags(header::IF_MATCH), tags(header::IF_NONE_MATCH));
     if other.iter().any(|tag| tag == "*") {
         Expected::Nothing
-    } else if matching.is_empty() {
-        Expected::Anything
-    } else {
+    } else if !matching.is_empty() {
         Expected::OneOf(matching)
+    } else if !other.is_empty() {
+        let weak = other.iter().map(|tag| tag.trim_start_matches("W/\""));
+        Expected::NoneOf(weak.map(str::to_owned).collect())
+    } else {
+        Expected::Anything
     }
 }
 

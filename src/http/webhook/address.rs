@@ -38,7 +38,15 @@ impl Target {
             return None;
         }
         let host = authority.host().trim_matches(['[', ']']).to_owned();
-        let port = authority.port_u16().unwrap_or(if tls { 443 } else { 80 });
+        let port = match authority.as_str().strip_prefix(authority.host())? {
+            "" | ":" if tls => 443,
+            "" | ":" => 80,
+            port => port
+                .strip_prefix(':')?
+                .parse()
+                .ok()
+                .filter(|port| *port > 0)?,
+        };
         let numeric = host.parse::<IpAddr>().ok();
         if !private && numeric.is_some_and(|address| !is_public(address)) {
             return None;
@@ -141,6 +149,9 @@ mod tests {
             ("http://hooks.example/", false, true),
             ("https://127.0.0.1/", false, true),
             ("https://[::1]:9000/", false, true),
+            ("https://hooks.example:/", true, true),
+            ("https://hooks.example:0/", false, false),
+            ("https://hooks.example:65536/", false, false),
             ("https://user:word@hooks.example/", false, false),
             ("https://hooks.example/#a", false, false),
             ("ftp://hooks.example/", false, false),

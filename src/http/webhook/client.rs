@@ -107,13 +107,13 @@ fn request(
         header::USER_AGENT,
         HeaderValue::from_static(concat!("noctule/", env!("CARGO_PKG_VERSION"))),
     );
-    let path = target
-        .uri
-        .path_and_query()
-        .map_or("/", |path| path.as_str());
+    let path = target.uri.path_and_query();
+    let path = path.map_or("", |path| path.as_str());
+    // A query may follow the host without a path between them.
+    let slash = if path.starts_with('/') { "" } else { "/" };
     let mut request = Request::new(Full::new(Bytes::from(body)));
     *request.method_mut() = Method::POST;
-    *request.uri_mut() = path.parse().map_err(io::Error::other)?;
+    *request.uri_mut() = format!("{slash}{path}").parse().map_err(io::Error::other)?;
     *request.headers_mut() = headers;
     Ok(request)
 }

@@ -6,13 +6,13 @@ use std::sync::Arc;
 
 use crate::geometry::geodesy::{LatLon, LatLonBox, TangentPlane, undulation_m};
 use crate::geometry::{Point2, Point3, Rect};
-use crate::scenario::frame::{self, Datum, Frame, Wgs84};
+use crate::scenario::frame::{self, Datum, Frame, MAX_REACH_M, Wgs84};
 
 use super::dataset::{Named, over_grid};
 use super::fault::Faults;
 use super::fields::Fields;
 use super::path::Path;
-use super::ranges::{COORDINATE, LATITUDE, LONGITUDE, MAX_REACH_M};
+use super::ranges::{COORDINATE, LATITUDE, LONGITUDE};
 use super::sketch;
 use super::value::{At, figure};
 

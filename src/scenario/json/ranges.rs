@@ -83,8 +83,6 @@ pub(super) const COORDINATE: Range = Range::closed(-1e7, 1e7);
 pub(super) const LATITUDE: Range = Range::closed(-90.0, 90.0);
 /// Degrees.
 pub(super) const LONGITUDE: Range = Range::closed(-180.0, 180.0);
-/// Places farther than this from the middle of an area in degrees are not laid onto its plane, metres.
-pub(super) const MAX_REACH_M: f64 = 500e3;
 /// Corners of the area, metres; wider, so that the default area round the largest threat fits.
 pub(super) const AREA: Range = Range::closed(-1e8, 1e8);
 /// `radius` and `influence`, metres.

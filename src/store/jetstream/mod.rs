@@ -55,7 +55,7 @@ use super::{
     Webhook,
 };
 use crate::export::document::Incumbent;
-use crate::job::{Event, Plan, PlanId, Submission};
+use crate::job::{Event, Idempotency, Owner, Plan, PlanId, Submission};
 
 /// What was there must be read so soon at the start.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -174,6 +174,14 @@ impl Store for JetStreamStore {
     async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError> {
         let store = Arc::clone(self.open_store()?);
         detached(async move { store.submit(&submission).await }).await
+    }
+
+    async fn repeated(
+        &self,
+        owner: Option<&Owner>,
+        idempotency: &Idempotency,
+    ) -> Result<Option<Plan>, StoreError> {
+        self.open_store()?.repeated(owner, idempotency).await
     }
 
     async fn claim(&self) -> Result<Lease, StoreError> {

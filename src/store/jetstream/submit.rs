@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use async_nats::jetstream::context::PublishErrorKind;
-use async_nats::jetstream::kv::{CreateErrorKind, Operation, UpdateErrorKind};
+use async_nats::jetstream::kv::{CreateErrorKind, Entry, Operation, UpdateErrorKind};
 use async_nats::jetstream::message::PublishMessage;
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ use super::record::{Document, Queued, Record};
 use super::steps::Change;
 use super::trouble::failed;
 use crate::export::sha256_hex;
-use crate::job::{Idempotency, Plan, PlanId, Submission};
+use crate::job::{Idempotency, Owner, Plan, PlanId, Submission};
 use crate::store::{IDEMPOTENCY_MS, StoreError, Submitted};
 
 /// A first submission that has not ended after so long is taken to be broken off.
@@ -32,7 +32,52 @@ struct First {
     seen_ms: i64,
 }
 
+impl First {
+    /// The plan of the first submission, unless that was too long ago.
+    fn read(
+        entry: &Entry,
+        idempotency: &Idempotency,
+        now_ms: i64,
+    ) -> Result<Option<PlanId>, StoreError> {
+        let first: Self = serde_json::from_slice(&entry.value).map_err(|error| unread(&error))?;
+        if first.seen_ms <= now_ms.saturating_sub(IDEMPOTENCY_MS) {
+            return Ok(None);
+        }
+        if first.body_sha256 != idempotency.body_sha256 {
+            return Err(StoreError::KeyReused);
+        }
+        Ok(Some(first.plan))
+    }
+}
+
+fn unread(error: &(dyn std::error::Error + 'static)) -> StoreError {
+    StoreError::unavailable(format!("idempotency key: {error}"))
+}
+
 impl JetStream {
+    /// See [`Store::repeated`](crate::store::Store::repeated).
+    pub(super) async fn repeated(
+        &self,
+        owner: Option<&Owner>,
+        idempotency: &Idempotency,
+    ) -> Result<Option<Plan>, StoreError> {
+        let key = key_of(owner, idempotency);
+        let entry = self.servers.keys.entry(key).await;
+        let entry = entry.map_err(|error| unread(&error))?;
+        let Some(entry) = entry.filter(|entry| entry.operation == Operation::Put) else {
+            return Ok(None);
+        };
+        let now_ms = (self.options.clock)();
+        let Some(first) = First::read(&entry, idempotency, now_ms)? else {
+            return Ok(None);
+        };
+        match self.get(first).await {
+            // It was never accepted, or not yet.
+            Err(StoreError::NotFound(_)) => Ok(None),
+            found => found.map(Some),
+        }
+    }
+
     pub(super) async fn submit(&self, submission: &Submission) -> Result<Submitted, StoreError> {
         let Some(idempotency) = &submission.idempotency else {
             return self.accept(submission).await.map(|plan| Submitted {
@@ -40,7 +85,7 @@ impl JetStream {
                 replayed: false,
             });
         };
-        let key = key_of(submission, idempotency);
+        let key = key_of(submission.owner.as_ref(), idempotency);
         let revision = match self.be_first(&key, submission, idempotency).await? {
             Turn::First { revision } => revision,
             Turn::Later(plan) => {
@@ -146,9 +191,7 @@ impl JetStream {
         submission: &Submission,
         idempotency: &Idempotency,
     ) -> Result<Turn, StoreError> {
-        let what = |error: &(dyn std::error::Error + 'static)| {
-            StoreError::unavailable(format!("idempotency key: {error}"))
-        };
+        let what = unread;
         let keys = &self.servers.keys;
         let until = Instant::now() + PATIENCE;
         loop {
@@ -170,14 +213,8 @@ impl JetStream {
             let Some(entry) = entry.filter(|entry| entry.operation == Operation::Put) else {
                 continue;
             };
-            let first: First =
-                serde_json::from_slice(&entry.value).map_err(|error| what(&error))?;
-            let expired = first.seen_ms <= now_ms.saturating_sub(IDEMPOTENCY_MS);
-            if !expired {
-                if first.body_sha256 != idempotency.body_sha256 {
-                    return Err(StoreError::KeyReused);
-                }
-                match self.get(first.plan).await {
+            if let Some(first) = First::read(&entry, idempotency, now_ms)? {
+                match self.get(first).await {
                     Ok(plan) => return Ok(Turn::Later(Box::new(plan))),
                     Err(StoreError::NotFound(_)) if Instant::now() < until => {
                         tokio::time::sleep(Duration::from_millis(10)).await;
@@ -205,7 +242,7 @@ enum Turn {
 }
 
 /// Callers choose keys freely; a bucket does not take all of them.
-fn key_of(submission: &Submission, idempotency: &Idempotency) -> String {
-    let owner = submission.owner.as_deref().unwrap_or_default();
+fn key_of(owner: Option<&Owner>, idempotency: &Idempotency) -> String {
+    let owner = owner.map_or("", String::as_str);
     sha256_hex(format!("{owner}\n{}", idempotency.key).as_bytes())
 }

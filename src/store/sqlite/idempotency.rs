@@ -1,27 +1,26 @@
 //! Which submission was the first with its idempotency key.
 
-use rusqlite::{OptionalExtension, params};
+use rusqlite::{Connection, OptionalExtension, params};
 
+use super::read;
 use super::transaction::Transaction;
-use crate::job::{PlanId, Submission};
+use crate::job::{Idempotency, Owner, Plan, PlanId, Submission};
 use crate::store::{IDEMPOTENCY_MS, StoreError};
 
-/// The plan of an earlier submission with the same key, owner and body.
+/// The plan of the first submission with this key, owner and body, as it stands.
 pub(super) fn earlier(
-    tx: &Transaction<'_>,
-    submission: &Submission,
-) -> Result<Option<PlanId>, StoreError> {
-    let Some(idempotency) = &submission.idempotency else {
-        return Ok(None);
-    };
-    let seen: Option<(String, String)> = tx
-        .connection
+    connection: &Connection,
+    owner: Option<&Owner>,
+    idempotency: &Idempotency,
+    now_ms: i64,
+) -> Result<Option<Plan>, StoreError> {
+    let seen: Option<(String, String)> = connection
         .prepare_cached(
             "SELECT body_sha256, plan_id FROM idempotency_keys \
              WHERE owner = ?1 AND key = ?2 AND seen_ms > ?3",
         )?
         .query_row(
-            params![owner(submission), idempotency.key, oldest(tx.now_ms())],
+            params![named(owner), idempotency.key, oldest(now_ms)],
             |row| Ok((row.get(0)?, row.get(1)?)),
         )
         .optional()?;
@@ -33,7 +32,7 @@ pub(super) fn earlier(
     }
     let plan = PlanId::parse_str(&plan)
         .map_err(|error| StoreError::unavailable(format!("plan id {plan:?}: {error}")))?;
-    Ok(Some(plan))
+    read::get(connection, plan, now_ms).map(Some)
 }
 
 /// Keep the key of a submission that made a plan.
@@ -46,7 +45,7 @@ pub(super) fn remember(tx: &Transaction<'_>, submission: &Submission) -> Result<
                  VALUES (?1, ?2, ?3, ?4, ?5)",
             )?
             .execute(params![
-                owner(submission),
+                named(submission.owner.as_ref()),
                 idempotency.key,
                 idempotency.body_sha256,
                 submission.id.to_string(),
@@ -69,6 +68,6 @@ fn oldest(now_ms: i64) -> i64 {
 }
 
 /// A part of the key must not be null.
-fn owner(submission: &Submission) -> &str {
-    submission.owner.as_deref().unwrap_or_default()
+fn named(owner: Option<&Owner>) -> &str {
+    owner.map_or("", String::as_str)
 }

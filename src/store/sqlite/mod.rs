@@ -36,7 +36,7 @@ use super::{
     Submitted, Trouble, Webhook,
 };
 use crate::export::document::Incumbent;
-use crate::job::{Event, Plan, PlanId, Submission};
+use crate::job::{Event, Idempotency, Owner, Plan, PlanId, Submission};
 
 /// Name of the database in the data directory.
 const DATABASE: &str = "noctule.db";
@@ -137,6 +137,20 @@ impl Store for SqliteStore {
     async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError> {
         self.writer
             .change(move |tx| operations::submit(tx, &submission))
+            .await
+    }
+
+    async fn repeated(
+        &self,
+        owner: Option<&Owner>,
+        idempotency: &Idempotency,
+    ) -> Result<Option<Plan>, StoreError> {
+        let (owner, idempotency) = (owner.cloned(), idempotency.clone());
+        let now_ms = (self.clock)();
+        self.readers
+            .read(move |connection| {
+                idempotency::earlier(connection, owner.as_ref(), &idempotency, now_ms)
+            })
             .await
     }
 

@@ -17,14 +17,14 @@ pub(super) fn submit(
     tx: &mut Transaction<'_>,
     submission: &Submission,
 ) -> Result<Submitted, StoreError> {
-    if let Some(first) = idempotency::earlier(tx, submission)? {
-        return match PlanRow::load(tx.connection, first)? {
-            Some(row) => Ok(Submitted {
-                plan: row.plan,
-                replayed: true,
-            }),
-            None => Err(missing(tx.connection, first, tx.now_ms())?),
-        };
+    let owner = submission.owner.as_ref();
+    if let Some(idempotency) = &submission.idempotency
+        && let Some(plan) = idempotency::earlier(tx.connection, owner, idempotency, tx.now_ms())?
+    {
+        return Ok(Submitted {
+            plan,
+            replayed: true,
+        });
     }
     if tx.queued >= tx.options.queue_limit {
         return Err(StoreError::QueueFull { queued: tx.queued });

@@ -157,5 +157,7 @@ fn open(data_dir: &Path) -> Result<Connection, StoreError> {
     }
     let connection = Connection::open_with_flags(&file, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
     connection.busy_timeout(BUSY_TIMEOUT)?;
+    // Of a database that is none of ours, a copy would be no backup.
+    connection.prepare("SELECT id FROM plans")?;
     Ok(connection)
 }

@@ -42,8 +42,16 @@ async fn the_same_key_and_body_get_the_same_plan() {
         assert_eq!(store.stats().await.unwrap().queued, 1);
 
         let other_body = with_key(submission(), "k", "another body");
-        assert_eq!(kind(store.submit(other_body).await), Err("key reused"));
         let other_owner = with_key(of("alice"), "k", "another body");
+        let repeated = async |submission: &Submission| {
+            let idempotency = submission.idempotency.as_ref().expect("it has a key");
+            store.repeated(submission.owner.as_ref(), idempotency).await
+        };
+        let found = repeated(&again()).await.unwrap();
+        assert_eq!(found, Some(store.get(id).await.unwrap()));
+        assert_eq!(kind(repeated(&other_body).await), Err("key reused"));
+        assert_eq!(repeated(&other_owner).await.unwrap(), None);
+        assert_eq!(kind(store.submit(other_body).await), Err("key reused"));
         assert_eq!(kind(store.submit(other_owner).await), Err("queue full"));
 
         // What is told is how the plan stands now, by whoever opens the store.
@@ -55,6 +63,9 @@ async fn the_same_key_and_body_get_the_same_plan() {
 
         store.delete(id, store.now_ms()).await.unwrap();
         assert_eq!(kind(store.submit(again()).await), Err("gone"));
+        let idempotency = again().idempotency.expect("it has a key");
+        let repeated = store.repeated(None, &idempotency).await;
+        assert_eq!(kind(repeated), Err("gone"));
     })
     .await;
 }

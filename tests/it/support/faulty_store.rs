@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use async_trait::async_trait;
 use noctule::export::document::Incumbent;
-use noctule::job::{Event, Plan, PlanId, Submission};
+use noctule::job::{Event, Idempotency, Owner, Plan, PlanId, Submission};
 use noctule::store::{
     DatasetUse, End, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Webhook,
 };
@@ -37,6 +37,14 @@ impl FaultyStore {
 impl Store for FaultyStore {
     async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError> {
         self.sound.submit(submission).await
+    }
+
+    async fn repeated(
+        &self,
+        owner: Option<&Owner>,
+        idempotency: &Idempotency,
+    ) -> Result<Option<Plan>, StoreError> {
+        self.sound.repeated(owner, idempotency).await
     }
 
     async fn claim(&self) -> Result<Lease, StoreError> {

@@ -15,7 +15,7 @@ const LOOPBACK: &str = "127.0.0.1:0";
 /// More than anything here takes.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-fn noctule() -> Command {
+pub(crate) fn noctule() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_noctule"));
     clean(&mut command);
     command

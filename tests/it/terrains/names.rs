@@ -71,6 +71,10 @@ async fn a_name_can_be_given_to_another_content() {
         ("if-match", &*tag(&first), 412),
         ("if-match", &*tag(&second), 200),
         ("if-match", "*", 200),
+        ("if-match", "\"caf\u{e9}\"", 412),
+        ("if-none-match", &*tag(&second), 412),
+        ("if-none-match", &*format!("\"x\", W/{}", tag(&second)), 412),
+        ("if-none-match", &*tag(&first), 200),
     ] {
         let answer = put_with(&api, "/terrains/hill", &[(header, value)], hill(25.0)).await;
         assert_eq!(answer.status, status, "{header}: {value}");
@@ -78,9 +82,14 @@ async fn a_name_can_be_given_to_another_content() {
             put(&api, "/terrains/hill", hill(50.0)).await;
         }
     }
-    for (header, value, status) in [("if-match", "*", 412), ("if-none-match", "*", 201)] {
+    for (header, value, status) in [
+        ("if-match", "*", 412),
+        ("if-none-match", "*", 201),
+        ("if-none-match", "\"x\"", 201),
+    ] {
         let answer = put_with(&api, "/terrains/new", &[(header, value)], hill(25.0)).await;
         assert_eq!(answer.status, status, "{header}: {value}");
+        api.delete("/terrains/new").await;
     }
 }
 

@@ -68,7 +68,10 @@ pub(super) fn smooth(model: &Model, route: &[Point3]) -> Option<Path> {
             return Some(deliver(model, spline, &samples));
         }
         let shaped_by = |piece: usize| corners[piece..=piece + spline.degree].iter().copied();
-        if !tighten(&mut tightness, cutting.into_iter().flat_map(shaped_by)) {
+        // Where waypoints all but coincide, so do samples, and the corner may be another's.
+        if !tighten(&mut tightness, cutting.into_iter().flat_map(shaped_by))
+            && !tighten(&mut tightness, 0..route.len())
+        {
             return None;
         }
     }
@@ -311,6 +314,26 @@ mod tests {
             );
             assert_eq!(broken, 0, "degree {degree}");
         }
+    }
+
+    /// A pile of waypoints nanometres apart gives samples whose corner lies in another's piece.
+    #[test]
+    fn a_route_with_waypoints_all_but_in_one_place_has_a_path() {
+        let mut scenario = scenario();
+        scenario.threats.clear();
+        scenario.vehicle.max_climb_deg = 10.0;
+        scenario.vehicle.min_leg = 0.0;
+        scenario.start = Point3::new(0.0, 100.0, 0.0);
+        scenario.target = Point3::origin();
+        let pile = Point3::new(-8.0, 55.0, 8.0);
+        let shares = (0..8)
+            .map(|step| 1e-11 * f64::from(step))
+            .chain((0..9).map(|doubled| 8e-11 * libm::exp2(f64::from(doubled))));
+        let mut route = vec![scenario.start];
+        route.extend(shares.map(|share| pile + (scenario.target - pile) * share));
+        route.push(scenario.target);
+        let path = smooth(&Model::new(&scenario), &route).expect("the polyline is clear");
+        assert_eq!(path.points[path.points.len() - 1], scenario.target);
     }
 
     #[test]

@@ -3,6 +3,18 @@
 use super::{hover_exposure, intensity};
 use crate::geometry::{LEVEL, Point2, Rect, Segment};
 
+/// Where a leg keeps beyond this share of the influence, its exposure is summed up.
+const NEAR_EDGE: f64 = 0.99;
+
+/// Gauss and Legendre's five places in -1..1 and their weights: Abramowitz and Stegun, table 25.4.
+const GAUSS: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
+    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.0, 0.568_888_888_888_888_9),
+    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
+];
+
 /// A disc that is never entered, and a soft zone that costs, Eq. 5.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cylinder {
@@ -55,7 +67,8 @@ impl Cylinder {
     ///
     /// With `p` the distance of the axis from the leg's line and `s` the way from the foot of the
     /// perpendicular, `T = influence - sqrt(p^2 + s^2)` over the chord inside the disc, so that an
-    /// antiderivative is `influence s - (s d + p^2 asinh(s / p)) / 2`, `d = sqrt(p^2 + s^2)`.
+    /// antiderivative is `influence s - (s d + p^2 asinh(s / p)) / 2`, `d = sqrt(p^2 + s^2)`. Near the
+    /// edge of the soft zone that is a small difference of large numbers, but `T` is smooth.
     pub(super) fn exposure(&self, leg: &Segment, window: (f64, f64)) -> f64 {
         let length = leg.horizontal_length();
         if length < LEVEL {
@@ -68,14 +81,25 @@ impl Cylinder {
         if p >= self.influence {
             return 0.0;
         }
-        let half_chord = (self.influence * self.influence - p * p).sqrt();
+        let half_chord = ((self.influence - p) * (self.influence + p)).sqrt();
         let s0 = (window.0 * length - foot).max(-half_chord);
         let s1 = (window.1 * length - foot).min(half_chord);
         if s0 >= s1 {
             return 0.0;
         }
+        let distance = |s: f64| (p * p + s * s).sqrt();
+        let slope = leg.length() / length;
+        if distance(0.0_f64.clamp(s0, s1)) > NEAR_EDGE * self.influence {
+            let (middle, half) = (0.5 * (s0 + s1), 0.5 * (s1 - s0));
+            let sum = GAUSS.iter().map(|(at, weight)| {
+                let s = middle + half * at;
+                // influence - d, without the loss of digits.
+                weight * (half_chord - s) * (half_chord + s) / (self.influence + distance(s))
+            });
+            return half * sum.sum::<f64>() * slope;
+        }
         let primitive = |s: f64| {
-            let d = (p * p + s * s).sqrt();
+            let d = distance(s);
             // p^2 asinh(s / p) vanishes with p.
             let logarithm = if p < LEVEL {
                 0.0
@@ -84,7 +108,7 @@ impl Cylinder {
             };
             self.influence * s - 0.5 * (s * d + logarithm)
         };
-        (primitive(s1) - primitive(s0)) * (leg.length() / length)
+        (primitive(s1) - primitive(s0)) * slope
     }
 }
 
@@ -116,6 +140,32 @@ mod tests {
         let exposure =
             disc(50.0, 0.0, 2.0, 10.0).exposure(&leg([0.0; 3], [100.0, 0.0, 0.0]), (0.0, 1.0));
         assert!((exposure - 100.0).abs() < 1e-9, "{exposure}");
+    }
+
+    /// Beside a disc of 100 km, where the closed form would lose all digits.
+    #[test]
+    fn a_leg_that_grazes_the_soft_zone() {
+        let check = |depth: f64, t0: f64| {
+            let influence = 1e5;
+            let p = influence - depth;
+            let depth = influence - p;
+            let leg = leg([-1000.0, p, 0.0], [1000.0, p, 0.0]);
+            let exposure = disc(0.0, 0.0, 1.0, influence).exposure(&leg, (t0, 1.0));
+            // T is (c^2 - s^2) / (influence + d), nearly a parabola; c is the half chord.
+            let c = (depth * (influence + p)).sqrt();
+            let from = (2000.0 * t0 - 1000.0).max(-c);
+            let cubes = c * c * c - from * from * from;
+            let parabola = c * c * (c - from) - cubes / 3.0;
+            let expected = parabola / (2.0 * influence);
+            assert!(
+                (exposure / expected - 1.0).abs() < 1e-7 + depth / influence,
+                "{exposure} {expected}"
+            );
+        };
+        check(1.0, 0.0);
+        check(1e-3, 0.0);
+        check(1e-3, 0.503);
+        check(1e-5, 0.0);
     }
 
     #[test]

@@ -21,9 +21,7 @@ pub(in crate::planner) fn with_waypoints(
     mut route: Vec<Point3>,
     waypoints: usize,
 ) -> Vec<Point3> {
-    while route.len() > waypoints + 2 {
-        leave_out(model, &mut route);
-    }
+    leave_out(model, &mut route, waypoints + 2);
     let mut splits: Vec<Split> = route
         .windows(2)
         .map(|ends| Split::of(model, ends[0], ends[1]))
@@ -112,43 +110,80 @@ impl Split {
     }
 }
 
-/// Leave out the waypoint that is missed least, or put one in place of two.
-fn leave_out(model: &Model, route: &mut Vec<Point3>) {
-    let count = route.len();
-    let mut best: Option<(Fitness, usize, Option<Point3>)> = None;
-    let mut consider = |price: Fitness, idx: usize, instead: Option<Point3>| {
-        if best.as_ref().is_none_or(|(least, ..)| price.beats(least)) {
-            best = Some((price, idx, instead));
+/// Leave out the waypoint that is missed least, or put one in place of two, until `points` are left.
+fn leave_out(model: &Model, route: &mut Vec<Point3>, points: usize) {
+    if route.len() <= points {
+        return;
+    }
+    let mut omissions: Vec<Omission> = (1..route.len() - 1)
+        .map(|idx| Omission::of(model, route, idx))
+        .collect();
+    while route.len() > points {
+        let least = (1..omissions.len()).fold(0, |least, next| {
+            if omissions[next].change.beats(&omissions[least].change) {
+                next
+            } else {
+                least
+            }
+        });
+        let (idx, omission) = (least + 1, omissions.remove(least));
+        route.remove(idx);
+        if let Some(corner) = omission.instead {
+            route[idx] = corner;
         }
-    };
-    for idx in 1..count - 1 {
-        let before = idx.saturating_sub(2);
-        let after = (idx + 3).min(count);
+        // Of the others, only those that see what has changed.
+        let sees = idx.saturating_sub(Omission::AFTER).max(1)..idx + Omission::BEFORE + 1;
+        for near in sees.start..sees.end.min(route.len() - 1) {
+            omissions[near - 1] = Omission::of(model, route, near);
+        }
+    }
+}
+
+/// How a waypoint is best left out.
+struct Omission {
+    change: Fitness,
+    /// In place of it and the next.
+    instead: Option<Point3>,
+}
+
+impl Omission {
+    /// Points looked at before the waypoint.
+    const BEFORE: usize = 2;
+    /// And after it, at most.
+    const AFTER: usize = 3;
+
+    fn of(model: &Model, route: &[Point3], idx: usize) -> Self {
+        let count = route.len();
+        let before = idx.saturating_sub(Self::BEFORE);
+        let after = (idx + Self::AFTER).min(count);
         let without: Vec<Point3> = (before..after)
             .filter(|&other| other != idx)
             .map(|other| route[other])
             .collect();
-        consider(change(model, &route[before..after], &without), idx, None);
-        if idx + 2 < count
-            && let Some(corner) =
-                crossing(route[idx - 1], route[idx], route[idx + 1], route[idx + 2])
-        {
-            let after = (idx + 4).min(count);
-            let with: Vec<Point3> = (before..after)
-                .filter(|&other| other != idx + 1)
-                .map(|other| if other == idx { corner } else { route[other] })
-                .collect();
-            consider(
-                change(model, &route[before..after], &with),
-                idx,
-                Some(corner),
-            );
+        let plainly = Self {
+            change: change(model, &route[before..after], &without),
+            instead: None,
+        };
+        let corner = (idx + 2 < count)
+            .then(|| crossing(route[idx - 1], route[idx], route[idx + 1], route[idx + 2]))
+            .flatten();
+        let Some(corner) = corner else {
+            return plainly;
+        };
+        let after = (idx + Self::AFTER + 1).min(count);
+        let with: Vec<Point3> = (before..after)
+            .filter(|&other| other != idx + 1)
+            .map(|other| if other == idx { corner } else { route[other] })
+            .collect();
+        let change = change(model, &route[before..after], &with);
+        if change.beats(&plainly.change) {
+            Self {
+                change,
+                instead: Some(corner),
+            }
+        } else {
+            plainly
         }
-    }
-    let (_, idx, instead) = best.expect("there is a waypoint to leave out");
-    route.remove(idx);
-    if let Some(corner) = instead {
-        route[idx] = corner;
     }
 }
 
@@ -228,6 +263,29 @@ mod tests {
         let few = with_waypoints(&model, many.clone(), 2);
         let without_the_middle = [many[0], many[1], many[3], many[4]];
         assert!(!price(&model, &without_the_middle).beats(&price(&model, &few)));
+    }
+
+    /// Each of the single steps looks at every waypoint anew.
+    #[test]
+    fn many_are_left_out_as_one_by_one() {
+        let scenario = scenario();
+        let model = Model::new(&scenario);
+        let free: Vec<[f64; 3]> = (0..60_u32)
+            .map(|i| {
+                let (t, wave) = (f64::from(i) / 60.0, f64::from(i * 7 % 11));
+                [
+                    150.0 + 600.0 * t - 9.0 * wave,
+                    100.0 + 700.0 * t + 6.0 * wave,
+                    90.0 + wave,
+                ]
+            })
+            .collect();
+        let mut one_by_one = route(&free);
+        while one_by_one.len() > 5 {
+            let waypoints = one_by_one.len() - 3;
+            one_by_one = with_waypoints(&model, one_by_one, waypoints);
+            assert_eq!(one_by_one, with_waypoints(&model, route(&free), waypoints));
+        }
     }
 
     #[test]

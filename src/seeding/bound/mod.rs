@@ -188,7 +188,7 @@ fn plain(walls: &[Wall], prices: &Prices, stop: &dyn Fn() -> bool) -> f64 {
 }
 
 /// Length of the string round `walls` widened to `radii` (`None` leaves one out), metres, less what
-/// routes may cut off corners; infinite where there is none. Once that is proven to be `enough`, or
+/// routes may cut off corners, but not below 0; infinite where there is none. Once that is proven to be `enough`, or
 /// `stop` asks for it, what is proven. With it, the ways looked at.
 fn length(
     walls: &[Wall],
@@ -204,7 +204,8 @@ fn length(
     );
     let slack = slack(walls, radii, prices);
     let (shortest, ways) = shortest(&scene, (enough + slack, stop));
-    (shortest - slack, ways)
+    // Where little is paid for fuel and much for soft zones, corners may be worth more than the way.
+    ((shortest - slack).max(0.0), ways)
 }
 
 fn slack(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> f64 {
@@ -356,6 +357,41 @@ mod tests {
             include_str!("../../../scenarios/paper-4.json"),
             525.6264,
             0.20,
+        );
+    }
+
+    /// What a route may cut off corners can be worth more than the way; and it may go through what
+    /// is thinner than its tolerance.
+    #[test]
+    fn never_above_a_way_through_what_is_no_obstacle() {
+        let check = |ring: &str, fuel: f64, threat: f64| {
+            let mut scenario = scenario(&format!(
+                r#""threats": [{{"kind": "polygon", "margin": 60, "vertices": [{ring}]}}]"#
+            ));
+            scenario.weights.fuel = fuel;
+            scenario.weights.threat = threat;
+            scenario.weights.altitude = 0.0;
+            let straight = fuel * (scenario.target - scenario.start).norm();
+            let bound = lower_bound(&scenario);
+            assert!(bound <= straight, "{bound} {straight}");
+        };
+        // Both keep out of the way, with their soft zones.
+        let triangle = r#"{"x": 900, "y": 0}, {"x": 990, "y": 0}, {"x": 950, "y": 90}"#;
+        check(triangle, 1e-6, 1000.0);
+        let needle = r#"{"x": 900, "y": 0}, {"x": 900.001, "y": 0}, {"x": 900, "y": 100}"#;
+        check(needle, 0.5, 1000.0);
+        // Half a micrometre wide where the way crosses it.
+        check(
+            r#"{"x": 0, "y": 500}, {"x": 0, "y": 500.000003}, {"x": 640, "y": 500}"#,
+            0.5,
+            0.0,
+        );
+        // A block with an arm of a micrometre.
+        check(
+            r#"{"x": 0, "y": 900}, {"x": 0, "y": 500}, {"x": 900, "y": 500},
+               {"x": 900, "y": 500.000001}, {"x": 50, "y": 500.000001}, {"x": 50, "y": 900}"#,
+            0.5,
+            0.0,
         );
     }
 

@@ -1,6 +1,7 @@
 //! Threats as a bound sees them: how far each may be widened for free, and which may be passed by
 //! flying over or under them.
 
+use super::super::arc::nearest_points;
 use super::super::outline::{Outline, OutlineShape};
 use super::Prices;
 use crate::geometry::Point2;
@@ -65,12 +66,6 @@ impl Wall {
                 polygon.margin(),
             ),
         };
-        if let OutlineShape::Ring(ring) = &shape {
-            // Thinner than what a route may enter it by: no obstacle to speak of.
-            if 2.0 * area(ring) <= perimeter(ring) * 2.0 * slack {
-                return None;
-            }
-        }
         let mut wall = Self {
             shape,
             core,
@@ -80,6 +75,12 @@ impl Wall {
             safe: 0.0,
             toll,
         };
+        if let OutlineShape::Ring(ring) = &wall.shape
+            && (wall.slack(slack) >= perimeter(ring) || is_thin(ring, 2.0 * slack))
+        {
+            // A route may cut through: no obstacle to speak of.
+            return None;
+        }
         let outline = wall.outline(0.0);
         let nearest = [scenario.start, scenario.target]
             .map(|end| outline.distance(end.xy()))
@@ -144,19 +145,36 @@ impl Wall {
                 );
                 let (one, other) = ((before - at).normalize(), (after - at).normalize());
                 // sin of half the angle between the edges.
-                let half = (0.5 * (1.0 - one.dot(&other))).max(0.0).sqrt();
-                2.0 * tolerance / half.max(1e-6)
+                let half = 0.5 * (one - other).norm();
+                2.0 * tolerance / half
             })
             .sum()
     }
 }
 
-fn area(ring: &[Point2]) -> f64 {
+/// Whether two edges of `ring` that have no corner in common come within `least` metres of each other.
+fn is_thin(ring: &[Point2], least: f64) -> bool {
     let count = ring.len();
-    let twice: f64 = (0..count)
-        .map(|i| (ring[i] - ring[0]).perp(&(ring[(i + 1) % count] - ring[0])))
-        .sum();
-    0.5 * twice.abs()
+    let low = |edge: &(usize, Point2, Point2)| edge.1.x.min(edge.2.x);
+    let mut edges: Vec<_> = (0..count)
+        .map(|i| (i, ring[i], ring[(i + 1) % count]))
+        .collect();
+    edges.sort_by(|one, other| low(one).total_cmp(&low(other)));
+    edges.iter().enumerate().any(|(at, one)| {
+        let (highest_x, y) = (one.1.x.max(one.2.x), [one.1.y, one.2.y]);
+        let after = edges[at + 1..].iter();
+        after
+            .take_while(|other| low(other) <= highest_x + least)
+            .filter(|other| {
+                other.1.y.min(other.2.y) <= y[0].max(y[1]) + least
+                    && other.1.y.max(other.2.y) >= y[0].min(y[1]) - least
+            })
+            .filter(|other| (one.0 + 1) % count != other.0 && (other.0 + 1) % count != one.0)
+            .any(|other| {
+                let (p, q) = nearest_points((one.1, one.2), (other.1, other.2));
+                (q - p).norm() <= least
+            })
+    })
 }
 
 fn perimeter(ring: &[Point2]) -> f64 {

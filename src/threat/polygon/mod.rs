@@ -170,6 +170,14 @@ impl Polygon {
         let features = nearest::features(&self.vertices, leg);
         let mut pieces = Vec::new();
         cut(&features, window, leg.horizontal_length(), &mut pieces);
+        if window.0 >= window.1 {
+            // A single point, as of a leg that only just rises to the base.
+            let inside = self.contains(leg.at(window.0).xy());
+            for piece in &mut pieces {
+                piece.inside = inside;
+            }
+            return pieces;
+        }
         // Sides are not told by the nearest features: where edges are nearly in line, rounding may
         // take one for another beside a vertex, and with it the crossing.
         let crossings = nearest::crossings(&features, window);

@@ -41,6 +41,18 @@ fn clearance_is_exact_and_signed() {
     check([4.0, 4.0, 0.0], [4.0, 4.0, 9.0], -4.0);
 }
 
+/// A leg that rises to the base of a threat, and no further, enters it all the same.
+#[test]
+fn a_single_point_may_lie_inside() {
+    let check = |at: f64, expected: f64| {
+        let clearance = square(0.0).clearance(&leg([-5.0, 7.0, 0.0], [5.0, 7.0, 9.0]), (at, at));
+        assert!((clearance - expected).abs() < 1e-9, "{clearance}");
+    };
+    check(1.0, -3.0);
+    check(0.7, -2.0);
+    check(0.2, 3.0);
+}
+
 /// Across the square at mid-height: two ramps of the margin outside and 10 m inside.
 #[test]
 fn exposure_across() {

@@ -72,7 +72,10 @@ pub(super) fn smooth(model: &Model, route: &[Point3]) -> Option<Path> {
         if !tighten(&mut tightness, cutting.into_iter().flat_map(shaped_by))
             && !tighten(&mut tightness, 0..route.len())
         {
-            return None;
+            // Legs shorter than samples lie apart turn, too.
+            let corners = corners_alone(route, spacing);
+            let points: Vec<Point3> = corners.iter().map(|sample| sample.point).collect();
+            return keeps_limits(model, &points).then(|| deliver(model, spline, &corners));
         }
     }
 }
@@ -161,6 +164,36 @@ fn sample(spline: &BSpline, spacing: f64) -> Vec<Sample> {
     samples[0].point = spline.control_points[0];
     samples[last].point = spline.control_points[spline.control_points.len() - 1];
     samples
+}
+
+/// Samples of the legs themselves, every waypoint among them.
+fn corners_alone(route: &[Point3], spacing: f64) -> Vec<Sample> {
+    let at = |point| Sample {
+        point,
+        u: 0.0,
+        piece: 0,
+    };
+    let mut samples = vec![at(route[0])];
+    for ends in route.windows(2) {
+        let way = ends[1] - ends[0];
+        let parts = (way.norm() / spacing).ceil();
+        let mut part = 1.0;
+        while part < parts {
+            samples.push(at(ends[0] + way * (part / parts)));
+            part += 1.0;
+        }
+        samples.push(at(ends[1]));
+    }
+    samples
+}
+
+/// Whether a path is held to nothing that `points` break.
+fn keeps_limits(model: &Model, points: &[Point3]) -> bool {
+    let mut keeps = true;
+    model.assess(points, Quadrature::Integral, model.tolerance, |breach| {
+        keeps &= !binds(&breach);
+    });
+    keeps
 }
 
 /// Samples nearer than this are one, metres.
@@ -314,6 +347,33 @@ mod tests {
             );
             assert_eq!(broken, 0, "degree {degree}");
         }
+    }
+
+    /// Round within some nanometres, and back: turns that no samples show.
+    #[test]
+    fn a_route_that_turns_within_nanometres_has_a_path() {
+        let mut scenario = scenario();
+        scenario.threats.clear();
+        scenario.vehicle.min_leg = 0.0;
+        scenario.start = Point3::new(100.0, 100.0, 100.0);
+        scenario.target = Point3::new(100.0, 102.0, 100.0);
+        let mut route = vec![scenario.start];
+        let mut at = Point3::new(600.0, 101.0, 100.0);
+        for bend in 0..5 {
+            route.push(at);
+            let heading = (45.0 * f64::from(bend)).to_radians();
+            at += nalgebra::Vector3::new(heading.cos(), heading.sin(), 0.0) * 1e-8;
+        }
+        route.push(scenario.target);
+        let model = Model::new(&scenario);
+        let mut breaches = 0;
+        model.assess(&route, Quadrature::Integral, model.tolerance, |_| {
+            breaches += 1;
+        });
+        assert_eq!(breaches, 0);
+        let path = smooth(&model, &route).expect("the route itself can be flown");
+        assert!(keeps_limits(&model, &path.points));
+        assert!(route.iter().all(|corner| path.points.contains(corner)));
     }
 
     /// A pile of waypoints nanometres apart gives samples whose corner lies in another's piece.

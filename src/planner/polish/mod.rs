@@ -31,6 +31,10 @@ pub(super) struct Steps {
 /// half that step half as much.
 const HOPE: f64 = 0.12;
 
+/// What is beyond limits must shrink by this share for a sweep to be worth another: what cannot be mended
+/// would else shrink by less and less for ever.
+const MENDED: f64 = 1e-3;
+
 /// By which a violation becomes dearer as the step is halved.
 const DEARER: f64 = 8.0;
 
@@ -88,8 +92,11 @@ impl<'m, 's> Polish<'m, 's> {
                 let next = self.lattice.price(&trial);
                 let (new, old) = (paid(next, rate), paid(best, rate));
                 if new.beats(&old) {
-                    better = new.violation < old.violation
-                        || old.cost - new.cost > steps.gain * old.cost;
+                    better = if new.violation < old.violation {
+                        old.violation - new.violation > MENDED * old.violation
+                    } else {
+                        old.cost - new.cost > steps.gain * old.cost
+                    };
                     best = next;
                     *route = trial;
                     let is_known = |(fitness, other): &(Fitness, Vec<Point3>)| {

@@ -362,7 +362,7 @@ mod tests {
         for bend in 0..5 {
             route.push(at);
             let heading = (45.0 * f64::from(bend)).to_radians();
-            at += nalgebra::Vector3::new(heading.cos(), heading.sin(), 0.0) * 1e-8;
+            at += nalgebra::Vector3::new(libm::cos(heading), libm::sin(heading), 0.0) * 1e-8;
         }
         route.push(scenario.target);
         let model = Model::new(&scenario);

@@ -79,10 +79,16 @@ impl Heights {
         let band = model.scenario.altitude;
         let slack = OVERLOOKED * tolerance.height_m;
         let ends = [model.scenario.start, model.scenario.target];
-        let floors = model.zones.iter().map(|zone| zone.floor);
-        let wide = model.zones.iter().filter(|zone| zone.radius > 0.0);
+        // An end that lies in the band has no zone to be measured by.
+        let wide: Vec<_> = model
+            .zones
+            .iter()
+            .filter(|zone| zone.radius > 0.0)
+            .collect();
+        let floors = wide.iter().map(|zone| zone.floor);
         Self {
             zones: wide
+                .iter()
                 .map(|zone| Zone {
                     center: zone.center,
                     radius: zone.radius,

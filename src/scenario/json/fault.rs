@@ -111,7 +111,7 @@ pub const CODES: &[(&str, &str)] = &[
     ),
     (
         "unknown-plan",
-        "the plan to start from is not there, or has no route yet",
+        "the plan to start from is not there, has no route yet, or one in another frame or more than 500 km away",
     ),
     ("more-faults", "only the first faults are listed"),
 ];

@@ -43,7 +43,9 @@ const LOW: f64 = 0.1;
 struct Climb {
     /// Above ground, metres.
     height: f64,
-    /// Along the ground from start and from target to there, metres.
+    /// Along the ground from start to target, metres, for nothing but to climb.
+    least: f64,
+    /// Along the ground from start and from target to there, with room for the waypoints that stay there.
     needed: [f64; 2],
     /// What the target's being higher than the start, or lower, takes more than that.
     more: f64,
@@ -58,19 +60,14 @@ pub(super) fn routes(model: &Model) -> Vec<Vec<Point3>> {
         let climb = Climb::by(scenario, share);
         let tries = TRIES
             .into_iter()
-            .filter(|_| climb.length() > direct)
+            .filter(|_| climb.least > direct)
             .flat_map(|(near, room)| Ways::new(model, climb, room).routes(near));
         tries.collect::<Vec<_>>()
     };
     let mut routes = find(BETWEEN);
     if scenario.weights.altitude > 0.0 {
-        let higher = SHARES.into_iter().map(find);
-        routes.extend(
-            higher
-                .into_iter()
-                .find(|routes| !routes.is_empty())
-                .unwrap_or_default(),
-        );
+        let mut higher = SHARES.into_iter().map(find);
+        routes.extend(higher.find(|routes| !routes.is_empty()).unwrap_or_default());
     }
     routes
 }
@@ -136,12 +133,14 @@ impl Climb {
         // Waypoints up there keep their distance from each other.
         let level = LEVEL * scenario.planner.waypoints as f64 * scenario.vehicle.min_leg;
         let climb = |rise: f64| rise.abs() / steepest(scenario) * (1.0 + SLACK);
-        let needed = own.map(|own| climb(own - height) + 0.5 * level);
-        let least = climb(scenario.target.z - scenario.start.z);
+        let climbs = own.map(|own| climb(own - height));
+        let direct = climb(scenario.target.z - scenario.start.z);
+        let least = direct.max(climbs[0] + climbs[1]);
         Self {
             height,
-            needed,
-            more: (least - needed[0] - needed[1]).max(0.0),
+            least,
+            needed: climbs.map(|climb| climb + 0.5 * level),
+            more: (direct - climbs[0] - climbs[1] - level).max(0.0),
         }
     }
 
@@ -177,7 +176,7 @@ mod tests {
         scenario.altitude.max = 400.0;
         scenario.vehicle.max_climb_deg = climb;
         scenario.vehicle.max_turn_deg = turn;
-        scenario.vehicle.min_leg = distance.hypot(rise) / (10.0 * (waypoints + 1) as f64);
+        scenario.vehicle.min_leg = libm::hypot(distance, rise) / (10.0 * (waypoints + 1) as f64);
         scenario.planner.seeding = Seeding::Tangent;
         scenario.planner.polish = true;
         scenario.planner.waypoints = waypoints;

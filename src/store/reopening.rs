@@ -142,7 +142,6 @@ impl Store for Reopening {
         self.heed(&store, store.submit(submission).await)
     }
 
-    /// Waits for the store to be open, too.
     async fn repeated(
         &self,
         owner: Option<&Owner>,
@@ -152,6 +151,7 @@ impl Store for Reopening {
         self.heed(&store, store.repeated(owner, idempotency).await)
     }
 
+    /// Waits for the store to be open, too.
     async fn claim(&self) -> Result<Lease, StoreError> {
         let store = self.opened().await?;
         self.heed(&store, store.claim().await)

@@ -13,6 +13,7 @@ mod events;
 mod feed;
 mod ground;
 mod idempotency;
+mod known_tags;
 mod metrics;
 mod off_thread;
 mod pages;

@@ -5,6 +5,7 @@
 
 mod claims;
 mod idempotency;
+mod opening;
 mod operations;
 mod packed;
 mod read;
@@ -17,7 +18,7 @@ pub mod upkeep;
 mod webhooks;
 mod writer;
 
-use std::fs::{DirBuilder, File, TryLockError};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -27,6 +28,7 @@ use rusqlite::{Connection, ErrorCode};
 use tokio::sync::watch;
 
 use self::claims::When;
+use self::opening::{create_directory, lock, open_database, sync_directory};
 use self::read::Readers;
 use self::records::Records;
 use self::writer::Writer;
@@ -40,9 +42,6 @@ use crate::job::{Event, Idempotency, Owner, Plan, PlanId, Submission};
 
 /// Name of the database in the data directory.
 const DATABASE: &str = "noctule.db";
-
-/// Name of the file in the data directory whose lock keeps a second process out.
-const LOCK: &str = "noctule.lock";
 
 /// How long to wait for a person who holds the database in `sqlite3`.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
@@ -316,68 +315,6 @@ impl From<rusqlite::Error> for StoreError {
 
 fn closed() -> StoreError {
     StoreError::unavailable("the store is closed".to_owned())
-}
-
-fn failed(what: &str, error: &std::io::Error) -> StoreError {
-    StoreError::Unavailable {
-        trouble: match error.kind() {
-            std::io::ErrorKind::StorageFull => Trouble::Full,
-            _ => Trouble::ReadOnly,
-        },
-        detail: format!("{what}: {error}"),
-    }
-}
-
-fn create_directory(data_dir: &Path) -> Result<(), StoreError> {
-    let mut builder = DirBuilder::new();
-    builder.recursive(true);
-    #[cfg(unix)]
-    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
-    builder.create(data_dir).map_err(|error| {
-        let what = format!("data directory {} cannot be made", data_dir.display());
-        failed(&what, &error)
-    })
-}
-
-fn lock(data_dir: &Path) -> Result<File, StoreError> {
-    let path = data_dir.join(LOCK);
-    let unusable = |error| failed(&format!("lock file {}", path.display()), &error);
-    let file = File::options()
-        .create(true)
-        .truncate(false)
-        .write(true)
-        .open(&path)
-        .map_err(unusable)?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(StoreError::InUse(data_dir.to_owned())),
-        Err(TryLockError::Error(error)) => Err(unusable(error)),
-    }
-}
-
-fn open_database(file: &Path) -> Result<Connection, StoreError> {
-    let mut connection = Connection::open(file)?;
-    connection.busy_timeout(BUSY_TIMEOUT)?;
-    connection.set_prepared_statement_cache_capacity(64);
-    connection.pragma_update(None, "journal_mode", "WAL")?;
-    connection.pragma_update(None, "synchronous", "FULL")?;
-    connection.pragma_update(None, "foreign_keys", true)?;
-    // Pages of 4 KiB: the log is folded into the database at 16 MiB.
-    connection.pragma_update(None, "wal_autocheckpoint", 4_096)?;
-    connection.pragma_update(None, "journal_size_limit", 64 * 1_024 * 1_024)?;
-    schema::prepare(&mut connection)?;
-    Ok(connection)
-}
-
-/// A new file is only found again after a power failure when its directory is on the disk too.
-fn sync_directory(data_dir: &Path) -> Result<(), StoreError> {
-    #[cfg(unix)]
-    File::open(data_dir)
-        .and_then(|directory| directory.sync_all())
-        .map_err(|error| failed(&format!("data directory {}", data_dir.display()), &error))?;
-    #[cfg(not(unix))]
-    let _ = data_dir;
-    Ok(())
 }
 
 #[cfg(test)]

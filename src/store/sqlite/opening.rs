@@ -1,0 +1,74 @@
+//! The files in the data directory: made, locked, opened, and found again after a power failure.
+
+use std::fs::{DirBuilder, File, TryLockError};
+use std::path::Path;
+
+use rusqlite::Connection;
+
+use super::{BUSY_TIMEOUT, schema};
+use crate::store::{StoreError, Trouble};
+
+/// Name of the file in the data directory whose lock keeps a second process out.
+const LOCK: &str = "noctule.lock";
+
+pub(super) fn create_directory(data_dir: &Path) -> Result<(), StoreError> {
+    let mut builder = DirBuilder::new();
+    builder.recursive(true);
+    #[cfg(unix)]
+    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+    builder.create(data_dir).map_err(|error| {
+        let what = format!("data directory {} cannot be made", data_dir.display());
+        failed(&what, &error)
+    })
+}
+
+pub(super) fn lock(data_dir: &Path) -> Result<File, StoreError> {
+    let path = data_dir.join(LOCK);
+    let unusable = |error| failed(&format!("lock file {}", path.display()), &error);
+    let file = File::options()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(&path)
+        .map_err(unusable)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(StoreError::InUse(data_dir.to_owned())),
+        Err(TryLockError::Error(error)) => Err(unusable(error)),
+    }
+}
+
+pub(super) fn open_database(file: &Path) -> Result<Connection, StoreError> {
+    let mut connection = Connection::open(file)?;
+    connection.busy_timeout(BUSY_TIMEOUT)?;
+    connection.set_prepared_statement_cache_capacity(64);
+    connection.pragma_update(None, "journal_mode", "WAL")?;
+    connection.pragma_update(None, "synchronous", "FULL")?;
+    connection.pragma_update(None, "foreign_keys", true)?;
+    // Pages of 4 KiB: the log is folded into the database at 16 MiB.
+    connection.pragma_update(None, "wal_autocheckpoint", 4_096)?;
+    connection.pragma_update(None, "journal_size_limit", 64 * 1_024 * 1_024)?;
+    schema::prepare(&mut connection)?;
+    Ok(connection)
+}
+
+/// A new file is only found again after a power failure when its directory is on the disk too.
+pub(super) fn sync_directory(data_dir: &Path) -> Result<(), StoreError> {
+    #[cfg(unix)]
+    File::open(data_dir)
+        .and_then(|directory| directory.sync_all())
+        .map_err(|error| failed(&format!("data directory {}", data_dir.display()), &error))?;
+    #[cfg(not(unix))]
+    let _ = data_dir;
+    Ok(())
+}
+
+fn failed(what: &str, error: &std::io::Error) -> StoreError {
+    StoreError::Unavailable {
+        trouble: match error.kind() {
+            std::io::ErrorKind::StorageFull => Trouble::Full,
+            _ => Trouble::ReadOnly,
+        },
+        detail: format!("{what}: {error}"),
+    }
+}

@@ -1,4 +1,5 @@
-//! Routes to start from: along taut strings round the threats, and along a route that is known.
+//! Routes to start from: along taut strings round the threats, over the ground, long enough to climb, and along a route
+//! that is known.
 
 mod climbs;
 mod count;
@@ -9,6 +10,7 @@ mod roadmap;
 mod tangents;
 mod thin;
 mod trails;
+mod worth;
 
 pub(super) use count::{spread, with_waypoints};
 
@@ -76,25 +78,23 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let warm = known.is_some();
     let mut legs_priced = 0;
     let mut shapes: Vec<Vec<Point3>> = known.into_iter().collect();
-    let mut climbs = Vec::new();
+    let mut low = false;
     if settings.seeding == Seeding::Tangent {
         shapes.extend(along_strings(model, stop));
         // Who brings a route has been over the hills already.
         if !warm {
-            climbs = climbs::routes(model);
             let found = over_ground(model);
+            let climbs = climbs::routes(model);
+            legs_priced = found.legs_priced + climbs.legs_priced;
             shapes.extend(found.routes);
-            legs_priced = found.legs_priced;
+            if !climbs.routes.is_empty() {
+                shapes.extend(climbs.routes);
+                (shapes, low) = worth::promising(model, shapes);
+            }
         }
     }
     if shapes.is_empty() {
         return None;
-    }
-    // Where the way must be made longer, spare waypoints are dear on the others.
-    let mut low = false;
-    if !climbs.is_empty() {
-        shapes.append(&mut climbs);
-        (shapes, low) = climbs::promising(model, shapes);
     }
     // A known route keeps its bends; a string needs but as many waypoints as it has.
     let coarse = if warm || low {

@@ -8,10 +8,8 @@
 mod places;
 mod ways;
 
+use super::net::Found;
 use crate::cost::Model;
-use crate::geometry::Point3;
-use crate::optimizer::Fitness;
-use crate::planner::price::price;
 use crate::scenario::Scenario;
 use ways::Ways;
 
@@ -32,12 +30,6 @@ const LEVEL: f64 = 0.7;
 /// Ways are longer than they must be by this share, and turns less sharp.
 const SLACK: f64 = 1e-6;
 
-/// A route this much dearer than the best, as a share, is left out.
-const DEAR: f64 = 0.16;
-
-/// Where spare waypoints cost more than this share of the best route, its climb is not to be searched with fewer.
-const LOW: f64 = 0.1;
-
 /// What a way has to reach.
 #[derive(Clone, Copy)]
 struct Climb {
@@ -53,71 +45,36 @@ struct Climb {
 
 /// Routes that are long enough to climb, of no more waypoints than `model` asks for; none where the direct way is
 /// long enough.
-pub(super) fn routes(model: &Model) -> Vec<Vec<Point3>> {
-    let scenario = model.scenario;
-    let direct = (scenario.target - scenario.start).xy().norm();
-    let find = |share: f64| {
-        let climb = Climb::by(scenario, share);
-        let tries = TRIES
-            .into_iter()
-            .filter(|_| climb.least > direct)
-            .flat_map(|(near, room)| Ways::new(model, climb, room).routes(near));
-        tries.collect::<Vec<_>>()
-    };
-    let mut routes = find(BETWEEN);
-    if scenario.weights.altitude > 0.0 {
-        let mut higher = SHARES.into_iter().map(find);
-        routes.extend(higher.find(|routes| !routes.is_empty()).unwrap_or_default());
+pub(super) fn routes(model: &Model) -> Found {
+    let mut found = ways(model, BETWEEN);
+    if model.scenario.weights.altitude > 0.0 {
+        for share in SHARES {
+            let higher = ways(model, share);
+            found.legs_priced += higher.legs_priced;
+            if !higher.routes.is_empty() {
+                found.routes.extend(higher.routes);
+                break;
+            }
+        }
     }
-    routes
+    found
 }
 
-/// Those of `shapes` that may still win once they have all their waypoints, and whether these are too low to be
-/// left out in a coarse search.
-pub(super) fn promising(model: &Model, shapes: Vec<Vec<Point3>>) -> (Vec<Vec<Point3>>, bool) {
-    let mut worth: Vec<(Worth, Vec<Point3>)> = shapes
-        .into_iter()
-        .map(|shape| {
-            let waypoints = model.scenario.planner.waypoints.min(shape.len() - 2);
-            let route = super::with_waypoints(model, shape, waypoints);
-            (Worth::of(model, &route), route)
-        })
-        .collect();
-    worth.sort_by(|(one, _), (other, _)| one.fitness.rank(&other.fitness));
-    let Some((best, _)) = worth.first() else {
-        return (Vec::new(), false);
+/// Of one climb.
+fn ways(model: &Model, share: f64) -> Found {
+    let mut found = Found {
+        routes: Vec::new(),
+        legs_priced: 0,
     };
-    let (most, low) = (
-        best.fitness.cost * (1.0 + DEAR),
-        best.spare > LOW * best.fitness.cost,
-    );
-    worth.retain(|(worth, _)| worth.fitness.cost <= most);
-    (worth.into_iter().map(|(_, route)| route).collect(), low)
-}
-
-/// What a route is worth with all its waypoints.
-struct Worth {
-    fitness: Fitness,
-    /// Share of its cost for the waypoints that are not there yet, each where it is cheapest.
-    spare: f64,
-}
-
-impl Worth {
-    fn of(model: &Model, route: &[Point3]) -> Self {
-        let middles = route
-            .windows(2)
-            .map(|ends| nalgebra::center(&ends[0], &ends[1]));
-        let least = route[1..route.len() - 1]
-            .iter()
-            .copied()
-            .chain(middles)
-            .map(|at| model.waypoint(at, model.tolerance).1)
-            .fold(f64::INFINITY, f64::min);
-        let mut fitness = price(model, route);
-        let spare = (model.scenario.planner.waypoints + 2 - route.len()) as f64 * least;
-        fitness.cost += spare;
-        Self { fitness, spare }
+    let climb = Climb::by(model.scenario, share);
+    if climb.least > (model.scenario.target - model.scenario.start).xy().norm() {
+        for (near, room) in TRIES {
+            let ways = Ways::new(model, climb, room);
+            found.routes.extend(ways.routes(near));
+            found.legs_priced += ways.legs_priced();
+        }
     }
+    found
 }
 
 impl Climb {
@@ -158,7 +115,8 @@ fn steepest(scenario: &Scenario) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Point2, Rect};
+    use crate::geometry::{Point2, Point3, Rect};
+    use crate::planner::price::price;
     use crate::planner::tests::scenario;
     use crate::planner::{Nobody, plan};
     use crate::scenario::Seeding;
@@ -188,7 +146,7 @@ mod tests {
     #[test]
     fn a_way_that_is_long_enough_is_left_alone() {
         for shape in [[900.0, 0.0, 45.0, 60.0], [400.0, 200.0, 45.0, 60.0]] {
-            assert!(routes(&Model::new(&steep(shape, 10))).is_empty());
+            assert!(routes(&Model::new(&steep(shape, 10))).routes.is_empty());
         }
     }
 
@@ -203,7 +161,7 @@ mod tests {
         ] {
             let scenario = steep(shape, waypoints);
             let model = Model::new(&scenario);
-            let routes = routes(&model);
+            let routes = routes(&model).routes;
             let flown = |route: &&Vec<Point3>| price(&model, route).is_feasible();
             assert!(routes.iter().any(|route| flown(&route)), "{shape:?}");
             for route in &routes {

@@ -98,6 +98,11 @@ impl<'m, 's> Ways<'m, 's> {
         routes
     }
 
+    /// How many were priced for it: those of half the square, since a leg costs the same both ways.
+    pub(super) fn legs_priced(&self) -> u64 {
+        (self.places.len() * (self.places.len() - 1) / 2) as u64
+    }
+
     fn leg(&self, from: usize, to: usize) -> Leg {
         self.legs[from * self.places.len() + to]
     }

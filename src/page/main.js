@@ -454,7 +454,7 @@ Object.defineProperty(globalThis, 'noctule', {
   value: Object.freeze({
     scene: () => world?.inventory() ?? null,
     onScreen: (place) => world?.onScreen(place) ?? null,
-    toMetres: (position) => stage.frame.to(position),
+    toMetres: (position) => stage.frame?.to(position) ?? null,
     groundAt: (x, y) => stage.ground.at(x, y),
     routeAt: (share) => {
       const way = stage.plan && stage.wayOf(stage.plan);

@@ -5,7 +5,7 @@ import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
-import { SMALL, browser, FIRST, document_, drawn, drop, fill, groundPoint, open, scene, service } from './support.js';
+import { SMALL, browser, FIRST, document_, drawn, drop, fill, groundPoint, open, scene, service, settled } from './support.js';
 
 let site;
 let chrome;
@@ -146,6 +146,7 @@ test('the ground of a dataset is drawn as the service has it', async () => {
   await page.setInputFiles('#file', join(directory, 'jacksboro-wgs84.json'));
   await page.waitForFunction(() => globalThis.noctule.document().terrain.kind === 'dataset');
   await page.waitForFunction(() => globalThis.noctule.scene().ground.columns === 201);
+  await settled(page);
   const text = readFileSync(join(directory, 'jacksboro-wgs84.json'), 'utf8');
   const { start } = JSON.parse(text);
   const ground = await page.evaluate((p) => {

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { FIRST, SMALL, WALLED, around, browser, color, document_, drawn, fill, made, open, pixels, plan, scene, service } from './support.js';
+import { FIRST, SMALL, WALLED, around, browser, color, document_, drawn, fill, made, open, pixels, plan, scene, service, settled } from './support.js';
 
 let site;
 let chrome;
@@ -34,7 +34,7 @@ test('a result says so when the scenario has been edited since', async () => {
 
 test('a route within a threat is seen there', async () => {
   const page = await opened(await made(site.url, WALLED));
-  await page.waitForTimeout(300);
+  await settled(page);
   const fault = await color(page, 'fault');
   // Within the wall, but for the dots of the waypoints and of the fault.
   const within = [0.46, 0.48, 0.52, 0.54];
@@ -61,7 +61,7 @@ async function apart(page, selector, atLeast) {
 test('names in the scene cover no others', async () => {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);
-  await page.waitForTimeout(500);
+  await settled(page);
   await apart(page, '#labels span:not([hidden])', 4);
   await page.done();
 });
@@ -94,7 +94,7 @@ test('light that turns to dark recolours the chart, its legend and what is laid 
   const page = await open(chrome, `${site.url}#plan=${first}&with=${second}`);
   await page.waitForFunction(() => globalThis.noctule.scene()?.routes.length === 2);
   await page.emulateMedia({ colorScheme: 'dark' });
-  await page.waitForTimeout(500);
+  await settled(page);
   const [route, other] = [await color(page, 'route'), await color(page, 'other-0')];
   const hex = (css) => `#${css.match(/\d+/g).slice(0, 3).map((part) => Number(part).toString(16).padStart(2, '0')).join('')}`;
   const swatches = await page.locator('#legend i').evaluateAll((nodes) => nodes.map((node) => getComputedStyle(node).backgroundColor));
@@ -120,16 +120,16 @@ test('the keyboard turns the scene', async () => {
   await drawn(page, 1);
   const { start } = await document_(page);
   const at = () => page.evaluate((position) => globalThis.noctule.onScreen(globalThis.noctule.toMetres(position)), start);
-  await page.waitForTimeout(400);
+  await settled(page);
   const before_ = await at();
   await page.focus('[aria-label="Turn left"]');
   await page.keyboard.press('Enter');
-  await page.waitForTimeout(100);
+  await settled(page);
   const turned = await at();
   assert.ok(Math.hypot(turned.x - before_.x, turned.y - before_.y) > 20);
   await page.keyboard.press('Tab');
   await page.keyboard.press('Enter');
-  await page.waitForTimeout(100);
+  await settled(page);
   const back = await at();
   assert.ok(Math.hypot(back.x - before_.x, back.y - before_.y) < 1);
   await page.done();
@@ -142,7 +142,7 @@ test('the name of a chosen threat can be read, light and dark', async () => {
   await page.waitForSelector('#labels .chosen');
   for (const colorScheme of ['light', 'dark']) {
     await page.emulateMedia({ colorScheme });
-    await page.waitForTimeout(300);
+    await settled(page);
     const contrast = await page.evaluate(() => {
       const node = document.querySelector('#labels .chosen');
       const { color, backgroundColor } = getComputedStyle(node);

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { browser, choose, difference, drawn, FIRST, open, plan, scene, service } from './support.js';
+import { browser, choose, difference, drawn, FIRST, open, plan, scene, service, settled } from './support.js';
 
 let site;
 let chrome;
@@ -30,7 +30,7 @@ test('a picture of ground and threats with a route on it is what drawing all of 
     return { backdrop, mark, data: document.getElementById('canvas').toDataURL() };
   }, [act, target]);
   for (const view of [2, 3]) {
-    await page.waitForTimeout(400);
+    await settled(page);
     const whole = await picture('click', `#camera > :nth-child(${view})`);
     const marked = await picture('pointerenter', '.legs tr[data-leg="2"]');
     const kept = await picture('pointerleave', '.legs tr[data-leg="2"]');

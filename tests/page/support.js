@@ -14,6 +14,9 @@ const ARGUMENTS = [
   '--disable-component-update', '--disable-sync',
 ];
 
+/** What has not come by then does not come: long, since the machine may be busy with other things. */
+const PATIENCE_MS = 120000;
+
 /** What the browser itself notes about answers that the page expects: refusals are shown in the page. */
 const EXPECTED = /Failed to load resource: the server responded with a status of (401|404|409|422)|GPU stall due to ReadPixels/;
 
@@ -85,7 +88,7 @@ export async function open(chrome, url, settings = {}) {
     if (['error', 'warning'].includes(message.type()) && !EXPECTED.test(message.text()) && !page.allowed?.test(message.text())) wrong.push(message.text());
   });
   page.on('pageerror', (error) => wrong.push(error.stack));
-  page.setDefaultTimeout(30000);
+  page.setDefaultTimeout(PATIENCE_MS);
   await page.goto(url);
   const done = async () => {
     await context.close();
@@ -102,6 +105,17 @@ export const drawn = (page, threats) => page.waitForFunction((count) => {
   const scene = globalThis.noctule?.scene();
   return scene && scene.ends === 2 && (count === undefined ? scene.frames.count > 1 : scene.threats === count);
 }, threats);
+
+/** Waits until nothing more is drawn. Counted in the page's own frames: a slow machine is given its time. */
+export const settled = (page) => page.evaluate(async () => {
+  const drawings = () => globalThis.noctule.scene()?.frames.count;
+  for (let still = 0, before = drawings(); still < 20; still += 1) {
+    await new Promise(requestAnimationFrame);
+    if (drawings() === before) continue;
+    before = drawings();
+    still = 0;
+  }
+});
 
 export const scene = (page) => page.evaluate(() => globalThis.noctule.scene());
 export const document_ = (page) => page.evaluate(() => globalThis.noctule.document());
@@ -127,7 +141,7 @@ export async function fill(page, pointer, value) {
 export async function plan(page, button = '#plan') {
   await page.evaluate(() => document.querySelector('.verdict')?.classList.add('old'));
   await page.click(button);
-  await page.waitForSelector('.verdict:not(.old)', { timeout: 60000 });
+  await page.waitForSelector('.verdict:not(.old)');
   return page.evaluate(() => new URLSearchParams(location.hash.slice(1)).get('plan'));
 }
 

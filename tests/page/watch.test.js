@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { SMALL, WALLED, around, ask, browser, choose, FIRST, color, drawn, made, open, pixels, plan, scene, service, wire } from './support.js';
+import { SMALL, WALLED, around, ask, browser, choose, FIRST, color, drawn, made, open, pixels, plan, scene, service, settled, wire } from './support.js';
 
 let site;
 let chrome;
@@ -20,7 +20,7 @@ test('the swarm is seen converging, and cancelling keeps the best', async () => 
   await drawn(page, FIRST);
   await choose(page, 'paper-4', LONG);
   await page.click('#plan');
-  await page.waitForFunction(() => globalThis.noctule.scene().trail >= 2, null, { timeout: 60000 });
+  await page.waitForFunction(() => globalThis.noctule.scene().trail >= 2);
   const live = await scene(page);
   assert.equal(live.routes.find((route) => route.name === 'route').points, 10);
   assert.match(await page.textContent('#state'), /running/);
@@ -46,7 +46,7 @@ test('the route is drawn where it is, and a place in it is one place everywhere'
   const route = await color(page, 'route');
   // From above, so that no threat stands before it.
   await page.click('text=Above');
-  await page.waitForTimeout(300);
+  await settled(page);
   for (const share of [0.21, 0.47, 0.83]) {
     const place = await page.evaluate((t) => globalThis.noctule.routeAt(t), share);
     assert.ok(await pixels(page, route, await around(page, place)) >= 8, `the route's colour at ${share} of it`);
@@ -81,7 +81,7 @@ test('a lost connection says so, and is taken up again without a loss', async ()
   await drawn(page, FIRST);
   await choose(page, 'paper-4', LONG);
   await page.click('#plan');
-  await page.waitForFunction(() => globalThis.noctule.scene().trail >= 1, null, { timeout: 60000 });
+  await page.waitForFunction(() => globalThis.noctule.scene().trail >= 1);
   line.cut();
   await page.waitForSelector('#notice:not([hidden])');
   assert.match(await page.textContent('#notice'), /The connection is lost. It is being resumed/);
@@ -163,7 +163,7 @@ test('a search of milliseconds has its whole history, also when its plan is open
   await page.click('#again');
   await page.waitForFunction(() => globalThis.noctule.scene().trail >= 2);
   assert.equal(await page.textContent('#again'), 'Stop');
-  await page.waitForFunction(() => document.getElementById('again').textContent === 'Watch again', null, { timeout: 8000 });
+  await page.waitForFunction(() => document.getElementById('again').textContent === 'Watch again');
   await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 1 && globalThis.noctule.scene().trail === 0);
   await page.done();
 });
@@ -182,7 +182,7 @@ test('a search that starts over is shown from its new beginning', async () => {
   });
   await page.click('#plan');
   await page.waitForFunction(() => globalThis.noctule.history().points > 0);
-  await page.waitForTimeout(300);
+  await settled(page);
   assert.deepEqual(await page.evaluate(() => globalThis.noctule.history()), { points: 1, incumbents: 1 });
   await page.click('#cancel');
   await page.done();
@@ -201,7 +201,7 @@ test('a search of very many iterations is drawn', async () => {
   await page.click('#plan');
   await page.waitForFunction(() => globalThis.noctule.history().points === 80000);
   await page.waitForFunction(() => /best 500/.test(document.getElementById('legend').textContent));
-  await page.waitForTimeout(300);
+  await settled(page);
   await page.click('#cancel');
   await page.done();
 });

@@ -152,11 +152,12 @@ async fn a_dropped_claim_takes_nothing() {
         // Dropped at any time after it has been sent, its answer on the way or already there.
         for round in 0..50 {
             let mut claim = Box::pin(store.claim());
-            assert!(claim.as_mut().now_or_never().is_none());
+            // The answer may be there at once.
+            let lease = claim.as_mut().now_or_never();
             if round % 2 == 0 {
                 until(&**store, id, |plan| plan.status == Status::Running).await;
             }
-            drop(claim);
+            drop((claim, lease));
             until(&**store, id, |plan| plan.status == Status::Queued).await;
         }
         let second = store.submit(submission()).await.unwrap().plan.id;

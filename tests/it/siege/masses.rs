@@ -18,7 +18,7 @@ const KEPT: usize = 200;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn thousands_of_plans_fit_into_the_memory_and_the_limit_of_some() {
-    let n_plans = size(2_000, 100_000);
+    let n_plans = size(600, 100_000);
     let directory = tempfile::tempdir().expect("a temporary directory");
     let kept = KEPT.to_string();
     let service = Service::start(

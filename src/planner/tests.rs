@@ -228,9 +228,9 @@ fn a_time_limit_ends_the_run() {
 fn a_stop_within_an_iteration_is_heard() {
     let mut scenario = scenario();
     let far = scenario.threats[0].clone();
-    scenario.threats.extend((0..5_000).map(|_| far.clone()));
-    // Every sixteenth route or so is a look; the first population takes 60 routes.
-    let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(3));
+    scenario.threats.extend((0..20_000).map(|_| far.clone()));
+    // Every fourth route or so is a look; the first population takes 60 routes.
+    let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(5));
     assert_eq!(outcome.stop_reason, StopReason::Cancelled);
     assert_eq!(outcome.convergence.len(), 1);
     assert!(
@@ -239,7 +239,7 @@ fn a_stop_within_an_iteration_is_heard() {
         outcome.evaluations
     );
     assert!(outcome.convergence[0].mean_cost.is_finite());
-    let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(10));
+    let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(40));
     assert_eq!(outcome.convergence.len(), 2);
     assert_eq!(outcome.evaluations, outcome.convergence[1].evaluations);
     assert!(

@@ -4,7 +4,6 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::siege::size;
 use crate::support::lives::{a_run_of, life, running, running_at};
 use crate::support::process::Service;
 use crate::support::sse::{Block, events};
@@ -135,7 +134,7 @@ async fn open_streams_do_not_hold_up_the_end() {
     let service = Service::start(directory.path(), &["--workers", "1", "--grace", "8"]);
     let address = service.submit(&a_run_of(60_000)).await;
     let mut streams = Vec::new();
-    for _ in 0..size(100, 500) {
+    for _ in 0..500 {
         // Of so many readers only that they are let go matters.
         streams.push(running_at(&service, &address, 0.01).await);
     }

@@ -206,7 +206,7 @@ proptest! {
         t0 in 0.0..0.4f64, t1 in 0.6..1.0f64,
     ) {
         let (star, leg) = (star(), leg(a, b));
-        let steps = 8_000;
+        let steps = 20_000;
         let points = (0..steps).map(|i| leg.at(t0 + (t1 - t0) * (f64::from(i) + 0.5) / f64::from(steps)).xy());
         let (mut sum, mut signed) = (0.0, f64::INFINITY);
         for point in points {

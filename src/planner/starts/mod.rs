@@ -76,7 +76,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
         Some(WarmStart::Plan(_)) | None => None,
     };
     let warm = known.is_some();
-    let mut legs_priced = 0;
+    let (mut legs_priced, mut evaluations) = (0, 0);
     let mut shapes: Vec<Vec<Point3>> = known.into_iter().collect();
     let mut low = false;
     if settings.seeding == Seeding::Tangent {
@@ -89,6 +89,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
             shapes.extend(found.routes);
             if !climbs.routes.is_empty() {
                 shapes.extend(climbs.routes);
+                evaluations += shapes.len() as u64;
                 (shapes, low) = worth::promising(model, shapes);
             }
         }
@@ -104,7 +105,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     };
     let mut starts = Starts {
         routes: Vec::new(),
-        evaluations: legs_priced / (coarse as u64 + 1),
+        evaluations: evaluations + legs_priced / (coarse as u64 + 1),
     };
     let mut priced: Vec<(Fitness, Vec<Point3>)> = Vec::new();
     for shape in shapes {

@@ -5,9 +5,10 @@ use crate::cost::batch::{LANES, PointRow};
 use crate::geometry::{Point2, Point3, Vector2};
 use crate::scenario::Scenario;
 
-/// What a net gave.
+/// What a search for ways gave.
+#[derive(Default)]
 pub(super) struct Found {
-    /// Routes that differ, the cheapest first.
+    /// Routes that differ; those of a net have the cheapest first.
     pub(super) routes: Vec<Vec<Point3>>,
     /// Legs priced for them.
     pub(super) legs_priced: u64,

@@ -62,10 +62,7 @@ pub(super) fn routes(model: &Model) -> Found {
 
 /// Of one climb.
 fn ways(model: &Model, share: f64) -> Found {
-    let mut found = Found {
-        routes: Vec::new(),
-        legs_priced: 0,
-    };
+    let mut found = Found::default();
     let climb = Climb::by(model.scenario, share);
     if climb.least > (model.scenario.target - model.scenario.start).xy().norm() {
         for (near, room) in TRIES {

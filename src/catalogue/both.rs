@@ -10,8 +10,7 @@ use std::time::Duration;
 use super::shared::Shared;
 use super::uploaded::Uploaded;
 use super::{
-    Catalogue, CatalogueError, Checked, Claim, Entry, GRACE, Kept, Mounted, Naming, Sharing,
-    Staged, Tally,
+    Catalogue, CatalogueError, Checked, Entry, GRACE, Kept, Mounted, Naming, Sharing, Staged, Tally,
 };
 use crate::terrain::{DatasetError, Datasets, Found};
 
@@ -24,8 +23,8 @@ pub(super) trait Uploads: Debug + Send + Sync {
     fn stage(&self, limit: u64) -> Result<Staged, CatalogueError>;
     fn permit(&self, naming: &Naming) -> Result<(), CatalogueError>;
     fn keep(&self, file: &Checked, naming: &Naming) -> Result<Kept, CatalogueError>;
-    fn removable(&self, name: &str, by: &Claim) -> Result<String, CatalogueError>;
-    fn remove(&self, name: &str, by: &Claim) -> Result<(), CatalogueError>;
+    fn removable(&self, naming: &Naming) -> Result<String, CatalogueError>;
+    fn remove(&self, naming: &Naming) -> Result<(), CatalogueError>;
     fn has_unnamed(&self) -> bool;
     fn sweep(&self, used: &BTreeSet<String>) -> Result<usize, CatalogueError>;
 }
@@ -178,14 +177,14 @@ impl Catalogue for Directories {
         self.uploaded()?.keep(&file, naming)
     }
 
-    fn removable(&self, name: &str, by: &Claim) -> Result<String, CatalogueError> {
-        self.check_not_mounted(name)?;
-        self.uploaded()?.removable(name, by)
+    fn removable(&self, naming: &Naming) -> Result<String, CatalogueError> {
+        self.check_not_mounted(&naming.name)?;
+        self.uploaded()?.removable(naming)
     }
 
-    fn remove(&self, name: &str, by: &Claim) -> Result<(), CatalogueError> {
-        self.check_not_mounted(name)?;
-        self.uploaded()?.remove(name, by)
+    fn remove(&self, naming: &Naming) -> Result<(), CatalogueError> {
+        self.check_not_mounted(&naming.name)?;
+        self.uploaded()?.remove(naming)
     }
 
     fn has_unnamed(&self) -> bool {

@@ -79,14 +79,13 @@ pub trait Catalogue: Datasets {
     ///
     /// # Errors
     /// As [`Catalogue::remove`].
-    fn removable(&self, name: &str, by: &Claim) -> Result<String, CatalogueError>;
+    fn removable(&self, naming: &Naming) -> Result<String, CatalogueError>;
 
     /// Take a name away. Its content stays until nothing needs it.
     ///
     /// # Errors
-    /// [`CatalogueError::Unknown`], [`CatalogueError::Mounted`], [`CatalogueError::Owned`],
-    /// [`CatalogueError::Unavailable`].
-    fn remove(&self, name: &str, by: &Claim) -> Result<(), CatalogueError>;
+    /// [`CatalogueError::Unknown`], and as [`Catalogue::keep`].
+    fn remove(&self, naming: &Naming) -> Result<(), CatalogueError>;
 
     /// Whether there is content that no name stands for, so that [`Catalogue::sweep`] may find work.
     fn has_unnamed(&self) -> bool;
@@ -162,7 +161,7 @@ impl Claim {
     }
 }
 
-/// How a file is to be kept.
+/// What is done to a name: it is given to a file, or taken away.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Naming {
     /// The name, which must be one.
@@ -175,7 +174,7 @@ pub struct Naming {
     pub expected: Expected,
 }
 
-/// What a name must stand for before it is given to another content.
+/// What a name must stand for before it is given to another content, or to none.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Expected {
     /// Whatever it is.

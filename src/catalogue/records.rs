@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::content::{Checked, Declaration};
-use super::{CatalogueError, Claim, Expected, Kept, Naming};
+use super::{CatalogueError, Expected, Kept, Naming};
 use crate::terrain::dem::Survey;
 
 /// What a name stands for, as it is written down.
@@ -23,7 +23,7 @@ impl Name {
         }
     }
 
-    /// Whether `name`, which stands for `before`, may be given to another content.
+    /// Whether a name that stands for `before` may be given to another content, or to none.
     pub(super) fn permit(before: Option<&Self>, naming: &Naming) -> Result<(), CatalogueError> {
         let name = naming.name.clone();
         match (&naming.expected, before) {
@@ -54,20 +54,17 @@ impl Name {
         }
     }
 
-    /// The sum of what `name` stands for, when it may be taken away.
+    /// The sum of what a name stands for, when it may be taken away.
     pub(super) fn removable<'a>(
         before: Option<&'a Self>,
-        name: &str,
-        by: &Claim,
+        naming: &Naming,
     ) -> Result<&'a str, CatalogueError> {
-        let name = name.to_owned();
-        match before {
-            None => Err(CatalogueError::Unknown { name }),
-            Some(record) if !by.covers(record.owner.as_ref()) => {
-                Err(CatalogueError::Owned { name })
-            }
-            Some(record) => Ok(&record.sha256),
-        }
+        let Some(record) = before else {
+            let name = naming.name.clone();
+            return Err(CatalogueError::Unknown { name });
+        };
+        Self::permit(before, naming)?;
+        Ok(&record.sha256)
     }
 }
 

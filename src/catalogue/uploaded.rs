@@ -16,7 +16,7 @@ use serde::de::DeserializeOwned;
 
 use super::content::Checked;
 use super::records::{Content, Name};
-use super::{CatalogueError, Claim, Entry, Kept, Naming, Staged, Tally, Uploads, files};
+use super::{CatalogueError, Entry, Kept, Naming, Staged, Tally, Uploads, files};
 use crate::terrain::dem;
 use crate::terrain::{DatasetError, Found};
 
@@ -230,14 +230,15 @@ impl Uploads for Uploaded {
         Ok(kept)
     }
 
-    fn removable(&self, name: &str, by: &Claim) -> Result<String, CatalogueError> {
+    fn removable(&self, naming: &Naming) -> Result<String, CatalogueError> {
         let state = self.lock();
-        Name::removable(state.names.get(name), name, by).map(str::to_owned)
+        Name::removable(state.names.get(&naming.name), naming).map(str::to_owned)
     }
 
-    fn remove(&self, name: &str, by: &Claim) -> Result<(), CatalogueError> {
+    fn remove(&self, naming: &Naming) -> Result<(), CatalogueError> {
+        let name = &*naming.name;
         let mut state = self.lock();
-        let sha256 = Name::removable(state.names.get(name), name, by)?.to_owned();
+        let sha256 = Name::removable(state.names.get(name), naming)?.to_owned();
         let path = self.name(name);
         files::remove(&path)
             .map_err(|error| CatalogueError::unavailable("removed", &path, error))?;

@@ -34,7 +34,7 @@ use self::retire::Watched;
 use self::view::{View, name_key};
 use super::both::Uploads;
 use super::records::Name;
-use super::{CatalogueError, Checked, Claim, Entry, Kept, Naming, Shelf, Staged, Tally};
+use super::{CatalogueError, Checked, Entry, Kept, Naming, Shelf, Staged, Tally};
 use crate::telemetry::Instruments;
 use crate::terrain::dem;
 use crate::terrain::{DatasetError, Found};
@@ -199,16 +199,16 @@ impl Uploads for Shared {
         Ok(kept)
     }
 
-    fn removable(&self, name: &str, by: &Claim) -> Result<String, CatalogueError> {
+    fn removable(&self, naming: &Naming) -> Result<String, CatalogueError> {
         let view = self.view()?;
-        Name::removable(view.names.get(name), name, by).map(str::to_owned)
+        Name::removable(view.names.get(&naming.name), naming).map(str::to_owned)
     }
 
-    fn remove(&self, name: &str, by: &Claim) -> Result<(), CatalogueError> {
+    fn remove(&self, naming: &Naming) -> Result<(), CatalogueError> {
+        let key = name_key(&naming.name);
         loop {
             let view = self.view()?;
-            Name::removable(view.names.get(name), name, by)?;
-            let key = name_key(name);
+            Name::removable(view.names.get(&naming.name), naming)?;
             if self.erase(&key, view.written(&key))? {
                 return Ok(());
             }

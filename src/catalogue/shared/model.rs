@@ -8,7 +8,7 @@ use std::time::Duration;
 use proptest::prelude::*;
 
 use super::memory::{Memory, Trouble};
-use super::tests::{Node, everybody, height};
+use super::tests::{Node, height, naming};
 use crate::catalogue::CatalogueError;
 use crate::catalogue::both::Uploads as _;
 
@@ -99,7 +99,7 @@ proptest! {
                 Step::Remove { name } => {
                     let name = NAMES[name];
                     let before = names.get(name).copied();
-                    match here.shared.remove(name, &everybody()) {
+                    match here.shared.remove(&naming(name)) {
                         Ok(()) => { prop_assert!(names.remove(name).is_some()); }
                         Err(CatalogueError::Unknown { .. }) => prop_assert_eq!(before, None),
                         Err(error) => {

@@ -13,6 +13,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 
 use crate::export::sha256_hex;
+use crate::http::known_tags::KnownTags;
 use crate::http::params::Params;
 use crate::http::problem::Problem;
 
@@ -163,7 +164,7 @@ fn serve(name: &str, uri: &Uri, headers: &HeaderMap) -> Result<Response, Problem
         (header::CONTENT_SECURITY_POLICY, POLICY),
         (header::VARY, HeaderValue::from_static("accept-encoding")),
     ];
-    if is_known(headers, &tag) {
+    if KnownTags::of(headers).is_some_and(|known| known.contain(&tag)) {
         return Ok((StatusCode::NOT_MODIFIED, common).into_response());
     }
     let mut response = (common, bytes).into_response();
@@ -237,17 +238,6 @@ fn takes(headers: &HeaderMap, coding: &str) -> bool {
                 .any(|weight| weight.parse().is_ok_and(|weight: f64| weight <= 0.0));
             named && !refused
         })
-}
-
-/// Whether `If-None-Match` names the tag.
-fn is_known(headers: &HeaderMap, tag: &HeaderValue) -> bool {
-    let tag = tag.to_str().expect("visible ASCII");
-    let lists = headers.get_all(header::IF_NONE_MATCH).iter();
-    lists
-        .filter_map(|list| list.to_str().ok())
-        .flat_map(|list| list.split(','))
-        .map(|known| known.trim().trim_start_matches("W/"))
-        .any(|known| known == tag || known == "*")
 }
 
 #[cfg(test)]

@@ -283,13 +283,20 @@ pub(super) async fn delete(
     caller: Caller,
     Name(name): Name,
     uri: Uri,
+    headers: HeaderMap,
 ) -> Result<StatusCode, Problem> {
     Params::read(&uri, &[])?;
     check_name(&name)?;
-    let (asked, by) = (name.clone(), claim(&caller));
+    let naming = Naming {
+        name: name.clone(),
+        by: claim(&caller),
+        now_ms: now_ms(),
+        expected: expected(&headers),
+    };
+    let asked = naming.clone();
     let removed = state
         .terrains
-        .ask(move |catalogue| match catalogue.removable(&asked, &by) {
+        .ask(move |catalogue| match catalogue.removable(&asked) {
             Err(CatalogueError::Unknown { .. }) => Ok(None),
             found => found.map(Some),
         })
@@ -302,10 +309,9 @@ pub(super) async fn delete(
     if plans > 0 {
         return Err(Problem::TerrainInUse { name, plans });
     }
-    let by = claim(&caller);
     state
         .terrains
-        .ask(move |catalogue| match catalogue.remove(&name, &by) {
+        .ask(move |catalogue| match catalogue.remove(&naming) {
             Err(CatalogueError::Unknown { .. }) => Ok(()),
             removed => removed,
         })

@@ -83,6 +83,17 @@ async fn a_name_can_be_given_to_another_content() {
         }
     }
     for (header, value, status) in [
+        ("if-match", &*tag(&first), 412),
+        ("if-none-match", &*tag(&second), 412),
+        ("if-match", &*tag(&second), 204),
+        // Who asks again had no answer the first time.
+        ("if-match", &*tag(&second), 204),
+    ] {
+        let headers = [(header, value)];
+        let answer = api.send(Method::DELETE, "/terrains/hill", &headers, "");
+        assert_eq!(answer.await.status, status, "{header}: {value}");
+    }
+    for (header, value, status) in [
         ("if-match", "*", 412),
         ("if-none-match", "*", 201),
         ("if-none-match", "\"x\"", 201),

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::mpsc;
 
-use super::{Node, everybody, height, naming, two};
+use super::{Node, height, naming, two};
 use crate::catalogue::both::Uploads as _;
 use crate::catalogue::shared::memory::Trouble;
 use crate::catalogue::{CatalogueError, Claim, Expected, Kept, Naming};
@@ -37,7 +37,7 @@ fn what_one_node_keeps_every_node_finds() {
     let gone = a.shared.find("hill", Some(&found.sha256));
     assert!(matches!(gone, Err(DatasetError::Replaced { sha256 }) if sha256 == own.sha256));
     assert_eq!(b.copies().len(), 1, "copies of what has gone go, too");
-    a.shared.remove("hill", &everybody()).expect("removed");
+    a.shared.remove(&naming("hill")).expect("removed");
     assert!(matches!(b.find("hill"), Err(DatasetError::Unknown { names }) if names.is_empty()));
 }
 
@@ -66,21 +66,18 @@ fn who_expects_something_else_or_owns_nothing_is_refused_on_every_node() {
     refused(error, "Exists");
     let error = keep(&b, 2, &naming("bob", Expected::Anything)).expect_err("it is ada's");
     refused(error, "Owned");
-    let other = Expected::OneOf(vec!["0".repeat(64)]);
-    let error = keep(&b, 2, &naming("ada", other)).expect_err("it is another");
+    let other = naming("ada", Expected::OneOf(vec!["0".repeat(64)]));
+    let error = keep(&b, 2, &other).expect_err("it is another");
     refused(error, "Changed");
-    refused(
-        b.shared
-            .removable("hill", &by("bob"))
-            .expect_err("it is ada's"),
-        "Owned",
-    );
-    refused(
-        b.shared
-            .remove("hill", &by("bob"))
-            .expect_err("it is ada's"),
-        "Owned",
-    );
+    for (naming, expected) in [
+        (naming("bob", Expected::Anything), "Owned"),
+        (other, "Changed"),
+    ] {
+        let kept = b.shared.removable(&naming).expect_err("it is not to go");
+        refused(kept, expected);
+        let kept = b.shared.remove(&naming).expect_err("it is not to go");
+        refused(kept, expected);
+    }
     keep(&b, 2, &naming("ada", Expected::OneOf(vec![first]))).expect("as expected");
     assert_eq!(height(&a.find("hill").expect("found")), 2);
 }

@@ -97,19 +97,15 @@ pub(super) fn height(found: &Found) -> u32 {
     format!("{height}").parse().expect("a height")
 }
 
-fn naming(name: &str) -> Naming {
+pub(super) fn naming(name: &str) -> Naming {
     Naming {
         name: name.to_owned(),
-        by: everybody(),
+        by: Claim {
+            owner: None,
+            over_all: true,
+        },
         now_ms: 7,
         expected: Expected::Anything,
-    }
-}
-
-pub(super) fn everybody() -> Claim {
-    Claim {
-        owner: None,
-        over_all: true,
     }
 }
 

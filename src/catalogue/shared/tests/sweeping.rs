@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use super::{Node, everybody, height, two, two_with};
+use super::{Node, height, naming, two, two_with};
 use crate::catalogue::both::Uploads as _;
 use crate::catalogue::shared::memory::Trouble;
 use crate::catalogue::{Kept, Shelf as _};
@@ -37,7 +37,7 @@ fn what_was_asked_for_lately_on_any_node_is_kept() {
     let (shelf, a, b) = two_with(grace);
     a.keep("hill", 1).expect("kept");
     let sha256 = b.find("hill").expect("found").sha256;
-    b.shared.remove("hill", &everybody()).expect("removed");
+    b.shared.remove(&naming("hill")).expect("removed");
     assert!(a.shared.has_unnamed());
     for _ in 0..5 {
         assert_eq!(a.sweep(), 0);

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use reqwest::StatusCode;
 
+use crate::support::patience::eventually;
 use crate::support::process::{Service, run, run_with};
 use crate::support::scenario;
 
@@ -72,17 +73,9 @@ impl Guarded {
 
 /// The log, once it has `part` in it.
 async fn log_with(path: &Path, part: &str) -> String {
-    for _ in 0..600 {
-        let log = fs::read_to_string(path).expect("a log");
-        if log.contains(part) {
-            return log;
-        }
-        tokio::time::sleep(std::time::Duration::from_millis(100)).await;
-    }
-    panic!(
-        "{part:?} is not logged: {}",
-        fs::read_to_string(path).expect("a log")
-    );
+    let log = || fs::read_to_string(path).expect("a log");
+    eventually(async || log().contains(part)).await;
+    log()
 }
 
 #[test]

@@ -1,7 +1,5 @@
 //! Event streams over a real connection: order, resumption, thinning, the end.
 
-use std::time::Duration;
-
 use axum::http::StatusCode;
 use futures_util::future::join_all;
 use noctule::http::Phase;
@@ -11,6 +9,7 @@ use reqwest::{Client, RequestBuilder};
 use serde_json::Value;
 
 use crate::support::api::Api;
+use crate::support::patience::in_time;
 use crate::support::run;
 use crate::support::server::Server;
 use crate::support::sse::{Block, Stream, events};
@@ -196,8 +195,7 @@ async fn a_reader_who_names_an_event_that_never_was_is_let_go_at_the_end() {
         let lease = store.claim().await.expect("a queued plan");
         let ahead = Stream::open(plan.events("?last_event_id=1000")).await;
         run::finish(&**store, &lease, Status::Succeeded).await;
-        let rest = tokio::time::timeout(Duration::from_secs(60), ahead.rest());
-        assert_eq!(events(&rest.await.expect("it ends")), []);
+        assert_eq!(events(&in_time(ahead.rest()).await), []);
     })
     .await;
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 use tempfile::TempDir;
 
+use crate::support::patience::eventually;
 use crate::support::process::{Service, run_with};
 use crate::support::{nats, scenario};
 
@@ -81,16 +82,11 @@ async fn limits_tell_of_the_workers_of_all_nodes() {
     // It counts the others at its start.
     let api = node(second.path(), &address, &["--role", "api"]);
     api.until_ready(200).await;
-    let workers = async {
-        loop {
-            let limits: Value = serde_json::from_slice(&api.bytes("/limits").await).expect("JSON");
-            if limits["workers"] == 5 {
-                return;
-            }
-        }
-    };
-    let told = tokio::time::timeout(std::time::Duration::from_secs(30), workers).await;
-    told.expect("five");
+    eventually(async || {
+        let limits: Value = serde_json::from_slice(&api.bytes("/limits").await).expect("JSON");
+        limits["workers"] == 5
+    })
+    .await;
 }
 
 /// A node without its servers answers, says why it is not ready, and goes on when they are there.

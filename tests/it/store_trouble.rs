@@ -8,7 +8,6 @@ use std::io::Write as _;
 use std::os::unix::fs::FileExt as _;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
 
 use noctule::job::{PlanId, Submission};
 use noctule::store::reopening::{Open, Reopening};
@@ -17,6 +16,7 @@ use noctule::store::{Options, Store, StoreError, Trouble};
 use serde_json::Value;
 use tempfile::TempDir;
 
+use crate::support::patience::eventually;
 use crate::support::plans::submission;
 use crate::support::process::{Service, run};
 use crate::support::scenario;
@@ -206,12 +206,5 @@ async fn damage_that_is_met_on_the_way_closes_the_store_until_it_is_mended() {
 }
 
 async fn until(store: &Reopening, healthy: bool) {
-    let changed = async {
-        while store.health().await.is_ok() != healthy {
-            tokio::time::sleep(Duration::from_millis(20)).await;
-        }
-    };
-    tokio::time::timeout(Duration::from_secs(30), changed)
-        .await
-        .unwrap_or_else(|_| panic!("never healthy = {healthy}"));
+    eventually(async || store.health().await.is_ok() == healthy).await;
 }

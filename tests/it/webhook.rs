@@ -17,6 +17,7 @@ use tokio::sync::mpsc;
 
 use crate::support::api::{Answer, Api};
 use crate::support::description::check_schema;
+use crate::support::patience::{eventually, in_time};
 use crate::support::process::Service;
 use crate::support::run;
 use crate::support::scenario;
@@ -84,8 +85,8 @@ impl Receiver {
     }
 
     async fn next(&mut self) -> Message {
-        let next = tokio::time::timeout(Duration::from_secs(60), self.messages.recv()).await;
-        next.expect("in time").expect("the receiver lives")
+        let next = in_time(self.messages.recv()).await;
+        next.expect("the receiver lives")
     }
 }
 
@@ -246,17 +247,12 @@ async fn private_receivers_are_not_called() {
         run::complete(&*api.store, Vec::new()).await;
     }
     let _sender = Sender::start(api.store.clone(), settings(false));
-    loop {
-        let due = api
-            .store
-            .due_webhooks(i64::MAX, 10)
-            .await
-            .expect("readable");
-        if due.len() == 2 && due.iter().all(|webhook| webhook.tries == 1) {
-            break;
-        }
-        tokio::time::sleep(Duration::from_millis(50)).await;
-    }
+    eventually(async || {
+        let due = api.store.due_webhooks(i64::MAX, 10).await;
+        let due = due.expect("readable");
+        due.len() == 2 && due.iter().all(|webhook| webhook.tries == 1)
+    })
+    .await;
     assert!(receiver.messages.try_recv().is_err());
 }
 
@@ -349,8 +345,8 @@ async fn tls_is_spoken_with_whom_the_machine_trusts() {
     let connection = hyper::server::conn::http1::Builder::new()
         .serve_connection(hyper_util::rt::TokioIo::new(stream), service);
     tokio::spawn(async move { connection.await.is_ok() });
-    let message = tokio::time::timeout(Duration::from_secs(60), messages.recv()).await;
-    check(&message.expect("in time").expect("a message"), &plan);
+    let message = in_time(messages.recv()).await;
+    check(&message.expect("a message"), &plan);
 }
 
 /// Of a receiver called localhost.

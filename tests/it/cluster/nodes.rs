@@ -170,7 +170,7 @@ async fn a_plan_whose_node_is_lost_is_another_nodes_to_run() {
 async fn a_plan_that_loses_one_node_after_another_fails() {
     let address = nats::address();
     let settings = || Settings {
-        lease: Duration::from_millis(300),
+        lease: Duration::from_secs(1),
         ..node(&address)
     };
     let observer = open_as(Settings {

@@ -12,14 +12,13 @@ use noctule::store::{Store, StoreError};
 
 use super::{open, open_as, turn};
 use crate::support::nats::{Cluster, NatsServer};
+use crate::support::patience::eventually;
 use crate::support::plans::{ending, history, kind, point, submission, until};
 use crate::support::stores::node;
 
 /// Ask again until the store is sound.
 async fn until_sound(store: &dyn Store) {
-    while store.health().await.is_err() {
-        tokio::time::sleep(Duration::from_millis(50)).await;
-    }
+    eventually(async || store.health().await.is_ok()).await;
 }
 
 /// Do a step as a worker does: again, until a server that leads has answered.
@@ -48,9 +47,7 @@ async fn a_server_that_comes_back_has_everything_and_is_taken_up_again() {
     store.append(&lease, vec![point(1, None)]).await.unwrap();
 
     server.kill();
-    while store.health().await.is_ok() {
-        tokio::time::sleep(Duration::from_millis(20)).await;
-    }
+    eventually(async || store.health().await.is_err()).await;
     assert_eq!(kind(store.submit(submission()).await), Err("unavailable"));
     // What is known is still told.
     assert_eq!(follower.get(running).await.unwrap().status, Status::Running);

@@ -3,7 +3,6 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use noctule::job::{Event, Status};
 use noctule::store::jetstream::JetStreamStore;
@@ -11,6 +10,7 @@ use noctule::store::{Options, Store, wall_clock};
 
 use super::open;
 use crate::support::nats::{self, NatsServer, namespace};
+use crate::support::patience::eventually;
 use crate::support::plans::{ending, history, kind, point, submission, until};
 use crate::support::stores::{LEASE, node};
 use crate::support::wire::Wire;
@@ -46,9 +46,7 @@ async fn a_node_that_is_cut_off_loses_its_run_and_catches_up_when_it_is_back() {
     }
 
     wire.mend();
-    while far.health().await.is_err() {
-        tokio::time::sleep(Duration::from_millis(50)).await;
-    }
+    eventually(async || far.health().await.is_ok()).await;
     let late = far.finish(&lost, ending(Status::Succeeded).at(0)).await;
     assert_eq!(kind(late), Err("lease lost"));
     let end = ending(Status::Succeeded).after(vec![point(3, None)], 0);

@@ -6,7 +6,6 @@ mod fuzz;
 mod wgs84;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::time::Instant;
 
 use noctule::scenario::json::{
     self, AlgorithmRule, CODES, Fault, MAX_LISTED, ParameterRule, Refusal, Rules,
@@ -18,6 +17,8 @@ use noctule::threat::Shape;
 
 use cases::all_cases;
 pub(crate) use wgs84::IN_DEGREES;
+
+use crate::support::patience::at_little_cost;
 
 fn rules() -> Rules {
     let parameters = vec![
@@ -384,7 +385,7 @@ fn a_body_of_eight_mebibytes_is_read_at_once() {
     let document = LEAST
         .replace(r#""altitude""#, &grid)
         .replace(r#""z":0"#, r#""z":200"#);
-    let scenario = in_good_time(|| read(&document)).expect("it has no fault");
+    let scenario = at_little_cost(|| read(&document)).expect("it has no fault");
     assert!(matches!(&scenario.terrain, Terrain::Grid(grid) if grid.elevations.len() == nodes));
 }
 
@@ -416,19 +417,9 @@ fn a_hostile_body_of_eight_mebibytes_is_refused_at_once() {
         ),
     ] {
         let document = format!("{open}{}{close}", item.repeat(size / item.len()));
-        let faults = in_good_time(|| faults(&document));
+        let faults = at_little_cost(|| faults(&document));
         assert!(faults.len() <= MAX_LISTED + 1);
     }
-}
-
-/// Far more than it takes on an idle machine, far less than anything quadratic.
-#[track_caller]
-fn in_good_time<T>(work: impl FnOnce() -> T) -> T {
-    let begin = Instant::now();
-    let done = work();
-    let taken = begin.elapsed();
-    assert!(taken.as_secs() < 5, "{taken:?}");
-    done
 }
 
 #[test]

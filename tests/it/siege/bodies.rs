@@ -7,8 +7,9 @@ use flate2::write::GzEncoder;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
-use super::{Dice, PATIENCE};
+use super::Dice;
 use crate::support::api::Api;
+use crate::support::patience::in_time;
 use crate::support::process::Service;
 use crate::support::server::Server;
 
@@ -29,9 +30,7 @@ async fn exchange_or_leave(server: &Server, sent: &[u8], leaves: bool) -> String
         let _ = stream.shutdown().await;
     }
     let mut text = Vec::new();
-    let _ = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut text))
-        .await
-        .expect("an answer in time");
+    let _ = in_time(stream.read_to_end(&mut text)).await;
     String::from_utf8(text).expect("UTF-8")
 }
 

@@ -9,14 +9,14 @@ use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 use tokio::sync::watch;
 
-use super::{PATIENCE, size};
+use super::size;
+use crate::support::patience::in_time;
 use crate::support::process::Service;
 
 /// Everything until the service closes the connection.
 async fn until_closed(mut stream: TcpStream) -> String {
     let mut text = Vec::new();
-    let read = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut text)).await;
-    if let Err(error) = read.expect("the connection is closed in time") {
+    if let Err(error) = in_time(stream.read_to_end(&mut text)).await {
         assert_eq!(error.kind(), ErrorKind::ConnectionReset);
     }
     String::from_utf8(text).expect("UTF-8")
@@ -33,8 +33,7 @@ async fn drip(address: SocketAddr, text: &str, drip: u8) -> String {
         }
     });
     let mut text = Vec::new();
-    let read = tokio::time::timeout(PATIENCE, reading.read_to_end(&mut text)).await;
-    if let Err(error) = read.expect("the connection is closed in time") {
+    if let Err(error) = in_time(reading.read_to_end(&mut text)).await {
         assert_eq!(error.kind(), ErrorKind::ConnectionReset);
     }
     dripping.abort();
@@ -127,8 +126,8 @@ async fn both_versions_of_http_are_spoken_however_they_come() {
                 tokio::task::yield_now().await;
             }
             let mut first = [0; 12];
-            let read = tokio::time::timeout(PATIENCE, stream.read_exact(&mut first)).await;
-            read.expect("in time").expect("an answer");
+            let read = in_time(stream.read_exact(&mut first)).await;
+            read.expect("an answer");
             let place = if answer.len() == 1 { 3 } else { 4 };
             assert!(first[place..].starts_with(answer), "{first:?}");
         }

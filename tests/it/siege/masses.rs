@@ -8,8 +8,9 @@ use noctule::scenario::json;
 use noctule::scenario::limits::Limits;
 use serde_json::Value;
 
-use super::{Dice, PATIENCE, size};
+use super::{Dice, size};
 use crate::support::api::Api;
+use crate::support::patience::in_time;
 use crate::support::process::Service;
 use crate::support::scenario;
 
@@ -66,9 +67,7 @@ async fn thousands_of_plans_fit_into_the_memory_and_the_limit_of_some() {
             }
         }
     };
-    tokio::time::timeout(PATIENCE, settled)
-        .await
-        .expect("a sweep comes in time");
+    in_time(settled).await;
 }
 
 /// Valid documents, to be spoilt.

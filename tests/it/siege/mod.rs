@@ -11,11 +11,6 @@ mod queue;
 mod races;
 mod streams;
 
-use std::time::Duration;
-
-/// A hanging test fails after this.
-const PATIENCE: Duration = Duration::from_secs(120);
-
 /// How much to do.
 pub(crate) fn size<T>(in_ci: T, full: T) -> T {
     if std::env::var_os("NOCTULE_SIEGE").is_some_and(|size| size == "full") {

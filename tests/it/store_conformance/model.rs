@@ -7,8 +7,9 @@ use noctule::store::Lease;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
+use crate::support::patience::in_time;
 use crate::support::plans::{ending, failure, history, kind, point, statuses, submission};
-use crate::support::stores::{BACKENDS, Fixture, PATIENCE, Place};
+use crate::support::stores::{BACKENDS, Fixture, Place};
 
 const QUEUE_LIMIT: usize = 4;
 
@@ -260,7 +261,7 @@ proptest! {
                     }
                     model.compare(&store).await;
                 };
-                tokio::time::timeout(PATIENCE, agree).await.expect("no step waits for ever");
+                in_time(agree).await;
             }
         });
     }

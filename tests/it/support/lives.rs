@@ -8,7 +8,7 @@ use super::sse::{Block, Stream, events};
 
 /// A plan that runs for so long, wherever it runs: its iterations alone would take minutes.
 pub(crate) fn a_run_of(ms: u64) -> Value {
-    let mut scenario = a_plan(2_000, 100_000, 7);
+    let mut scenario = a_plan(4_000, 100_000, 7);
     scenario["planner"]["time_limit_ms"] = ms.into();
     scenario
 }

@@ -10,6 +10,7 @@ pub(crate) mod keys;
 pub(crate) mod lives;
 pub(crate) mod nats;
 pub(crate) mod openmetrics;
+pub(crate) mod patience;
 pub(crate) mod plans;
 pub(crate) mod process;
 pub(crate) mod run;

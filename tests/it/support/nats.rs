@@ -15,8 +15,7 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use uuid::Uuid;
 
-/// A server that is not there by then never comes.
-const PATIENCE: Duration = Duration::from_secs(60);
+use super::patience::PATIENCE;
 
 /// Says the server's process id, waits for a line, and kills. Without a line whoever asked for the
 /// server is gone, and what the server wrote goes too.

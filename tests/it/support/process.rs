@@ -9,11 +9,10 @@ use std::time::Duration;
 use reqwest::{Client, RequestBuilder, Response};
 use serde_json::Value;
 
+use super::patience::{PATIENCE, in_time};
+
 /// A free port of this machine alone.
 const LOOPBACK: &str = "127.0.0.1:0";
-
-/// More than anything here takes.
-const PATIENCE: Duration = Duration::from_secs(60);
 
 pub(crate) fn noctule() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_noctule"));
@@ -263,9 +262,7 @@ impl Service {
                 tokio::time::sleep(Duration::from_millis(20)).await;
             }
         };
-        tokio::time::timeout(PATIENCE, answer)
-            .await
-            .unwrap_or_else(|_| panic!("/readyz is never {status}"))
+        in_time(answer).await
     }
 
     /// Send `SIG{name}`.
@@ -287,8 +284,7 @@ impl Service {
     /// Wait for the process to end by itself.
     pub(crate) async fn exit(mut self) -> ExitStatus {
         let ended = tokio::task::spawn_blocking(move || self.child.wait().expect("reaped"));
-        let ended = tokio::time::timeout(PATIENCE, ended).await;
-        ended.expect("the process ends").expect("no panic")
+        in_time(ended).await.expect("no panic")
     }
 }
 

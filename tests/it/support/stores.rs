@@ -13,6 +13,7 @@ use noctule::store::{Options, Retention, Store, StoreError};
 use tempfile::TempDir;
 
 use super::nats;
+use super::patience::in_time;
 use super::process::Service;
 
 /// A kind of store.
@@ -27,9 +28,6 @@ pub(crate) const BACKENDS: [Backend; 2] = [Backend::Sqlite, Backend::JetStream];
 
 /// How long a run is a node's after it last said so.
 pub(crate) const LEASE: Duration = Duration::from_secs(2);
-
-/// A hanging test fails after this.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Where a store keeps its plans, and finds them when it is opened again.
 pub(crate) struct Place {
@@ -175,9 +173,7 @@ pub(crate) async fn for_every_backend(test: impl AsyncFn(Backend)) {
 pub(crate) async fn on_every_backend(queue_limit: u64, test: impl AsyncFn(&mut Fixture)) {
     for_every_backend(async |backend| {
         let mut fixture = Fixture::new(Place::new(backend), queue_limit).await;
-        tokio::time::timeout(PATIENCE, test(&mut fixture))
-            .await
-            .unwrap_or_else(|_| panic!("{backend:?}: still waiting after {PATIENCE:?}"));
+        in_time(test(&mut fixture)).await;
         fixture.close().await;
     })
     .await;

@@ -5,6 +5,7 @@ use tokio::io::AsyncWriteExt as _;
 use tokio::net::TcpStream;
 
 use super::{hill, jacksboro, kept};
+use crate::support::patience::eventually;
 use crate::support::process::Service;
 
 #[tokio::test]
@@ -31,21 +32,15 @@ async fn a_crash_midway_leaves_what_was_there_and_nothing_else() {
         .write_all(&file[..file.len() / 2])
         .await
         .expect("sent");
-    let arrived = async {
-        loop {
-            let incoming = std::fs::read_dir(uploads.join("incoming")).expect("it is there");
-            let length = |entry: std::io::Result<std::fs::DirEntry>| {
-                entry.ok()?.metadata().ok().map(|metadata| metadata.len())
-            };
-            if incoming.filter_map(length).any(|length| length > 1000) {
-                return;
-            }
-            tokio::time::sleep(std::time::Duration::from_millis(5)).await;
-        }
+    let arrived = async || {
+        let mut incoming = std::fs::read_dir(uploads.join("incoming")).expect("it is there");
+        incoming.any(|entry| {
+            entry
+                .and_then(|entry| entry.metadata())
+                .is_ok_and(|file| file.len() > 1000)
+        })
     };
-    tokio::time::timeout(std::time::Duration::from_secs(60), arrived)
-        .await
-        .expect("it arrives");
+    eventually(arrived).await;
     service.kill();
     // With the dataset that comes with the program.
     assert_eq!(kept(&uploads), [4, 2, 1]);

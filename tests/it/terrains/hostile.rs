@@ -12,6 +12,7 @@ use tokio::net::TcpStream;
 use super::{hill, jacksboro, kept, put, put_with};
 use crate::support::api::Api;
 use crate::support::elevations::write_tiff;
+use crate::support::patience::eventually;
 use crate::support::process::Service;
 use crate::support::server::Server;
 
@@ -251,15 +252,7 @@ async fn a_body_that_breaks_off_or_lies_about_its_length_leaves_nothing_behind()
 
 /// Who leaves is noticed a little later.
 async fn nothing_comes_in(api: &Api) {
-    let gone = async {
-        while kept(&api.uploads())[2] > 0 {
-            tokio::time::sleep(std::time::Duration::from_millis(5)).await;
-        }
-    };
-    let patience = std::time::Duration::from_secs(30);
-    tokio::time::timeout(patience, gone)
-        .await
-        .expect("it is removed");
+    eventually(async || kept(&api.uploads())[2] == 0).await;
 }
 
 #[tokio::test]

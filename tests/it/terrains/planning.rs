@@ -1,11 +1,10 @@
 //! Plans over datasets: the same ground for the same document, whatever happens to the name.
 
-use std::time::Duration;
-
 use reqwest::Method;
 use serde_json::{Value, json};
 
 use super::{hill, over, shipped};
+use crate::support::patience::in_time;
 use crate::support::process::{Service, run};
 
 async fn upload(service: &Service, uri: &str, body: impl Into<Vec<u8>>) -> Value {
@@ -113,8 +112,7 @@ async fn a_plan_whose_ground_went_while_it_waited_fails_and_says_why() {
     std::fs::write(&file, hill(101.5)).expect("written");
     let cancel = service.request(Method::POST, &format!("{running}/cancel"));
     cancel.send().await.expect("an answer");
-    let status = tokio::time::timeout(Duration::from_secs(60), service.ended(&waiting)).await;
-    let status = status.expect("it ends");
+    let status = in_time(service.ended(&waiting)).await;
     assert_eq!(status["status"], "failed", "{status}");
     let detail = status["error"]["detail"].as_str().expect("text");
     assert!(detail.contains("no longer kept"), "{detail}");

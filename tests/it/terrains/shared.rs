@@ -22,6 +22,8 @@ use tokio::task::spawn_blocking;
 use super::{hill, over, put, put_with};
 use crate::support::api::Api;
 use crate::support::nats::{self, Cluster, NatsServer};
+use crate::support::patience::{PATIENCE, eventually};
+use crate::support::plans::until;
 use crate::support::process::Service;
 
 fn settings(address: &str, replicas: usize) -> Settings {
@@ -284,13 +286,7 @@ async fn while_the_servers_are_away_all_is_refused_and_nothing_lost() {
         assert_eq!(node.api.get("/metrics").await.status, 200);
     }
     server.restart();
-    let back = async {
-        while b.api.get("/terrains").await.status != 200 {
-            tokio::time::sleep(Duration::from_millis(50)).await;
-        }
-    };
-    let back = tokio::time::timeout(Duration::from_secs(30), back).await;
-    back.expect("it comes back");
+    eventually(async || b.api.get("/terrains").await.status == 200).await;
     assert_eq!(
         b.validate("hill").await["scenario"]["terrain"]["sha256"],
         sha256
@@ -330,27 +326,16 @@ impl Node {
 
     /// Once as many plans as that are known here to be queued or running over a dataset.
     async fn until_in_use(&self, path: &str, plans: u64) {
-        let known = async {
-            while self.api.get(path).await.json()["in_use"] != plans {
-                tokio::time::sleep(Duration::from_millis(20)).await;
-            }
-        };
-        let known = tokio::time::timeout(Duration::from_secs(30), known).await;
-        known.expect("it comes to be known");
+        eventually(async || self.api.get(path).await.json()["in_use"] == plans).await;
     }
 
     async fn ended(&self, plan: &str) -> Value {
-        let ended = async {
-            loop {
-                let status = self.api.get(plan).await.json();
-                if ["succeeded", "failed"].contains(&status["status"].as_str().expect("text")) {
-                    return status;
-                }
-                tokio::time::sleep(Duration::from_millis(20)).await;
-            }
-        };
-        let ended = tokio::time::timeout(Duration::from_secs(60), ended).await;
-        ended.expect("it ends")
+        eventually(async || {
+            let status = self.api.get(plan).await.json();
+            ["succeeded", "failed"].contains(&status["status"].as_str().expect("text"))
+        })
+        .await;
+        self.api.get(plan).await.json()
     }
 }
 
@@ -381,7 +366,7 @@ async fn a_worker_plans_over_what_was_uploaded_elsewhere_and_replaced_since() {
         assert_eq!(answer.status, 200, "{answer:?}");
     }
     assert_eq!(b.copies().len(), 2);
-    pool.drain(Duration::from_secs(60)).await;
+    pool.drain(PATIENCE).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -397,17 +382,11 @@ async fn a_plan_waits_for_ground_that_is_away() {
     let pool = b.work();
     let id = plan.rsplit('/').next().and_then(|id| id.parse().ok());
     let id = id.expect("an id");
-    let run = async {
-        while a.api.store.get(id).await.expect("it is there").status != Status::Running {
-            tokio::time::sleep(Duration::from_millis(20)).await;
-        }
-    };
-    let run = tokio::time::timeout(Duration::from_secs(30), run).await;
-    run.expect("it is tried");
+    until(&*a.api.store, id, |plan| plan.status == Status::Running).await;
     server.restart();
     let status = a.ended(&plan).await;
     assert_eq!(status["status"], "succeeded", "{status}");
-    pool.drain(Duration::from_secs(60)).await;
+    pool.drain(PATIENCE).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -459,7 +438,7 @@ async fn a_node_killed_amid_an_upload_leaves_nothing_that_is_seen() {
     let upload = tokio::spawn(request.body(vec![0; 2 * 3601 * 3601]).send());
     let own = shelf(&address);
     let is_there = spawn_blocking(move || {
-        let until = Instant::now() + Duration::from_secs(60);
+        let until = Instant::now() + PATIENCE;
         while own.files().expect("it can be reached").len() < 2 {
             assert!(Instant::now() < until, "it never comes");
         }

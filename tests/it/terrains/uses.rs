@@ -10,6 +10,7 @@ use noctule::worker::Sweeper;
 
 use super::{hill, kept, over, put};
 use crate::support::api::Api;
+use crate::support::patience::eventually;
 
 /// Whose content goes as soon as nothing refers to it.
 fn impatient() -> Api {
@@ -72,13 +73,7 @@ async fn content_goes_with_the_last_plan_over_it() {
 }
 
 async fn until_kept(api: &Api, expected: [usize; 3]) {
-    let swept = async {
-        while kept(&api.uploads()) != expected {
-            tokio::time::sleep(Duration::from_millis(20)).await;
-        }
-    };
-    let swept = tokio::time::timeout(Duration::from_secs(60), swept).await;
-    swept.unwrap_or_else(|_| panic!("{:?} is never {expected:?}", kept(&api.uploads())));
+    eventually(async || kept(&api.uploads()) == expected).await;
 }
 
 #[tokio::test]

@@ -38,6 +38,7 @@ pub struct Metrics {
     workers: Level,
     accepted: Counter,
     ended: Family<Status, Counter>,
+    lost: Counter,
     run_times: Family<Status, Histogram, fn() -> Histogram>,
     wait_times: Histogram,
     gaps: Histogram,
@@ -140,6 +141,10 @@ impl Default for Metrics {
             workers: new.add("workers", "Plans that may run at the same time"),
             accepted: new.add("plans_accepted", "Plans accepted"),
             ended: new.add("plans_ended", "Runs that ended, by the status of the plan"),
+            lost: new.add(
+                "plan_runs_lost",
+                "Runs whose plan was taken away: it was deleted, or another node runs it",
+            ),
             run_times: new.family_of_times(
                 "plan_run",
                 "From a plan's start to its end, by its status",
@@ -263,6 +268,11 @@ impl Metrics {
                 .get_or_create(&status)
                 .observe(seconds(run_ms));
         }
+    }
+
+    /// A plan was taken from its run.
+    pub fn lost(&self) {
+        self.lost.inc();
     }
 
     /// A route was delivered that is proven to be so near to the best.

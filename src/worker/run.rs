@@ -179,7 +179,8 @@ impl Slot {
                 Ok(done) => return Some(done),
                 Err(StoreError::LeaseLost(plan)) => {
                     self.instruments.origins.forget(plan);
-                    tracing::debug!("the plan was taken from its worker");
+                    self.instruments.metrics.lost();
+                    tracing::info!("the plan was taken from its worker");
                     return None;
                 }
                 Err(error) if last_try => {

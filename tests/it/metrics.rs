@@ -4,7 +4,9 @@ use axum::http::Method;
 use serde_json::{Value, json};
 
 use crate::support::api::Api;
+use crate::support::lives::{a_run_of, running};
 use crate::support::openmetrics::Reading;
+use crate::support::patience::eventually;
 use crate::support::process::Service;
 use crate::support::scenario;
 
@@ -117,6 +119,23 @@ async fn a_run_is_counted() {
         env!("CARGO_PKG_VERSION")
     );
     assert!((count(&build) - 1.0).abs() < 0.5);
+}
+
+#[tokio::test]
+async fn a_run_that_loses_its_plan_is_counted() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &["--workers", "1"]);
+    let address = service.submit(&a_run_of(3_600_000)).await;
+    drop(running(&service, &address).await);
+    let lost = async || {
+        read_from(&service)
+            .await
+            .value("noctule_plan_runs_lost_total")
+    };
+    assert!(lost().await < 0.5);
+    let deleted = service.request(Method::DELETE, &address).send().await;
+    assert_eq!(deleted.expect("an answer").status(), 204);
+    eventually(async || lost().await > 0.5).await;
 }
 
 /// What is shown and what alerts are raised on is there.

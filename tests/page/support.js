@@ -15,7 +15,7 @@ const ARGUMENTS = [
 ];
 
 /** What has not come by then does not come: long, since the machine may be busy with other things. */
-const PATIENCE_MS = 120000;
+const PATIENCE_MS = 600000;
 
 /** What the browser itself notes about answers that the page expects: refusals are shown in the page. */
 const EXPECTED = /Failed to load resource: the server responded with a status of (401|404|409|422)|GPU stall due to ReadPixels/;

@@ -117,10 +117,16 @@ impl<S: Send + Sync> FromRequestParts<S> for Name {
     }
 }
 
-fn claim(caller: &Caller) -> Claim {
-    Claim {
-        owner: caller.owner.clone(),
-        over_all: caller.sees_all,
+/// What the caller does to a name, and under which condition.
+fn naming(name: String, caller: &Caller, headers: &HeaderMap) -> Naming {
+    Naming {
+        name,
+        by: Claim {
+            owner: caller.owner.clone(),
+            over_all: caller.sees_all,
+        },
+        now_ms: now_ms(),
+        expected: expected(headers),
     }
 }
 
@@ -146,12 +152,7 @@ pub(super) async fn put(
         crs: params.text("crs").map(str::to_owned),
         filename: Some(params.text("filename").unwrap_or(&name).to_owned()),
     };
-    let naming = Naming {
-        name,
-        by: claim(&caller),
-        now_ms: now_ms(),
-        expected: expected(&headers),
-    };
+    let naming = naming(name, &caller, &headers);
     // Before a long body has been sent for nothing.
     let asked = naming.clone();
     let terrains = &state.terrains;
@@ -287,12 +288,7 @@ pub(super) async fn delete(
 ) -> Result<StatusCode, Problem> {
     Params::read(&uri, &[])?;
     check_name(&name)?;
-    let naming = Naming {
-        name: name.clone(),
-        by: claim(&caller),
-        now_ms: now_ms(),
-        expected: expected(&headers),
-    };
+    let naming = naming(name, &caller, &headers);
     let asked = naming.clone();
     let removed = state
         .terrains
@@ -307,6 +303,7 @@ pub(super) async fn delete(
     };
     let plans = active(&state.store.datasets_in_use().await?, Some(&sha256));
     if plans > 0 {
+        let name = naming.name;
         return Err(Problem::TerrainInUse { name, plans });
     }
     state

@@ -1,5 +1,7 @@
 //! SIGTERM on the real binary: nothing is lost, streams end, the exit comes in time.
 
+use std::time::{Duration, Instant};
+
 use futures_util::future::join_all;
 use reqwest::Method;
 use serde_json::Value;
@@ -13,6 +15,9 @@ use crate::support::stores::{Place, for_every_backend};
 const AN_HOUR_MS: u64 = 3_600_000;
 const AN_HOUR: &str = "3600";
 
+/// An end that waited for such a plan, for a stream, or for the whole of an idle grace period would come after it.
+const LONG_BEFORE: Duration = Duration::from_secs(30);
+
 #[tokio::test]
 async fn an_idle_service_leaves_at_once() {
     for_every_backend(async |backend| {
@@ -20,8 +25,10 @@ async fn an_idle_service_leaves_at_once() {
             let place = Place::new(backend);
             let service = place.serve(&["--grace", AN_HOUR]);
             assert_eq!(service.bytes("/readyz").await, r#"{"status":"ok"}"#);
+            let begun = Instant::now();
             service.signal(signal);
             assert!(service.exit().await.success());
+            assert!(begun.elapsed() < LONG_BEFORE, "{:?}", begun.elapsed());
         }
     })
     .await;
@@ -36,6 +43,7 @@ async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
         let waiting = service.submit(&a_run_of(10)).await;
         let stream = running(&service, &address).await;
 
+        let begun = Instant::now();
         service.signal("TERM");
         let refused = loop {
             let ready = service
@@ -62,6 +70,7 @@ async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
             "the plan has not ended"
         );
         assert!(service.exit().await.success());
+        assert!(begun.elapsed() < LONG_BEFORE, "{:?}", begun.elapsed());
 
         let service = place.serve(&["--workers", "1"]);
         let mut again = running(&service, &address).await;
@@ -136,6 +145,7 @@ async fn open_streams_do_not_hold_up_the_end() {
     let address = service.submit(&a_run_of(AN_HOUR_MS)).await;
     // Of so many readers only that they are let go matters.
     let streams = join_all((0..500).map(|_| running_at(&service, &address, 0.01))).await;
+    let begun = Instant::now();
     service.signal("TERM");
     let ready = async || service.get("/readyz").send().await.expect("an answer");
     while ready().await.status() != 503 {}
@@ -148,6 +158,7 @@ async fn open_streams_do_not_hold_up_the_end() {
         );
     }
     assert!(service.exit().await.success());
+    assert!(begun.elapsed() < LONG_BEFORE, "{:?}", begun.elapsed());
     let service = Service::start(directory.path(), &["--workers", "1", "--grace", "0"]);
     let status: Value = serde_json::from_slice(&service.bytes(&address).await).expect("JSON");
     let status = status["status"].as_str().expect("text");

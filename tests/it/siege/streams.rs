@@ -163,8 +163,8 @@ async fn five_hundred_readers_see_every_incumbent_and_one_end() {
     for_every_backend(async |backend| {
         let plan = Plan::on(backend).await;
         let readers = join_all((0..500).map(|_| plan.read("?rate=0", 0, usize::MAX)));
-        let all = in_time(async { tokio::join!(readers, plan.run(60)).0 });
-        for told in all.await {
+        let all = async { tokio::join!(readers, plan.run(60)).0 };
+        for told in in_time(all).await {
             let count = |wanted: &str| told.iter().filter(|(_, name)| name == wanted).count();
             assert_eq!(
                 (count("incumbent"), count("convergence"), count("end")),
@@ -188,17 +188,15 @@ async fn a_reader_who_does_not_read_costs_the_others_nothing() {
     );
     stalled.write_all(request.as_bytes()).await.expect("sent");
 
-    // More than the buffers of a connection hold.
-    // Nobody waits for the one who does not read.
-    let others =
-        in_time(async { tokio::join!(plan.read("?rate=0", 0, usize::MAX), plan.run(20_000)).0 });
-    let others = others.await;
+    // More than the buffers of a connection hold; nobody waits for the one who does not read.
+    let all = async { tokio::join!(plan.read("?rate=0", 0, usize::MAX), plan.run(20_000)).0 };
+    let others = in_time(all).await;
     assert_eq!(others.last().map(|(_, name)| name.as_str()), Some("end"));
     tokio::time::sleep(size(Duration::ZERO, Duration::from_secs(60))).await;
 
     let mut text = Vec::new();
-    let rest = in_time(stalled.read_to_end(&mut text));
-    rest.await.expect("an unbroken stream");
+    let rest = in_time(stalled.read_to_end(&mut text)).await;
+    rest.expect("an unbroken stream");
     let text = String::from_utf8(text).expect("UTF-8");
     assert_eq!(
         text.matches("\nevent: end\n").count(),

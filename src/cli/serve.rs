@@ -24,7 +24,7 @@ use crate::job::Failure;
 use crate::planner;
 use crate::scenario::json::{self, Refusal, Rules};
 use crate::store::measured::MeasuredStore;
-use crate::store::{self, Store};
+use crate::store::{self, SteadyClock, Store};
 use crate::telemetry::{self, Instruments};
 use crate::worker::{self, Engine, Pool, Sweeper, Unplanned};
 
@@ -69,22 +69,23 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let listener =
         listen(config.listen).with_context(|| format!("cannot listen on {}", config.listen))?;
     let instruments = Arc::new(Instruments::default());
-    let store = backend::open(config).await?;
+    let clock = SteadyClock::following(store::wall_clock());
+    let store = backend::open(config, clock.clock()).await?;
     let store: Arc<dyn Store> = Arc::new(MeasuredStore::new(store, instruments.clone()));
     let catalogue = datasets::open(config, &instruments).await?;
     let rules = planner::rules(config.limits).with_datasets(catalogue.clone());
     let rules = Arc::new(rules);
     let settings = worker::Settings {
         workers: slots(config),
-        clock: store::wall_clock(),
+        clock: clock.clock(),
         instruments: instruments.clone(),
     };
     let pool = Pool::start(store.clone(), settings, engine(rules.clone()));
-    let sweeper = Sweeper::start(store.clone(), catalogue.clone(), store::wall_clock());
+    let sweeper = Sweeper::start(store.clone(), catalogue.clone(), clock.clock());
     let sender = webhooks
         .clone()
         .filter(|_| config.role.serves())
-        .map(|settings| Sender::start(store.clone(), settings));
+        .map(|settings| Sender::start(store.clone(), settings, clock.clock()));
     let (phase, watched) = watch::channel(Phase::Serving);
     let parts = Parts {
         store: store.clone(),
@@ -95,7 +96,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
             queue: config.queue,
         },
         in_flight: InFlight::default(),
-        clock_jump_ms: sweeper.clock_jump_ms(),
+        clock,
         body_timeout: config.http.body_timeout,
         access: access.clone(),
         webhooks: webhooks.clone(),

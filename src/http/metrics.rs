@@ -3,7 +3,6 @@
 use axum::extract::State;
 use axum::http::{Uri, header};
 use axum::response::{IntoResponse, Response};
-use jiff::Timestamp;
 
 use super::AppState;
 use super::params::Params;
@@ -17,7 +16,7 @@ pub(super) async fn show(State(state): State<AppState>, uri: Uri) -> Result<Resp
     let stats = stats
         .inspect_err(|error| tracing::warn!(%error, "the queue could not be counted"))
         .ok();
-    let now_ms = Timestamp::now().as_millisecond();
+    let now_ms = state.clock.now_ms();
     let queue = Queue {
         queued: stats.map(|stats| stats.queued),
         running: stats.map(|stats| stats.running),

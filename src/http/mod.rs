@@ -61,7 +61,7 @@ pub use phase::Phase;
 pub use terrains::Terrains;
 
 use crate::scenario::json::Rules;
-use crate::store::{Stats, Store};
+use crate::store::{Stats, SteadyClock, Store};
 use crate::telemetry::Instruments;
 use auth::{Access, Needs};
 use problem::Problem;
@@ -93,8 +93,8 @@ pub struct Parts {
     pub in_flight: InFlight,
     /// A request's body must be complete after this.
     pub body_timeout: Duration,
-    /// By how much the wall clock has jumped, milliseconds, while nothing expires for it.
-    pub clock_jump_ms: watch::Receiver<Option<i64>>,
+    /// By which plans are stamped and expire.
+    pub clock: Arc<SteadyClock>,
     /// Who may do what.
     pub access: Access,
     /// How ends of plans are told; `None` when they are not.

@@ -1,7 +1,6 @@
 //! `GET /plans/{id}/result?partial=true` before the end: the best route so far, measured as a
 //! result is, as if the plan were cancelled now.
 
-use super::plans::now_ms;
 use super::problem::Problem;
 use super::{AppState, off_thread};
 use crate::export::document::{Convergence, Incumbent, Origin, ResultDocument};
@@ -19,7 +18,9 @@ pub(super) async fn result(state: &AppState, plan: &Plan) -> Result<Option<Strin
     };
     let curve = curve(state, plan).await?;
     let scenario = state.store.scenario(plan.id).await?;
-    let run_ms = plan.started_ms.map_or(0, |began| now_ms() - began);
+    let run_ms = plan
+        .started_ms
+        .map_or(0, |began| state.clock.now_ms() - began);
     let origin = plan.origin(&scenario, run_ms.max(0) as f64);
     let rules = state.rules.clone();
     off_thread::run(move || measure(&scenario, &rules, best, curve, origin).map(Some)).await?

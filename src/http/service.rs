@@ -27,9 +27,8 @@ pub(super) async fn readyz(State(state): State<AppState>, uri: Uri) -> Result<Re
         return Err(Problem::Draining { retry_after_s });
     }
     state.store.health().await?;
-    let jump_ms = *state.clock_jump_ms.borrow();
-    Ok(jump_ms.map_or_else(ok, |jump_ms| {
-        let warning = format!("the clock jumped by {jump_ms} ms; no plan expires for now");
+    Ok(state.clock.jump_ms().map_or_else(ok, |jump_ms| {
+        let warning = format!("the clock jumped by {jump_ms} ms and is not believed for now");
         Json(json!({"status": "ok", "warnings": [warning]})).into_response()
     }))
 }

@@ -4,6 +4,7 @@
 //! step durable before it answers. Deliberately absent: what a plan means, and who may see it.
 
 mod changes;
+mod clock;
 mod end;
 mod error;
 pub mod jetstream;
@@ -12,9 +13,10 @@ mod options;
 pub mod reopening;
 pub mod sqlite;
 
+pub use clock::{Clock, SteadyClock, wall_clock};
 pub use end::{End, Ending};
 pub use error::{StoreError, Trouble};
-pub use options::{Clock, Options, Retention, wall_clock};
+pub use options::{Options, Retention};
 
 use std::sync::Arc;
 

@@ -1,18 +1,6 @@
 //! What a store is opened with.
 
-use std::sync::Arc;
-
-/// Tells the time: milliseconds since 1970.
-pub type Clock = Arc<dyn Fn() -> i64 + Send + Sync>;
-
-/// The machine's clock.
-#[must_use]
-pub fn wall_clock() -> Clock {
-    Arc::new(|| {
-        let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-        i64::try_from(since.unwrap_or_default().as_millis()).unwrap_or(i64::MAX)
-    })
-}
+use super::clock::{Clock, wall_clock};
 
 /// What a store is opened with.
 #[derive(Clone)]

@@ -462,18 +462,6 @@ async fn a_plan_past_its_time_is_gone_and_says_so() {
     assert!(detail.contains("as long as the service keeps"), "{detail}");
 }
 
-#[tokio::test]
-async fn a_clock_that_jumped_is_told_and_keeps_nobody_out() {
-    let api = Api::new();
-    let sound = api.get("/readyz").await.json();
-    assert_eq!(sound, json!({"status": "ok"}));
-    api.clock.send_replace(Some(-7_200_000));
-    let answer = api.get("/readyz").await;
-    assert_eq!(answer.status, StatusCode::OK);
-    let warning = answer.json()["warnings"][0].to_string();
-    assert!(warning.contains("-7200000 ms"), "{warning}");
-}
-
 fn gzip(plain: &[u8]) -> Vec<u8> {
     let mut packed = Vec::new();
     flate2::read::GzEncoder::new(plain, flate2::Compression::best())

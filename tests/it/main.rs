@@ -8,6 +8,7 @@ mod bench;
 mod bound;
 mod browser;
 mod cli;
+mod clock;
 mod cluster;
 mod config;
 mod crash;

@@ -11,6 +11,7 @@ use axum::extract::State;
 use axum::http::{HeaderMap, Method, StatusCode, Uri};
 use noctule::export::sha256_hex;
 use noctule::http::webhook::{Secret, Sender, Settings};
+use noctule::store::wall_clock;
 use serde_json::{Value, json};
 use tokio::net::TcpListener;
 use tokio::sync::mpsc;
@@ -29,6 +30,10 @@ fn settings(allow_private: bool) -> Settings {
         secret: Secret::read(SECRET).expect("a secret"),
         allow_private,
     }
+}
+
+fn sender(api: &Api, allow_private: bool) -> Sender {
+    Sender::start(api.store.clone(), settings(allow_private), wall_clock())
 }
 
 /// A message that has come.
@@ -154,7 +159,7 @@ async fn an_end_is_told_once_and_signed() {
         .await
         .header("location")
         .to_owned();
-    let _sender = Sender::start(api.store.clone(), settings(true));
+    let _sender = sender(&api, true);
     run::complete(&*api.store, Vec::new()).await;
     let told = check(&receiver.next().await, &plan);
     assert_eq!(told, api.get(&plan).await.json());
@@ -179,7 +184,7 @@ async fn an_end_is_told_once_and_signed() {
 async fn an_address_of_a_host_and_a_query_is_called() {
     let mut receiver = Receiver::new(&[]).await;
     let api = Api::with_webhooks(settings(true));
-    let _sender = Sender::start(api.store.clone(), settings(true));
+    let _sender = sender(&api, true);
     let url = receiver.url.replace("/hook?", "?");
     assert_eq!(submit(&api, &url).await.status, 202);
     run::complete(&*api.store, Vec::new()).await;
@@ -195,7 +200,7 @@ async fn what_is_not_heard_is_told_again_and_redirects_lead_nowhere() {
         .header("location")
         .to_owned();
     run::complete(&*api.store, Vec::new()).await;
-    let _sender = Sender::start(api.store.clone(), settings(true));
+    let _sender = sender(&api, true);
     let first = receiver.next().await;
     check(&first, &plan);
     let second = receiver.next().await;
@@ -216,7 +221,7 @@ async fn a_receiver_that_is_gone_hears_no_more() {
     let mut receiver = Receiver::new(&[410]).await;
     submit(&api, &receiver.url).await;
     run::complete(&*api.store, Vec::new()).await;
-    let _sender = Sender::start(api.store.clone(), settings(true));
+    let _sender = sender(&api, true);
     receiver.next().await;
     loop {
         let due = api
@@ -246,7 +251,7 @@ async fn private_receivers_are_not_called() {
         assert_eq!(submit(&api, &url).await.status, 202, "{url}");
         run::complete(&*api.store, Vec::new()).await;
     }
-    let _sender = Sender::start(api.store.clone(), settings(false));
+    let _sender = sender(&api, false);
     eventually(async || {
         let due = api.store.due_webhooks(i64::MAX, 10).await;
         let due = due.expect("readable");

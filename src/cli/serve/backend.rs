@@ -11,14 +11,14 @@ use crate::config::{self, Address, Config, Place};
 use crate::store::jetstream::{JetStreamShelf, JetStreamStore, Settings};
 use crate::store::reopening::{Open, Reopening};
 use crate::store::sqlite::SqliteStore;
-use crate::store::{Options, Retention, Store};
+use crate::store::{Clock, Options, Retention, Store};
 
 /// The store, as soon as it can be opened.
 ///
 /// # Errors
 /// When the configuration names none.
-pub(super) async fn open(config: &Config) -> anyhow::Result<Arc<dyn Store>> {
-    let options = options(config);
+pub(super) async fn open(config: &Config, clock: Clock) -> anyhow::Result<Arc<dyn Store>> {
+    let options = options(config, clock);
     let open = match &config.store {
         Place::Sqlite => sqlite(data_dir(config)?, options),
         Place::Nats(address) => jetstream(settings(config, address), options),
@@ -69,8 +69,9 @@ fn settings(config: &Config, address: &Address) -> Settings {
     }
 }
 
-fn options(config: &Config) -> Options {
+fn options(config: &Config, clock: Clock) -> Options {
     Options {
+        clock,
         retention: retention(config.retention),
         events_kept: config.retention.events,
         ..Options::new(config.queue as u64)

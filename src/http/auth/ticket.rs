@@ -76,7 +76,7 @@ mod tests {
     #[test]
     fn a_ticket_is_for_one_plan_and_some_time() {
         let tickets = Tickets::default();
-        let (plan, now, key) = (new_id(), Instant::now(), Some([1; 32]));
+        let (plan, now, key) = (new_id(0), Instant::now(), Some([1; 32]));
         let ticket = tickets.issue(plan, key, now, LIFE).expect("random");
         assert_eq!(tickets.holder(&ticket, plan, now), Some(Holder(key)));
         let later = now + LIFE - Duration::from_millis(1);
@@ -85,7 +85,7 @@ mod tests {
             Some(Holder(key)),
             "again"
         );
-        assert_eq!(tickets.holder(&ticket, new_id(), now), None);
+        assert_eq!(tickets.holder(&ticket, new_id(0), now), None);
         assert_eq!(tickets.holder(&ticket, plan, now + LIFE), None);
         assert_eq!(tickets.holder("", plan, now), None);
     }
@@ -93,7 +93,7 @@ mod tests {
     #[test]
     fn a_key_has_so_many_and_no_more() {
         let tickets = Tickets::default();
-        let (plan, begin) = (new_id(), Instant::now());
+        let (plan, begin) = (new_id(0), Instant::now());
         let issue = |key: u8, n: usize| {
             let now = begin + Duration::from_micros(n as u64);
             tickets

@@ -8,7 +8,6 @@ use std::time::Duration;
 use axum::extract::State;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
-use jiff::Timestamp;
 use tokio::time::Instant;
 
 pub(super) use list::{MAX_PAGE, list};
@@ -79,7 +78,7 @@ pub(super) async fn cancel(
 ) -> Result<Response, Problem> {
     Params::read(&uri, &[])?;
     caller.plan(&*state.store, id).await?;
-    let plan = state.store.request_cancel(id, now_ms()).await?;
+    let plan = state.store.request_cancel(id, state.clock.now_ms()).await?;
     let status = if plan.status.is_final() {
         StatusCode::OK
     } else {
@@ -97,7 +96,7 @@ pub(super) async fn delete(
 ) -> Result<StatusCode, Problem> {
     Params::read(&uri, &[])?;
     match caller.plan(&*state.store, id).await {
-        Ok(_) => state.store.delete(id, now_ms()).await?,
+        Ok(_) => state.store.delete(id, state.clock.now_ms()).await?,
         // Whoever asks again had no answer the first time.
         Err(Problem::Gone(_)) => {}
         Err(problem) => return Err(problem),
@@ -128,9 +127,4 @@ async fn wait_for(
             () = stopping(&mut phase) => return Ok(plan),
         }
     }
-}
-
-/// Milliseconds since 1970.
-pub(super) fn now_ms() -> i64 {
-    Timestamp::now().as_millisecond()
 }

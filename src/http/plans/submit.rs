@@ -6,7 +6,7 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 
-use super::{now_ms, wait_for};
+use super::wait_for;
 use crate::http::caller::Caller;
 use crate::http::idempotency::IDEMPOTENCY_REPLAYED;
 use crate::http::params::Params;
@@ -205,15 +205,16 @@ async fn accept(state: &AppState, caller: &Caller, document: Bytes) -> Result<Su
     }?;
     warm_start::resolve(state, caller, &mut scenario).await?;
     let Caller { owner, quota, .. } = caller.clone();
+    let created_ms = state.clock.now_ms();
     let submission = move || Submission {
-        id: job::new_id(),
+        id: job::new_id(created_ms),
         scenario: json::write(&scenario),
         work: scenario.planner.work(),
         name: scenario.name,
         algorithm: scenario.planner.algorithm,
         seed: scenario.planner.seed,
         iterations: scenario.planner.iterations as u64,
-        created_ms: now_ms(),
+        created_ms,
         owner,
         quota,
         webhook: None,

@@ -24,7 +24,6 @@ use document::TerrainDocument;
 
 use super::caller::Caller;
 use super::params::{self, Params};
-use super::plans::now_ms;
 use super::problem::Problem;
 use super::{AppState, off_thread};
 use crate::catalogue::{
@@ -118,14 +117,14 @@ impl<S: Send + Sync> FromRequestParts<S> for Name {
 }
 
 /// What the caller does to a name, and under which condition.
-fn naming(name: String, caller: &Caller, headers: &HeaderMap) -> Naming {
+fn naming(state: &AppState, name: String, caller: &Caller, headers: &HeaderMap) -> Naming {
     Naming {
         name,
         by: Claim {
             owner: caller.owner.clone(),
             over_all: caller.sees_all,
         },
-        now_ms: now_ms(),
+        now_ms: state.clock.now_ms(),
         expected: expected(headers),
     }
 }
@@ -152,7 +151,7 @@ pub(super) async fn put(
         crs: params.text("crs").map(str::to_owned),
         filename: Some(params.text("filename").unwrap_or(&name).to_owned()),
     };
-    let naming = naming(name, &caller, &headers);
+    let naming = naming(&state, name, &caller, &headers);
     // Before a long body has been sent for nothing.
     let asked = naming.clone();
     let terrains = &state.terrains;
@@ -288,7 +287,7 @@ pub(super) async fn delete(
 ) -> Result<StatusCode, Problem> {
     Params::read(&uri, &[])?;
     check_name(&name)?;
-    let naming = naming(name, &caller, &headers);
+    let naming = naming(&state, name, &caller, &headers);
     let asked = naming.clone();
     let removed = state
         .terrains

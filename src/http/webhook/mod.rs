@@ -24,7 +24,7 @@ use super::params;
 use super::problem::Problem;
 use super::status::StatusDocument;
 use crate::job::PlanId;
-use crate::store::{Store, StoreError, Webhook};
+use crate::store::{Clock, Store, StoreError, Webhook};
 use address::Target;
 use client::Client;
 
@@ -77,12 +77,13 @@ pub struct Sender(JoinHandle<()>);
 impl Sender {
     /// Send what `store` has to tell.
     #[must_use]
-    pub fn start(store: Arc<dyn Store>, settings: Settings) -> Self {
+    pub fn start(store: Arc<dyn Store>, settings: Settings, clock: Clock) -> Self {
         let client = Client::new(settings.allow_private);
         let delivery = Arc::new(Delivery {
             store,
             settings,
             client,
+            clock,
         });
         Self(tokio::spawn(deliver_all(delivery)))
     }
@@ -98,6 +99,8 @@ struct Delivery {
     store: Arc<dyn Store>,
     settings: Settings,
     client: Client,
+    /// When to try; a receiver is told the time of the wall.
+    clock: Clock,
 }
 
 async fn deliver_all(delivery: Arc<Delivery>) {
@@ -115,8 +118,8 @@ async fn deliver_all(delivery: Arc<Delivery>) {
                 continue;
             }
         }
-        let now_ms = Timestamp::now().as_millisecond();
-        let due = match delivery.store.due_webhooks(now_ms, AT_ONCE).await {
+        let due = delivery.store.due_webhooks((delivery.clock)(), AT_ONCE);
+        let due = match due.await {
             Ok(due) => due,
             Err(error) => {
                 tracing::debug!(%error, "the store does not say which webhooks are due");
@@ -136,7 +139,7 @@ impl Delivery {
     /// Try once, and write down what came of it.
     async fn deliver(&self, webhook: Webhook) -> PlanId {
         let (id, tries) = (webhook.plan.id, webhook.tries + 1);
-        let next_ms = match self.try_once(webhook).await {
+        let pause_ms = match self.try_once(webhook).await {
             Ok(status) if status.is_success() => {
                 tracing::info!(plan = %id, tries, "the webhook got through");
                 None
@@ -148,6 +151,7 @@ impl Delivery {
             Ok(status) => again(id, tries, &format!("the answer is {status}")),
             Err(error) => again(id, tries, &error.to_string()),
         };
+        let next_ms = pause_ms.map(|pause_ms| (self.clock)() + pause_ms);
         match self.store.webhook_tried(id, next_ms).await {
             // Of a plan that has been deleted meanwhile nobody wants to hear.
             Ok(()) | Err(StoreError::NotFound(_) | StoreError::Gone(_)) => {}
@@ -180,13 +184,13 @@ impl Delivery {
     }
 }
 
-/// When to try again. The address stays out of the log: it may hold the receiver's own secret.
+/// Milliseconds after which to try again. The address stays out of the log: it may hold the receiver's own secret.
 fn again(id: PlanId, tries: u32, why: &str) -> Option<i64> {
     let jitter = f64::from(getrandom::u32().unwrap_or(u32::MAX / 2)) / f64::from(u32::MAX);
     if let Some(pause_ms) = retry::pause_ms(tries, jitter) {
         let pause_s = pause_ms / 1000;
         tracing::warn!(plan = %id, tries, pause_s, why, "a webhook did not get through");
-        Some(Timestamp::now().as_millisecond() + pause_ms)
+        Some(pause_ms)
     } else {
         tracing::error!(plan = %id, tries, why, "a webhook did not get through and is given up");
         None

@@ -73,7 +73,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_job_comes_again_ever_later_and_is_nobodys_after_a_minute() {
-        let (orphans, id) = (Orphans::default(), new_id());
+        let (orphans, id) = (Orphans::default(), new_id(0));
         let mut came = 0;
         assert!(!orphans.is_known(id));
         let begun = Instant::now();
@@ -89,7 +89,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_job_whose_record_came_is_no_orphan() {
-        let (orphans, id, other) = (Orphans::default(), new_id(), new_id());
+        let (orphans, id, other) = (Orphans::default(), new_id(0), new_id(0));
         assert_eq!(orphans.miss(id), Orphan::Waits(SOONEST));
         orphans.miss(other);
         tokio::time::sleep(NOBODYS).await;

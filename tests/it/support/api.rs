@@ -17,7 +17,7 @@ use noctule::planner;
 use noctule::scenario::limits::Limits;
 use noctule::store::measured::MeasuredStore;
 use noctule::store::sqlite::SqliteStore;
-use noctule::store::{Options, Store};
+use noctule::store::{Options, SteadyClock, Store, wall_clock};
 use noctule::telemetry::Instruments;
 use serde_json::Value;
 use tokio::sync::watch;
@@ -32,7 +32,6 @@ pub(crate) struct Api {
     pub(crate) state: Parts,
     pub(crate) router: Router,
     pub(crate) phase: watch::Sender<Phase>,
-    pub(crate) clock: watch::Sender<Option<i64>>,
     uploads: PathBuf,
     place: Place,
 }
@@ -68,6 +67,22 @@ impl Api {
         let store = place.open(options).await.expect("a fresh store");
         let access = Access::new(None, Settings::default());
         Self::over(store, place, queue, access, &[])
+    }
+
+    /// Over a store of this kind, where it is what `clock` says.
+    pub(crate) async fn by_clock(
+        backend: Backend,
+        clock: Arc<SteadyClock>,
+        options: Options,
+    ) -> Self {
+        let options = Options {
+            clock: clock.clock(),
+            ..options
+        };
+        let mut api = Self::on(backend, options).await;
+        api.state.clock = clock;
+        api.router = http::router(api.state.clone());
+        api
     }
 
     /// For holders of keys alone.
@@ -130,7 +145,6 @@ impl Api {
         let queue = usize::try_from(queue).expect("a small number");
         let instruments = Arc::new(Instruments::default());
         let store = Arc::new(MeasuredStore::new(store, instruments.clone()));
-        let clock = watch::channel(None);
         let origins: Vec<String> = origins.iter().map(ToString::to_string).collect();
         let (phase, watched) = watch::channel(Phase::Serving);
         let uploads = place.path().join("terrains");
@@ -145,7 +159,7 @@ impl Api {
             terrains: Terrains::new(catalogue),
             capacity: Capacity { workers: 2, queue },
             in_flight: InFlight::default(),
-            clock_jump_ms: clock.1,
+            clock: SteadyClock::following(wall_clock()),
             body_timeout: Duration::from_secs(30),
             access,
             webhooks: None,
@@ -158,7 +172,6 @@ impl Api {
             store,
             state,
             phase,
-            clock: clock.0,
             uploads,
             place,
         }

@@ -146,15 +146,16 @@ pub(super) async fn rates(settings: Settings, plans: u32) -> anyhow::Result<Took
 
 /// As a caller would hand in.
 pub(super) fn submission() -> Submission {
+    let created_ms = wall_clock()();
     Submission {
-        id: job::new_id(),
+        id: job::new_id(created_ms),
         name: Some("bench".to_owned()),
         algorithm: "tms-sba".to_owned(),
         seed: 1,
         iterations: 200,
         work: 400_000,
         scenario: "s".repeat(SCENARIO),
-        created_ms: wall_clock()(),
+        created_ms,
         owner: None,
         quota: None,
         webhook: None,

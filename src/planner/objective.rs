@@ -5,7 +5,7 @@ use super::blocks::{Blocks, Pricers};
 use super::coding::{Cartesian, Coding};
 use super::guide::Guide;
 use super::kept::Kept;
-use super::price::{PRICED_FROM, price};
+use super::price::PRICED_FROM;
 use super::watch::Watch;
 use crate::cost::Model;
 use crate::cost::batch::{LANES, Pricer};
@@ -21,7 +21,6 @@ pub(super) struct Routes<'s> {
     pricers: Pricers<'s>,
     /// Of each thread.
     kept: Vec<Kept>,
-    route: Vec<Point3>,
     pub(super) watch: Watch<'s>,
 }
 
@@ -67,19 +66,14 @@ impl<'s> Routes<'s> {
             pricers,
             model: model.clone(),
             kept: (0..threads).map(|_| Kept::of(legs)).collect(),
-            route: Vec::new(),
             watch: Watch::new(model.scenario, stop),
         }
     }
 
     fn price(&mut self, positions: &[f64], rivals: Option<&[Fitness]>, fitness: &mut [Fitness]) {
         let threads = self.model.scenario.planner.threads;
-        let stride = self.watch.stride;
-        if threads > 1 && fitness.len() >= WORTH_THREADS && stride >= fitness.len() as u64 {
+        if threads > 1 && fitness.len() >= WORTH_THREADS {
             return self.side_by_side(threads, positions, rivals, fitness);
-        }
-        if stride < LANES as u64 {
-            return self.one_by_one(positions, fitness);
         }
         let watch = &mut self.watch;
         Blocks::new(&self.coding, &self.pricers, &mut self.kept[0]).price(
@@ -90,7 +84,7 @@ impl<'s> Routes<'s> {
         );
     }
 
-    /// Price all positions on several threads, each a run of whole blocks; no price depends on which.
+    /// Price all positions on several threads, as many at once as may be between two looks at the clock.
     fn side_by_side(
         &mut self,
         threads: usize,
@@ -98,9 +92,31 @@ impl<'s> Routes<'s> {
         rivals: Option<&[Fitness]>,
         fitness: &mut [Fitness],
     ) {
-        if !self.watch.may_price(fitness.len()) {
-            return fitness.fill(Fitness::WORST);
+        let dimension = self.coding.bounds().dimension();
+        let at_once = usize::try_from(self.watch.stride).unwrap_or(usize::MAX);
+        let at_once = at_once
+            .clamp(WORTH_THREADS, fitness.len())
+            .next_multiple_of(LANES);
+        let batches = positions.chunks(at_once * dimension);
+        for (idx, (positions, fitness)) in batches.zip(fitness.chunks_mut(at_once)).enumerate() {
+            if self.watch.may_price(fitness.len()) {
+                let first = idx * at_once;
+                let rivals = rivals.map(|all| &all[first..first + fitness.len()]);
+                self.share_out(threads, positions, rivals, fitness);
+            } else {
+                fitness.fill(Fitness::WORST);
+            }
         }
+    }
+
+    /// Each thread prices a run of whole blocks; no price depends on which.
+    fn share_out(
+        &mut self,
+        threads: usize,
+        positions: &[f64],
+        rivals: Option<&[Fitness]>,
+        fitness: &mut [Fitness],
+    ) {
         let (coding, pricers) = (&self.coding, &self.pricers);
         let dimension = coding.bounds().dimension();
         let share = fitness.len().div_ceil(threads).next_multiple_of(LANES);
@@ -115,21 +131,6 @@ impl<'s> Routes<'s> {
                 });
             }
         });
-    }
-
-    /// As a block, where a single route takes long: between two of them a run may end.
-    fn one_by_one(&mut self, positions: &[f64], fitness: &mut [Fitness]) {
-        let dimension = self.coding.bounds().dimension();
-        let mut route = std::mem::take(&mut self.route);
-        for (position, fitness) in positions.chunks_exact(dimension).zip(fitness) {
-            if self.watch.may_price(1) {
-                self.coding.decode(position, &mut route);
-                *fitness = price(&self.model, &route);
-            } else {
-                *fitness = Fitness::WORST;
-            }
-        }
-        self.route = route;
     }
 }
 

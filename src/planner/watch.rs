@@ -1,6 +1,7 @@
 //! Counts the routes that a search prices, and looks at the clock between them now and then.
 
 use super::{Stop, why_stop};
+use crate::cost::batch::LANES;
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;
 use crate::threat::Shape;
@@ -12,7 +13,7 @@ const STEPS_UNWATCHED: usize = 1_000_000;
 pub(super) struct Watch<'s> {
     scenario: &'s Scenario,
     stop: &'s dyn Stop,
-    /// Evaluations between two looks at the clock.
+    /// Evaluations between two looks at the clock; a block of them at least, which are priced side by side.
     pub(super) stride: u64,
     /// Routes priced so far.
     pub(super) evaluations: u64,
@@ -26,7 +27,7 @@ impl<'s> Watch<'s> {
         Self {
             scenario,
             stop,
-            stride: (STEPS_UNWATCHED / steps(scenario)).max(1) as u64,
+            stride: (STEPS_UNWATCHED / steps(scenario)).max(LANES) as u64,
             evaluations: 0,
             interrupted: false,
         }
@@ -48,7 +49,7 @@ impl<'s> Watch<'s> {
     }
 }
 
-/// About how many steps the pricing of one route takes.
+/// About how many steps the pricing of one route takes, if no threat is too far away to be asked.
 fn steps(scenario: &Scenario) -> usize {
     let vertices = |shape: &Shape| match shape {
         Shape::Cylinder(_) => 1,
@@ -61,7 +62,7 @@ fn steps(scenario: &Scenario) -> usize {
         .sum();
     let ground = match &scenario.terrain {
         Terrain::Flat(_) => 1,
-        Terrain::Peaks(peaks) => 100 * (1 + peaks.peaks.len()),
+        Terrain::Peaks(peaks) => 10 * (1 + peaks.peaks.len()),
         Terrain::Grid(grid) => grid.columns + grid.rows,
         Terrain::Dem(dem) => dem.raster().lattice.columns + dem.raster().lattice.rows,
     };

@@ -12,7 +12,7 @@ use tokio::time::Instant;
 use super::Phase;
 use super::phase::stopping;
 use super::throttle::Throttle;
-use crate::job::{Event, NumberedEvent, PlanId};
+use crate::job::{Event, NumberedEvent, PlanId, Status};
 use crate::store::{Store, StoreError};
 
 /// Events read at once.
@@ -22,7 +22,7 @@ const PAGE: usize = 128;
 /// moments, their end among it, and no more, so that nobody holds up the exit.
 const LAST_PAGES: usize = 16;
 
-/// A comment is due when nothing has been said for so long.
+/// A comment is due when the reader has been told nothing for so long.
 const SILENCE: Duration = Duration::from_secs(15);
 
 /// What a reader gets next.
@@ -54,6 +54,10 @@ pub(super) struct Feed {
     phase: watch::Receiver<Phase>,
     /// Since when the throttle holds something back.
     held_since: Option<Instant>,
+    /// When the reader was told something last.
+    told: Instant,
+    /// Whether the reader has been given all that there was when the store was last looked at.
+    caught_up: bool,
     /// Whether anything has come after the event that the reader named; who names one that the plan
     /// never had would wait for ever.
     heard: bool,
@@ -79,6 +83,8 @@ impl Feed {
             throttle: Throttle::new(rate_hz),
             phase,
             held_since: None,
+            told: Instant::now(),
+            caught_up: false,
             heard: after == 0,
             last_pages: LAST_PAGES,
             over: false,
@@ -89,9 +95,14 @@ impl Feed {
         self.id
     }
 
-    /// Wait for what comes next; `None` after the end, after [`Told::Stopping`] and when the plan
-    /// has been deleted.
+    /// Wait for what comes next; `None` after the end and after [`Told::Stopping`].
     pub(super) async fn next(&mut self) -> Option<Told> {
+        let told = self.wait_for_next().await;
+        self.told = Instant::now();
+        told
+    }
+
+    async fn wait_for_next(&mut self) -> Option<Told> {
         let mut out = Vec::new();
         while !self.over {
             // Looked at before the store: what was told until then will still be read.
@@ -100,7 +111,7 @@ impl Feed {
             let ended = !self.heard && self.has_ended().await;
             let page = match self.store.events(self.id, self.after, PAGE).await {
                 Ok(page) => page,
-                Err(StoreError::Gone(_) | StoreError::NotFound(_)) => break,
+                Err(StoreError::Gone(_) | StoreError::NotFound(_)) => return self.removed(),
                 Err(error) => {
                     tracing::warn!(%error, "a stream of events broke off");
                     break;
@@ -111,6 +122,7 @@ impl Feed {
             }
             let quiet = page.events.is_empty();
             self.heard |= !quiet;
+            self.caught_up = quiet;
             if quiet && ended {
                 break;
             }
@@ -168,6 +180,20 @@ impl Feed {
         }]))
     }
 
+    /// The plan has been deleted, which cancels it if it had not ended. A reader who is behind cannot be told how it did.
+    fn removed(&mut self) -> Option<Told> {
+        self.over = true;
+        let mut out = Vec::new();
+        self.throttle.flush(&mut out);
+        if self.caught_up {
+            out.push(NumberedEvent {
+                id: self.after + 1,
+                event: Event::End(Status::Cancelled),
+            });
+        }
+        (!out.is_empty()).then_some(Told::Events(out))
+    }
+
     async fn has_ended(&self) -> bool {
         let plan = self.store.get(self.id).await;
         plan.is_ok_and(|plan| plan.status.is_final())
@@ -190,7 +216,7 @@ impl Feed {
             .held_since
             .zip(self.throttle.window_ms())
             .map(|(since, window_ms)| since + Duration::from_secs_f64(window_ms / 1000.0));
-        let silent = Instant::now() + SILENCE;
+        let silent = self.told + SILENCE;
         let (deadline, woken) = match window_closes {
             Some(closes) if closes <= silent => (closes, Woken::WindowClosed),
             _ => (silent, Woken::Silence),

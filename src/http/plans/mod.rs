@@ -21,7 +21,10 @@ use super::prefer::{PREFERENCE_APPLIED, Wait};
 use super::problem::Problem;
 use super::status::{StatusDocument, etag};
 use super::{AppState, retry};
-use crate::job::{Plan, PlanId};
+use crate::job::{Plan, PlanId, Status};
+
+/// Between two looks at a waiting plan's place in the queue.
+const PLACE_LOOK: Duration = Duration::from_secs(1);
 
 /// `GET /plans/{id}`.
 pub(super) async fn show(
@@ -121,9 +124,12 @@ async fn wait_for(
         if enough(&plan) {
             return Ok(plan);
         }
+        // Its place changes with other plans, of which nothing is heard here.
+        let moves = plan.status == Status::Queued;
         tokio::select! {
             changed = changes.changed() => if changed.is_err() { return Ok(plan) },
             () = tokio::time::sleep_until(deadline) => return Ok(state.store.get(id).await?),
+            () = tokio::time::sleep(PLACE_LOOK), if moves => {}
             () = stopping(&mut phase) => return Ok(plan),
         }
     }

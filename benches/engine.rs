@@ -8,6 +8,7 @@ use std::fs;
 use noctule::cost::Model;
 use noctule::cost::batch::{LANES, PointRow, Pricer};
 use noctule::geometry::{Point2, Point3};
+use noctule::optimizer::{self, Objective as _, Random, Settings};
 use noctule::planner::{self, Nobody};
 use noctule::scenario::json::{self, Rules};
 use noctule::scenario::limits::Limits;
@@ -115,6 +116,44 @@ fn evaluate_lanes_by_waypoints(bencher: divan::Bencher, waypoints: usize) {
     scenario.planner.waypoints = waypoints;
     scenario.planner.iterations = 20;
     bench_lanes(bencher, &scenario, &swarm(&scenario));
+}
+
+/// A position of the search as a route, Eq. 22.
+#[divan::bench(args = SCENARIOS)]
+fn decode(bencher: divan::Bencher, name: &str) {
+    let scenario = scenario(name);
+    let mut objective = planner::objective(&scenario, &Nobody);
+    let mut position = vec![0.0; objective.bounds().dimension()];
+    objective.draw(&mut Random::new(1), &mut position);
+    let decode = planner::decoder(&scenario);
+    bencher
+        .counter(divan::counter::ItemsCount::new(1_u32))
+        .bench(|| decode(divan::black_box(&position)));
+}
+
+/// One iteration of the plain algorithm with the document's own population.
+#[divan::bench(args = SCENARIOS)]
+fn iteration(bencher: divan::Bencher, name: &str) {
+    let scenario = scenario(name);
+    let mut objective = planner::objective(&scenario, &Nobody);
+    let algorithm = optimizer::by_name(&scenario.planner.algorithm).expect("one of the table");
+    let settings = Settings {
+        population: scenario.planner.population,
+        seed: 1,
+        parameters: algorithm.parameters_with(|_| None),
+    };
+    let mut search = (algorithm.start)(&settings, &mut objective);
+    bencher
+        .counter(divan::counter::ItemsCount::new(settings.population))
+        .bench_local(|| search.iterate(&mut objective, 0.5));
+}
+
+/// From waypoints to the path that is flown, Eq. 26 and 27.
+#[divan::bench(args = SCENARIOS)]
+fn smoothing(bencher: divan::Bencher, name: &str) {
+    let scenario = scenario(name);
+    let route = planner::plan(&scenario, &mut Nobody, &Nobody).waypoints;
+    bencher.bench(|| planner::smoothed(&scenario, &route));
 }
 
 /// A whole plan with the document's own settings (200 x 200 for the paper's scenarios), smoothing and certificate included.

@@ -37,6 +37,7 @@ use crate::geometry::Point3;
 use crate::optimizer::Objective;
 use crate::scenario::{Quadrature, Scenario};
 use crate::seeding;
+use coding::Coding;
 use log::Log;
 use objective::Routes;
 
@@ -114,6 +115,25 @@ fn search(model: &Model, log: &mut Log) -> StopReason {
 /// When the scenario names an algorithm that is not in the table; its reader refuses those.
 pub fn objective<'s>(scenario: &'s Scenario, stop: &'s dyn Stop) -> impl Objective + 's {
     Routes::plain(&Model::new(scenario), stop)
+}
+
+/// The route, start to target, of a position of [`objective`].
+///
+/// # Panics
+/// When the scenario names an algorithm that is not in the table; its reader refuses those.
+pub fn decoder(scenario: &Scenario) -> impl Fn(&[f64]) -> Vec<Point3> + '_ {
+    let coding = Coding::of(scenario, scenario.planner.waypoints);
+    move |position| {
+        let mut route = Vec::new();
+        coding.decode(position, &mut route);
+        route
+    }
+}
+
+/// The path that a vehicle flies along `route`, start to target; `None` where none is found that keeps every limit.
+#[must_use]
+pub fn smoothed(scenario: &Scenario, route: &[Point3]) -> Option<Path> {
+    smoothing::smooth(&Model::new(scenario), route)
 }
 
 /// Routes are the same when no waypoint is farther from its like than this share of the way.

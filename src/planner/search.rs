@@ -40,8 +40,7 @@ pub(super) fn plain(model: &Model, log: &mut Log) -> StopReason {
     let scenario = model.scenario;
     let iterations = 0..=scenario.planner.iterations;
     let (_, reason) = run(model, &mut routes, iterations, log);
-    finish(model, reason, log);
-    reason
+    finish(model, reason, log)
 }
 
 /// From `starts`, best first: bats about coarse routes, then about whole ones, then polish.
@@ -81,12 +80,11 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         let first = if turning > 0 { turning + 1 } else { 0 };
         (_, reason) = run(model, &mut routes, first..=settings.iterations, log);
     }
-    finish(model, reason, log);
-    reason
+    finish(model, reason, log)
 }
 
-/// Polish the best route, as the last point of the curve, unless it is good enough already.
-fn finish(model: &Model, reason: StopReason, log: &mut Log) {
+/// Polish the best route, as the last point of the curve, unless it is good enough already; it may be after.
+fn finish(model: &Model, reason: StopReason, log: &mut Log) -> StopReason {
     if model.scenario.planner.polish && reason != StopReason::Converged {
         let mut route = log.route.clone();
         if let Some(fitness) = polish(model, &mut route, LAST_STEPS, log) {
@@ -94,6 +92,10 @@ fn finish(model: &Model, reason: StopReason, log: &mut Log) {
         }
         log.last_point();
     }
+    if reason == StopReason::Iterations && log.has_converged() {
+        return StopReason::Converged;
+    }
+    reason
 }
 
 /// Improve `route` by `steps`, if the scenario asks for polish.

@@ -3,6 +3,7 @@
 
 mod climbs;
 mod count;
+mod exposed;
 mod known;
 mod net;
 mod over;
@@ -83,7 +84,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
         shapes.extend(along_strings(model, stop));
         // Who brings a route has been over the hills already.
         if !warm {
-            let found = over_ground(model);
+            let found = over_ground(model, &shapes);
             let climbs = climbs::routes(model);
             legs_priced = found.legs_priced + climbs.legs_priced;
             shapes.extend(found.routes);
@@ -237,19 +238,33 @@ fn along_strings(model: &Model, stop: &dyn Stop) -> Vec<Vec<Point3>> {
     shapes
 }
 
-/// Routes over the ground: through a fine net only where the coarse one has none that can be flown as it is.
-fn over_ground(model: &Model) -> Found {
-    let scenario = model.scenario;
+/// Routes over the ground: through a fine net only where the coarse one has none that can be flown as it is, and
+/// far about where the best so far pays much for soft zones.
+fn over_ground(model: &Model, strings: &[Vec<Point3>]) -> Found {
     let mut found = roadmap::routes(model, OVERLAND);
-    let can_be_flown = |route: &Vec<Point3>| {
-        route.len() - 2 <= scenario.planner.waypoints && price(model, route).is_feasible()
-    };
-    if !found.routes.iter().any(can_be_flown) {
-        let trails = trails::routes(model, OVERLAND);
+    let over = best_of(model, &found.routes);
+    let strung = best_of(model, strings);
+    let best = over
+        .into_iter()
+        .chain(strung)
+        .min_by(|one, other| one.0.rank(&other.0));
+    let detour = best.and_then(|(_, route)| exposed::detour(model, route));
+    if over.is_none() || detour.is_some() {
+        let trails = trails::routes(model, detour, OVERLAND);
         found.routes.extend(trails.routes);
         found.legs_priced += trails.legs_priced;
     }
     found
+}
+
+/// The best of `routes` that can be flown as it is.
+fn best_of<'r>(model: &Model, routes: &'r [Vec<Point3>]) -> Option<(Fitness, &'r [Point3])> {
+    routes
+        .iter()
+        .filter(|route| route.len() - 2 <= model.scenario.planner.waypoints)
+        .map(|route| (price(model, route), route.as_slice()))
+        .filter(|(fitness, _)| fitness.is_feasible())
+        .min_by(|one, other| one.0.rank(&other.0))
 }
 
 /// The route along `string`, in the middle of the band where it can be reached.

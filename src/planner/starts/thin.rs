@@ -1,13 +1,13 @@
 //! A chain of many short legs as a route of few waypoints.
 
-use super::net;
+use super::{MOST_COARSE, net};
 use crate::cost::Model;
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
 use crate::planner::price::PRICED_FROM;
 
-/// Of the places of `chain`, those that make the best route of as many free waypoints as may be, and how
+/// Of the places of `chain`, those that make the best route of as many free waypoints as a coarse one may have, and how
 /// many legs were priced to tell.
 pub(super) fn thin(model: &Model, pricer: &Pricer, chain: &[Point3]) -> (Vec<Point3>, u64) {
     let last = chain.len() - 1;
@@ -32,7 +32,8 @@ pub(super) fn thin(model: &Model, pricer: &Pricer, chain: &[Point3]) -> (Vec<Poi
         0,
     );
     let mut ways = vec![best];
-    for _ in 0..=model.scenario.planner.waypoints.min(last - 1) {
+    let most = model.scenario.planner.waypoints.min(MOST_COARSE);
+    for _ in 0..=most.min(last - 1) {
         let known = &ways[ways.len() - 1];
         let mut best = vec![(Fitness::WORST, 0); chain.len()];
         for (idx, &(a, b)) in ends.iter().enumerate() {

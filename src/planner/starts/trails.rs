@@ -15,6 +15,7 @@ use crate::cost::Model;
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::geometry::Point3;
 use crate::planner::price::PRICED_FROM;
+use crate::scenario::Scenario;
 
 /// Spots of the net, besides both ends.
 const SPOTS: usize = 1000;
@@ -23,15 +24,19 @@ const SPOTS: usize = 1000;
 const HEIGHTS: [f64; 1] = [0.5];
 const HEIGHTS_OVER_HILLS: [f64; 3] = [1.0 / 6.0, 0.5, 5.0 / 6.0];
 
-/// The net covers all points of which the way over them is at most so many times the direct one.
+/// The net covers all points of which the way over them is at most so many times the direct one, or more.
 const DETOUR: f64 = 1.5;
+
+/// Spots of a net that covers more.
+const SPOTS_FAR_ABOUT: usize = 2500;
 
 /// Places are joined to those within so many steps of the net.
 const REACH: f64 = 2.1;
 
-/// Up to `count` routes that differ, of at most as many free waypoints as `model` asks for.
-pub(super) fn routes(model: &Model, count: usize) -> Found {
-    let mut net = Net::new(model);
+/// Up to `count` routes that differ, of at most as many free waypoints as `model` asks for, by ways that are up to
+/// `detour` times as long as the direct one, if that is more than the net covers anyway.
+pub(super) fn routes(model: &Model, detour: Option<f64>, count: usize) -> Found {
+    let mut net = Net::new(model, detour.filter(|&detour| detour > DETOUR));
     let trees = [0, net.places.len() - 1].map(|end| net.cheapest(end));
     let mut found = Found {
         routes: Vec::new(),
@@ -74,11 +79,14 @@ struct Arrival {
 }
 
 impl<'s> Net<'s> {
-    fn new(model: &Model<'s>) -> Self {
+    fn new(model: &Model<'s>, far_about: Option<f64>) -> Self {
         let scenario = model.scenario;
         let tolerance = model.tolerance.scaled(PRICED_FROM);
         let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).verdicts();
-        let spots = net::spots(scenario, SPOTS, DETOUR);
+        let spots = match far_about {
+            Some(detour) => far_about_spots(scenario, detour),
+            None => net::spots(scenario, SPOTS, DETOUR),
+        };
         let places = places(model, &spots);
         let mut ends = Vec::new();
         let reach = REACH * spots.step;
@@ -204,6 +212,13 @@ impl<'s> Net<'s> {
     }
 }
 
+/// As many as are asked for within the area: of what lies so far about, most may be outside of it.
+fn far_about_spots(scenario: &Scenario, detour: f64) -> Spots {
+    let within = net::spots(scenario, SPOTS_FAR_ABOUT, detour).points.len();
+    let count = SPOTS_FAR_ABOUT * SPOTS_FAR_ABOUT / within.max(SPOTS_FAR_ABOUT / 20);
+    net::spots(scenario, count, detour)
+}
+
 /// Start, the spots at their heights, target.
 fn places(model: &Model, spots: &Spots) -> Vec<Point3> {
     let scenario = model.scenario;
@@ -303,7 +318,7 @@ mod tests {
         let can_be_flown = |route: &&Vec<Point3>| price(&model, route).is_feasible();
         let coarse = roadmap::routes(&model, 8).routes;
         assert_eq!(coarse.iter().filter(can_be_flown).count(), 0);
-        let fine = routes(&model, 8).routes;
+        let fine = routes(&model, None, 8).routes;
         assert!(fine.iter().filter(can_be_flown).count() > 0);
         for route in &fine {
             assert!(route.len() <= 14);
@@ -339,7 +354,7 @@ mod tests {
             let priced = found.routes.iter().map(|route| price(&model, route));
             priced.min_by(Fitness::rank).expect("a route")
         };
-        let [coarse, fine] = [roadmap::routes(&model, 8), routes(&model, 8)].map(best);
+        let [coarse, fine] = [roadmap::routes(&model, 8), routes(&model, None, 8)].map(best);
         assert!(!coarse.is_feasible());
         assert!(fine.beats(&coarse), "{coarse:?} {fine:?}");
     }

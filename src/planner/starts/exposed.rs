@@ -1,0 +1,45 @@
+//! Whether the best start pays so much for soft zones that a way far about may be cheaper.
+
+use crate::cost::{Model, metre};
+use crate::geometry::Point3;
+
+/// A route pays much for soft zones if they are this share of what it pays for its way.
+const MUCH: f64 = 0.1;
+
+/// Nets do not reach farther about than this, in direct ways: their steps would be too long.
+const FARTHEST: f64 = 4.0;
+
+/// How many times longer than the direct way a cheaper way than `route` may be, where that is worth a look: a way
+/// whose fuel alone costs more is not cheaper.
+pub(super) fn detour(model: &Model, route: &[Point3]) -> Option<f64> {
+    let scenario = model.scenario;
+    let quadrature = scenario.planner.quadrature;
+    let figures = model.assess(route, quadrature, model.tolerance, |_| {});
+    let way = figures.fuel + figures.threat;
+    let direct = (scenario.target - scenario.start).norm() * metre(scenario);
+    (figures.threat > MUCH * way).then(|| (way / direct).min(FARTHEST))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::tests::scenario;
+    use crate::scenario::Weights;
+
+    /// Straight through the soft zones a way costs more than one that is longer by as much.
+    #[test]
+    fn ways_are_looked_for_as_far_about_as_they_may_pay() {
+        let mut scenario = scenario();
+        let straight = [scenario.start, scenario.target];
+        let of = |scenario: &crate::scenario::Scenario| detour(&Model::new(scenario), &straight);
+        let far = of(&scenario).expect("it crosses soft zones");
+        assert!(far > 1.0 && far <= FARTHEST, "{far}");
+        scenario.weights = Weights {
+            threat: 1e6,
+            ..scenario.weights
+        };
+        assert_eq!(of(&scenario), Some(FARTHEST));
+        scenario.weights.threat = 0.0;
+        assert_eq!(of(&scenario), None);
+    }
+}

@@ -2,6 +2,7 @@
 
 mod backend;
 mod datasets;
+mod descriptors;
 mod ending;
 
 use std::io::Write as _;
@@ -62,6 +63,7 @@ pub(super) fn start(config: &Config) -> anyhow::Result<()> {
 
 async fn serve(config: &Config) -> anyhow::Result<()> {
     let mut signals = Signals::new()?;
+    let max_connections = descriptors::connections(config.http.max_connections);
     let access = access::open(config)?;
     let cors =
         Origins::read(&config.cors_origins).map_err(|fault| anyhow!("cors_origins: {fault}"))?;
@@ -113,7 +115,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let times = Times::within(config.grace);
     let settings = http::server::Settings {
         head_timeout: config.http.head_timeout,
-        max_connections: config.http.max_connections,
+        max_connections,
         patience: LAST_ANSWERS,
         instruments,
     };

@@ -3,6 +3,8 @@
 //! An accept loop of our own because `axum::serve` sets no timer, without which hyper's header
 //! timeout never fires.
 
+mod complaints;
+
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,8 +20,10 @@ use hyper_util::server::graceful::{GracefulShutdown, Watcher};
 use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
+use tokio::time::Instant;
 use tower::ServiceExt as _;
 
+use self::complaints::Complaints;
 use super::Phase;
 use super::phase::stopping;
 use crate::telemetry::Instruments;
@@ -53,6 +57,7 @@ pub async fn serve(
 ) {
     let connections = GracefulShutdown::new();
     let places = Arc::new(Semaphore::new(settings.max_connections));
+    let mut complaints = Complaints::default();
     loop {
         let arrival = tokio::select! {
             arrival = accept(&listener, &places) => arrival,
@@ -74,7 +79,9 @@ pub async fn serve(
                 });
             }
             Err(error) => {
-                tracing::warn!(%error, "a connection could not be accepted");
+                if let Some(failures) = complaints.count(Instant::now()) {
+                    tracing::warn!(%error, failures, "a connection could not be accepted");
+                }
                 tokio::time::sleep(ACCEPT_PAUSE).await;
             }
         }

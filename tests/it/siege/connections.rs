@@ -1,7 +1,9 @@
 //! Callers who send too slowly or nothing at all, in masses, while others are served.
 
+use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::net::SocketAddr;
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use futures_util::future::join_all;
@@ -100,6 +102,57 @@ async fn slow_and_silent_callers_are_let_go_while_others_are_served() {
     let (longest, ()) = tokio::join!(watched, siege);
     let longest = longest.expect("it was asked");
     println!("the longest wait for /readyz: {longest:.1?}");
+}
+
+/// The service raises what it may.
+#[tokio::test(flavor = "multi_thread")]
+async fn more_callers_are_met_than_files_may_be_open_at_first() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let few = "ulimit -S -n 128";
+    let patient = ["--http-head-timeout", "3600"];
+    let service = Service::start_with_few_files(few, directory.path(), &patient, Stdio::null());
+    let mut asking = Vec::new();
+    for _ in 0..300 {
+        let mut stream = TcpStream::connect(service.address())
+            .await
+            .expect("connected");
+        let request = "GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\n";
+        stream.write_all(request.as_bytes()).await.expect("sent");
+        let mut first = [0; 12];
+        in_time(stream.read_exact(&mut first))
+            .await
+            .expect("an answer");
+        assert_eq!(&first, b"HTTP/1.1 200");
+        asking.push(stream);
+    }
+}
+
+/// The others wait until some have gone.
+#[tokio::test(flavor = "multi_thread")]
+async fn no_more_callers_are_let_in_than_files_may_be_open() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let log = directory.path().join("log");
+    let service = Service::start_with_few_files(
+        "ulimit -n 128",
+        &directory.path().join("data"),
+        &["--http-head-timeout", "1"],
+        File::create(&log).expect("a file"),
+    );
+    let mut silent = Vec::new();
+    for _ in 0..300 {
+        let stream = TcpStream::connect(service.address())
+            .await
+            .expect("connected");
+        silent.push(until_closed(stream));
+    }
+    let answer = service.get("/readyz").send();
+    let (answer, _) = tokio::join!(answer, join_all(silent));
+    assert_eq!(answer.expect("an answer").status(), 200);
+    let log = fs::read_to_string(log).expect("UTF-8");
+    let told = log.matches("fewer connections than http.max_connections, 20000");
+    assert_eq!(told.count(), 1, "{log}");
+    assert!(log.contains("connections=96"), "{log}");
+    assert!(!log.contains("could not be accepted"), "{log}");
 }
 
 /// Whole or byte by byte, the first of which may be those of either.

@@ -115,6 +115,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let times = Times::within(config.grace);
     let settings = http::server::Settings {
         head_timeout: config.http.head_timeout,
+        body_timeout: config.http.body_timeout,
         max_connections,
         patience: LAST_ANSWERS,
         instruments,

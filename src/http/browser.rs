@@ -39,11 +39,12 @@ const EXPOSED: [HeaderName; 12] = [
 ];
 
 /// Headers that pages elsewhere may send.
-const ALLOWED: [HeaderName; 11] = [
+const ALLOWED: [HeaderName; 12] = [
     header::ACCEPT,
     header::AUTHORIZATION,
     header::CONTENT_ENCODING,
     header::CONTENT_TYPE,
+    header::IF_MATCH,
     header::IF_NONE_MATCH,
     HeaderName::from_static("idempotency-key"),
     HeaderName::from_static("last-event-id"),

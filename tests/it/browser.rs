@@ -53,6 +53,7 @@ async fn a_page_of_a_listed_origin_may_ask_and_read() {
         "authorization",
         "content-type",
         "idempotency-key",
+        "if-match",
         "if-none-match",
         "last-event-id",
         "prefer",

@@ -67,6 +67,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let access = access::open(config)?;
     let cors =
         Origins::read(&config.cors_origins).map_err(|fault| anyhow!("cors_origins: {fault}"))?;
+    let hosts = access::hosts(config, &access, &cors);
     let webhooks = webhooks(&config.webhook)?;
     let listener =
         listen(config.listen).with_context(|| format!("cannot listen on {}", config.listen))?;
@@ -102,6 +103,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         access: access.clone(),
         webhooks: webhooks.clone(),
         cors,
+        hosts,
         phase: watched.clone(),
         instruments: instruments.clone(),
     };

@@ -73,6 +73,14 @@ impl Origins {
         origins.iter().map(read).collect::<Result<_, _>>().map(Self)
     }
 
+    /// Without their ports.
+    pub(super) fn hosts(&self) -> impl Iterator<Item = String> {
+        self.0.iter().filter_map(|origin| {
+            let uri: Uri = origin.to_str().ok()?.parse().ok()?;
+            uri.host().map(str::to_owned)
+        })
+    }
+
     /// Answers preflights, and tells the pages' browsers that they may read. Nothing where nobody may.
     pub(super) fn layer(&self) -> Either<CorsLayer, Identity> {
         let layer = CorsLayer::new()

@@ -427,7 +427,7 @@ async fn a_slow_key_is_told_how_long_it_takes() {
 
 /// A stream that is open; its head has come.
 async fn open(api: &Api, plan: &str, secret: Option<&str>) -> axum::http::Response<Body> {
-    let request = Request::get(format!("{plan}/events"));
+    let request = Request::get(format!("{plan}/events")).header("host", "localhost");
     let request = match secret {
         Some(secret) => request.header("authorization", bearer(secret)),
         None => request,

@@ -14,6 +14,7 @@ async fn preflight(api: &Api, origin: &str) -> Response<Body> {
     let request = Request::builder()
         .method(Method::OPTIONS)
         .uri("/plans")
+        .header("host", "localhost")
         .header("origin", origin)
         .header("access-control-request-method", "POST")
         .header(

@@ -67,7 +67,7 @@ async fn slow_and_silent_callers_are_let_go_while_others_are_served() {
         waits.into_iter().max()
     };
     let siege = async {
-        let head = "POST /plans HTTP/1.1\r\nhost: x\r\n";
+        let head = "POST /plans HTTP/1.1\r\nhost: localhost\r\n";
         let body = format!("{head}content-type: application/json\r\ncontent-length: 1000\r\n\r\n");
         // One after the other: who comes when the listener's backlog is full is not even refused.
         let mut silent = Vec::new();
@@ -76,7 +76,7 @@ async fn slow_and_silent_callers_are_let_go_while_others_are_served() {
             // Some have asked before, and then say nothing more.
             let asks = caller % 2 == 0;
             if asks {
-                let request = "GET /livez HTTP/1.1\r\nhost: x\r\n\r\n";
+                let request = "GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\n";
                 stream.write_all(request.as_bytes()).await.expect("sent");
             }
             silent.push(async move {
@@ -162,8 +162,8 @@ async fn both_versions_of_http_are_spoken_however_they_come() {
     let service = Service::start(directory.path(), &["--workers", "1"]);
     // An empty SETTINGS frame after the preface; the service's own begins with its length and type.
     let http2: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\x04\0\0\0\0\0";
-    let get: &[u8] = b"GET /livez HTTP/1.1\r\nhost: x\r\n\r\n";
-    let put: &[u8] = b"PUT /livez HTTP/1.1\r\nhost: x\r\ncontent-length: 0\r\n\r\n";
+    let get: &[u8] = b"GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\n";
+    let put: &[u8] = b"PUT /livez HTTP/1.1\r\nhost: localhost\r\ncontent-length: 0\r\n\r\n";
     for (said, answer) in [
         (http2, &b"\x04"[..]),
         (get, b"/1.1 200"),
@@ -205,7 +205,7 @@ async fn an_idle_stream_costs_little_memory() {
         let mut stream = TcpStream::connect(service.address())
             .await
             .expect("connected");
-        let request = format!("GET {waiting}/events HTTP/1.1\r\nhost: x\r\n\r\n");
+        let request = format!("GET {waiting}/events HTTP/1.1\r\nhost: localhost\r\n\r\n");
         stream.write_all(request.as_bytes()).await.expect("sent");
         let mut text = String::new();
         while !text.contains("\nevent: status\n") {

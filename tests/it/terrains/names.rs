@@ -125,11 +125,18 @@ async fn who_knows_a_dataset_already_is_told_so() {
 
     let accepted = api.post("/plans", &over("hill")).await;
     let plan = accepted.header("location");
-    let used = api.get_with("/terrains/hill", &[("if-none-match", &tag)]).await;
-    assert_eq!((used.status.as_u16(), &used.json()["in_use"]), (200, &1.into()));
+    let used = api
+        .get_with("/terrains/hill", &[("if-none-match", &tag)])
+        .await;
+    assert_eq!(
+        (used.status.as_u16(), &used.json()["in_use"]),
+        (200, &1.into())
+    );
     assert_ne!(used.header("etag"), tag);
     api.delete(plan).await;
-    let again = api.get_with("/terrains/hill", &[("if-none-match", &tag)]).await;
+    let again = api
+        .get_with("/terrains/hill", &[("if-none-match", &tag)])
+        .await;
     assert_eq!(again.status, 304);
 
     for (tag, status) in [(used.header("etag"), 200), (&tag, 412)] {

@@ -7,6 +7,7 @@ use tokio::signal::unix::{SignalKind, signal};
 
 use crate::config::Config;
 use crate::http::auth::{Access, Keys, Settings};
+use crate::http::{Hosts, Origins};
 
 /// Keys themselves, in the form of the file.
 const VARIABLE: &str = "NOCTULE_KEYS";
@@ -45,6 +46,16 @@ pub(super) fn open(config: &Config) -> anyhow::Result<Access> {
         ..Settings::default()
     };
     Ok(Access::new(keys, settings))
+}
+
+/// What the service may be called. Without keys it is for this machine alone, which pages of other names
+/// are not; with them, or with leave for everybody, a proxy may call it whatever it likes.
+pub(super) fn hosts(config: &Config, access: &Access, cors: &Origins) -> Hosts {
+    if access.is_guarded() || config.allow_anonymous {
+        Hosts::any()
+    } else {
+        Hosts::of_this_machine(cors)
+    }
 }
 
 /// Read the file of keys again whenever SIGHUP comes. One that is wrong changes nothing.

@@ -2,6 +2,7 @@
 
 mod backend;
 mod datasets;
+mod descriptors;
 mod ending;
 
 use std::io::Write as _;
@@ -62,9 +63,11 @@ pub(super) fn start(config: &Config) -> anyhow::Result<()> {
 
 async fn serve(config: &Config) -> anyhow::Result<()> {
     let mut signals = Signals::new()?;
+    let max_connections = descriptors::connections(config.http.max_connections);
     let access = access::open(config)?;
     let cors =
         Origins::read(&config.cors_origins).map_err(|fault| anyhow!("cors_origins: {fault}"))?;
+    let hosts = access::hosts(config, &access, &cors);
     let webhooks = webhooks(&config.webhook)?;
     let listener =
         listen(config.listen).with_context(|| format!("cannot listen on {}", config.listen))?;
@@ -101,6 +104,7 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
         access: access.clone(),
         webhooks: webhooks.clone(),
         cors,
+        hosts,
         phase: watched.clone(),
         instruments: instruments.clone(),
     };
@@ -114,7 +118,8 @@ async fn serve(config: &Config) -> anyhow::Result<()> {
     let times = Times::within(config.grace);
     let settings = http::server::Settings {
         head_timeout: config.http.head_timeout,
-        max_connections: config.http.max_connections,
+        body_timeout: config.http.body_timeout,
+        max_connections,
         patience: LAST_ANSWERS,
         instruments,
     };

@@ -64,6 +64,8 @@ fn argument(setting: &Setting, defaults: &Config) -> Arg {
     let argument = Arg::new(setting.key)
         .long(setting.flag())
         .value_name(setting.placeholder)
+        // For the setting to say what it allows, and not clap that there is no flag called so.
+        .allow_negative_numbers(true)
         .help(help);
     let argument = match setting.path().0 {
         "" => argument,

@@ -82,7 +82,7 @@ pub struct Config {
 pub struct Http {
     /// A request's head must be complete after this; also how long a connection may idle.
     pub head_timeout: Duration,
-    /// A request's body must be complete after this.
+    /// A request's body must be complete after this; with `head_timeout`, also how long an answer may be left unread.
     pub body_timeout: Duration,
     /// Connections open at once; more wait in the listener's backlog.
     pub max_connections: usize,

@@ -181,7 +181,7 @@ fn http() -> Vec<Setting> {
         row(
             "http.body_timeout",
             "SECONDS",
-            "A request's body must be complete after this",
+            "A request's body must be complete after this; with http.head_timeout, also how long an answer may be left unread",
             TIMEOUT,
             |c| &mut c.http.body_timeout,
         ),

@@ -39,11 +39,12 @@ const EXPOSED: [HeaderName; 12] = [
 ];
 
 /// Headers that pages elsewhere may send.
-const ALLOWED: [HeaderName; 11] = [
+const ALLOWED: [HeaderName; 12] = [
     header::ACCEPT,
     header::AUTHORIZATION,
     header::CONTENT_ENCODING,
     header::CONTENT_TYPE,
+    header::IF_MATCH,
     header::IF_NONE_MATCH,
     HeaderName::from_static("idempotency-key"),
     HeaderName::from_static("last-event-id"),
@@ -70,6 +71,14 @@ impl Origins {
             HeaderValue::from_str(origin).map_err(|_| refused())
         };
         origins.iter().map(read).collect::<Result<_, _>>().map(Self)
+    }
+
+    /// Without their ports.
+    pub(super) fn hosts(&self) -> impl Iterator<Item = String> {
+        self.0.iter().filter_map(|origin| {
+            let uri: Uri = origin.to_str().ok()?.parse().ok()?;
+            uri.host().map(str::to_owned)
+        })
     }
 
     /// Answers preflights, and tells the pages' browsers that they may read. Nothing where nobody may.

@@ -1,5 +1,6 @@
 //! `GET /plans/{id}/events`: follow a plan, or resume where a cut stream left off.
 
+use axum::Extension;
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
@@ -15,6 +16,7 @@ use super::caller::Caller;
 use super::feed::{Feed, Told};
 use super::params::{self, Id, Params};
 use super::problem::Problem;
+use super::server::traffic::MayStandStill;
 use super::sse::{Outgoing, Wire};
 use super::{AppState, accept};
 use crate::job::{Event, NumberedEvent};
@@ -130,7 +132,8 @@ fn streamed(stream: Stream, wire: Wire) -> Response {
         (X_ACCEL_BUFFERING, HeaderValue::from_static("no")),
     ];
     let body = Body::from_stream(futures_util::StreamExt::chain(prologue, told));
-    (headers, body).into_response()
+    // A slow reader costs a place in a plan's events, no memory, and may be as slow as it likes.
+    (Extension(MayStandStill), headers, body).into_response()
 }
 
 impl Stream {

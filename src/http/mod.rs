@@ -12,6 +12,7 @@ mod documents;
 mod events;
 mod feed;
 mod ground;
+mod hosts;
 mod idempotency;
 mod known_tags;
 mod metrics;
@@ -45,7 +46,7 @@ use axum::Router;
 use axum::body::Body;
 use axum::handler::Handler;
 use axum::http::{StatusCode, Uri, header};
-use axum::middleware::{from_fn, from_fn_with_state};
+use axum::middleware::from_fn_with_state;
 use axum::response::Response;
 use axum::routing::{self, MethodRouter};
 use tokio::sync::watch;
@@ -56,6 +57,7 @@ use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove
 use tower_http::compression::{CompressionBody, CompressionLayer};
 
 pub use browser::Origins;
+pub use hosts::Hosts;
 pub use idempotency::InFlight;
 pub use phase::Phase;
 pub use terrains::Terrains;
@@ -101,6 +103,8 @@ pub struct Parts {
     pub webhooks: Option<webhook::Settings>,
     /// Pages from elsewhere that may use this service.
     pub cors: Origins,
+    /// What it may be called.
+    pub hosts: Hosts,
     /// Where the service stands between its start and its end.
     pub phase: watch::Receiver<Phase>,
     /// What is reported to the operator.
@@ -195,6 +199,7 @@ fn assemble<T: 'static>(
     nowhere: impl Handler<T, AppState>,
 ) -> Router {
     let (access, cors) = (parts.access.clone(), parts.cors.clone());
+    let hosts = parts.hosts.clone();
     let instruments = parts.instruments.clone();
     let router = routes
         .into_iter()
@@ -205,7 +210,7 @@ fn assemble<T: 'static>(
         .method_not_allowed_fallback(async || Problem::MethodNotAllowed)
         .fallback(nowhere)
         .with_state(AppState(Arc::new(parts)));
-    wrap(router, &cors, instruments)
+    wrap(router, &cors, hosts, instruments)
 }
 
 /// Streams are not: what is told must leave at once.
@@ -241,7 +246,7 @@ fn unwrap_uncompressed(mut answer: Response<CompressionBody<Body>>) -> Response 
 }
 
 /// What goes round every handler.
-fn wrap(router: Router, cors: &Origins, instruments: Arc<Instruments>) -> Router {
+fn wrap(router: Router, cors: &Origins, hosts: Hosts, instruments: Arc<Instruments>) -> Router {
     // The outermost first. One stack, for the router puts what it is given in a box of its own for each request.
     let layers = ServiceBuilder::new()
         .layer(from_fn_with_state(instruments, request_id::assign))
@@ -250,7 +255,7 @@ fn wrap(router: Router, cors: &Origins, instruments: Arc<Instruments>) -> Router
         .layer(MapResponseLayer::new(unwrap_uncompressed))
         .layer(CompressionLayer::new().compress_when(worth_compressing()))
         .layer(MapResponseLayer::new(note_status))
-        .layer(from_fn(auth::refuse_keys_in_urls));
+        .layer(from_fn_with_state(hosts, hosts::hold));
     router.layer(layers)
 }
 
@@ -295,9 +300,10 @@ mod tests {
     async fn a_panic_is_a_problem_that_does_not_tell_why() {
         let broken = Router::new().route("/", routing::get(breaks));
         let request = Request::get("/")
+            .header("host", "localhost")
             .header("x-request-id", "caller-1")
             .body(Body::empty());
-        let answer = wrap(broken, &Origins::default(), Arc::default())
+        let answer = wrap(broken, &Origins::default(), Hosts::any(), Arc::default())
             .oneshot(request.expect("a request"))
             .await
             .expect("an answer");

@@ -3,23 +3,33 @@
 //! An accept loop of our own because `axum::serve` sets no timer, without which hyper's header
 //! timeout never fires.
 
+mod complaints;
+mod socket;
+pub(super) mod traffic;
+
+use std::convert::Infallible;
+use std::fmt::Display;
 use std::io;
+use std::pin::pin;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use axum::Router;
 use axum::extract::Request;
 use hyper::body::Incoming;
 use hyper::server::conn::http1;
+use hyper::service::service_fn;
 use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
 use hyper_util::server::conn::auto;
-use hyper_util::server::graceful::{GracefulShutdown, Watcher};
-use hyper_util::service::TowerToHyperService;
+use hyper_util::server::graceful::GracefulConnection;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
+use tokio::time::Instant;
 use tower::ServiceExt as _;
 
+use self::complaints::Complaints;
+use self::socket::Socket;
+use self::traffic::Traffic;
 use super::Phase;
 use super::phase::stopping;
 use crate::telemetry::Instruments;
@@ -29,6 +39,8 @@ use crate::telemetry::Instruments;
 pub struct Settings {
     /// A request's head must be complete after this; also how long a connection may idle.
     pub head_timeout: Duration,
+    /// After that, whoever still does not take an answer is let go when this has passed, too.
+    pub body_timeout: Duration,
     /// Connections open at once; more wait in the listener's backlog.
     pub max_connections: usize,
     /// At the end, open connections may finish their answers for so long.
@@ -51,8 +63,13 @@ pub async fn serve(
     mut phase: watch::Receiver<Phase>,
     settings: Settings,
 ) {
-    let connections = GracefulShutdown::new();
-    let places = Arc::new(Semaphore::new(settings.max_connections));
+    let n_places = u32::try_from(settings.max_connections).unwrap_or(u32::MAX);
+    let places = Arc::new(Semaphore::new(n_places as usize));
+    let times = Times {
+        idle: settings.head_timeout,
+        unread: settings.body_timeout,
+    };
+    let mut complaints = Complaints::default();
     loop {
         let arrival = tokio::select! {
             arrival = accept(&listener, &places) => arrival,
@@ -60,13 +77,7 @@ pub async fn serve(
         };
         match arrival {
             Ok((stream, place)) => {
-                let answer = answer(
-                    stream,
-                    router.clone(),
-                    connections.watcher(),
-                    phase.clone(),
-                    settings.head_timeout,
-                );
+                let answer = answer(stream, router.clone(), phase.clone(), times);
                 let counted = settings.instruments.metrics.connection();
                 tokio::spawn(async move {
                     answer.await;
@@ -74,18 +85,31 @@ pub async fn serve(
                 });
             }
             Err(error) => {
-                tracing::warn!(%error, "a connection could not be accepted");
+                if let Some(failures) = complaints.count(Instant::now()) {
+                    tracing::warn!(%error, failures, "a connection could not be accepted");
+                }
                 tokio::time::sleep(ACCEPT_PAUSE).await;
             }
         }
     }
     drop(listener);
-    if tokio::time::timeout(settings.patience, connections.shutdown())
+    // Each connection gives its place back at its end.
+    let all_ended = places.acquire_many(n_places);
+    if tokio::time::timeout(settings.patience, all_ended)
         .await
         .is_err()
     {
         tracing::warn!("some connections did not end in time");
     }
+}
+
+/// How long a connection may stand still.
+#[derive(Clone, Copy)]
+struct Times {
+    /// Then it ends as soon as what was asked is answered.
+    idle: Duration,
+    /// Then it is over.
+    unread: Duration,
 }
 
 async fn accept(
@@ -102,69 +126,79 @@ async fn accept(
 async fn answer(
     stream: TcpStream,
     router: Router,
-    watcher: Watcher,
     mut phase: watch::Receiver<Phase>,
-    head_timeout: Duration,
+    times: Times,
 ) {
     let http1 = tokio::select! {
         // Who has asked already is answered.
         biased;
         http1 = speaks_http1(&stream) => http1,
         () = stopping(&mut phase) => return,
-        () = tokio::time::sleep(head_timeout) => {
+        () = tokio::time::sleep(times.idle) => {
             tracing::debug!("a connection sent nothing");
             return;
         }
     };
-    drop(phase);
+    let traffic = Arc::new(Traffic::new());
+    let socket = TokioIo::new(Socket {
+        stream,
+        traffic: traffic.clone(),
+    });
+    let watched = traffic.clone();
+    let service = service_fn(move |request: Request<Incoming>| {
+        let busy = watched.clone().begin();
+        let answer = router.clone().oneshot(request);
+        async move { Ok::<_, Infallible>(busy.answered(answer.await?)) }
+    });
     if http1 {
         let mut builder = http1::Builder::new();
         builder
             .timer(TokioTimer::new())
-            .header_read_timeout(head_timeout);
+            .header_read_timeout(times.idle);
         // Without what the other version needs: whatever is held here, every open stream holds.
-        let service = TowerToHyperService::new(router);
-        let connection = builder.serve_connection(TokioIo::new(stream), service);
-        if let Err(error) = watcher.watch(connection).await {
-            tracing::debug!(%error, "a connection broke off");
-        }
+        let connection = builder.serve_connection(socket, service);
+        keep(connection, phase, &traffic, times).await;
     } else {
-        Box::pin(answer_either(stream, router, watcher, head_timeout)).await;
+        let mut builder = auto::Builder::new(TokioExecutor::new());
+        builder
+            .http1()
+            .timer(TokioTimer::new())
+            .header_read_timeout(times.idle);
+        builder
+            .http2()
+            .timer(TokioTimer::new())
+            .keep_alive_interval(times.idle)
+            .max_concurrent_streams(256);
+        let connection = builder.serve_connection(socket, service);
+        Box::pin(keep(connection, phase, &traffic, times)).await;
     }
 }
 
-/// Answer the requests of a connection that may be one of HTTP/2.
-async fn answer_either(
-    stream: TcpStream,
-    router: Router,
-    watcher: Watcher,
-    head_timeout: Duration,
+/// Let a connection go on until it ends, the service does, or nothing moves on it any more.
+async fn keep<C: GracefulConnection<Error: Display>>(
+    connection: C,
+    mut phase: watch::Receiver<Phase>,
+    traffic: &Traffic,
+    times: Times,
 ) {
-    let begun = Arc::new(AtomicBool::new(false));
-    let service = {
-        let begun = begun.clone();
-        router.map_request(move |request: Request<Incoming>| {
-            begun.store(true, Ordering::Relaxed);
-            request
-        })
-    };
-    let mut builder = auto::Builder::new(TokioExecutor::new());
-    builder
-        .http1()
-        .timer(TokioTimer::new())
-        .header_read_timeout(head_timeout);
-    builder
-        .http2()
-        .timer(TokioTimer::new())
-        .keep_alive_interval(head_timeout)
-        .max_concurrent_streams(256);
-    let connection =
-        builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
+    let mut connection = pin!(connection);
     tokio::select! {
-        ended = watcher.watch(connection.into_owned()) => if let Err(error) = ended {
-            tracing::debug!(%error, "a connection broke off");
-        },
-        () = never_began(&begun, head_timeout) => tracing::debug!("a connection sent no request"),
+        ended = &mut connection => return note(ended),
+        () = stopping(&mut phase) => {}
+        () = traffic.still_for(times.idle) => {}
+    }
+    connection.as_mut().graceful_shutdown();
+    tokio::select! {
+        ended = connection => note(ended),
+        () = traffic.still_for(times.unread) => {
+            tracing::debug!("a connection's answers were not taken");
+        }
+    }
+}
+
+fn note(ended: Result<(), impl Display>) {
+    if let Err(error) = ended {
+        tracing::debug!(%error, "a connection broke off");
     }
 }
 
@@ -177,13 +211,4 @@ async fn speaks_http1(stream: &TcpStream) -> bool {
     // What cannot be looked at cannot be read either.
     let length = stream.peek(&mut first).await.unwrap_or(0);
     !PREFACE.starts_with(&first[..length])
-}
-
-/// Until it is clear that no first request comes. hyper's own timer starts only after the protocol
-/// is known, which a silent caller never lets it be.
-async fn never_began(begun: &AtomicBool, head_timeout: Duration) {
-    tokio::time::sleep(head_timeout).await;
-    if begun.load(Ordering::Relaxed) {
-        std::future::pending::<()>().await;
-    }
 }

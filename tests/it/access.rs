@@ -4,8 +4,10 @@ use std::fs;
 use std::path::Path;
 
 use reqwest::StatusCode;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::TcpStream;
 
-use crate::support::patience::eventually;
+use crate::support::patience::{eventually, in_time};
 use crate::support::process::{Service, run, run_with};
 use crate::support::scenario;
 
@@ -161,6 +163,64 @@ fn a_service_without_keys_does_not_listen_to_strangers() {
         !Path::new(data_dir).exists(),
         "refused before anything is made"
     );
+}
+
+/// Or a page whose name leads here uses it through a browser on this machine.
+#[tokio::test]
+async fn a_service_without_keys_answers_to_no_name_that_others_can_give_it() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let path = |name: &str| directory.path().join(name);
+    let (_, entry) = new_key(&["--name", "a"]);
+    fs::write(path("keys.toml"), entry).expect("written");
+    let keys = path("keys.toml");
+    for (arguments, evil, listed) in [
+        (&[][..], 421, 421),
+        (&["--cors-origins", "https://plans.example:8443"], 421, 200),
+        (&["--allow-anonymous"], 200, 200),
+        (&["--keys-file", keys.to_str().expect("UTF-8")], 200, 200),
+    ] {
+        let service = Service::start(&path("data"), arguments);
+        for (host, status) in [
+            ("localhost:8080", 200),
+            ("plans.localhost", 200),
+            ("[::1]", 200),
+            ("plans.example", listed),
+            ("evil.example:8080", evil),
+        ] {
+            let asked = service.get("/livez").header("host", host);
+            let answer = asked.send().await.expect("an answer");
+            assert_eq!(answer.status(), status, "{arguments:?} {host}");
+            if status == 421 {
+                let problem: serde_json::Value = answer.json().await.expect("JSON");
+                assert_eq!(problem["type"], "/problems/misdirected-request");
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_request_of_http_1_1_names_its_host() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &["--allow-anonymous"]);
+    for (head, status) in [
+        ("GET /livez HTTP/1.1\r\n", "400"),
+        ("GET /livez HTTP/1.1\r\nhost: a\r\nhost: a\r\n", "400"),
+        ("GET /livez HTTP/1.1\r\nhost: a\r\n", "200"),
+        ("GET /livez HTTP/1.0\r\n", "200"),
+    ] {
+        let mut stream = TcpStream::connect(service.address())
+            .await
+            .expect("connected");
+        let request = format!("{head}connection: close\r\n\r\n");
+        stream.write_all(request.as_bytes()).await.expect("sent");
+        let mut answer = String::new();
+        let read = in_time(stream.read_to_string(&mut answer)).await;
+        read.expect("an answer");
+        assert_eq!(answer.split(' ').nth(1), Some(status), "{head}: {answer}");
+        if status == "400" {
+            assert!(answer.contains("/problems/invalid-parameter"), "{answer}");
+        }
+    }
 }
 
 #[tokio::test]

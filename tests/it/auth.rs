@@ -413,9 +413,21 @@ async fn a_key_asks_no_faster_than_it_may() {
     assert!(!free.headers.contains_key("ratelimit"));
 }
 
+/// Longer than for anything else, as it is described.
+#[tokio::test]
+async fn a_slow_key_is_told_how_long_it_takes() {
+    let slow = "requests_per_second = 0.001\nburst = 1";
+    let api = Api::with_keys(&entry("alice", "of alice", "read", slow));
+    assert_eq!(send(&api, "of alice", "GET /plans").await.status, 200);
+    let refused = send(&api, "of alice", "GET /plans").await;
+    refused.expect_problem(429, "rate-limited");
+    let seconds: u64 = refused.header("retry-after").parse().expect("seconds");
+    assert!((900..=1000).contains(&seconds), "{seconds}");
+}
+
 /// A stream that is open; its head has come.
 async fn open(api: &Api, plan: &str, secret: Option<&str>) -> axum::http::Response<Body> {
-    let request = Request::get(format!("{plan}/events"));
+    let request = Request::get(format!("{plan}/events")).header("host", "localhost");
     let request = match secret {
         Some(secret) => request.header("authorization", bearer(secret)),
         None => request,

@@ -14,6 +14,7 @@ async fn preflight(api: &Api, origin: &str) -> Response<Body> {
     let request = Request::builder()
         .method(Method::OPTIONS)
         .uri("/plans")
+        .header("host", "localhost")
         .header("origin", origin)
         .header("access-control-request-method", "POST")
         .header(
@@ -53,6 +54,7 @@ async fn a_page_of_a_listed_origin_may_ask_and_read() {
         "authorization",
         "content-type",
         "idempotency-key",
+        "if-match",
         "if-none-match",
         "last-event-id",
         "prefer",

@@ -100,6 +100,34 @@ fn what_is_wrong_is_refused_before_anything_is_opened() {
     );
 }
 
+/// Whichever way it is written, the setting says what it allows.
+#[test]
+fn a_negative_number_is_no_flag() {
+    for (arguments, expected) in [
+        (
+            &["--queue", "-1"][..],
+            "--queue is \"-1\", must be a whole number",
+        ),
+        (&["--queue=-1"], "--queue is \"-1\", must be a whole number"),
+        (
+            &["--retention-age", "-5"],
+            "--retention-age is \"-5\", must be seconds",
+        ),
+        (
+            &["--http-head-timeout", "-0.5"],
+            "--http-head-timeout is \"-0.5\", must be seconds",
+        ),
+    ] {
+        let refused = run(&[&["serve", "--print-config"], arguments].concat(), "");
+        assert_eq!(refused.status.code(), Some(1));
+        let text = String::from_utf8(refused.stderr).expect("UTF-8");
+        assert!(text.contains(expected), "{expected} is not in\n{text}");
+    }
+    let unknown = run(&["serve", "-1"], "");
+    let text = String::from_utf8(unknown.stderr).expect("UTF-8");
+    assert!(text.contains("unexpected argument '-1'"), "{text}");
+}
+
 #[test]
 fn a_shared_store_is_printed_and_a_password_is_not() {
     let text = printed(

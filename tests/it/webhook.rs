@@ -100,6 +100,7 @@ async fn axum_serve(listener: TcpListener, router: Router) {
     let (_phase, watched) = tokio::sync::watch::channel(noctule::http::Phase::Serving);
     let settings = noctule::http::server::Settings {
         head_timeout: Duration::from_secs(30),
+        body_timeout: Duration::from_secs(30),
         max_connections: 10,
         patience: Duration::ZERO,
         instruments: Arc::default(),

@@ -299,14 +299,14 @@ pub(super) async fn gate(
     response
 }
 
-/// The layer before all routes: an address is written down by proxies, browsers and logs, so a key
-/// in one has been given away.
-pub(super) async fn refuse_keys_in_urls(request: Request, next: Next) -> Response {
-    if super::params::brings_a_key(request.uri()) {
+/// For every route: an address is written down by proxies, browsers and logs, so a key in one has been
+/// given away.
+pub(super) fn refuse_key_in_url(uri: &Uri) -> Result<(), Problem> {
+    if super::params::brings_a_key(uri) {
         tracing::warn!(
             "a key came in a URL and may have been written down on its way; withdraw it"
         );
-        return Problem::KeyInUrl.into_response();
+        return Err(Problem::KeyInUrl);
     }
-    next.run(request).await
+    Ok(())
 }

@@ -39,6 +39,9 @@ impl Problem {
             Self::KeyInUrl => {
                 "URLs are written down on their way: send the key as Authorization: Bearer, and replace this one".to_owned()
             }
+            Self::Misdirected(host) => {
+                format!("this service has no keys and answers as localhost or by its address alone, not as {host}; its operator can say otherwise")
+            }
             Self::Unauthorized(why) => why.detail().to_owned(),
             Self::Forbidden(scope) => format!("the key has not the scope {}", scope.name()),
             Self::RateLimited { retry_after_s } => {

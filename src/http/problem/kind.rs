@@ -37,6 +37,11 @@ impl Problem {
                 "key-in-url",
                 "Keys do not belong in URLs",
             ),
+            Self::Misdirected(_) => (
+                StatusCode::MISDIRECTED_REQUEST,
+                "misdirected-request",
+                "The request is for another host",
+            ),
             Self::Unauthorized(_) => (StatusCode::UNAUTHORIZED, "unauthorized", "A key is needed"),
             Self::Forbidden(_) => (
                 StatusCode::FORBIDDEN,

@@ -104,6 +104,8 @@ pub(super) enum Problem {
     },
     /// A key stands in the address.
     KeyInUrl,
+    /// The request is for another host; which.
+    Misdirected(String),
     /// The caller has shown nothing that lets them in.
     Unauthorized(Unauthorized),
     /// The caller's key has not this scope.

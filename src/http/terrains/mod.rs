@@ -23,12 +23,14 @@ pub(super) use elevations::elevations;
 use document::TerrainDocument;
 
 use super::caller::Caller;
+use super::known_tags::KnownTags;
 use super::params::{self, Params};
 use super::problem::Problem;
 use super::{AppState, off_thread};
 use crate::catalogue::{
     Catalogue, CatalogueError, Claim, Declaration, Entry, Expected, Kept, Naming, Tally,
 };
+use crate::export::sha256_hex;
 use crate::terrain::dem::Format;
 use crate::terrain::is_dataset_name;
 
@@ -173,7 +175,9 @@ pub(super) async fn put(
         Kept::Created => StatusCode::CREATED,
         Kept::Replaced | Kept::Unchanged => StatusCode::OK,
     };
-    let mut answer = shown(&state, entry).await?;
+    let content = entry.sha256.as_deref().map(etag);
+    let document = document(&state, entry).await?;
+    let mut answer = tagged(document.into(), content);
     *answer.status_mut() = status;
     if kept == Kept::Created {
         let location = HeaderValue::from_str(uri.path()).expect("a path is visible ASCII");
@@ -207,7 +211,7 @@ fn expected(headers: &HeaderMap) -> Expected {
         // What cannot be read is a tag, too: one that nothing has.
         let values = values.map(|value| String::from_utf8_lossy(value.as_bytes()));
         let tags = values.flat_map(|value| value.split(',').map(str::to_owned).collect::<Vec<_>>());
-        tags.map(|tag| tag.trim().trim_matches('"').to_owned())
+        tags.map(|tag| content_of(tag.trim().trim_matches('"')).to_owned())
             .collect()
     };
     let (matching, other) = (tags(header::IF_MATCH), tags(header::IF_NONE_MATCH));
@@ -221,6 +225,11 @@ fn expected(headers: &HeaderMap) -> Expected {
     } else {
         Expected::Anything
     }
+}
+
+/// Of the entity tag of a content or of a document; names change with the first alone.
+fn content_of(tag: &str) -> &str {
+    tag.split_once(OF).map_or(tag, |(content, _)| content)
 }
 
 /// The list.
@@ -254,22 +263,60 @@ pub(super) async fn show(
     State(state): State<AppState>,
     Name(name): Name,
     uri: Uri,
+    headers: HeaderMap,
 ) -> Result<Response, Problem> {
     Params::read(&uri, &[])?;
     let catalogue = state.terrains.catalogue.clone();
     let entry = one_of_few(&state.terrains.checks, move || catalogue.entry(&name)).await??;
-    shown(&state, entry).await
+    let content = entry.sha256.clone();
+    let document = document(&state, entry).await?;
+    let tag = content.map(|content| document_etag(&content, &document));
+    let known = tag
+        .as_ref()
+        .zip(KnownTags::of(&headers))
+        .is_some_and(|(tag, known)| known.contain(tag));
+    Ok(if known {
+        tagged(StatusCode::NOT_MODIFIED.into_response(), tag)
+    } else {
+        tagged(document.into(), tag)
+    })
 }
 
-async fn shown(state: &AppState, entry: Entry) -> Result<Response, Problem> {
+/// What is known of a dataset now, as it is sent.
+async fn document(state: &AppState, entry: Entry) -> Result<Text, Problem> {
     let uses = state.store.datasets_in_use().await?;
     let active = active(&uses, entry.sha256.as_deref());
-    let tag = entry.sha256.as_deref().map(etag);
-    let mut answer = Json(TerrainDocument::new(entry, active)).into_response();
+    let document = TerrainDocument::new(entry, active);
+    let text = serde_json::to_string(&document).expect("every map key is a string");
+    Ok(Text(text))
+}
+
+/// A document, written.
+struct Text(String);
+
+impl From<Text> for Response {
+    fn from(Text(text): Text) -> Self {
+        let json = HeaderValue::from_static("application/json");
+        ([(header::CONTENT_TYPE, json)], text).into_response()
+    }
+}
+
+fn tagged(mut answer: Response, tag: Option<HeaderValue>) -> Response {
     let headers = answer.headers_mut();
     headers.extend(tag.map(|tag| (header::ETAG, tag)));
     headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
-    Ok(answer)
+    answer
+}
+
+/// Between the sum of a content and that of what is said of it, in a document's entity tag.
+const OF: char = '.';
+
+/// The entity tag of a document. It begins with its content's sum, so that a dataset can be replaced or
+/// deleted by it; what follows changes with all else that the document says, such as how many plans
+/// need it.
+fn document_etag(sha256: &str, Text(text): &Text) -> HeaderValue {
+    let of_text = sha256_hex(text.as_bytes());
+    etag(&format!("{sha256}{OF}{}", &of_text[..16]))
 }
 
 /// The entity tag of a content.

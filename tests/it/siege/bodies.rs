@@ -43,7 +43,7 @@ fn statuses(text: &str) -> Vec<&str> {
 
 fn post(headers: &str, body: &[u8]) -> Vec<u8> {
     let head = format!(
-        "POST /plans HTTP/1.1\r\nhost: x\r\ncontent-type: application/json\r\n{headers}\r\n\r\n"
+        "POST /plans HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\n{headers}\r\n\r\n"
     );
     [head.as_bytes(), body].concat()
 }

@@ -1,7 +1,9 @@
 //! Callers who send too slowly or nothing at all, in masses, while others are served.
 
+use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::net::SocketAddr;
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use futures_util::future::join_all;
@@ -65,7 +67,7 @@ async fn slow_and_silent_callers_are_let_go_while_others_are_served() {
         waits.into_iter().max()
     };
     let siege = async {
-        let head = "POST /plans HTTP/1.1\r\nhost: x\r\n";
+        let head = "POST /plans HTTP/1.1\r\nhost: localhost\r\n";
         let body = format!("{head}content-type: application/json\r\ncontent-length: 1000\r\n\r\n");
         // One after the other: who comes when the listener's backlog is full is not even refused.
         let mut silent = Vec::new();
@@ -74,7 +76,7 @@ async fn slow_and_silent_callers_are_let_go_while_others_are_served() {
             // Some have asked before, and then say nothing more.
             let asks = caller % 2 == 0;
             if asks {
-                let request = "GET /livez HTTP/1.1\r\nhost: x\r\n\r\n";
+                let request = "GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\n";
                 stream.write_all(request.as_bytes()).await.expect("sent");
             }
             silent.push(async move {
@@ -102,6 +104,57 @@ async fn slow_and_silent_callers_are_let_go_while_others_are_served() {
     println!("the longest wait for /readyz: {longest:.1?}");
 }
 
+/// The service raises what it may.
+#[tokio::test(flavor = "multi_thread")]
+async fn more_callers_are_met_than_files_may_be_open_at_first() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let few = "ulimit -S -n 128";
+    let patient = ["--http-head-timeout", "3600"];
+    let service = Service::start_with_few_files(few, directory.path(), &patient, Stdio::null());
+    let mut asking = Vec::new();
+    for _ in 0..300 {
+        let mut stream = TcpStream::connect(service.address())
+            .await
+            .expect("connected");
+        let request = "GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\n";
+        stream.write_all(request.as_bytes()).await.expect("sent");
+        let mut first = [0; 12];
+        in_time(stream.read_exact(&mut first))
+            .await
+            .expect("an answer");
+        assert_eq!(&first, b"HTTP/1.1 200");
+        asking.push(stream);
+    }
+}
+
+/// The others wait until some have gone.
+#[tokio::test(flavor = "multi_thread")]
+async fn no_more_callers_are_let_in_than_files_may_be_open() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let log = directory.path().join("log");
+    let service = Service::start_with_few_files(
+        "ulimit -n 128",
+        &directory.path().join("data"),
+        &["--http-head-timeout", "1"],
+        File::create(&log).expect("a file"),
+    );
+    let mut silent = Vec::new();
+    for _ in 0..300 {
+        let stream = TcpStream::connect(service.address())
+            .await
+            .expect("connected");
+        silent.push(until_closed(stream));
+    }
+    let answer = service.get("/readyz").send();
+    let (answer, _) = tokio::join!(answer, join_all(silent));
+    assert_eq!(answer.expect("an answer").status(), 200);
+    let log = fs::read_to_string(log).expect("UTF-8");
+    let told = log.matches("fewer connections than http.max_connections, 20000");
+    assert_eq!(told.count(), 1, "{log}");
+    assert!(log.contains("connections=96"), "{log}");
+    assert!(!log.contains("could not be accepted"), "{log}");
+}
+
 /// Whole or byte by byte, the first of which may be those of either.
 #[tokio::test(flavor = "multi_thread")]
 async fn both_versions_of_http_are_spoken_however_they_come() {
@@ -109,8 +162,8 @@ async fn both_versions_of_http_are_spoken_however_they_come() {
     let service = Service::start(directory.path(), &["--workers", "1"]);
     // An empty SETTINGS frame after the preface; the service's own begins with its length and type.
     let http2: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\x04\0\0\0\0\0";
-    let get: &[u8] = b"GET /livez HTTP/1.1\r\nhost: x\r\n\r\n";
-    let put: &[u8] = b"PUT /livez HTTP/1.1\r\nhost: x\r\ncontent-length: 0\r\n\r\n";
+    let get: &[u8] = b"GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\n";
+    let put: &[u8] = b"PUT /livez HTTP/1.1\r\nhost: localhost\r\ncontent-length: 0\r\n\r\n";
     for (said, answer) in [
         (http2, &b"\x04"[..]),
         (get, b"/1.1 200"),
@@ -152,7 +205,7 @@ async fn an_idle_stream_costs_little_memory() {
         let mut stream = TcpStream::connect(service.address())
             .await
             .expect("connected");
-        let request = format!("GET {waiting}/events HTTP/1.1\r\nhost: x\r\n\r\n");
+        let request = format!("GET {waiting}/events HTTP/1.1\r\nhost: localhost\r\n\r\n");
         stream.write_all(request.as_bytes()).await.expect("sent");
         let mut text = String::new();
         while !text.contains("\nevent: status\n") {

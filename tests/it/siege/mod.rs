@@ -9,6 +9,7 @@ mod kill;
 mod masses;
 mod queue;
 mod races;
+mod still;
 mod streams;
 
 /// How much to do.

@@ -183,7 +183,7 @@ async fn a_reader_who_does_not_read_costs_the_others_nothing() {
         .await
         .expect("connected");
     let request = format!(
-        "GET {}/events?rate=0 HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n",
+        "GET {}/events?rate=0 HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n",
         plan.address
     );
     stalled.write_all(request.as_bytes()).await.expect("sent");

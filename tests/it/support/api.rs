@@ -12,7 +12,7 @@ use http_body_util::BodyExt as _;
 use noctule::catalogue::Directories;
 use noctule::http::auth::{Access, Keys, Settings};
 use noctule::http::webhook;
-use noctule::http::{self, Capacity, InFlight, Origins, Parts, Phase, Terrains};
+use noctule::http::{self, Capacity, Hosts, InFlight, Origins, Parts, Phase, Terrains};
 use noctule::planner;
 use noctule::scenario::limits::Limits;
 use noctule::store::measured::MeasuredStore;
@@ -164,6 +164,7 @@ impl Api {
             access,
             webhooks: None,
             cors: Origins::read(&origins).expect("origins"),
+            hosts: Hosts::any(),
             phase: watched,
             instruments,
         };
@@ -188,7 +189,10 @@ impl Api {
         let request = headers
             .iter()
             .fold(
-                Request::builder().method(method.clone()).uri(uri),
+                Request::builder()
+                    .method(method.clone())
+                    .uri(uri)
+                    .header("host", "localhost"),
                 |request, (name, value)| request.header(*name, *value),
             )
             .body(body.into())

@@ -32,6 +32,16 @@ fn on_a_small_disk(data_dir: &Path, options: &str) -> Command {
     command
 }
 
+/// The binary where the shell's `ulimit` holds it to so many open files.
+fn with_few_files(ulimit: &str) -> Command {
+    let mut command = Command::new("sh");
+    command
+        .args(["-c", &format!("{ulimit} && exec \"$0\" \"$@\"")])
+        .arg(env!("CARGO_BIN_EXE_noctule"));
+    clean(&mut command);
+    command
+}
+
 fn clean(command: &mut Command) {
     // What the tests are run with must not change what they see.
     for (name, _) in std::env::vars_os() {
@@ -112,6 +122,16 @@ impl Service {
     pub(crate) fn start_on_a_small_disk(data_dir: &Path, options: &str) -> Self {
         let command = on_a_small_disk(data_dir, options);
         Self::start_as(command, LOOPBACK, data_dir, &[], Stdio::null())
+    }
+
+    /// Held to so many open files, such as by `ulimit -n 256`.
+    pub(crate) fn start_with_few_files(
+        ulimit: &str,
+        data_dir: &Path,
+        arguments: &[&str],
+        log: impl Into<Stdio>,
+    ) -> Self {
+        Self::start_as(with_few_files(ulimit), LOOPBACK, data_dir, arguments, log)
     }
 
     fn start_as(

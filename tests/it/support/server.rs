@@ -22,6 +22,7 @@ impl Server {
         let address = listener.local_addr().expect("bound");
         let settings = Settings {
             head_timeout: Duration::from_secs(30),
+            body_timeout: Duration::from_secs(30),
             max_connections: 20_000,
             patience: Duration::from_secs(5),
             instruments: api.state.instruments.clone(),

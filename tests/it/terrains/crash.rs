@@ -24,7 +24,7 @@ async fn a_crash_midway_leaves_what_was_there_and_nothing_else() {
         .await
         .expect("connected");
     let head = format!(
-        "PUT /terrains/hill HTTP/1.1\r\nhost: x\r\ncontent-length: {}\r\n\r\n",
+        "PUT /terrains/hill HTTP/1.1\r\nhost: localhost\r\ncontent-length: {}\r\n\r\n",
         file.len()
     );
     stream.write_all(head.as_bytes()).await.expect("sent");

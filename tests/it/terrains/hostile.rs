@@ -221,13 +221,13 @@ async fn a_body_that_breaks_off_or_lies_about_its_length_leaves_nothing_behind()
     let server = Server::start(&api).await;
     let file = jacksboro();
     let head = |length: usize| {
-        format!("PUT /terrains/cut HTTP/1.1\r\nhost: x\r\ncontent-length: {length}\r\n\r\n")
+        format!("PUT /terrains/cut HTTP/1.1\r\nhost: localhost\r\ncontent-length: {length}\r\n\r\n")
             .into_bytes()
     };
     let short = [head(file.len()), file[..file.len() / 2].to_vec()].concat();
     let long = [head(file.len() / 2), file.clone()].concat();
     let chunk = [
-        b"PUT /terrains/cut HTTP/1.1\r\nhost: x\r\ntransfer-encoding: chunked\r\n\r\n1000\r\n"
+        b"PUT /terrains/cut HTTP/1.1\r\nhost: localhost\r\ntransfer-encoding: chunked\r\n\r\n1000\r\n"
             .to_vec(),
         file[..0x800].to_vec(),
     ]

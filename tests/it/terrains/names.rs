@@ -2,7 +2,7 @@
 
 use axum::http::Method;
 
-use super::{hill, jacksboro, kept, put, put_with};
+use super::{hill, jacksboro, kept, over, put, put_with};
 use crate::support::api::Api;
 use crate::support::keys::{bearer, entry};
 
@@ -101,6 +101,47 @@ async fn a_name_can_be_given_to_another_content() {
         let answer = put_with(&api, "/terrains/new", &[(header, value)], hill(25.0)).await;
         assert_eq!(answer.status, status, "{header}: {value}");
         api.delete("/terrains/new").await;
+    }
+}
+
+/// The document's tag changes with all that it says, and stands for its content where that is changed.
+#[tokio::test]
+async fn who_knows_a_dataset_already_is_told_so() {
+    let api = Api::new();
+    put(&api, "/terrains/hill", hill(100.0)).await;
+    let shown = api.get("/terrains/hill").await;
+    let tag = shown.header("etag").to_owned();
+    for (known, status) in [
+        (tag.clone(), 304),
+        (format!("\"x\", W/{tag}"), 304),
+        ("*".to_owned(), 304),
+        ("\"x\"".to_owned(), 200),
+    ] {
+        let headers = [("if-none-match", known.as_str())];
+        let answer = api.get_with("/terrains/hill", &headers).await;
+        assert_eq!(answer.status, status, "{known}");
+        assert_eq!(answer.header("etag"), tag);
+    }
+
+    let accepted = api.post("/plans", &over("hill")).await;
+    let plan = accepted.header("location");
+    let used = api
+        .get_with("/terrains/hill", &[("if-none-match", &tag)])
+        .await;
+    assert_eq!(
+        (used.status.as_u16(), &used.json()["in_use"]),
+        (200, &1.into())
+    );
+    assert_ne!(used.header("etag"), tag);
+    api.delete(plan).await;
+    let again = api
+        .get_with("/terrains/hill", &[("if-none-match", &tag)])
+        .await;
+    assert_eq!(again.status, 304);
+
+    for (tag, status) in [(used.header("etag"), 200), (&tag, 412)] {
+        let answer = put_with(&api, "/terrains/hill", &[("if-match", tag)], hill(50.0)).await;
+        assert_eq!(answer.status, status, "{tag}");
     }
 }
 

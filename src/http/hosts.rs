@@ -1,0 +1,171 @@
+//! Which host a request is for, and whether this service is that host.
+//!
+//! A service without keys trusts its loopback address to keep strangers out. A browser on the
+//! same machine is let in there, and with it every page whose name has been made to lead there
+//! (DNS rebinding); such a page cannot hide that name, for the browser sends it.
+
+use std::net::{Ipv4Addr, Ipv6Addr};
+use std::sync::Arc;
+
+use axum::extract::{Request, State};
+use axum::http::uri::Authority;
+use axum::http::{HeaderMap, Uri, Version, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+
+use super::auth;
+use super::browser::Origins;
+use super::problem::Problem;
+
+/// The hosts that this service answers for.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Hosts(Option<Arc<[String]>>);
+
+impl Hosts {
+    /// Whatever it is called.
+    #[must_use]
+    pub fn any() -> Self {
+        Self(None)
+    }
+
+    /// This machine, by its address or as localhost, and the hosts of `origins`.
+    #[must_use]
+    pub fn of_this_machine(origins: &Origins) -> Self {
+        Self(Some(origins.hosts().collect()))
+    }
+
+    /// # Errors
+    /// Where HTTP wants a host and there is none, or more than one, or one that cannot be read; and where it
+    /// is not of this service.
+    fn check(&self, uri: &Uri, version: Version, headers: &HeaderMap) -> Result<(), Problem> {
+        if version == Version::HTTP_11 && !headers.contains_key(header::HOST) {
+            return Err(refused("is missing, must name the host that is asked"));
+        }
+        match (named(uri, headers)?, &self.0) {
+            (Some(host), Some(known)) if !is_of_this_machine(&host, known) => {
+                Err(Problem::Misdirected(host))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The host, without its port, in lower case: of the address where it has one, as in HTTP/2, else of the header.
+fn named(uri: &Uri, headers: &HeaderMap) -> Result<Option<String>, Problem> {
+    let mut values = headers.get_all(header::HOST).iter();
+    let value = values.next();
+    if values.next().is_some() {
+        return Err(refused("is given twice, must be given once"));
+    }
+    let of_header = value
+        .map(|value| {
+            let text = value.to_str().unwrap_or_default();
+            let read = text.parse::<Authority>().ok();
+            read.filter(|authority| !authority.as_str().contains('@'))
+                .ok_or_else(|| refused(&format!("is {value:?}, must be a host and maybe a port")))
+        })
+        .transpose()?;
+    let authority = uri.authority().or(of_header.as_ref());
+    Ok(authority.map(|authority| authority.host().to_ascii_lowercase()))
+}
+
+fn refused(detail: &str) -> Problem {
+    Problem::InvalidParameter {
+        name: "host".to_owned(),
+        detail: format!("host {detail}"),
+    }
+}
+
+/// `known` are hosts beside it. An address leads where it says, whoever names it.
+fn is_of_this_machine(host: &str, known: &[String]) -> bool {
+    let name = host.strip_suffix('.').unwrap_or(host);
+    let v6 = host
+        .strip_prefix('[')
+        .and_then(|host| host.strip_suffix(']'));
+    name == "localhost"
+        || name.ends_with(".localhost")
+        || host.parse::<Ipv4Addr>().is_ok()
+        || v6.is_some_and(|v6| v6.parse::<Ipv6Addr>().is_ok())
+        || known.iter().any(|known| known == name)
+}
+
+/// The layer before all routes, for what is asked of every address; one, for each costs every request.
+pub(super) async fn hold(State(hosts): State<Hosts>, request: Request, next: Next) -> Response {
+    let uri = request.uri();
+    let checked = hosts
+        .check(uri, request.version(), request.headers())
+        .and_then(|()| auth::refuse_key_in_url(uri));
+    match checked {
+        Ok(()) => next.run(request).await,
+        Err(problem) => problem.into_response(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use axum::http::HeaderValue;
+
+    use super::*;
+
+    #[test]
+    fn names_that_others_can_give_this_machine_are_not_its_own() {
+        let known = ["plans.example".to_owned()];
+        for (host, expected) in [
+            ("localhost", true),
+            ("localhost.", true),
+            ("noctule.localhost", true),
+            ("127.0.0.1", true),
+            ("192.0.2.7", true),
+            ("[::1]", true),
+            ("plans.example", true),
+            ("x.plans.example", false),
+            ("evil.example", false),
+            ("localhost.evil.example", false),
+            ("127.0.0.1.evil.example", false),
+            ("evillocalhost", false),
+            ("127.1", false),
+            ("[evil]", false),
+            ("", false),
+        ] {
+            assert_eq!(is_of_this_machine(host, &known), expected, "{host}");
+        }
+    }
+
+    #[test]
+    fn a_host_is_named_once_and_can_be_read() {
+        #[track_caller]
+        fn check(version: Version, uri: &str, values: &[&[u8]], expected: Option<u16>) {
+            let mut headers = HeaderMap::new();
+            for value in values {
+                let value = HeaderValue::from_bytes(value).expect("a header");
+                headers.append(header::HOST, value);
+            }
+            let uri = uri.parse().expect("an address");
+            let origins = Origins::read(&["https://plans.example:8443".to_owned()]);
+            let hosts = Hosts::of_this_machine(&origins.expect("an origin"));
+            let problem = hosts.check(&uri, version, &headers).err();
+            let status = problem.map(|problem| problem.into_response().status().as_u16());
+            assert_eq!(status, expected, "{version:?} {uri} {headers:?}");
+        }
+        let (v1, v11, v2) = (Version::HTTP_10, Version::HTTP_11, Version::HTTP_2);
+        check(v11, "/", &[b"localhost:8080"], None);
+        check(v11, "/", &[b"LocalHost"], None);
+        check(v11, "/", &[b"[::1]:8080"], None);
+        check(v11, "/", &[b"plans.example"], None);
+        check(v11, "/", &[], Some(400));
+        check(v11, "/", &[b""], Some(400));
+        check(v11, "/", &[b"localhost", b"localhost"], Some(400));
+        check(v11, "/", &[b"two words"], Some(400));
+        check(v11, "/", &[b"me@localhost"], Some(400));
+        check(v11, "/", &[b"caf\xe9"], Some(400));
+        check(v11, "/", &[b"evil.example:8080"], Some(421));
+        // An address that names one goes before the header.
+        check(v11, "http://evil.example/", &[b"localhost"], Some(421));
+        check(v11, "http://localhost/", &[], Some(400));
+        check(v1, "/", &[], None);
+        check(v1, "/", &[b"evil.example"], Some(421));
+        check(v2, "http://localhost:8080/", &[], None);
+        check(v2, "http://evil.example/", &[], Some(421));
+        check(v2, "/", &[b"evil.example"], Some(421));
+    }
+}

@@ -1,0 +1,190 @@
+//! Whether anything still moves on a connection.
+//!
+//! A caller who asks for nothing, or takes nothing of what it asked for, holds a connection and
+//! whatever waits to be sent on it. Of the two only the first is known to hyper, and only where
+//! it speaks HTTP/1.
+
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use axum::body::{Body, Bytes};
+use axum::response::Response;
+use hyper::body::{Frame, SizeHint};
+use tokio::time::Instant;
+
+/// An answer that may stand still for as long as it likes, says so by having this among its extensions.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::http) struct MayStandStill;
+
+/// So much has to be sent to count: more than pings and acknowledgements of HTTP/2, which go on while
+/// nobody asks for anything.
+const WORTH_NOTING: usize = 1024;
+
+/// What moves on one connection.
+#[derive(Debug)]
+pub(super) struct Traffic(Mutex<State>);
+
+#[derive(Debug)]
+struct State {
+    /// Requests that are being worked on, and answers that may stand still.
+    busy: usize,
+    /// When something last moved.
+    moved: Instant,
+    /// Sent since, in bytes.
+    unnoted: usize,
+}
+
+impl Traffic {
+    pub(super) fn new() -> Self {
+        Self(Mutex::new(State {
+            busy: 0,
+            moved: Instant::now(),
+            unnoted: 0,
+        }))
+    }
+
+    /// A request has come. It moves until it is answered.
+    pub(super) fn begin(self: Arc<Self>) -> Busy {
+        self.state().busy += 1;
+        Busy(self)
+    }
+
+    /// So many bytes have been taken from the service.
+    pub(super) fn sent(&self, bytes: usize) {
+        let mut state = self.state();
+        state.unnoted += bytes;
+        if state.unnoted >= WORTH_NOTING {
+            state.note();
+        }
+    }
+
+    /// Until nothing has moved for `time`, from now on.
+    pub(super) async fn still_for(&self, time: Duration) {
+        let mut due = Instant::now() + time;
+        loop {
+            tokio::time::sleep_until(due).await;
+            let now = Instant::now();
+            due = self.state().moved(now) + time;
+            if due <= now {
+                return;
+            }
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    fn note(&mut self) {
+        self.moved = Instant::now();
+        self.unnoted = 0;
+    }
+
+    fn moved(&self, now: Instant) -> Instant {
+        if self.busy > 0 { now } else { self.moved }
+    }
+}
+
+/// What keeps a connection from standing still.
+#[derive(Debug)]
+pub(super) struct Busy(Arc<Traffic>);
+
+impl Busy {
+    /// What was begun is answered with this.
+    pub(super) fn answered(self, answer: Response) -> Response<Answer> {
+        let may_stand_still = answer.extensions().get::<MayStandStill>().is_some();
+        let busy = may_stand_still.then_some(self);
+        answer.map(|body| Answer { body, _busy: busy })
+    }
+}
+
+impl Drop for Busy {
+    fn drop(&mut self) {
+        let mut state = self.0.state();
+        state.busy -= 1;
+        state.note();
+    }
+}
+
+/// The body of an answer.
+pub(super) struct Answer {
+    body: Body,
+    /// Of one that may stand still.
+    _busy: Option<Busy>,
+}
+
+impl hyper::body::Body for Answer {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        Pin::new(&mut self.body).poll_frame(context)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TIME: Duration = Duration::from_secs(30);
+
+    /// Seconds until `traffic` has stood still for [`TIME`].
+    async fn still_after_s(traffic: &Traffic) -> u64 {
+        let begin = Instant::now();
+        traffic.still_for(TIME).await;
+        begin.elapsed().as_secs()
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn what_is_asked_and_what_is_sent_counts() {
+        let traffic = Arc::new(Traffic::new());
+        assert_eq!(still_after_s(&traffic).await, 30, "nobody asks");
+        assert_eq!(still_after_s(&traffic).await, 30, "from now on");
+
+        for (bytes, expected, what) in [(WORTH_NOTING, 50, "an answer"), (17, 30, "a ping")] {
+            let later = async {
+                tokio::time::sleep(Duration::from_secs(20)).await;
+                traffic.sent(bytes);
+            };
+            let (still, ()) = tokio::join!(still_after_s(&traffic), later);
+            assert_eq!(still, expected, "{what}");
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_request_moves_until_it_is_answered_and_a_stream_until_it_ends() {
+        let traffic = Arc::new(Traffic::new());
+        let after = async |held: Box<dyn Send>| {
+            tokio::time::sleep(Duration::from_secs(100)).await;
+            drop(held);
+        };
+        let request = traffic.clone().begin();
+        let (still, ()) = tokio::join!(still_after_s(&traffic), after(Box::new(request)));
+        assert_eq!(still, 130);
+
+        let answer = traffic.clone().begin().answered(Response::default());
+        let (still, ()) = tokio::join!(still_after_s(&traffic), after(Box::new(answer)));
+        assert_eq!(still, 30, "nobody reads it");
+
+        let mut stream = Response::default();
+        stream.extensions_mut().insert(MayStandStill);
+        let stream = traffic.clone().begin().answered(stream);
+        let (still, ()) = tokio::join!(still_after_s(&traffic), after(Box::new(stream)));
+        assert_eq!(still, 130);
+    }
+}

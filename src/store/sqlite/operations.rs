@@ -67,7 +67,7 @@ fn within_quota(tx: &Transaction<'_>, submission: &Submission) -> Result<(), Sto
         .query_row([owner], |row| row.get(0))?;
     let active = active.cast_unsigned();
     if active >= quota {
-        return Err(StoreError::QuotaReached { active });
+        return Err(StoreError::QuotaReached { active, quota });
     }
     Ok(())
 }

@@ -16,7 +16,7 @@ use super::record::{Record, State};
 use super::steps::Change;
 use super::view::Standing;
 use super::{JetStream, closed};
-use crate::job::{Failure, Plan, PlanId, Status};
+use crate::job::{FailureKind, Plan, PlanId, Status};
 use crate::store::{Lease, StoreError};
 
 /// Runs of a plan whose workers were lost, after which it is taken to be the reason.
@@ -320,11 +320,8 @@ fn end_of_lost(plan: &mut Plan, lost: u32, now_ms: i64) -> Result<Option<Status>
     if plan.cancel_requested {
         plan.cancel(now_ms)?;
     } else if lost >= LOST_RUNS {
-        let failure = Failure {
-            kind: "worker-lost".to_owned(),
-            detail: format!("{lost} workers were lost while they ran the plan"),
-        };
-        plan.fail(failure, now_ms)?;
+        let detail = format!("{lost} workers were lost while they ran the plan");
+        plan.fail(FailureKind::WorkerLost.because(detail), now_ms)?;
     } else {
         return Ok(None);
     }

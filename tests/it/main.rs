@@ -16,6 +16,7 @@ mod determinism;
 mod events;
 mod formats;
 mod idempotency;
+mod imports;
 mod layering;
 mod logs;
 mod metrics;

@@ -6,9 +6,10 @@ use std::time::Duration;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use super::{Dice, size};
+use super::Dice;
 use crate::support::process::Service;
 use crate::support::scenario;
+use crate::support::size::size;
 use crate::support::sse::{Stream, events};
 use crate::support::stores::{Place, for_every_backend};
 

@@ -9,11 +9,12 @@ use reqwest::Client;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
-use super::{Dice, size};
+use super::Dice;
 use crate::support::api::Api;
 use crate::support::patience::in_time;
 use crate::support::run;
 use crate::support::server::Server;
+use crate::support::size::size;
 use crate::support::stores::{Backend, for_every_backend};
 
 /// A plan on a real port, whose run the test plays.

@@ -60,7 +60,7 @@ async fn a_newer_schema_is_refused_and_left_alone() {
     drop(database);
     let message = refusal(directory.path());
     assert!(
-        message.contains("schema version 99") && message.contains("up to 5"),
+        message.contains("schema version 99") && message.contains("up to 6"),
         "{message}"
     );
     let database = rusqlite::Connection::open(&file).unwrap();

@@ -17,11 +17,8 @@ use super::record::{Record, State};
 use super::steps::Change;
 use super::view::Standing;
 use super::{JetStream, closed};
-use crate::job::{FailureKind, Plan, PlanId, Status};
-use crate::store::{Lease, StoreError};
-
-/// Runs of a plan whose workers were lost, after which it is taken to be the reason.
-const LOST_RUNS: u32 = 5;
+use crate::job::{PlanId, Status};
+use crate::store::{Lease, StoreError, lost};
 
 /// A job may be seen before its record; for so long a claim waits.
 const RECORD_PATIENCE: Duration = Duration::from_millis(100);
@@ -241,12 +238,10 @@ impl JetStream {
                     }
                     Status::Running => {
                         record.lost += 1;
-                        if let Some(end) = end_of_lost(&mut record.plan, record.lost, now_ms)? {
+                        if lost::end(&mut record.plan, record.lost.into(), now_ms)? {
                             record.ended(self.options.retention.age_ms);
-                            tracing::warn!(plan_id = %id, status = end.name(), "a plan whose worker was lost ends");
                             return Ok(Some(Change::told(record)));
                         }
-                        tracing::warn!(plan_id = %id, attempt = record.attempt, "a plan whose worker was lost runs again");
                         record.plan.requeue()?;
                         events.push(record.status());
                     }
@@ -256,7 +251,10 @@ impl JetStream {
                 record.attempt += 1;
                 record.appended = 0;
                 found = Found::Run(record.clone());
-                Ok(Some(Change { events, ..Change::told(record) }))
+                Ok(Some(Change {
+                    events,
+                    ..Change::told(record)
+                }))
             })
             .await
             .map(|_| found)
@@ -315,19 +313,6 @@ enum Found {
     Ours,
     /// Done, or removed.
     Over,
-}
-
-/// Ends a plan whose worker was lost, when it is not to run again.
-fn end_of_lost(plan: &mut Plan, lost: u32, now_ms: i64) -> Result<Option<Status>, StoreError> {
-    if plan.cancel_requested {
-        plan.cancel(now_ms)?;
-    } else if lost >= LOST_RUNS {
-        let detail = format!("{lost} workers were lost while they ran the plan");
-        plan.fail(FailureKind::WorkerLost.because(detail), now_ms)?;
-    } else {
-        return Ok(None);
-    }
-    Ok(Some(plan.status))
 }
 
 /// Answer a delivery. A lost answer is made good by the next delivery, so nobody waits for one to be

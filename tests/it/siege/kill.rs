@@ -16,7 +16,7 @@ use crate::support::stores::{Place, for_every_backend};
 /// A kill comes so many milliseconds after the start at the latest.
 const LIFE_MS: usize = 400;
 
-/// A plan that loses five workers is taken for the reason, where nodes share their plans: before a fifth kill, all end.
+/// A plan that loses five workers is taken for the reason: before a fifth kill, all end.
 const KILLS_OF_A_PLAN: usize = 4;
 
 /// What the caller knows.

@@ -30,6 +30,7 @@ mod siege;
 mod store_conformance;
 mod store_sqlite;
 mod store_trouble;
+mod store_versions;
 mod support;
 mod svg;
 mod terrains;

@@ -1,6 +1,6 @@
 //! kill -9 again and again while plans come in: what was accepted is done, once, and what was done stays.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -27,8 +27,8 @@ struct Known {
 }
 
 impl Known {
-    /// Post plans until there are `enough`, then look for results.
-    async fn grow(&mut self, service: &Service, enough: usize) {
+    /// Post plans until `enough` were accepted.
+    async fn post(&mut self, service: &Service, enough: usize) {
         while self.accepted.len() < enough {
             let mut scenario = scenario();
             scenario["planner"]["population"] = 50.into();
@@ -36,6 +36,11 @@ impl Known {
             scenario["planner"]["seed"] = self.accepted.len().into();
             self.accepted.push(service.submit(&scenario).await);
         }
+    }
+
+    /// Post plans until there are `enough`, then look for results.
+    async fn grow(&mut self, service: &Service, enough: usize) {
+        self.post(service, enough).await;
         for address in &self.accepted {
             if self.finished.contains_key(address) {
                 continue;
@@ -71,10 +76,11 @@ async fn kills_at_random_points_lose_nothing_and_repeat_nothing() {
             let _ = tokio::time::timeout_at(point, known.grow(&service, enough)).await;
             service.kill();
         }
-        let (accepted, finished) = (known.accepted, known.finished);
-        assert!(!accepted.is_empty());
-
         let service = place.serve(&["--workers", "2"]);
+        // Those that the kills left no time for.
+        known.post(&service, n_plans).await;
+        let (accepted, finished) = (known.accepted, known.finished);
+        assert_eq!(accepted.iter().collect::<BTreeSet<_>>().len(), n_plans);
         for address in &accepted {
             let ended = service.ended(address).await;
             assert_eq!(ended["status"], "succeeded", "{address}");

@@ -21,7 +21,7 @@ use super::{access, exit, files};
 use crate::config::{self, Config, Flags};
 use crate::http::webhook::{self, Secret, Sender};
 use crate::http::{self, Capacity, InFlight, Origins, Parts, Phase, Terrains};
-use crate::job::Failure;
+use crate::job::{Failure, FailureKind};
 use crate::planner;
 use crate::scenario::json::{self, Refusal, Rules};
 use crate::store::measured::MeasuredStore;
@@ -167,22 +167,14 @@ fn engine(rules: Arc<Rules>) -> Engine {
 
 /// Why a document is not read that was once.
 fn unread(refusal: &Refusal) -> Failure {
-    let (kind, detail) = match refusal.lost_ground() {
-        Some(fault) => (
-            "no-ground",
-            format!(
-                "the ground that it was accepted over is gone: {}",
-                fault.detail
-            ),
-        ),
-        None => (
-            "invalid-scenario",
-            format!("this version of the service cannot read the accepted document: {refusal}"),
-        ),
-    };
-    Failure {
-        kind: kind.to_owned(),
-        detail,
+    match refusal.lost_ground() {
+        Some(fault) => FailureKind::NoGround.because(format!(
+            "the ground that it was accepted over is gone: {}",
+            fault.detail
+        )),
+        None => FailureKind::InvalidScenario.because(format!(
+            "this version of the service cannot read the accepted document: {refusal}"
+        )),
     }
 }
 

@@ -1,6 +1,5 @@
 //! Files as they come, right and wrong.
 
-use proptest::prelude::*;
 use serde_json::{Value, json};
 
 use super::*;
@@ -378,23 +377,4 @@ fn hostile_files_are_refused_and_soon() {
     };
     assert_eq!(unused.len(), 1001);
     assert_eq!(unused[1000].reason, "2000 more are not listed");
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
-
-    /// Cut anywhere, or a byte of it another, a file is read or refused.
-    #[test]
-    fn damaged_files_never_break_the_reader(cut: prop::sample::Index, at: prop::sample::Index, byte: u8) {
-        let mut features = ends();
-        features.push(feature(json!({"radius": 5}), json!({"type": "Point", "coordinates": [8.5, 47.3]})));
-        let collection = json!({"type": "FeatureCollection", "features": features}).to_string();
-        for text in [KML, &collection] {
-            let mut bytes = text.as_bytes().to_vec();
-            bytes[at.index(text.len())] = byte;
-            let _ = convert(&bytes, Syntax::of(&bytes));
-            bytes.truncate(cut.index(text.len()));
-            let _ = convert(&bytes, Syntax::of(&bytes));
-        }
-    }
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-use super::Status;
+use super::{Failure, Status};
 
 /// Identifies a plan; version 7, so ids sort by the time of acceptance.
 pub type PlanId = Uuid;
@@ -97,15 +97,6 @@ pub struct Plan {
     pub error: Option<Failure>,
     /// Grows with every change of this record.
     pub revision: u64,
-}
-
-/// Why a plan failed.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Failure {
-    /// Last part of the problem's `type`, such as `planner-panic`.
-    pub kind: String,
-    /// For people.
-    pub detail: String,
 }
 
 #[cfg(test)]

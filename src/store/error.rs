@@ -20,10 +20,12 @@ pub enum StoreError {
         queued: u64,
     },
     /// The owner has as many active plans as the submission allows.
-    #[error("the owner has {active} active plans, the quota")]
+    #[error("the owner has {active} active plans, its quota is {quota}")]
     QuotaReached {
         /// How many.
         active: u64,
+        /// How many there may be.
+        quota: u64,
     },
     /// The idempotency key came with another body before.
     #[error("the idempotency key was used with another body")]

@@ -8,6 +8,7 @@ mod clock;
 mod end;
 mod error;
 pub mod jetstream;
+mod lost;
 pub mod measured;
 mod options;
 pub mod reopening;
@@ -54,7 +55,8 @@ pub trait Store: Send + Sync + 'static {
     ) -> Result<Option<Plan>, StoreError>;
 
     /// Wait for the plan at the head of the queue and take it: queued -> running, at the time that
-    /// the store's clock shows then. Dropping the future before it is done takes nothing; what was on its way
+    /// the store's clock shows then. A plan whose run was cut off by the end of its process, and not given back, is
+    /// handed out again; after the fifth time it fails, `worker-lost`. Dropping the future before it is done takes nothing; what was on its way
     /// goes back, and meanwhile others are given what stands behind it.
     ///
     /// # Errors
@@ -167,7 +169,8 @@ pub trait Store: Send + Sync + 'static {
     /// Whether the store can take a write now: it makes a small one durable.
     async fn health(&self) -> Result<(), StoreError>;
 
-    /// Finish what is being written and let go of files. Waiting claims and later calls fail.
+    /// Finish what is being written, give back what is still run here, and let go of files. Waiting claims and later
+    /// calls fail.
     async fn close(&self);
 }
 

@@ -14,7 +14,7 @@ use tracing::Span;
 use super::run::BATCH;
 use super::{Engine, Unplanned};
 use crate::export::document::ResultDocument;
-use crate::job::{Event, Failure, Plan};
+use crate::job::{Event, FailureKind, Plan};
 use crate::planner::{ConvergencePoint, Incumbent, Observer, Outcome, Stop, StopReason};
 use crate::store::{Ending, Lease};
 use crate::telemetry::Instruments;
@@ -214,10 +214,8 @@ fn panicked(payload: &(dyn Any + Send)) -> Ending {
         panic = message,
         "the planner panicked; its plan fails, the others go on"
     );
-    Ending::Failed(Failure {
-        kind: "planner-panic".to_owned(),
-        detail: "the planner broke on this scenario; the service's log says where".to_owned(),
-    })
+    let detail = "the planner broke on this scenario; the service's log says where";
+    Ending::Failed(FailureKind::PlannerPanic.because(detail))
 }
 
 /// Hands events on; waits when they come faster than they can be stored.

@@ -365,6 +365,8 @@ async fn a_key_has_so_many_active_plans_and_no_more() {
         let refused = post(&api, secret).await;
         refused.expect_problem(429, "quota-reached");
         assert!(refused.headers.contains_key("retry-after"));
+        assert_eq!(refused.header("ratelimit-policy"), "\"plans\";q=2");
+        assert_eq!(refused.header("ratelimit"), "\"plans\";r=0");
     }
     submit(&api, "of bob").await;
     run::complete(&*api.store, Vec::new()).await;
@@ -457,7 +459,12 @@ async fn a_stream_counts_until_its_body_is_dropped() {
     let refused = async |secret: &str| {
         let answer = send(&api, secret, &format!("GET {plan}/events")).await;
         assert!(answer.headers.contains_key("retry-after"));
-        answer.expect_problem(429, "too-many-streams")["limit"].clone()
+        let limit = answer.expect_problem(429, "too-many-streams")["limit"].clone();
+        let name = limit.as_str().expect("text");
+        let policy = format!("\"{name}\";q={}", limits[name]);
+        assert_eq!(answer.header("ratelimit-policy"), policy);
+        assert_eq!(answer.header("ratelimit"), format!("\"{name}\";r=0"));
+        limit
     };
     let mut first = open(&api, &plan, Some("of alice")).await;
     let second = open(&api, &plan, Some("of rita")).await;

@@ -6,6 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use crate::support::collector::{Collector, Taken};
+use crate::support::patience::eventually;
 use crate::support::process::Service;
 use crate::support::scenario;
 
@@ -138,15 +139,71 @@ async fn a_plan_and_its_request_are_exported_as_parts_of_the_callers_trace() {
 
 #[tokio::test]
 async fn without_a_collector_plans_run_and_one_line_tells() {
-    // Nobody listens on a port that has just been given back.
-    let endpoint = {
-        let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
-        format!("http://{}", listener.local_addr().expect("bound"))
-    };
+    let endpoint = format!("http://{}", nobodys());
     let (_, lines) = logged(&["--otlp-endpoint", &endpoint], &scenario()).await;
     let told = lines
         .iter()
         .filter(|line| line["message"] == "traces cannot be exported; they are dropped");
     assert_eq!(told.count(), 1, "{lines:#?}");
     line(&lines, "plan ended");
+}
+
+/// A port on which nobody listens: it has just been given back.
+fn nobodys() -> std::net::SocketAddr {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
+    listener.local_addr().expect("bound")
+}
+
+/// Webhooks are sent when neither the request nor the run is there any more.
+#[tokio::test]
+async fn a_line_about_a_webhook_names_its_plan() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let (log, secret) = (
+        directory.path().join("log"),
+        directory.path().join("secret"),
+    );
+    let text = "whsec_MDEyMzQ1Njc4OWFiY2RlZjAxMjM0NTY3ODlhYmNkZWY=";
+    fs::write(&secret, text).expect("written");
+    let arguments = [
+        "--log-format",
+        "json",
+        "--webhook-allow-private",
+        "--webhook-secret-file",
+        secret.to_str().expect("UTF-8"),
+    ];
+    let file = File::create(&log).expect("a file");
+    let service = Service::start_with_log(&directory.path().join("data"), &arguments, file);
+    let request = service
+        .request(reqwest::Method::POST, "/plans")
+        .header("noctule-webhook", format!("http://{}/", nobodys()))
+        .json(&scenario());
+    let answer = request.send().await.expect("an answer");
+    let accepted: Value = answer.json().await.expect("JSON");
+    let tried = || {
+        let text = fs::read_to_string(&log).expect("UTF-8");
+        let whole = text.rsplit_once('\n').map_or("", |(whole, _)| whole);
+        let mut lines = whole
+            .lines()
+            .map(|line| serde_json::from_str(line).expect("JSON"));
+        lines.find(|line: &Value| line["message"] == "a webhook did not get through")
+    };
+    eventually(async || tried().is_some()).await;
+    assert_eq!(tried().expect("told")["plan_id"], accepted["id"]);
+}
+
+/// Whoever looks for a plan looks for one name.
+#[test]
+fn no_line_calls_a_plans_id_otherwise() {
+    let mut rooms = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("src")];
+    while let Some(room) = rooms.pop() {
+        for entry in fs::read_dir(&room).expect("a directory") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                rooms.push(path);
+            } else if path.extension().is_some_and(|end| end == "rs") {
+                let text = fs::read_to_string(&path).expect("UTF-8");
+                assert!(!text.contains("plan = %"), "{}", path.display());
+            }
+        }
+    }
 }

@@ -6,11 +6,13 @@ use std::collections::BTreeSet;
 use axum::http::Method;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
+use noctule::job::FailureKind;
 use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 
 use crate::support::api::Api;
 use crate::support::description::{DESCRIPTION, check_schema, resolve};
+use crate::support::run;
 
 #[test]
 fn routes_and_descriptions_are_the_same() {
@@ -217,6 +219,33 @@ async fn pages_are_closed_to_everything_but_their_style() {
             "{path}"
         );
     }
+}
+
+/// What a plan fails for is a problem with a page, which tells of the same status, and described.
+#[tokio::test]
+async fn what_plans_fail_for_leads_to_its_page() {
+    let problems = include_str!("../../docs/PROBLEMS.md");
+    let mut told = BTreeSet::new();
+    for kind in FailureKind::ALL {
+        let api = Api::new();
+        let plan = api.submit().await;
+        let lease = api.store.claim().await.expect("a queued plan");
+        run::fail_for(&*api.store, &lease, kind).await;
+        let error = api.get(&plan).await.json()["error"].clone();
+        let slug = kind.name();
+        assert_eq!(error["type"], format!("/problems/{slug}"));
+        let row = format!("| [{slug}](#{slug}) | {} |", error["status"]);
+        assert!(problems.contains(&row), "no row {row}");
+        let page = api.get(&format!("/problems/{slug}")).await;
+        assert_eq!(page.status, 200, "{slug}");
+        let page = std::str::from_utf8(&page.body).expect("UTF-8");
+        assert!(page.contains(&format!("<h2>{slug}</h2>")), "{page}");
+        told.insert(error["type"].clone().to_string());
+    }
+    let error = &DESCRIPTION["components"]["schemas"]["StatusDocument"]["properties"]["error"];
+    let described = error["oneOf"][1]["properties"]["type"]["enum"].as_array();
+    let described = described.expect("a list").iter().map(Value::to_string);
+    assert_eq!(described.collect::<BTreeSet<_>>(), told);
 }
 
 /// The `type` of a problem is an address.

@@ -4,12 +4,12 @@
 
 use std::path::Path;
 
-use noctule::job::{Event, Status};
+use noctule::job::Status;
 use noctule::store::sqlite::SqliteStore;
-use noctule::store::{ListQuery, Options, Retention, Store, StoreError, wall_clock};
+use noctule::store::{Options, Store, StoreError};
 use tempfile::TempDir;
 
-use crate::support::plans::{ending, history, point, submission};
+use crate::support::plans::{ending, point, submission};
 
 fn options() -> Options {
     Options::new(1_000)
@@ -60,7 +60,7 @@ async fn a_newer_schema_is_refused_and_left_alone() {
     drop(database);
     let message = refusal(directory.path());
     assert!(
-        message.contains("schema version 99") && message.contains("up to 5"),
+        message.contains("schema version 99") && message.contains("up to 6"),
         "{message}"
     );
     let database = rusqlite::Connection::open(&file).unwrap();
@@ -173,67 +173,6 @@ async fn a_write_waits_for_a_person_who_holds_the_file() {
     assert_eq!(store.stats().await.unwrap().queued, 0);
     person.execute_batch("COMMIT").unwrap();
     submit.await.unwrap();
-}
-
-/// What was written before owners, idempotency keys and retention were known.
-#[tokio::test(flavor = "multi_thread")]
-async fn a_file_of_the_first_version_is_brought_up_and_goes_on() {
-    use Status::{Queued, Succeeded};
-    let directory = TempDir::new().unwrap();
-    let file = directory.path().join("noctule.db");
-    let database = rusqlite::Connection::open(&file).unwrap();
-    database
-        .execute_batch(include_str!("fixtures/store-version-1.sql"))
-        .unwrap();
-    drop(database);
-
-    let store = SqliteStore::open(directory.path(), options()).unwrap();
-    let all = ListQuery {
-        limit: 10,
-        ..ListQuery::default()
-    };
-    let plans = store.list(all.clone()).await.unwrap();
-    let statuses: Vec<_> = plans.iter().map(|plan| plan.status).collect();
-    assert_eq!(statuses, [Queued, Queued, Succeeded, Succeeded]);
-    for plan in &plans {
-        assert_eq!((&plan.owner, plan.expires_ms), (&None, None));
-        let told = history(&store, plan.id).await;
-        assert!(matches!(&told[0], Event::Status(first) if first.id == plan.id));
-        let document = store.result(plan.id).await.unwrap();
-        assert_eq!(document.is_some(), plan.status == Succeeded);
-        assert!(store.scenario(plan.id).await.unwrap().contains("planner"));
-    }
-    // The interrupted run is the next one, and the bytes of old plans count.
-    let lease = store.claim().await.unwrap();
-    assert_eq!(lease.plan.name.as_deref(), Some("long"));
-    store
-        .append(&lease, vec![point(1, Some(9.0))])
-        .await
-        .unwrap();
-    store
-        .finish(&lease, ending(Succeeded).at(wall_clock()()))
-        .await
-        .unwrap();
-    store.close().await;
-
-    let database = rusqlite::Connection::open(&file).unwrap();
-    let short: i64 = database
-        .query_row("SELECT count(*) FROM plans WHERE bytes < 500", [], |row| {
-            row.get(0)
-        })
-        .unwrap();
-    assert_eq!(short, 0);
-    drop(database);
-    let keep_none = Options {
-        retention: Retention {
-            plans: Some(0),
-            ..Retention::default()
-        },
-        ..options()
-    };
-    let store = SqliteStore::open(directory.path(), keep_none).unwrap();
-    assert_eq!(store.sweep(wall_clock()()).await.unwrap(), 3);
-    assert_eq!(store.list(all).await.unwrap().len(), 1);
 }
 
 /// A run may begin before its claim is durable; here the disk then refuses the claim.

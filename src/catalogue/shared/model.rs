@@ -65,7 +65,7 @@ fn steps() -> impl Strategy<Value = Vec<(usize, Step, Failing)>> {
 const CACHE_BYTES: u64 = 200;
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases / 4, ..ProptestConfig::default() })]
 
     #[test]
     fn names_and_contents_are_as_if_there_were_one_node(steps in steps()) {

@@ -4,6 +4,7 @@
 //! leaves a `Caller` in the request. Whose plan is whose is decided there and in the store, not
 //! here. Deliberately absent: names of people, passwords, sessions, any key in readable form.
 
+mod allowance;
 mod fresh;
 mod key_file;
 mod keys;
@@ -28,6 +29,7 @@ pub use keys::{Key, Keys, KeysError};
 pub use rate::Rate;
 pub use scope::{Needs, Scope};
 
+pub(super) use allowance::Allowance;
 pub(super) use keys::{Digest, holds_a_key};
 pub(super) use streams::{Permit, TooMany};
 
@@ -294,7 +296,7 @@ pub(super) async fn gate(
         Err(Refused { problem, taken }) => (problem.into_response(), taken),
     };
     if let Some(taken) = taken {
-        taken.write(response.headers_mut());
+        taken.allowance().write(response.headers_mut());
     }
     response
 }

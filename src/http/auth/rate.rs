@@ -1,13 +1,11 @@
-//! How fast a key may ask: a bucket of tokens each, and the header fields that tell of it.
+//! How fast a key may ask: a bucket of tokens each.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::{Mutex, PoisonError};
 
-use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use tokio::time::Instant;
 
-const RATELIMIT: HeaderName = HeaderName::from_static("ratelimit");
-const RATELIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
+use super::allowance::{Allowance, Filling};
 
 /// A bucket of `burst` tokens that fills at `per_second`; a request takes one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,34 +71,40 @@ impl Taken {
         seconds((1.0 - self.left) / self.rate.per_second).max(1)
     }
 
-    /// The fields of draft-ietf-httpapi-ratelimit-headers-10. The window of the policy is the time in
-    /// which an empty bucket fills, `t` that until this one is full.
-    pub(super) fn write(&self, headers: &mut HeaderMap) {
+    /// What the bucket holds now.
+    pub(super) fn allowance(&self) -> Allowance {
         let full = f64::from(self.rate.burst);
-        let window_s = seconds(full / self.rate.per_second);
-        let full_in_s = seconds((full - self.left) / self.rate.per_second);
-        let policy = format!("\"requests\";q={};w={window_s}", self.rate.burst);
-        let limit = format!("\"requests\";r={};t={full_in_s}", self.left.floor());
-        for (name, value) in [(RATELIMIT_POLICY, policy), (RATELIMIT, limit)] {
-            let value = HeaderValue::from_str(&value).expect("visible ASCII");
-            headers.insert(name, value);
+        Allowance {
+            name: "requests",
+            quota: u64::from(self.rate.burst),
+            left: whole(self.left.floor()),
+            filling: Some(Filling {
+                window_s: seconds(full / self.rate.per_second),
+                full_in_s: seconds((full - self.left) / self.rate.per_second),
+            }),
         }
     }
 }
 
 fn seconds(seconds: f64) -> u64 {
+    whole(seconds.ceil())
+}
+
+fn whole(number: f64) -> u64 {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "not negative, at most a burst of 2^32 at a thousandth a second"
     )]
-    let whole = seconds.ceil() as u64;
+    let whole = number as u64;
     whole
 }
 
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
+
+    use axum::http::HeaderMap;
 
     use super::*;
 
@@ -111,8 +115,8 @@ mod tests {
 
     fn fields(taken: &Taken) -> [String; 2] {
         let mut headers = HeaderMap::new();
-        taken.write(&mut headers);
-        [RATELIMIT_POLICY, RATELIMIT]
+        taken.allowance().write(&mut headers);
+        ["ratelimit-policy", "ratelimit"]
             .map(|name| headers[name].to_str().expect("visible ASCII").to_owned())
     }
 

@@ -120,10 +120,11 @@ async fn hand_in(
                 retry_after_s,
             })
         }
-        Err(StoreError::QuotaReached { active }) => {
+        Err(StoreError::QuotaReached { active, quota }) => {
             let retry_after_s = retry::for_room(&state.store.stats().await?, state.capacity);
             Err(Problem::QuotaReached {
                 active,
+                quota,
                 retry_after_s,
             })
         }

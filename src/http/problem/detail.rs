@@ -111,8 +111,8 @@ impl Problem {
             Self::IdempotencyKeyReused => {
                 "a request with this Idempotency-Key had another body; take a new key for a new request".to_owned()
             }
-            Self::QuotaReached { active, retry_after_s } => {
-                format!("{active} plans of this key are queued or running, its quota; try again in {retry_after_s} s")
+            Self::QuotaReached { active, quota, retry_after_s } => {
+                format!("{active} plans of this key are queued or running, its quota is {quota}; try again in {retry_after_s} s")
             }
             Self::BodyTooLarge(limit) => {
                 format!(

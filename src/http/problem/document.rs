@@ -1,10 +1,9 @@
 //! Problem documents, RFC 9457.
 
-use axum::http::StatusCode;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::Problem;
+use super::{Problem, kind};
 use crate::http::auth::TooMany;
 use crate::job::Failure;
 use crate::scenario::json::Fault;
@@ -76,10 +75,11 @@ pub(in crate::http) struct FailureDocument {
 
 impl From<Failure> for FailureDocument {
     fn from(failure: Failure) -> Self {
+        let (status, title) = kind::of_failure(&failure.kind);
         Self {
             r#type: format!("/problems/{}", failure.kind),
-            title: "The plan failed",
-            status: StatusCode::INTERNAL_SERVER_ERROR.as_u16(),
+            title,
+            status: status.as_u16(),
             detail: failure.detail,
         }
     }

@@ -16,8 +16,9 @@ impl From<StoreError> for Problem {
             StoreError::NotFound(id) => Self::NoSuchPlan(id.to_string()),
             StoreError::Gone(tombstone) => Self::Gone(tombstone),
             StoreError::KeyReused => Self::IdempotencyKeyReused,
-            StoreError::QuotaReached { active } => Self::QuotaReached {
+            StoreError::QuotaReached { active, quota } => Self::QuotaReached {
                 active,
+                quota,
                 retry_after_s: 1,
             },
             StoreError::QueueFull { queued } => Self::QueueFull {

@@ -3,9 +3,34 @@
 use axum::http::StatusCode;
 
 use super::Problem;
+use crate::job::FailureKind;
 
 /// What a kind of problem is called: status, the last part of `type`, title.
 pub(super) type Kind = (StatusCode, &'static str, &'static str);
+
+const NO_GROUND: Kind = (
+    StatusCode::CONFLICT,
+    "no-ground",
+    "The plan's ground is gone",
+);
+
+const INVALID_SCENARIO: Kind = (
+    StatusCode::UNPROCESSABLE_ENTITY,
+    "invalid-scenario",
+    "The scenario cannot be planned",
+);
+
+/// Status and title of what a plan failed for: where a request is refused for the same, those.
+pub(super) fn of_failure(name: &str) -> (StatusCode, &'static str) {
+    let (status, _, title) = match FailureKind::named(name) {
+        Some(FailureKind::NoGround) => NO_GROUND,
+        Some(FailureKind::InvalidScenario) => INVALID_SCENARIO,
+        Some(FailureKind::PlannerPanic | FailureKind::WorkerLost) | None => {
+            return (StatusCode::INTERNAL_SERVER_ERROR, "The plan failed");
+        }
+    };
+    (status, title)
+}
 
 impl Problem {
     /// The one table from error to status. Slugs are stable; `docs/PROBLEMS.md` has a section for each.
@@ -99,11 +124,7 @@ impl Problem {
                 "terrain-mounted",
                 "The dataset is the operator's",
             ),
-            Self::NoGround(_) => (
-                StatusCode::CONFLICT,
-                "no-ground",
-                "The plan's ground is gone",
-            ),
+            Self::NoGround(_) => NO_GROUND,
             Self::PreconditionFailed(_) => (
                 StatusCode::PRECONDITION_FAILED,
                 "precondition-failed",
@@ -136,11 +157,7 @@ impl Problem {
                 "unsupported-media-type",
                 "Unsupported media type",
             ),
-            Self::InvalidScenario(_) => (
-                StatusCode::UNPROCESSABLE_ENTITY,
-                "invalid-scenario",
-                "The scenario cannot be planned",
-            ),
+            Self::InvalidScenario(_) => INVALID_SCENARIO,
             Self::IdempotencyKeyReused => (
                 StatusCode::UNPROCESSABLE_ENTITY,
                 "idempotency-key-reused",

@@ -18,7 +18,7 @@ use axum::response::{IntoResponse, Response};
 
 pub(super) use document::FailureDocument;
 
-use super::auth::{Scope, TooMany, Unauthorized};
+use super::auth::{Allowance, Scope, TooMany, Unauthorized};
 use crate::import::Unused;
 use crate::job::{Failure, PlanId, Status};
 use crate::scenario::json::Fault;
@@ -156,6 +156,8 @@ pub(super) enum Problem {
     QuotaReached {
         /// How many.
         active: u64,
+        /// How many it may have.
+        quota: u64,
         /// See [`super::retry`].
         retry_after_s: u64,
     },
@@ -195,6 +197,18 @@ impl Problem {
         }
     }
 
+    /// What is left of the limit that the caller has met; the gate writes down that of a rate, which is told
+    /// with every answer.
+    fn allowance(&self) -> Option<Allowance> {
+        match self {
+            Self::QuotaReached { quota, .. } => Some(Allowance::none_left("plans", *quota)),
+            Self::TooManyStreams(TooMany { limit, most }) => {
+                Some(Allowance::none_left(limit, *most as u64))
+            }
+            _ => None,
+        }
+    }
+
     /// What would let the caller in, RFC 6750 section 3.
     fn challenge(&self) -> Option<HeaderValue> {
         match self {
@@ -224,6 +238,9 @@ impl IntoResponse for Problem {
             response
                 .headers_mut()
                 .insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        if let Some(allowance) = self.allowance() {
+            allowance.write(response.headers_mut());
         }
         if let Some(challenge) = self.challenge() {
             response

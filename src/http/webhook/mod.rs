@@ -141,11 +141,11 @@ impl Delivery {
         let (id, tries) = (webhook.plan.id, webhook.tries + 1);
         let pause_ms = match self.try_once(webhook).await {
             Ok(status) if status.is_success() => {
-                tracing::info!(plan = %id, tries, "the webhook got through");
+                tracing::info!(plan_id = %id, tries, "the webhook got through");
                 None
             }
             Ok(StatusCode::GONE) => {
-                tracing::info!(plan = %id, tries, "the webhook's receiver is gone");
+                tracing::info!(plan_id = %id, tries, "the webhook's receiver is gone");
                 None
             }
             Ok(status) => again(id, tries, &format!("the answer is {status}")),
@@ -155,7 +155,7 @@ impl Delivery {
         match self.store.webhook_tried(id, next_ms).await {
             // Of a plan that has been deleted meanwhile nobody wants to hear.
             Ok(()) | Err(StoreError::NotFound(_) | StoreError::Gone(_)) => {}
-            Err(error) => tracing::warn!(plan = %id, %error, "a webhook will be sent once more"),
+            Err(error) => tracing::warn!(plan_id = %id, %error, "a webhook will be sent once more"),
         }
         id
     }
@@ -189,10 +189,10 @@ fn again(id: PlanId, tries: u32, why: &str) -> Option<i64> {
     let jitter = f64::from(getrandom::u32().unwrap_or(u32::MAX / 2)) / f64::from(u32::MAX);
     if let Some(pause_ms) = retry::pause_ms(tries, jitter) {
         let pause_s = pause_ms / 1000;
-        tracing::warn!(plan = %id, tries, pause_s, why, "a webhook did not get through");
+        tracing::warn!(plan_id = %id, tries, pause_s, why, "a webhook did not get through");
         Some(pause_ms)
     } else {
-        tracing::error!(plan = %id, tries, why, "a webhook did not get through and is given up");
+        tracing::error!(plan_id = %id, tries, why, "a webhook did not get through and is given up");
         None
     }
 }

@@ -267,7 +267,7 @@ fn sampled(discs: &[(f64, f64, f64)], ends: [[f64; 2]; 2]) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases / 4, ..ProptestConfig::default() })]
 
     #[test]
     fn as_short_as_brute_force(

@@ -7,6 +7,7 @@ use async_nats::jetstream::{AckKind, Message};
 use tokio::runtime::Handle;
 use tokio::sync::oneshot;
 use tokio::time::Instant;
+use tracing::field::display;
 
 use super::connect::plan_of;
 use super::lane::Version;
@@ -16,11 +17,8 @@ use super::record::{Record, State};
 use super::steps::Change;
 use super::view::Standing;
 use super::{JetStream, closed};
-use crate::job::{Failure, Plan, PlanId, Status};
-use crate::store::{Lease, StoreError};
-
-/// Runs of a plan whose workers were lost, after which it is taken to be the reason.
-const LOST_RUNS: u32 = 5;
+use crate::job::{PlanId, Status};
+use crate::store::{Lease, StoreError, lost};
 
 /// A job may be seen before its record; for so long a claim waits.
 const RECORD_PATIENCE: Duration = Duration::from_millis(100);
@@ -92,7 +90,8 @@ impl JetStream {
     async fn take_back(&self, lease: &Lease) {
         let _turn = self.turn.lock().await;
         if let Err(error) = self.release(lease.plan.id, lease.attempt).await {
-            tracing::warn!(%error, "a plan that nobody waits for goes back when its lease ends");
+            let plan_id = lease.plan.id;
+            tracing::warn!(%plan_id, %error, "a plan that nobody waits for goes back when its lease ends");
         }
     }
 
@@ -165,36 +164,36 @@ impl JetStream {
                 subject = message.subject.as_str(),
                 "a job of no plan is thrown away"
             );
-            answer(&job, AckKind::Ack).await;
+            answer(None, &job, AckKind::Ack).await;
             return Ok(None);
         };
         let document = match self.record_of_job(id).await {
             Ok(standing) => match &*standing.state {
                 State::Kept(record) => record.scenario.clone(),
                 State::Buried(_) => {
-                    answer(&job, AckKind::Ack).await;
+                    answer(id, &job, AckKind::Ack).await;
                     return Ok(None);
                 }
             },
             Err(StoreError::NotFound(_)) => {
                 match self.orphans.miss(id) {
-                    Orphan::Waits(pause) => answer(&job, AckKind::Nak(Some(pause))).await,
+                    Orphan::Waits(pause) => answer(id, &job, AckKind::Nak(Some(pause))).await,
                     Orphan::Nobodys => {
-                        tracing::info!(plan = %id, "a job that was never accepted is thrown away");
+                        tracing::info!(plan_id = %id, "a job that was never accepted is thrown away");
                         self.servers.remove_documents(id, &[]).await?;
-                        answer(&job, AckKind::Ack).await;
+                        answer(id, &job, AckKind::Ack).await;
                     }
                 }
                 return Ok(None);
             }
             Err(error) => {
-                answer(&job, AckKind::Nak(None)).await;
+                answer(id, &job, AckKind::Nak(None)).await;
                 return Err(error);
             }
         };
         let (found, scenario) = tokio::join!(self.start(id, &job), self.servers.read(&document));
         match found? {
-            Found::Over => answer(&job, AckKind::Ack).await,
+            Found::Over => answer(id, &job, AckKind::Ack).await,
             Found::Ours => {}
             Found::Run(record) => return self.lease(*record, scenario, job).await.map(Some),
         }
@@ -239,12 +238,10 @@ impl JetStream {
                     }
                     Status::Running => {
                         record.lost += 1;
-                        if let Some(end) = end_of_lost(&mut record.plan, record.lost, now_ms)? {
+                        if lost::end(&mut record.plan, record.lost.into(), now_ms)? {
                             record.ended(self.options.retention.age_ms);
-                            tracing::warn!(plan = %id, status = end.name(), "a plan whose worker was lost ends");
                             return Ok(Some(Change::told(record)));
                         }
-                        tracing::warn!(plan = %id, attempt = record.attempt, "a plan whose worker was lost runs again");
                         record.plan.requeue()?;
                         events.push(record.status());
                     }
@@ -254,7 +251,10 @@ impl JetStream {
                 record.attempt += 1;
                 record.appended = 0;
                 found = Found::Run(record.clone());
-                Ok(Some(Change { events, ..Change::told(record) }))
+                Ok(Some(Change {
+                    events,
+                    ..Change::told(record)
+                }))
             })
             .await
             .map(|_| found)
@@ -315,30 +315,15 @@ enum Found {
     Over,
 }
 
-/// Ends a plan whose worker was lost, when it is not to run again.
-fn end_of_lost(plan: &mut Plan, lost: u32, now_ms: i64) -> Result<Option<Status>, StoreError> {
-    if plan.cancel_requested {
-        plan.cancel(now_ms)?;
-    } else if lost >= LOST_RUNS {
-        let failure = Failure {
-            kind: "worker-lost".to_owned(),
-            detail: format!("{lost} workers were lost while they ran the plan"),
-        };
-        plan.fail(failure, now_ms)?;
-    } else {
-        return Ok(None);
-    }
-    Ok(Some(plan.status))
-}
-
 /// Answer a delivery. A lost answer is made good by the next delivery, so nobody waits for one to be
 /// heard, except where a job is given back: it comes before whatever is asked for next.
-pub(super) async fn answer(job: &Job, answer: AckKind) {
+pub(super) async fn answer(plan: impl Into<Option<PlanId>>, job: &Job, answer: AckKind) {
     let answered = match answer {
         AckKind::Nak(_) => job.double_ack_with(answer).await,
         other => job.ack_with(other).await,
     };
     if let Err(error) = answered {
-        tracing::debug!(error = %error, "a job was not answered");
+        let plan_id = plan.into().map(display);
+        tracing::debug!(plan_id, error = %error, "a job was not answered");
     }
 }

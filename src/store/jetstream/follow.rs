@@ -102,7 +102,7 @@ impl JetStream {
         match Step::read(&message.payload) {
             Ok(step) => self.plans().learn(id, &Placed { sequence, step }),
             Err(error) => {
-                tracing::error!(%error, plan = %id, sequence, "a step cannot be read; it is left out");
+                tracing::error!(%error, plan_id = %id, sequence, "a step cannot be read; it is left out");
             }
         }
     }

@@ -94,7 +94,7 @@ impl JetStream {
         if self.telling().remove(&id)
             && let Err(error) = self.servers.tellers.purge(id.to_string()).await
         {
-            tracing::debug!(%error, plan = %id, "a webhook is left to others two minutes later");
+            tracing::debug!(%error, plan_id = %id, "a webhook is left to others two minutes later");
         }
     }
 

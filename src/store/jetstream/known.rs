@@ -259,8 +259,10 @@ impl Known {
             own.map(|(_, plans)| plans.len() as u64).sum::<u64>()
         };
         let active = coming + of_owner(&self.lanes) + of_owner(&self.running);
-        if quota.is_some_and(|quota| active >= quota) {
-            return Err(StoreError::QuotaReached { active });
+        if let Some(quota) = quota
+            && active >= quota
+        {
+            return Err(StoreError::QuotaReached { active, quota });
         }
         *self.coming.entry(lane.owner.clone()).or_default() += 1;
         self.coming_in_all += 1;

@@ -51,7 +51,7 @@ impl Leases {
             attempt,
             cancel,
             job,
-            renewing: tokio::spawn(renew(jobs, ack_wait / RENEWALS)),
+            renewing: tokio::spawn(renew(id, jobs, ack_wait / RENEWALS)),
             appended: 0,
         };
         if let Some(before) = self.held().insert(id, held) {
@@ -129,12 +129,12 @@ impl Drop for Leases {
     }
 }
 
-async fn renew(jobs: watch::Receiver<Job>, period: Duration) {
+async fn renew(id: PlanId, jobs: watch::Receiver<Job>, period: Duration) {
     loop {
         tokio::time::sleep(period).await;
         let job = jobs.borrow().clone();
         if let Err(error) = job.ack_with(AckKind::Progress).await {
-            tracing::warn!(error = %error, "a lease was not renewed; trying again");
+            tracing::warn!(plan_id = %id, error = %error, "a lease was not renewed; trying again");
         }
     }
 }

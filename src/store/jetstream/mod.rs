@@ -38,6 +38,7 @@ use async_trait::async_trait;
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::Instant;
+use tracing::Instrument as _;
 use uuid::Uuid;
 
 pub use settings::Settings;
@@ -320,7 +321,7 @@ impl Store for JetStreamStore {
         runs.sort_by_key(|(id, _)| self.store.view.known().place(*id));
         for (id, attempt) in runs {
             if let Err(error) = self.store.release(id, attempt).await {
-                tracing::debug!(%error, "a run is left to the end of its lease");
+                tracing::debug!(plan_id = %id, %error, "a run is left to the end of its lease");
             }
         }
         self.store.let_tell_all().await;
@@ -334,15 +335,17 @@ impl Store for JetStreamStore {
     }
 }
 
-/// Go on with several writes even when the caller goes away between them.
+/// Go on with several writes even when the caller goes away between them; their lines of the log stay the caller's.
 async fn detached<T: Send + 'static>(
     writes: impl Future<Output = Result<T, StoreError>> + Send + 'static,
 ) -> Result<T, StoreError> {
-    tokio::spawn(writes).await.unwrap_or_else(|broken| {
-        Err(StoreError::unavailable(format!(
-            "a task of the store broke: {broken}"
-        )))
-    })
+    tokio::spawn(writes.in_current_span())
+        .await
+        .unwrap_or_else(|broken| {
+            Err(StoreError::unavailable(format!(
+                "a task of the store broke: {broken}"
+            )))
+        })
 }
 
 fn closed() -> StoreError {

@@ -56,7 +56,7 @@ impl JetStream {
     /// (To purge its subject would also make the servers forget which jobs were given back.)
     pub(super) async fn withdraw(&self, id: PlanId, place: u64) {
         if let Err(error) = self.servers.jobs.delete_message(place).await {
-            tracing::debug!(%error, plan = %id, "a job is left in the queue");
+            tracing::debug!(%error, plan_id = %id, "a job is left in the queue");
         }
     }
 

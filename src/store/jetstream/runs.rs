@@ -121,7 +121,7 @@ impl JetStream {
             .await;
         let standing = finished.map_err(|error| lost(error, id))?;
         if let Some(job) = self.leases.let_go(id, attempt) {
-            answer(&job, AckKind::Ack).await;
+            answer(id, &job, AckKind::Ack).await;
         }
         let record = standing.record(id, end.at_ms)?;
         Ok(record.plan.clone())
@@ -147,7 +147,7 @@ impl JetStream {
             .await;
         released.map_err(|error| lost(error, id))?;
         if let Some(job) = self.leases.let_go(id, attempt) {
-            answer(&job, back).await;
+            answer(id, &job, back).await;
         }
         Ok(())
     }

@@ -319,6 +319,8 @@ fn closed() -> StoreError {
 
 #[cfg(test)]
 mod tests {
+    use rusqlite::types::Value;
+
     use super::*;
 
     fn submission(bytes: usize) -> Submission {
@@ -327,6 +329,26 @@ mod tests {
             scenario: "x".repeat(bytes),
             ..Submission::example()
         }
+    }
+
+    /// What the writer's own connection says of itself, after all that opening a store does: only so does a commit
+    /// come back when the log is on the disk, and only so is it the log that is waited for.
+    #[tokio::test]
+    async fn a_commit_waits_for_the_disk() {
+        let directory = tempfile::TempDir::new().expect("a temporary directory");
+        let store = SqliteStore::open(directory.path(), Options::new(1)).expect("it opens");
+        let set = |name: &'static str| {
+            store.writer.change(move |tx| {
+                let connection = tx.connection;
+                Ok(connection.pragma_query_value(None, name, |row| row.get::<_, Value>(0))?)
+            })
+        };
+        let wal = Value::Text("wal".to_owned());
+        assert_eq!(set("journal_mode").await.expect("it is told"), wal);
+        // From OFF, 0, to EXTRA, 3: FULL.
+        let full = Value::Integer(2);
+        assert_eq!(set("synchronous").await.expect("it is told"), full);
+        store.close().await;
     }
 
     /// Other programs are held to the states there are; a file in which one is not, is damaged.

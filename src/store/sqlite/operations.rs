@@ -6,12 +6,12 @@ use rusqlite::params;
 use tokio::sync::watch;
 
 use super::read::missing;
-use super::row::PlanRow;
+use super::row::{COLUMNS, PlanRow};
 use super::transaction::{Batch, Effect, Transaction};
 use super::{idempotency, removal, webhooks};
 use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Status, Submission};
-use crate::store::{End, Ending, Lease, StoreError, Submitted, Tombstone};
+use crate::store::{End, Ending, Lease, StoreError, Submitted, Tombstone, lost};
 
 pub(super) fn submit(
     tx: &mut Transaction<'_>,
@@ -36,6 +36,7 @@ pub(super) fn submit(
         last_event: 0,
         forgotten: 0,
         bytes: submission.scenario.len() as u64,
+        lost: 0,
         plan: Plan::accepted(submission, tx.queued + 1),
     };
     let status = Event::Status(Box::new(row.plan.clone()));
@@ -67,7 +68,7 @@ fn within_quota(tx: &Transaction<'_>, submission: &Submission) -> Result<(), Sto
         .query_row([owner], |row| row.get(0))?;
     let active = active.cast_unsigned();
     if active >= quota {
-        return Err(StoreError::QuotaReached { active });
+        return Err(StoreError::QuotaReached { active, quota });
     }
     Ok(())
 }
@@ -145,26 +146,43 @@ pub(super) fn release(
     attempt: u64,
 ) -> Result<(), StoreError> {
     let row = leased(tx, id, attempt)?;
-    give_back(tx, row)?;
-    tx.effects.push(Effect::Unleased(id));
+    give_back(tx, row)
+}
+
+/// Give back all that is being run, when the store is closed.
+pub(super) fn release_all(tx: &mut Transaction<'_>) -> Result<(), StoreError> {
+    for row in running(tx)? {
+        give_back(tx, row)?;
+    }
     Ok(())
 }
 
-/// Give back what an earlier process was running; nobody holds those leases any more.
+/// What an earlier process was running when it died is queued again, or is at its end; nobody holds those leases any
+/// more.
 pub(super) fn recover(tx: &mut Transaction<'_>) -> Result<(), StoreError> {
-    let ids = tx
-        .connection
-        .prepare_cached("SELECT id FROM plans WHERE status = 'running' ORDER BY seq")?
-        .query_map([], |row| row.get::<_, String>(0))?
-        .collect::<Result<Vec<_>, _>>()?;
-    for id in ids {
-        let id = PlanId::parse_str(&id)
-            .map_err(|error| StoreError::unavailable(format!("plan id {id:?}: {error}")))?;
-        if let Some(row) = PlanRow::load(tx.connection, id)? {
-            give_back(tx, row)?;
+    for mut row in running(tx)? {
+        row.lost += 1;
+        if lost::end(&mut row.plan, row.lost, tx.now_ms())? {
+            forget_incumbent(tx, &row)?;
+            tell_end(tx, &mut row)?;
+            row.update(tx.connection)?;
+        } else {
+            requeue(tx, row)?;
         }
     }
     Ok(())
+}
+
+/// In the order in which they were accepted.
+fn running(tx: &Transaction<'_>) -> Result<Vec<PlanRow>, StoreError> {
+    let rows = tx
+        .connection
+        .prepare_cached(&format!(
+            "SELECT {COLUMNS} FROM plans WHERE status = 'running' ORDER BY seq"
+        ))?
+        .query_map([], PlanRow::read)?
+        .collect::<Result<_, _>>()?;
+    Ok(rows)
 }
 
 pub(super) fn request_cancel(
@@ -230,12 +248,17 @@ fn leased(tx: &Transaction<'_>, id: PlanId, attempt: u64) -> Result<PlanRow, Sto
 
 /// Back to the queue, or to its end when that was asked for.
 fn give_back(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<(), StoreError> {
+    tx.effects.push(Effect::Unleased(row.plan.id));
     if row.plan.cancel_requested {
         row.plan.cancel(tx.now_ms())?;
         tell_end(tx, &mut row)?;
         row.update(tx.connection)?;
         return Ok(());
     }
+    requeue(tx, row)
+}
+
+fn requeue(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<(), StoreError> {
     row.plan.requeue()?;
     forget_incumbent(tx, &row)?;
     tx.queued += 1;

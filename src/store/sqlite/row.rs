@@ -9,7 +9,7 @@ use crate::job::{Failure, Plan, PlanId, Status};
 pub(super) const COLUMNS: &str = "seq, id, owner, name, status, stop_reason, feasible, best_cost, progress, \
      iteration, iterations, evaluations, algorithm, seed, created_ms, started_ms, finished_ms, expires_ms, \
      cancel_requested, error_kind, error_detail, revision, attempt, last_event, \
-     forgotten, bytes";
+     forgotten, bytes, lost";
 
 /// A record with what the store alone knows of it.
 #[derive(Debug)]
@@ -21,6 +21,8 @@ pub(super) struct PlanRow {
     pub(super) forgotten: u64,
     /// Of its documents and events.
     pub(super) bytes: u64,
+    /// Runs that ended with their process.
+    pub(super) lost: u64,
     /// `queue_position` is no column: see [`queue_position`].
     pub(super) plan: Plan,
 }
@@ -60,6 +62,7 @@ impl PlanRow {
             last_event: row.count()?,
             forgotten: row.count()?,
             bytes: row.count()?,
+            lost: row.count()?,
         })
     }
 
@@ -163,7 +166,7 @@ impl PlanRow {
                 "UPDATE plans SET feasible = ?2, best_cost = ?3, progress = ?4, iteration = ?5, \
                  evaluations = ?6, revision = ?7, last_event = ?8, forgotten = ?9, bytes = ?10, \
                  status = ?11, stop_reason = ?12, started_ms = ?13, finished_ms = ?14, expires_ms = ?15, \
-                 cancel_requested = ?16, error_kind = ?17, error_detail = ?18, attempt = ?19 \
+                 cancel_requested = ?16, error_kind = ?17, error_detail = ?18, attempt = ?19, lost = ?20 \
                  WHERE seq = ?1",
             )?
             .execute(params![
@@ -186,6 +189,7 @@ impl PlanRow {
                 error.map(|error| &error.kind),
                 error.map(|error| &error.detail),
                 self.attempt.cast_signed(),
+                self.lost.cast_signed(),
             ])?;
         Ok(())
     }

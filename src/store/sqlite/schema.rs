@@ -115,6 +115,9 @@ CREATE INDEX plans_by_dataset ON plans (dataset, status) WHERE dataset IS NOT NU
     "
 ALTER TABLE events ADD COLUMN packed BLOB; -- what a search tells, as bytes; batch is empty then
 ",
+    "
+ALTER TABLE plans ADD COLUMN lost INTEGER NOT NULL DEFAULT 0; -- runs that ended with their process
+",
 ];
 
 /// Bring the file up to this version; refuse those of a newer one.

@@ -75,7 +75,10 @@ where
 pub(super) enum Message {
     Change(Box<dyn Operation>),
     Claim(Claimer),
+    /// Give back what is run, and end.
     Close(oneshot::Sender<()>),
+    /// End as if the process did.
+    Leave,
 }
 
 /// The handle to the writing thread.
@@ -112,8 +115,8 @@ impl Writer {
                 let closing = desk.serve(&inbox);
                 desk.connection.close().ok();
                 drop(lock);
-                if let Some(closing) = closing {
-                    closing.send(()).ok();
+                for closed in closing {
+                    closed.send(()).ok();
                 }
             })
             .map_err(|error| {
@@ -147,7 +150,7 @@ impl Writer {
         Ok(delivery.accept())
     }
 
-    /// Write what has been sent, and end.
+    /// Write what has been sent, give back what is run, and end.
     pub(super) async fn close(&self) {
         let (reply, done) = oneshot::channel();
         if self.send(Message::Close(reply)).is_ok() {
@@ -162,8 +165,7 @@ impl Writer {
 
 impl Drop for Writer {
     fn drop(&mut self) {
-        let (reply, _) = oneshot::channel();
-        self.send(Message::Close(reply)).ok();
+        self.send(Message::Leave).ok();
         let thread = self
             .thread
             .lock()
@@ -212,26 +214,40 @@ impl Desk {
         })?
     }
 
-    /// Serve until somebody closes the store; returns whom to tell.
-    fn serve(&mut self, inbox: &Receiver<Message>) -> Option<oneshot::Sender<()>> {
-        loop {
-            let first = inbox.recv().ok()?;
+    /// Serve until somebody closes the store or drops it; returns whom to tell.
+    fn serve(&mut self, inbox: &Receiver<Message>) -> Vec<oneshot::Sender<()>> {
+        let mut closing = Vec::new();
+        while let Ok(first) = inbox.recv() {
             let mut batch = Vec::new();
-            let mut closing = None;
+            let mut ends = false;
             for message in std::iter::once(first).chain(inbox.try_iter().take(BATCH - 1)) {
                 match message {
                     Message::Change(operation) => batch.push(operation),
                     Message::Claim(claimer) => self.waiting.push_back(claimer),
-                    Message::Close(done) => closing = Some(done),
+                    Message::Close(done) => closing.push(done),
+                    Message::Leave => ends = true,
                 }
             }
-            if closing.is_some() {
+            ends |= !closing.is_empty();
+            if ends {
                 self.waiting.clear();
             }
             self.serve_batch(batch);
-            if closing.is_some() {
-                return closing;
+            if ends {
+                break;
             }
+        }
+        if !closing.is_empty() && !self.leases.is_empty() {
+            self.release_all();
+        }
+        closing
+    }
+
+    /// What cannot be given back now is taken at the next start for what was run when the process died.
+    fn release_all(&mut self) {
+        let released = self.commit(|tx, _| tx.step(operations::release_all));
+        if let Err(error) = released.flatten() {
+            tracing::debug!(%error, "runs are left to the next start");
         }
     }
 

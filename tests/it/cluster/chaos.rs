@@ -10,10 +10,10 @@ use futures_util::stream::{self, StreamExt as _};
 use serde_json::Value;
 
 use super::{Node, is_whole, turn};
-use crate::siege::size;
 use crate::support::lives::a_plan;
 use crate::support::nats::Cluster;
 use crate::support::process::Service;
+use crate::support::size::size;
 use crate::support::sse::{Stream, events};
 
 /// Between two kills.

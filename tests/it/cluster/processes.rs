@@ -2,16 +2,18 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
 use futures_util::future::join_all;
 use reqwest::Client;
 use serde_json::Value;
+use tokio::sync::watch;
 
 use super::{Node, ends_once};
 use crate::support::lives::{self, a_run_of, await_run, life, running};
 use crate::support::nats;
+use crate::support::patience::in_time;
 use crate::support::process::Service;
 use crate::support::scenario;
 use crate::support::sse::events;
@@ -95,41 +97,58 @@ async fn persist(client: &Client, urls: &Mutex<[Option<String>; 2]>, nth: usize)
     unreachable!("it tries for ever")
 }
 
+/// Wait until so many more plans have been accepted.
+async fn more(accepted: &mut watch::Receiver<usize>, plans: usize) {
+    let enough = *accepted.borrow() + plans;
+    let counted = in_time(accepted.wait_for(|accepted| *accepted >= enough)).await;
+    counted.expect("the load goes on");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn nodes_are_replaced_under_load_and_no_request_fails() {
     const PLANS: usize = 120;
+    /// Accepted before each replacement, and after the last.
+    const BETWEEN: usize = 8;
     let address = nats::address();
     let mut replaced = Node::api(&address, &[]);
-    let other = Node::api(&address, &[]);
+    let other = Arc::new(Node::api(&address, &[]));
     let _worker = Node::worker(&address, &[]);
     let urls = Arc::new(Mutex::new([Some(replaced.url("")), Some(other.url(""))]));
     let client = Client::builder().no_proxy().build().unwrap();
+    let (accepted, mut told) = watch::channel(0);
+    let over = Arc::new(AtomicBool::new(false));
     let load = tokio::spawn({
-        let urls = urls.clone();
+        let (urls, over, other) = (urls.clone(), over.clone(), other.clone());
         async move {
             let mut plans = Vec::new();
-            for first in (0..PLANS).step_by(4) {
+            while plans.len() < PLANS || !over.load(Ordering::Relaxed) {
+                let first = plans.len();
                 let four = (first..first + 4).map(|nth| persist(&client, &urls, nth));
                 plans.extend(join_all(four).await);
-                tokio::time::sleep(Duration::from_millis(50)).await;
+                accepted.send_replace(plans.len());
+                // As fast as the worker takes them.
+                other.ended(&plans[first]).await;
             }
             plans
         }
     });
+    more(&mut told, BETWEEN).await;
     // Once as it should be, and once as it should not.
     replaced.leave().await;
     replaced.restart();
     urls.lock().unwrap()[0] = Some(replaced.url(""));
-    tokio::time::sleep(Duration::from_millis(200)).await;
+    more(&mut told, BETWEEN).await;
     replaced.kill();
     replaced.restart();
     urls.lock().unwrap()[0] = Some(replaced.url(""));
-    let plans = load.await.unwrap();
+    more(&mut told, BETWEEN).await;
+    over.store(true, Ordering::Relaxed);
+    let plans = in_time(load).await.unwrap();
     for plan in &plans {
         ends_once(&replaced, plan).await;
     }
     let listed: Value = serde_json::from_slice(&other.bytes("/plans?limit=1000").await).unwrap();
-    assert_eq!(listed["plans"].as_array().unwrap().len(), PLANS);
+    assert_eq!(listed["plans"].as_array().unwrap().len(), plans.len());
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -6,6 +6,7 @@ use proptest::prelude::*;
 
 use super::{corpus, file, open, tile};
 use crate::support::patience::at_little_cost;
+use crate::support::size::cases;
 
 /// What a spoilt file is made of.
 #[derive(Debug, Clone)]
@@ -89,7 +90,7 @@ fn use_up(name: &str, bytes: &[u8]) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(1000))]
+    #![proptest_config(cases(1_000, 100_000))]
 
     #[test]
     fn a_spoilt_file_never_panics(which: prop::sample::Index, harms in prop::collection::vec(harm(), 1..6)) {

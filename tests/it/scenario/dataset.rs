@@ -335,7 +335,7 @@ fn both_ends_and_the_area_are_told_apart() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases / 4, ..ProptestConfig::default() })]
 
     /// Wherever in the data, near their edges too: what is accepted reads again to the same bits.
     #[test]

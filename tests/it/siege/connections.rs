@@ -11,9 +11,9 @@ use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 use tokio::sync::watch;
 
-use super::size;
 use crate::support::patience::in_time;
 use crate::support::process::Service;
+use crate::support::size::size;
 
 /// Everything until the service closes the connection.
 async fn until_closed(mut stream: TcpStream) -> String {

@@ -1,21 +1,22 @@
 //! kill -9 again and again while plans come in: what was accepted is done, once, and what was done stays.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use super::{Dice, size};
+use super::Dice;
 use crate::support::process::Service;
 use crate::support::scenario;
+use crate::support::size::size;
 use crate::support::sse::{Stream, events};
 use crate::support::stores::{Place, for_every_backend};
 
 /// A kill comes so many milliseconds after the start at the latest.
 const LIFE_MS: usize = 400;
 
-/// A plan that loses five workers is taken for the reason, where nodes share their plans: before a fifth kill, all end.
+/// A plan that loses five workers is taken for the reason: before a fifth kill, all end.
 const KILLS_OF_A_PLAN: usize = 4;
 
 /// What the caller knows.
@@ -26,8 +27,8 @@ struct Known {
 }
 
 impl Known {
-    /// Post plans until there are `enough`, then look for results.
-    async fn grow(&mut self, service: &Service, enough: usize) {
+    /// Post plans until `enough` were accepted.
+    async fn post(&mut self, service: &Service, enough: usize) {
         while self.accepted.len() < enough {
             let mut scenario = scenario();
             scenario["planner"]["population"] = 50.into();
@@ -35,6 +36,11 @@ impl Known {
             scenario["planner"]["seed"] = self.accepted.len().into();
             self.accepted.push(service.submit(&scenario).await);
         }
+    }
+
+    /// Post plans until there are `enough`, then look for results.
+    async fn grow(&mut self, service: &Service, enough: usize) {
+        self.post(service, enough).await;
         for address in &self.accepted {
             if self.finished.contains_key(address) {
                 continue;
@@ -70,10 +76,11 @@ async fn kills_at_random_points_lose_nothing_and_repeat_nothing() {
             let _ = tokio::time::timeout_at(point, known.grow(&service, enough)).await;
             service.kill();
         }
-        let (accepted, finished) = (known.accepted, known.finished);
-        assert!(!accepted.is_empty());
-
         let service = place.serve(&["--workers", "2"]);
+        // Those that the kills left no time for.
+        known.post(&service, n_plans).await;
+        let (accepted, finished) = (known.accepted, known.finished);
+        assert_eq!(accepted.iter().collect::<BTreeSet<_>>().len(), n_plans);
         for address in &accepted {
             let ended = service.ended(address).await;
             assert_eq!(ended["status"], "succeeded", "{address}");

@@ -8,11 +8,12 @@ use noctule::scenario::json;
 use noctule::scenario::limits::Limits;
 use serde_json::Value;
 
-use super::{Dice, size};
+use super::Dice;
 use crate::support::api::Api;
 use crate::support::patience::in_time;
 use crate::support::process::Service;
 use crate::support::scenario;
+use crate::support::size::size;
 
 /// Ended plans that are kept.
 const KEPT: usize = 200;

@@ -12,15 +12,6 @@ mod races;
 mod still;
 mod streams;
 
-/// How much to do.
-pub(crate) fn size<T>(in_ci: T, full: T) -> T {
-    if std::env::var_os("NOCTULE_SIEGE").is_some_and(|size| size == "full") {
-        full
-    } else {
-        in_ci
-    }
-}
-
 /// Numbers that look random and are the same each time: `SplitMix64`.
 pub(crate) struct Dice(u64);
 

@@ -6,10 +6,10 @@ use noctule::job::{Event, PlanId, Status};
 use noctule::store::{Options, Store};
 use tokio::task::JoinSet;
 
-use super::size;
 use crate::support::api::Api;
 use crate::support::plans::{ending, history, submission};
 use crate::support::run;
+use crate::support::size::size;
 use crate::support::stores::{for_every_backend, on_every_backend};
 
 /// Races at the same time.

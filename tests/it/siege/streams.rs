@@ -1,6 +1,6 @@
 //! Readers of events: cut anywhere, many, and one who does not read.
 
-use std::time::Duration;
+use std::net::SocketAddr;
 
 use futures_util::future::join_all;
 use noctule::job::{Event, Status};
@@ -9,11 +9,15 @@ use reqwest::Client;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
-use super::{Dice, size};
+use super::Dice;
 use crate::support::api::Api;
+use crate::support::lives::a_run_of;
 use crate::support::patience::in_time;
+use crate::support::process::Service;
 use crate::support::run;
 use crate::support::server::Server;
+use crate::support::size::size;
+use crate::support::sse::{Stream, events};
 use crate::support::stores::{Backend, for_every_backend};
 
 /// A plan on a real port, whose run the test plays.
@@ -176,28 +180,35 @@ async fn five_hundred_readers_see_every_incumbent_and_one_end() {
     .await;
 }
 
+/// A reader who has asked for all events of a plan, and reads none.
+async fn stall(service: SocketAddr, plan: &str) -> TcpStream {
+    let mut stalled = TcpStream::connect(service).await.expect("connected");
+    let request = format!(
+        "GET {plan}/events?rate=0 HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n"
+    );
+    stalled.write_all(request.as_bytes()).await.expect("sent");
+    stalled
+}
+
+/// What it finds when it reads after all.
+async fn rest(stalled: &mut TcpStream) -> String {
+    let mut text = Vec::new();
+    let rest = in_time(stalled.read_to_end(&mut text)).await;
+    rest.expect("an unbroken stream");
+    String::from_utf8(text).expect("UTF-8")
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_reader_who_does_not_read_costs_the_others_nothing() {
     let plan = Plan::new().await;
-    let mut stalled = TcpStream::connect(plan.server.address)
-        .await
-        .expect("connected");
-    let request = format!(
-        "GET {}/events?rate=0 HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n",
-        plan.address
-    );
-    stalled.write_all(request.as_bytes()).await.expect("sent");
+    let mut stalled = stall(plan.server.address, &plan.address).await;
 
     // More than the buffers of a connection hold; nobody waits for the one who does not read.
     let all = async { tokio::join!(plan.read("?rate=0", 0, usize::MAX), plan.run(20_000)).0 };
     let others = in_time(all).await;
     assert_eq!(others.last().map(|(_, name)| name.as_str()), Some("end"));
-    tokio::time::sleep(size(Duration::ZERO, Duration::from_secs(60))).await;
 
-    let mut text = Vec::new();
-    let rest = in_time(stalled.read_to_end(&mut text)).await;
-    rest.expect("an unbroken stream");
-    let text = String::from_utf8(text).expect("UTF-8");
+    let text = rest(&mut stalled).await;
     assert_eq!(
         text.matches("\nevent: end\n").count(),
         1,
@@ -207,4 +218,27 @@ async fn a_reader_who_does_not_read_costs_the_others_nothing() {
         text.matches("\nevent: incumbent\n").count(),
         20_000_usize.div_ceil(3)
     );
+}
+
+/// Beside readers who follow a run of a minute from its beginning to its end.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_reader_stalled_for_the_length_of_a_run_costs_the_others_nothing() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &["--workers", "1"]);
+    let plan = service.submit(&a_run_of(size(1_000, 60_000))).await;
+    let mut stalled = stall(service.address(), &plan).await;
+    let others = (0..20).map(async |_| {
+        let request = service.get(&format!("{plan}/events?rate=0"));
+        events(&Stream::open(request).await.rest().await)
+    });
+    let others = in_time(join_all(others)).await;
+    assert_eq!(service.ended(&plan).await["stop_reason"], "time-limit");
+    for told in &others {
+        let ids: Vec<u64> = told.iter().map(|(id, _)| *id).collect();
+        assert_eq!(ids, (1..=ids.len() as u64).collect::<Vec<_>>());
+        assert_eq!(told.last().expect("events").1, "end");
+    }
+    let text = rest(&mut stalled).await;
+    assert_eq!(text.matches("\nevent: ").count(), others[0].len());
+    assert_eq!(text.matches("\nevent: end\n").count(), 1);
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use futures_util::future::join_all;
-use noctule::job::{Event, Status};
+use noctule::job::{Event, FailureKind, Status};
 use noctule::store::Ending;
 
 use crate::support::plans::{ending, failure, history, kind, point, statuses, submission, until};
@@ -263,6 +263,42 @@ async fn a_cancelled_run_that_comes_back_is_not_run_again() {
                 Some(&Event::End(Status::Cancelled))
             );
         }
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plan_that_takes_its_worker_along_again_and_again_fails_in_the_end() {
+    on_every_backend(10, async |store| {
+        let id = store.submit(submission()).await.unwrap().plan.id;
+        // Given back, by its worker or with the store, it is not the plan's fault.
+        for _ in 0..3 {
+            let lease = store.claim().await.unwrap();
+            store.release(&lease).await.unwrap();
+            store.claim().await.unwrap();
+            store.reopen().await;
+            assert_eq!(store.get(id).await.unwrap().status, Status::Queued);
+        }
+        for attempt in 7..12 {
+            let lease = store.claim().await.unwrap();
+            assert_eq!((lease.plan.id, lease.attempt), (id, attempt));
+            store.append(&lease, vec![point(0, None)]).await.unwrap();
+            store.lose().await;
+        }
+        // Past one machine it is who asks for work that finds out.
+        let claimer = store.share();
+        let idle = tokio::spawn(async move { claimer.claim().await });
+        let plan = until(&**store, id, |plan| plan.status.is_final()).await;
+        assert_eq!(plan.status, Status::Failed);
+        let error = plan.error.expect("it failed");
+        assert_eq!(error.kind, FailureKind::WorkerLost.name());
+        assert!(error.detail.starts_with("5 workers"), "{}", error.detail);
+        let told = history(&**store, id).await;
+        assert_eq!(told.last(), Some(&Event::End(Status::Failed)));
+        assert_eq!(statuses(&told).last(), Some(&Status::Failed));
+        assert_eq!(store.incumbent(id).await.unwrap(), None);
+        idle.abort();
+        idle.await.ok();
     })
     .await;
 }

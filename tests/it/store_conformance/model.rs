@@ -9,6 +9,7 @@ use proptest::prelude::*;
 
 use crate::support::patience::in_time;
 use crate::support::plans::{ending, failure, history, kind, point, statuses, submission};
+use crate::support::size::cases;
 use crate::support::stores::{BACKENDS, Fixture, Place};
 
 const QUEUE_LIMIT: usize = 4;
@@ -245,7 +246,7 @@ fn compare_history(told: &[Event], status: Status) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..cases(12, 300) })]
 
     #[test]
     fn a_store_and_its_model_agree(steps in vec(step(), 1..60)) {

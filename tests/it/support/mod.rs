@@ -15,6 +15,7 @@ pub(crate) mod plans;
 pub(crate) mod process;
 pub(crate) mod run;
 pub(crate) mod server;
+pub(crate) mod size;
 pub(crate) mod sse;
 pub(crate) mod stores;
 pub(crate) mod wire;

@@ -4,7 +4,7 @@ use noctule::export::document::{
     Bound, Checks, Clearance, Convergence, Cost, Incumbent, Leg, MeasuresDocument, Position,
     ResultDocument, Timing,
 };
-use noctule::job::{Event, Failure, PlanId, Status};
+use noctule::job::{Event, FailureKind, PlanId, Status};
 use noctule::store::{Ending, Lease, Store};
 
 /// A point of the curve at a time of the run.
@@ -54,10 +54,12 @@ pub(crate) async fn finish(store: &dyn Store, lease: &Lease, status: Status) {
 
 /// End a run without one.
 pub(crate) async fn fail(store: &dyn Store, lease: &Lease) {
-    let failure = Failure {
-        kind: "planner-panic".to_owned(),
-        detail: "the planner broke".to_owned(),
-    };
+    fail_for(store, lease, FailureKind::PlannerPanic).await;
+}
+
+/// End a run without one, for this reason.
+pub(crate) async fn fail_for(store: &dyn Store, lease: &Lease, kind: FailureKind) {
+    let failure = kind.because("the planner broke");
     let ended_ms = lease.plan.created_ms + 50;
     store
         .finish(lease, Ending::Failed(failure).at(ended_ms))

@@ -146,6 +146,12 @@ impl Fixture {
         }
     }
 
+    /// Open the store again without having closed it, as after the end of its process.
+    pub(crate) async fn lose(&mut self) {
+        drop(self.store.take());
+        self.open().await;
+    }
+
     /// Another handle to the same open store.
     pub(crate) fn share(&self) -> Arc<dyn Store> {
         Arc::clone(self.store.as_ref().expect("the store is open"))

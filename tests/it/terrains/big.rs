@@ -7,9 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-use crate::siege::size;
 use crate::support::elevations::write_tiff;
 use crate::support::process::Service;
+use crate::support::size::size;
 
 /// More than a service may take for it beyond what it has when idle, KiB.
 const ROOM_KIB: u64 = 64 * 1024;

@@ -2,6 +2,7 @@
 
 mod client;
 mod planning;
+mod refusals;
 mod stage;
 mod streams;
 
@@ -83,7 +84,7 @@ async fn measure_all(arguments: &Arguments, cases: &[Case]) -> anyhow::Result<Re
     tables.push(requests(arguments).await?);
     bar.inc(1);
     bar.set_message("a full queue");
-    tables.push(full_queue(arguments).await?);
+    tables.push(refusals::measure(arguments).await?);
     bar.inc(1);
     bar.set_message("streams");
     tables.push(streams::measure(arguments).await?);
@@ -202,39 +203,4 @@ fn location(answer: &Answer) -> anyhow::Result<String> {
     );
     let location = answer.headers.get("location").context("it has a place")?;
     Ok(location.to_str()?.to_owned())
-}
-
-/// How soon those are refused who find the queue full.
-async fn full_queue(arguments: &Arguments) -> anyhow::Result<Table> {
-    const QUEUE: usize = 100;
-    let service = Stage::service(0, QUEUE)?;
-    let submission = Question::post("/plans", tiny().to_string());
-    let mut connection = Connection::open(service.address).await?;
-    for _ in 0..QUEUE {
-        location(&connection.ask(&submission).await?)?;
-    }
-    let mut rows = Vec::new();
-    for connections in [1, arguments.connections] {
-        let refused = load(
-            service.address,
-            connections.into(),
-            arguments.time(),
-            submission.clone(),
-        );
-        let refused = refused.await?.all(503)?;
-        rows.push(vec![
-            Cell::count(connections.into()),
-            Cell::Number(refused.rate, 0),
-            Cell::Number(refused.within_ms(0.5), 2),
-            Cell::Number(refused.within_ms(0.99), 2),
-            Cell::Number(20.0, 0),
-        ]);
-    }
-    Ok(Table {
-        name: "full-queue",
-        title: "Refusals when the queue is full".to_owned(),
-        note: format!("{QUEUE} plans wait; every answer is 503 `queue-full`."),
-        columns: vec!["connections", "refusals 1/s", "p50 ms", "p99 ms", "bar"],
-        rows,
-    })
 }

@@ -81,7 +81,7 @@ fn farthest(path: &[Point3], corners: &[Point3]) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases / 5, ..ProptestConfig::default() })]
 
     #[test]
     fn the_legs_keep_what_the_path_keeps(

@@ -1,0 +1,61 @@
+//! Why a plan failed.
+
+use serde::{Deserialize, Serialize};
+
+/// Why a plan failed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Failure {
+    /// Last part of the problem's `type`, as [`FailureKind::name`] gives it; in a record of a later version
+    /// it may be another one.
+    pub kind: String,
+    /// For people.
+    pub detail: String,
+}
+
+/// Everything that a plan fails for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FailureKind {
+    /// The planner met a defect of its own.
+    PlannerPanic,
+    /// One worker after the other was lost while it ran the plan.
+    WorkerLost,
+    /// The dataset that it was accepted over is gone.
+    NoGround,
+    /// This version does not read the document that was accepted.
+    InvalidScenario,
+}
+
+impl FailureKind {
+    /// Every one, once.
+    pub const ALL: [Self; 4] = [
+        Self::PlannerPanic,
+        Self::WorkerLost,
+        Self::NoGround,
+        Self::InvalidScenario,
+    ];
+
+    /// As it is kept and told.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PlannerPanic => "planner-panic",
+            Self::WorkerLost => "worker-lost",
+            Self::NoGround => "no-ground",
+            Self::InvalidScenario => "invalid-scenario",
+        }
+    }
+
+    /// The kind with that name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
+    /// A failure of this kind; `detail` is for people.
+    pub fn because(self, detail: impl Into<String>) -> Failure {
+        Failure {
+            kind: self.name().to_owned(),
+            detail: detail.into(),
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! Files to convert that nobody would write: they are read or refused. What the readers make of sound files is
+//! tested beside them.
+
+use noctule::import::{Syntax, convert};
+use proptest::prelude::*;
+
+use crate::support::patience::at_little_cost;
+use crate::support::size::cases;
+
+/// One of each format, with everything in it that its reader looks at.
+const FILES: [&str; 3] = [GEOJSON, KML, PLAN];
+
+const GEOJSON: &str = r#"{"type": "FeatureCollection", "name": "flight", "features": [
+  {"type": "Feature", "properties": {"name": "Start"}, "geometry": {"type": "Point", "coordinates": [8.5, 47.3, 500]}},
+  {"type": "Feature", "properties": {"name": "target"}, "geometry": {"type": "Point", "coordinates": [8.6, 47.4, 520.5]}},
+  {"type": "Feature", "properties": {"name": "radar", "radius": 150, "influence": 250, "base": 480, "top": 900},
+   "geometry": {"type": "Point", "coordinates": [8.55, 47.35]}},
+  {"type": "Feature", "properties": {"margin": 20}, "geometry": {"type": "GeometryCollection", "geometries": [
+    {"type": "Polygon", "coordinates": [[[8.51, 47.31], [8.52, 47.31], [8.52, 47.32], [8.51, 47.31]]]},
+    {"type": "MultiPolygon", "coordinates": [[[[8.53, 47.31], [8.54, 47.31], [8.54, 47.32], [8.53, 47.31]]]]},
+    {"type": "LineString", "coordinates": [[8.5, 47.3], [8.6, 47.4]]}]}}]}"#;
+
+const KML: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
+<kml xmlns="http://www.opengis.net/kml/2.2"><Document><name>flight</name><Folder>
+<Placemark><name>Start</name><Point><coordinates>8.5,47.3,500</coordinates></Point></Placemark>
+<Placemark><name>target</name><Point><coordinates> 8.6,47.4,520.5 </coordinates></Point></Placemark>
+<Placemark><name>radar &amp; mast</name><ExtendedData><Data name="radius"><value>150</value></Data></ExtendedData>
+<Point><coordinates>8.55,47.35,0</coordinates></Point></Placemark>
+<Placemark><MultiGeometry><Polygon><outerBoundaryIs><LinearRing><coordinates>
+8.51,47.31 8.52,47.31 8.52,47.32 8.51,47.31</coordinates></LinearRing></outerBoundaryIs></Polygon>
+<LineString><coordinates>8.5,47.3 8.6,47.4</coordinates></LineString></MultiGeometry></Placemark>
+</Folder></Document></kml>"#;
+
+const PLAN: &str = r#"{"fileType": "Plan", "version": 1, "groundStation": "QGroundControl",
+  "mission": {"plannedHomePosition": [47.3, 8.5, 480], "vehicleType": 1, "cruiseSpeed": 12, "hoverSpeed": 4, "items": [
+    {"type": "SimpleItem", "command": 22, "frame": 3, "params": [0, 0, 0, null, 47.3, 8.5, 30]},
+    {"type": "SimpleItem", "command": 178, "frame": 2, "params": [1, 12, -1, 0, 0, 0, 0]},
+    {"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, null, 47.35, 8.55, 40]},
+    {"type": "ComplexItem", "complexItemType": "survey"},
+    {"type": "SimpleItem", "command": 16, "frame": 0, "params": [0, 0, 0, null, 47.4, 8.6, 530]}]},
+  "geoFence": {
+    "circles": [{"inclusion": false, "circle": {"center": [47.35, 8.56], "radius": 200}}],
+    "polygons": [{"inclusion": false, "polygon": [[47.31, 8.51], [47.31, 8.52], [47.32, 8.52]]}]},
+  "rallyPoints": {"points": [[47.3, 8.5, 10]]}}"#;
+
+#[test]
+fn whole_they_are_read() {
+    for file in FILES {
+        let read = convert(file.as_bytes(), Syntax::of(file.as_bytes())).expect("a scenario");
+        let threats = read.scenario["threats"].as_array().expect("a list");
+        assert!(threats.len() >= 2, "{file}");
+    }
+}
+
+fn use_up(bytes: &[u8]) {
+    let _ = at_little_cost(|| convert(bytes, Syntax::of(bytes)));
+}
+
+proptest! {
+    #![proptest_config(cases(64, 20_000))]
+
+    /// Cut anywhere, a byte of it another, or a part of it again elsewhere.
+    #[test]
+    fn damaged_files_never_break_the_readers(
+        at: prop::sample::Index, byte: u8, from: prop::sample::Index, long in 1..60_usize, cut: prop::sample::Index,
+    ) {
+        for file in FILES {
+            let mut bytes = file.as_bytes().to_vec();
+            bytes[at.index(file.len())] = byte;
+            use_up(&bytes);
+            let part = bytes[from.index(file.len() - long)..][..long].to_vec();
+            let at = at.index(file.len());
+            bytes.splice(at..at, part);
+            use_up(&bytes);
+            bytes.truncate(cut.index(file.len()));
+            use_up(&bytes);
+        }
+    }
+
+    /// A number of a plan or a GeoJSON is another value.
+    #[test]
+    fn other_values_never_break_the_readers(which: prop::sample::Index, with in prop::sample::select(vec![
+        "null", "true", "-1", "1e308", "1e-320", "18446744073709551615", "\"12\"", "[]", "{}", "[[8.5, 47.3]]",
+    ])) {
+        for file in [GEOJSON, PLAN] {
+            let is_digit = |c: char| c.is_ascii_digit() || c == '.';
+            let numbers: Vec<_> = file.match_indices(|c: char| c.is_ascii_digit()).map(|(at, _)| at)
+                .filter(|at| !file[..*at].ends_with(is_digit)).collect();
+            let at = *which.get(&numbers);
+            let rest = file[at..].trim_start_matches(is_digit);
+            use_up([&file[..at], with, rest].concat().as_bytes());
+        }
+    }
+}

@@ -216,11 +216,7 @@ impl Feed {
             .held_since
             .zip(self.throttle.window_ms())
             .map(|(since, window_ms)| since + Duration::from_secs_f64(window_ms / 1000.0));
-        let silent = self.told + SILENCE;
-        let (deadline, woken) = match window_closes {
-            Some(closes) if closes <= silent => (closes, Woken::WindowClosed),
-            _ => (silent, Woken::Silence),
-        };
+        let (deadline, woken) = due(self.told, window_closes);
         tokio::select! {
             changed = self.changes.changed() => match changed {
                 Ok(()) => Woken::Changed,
@@ -232,11 +228,38 @@ impl Feed {
     }
 }
 
+/// When the reader, last `told` something, is told what the throttle holds until a window closes, or that there is
+/// nothing to tell: events that it holds back put neither off.
+fn due(told: Instant, window_closes: Option<Instant>) -> (Instant, Woken) {
+    let silent = told + SILENCE;
+    match window_closes {
+        Some(closes) if closes <= silent => (closes, Woken::WindowClosed),
+        _ => (silent, Woken::Silence),
+    }
+}
+
 /// Why a wait ended.
+#[derive(Debug, PartialEq, Eq)]
 enum Woken {
     Changed,
     WindowClosed,
     Silence,
     Stopping,
     Closed,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A proxy cuts what says nothing, however much the reader's own rate holds back.
+    #[test]
+    fn a_comment_is_due_however_long_the_throttle_holds() {
+        let told = Instant::now();
+        let after = |seconds| told + Duration::from_secs(seconds);
+        let silence = (after(15), Woken::Silence);
+        assert_eq!(due(told, None), silence);
+        assert_eq!(due(told, Some(after(100))), silence);
+        assert_eq!(due(told, Some(after(3))), (after(3), Woken::WindowClosed));
+    }
 }

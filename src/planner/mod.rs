@@ -117,7 +117,7 @@ pub fn objective<'s>(scenario: &'s Scenario, stop: &'s dyn Stop) -> impl Objecti
     Routes::plain(&Model::new(scenario), stop)
 }
 
-/// The route, start to target, of a position of [`objective`].
+/// The route, start to target, of a position of [`objective()`].
 ///
 /// # Panics
 /// When the scenario names an algorithm that is not in the table; its reader refuses those.

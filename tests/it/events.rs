@@ -1,17 +1,12 @@
 //! Event streams over a real connection: order, resumption, thinning, the end.
 
-use std::time::Duration;
-
-use axum::body::Body;
-use axum::http::{Request, StatusCode};
-use futures_util::StreamExt as _;
+use axum::http::StatusCode;
 use futures_util::future::join_all;
 use noctule::http::Phase;
 use noctule::job::{Event, Status};
 use noctule::store::Options;
 use reqwest::{Client, RequestBuilder};
 use serde_json::Value;
-use tower::ServiceExt as _;
 
 use crate::support::api::Api;
 use crate::support::patience::in_time;
@@ -341,45 +336,6 @@ async fn a_stream_of_a_deleted_plan_ends_as_cancelled() {
             .expect_problem(410, "gone");
     })
     .await;
-}
-
-/// A proxy cuts what says nothing, however much the reader's own rate holds back.
-#[tokio::test(start_paused = true)]
-async fn a_slow_stream_says_that_it_is_there() {
-    let api = Api::new();
-    let address = api.submit().await;
-    let lease = api.store.claim().await.expect("a queued plan");
-    let request = Request::get(format!("{address}/events?rate=0.01"));
-    let request = request.body(Body::empty()).expect("a request");
-    let response = api
-        .router
-        .clone()
-        .oneshot(request)
-        .await
-        .expect("never fails");
-    let mut said = response.into_body().into_data_stream();
-    let store = api.store.clone();
-    let telling = tokio::spawn(async move {
-        let mut every_second = tokio::time::interval(Duration::from_secs(1));
-        for iteration in 0.. {
-            every_second.tick().await;
-            let event = run::convergence(iteration, iteration as f64 * 1000.0);
-            store
-                .append(&lease, vec![event])
-                .await
-                .expect("the lease holds");
-        }
-    });
-    let (mut comments, mut points) = (0, 0);
-    while comments < 5 {
-        let text = said.next().await.expect("it goes on").expect("whole");
-        let text = String::from_utf8_lossy(&text).into_owned();
-        comments += usize::from(text == ":\n\n");
-        points += text.matches("event: convergence").count();
-    }
-    // One at once, and none for the next hundred seconds.
-    assert!(points <= 1, "{points}");
-    telling.abort();
 }
 
 #[tokio::test]

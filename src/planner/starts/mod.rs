@@ -47,8 +47,14 @@ const MOST_COARSE: usize = 20;
 /// Routes taken from the net of places.
 const OVERLAND: usize = 8;
 
+/// And from each of the nets that reach far about.
+const FAR_ABOUT: usize = 16;
+
 /// A start this much dearer than the best one refined, as a share, is not worth refining.
 const HOPELESS: f64 = 0.08;
+
+/// Where soft zones are dear, a small shift changes more of what it costs.
+const HOPELESS_IN_ZONES: f64 = 0.3;
 
 /// By which a start is pulled into place.
 const ROUGH_STEPS: Steps = Steps {
@@ -79,12 +85,15 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let warm = known.is_some();
     let (mut legs_priced, mut evaluations) = (0, 0);
     let mut shapes: Vec<Vec<Point3>> = known.into_iter().collect();
-    let mut low = false;
+    let (mut low, mut hopeless) = (false, HOPELESS);
     if settings.seeding == Seeding::Tangent {
         shapes.extend(along_strings(model, stop));
         // Who brings a route has been over the hills already.
         if !warm {
-            let found = over_ground(model, &shapes);
+            let (found, exposed) = over_ground(model, &shapes);
+            if exposed {
+                hopeless = HOPELESS_IN_ZONES;
+            }
             let climbs = climbs::routes(model);
             legs_priced = found.legs_priced + climbs.legs_priced;
             shapes.extend(found.routes);
@@ -123,7 +132,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let others = usize::from(warm);
     priced[others..].sort_by(|one, other| one.0.rank(&other.0));
     if settings.polish {
-        let hopeless = if warm { 0.0 } else { HOPELESS };
+        let hopeless = if warm { 0.0 } else { hopeless };
         refine(model, &mut priced, hopeless, stop, &mut starts.evaluations);
     }
     priced.truncate(STARTS);
@@ -239,8 +248,8 @@ fn along_strings(model: &Model, stop: &dyn Stop) -> Vec<Vec<Point3>> {
 }
 
 /// Routes over the ground: through a fine net only where the coarse one has none that can be flown as it is, and
-/// far about where the best so far pays much for soft zones.
-fn over_ground(model: &Model, strings: &[Vec<Point3>]) -> Found {
+/// far about where the best so far pays much for soft zones; and whether it does.
+fn over_ground(model: &Model, strings: &[Vec<Point3>]) -> (Found, bool) {
     let mut found = roadmap::routes(model, OVERLAND);
     let over = best_of(model, &found.routes);
     let strung = best_of(model, strings);
@@ -250,11 +259,16 @@ fn over_ground(model: &Model, strings: &[Vec<Point3>]) -> Found {
         .min_by(|one, other| one.0.rank(&other.0));
     let detour = best.and_then(|(_, route)| exposed::detour(model, route));
     if over.is_none() || detour.is_some() {
-        let trails = trails::routes(model, detour, OVERLAND);
+        let count = if detour.is_some() {
+            FAR_ABOUT
+        } else {
+            OVERLAND
+        };
+        let trails = trails::routes(model, detour, count);
         found.routes.extend(trails.routes);
         found.legs_priced += trails.legs_priced;
     }
-    found
+    (found, detour.is_some())
 }
 
 /// The best of `routes` that can be flown as it is.

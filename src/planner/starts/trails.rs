@@ -33,21 +33,36 @@ const SPOTS_FAR_ABOUT: usize = 2500;
 /// Places are joined to those within so many steps of the net.
 const REACH: f64 = 2.1;
 
-/// Up to `count` routes that differ, of at most as many free waypoints as `model` asks for, by ways that are up to
-/// `detour` times as long as the direct one, if that is more than the net covers anyway.
+/// Up to `count` routes that differ through each of its nets, of at most as many free waypoints as `model` asks for:
+/// over what is near to the direct way, or over all that is within `detour` times as far, if that is more.
 pub(super) fn routes(model: &Model, detour: Option<f64>, count: usize) -> Found {
-    let mut net = Net::new(model, detour.filter(|&detour| detour > DETOUR));
-    let trees = [0, net.places.len() - 1].map(|end| net.cheapest(end));
-    let mut found = Found {
-        routes: Vec::new(),
-        legs_priced: net.legs_priced,
-    };
-    for chain in net::chains(model, &net.places, &trees, count) {
-        let (route, legs_priced) = thin(model, &net.pricer, &chain);
-        found.routes.push(route);
-        found.legs_priced += legs_priced;
+    let mut found = Found::default();
+    for spots in nets(model.scenario, detour.filter(|&detour| detour > DETOUR)) {
+        let mut net = Net::new(model, &spots);
+        let trees = [0, net.places.len() - 1].map(|end| net.cheapest(end));
+        found.legs_priced += net.legs_priced;
+        for chain in net::chains(model, &net.places, &trees, count) {
+            let (route, legs_priced) = thin(model, &net.pricer, &chain);
+            found.routes.push(route);
+            found.legs_priced += legs_priced;
+        }
     }
     found
+}
+
+/// Of what lies far about, most may be outside of the area: then a finer net finds gaps, and a coarse one more ways
+/// that differ.
+fn nets(scenario: &Scenario, far_about: Option<f64>) -> Vec<Spots> {
+    let Some(detour) = far_about else {
+        return vec![net::spots(scenario, SPOTS, DETOUR)];
+    };
+    let coarse = net::spots(scenario, SPOTS_FAR_ABOUT, detour);
+    let within = coarse.points.len();
+    if 2 * within > SPOTS_FAR_ABOUT {
+        return vec![coarse];
+    }
+    let count = SPOTS_FAR_ABOUT * SPOTS_FAR_ABOUT / within.max(SPOTS_FAR_ABOUT / 20);
+    vec![coarse, net::spots(scenario, count, detour)]
 }
 
 /// Places joined by legs.
@@ -79,15 +94,11 @@ struct Arrival {
 }
 
 impl<'s> Net<'s> {
-    fn new(model: &Model<'s>, far_about: Option<f64>) -> Self {
+    fn new(model: &Model<'s>, spots: &Spots) -> Self {
         let scenario = model.scenario;
         let tolerance = model.tolerance.scaled(PRICED_FROM);
         let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).verdicts();
-        let spots = match far_about {
-            Some(detour) => far_about_spots(scenario, detour),
-            None => net::spots(scenario, SPOTS, DETOUR),
-        };
-        let places = places(model, &spots);
+        let places = places(model, spots);
         let mut ends = Vec::new();
         let reach = REACH * spots.step;
         for (a, one) in places.iter().enumerate() {
@@ -210,13 +221,6 @@ impl<'s> Net<'s> {
             }
         }
     }
-}
-
-/// As many as are asked for within the area: of what lies so far about, most may be outside of it.
-fn far_about_spots(scenario: &Scenario, detour: f64) -> Spots {
-    let within = net::spots(scenario, SPOTS_FAR_ABOUT, detour).points.len();
-    let count = SPOTS_FAR_ABOUT * SPOTS_FAR_ABOUT / within.max(SPOTS_FAR_ABOUT / 20);
-    net::spots(scenario, count, detour)
 }
 
 /// Start, the spots at their heights, target.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use futures_util::future::join_all;
 
-use crate::support::scenario;
+use crate::support::lives::a_plan;
 use crate::support::sse::{Stream, events};
 use crate::support::stores::{Place, for_every_backend};
 
@@ -14,12 +14,8 @@ async fn no_accepted_plan_is_lost_or_done_twice() {
         let place = Place::new(backend);
         let service = place.serve(&["--workers", "2"]);
         let addresses = join_all((0..50).map(|seed| {
-            let mut scenario = scenario();
-            scenario["planner"]["population"] = 50.into();
-            scenario["planner"]["iterations"] = 100.into();
-            scenario["planner"]["seed"] = seed.into();
             let service = &service;
-            async move { service.submit(&scenario).await }
+            async move { service.submit(&a_plan(50, 100, seed)).await }
         }))
         .await;
 

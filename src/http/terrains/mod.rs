@@ -177,7 +177,7 @@ pub(super) async fn put(
     };
     let content = entry.sha256.as_deref().map(etag);
     let document = document(&state, entry).await?;
-    let mut answer = tagged(document.into(), content);
+    let mut answer = tagged(json(document), content);
     *answer.status_mut() = status;
     if kept == Kept::Created {
         let location = HeaderValue::from_str(uri.path()).expect("a path is visible ASCII");
@@ -278,27 +278,20 @@ pub(super) async fn show(
     Ok(if known {
         tagged(StatusCode::NOT_MODIFIED.into_response(), tag)
     } else {
-        tagged(document.into(), tag)
+        tagged(json(document), tag)
     })
 }
 
 /// What is known of a dataset now, as it is sent.
-async fn document(state: &AppState, entry: Entry) -> Result<Text, Problem> {
+async fn document(state: &AppState, entry: Entry) -> Result<String, Problem> {
     let uses = state.store.datasets_in_use().await?;
     let active = active(&uses, entry.sha256.as_deref());
     let document = TerrainDocument::new(entry, active);
-    let text = serde_json::to_string(&document).expect("every map key is a string");
-    Ok(Text(text))
+    Ok(serde_json::to_string(&document).expect("every map key is a string"))
 }
 
-/// A document, written.
-struct Text(String);
-
-impl From<Text> for Response {
-    fn from(Text(text): Text) -> Self {
-        let json = HeaderValue::from_static("application/json");
-        ([(header::CONTENT_TYPE, json)], text).into_response()
-    }
+fn json(document: String) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], document).into_response()
 }
 
 fn tagged(mut answer: Response, tag: Option<HeaderValue>) -> Response {
@@ -314,9 +307,9 @@ const OF: char = '.';
 /// The entity tag of a document. It begins with its content's sum, so that a dataset can be replaced or
 /// deleted by it; what follows changes with all else that the document says, such as how many plans
 /// need it.
-fn document_etag(sha256: &str, Text(text): &Text) -> HeaderValue {
-    let of_text = sha256_hex(text.as_bytes());
-    etag(&format!("{sha256}{OF}{}", &of_text[..16]))
+fn document_etag(sha256: &str, document: &str) -> HeaderValue {
+    let of_document = sha256_hex(document.as_bytes());
+    etag(&format!("{sha256}{OF}{}", &of_document[..16]))
 }
 
 /// The entity tag of a content.

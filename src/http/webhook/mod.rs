@@ -118,8 +118,8 @@ async fn deliver_all(delivery: Arc<Delivery>) {
                 continue;
             }
         }
-        let due = delivery.store.due_webhooks((delivery.clock)(), AT_ONCE);
-        let due = match due.await {
+        let now_ms = (delivery.clock)();
+        let due = match delivery.store.due_webhooks(now_ms, AT_ONCE).await {
             Ok(due) => due,
             Err(error) => {
                 tracing::debug!(%error, "the store does not say which webhooks are due");

@@ -11,6 +11,7 @@ use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 use tokio::sync::watch;
 
+use crate::support::lives::waiting;
 use crate::support::patience::in_time;
 use crate::support::process::Service;
 use crate::support::size::size;
@@ -196,11 +197,7 @@ async fn an_idle_stream_costs_little_memory() {
     let n_streams = size(1_000, 9_900);
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &["--workers", "1", "--grace", "0"]);
-    let mut endless = crate::support::scenario();
-    endless["planner"]["population"] = 10_000.into();
-    endless["planner"]["iterations"] = 30_000.into();
-    service.submit(&endless).await;
-    let waiting = service.submit(&crate::support::scenario()).await;
+    let waiting = waiting(&service).await;
     let open = async || {
         let mut stream = TcpStream::connect(service.address())
             .await

@@ -7,8 +7,8 @@ use bytes::Bytes;
 use tokio::time::Instant;
 
 use super::Dice;
+use crate::support::lives::a_plan;
 use crate::support::process::Service;
-use crate::support::scenario;
 use crate::support::size::size;
 use crate::support::sse::{Stream, events};
 use crate::support::stores::{Place, for_every_backend};
@@ -30,11 +30,8 @@ impl Known {
     /// Post plans until `enough` were accepted.
     async fn post(&mut self, service: &Service, enough: usize) {
         while self.accepted.len() < enough {
-            let mut scenario = scenario();
-            scenario["planner"]["population"] = 50.into();
-            scenario["planner"]["iterations"] = 100.into();
-            scenario["planner"]["seed"] = self.accepted.len().into();
-            self.accepted.push(service.submit(&scenario).await);
+            let plan = a_plan(50, 100, self.accepted.len());
+            self.accepted.push(service.submit(&plan).await);
         }
     }
 

@@ -11,6 +11,7 @@ use tokio::io::AsyncWriteExt as _;
 use tokio::net::TcpStream;
 use tokio::task::JoinHandle;
 
+use crate::support::lives::waiting;
 use crate::support::patience::{eventually, in_time};
 use crate::support::process::Service;
 
@@ -27,11 +28,7 @@ async fn impatient(data_dir: &Path) -> (Service, String) {
         "0",
     ];
     let service = Service::start(data_dir, &limits);
-    let mut endless = crate::support::scenario();
-    endless["planner"]["population"] = 10_000.into();
-    endless["planner"]["iterations"] = 30_000.into();
-    service.submit(&endless).await;
-    let waiting = service.submit(&crate::support::scenario()).await;
+    let waiting = waiting(&service).await;
     (service, waiting)
 }
 

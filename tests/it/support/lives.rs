@@ -22,6 +22,12 @@ pub(crate) fn a_plan(population: u64, iterations: u64, seed: usize) -> Value {
     scenario
 }
 
+/// A plan that waits behind one that lasts, where there is one worker; its address.
+pub(crate) async fn waiting(service: &Service) -> String {
+    service.submit(&a_plan(10_000, 30_000, 7)).await;
+    service.submit(&scenario()).await
+}
+
 /// Read until the plan is running.
 pub(crate) async fn running(service: &Service, address: &str) -> Stream {
     running_at(service, address, 10.0).await

@@ -99,7 +99,13 @@ impl<'s> Moves<'s> {
         } else {
             random.normal() * reach / length
         };
-        route[into] = self.within([between(0) - dy * aside, between(1) + dx * aside, between(2)]);
+        // Where a leg climbs over a threat, or down from it, what is put on it is too high or too low.
+        let height = if random.unit() < 0.5 {
+            between(2)
+        } else {
+            0.5 * (self.scenario.altitude.min + self.scenario.altitude.max)
+        };
+        route[into] = self.within([between(0) - dy * aside, between(1) + dx * aside, height]);
     }
 
     /// The waypoints before and after number `idx`, or the ends of the route.

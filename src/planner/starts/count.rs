@@ -1,7 +1,8 @@
 //! Routes of as many waypoints as asked for: spare ones are spread along the legs, surplus ones
 //! left out.
 
-use crate::cost::Model;
+use super::{lifted, steepest};
+use crate::cost::{Model, metre};
 use crate::geometry::{LEVEL, Point3};
 use crate::optimizer::Fitness;
 use crate::planner::price::price;
@@ -17,6 +18,9 @@ const HAIR: f64 = 1e-3;
 
 /// A waypoint tells a direction from here on, metres.
 const FAR: f64 = 1.0;
+
+/// A waypoint that costs more than this share of the direct way's fuel is not put on its leg unless there is no other place.
+const DEAR: f64 = 1e-3;
 
 /// Costs nearer than this are the same.
 const NOTHING: f64 = 1e-9;
@@ -124,17 +128,48 @@ impl Split {
             }
         };
         // The middle, unless an end is nearer to the middle of the band.
-        [0.5, least, 1.0 - least]
+        let on_leg = [0.5, least, 1.0 - least]
             .map(at)
             .into_iter()
-            .reduce(|best, next| {
-                if next.added.cost < best.added.cost - NOTHING {
-                    next
-                } else {
-                    best
-                }
-            })
-            .expect("three places")
+            .reduce(Self::cheaper)
+            .expect("three places");
+        if on_leg.added.cost > DEAR * way * metre(model.scenario) {
+            on_leg.cheaper(Self::off_leg(model, a, b))
+        } else {
+            on_leg
+        }
+    }
+
+    /// As near to the middle of the band as the vehicle can climb to and back: where a leg is high or low from end to end,
+    /// as between one threat that is flown over and the next.
+    fn off_leg(model: &Model, a: Point3, b: Point3) -> Self {
+        let scenario = model.scenario;
+        let tolerance = model.tolerance.scaled(0.5);
+        let middle = lifted(scenario, nalgebra::center(&a, &b).xy(), 0.5);
+        let climb = 0.5 * (b.xy() - a.xy()).norm() * steepest(scenario);
+        let (lowest, highest) = (a.z.max(b.z) - climb, a.z.min(b.z) + climb);
+        let at = Point3::new(middle.x, middle.y, middle.z.min(highest).max(lowest));
+        let leg = |a: Point3, b: Point3| model.leg(a, b, scenario.planner.quadrature, tolerance);
+        let (own, without) = (model.waypoint(at, tolerance), leg(a, b));
+        let with = [leg(a, at), leg(at, b)];
+        Self {
+            at,
+            added: Fitness {
+                violation: own.0 + with[0].0 + with[1].0 - without.0,
+                cost: own.1 + with[0].1 + with[1].1 - without.1,
+            },
+            length: (b - a).norm(),
+        }
+    }
+
+    /// This one, unless `other` costs less and breaks no more.
+    fn cheaper(self, other: Self) -> Self {
+        let (own, its) = (self.added, other.added);
+        if its.cost < own.cost - NOTHING && its.violation <= own.violation {
+            other
+        } else {
+            self
+        }
     }
 
     fn rank(&self, other: &Self) -> std::cmp::Ordering {

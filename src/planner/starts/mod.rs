@@ -5,9 +5,11 @@ mod climbs;
 mod count;
 mod exposed;
 mod known;
+mod levels;
 mod net;
 mod over;
 mod roadmap;
+mod rounded;
 mod tangents;
 mod thin;
 mod trails;
@@ -268,6 +270,9 @@ fn over_ground(model: &Model, strings: &[Vec<Point3>]) -> (Found, bool) {
         found.routes.extend(trails.routes);
         found.legs_priced += trails.legs_priced;
     }
+    let rounded = |route: &Vec<Point3>| rounded::rounded(model.scenario, route);
+    let turned: Vec<_> = found.routes.iter().filter_map(rounded).collect();
+    found.routes.extend(turned);
     (found, detour.is_some())
 }
 
@@ -297,12 +302,16 @@ fn along(model: &Model, string: &TautString) -> Vec<Point3> {
 fn lifted(scenario: &Scenario, point: Point2, share: f64) -> Point3 {
     let band = scenario.altitude;
     let point = scenario.area.nearest(point);
-    let steepest = libm::tan(scenario.vehicle.max_climb_deg.to_radians()) * (1.0 - 1e-9);
     let height = band.min + share * (band.max - band.min);
     let mut z = scenario.terrain.elevation(point) + height;
     for end in [scenario.start, scenario.target] {
-        let reach = (point - end.xy()).norm() * steepest;
+        let reach = (point - end.xy()).norm() * steepest(scenario);
         z = z.clamp(end.z - reach, end.z + reach);
     }
     Point3::new(point.x, point.y, z)
+}
+
+/// Metres the vehicle may climb in a metre seen from above, less a hair.
+fn steepest(scenario: &Scenario) -> f64 {
+    libm::tan(scenario.vehicle.max_climb_deg.to_radians()) * (1.0 - 1e-9)
 }

@@ -1,10 +1,11 @@
-//! Ways over the ground: the cheapest routes through a net of places in the middle of the band.
+//! Ways over the ground: the cheapest routes through a net of places in the middle of the band, and just above or
+//! below threats that can be passed so.
 //!
 //! Taut strings know threats, but neither mountains nor what crossing a soft zone costs. Here every
 //! leg between two of some hundred places is priced as it is, those that break a limit left out, and
 //! the cheapest chains from start to target are found; turns alone are not looked at.
 
-use super::lifted;
+use super::levels;
 use super::net::{self, Found, Tree};
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::cost::{Model, metre};
@@ -19,6 +20,9 @@ const PLACES_OVER_HILLS: usize = 320;
 
 /// The net covers all points of which the way over them is at most so many times the direct one.
 const DETOUR: f64 = 1.4;
+
+/// A place has the height that clears a threat from so many steps of the net beside it on.
+const NEAR: f64 = 1.5;
 
 /// What a waypoint must gain, as a share of the direct way's fuel.
 const WORTH: f64 = 1e-4;
@@ -43,9 +47,12 @@ fn places(model: &Model) -> Vec<Point3> {
     } else {
         PLACES_OVER_HILLS
     };
-    let spots = net::spots(scenario, count, DETOUR).points.into_iter();
+    let spots = net::spots(scenario, count, DETOUR);
+    let near = NEAR * spots.step;
+    let over = |&spot| levels::over(scenario, spot, near);
     std::iter::once(scenario.start)
-        .chain(spots.map(|spot| lifted(scenario, spot, 0.5)))
+        .chain(spots.points.iter().flat_map(over))
+        .chain(levels::about_ends(scenario, 0.5 * spots.step))
         .chain([scenario.target])
         .collect()
 }

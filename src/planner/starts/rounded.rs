@@ -1,0 +1,45 @@
+//! Chains of a net know no turns: where one is too sharp, it is flown in several.
+
+use crate::geometry::{LEVEL, Point3};
+use crate::scenario::Scenario;
+
+/// Legs between turns that stand for one are this share of the direct way, or the shortest that are allowed.
+const SHORT: f64 = 0.004;
+
+/// `chain` with waypoints put after those at which it turns more than the vehicle can, if it has then no more than it may have.
+pub(super) fn rounded(scenario: &Scenario, chain: &[Point3]) -> Option<Vec<Point3>> {
+    let most = scenario.vehicle.max_turn_deg.to_radians() * (1.0 - 1e-6);
+    let short = (SHORT * (scenario.target - scenario.start).norm())
+        .max(scenario.vehicle.min_leg * (1.0 + 1e-6));
+    let mut route = vec![chain[0]];
+    for corner in chain.windows(3) {
+        route.push(corner[1]);
+        let [before, after] = [corner[1] - corner[0], corner[2] - corner[1]].map(|leg| leg.xy());
+        if before.norm() < LEVEL || after.norm() <= short {
+            continue;
+        }
+        let turn = libm::atan2(before.perp(&after), before.dot(&after));
+        if turn.abs() <= most {
+            continue;
+        }
+        // A hair less each, for what is shifted by flying them one after the other.
+        let count = (turn.abs() / most * 1.05).ceil();
+        let step = nalgebra::Rotation2::new(turn / count);
+        let height = corner[1].z - scenario.terrain.elevation(corner[1].xy());
+        let (mut at, mut ahead) = (corner[1].xy(), before.normalize() * short);
+        let mut turned = 1.0;
+        while turned < count {
+            ahead = step * ahead;
+            at = scenario.area.nearest(at + ahead);
+            route.push(Point3::new(
+                at.x,
+                at.y,
+                scenario.terrain.elevation(at) + height,
+            ));
+            turned += 1.0;
+        }
+    }
+    route.push(chain[chain.len() - 1]);
+    let count = route.len();
+    (count > chain.len() && count - 2 <= scenario.planner.waypoints).then_some(route)
+}

@@ -15,7 +15,7 @@ const CLEAR: f64 = 0.02;
 const DIRECTIONS: usize = 24;
 
 /// Of the threats about a place, the heights of so many at most.
-const MOST: usize = 8;
+const MOST: usize = 4;
 
 /// Heights nearer to each other than this share of the band are one.
 const ALIKE: f64 = 0.01;
@@ -50,7 +50,9 @@ pub(super) fn over(scenario: &Scenario, spot: Point2, reach: f64) -> Vec<Point3>
     places.sort_by(|one, other| away(one).total_cmp(&away(other)));
     let alike = ALIKE * (band.max - band.min);
     places.dedup_by(|next, before| (next.z - before.z).abs() <= alike);
-    places.truncate(MOST);
+    if places.len() > MOST {
+        places.drain(MOST - 1..places.len() - 1);
+    }
     places.insert(0, middle);
     places
 }

@@ -250,6 +250,26 @@ fn a_stop_within_an_iteration_is_heard() {
     );
 }
 
+/// Over one disc and round another: waypoints are high over the first alone. With all of them there, the route costs 901.
+#[test]
+fn a_threat_is_flown_over_by_no_more_waypoints_than_it_takes() {
+    let mut scenario = scenario();
+    scenario.start = Point3::new(125.0, 524.0, 88.0);
+    scenario.target = Point3::new(856.0, 323.0, 93.0);
+    scenario.altitude = AltitudeBand {
+        min: 20.0,
+        max: 120.0,
+    };
+    scenario.weights.fuel = 1.0;
+    scenario.threats = vec![radar(577.0, 360.0, 129.0), radar(637.0, 514.0, 180.0)];
+    scenario.threats[0].top = Some(83.0);
+    scenario.planner.seeding = Seeding::Tangent;
+    scenario.planner.polish = true;
+    let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(u32::MAX));
+    assert!(outcome.feasible);
+    assert!(outcome.cost.total < 812.0, "{}", outcome.cost.total);
+}
+
 #[test]
 fn an_impossible_scenario_ends_with_its_violations() {
     let mut scenario = scenario();

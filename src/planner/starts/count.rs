@@ -323,6 +323,21 @@ mod tests {
         }
     }
 
+    /// Where a leg is above the middle of the band from end to end, spare waypoints go down to it.
+    #[test]
+    fn spare_waypoints_leave_a_high_leg() {
+        let mut scenario = scenario();
+        scenario.start.z = 130.0;
+        scenario.threats.clear();
+        let model = Model::new(&scenario);
+        let high = vec![scenario.start, scenario.target];
+        let many = with_waypoints(&model, high.clone(), 10);
+        let [few, many] = [high, many].map(|route| price(&model, &route));
+        assert!(many.violation <= 0.0);
+        // Each would cost 30 or more on the leg.
+        assert!(many.cost < few.cost + 3.0, "{few:?} {many:?}");
+    }
+
     #[test]
     fn the_waypoint_that_is_missed_least_is_left_out() {
         let scenario = scenario();

@@ -89,3 +89,76 @@ fn can_be_reached(scenario: &Scenario, point: Point3) -> bool {
         (point.z - end.z).abs() <= way * steepest(scenario)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Segment;
+    use crate::planner::tests::{radar, scenario};
+
+    /// With a threat up to `top` and one from `base`, beside each other; the middle of the band is at 100.
+    fn passable(top: f64, base: f64) -> Scenario {
+        let mut scenario = scenario();
+        scenario.threats = vec![radar(350.0, 250.0, 60.0), radar(680.0, 620.0, 60.0)];
+        scenario.threats[0].top = Some(top);
+        scenario.threats[1].base = Some(base);
+        scenario
+    }
+
+    fn heights(scenario: &Scenario, x: f64, y: f64) -> Vec<f64> {
+        let places = over(scenario, Point2::new(x, y), 40.0);
+        places.iter().map(|place| place.z).collect()
+    }
+
+    #[test]
+    fn places_about_a_threat_have_the_heights_that_clear_it() {
+        let scenario = passable(130.0, 70.0);
+        assert_eq!(heights(&scenario, 350.0, 370.0), [100.0, 130.0, 134.0]);
+        assert_eq!(heights(&scenario, 680.0, 500.0), [100.0, 69.999, 66.0]);
+        assert_eq!(heights(&scenario, 500.0, 430.0), [100.0]);
+    }
+
+    #[test]
+    fn what_the_middle_of_the_band_clears_needs_no_height() {
+        let scenario = passable(99.0, 101.0);
+        for (x, y) in [(350.0, 250.0), (680.0, 620.0)] {
+            assert_eq!(heights(&scenario, x, y), [100.0]);
+        }
+    }
+
+    #[test]
+    fn nothing_is_outside_of_the_band_or_beyond_a_climb() {
+        let scenario = passable(199.0, 201.0);
+        assert_eq!(heights(&scenario, 350.0, 370.0), [100.0, 199.0]);
+        // From the start, at 0 m, 145 m away.
+        let heights = heights(&scenario, 280.0, 220.0);
+        assert_eq!(heights, [100.0]);
+    }
+
+    #[test]
+    fn of_many_heights_the_nearest_are_kept_and_the_one_that_clears_all() {
+        let mut scenario = passable(130.0, 0.0);
+        for top in [140.0, 150.0, 160.0, 170.0] {
+            let mut threat = scenario.threats[0].clone();
+            threat.top = Some(top);
+            scenario.threats.push(threat);
+        }
+        let expected = [100.0, 130.0, 134.0, 140.0, 174.0];
+        assert_eq!(heights(&scenario, 350.0, 370.0), expected);
+    }
+
+    #[test]
+    fn a_climb_from_an_end_is_over_after_one_leg() {
+        let mut scenario = scenario();
+        (scenario.start.x, scenario.start.y) = (300.0, 300.0);
+        // The target is 50 m above the middle, which a leg reaches nearer than that.
+        let places = about_ends(&scenario, 60.0);
+        assert_eq!(places.len(), DIRECTIONS);
+        for b in places {
+            let a = scenario.start;
+            assert!((b.z - 100.0).abs() < 1e-9);
+            assert!((Segment { a, b }.climb().to_degrees() - 45.0).abs() < 1e-6);
+        }
+        assert!(about_ends(&scenario, 200.0).is_empty());
+    }
+}

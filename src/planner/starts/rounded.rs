@@ -1,6 +1,6 @@
 //! Chains of a net know no turns: where one is too sharp, it is flown in several.
 
-use crate::geometry::{LEVEL, Point3};
+use crate::geometry::{LEVEL, Point3, Vector2};
 use crate::scenario::Scenario;
 
 /// Legs between turns that stand for one are this share of the direct way, or the shortest that are allowed.
@@ -24,12 +24,16 @@ pub(super) fn rounded(scenario: &Scenario, chain: &[Point3]) -> Option<Vec<Point
         }
         // A hair less each, for what is shifted by flying them one after the other.
         let count = (turn.abs() / most * 1.05).ceil();
-        let step = nalgebra::Rotation2::new(turn / count);
+        if count > scenario.planner.waypoints as f64 {
+            return None;
+        }
         let height = corner[1].z - scenario.terrain.elevation(corner[1].xy());
-        let (mut at, mut ahead) = (corner[1].xy(), before.normalize() * short);
+        let heading = libm::atan2(before.y, before.x);
+        let mut at = corner[1].xy();
         let mut turned = 1.0;
         while turned < count {
-            ahead = step * ahead;
+            let heading = heading + turn * turned / count;
+            let ahead = Vector2::new(libm::cos(heading), libm::sin(heading)) * short;
             at = scenario.area.nearest(at + ahead);
             route.push(Point3::new(
                 at.x,
@@ -42,4 +46,35 @@ pub(super) fn rounded(scenario: &Scenario, chain: &[Point3]) -> Option<Vec<Point
     route.push(chain[chain.len() - 1]);
     let count = route.len();
     (count > chain.len() && count - 2 <= scenario.planner.waypoints).then_some(route)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cost::Model;
+    use crate::planner::price::price;
+    use crate::planner::tests::scenario;
+
+    #[test]
+    fn a_sharp_turn_is_flown_in_several() {
+        let mut scenario = scenario();
+        scenario.threats.clear();
+        // Up to the middle of the band, and after a turn of 83 degrees on to the target.
+        let chain = [
+            scenario.start,
+            Point3::new(330.0, 40.0, 100.0),
+            scenario.target,
+        ];
+        let model = Model::new(&scenario);
+        assert!(price(&model, &chain).violation > 20.0);
+        let route = rounded(&scenario, &chain).expect("it turns too much");
+        assert_eq!(route.len(), 4);
+        let [sharp, soft] = [price(&model, &chain), price(&model, &route)];
+        assert!(soft.is_feasible(), "{soft:?}");
+        assert!(soft.cost < 1.01 * sharp.cost, "{sharp:?} {soft:?}");
+
+        scenario.planner.waypoints = 1;
+        assert_eq!(rounded(&scenario, &chain), None);
+        assert_eq!(rounded(&scenario, &route), None);
+    }
 }

@@ -21,14 +21,14 @@ const FIRST: f64 = 1700.0;
 /// Sides from start to target in the first mesh, at least.
 const FEWEST_STEPS: f64 = 10.0;
 
+/// As many at most.
+const MOST_STEPS: f64 = 2000.0;
+
 /// Triangles of a mesh that is made finer, at most, but for those at the edge.
 const MOST_TRIANGLES: usize = 16_000;
 
 /// Triangles that are marched over in all before the mesh is no longer made finer.
 const MOST_IN_ALL: usize = 80_000;
-
-/// As many at most.
-const MOST_STEPS: f64 = 2000.0;
 
 /// Sides of the longest way that keeps to the first mesh, unless that of the straight one is not much less.
 const LONGEST: f64 = 600.0;
@@ -419,8 +419,8 @@ mod tests {
     /// The cheapest way over a lattice of `NODES` nodes a side with legs in 32 directions, each
     /// summed up in its middle parts: dearer than the cheapest way of all, but for that sum.
     fn over_lattice(scenario: &Scenario) -> f64 {
-        const NODES: i32 = 101;
-        let spacing = 10.0;
+        const NODES: i32 = 51;
+        let spacing = 20.0;
         let prices = Prices::of(scenario);
         let walls = wall::walls(scenario, &prices);
         let price = |a: Point2, b: Point2| {
@@ -446,8 +446,8 @@ mod tests {
             |[i, j]: [i32; 2]| usize::try_from(j * NODES + i).expect("it lies in the lattice");
         let mut best = vec![f64::INFINITY; usize::try_from(NODES * NODES).expect("positive")];
         let mut heap = std::collections::BinaryHeap::new();
-        best[index([20, 50])] = 0.0;
-        heap.push((std::cmp::Reverse(0_u64), [20, 50]));
+        best[index([10, 25])] = 0.0;
+        heap.push((std::cmp::Reverse(0_u64), [10, 25]));
         while let Some((std::cmp::Reverse(key), [i, j])) = heap.pop() {
             if key != best[index([i, j])].to_bits() {
                 continue;
@@ -465,7 +465,7 @@ mod tests {
                 }
             }
         }
-        best[index([80, 50])]
+        best[index([40, 25])]
     }
 
     #[test]
@@ -484,19 +484,19 @@ mod tests {
             assert!(proven >= share * found, "{proven} {found}");
         };
         // One soft zone over both ends, without and with a core in the way.
-        check(1.0, &[disc(500.0, 560.0, 1.0, 600.0)], 0.91);
-        check(1.0, &[disc(500.0, 510.0, 80.0, 400.0)], 0.9);
+        check(1.0, &[disc(500.0, 560.0, 1.0, 600.0)], 0.87);
+        check(1.0, &[disc(500.0, 510.0, 80.0, 400.0)], 0.86);
         // Ends in zones of their own.
         let ends = [
             disc(230.0, 500.0, 20.0, 150.0),
             disc(800.0, 460.0, 25.0, 120.0),
         ];
-        check(0.5, &ends, 0.88);
+        check(0.5, &ends, 0.84);
         // A wall of zones that overlap.
         let wall: Vec<String> = (0..9)
             .map(|i| disc(500.0, 60.0 + 110.0 * f64::from(i), 30.0, 110.0))
             .collect();
-        check(0.5, &wall, 0.6);
+        check(0.5, &wall, 0.55);
     }
 
     /// From vertex to vertex, the mean over cells rises by no more than the way costs, summed up finely.

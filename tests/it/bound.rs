@@ -6,11 +6,12 @@ use std::fmt::Write;
 use noctule::cost::{Constraint, Model};
 use noctule::geometry::{Point2, Point3};
 use noctule::planner;
+use noctule::scenario::Scenario;
 use noctule::scenario::json::{self, Rules};
 use noctule::scenario::limits::Limits;
-use noctule::scenario::{Quadrature, Scenario};
 use noctule::seeding::{Obstacles, lower_bound, steep_ground, taut_strings};
 use proptest::prelude::*;
+use serde_json::Value;
 
 /// Nodes along a side of the lattice on which a first way is found.
 const NODES: usize = 26;
@@ -23,12 +24,17 @@ const STEPS: usize = 2500;
 
 #[derive(Debug, Clone)]
 struct Drawn {
+    /// Start and target.
+    ends: [[f64; 2]; 2],
     threats: Vec<String>,
+    /// Of all lengths.
+    scale: f64,
     fuel: f64,
     threat: f64,
     altitude: f64,
     heights: [f64; 2],
     waypoints: usize,
+    is_sampled: bool,
     seed: u64,
 }
 
@@ -90,7 +96,6 @@ fn polygon() -> impl Strategy<Value = String> {
 
 fn drawn() -> impl Strategy<Value = Drawn> {
     let threat = prop_oneof![3 => cylinder(), 2 => polygon()];
-    let log = |low: f64, high: f64| (low..high).prop_map(|exponent: f64| libm::exp2(exponent));
     (
         prop::collection::vec(threat, 0..8),
         log(-3.0, 1.0),
@@ -98,19 +103,167 @@ fn drawn() -> impl Strategy<Value = Drawn> {
         prop_oneof![1 => Just(0.0), 4 => log(-5.0, 1.0)],
         [0.0..200.0f64, 0.0..200.0f64],
         prop_oneof![Just(1_usize), Just(2), Just(3), Just(6), Just(12)],
+        prop::bool::weighted(0.1),
         any::<u64>(),
     )
         .prop_map(
-            |(threats, fuel, threat, altitude, heights, waypoints, seed)| Drawn {
+            |(threats, fuel, threat, altitude, heights, waypoints, is_sampled, seed)| Drawn {
+                ends: [[80.0, 120.0], [920.0, 840.0]],
                 threats,
+                scale: 1.0,
                 fuel,
                 threat,
                 altitude,
                 heights,
                 waypoints,
+                is_sampled,
                 seed,
             },
         )
+}
+
+/// Numbers between powers of two.
+fn log(low: f64, high: f64) -> impl Strategy<Value = f64> {
+    (low..high).prop_map(libm::exp2)
+}
+
+/// A soft zone that an end lies in, at times at its very edge or at its core.
+fn over(end: [f64; 2]) -> impl Strategy<Value = String> {
+    (
+        0.0..std::f64::consts::TAU,
+        log(0.0, 6.5),
+        log(-9.0, 6.0),
+        prop_oneof![1 => Just(0.0), 8 => log(-9.0, 9.5)],
+        prop::option::weighted(0.4, prop::collection::vec((0.2..1.0f64, 0.1..1.0f64), 3..8)),
+    )
+        .prop_map(move |(angle, radius, gap, depth, corners)| {
+            let away = radius + gap;
+            let (x, y) = (
+                end[0] + away * libm::cos(angle),
+                end[1] + away * libm::sin(angle),
+            );
+            let Some(corners) = corners else {
+                return format!(
+                    r#"{{"kind": "cylinder", "center": {{"x": {x}, "y": {y}}}, "radius": {radius}, "influence": {}}}"#,
+                    away + depth
+                );
+            };
+            let whole: f64 = corners.iter().map(|corner| corner.0).sum();
+            let mut angle = angle;
+            let vertices: Vec<String> = corners
+                .iter()
+                .map(|(share, length)| {
+                    angle += share / whole * std::f64::consts::TAU;
+                    let length = length * radius;
+                    let (x, y) = (x + length * libm::cos(angle), y + length * libm::sin(angle));
+                    format!(r#"{{"x": {x}, "y": {y}}}"#)
+                })
+                .collect();
+            format!(
+                r#"{{"kind": "polygon", "vertices": [{}], "margin": {}}}"#,
+                vertices.join(", "),
+                gap + depth
+            )
+        })
+}
+
+/// Ends far apart, close together, and at the very border.
+fn ends() -> impl Strategy<Value = [[f64; 2]; 2]> {
+    let place = || {
+        prop_oneof![
+            3 => [20.0..980.0f64, 20.0..980.0f64],
+            1 => (prop_oneof![Just(0.0), 0.0..3.0f64], 0.0..1000.0f64).prop_map(|(x, y)| [x, y]),
+        ]
+    };
+    let near = (0.0..std::f64::consts::TAU, log(-2.0, 6.0));
+    (place(), place(), prop::option::weighted(0.25, near)).prop_map(|(start, far, near)| {
+        let target = near.map_or(far, |(angle, away)| {
+            [
+                start[0] + away * libm::cos(angle),
+                start[1] + away * libm::sin(angle),
+            ]
+            .map(|place| place.clamp(0.0, 1000.0))
+        });
+        [start, target]
+    })
+}
+
+/// From edge to edge of the area between the ends, soft zones that overlap and cores that leave gaps.
+fn row() -> impl Strategy<Value = Vec<String>> {
+    (5.0..45.0f64, 1.0..30.0f64, 350.0..650.0f64, -0.3..0.3f64).prop_map(
+        |(radius, soft, x, slant)| {
+            let spacing = 2.0 * radius + soft;
+            let mut threats = Vec::new();
+            let mut y = 0.0;
+            while y < 1000.0 {
+                threats.push(format!(
+                    r#"{{"kind": "cylinder", "center": {{"x": {}, "y": {y}}}, "radius": {radius}, "influence": {}}}"#,
+                    x + slant * (y - 500.0),
+                    radius + 2.0 * soft
+                ));
+                y += spacing;
+            }
+            threats
+        },
+    )
+}
+
+/// Scenarios whose soft zones cannot be gone round.
+fn soft() -> impl Strategy<Value = Drawn> {
+    let zones = ends().prop_flat_map(|ends| {
+        let over = ends.map(|end| prop::collection::vec(over(end), 0..3));
+        (Just(ends), over)
+    });
+    let row = prop_oneof![2 => Just(Vec::new()).boxed(), 1 => row().boxed()];
+    let weight = || prop_oneof![2 => log(-3.0, 1.0), 1 => log(-17.0, 10.0)];
+    let scale = prop_oneof![2 => Just(1.0), 1 => log(-10.0, 10.0)];
+    (drawn(), zones, row, weight(), weight(), scale).prop_map(
+        |(drawn, (ends, [start, target]), row, fuel, threat, scale)| Drawn {
+            ends,
+            threats: drawn
+                .threats
+                .into_iter()
+                .take(3)
+                .chain(start)
+                .chain(target)
+                .chain(row)
+                .collect(),
+            scale,
+            fuel,
+            threat,
+            ..drawn
+        },
+    )
+}
+
+/// All lengths of a document times `scale`.
+fn scaled(value: &mut Value, scale: f64) {
+    const LENGTHS: [&str; 10] = [
+        "x",
+        "y",
+        "z",
+        "min",
+        "max",
+        "radius",
+        "influence",
+        "margin",
+        "top",
+        "base",
+    ];
+    match value {
+        Value::Object(members) => {
+            for (name, value) in members {
+                match value.as_f64() {
+                    Some(length) if LENGTHS.contains(&name.as_str()) => {
+                        *value = (length * scale).into();
+                    }
+                    _ => scaled(value, scale),
+                }
+            }
+        }
+        Value::Array(values) => values.iter_mut().for_each(|value| scaled(value, scale)),
+        _ => {}
+    }
 }
 
 fn rules() -> Rules {
@@ -121,28 +274,45 @@ fn rules() -> Rules {
 fn scenario(drawn: &Drawn) -> Option<Scenario> {
     let document = format!(
         r#"{{ "frame": "local",
-            "start": {{ "x": 80, "y": 120, "z": {} }}, "target": {{ "x": 920, "y": 840, "z": {} }},
+            "start": {{ "x": {}, "y": {}, "z": {} }}, "target": {{ "x": {}, "y": {}, "z": {} }},
             "area": {{ "min": {{ "x": 0, "y": 0 }}, "max": {{ "x": 1000, "y": 1000 }} }},
             "altitude": {{ "min": 0, "max": 200 }},
             "vehicle": {{ "max_turn_deg": 180, "max_climb_deg": 89, "fuel_per_km": 1000, "min_leg": 0.001 }},
             "weights": {{ "fuel": {}, "threat": {}, "altitude": {} }},
-            "planner": {{ "algorithm": "tms-sba", "waypoints": {} }},
+            "planner": {{ "algorithm": "tms-sba", "waypoints": {}, "parameters": {{ "quadrature": "{}" }} }},
             "threats": [{}] }}"#,
+        drawn.ends[0][0],
+        drawn.ends[0][1],
         drawn.heights[0],
+        drawn.ends[1][0],
+        drawn.ends[1][1],
         drawn.heights[1],
         drawn.fuel,
         drawn.threat,
         drawn.altitude,
         drawn.waypoints,
+        if drawn.is_sampled {
+            "paper"
+        } else {
+            "integral"
+        },
         drawn.threats.join(",\n")
     );
-    json::read(document.as_bytes(), &rules(), 1).ok()
+    let mut document: Value = serde_json::from_str(&document).expect("it is a document");
+    scaled(&mut document, drawn.scale);
+    json::read(document.to_string().as_bytes(), &rules(), 1).ok()
+}
+
+/// How many times as wide as a kilometre the area is.
+fn scale(scenario: &Scenario) -> f64 {
+    (scenario.area.max.x - scenario.area.min.x) / 1000.0
 }
 
 /// Total violation and cost of a route.
 fn price(model: &Model<'_>, route: &[Point3]) -> (f64, f64) {
     let mut violation = 0.0;
-    let figures = model.assess(route, Quadrature::Integral, model.tolerance, |breach| {
+    let quadrature = model.scenario.planner.quadrature;
+    let figures = model.assess(route, quadrature, model.tolerance, |breach| {
         // A bound knows nothing of turns.
         if breach.constraint != Constraint::Turn {
             violation += breach.amount;
@@ -154,9 +324,10 @@ fn price(model: &Model<'_>, route: &[Point3]) -> (f64, f64) {
 /// The cheapest way over a lattice, at one height.
 fn over_lattice(model: &Model<'_>, height: f64) -> Option<Vec<Point3>> {
     let [start, target] = [model.scenario.start, model.scenario.target];
+    let spacing = SPACING * scale(model.scenario);
     let node = |idx: usize| {
         let (column, row) = (idx % NODES, idx / NODES);
-        Point3::new(column as f64 * SPACING, row as f64 * SPACING, height)
+        Point3::new(column as f64 * spacing, row as f64 * spacing, height)
     };
     let at = |point: Point3| {
         (0..NODES * NODES)
@@ -237,6 +408,7 @@ fn cheapen(model: &Model<'_>, route: &mut Vec<Point3>, seed: u64) -> (f64, f64) 
     };
     let mut best = price(model, route);
     let free = route.len() - 2;
+    let scale = scale(model.scenario);
     for _ in 0..STEPS {
         let mut moved = route.clone();
         #[expect(
@@ -251,7 +423,7 @@ fn cheapen(model: &Model<'_>, route: &mut Vec<Point3>, seed: u64) -> (f64, f64) 
             reason = "0 to 2"
         )]
         let last = (first + (draw() * 3.0) as usize).min(free);
-        let size = 200.0 * libm::exp2(-17.0 * draw());
+        let size = scale * 200.0 * libm::exp2(-17.0 * draw());
         let way = nalgebra::Vector3::new(
             draw() - 0.5,
             draw() - 0.5,
@@ -259,7 +431,7 @@ fn cheapen(model: &Model<'_>, route: &mut Vec<Point3>, seed: u64) -> (f64, f64) 
         );
         for point in &mut moved[first..=last] {
             *point += way * size;
-            point.z = point.z.clamp(0.0, 200.0);
+            point.z = point.z.clamp(0.0, 200.0 * scale);
         }
         let price = price(model, &moved);
         if price.0 < best.0 || (price.0 <= best.0 && price.1 < best.1) {
@@ -273,16 +445,19 @@ fn cheapen(model: &Model<'_>, route: &mut Vec<Point3>, seed: u64) -> (f64, f64) 
 /// First ways: over the lattice at several heights, and along the strings.
 fn ways(model: &Model<'_>) -> Vec<Vec<Point3>> {
     let scenario = model.scenario;
+    let scale = scale(scenario);
     let mut ways: Vec<Vec<Point3>> = [5.0, 100.0, 195.0]
         .into_iter()
-        .filter_map(|height| over_lattice(model, height))
+        .filter_map(|height| over_lattice(model, scale * height))
         .collect();
     let hard = Obstacles::hard(scenario, |_, threat| {
         threat.top.is_none() && threat.base.is_none()
     });
     for string in taut_strings(&hard, 3).strings {
         let along = (0..=60).map(|i| string.at(f64::from(i) / 60.0));
-        let mut way: Vec<Point3> = along.map(|at| Point3::new(at.x, at.y, 100.0)).collect();
+        let mut way: Vec<Point3> = along
+            .map(|at| Point3::new(at.x, at.y, scale * 100.0))
+            .collect();
         way[0] = scenario.start;
         way[60] = scenario.target;
         ways.push(way);
@@ -295,17 +470,32 @@ proptest! {
 
     #[test]
     fn no_route_is_cheaper_than_the_bound(drawn in drawn()) {
-        let Some(scenario) = scenario(&drawn) else { return Ok(()) };
-        let model = Model::new(&scenario);
-        let bound = lower_bound(&scenario);
-        for way in ways(&model) {
-            let mut route = resample(&way, drawn.waypoints);
-            let (violation, cost) = cheapen(&model, &mut route, drawn.seed);
-            if violation <= 0.0 {
-                prop_assert!(cost >= bound, "{cost} is below the bound {bound}: {route:?}");
-            }
+        check(&drawn)?;
+    }
+
+    #[test]
+    fn no_route_is_cheaper_where_soft_zones_must_be_crossed(drawn in soft()) {
+        check(&drawn)?;
+    }
+}
+
+fn check(drawn: &Drawn) -> Result<(), TestCaseError> {
+    let Some(scenario) = scenario(drawn) else {
+        return Ok(());
+    };
+    let model = Model::new(&scenario);
+    let bound = lower_bound(&scenario);
+    for way in ways(&model) {
+        let mut route = resample(&way, drawn.waypoints);
+        let (violation, cost) = cheapen(&model, &mut route, drawn.seed);
+        if violation <= 0.0 {
+            prop_assert!(
+                cost >= bound,
+                "{cost} is below the bound {bound}: {route:?}"
+            );
         }
     }
+    Ok(())
 }
 
 /// Over hills the bound still holds, and steep ground is only ever a hint to seeds.

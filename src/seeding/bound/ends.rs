@@ -36,16 +36,19 @@ pub(super) fn are_too_many(walls: &[Wall]) -> bool {
     walls.iter().map(|wall| wall.centers().len()).sum::<usize>() > MOST_CORNERS
 }
 
-/// What no route undercuts that goes round `walls` widened to `radii`.
+/// What no route undercuts that goes round `walls` widened to radii, and costs `dense` or more seen
+/// from above.
 pub(super) fn bound(
     scenario: &Scenario,
     prices: &Prices,
-    walls: &[Wall],
-    radii: &[Option<f64>],
+    (walls, radii): (&[Wall], &[Option<f64>]),
+    dense: f64,
     stop: &dyn Fn() -> bool,
 ) -> f64 {
     let (string, _) = length(walls, radii, prices, (f64::INFINITY, stop));
-    let level = prices.climbing(string, prices.rise());
+    let level = prices
+        .climbing(string, prices.rise())
+        .max(prices.climbing_at(dense));
     let Terrain::Flat(ground) = scenario.terrain else {
         return level;
     };
@@ -75,7 +78,7 @@ pub(super) fn bound(
         price: 4 + corners + corners * corners / 10,
         stop,
     });
-    level.max(with_legs(legs, prices.fuel * string))
+    level.max(with_legs(legs, dense.max(prices.fuel * string)))
 }
 
 /// The least of `cost + steepness` over all 2-D costs of `least` or more: a route of a certain cost

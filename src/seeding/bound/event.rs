@@ -82,7 +82,7 @@ fn dip(idx: usize, wall: &Wall, prices: &Prices) -> Event {
 }
 
 /// Integral of `(depth - slope u)_+` for u from 0 to `way`.
-fn ramp(depth: f64, slope: f64, way: f64) -> f64 {
+pub(super) fn ramp(depth: f64, slope: f64, way: f64) -> f64 {
     if depth <= 0.0 {
         return 0.0;
     }

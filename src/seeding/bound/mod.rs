@@ -3,16 +3,18 @@
 //! Seen from above, a soft zone costs so much that going through it is never cheaper than going
 //! round it: its threat can be widened and counts as hard. The string round the widened threats,
 //! priced by its fuel, is then a lower bound for all routes that pass none of the few places where
-//! that argument has a gap, and those places are priced one by one.
+//! that argument has a gap, and those places are priced one by one. Where soft zones must be crossed, a
+//! potential in the field of all prices proves more; the better of both counts.
 
 mod ends;
 mod event;
+mod potential;
 mod wall;
 
 use std::cell::Cell;
 
 use super::obstacles::Obstacles;
-use super::taut::{Limits, taut_strings_within};
+use super::taut::{Limits, TautString, taut_strings_within};
 use crate::cost::{Tolerance, metre};
 use crate::geometry::Point3;
 use crate::scenario::{Quadrature, Scenario};
@@ -31,6 +33,9 @@ const MOST_WAYS_IN_ALL: usize = 120_000;
 
 /// Bisections on the number of events that a cheaper route may make use of.
 const MOST_LEVELS: usize = 24;
+
+/// Where the string itself is not this many times as dear as what is known, a potential promises nothing.
+const WORTHWHILE: f64 = 1.02;
 
 /// What a metre costs, and where it is flown.
 #[derive(Debug, Clone, Copy)]
@@ -75,6 +80,12 @@ impl Prices {
         self.fuel * (length * length + vertical * vertical).sqrt()
     }
 
+    /// Least cost of a way with the rise of the ends that costs so much seen from above.
+    fn climbing_at(&self, cost: f64) -> f64 {
+        let rise = self.fuel * self.rise();
+        (cost * cost + rise * rise).sqrt()
+    }
+
     /// Length, seen from above, of a way that costs `cost` with the rise of the ends, or a hair more.
     fn length_of(&self, cost: f64) -> f64 {
         let slant = cost / self.fuel;
@@ -110,8 +121,18 @@ pub fn lower_bound_until(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
 /// cost less, and without the others no route is cheaper.
 fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) -> f64 {
     let walls = wall::walls(scenario, prices);
+    // Seen from above, where the string with these radii is so dear that it could be more than `known`.
+    let across = |radii: &[Option<f64>], known: f64| {
+        if known.is_finite() && known < price_of_string(&walls, radii, prices, stop) / WORTHWHILE {
+            potential::bound(&walls, prices, &scenario.area, known, stop)
+        } else {
+            0.0
+        }
+    };
     let Some(events) = event::events(&walls, prices) else {
-        return plain(&walls, prices, stop);
+        let radii = cores(&walls);
+        let proven = plain(&walls, &radii, prices, stop);
+        return proven.max(prices.climbing_at(across(&radii, proven)));
     };
     let field = Field {
         scenario,
@@ -156,12 +177,14 @@ fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) ->
             usize::midpoint(low, high)
         };
     }
+    let dense = across(&field.radii(&events[..best]), proven);
+    proven = proven.max(prices.climbing_at(dense));
     if ends::are_too_many(&walls) {
         return proven;
     }
     // The legs of start and target make it dearer still, at times dearer than the next event.
     for _ in 0..2 {
-        let steep = field.steep(&events[..best]);
+        let steep = field.steep(&events[..best], dense);
         proven = proven.max(steep.min(cost_of(&events, best)));
         let affordable = events.partition_point(|event| event.cost < steep);
         if affordable <= best {
@@ -178,13 +201,36 @@ fn cost_of(events: &[Event], level: usize) -> f64 {
 }
 
 /// Without widening anything: where there are too many gaps to look at.
-fn plain(walls: &[Wall], prices: &Prices, stop: &dyn Fn() -> bool) -> f64 {
-    let radii: Vec<Option<f64>> = walls
-        .iter()
-        .map(|wall| wall.toll.is_none().then_some(wall.core))
-        .collect();
-    let (length, _) = length(walls, &radii, prices, (f64::INFINITY, stop));
+fn plain(walls: &[Wall], radii: &[Option<f64>], prices: &Prices, stop: &dyn Fn() -> bool) -> f64 {
+    let (length, _) = length(walls, radii, prices, (f64::INFINITY, stop));
     prices.climbing(length, prices.rise())
+}
+
+/// Radii of nothing but cores.
+fn cores(walls: &[Wall]) -> Vec<Option<f64>> {
+    let radius = |wall: &Wall| wall.toll.is_none().then_some(wall.core);
+    walls.iter().map(radius).collect()
+}
+
+/// What the string round `walls` widened to `radii` costs with all its soft zones, about: more than that
+/// cannot be proven by prices.
+fn price_of_string(
+    walls: &[Wall],
+    radii: &[Option<f64>],
+    prices: &Prices,
+    stop: &dyn Fn() -> bool,
+) -> f64 {
+    if prices.exposure <= 0.0 {
+        return 0.0;
+    }
+    let limits = Limits {
+        most_ways: MOST_WAYS,
+        enough: f64::INFINITY,
+        stop,
+    };
+    let found = taut_strings_within(&scene(walls, radii, prices), 1, limits);
+    let price = |string: &TautString| prices.climbing_at(potential::price(walls, prices, string));
+    found.strings.first().map_or(f64::INFINITY, price)
 }
 
 /// Length of the string round `walls` widened to `radii` (`None` leaves one out), metres, less what
@@ -196,16 +242,19 @@ fn length(
     prices: &Prices,
     (enough, stop): (f64, &dyn Fn() -> bool),
 ) -> (f64, usize) {
+    let slack = slack(walls, radii, prices);
+    let (shortest, ways) = shortest(&scene(walls, radii, prices), (enough + slack, stop));
+    // Where little is paid for fuel and much for soft zones, corners may be worth more than the way.
+    ((shortest - slack).max(0.0), ways)
+}
+
+fn scene(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> Obstacles {
     let outlines = walls.iter().zip(radii);
-    let scene = Obstacles::new(
+    Obstacles::new(
         outlines.map(|(wall, radius)| radius.map(|radius| wall.outline(radius))),
         prices.ends.map(|end| end.xy()),
         None,
-    );
-    let slack = slack(walls, radii, prices);
-    let (shortest, ways) = shortest(&scene, (enough + slack, stop));
-    // Where little is paid for fuel and much for soft zones, corners may be worth more than the way.
-    ((shortest - slack).max(0.0), ways)
+    )
 }
 
 fn slack(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> f64 {
@@ -268,10 +317,12 @@ impl Field<'_> {
         tame.max(with.min(cost(&self.radii(&[]))))
     }
 
-    /// As `level`, by the legs that begin at the start and end at the target.
-    fn steep(&self, allowed: &[Event]) -> f64 {
+    /// As `level`, by the legs that begin at the start and end at the target; no route costs less than
+    /// `dense` seen from above.
+    fn steep(&self, allowed: &[Event], dense: f64) -> f64 {
         let radii = self.radii(allowed);
-        ends::bound(self.scenario, self.prices, self.walls, &radii, self.stop)
+        let walls = (self.walls, &radii[..]);
+        ends::bound(self.scenario, self.prices, walls, dense, self.stop)
     }
 
     /// How far each wall may be widened so that it counts as hard whatever `allowed` events happen.

@@ -74,11 +74,10 @@ impl Model<'_> {
                 Quadrature::Integral => encounter.exposure,
                 Quadrature::Paper => sampled_exposure(threat, leg),
             };
-            let depth = encounter.clearance.map_or(0.0, |clearance| -clearance);
-            if depth > tolerance.length_m {
+            if encounter.depth > tolerance.length_m {
                 report(Breach {
                     threat: Some(threat_idx),
-                    ..Breach::on_leg(Constraint::Threat, leg_idx, depth)
+                    ..Breach::on_leg(Constraint::Threat, leg_idx, encounter.depth)
                 });
             }
         }

@@ -1,5 +1,7 @@
 //! What is measured of a delivered route, continuously and not at samples.
 
+use std::borrow::Cow;
+
 use super::{Clearance, Leg, Measures, Violation};
 use crate::cost::{Breach, Constraint, Model, turns};
 use crate::geometry::{Point3, Segment};
@@ -21,6 +23,7 @@ pub(super) fn legs(route: &[Point3]) -> Vec<Leg> {
 pub(super) fn measure(model: &Model, route: &[Point3]) -> Measures {
     let threats = model.scenario.threats.iter().enumerate();
     let flown = flown(route);
+    let every_leg: Vec<usize> = (0..route.len() - 1).collect();
     let heights = segments(route)
         .filter_map(|leg| model.free_heights(&leg))
         .reduce(HeightRange::join);
@@ -32,7 +35,7 @@ pub(super) fn measure(model: &Model, route: &[Point3]) -> Measures {
             .map(|(threat_idx, threat)| Clearance {
                 threat: threat_idx,
                 name: threat.name.clone(),
-                distance: least_clearance(threat, route, &flown),
+                distance: least_clearance(threat, route, &flown, &every_leg),
             })
             .collect(),
         min_agl: heights.map(|range| range.min),
@@ -102,14 +105,23 @@ fn flown(route: &[Point3]) -> Vec<f64> {
 
 /// The least clearance of the legs of `route`, by branch and bound: no point is nearer to a threat
 /// than a point in its neighbourhood less the way between them.
-fn least_clearance(threat: &Threat, route: &[Point3], flown: &[f64]) -> Option<f64> {
+fn least_clearance(
+    threat: &Threat,
+    route: &[Point3],
+    flown: &[f64],
+    every_leg: &[usize],
+) -> Option<f64> {
     let leg = |idx: usize| Segment {
         a: route[idx],
         b: route[idx + 1],
     };
-    let at_its_height: Vec<usize> = (0..route.len() - 1)
-        .filter(|&idx| leg(idx).between_heights(threat.base, threat.top).is_some())
-        .collect();
+    let is_at_its_height =
+        |&idx: &usize| leg(idx).between_heights(threat.base, threat.top).is_some();
+    let at_its_height = if threat.base.is_none() && threat.top.is_none() {
+        Cow::Borrowed(every_leg)
+    } else {
+        Cow::Owned(every_leg.iter().copied().filter(is_at_its_height).collect())
+    };
     let mut least = f64::INFINITY;
     // Runs of those legs, with what their clearance is at least.
     let mut open = vec![(&at_its_height[..], f64::NEG_INFINITY)];

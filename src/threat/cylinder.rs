@@ -202,7 +202,7 @@ mod tests {
             None
         );
         let below = threat.encounter(&leg([-9.0, 0.0, 99.0], [9.0, 0.0, 99.0]));
-        assert!((below.clearance.expect("it is below the top") + 5.0).abs() < 1e-12);
+        assert!((below.depth - 5.0).abs() < 1e-12);
         assert!(below.exposure > 0.0);
     }
 

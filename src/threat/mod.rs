@@ -8,6 +8,7 @@ mod polygon;
 
 pub use cylinder::Cylinder;
 pub use polygon::Polygon;
+pub(crate) use polygon::Zone;
 
 use crate::geometry::{Point2, Point3, Rect, Segment};
 
@@ -36,17 +37,16 @@ pub enum Shape {
 /// How one leg fares with one threat.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Encounter {
-    /// Least horizontal distance to the boundary, metres, negative inside; `None` when the leg is
-    /// never between base and top.
-    pub clearance: Option<f64>,
+    /// How far the leg goes beyond the boundary, horizontally, metres; not above 0 where it does not.
+    pub depth: f64,
     /// Integral of `T(d)` along the leg, Eq. 4-5, square metres.
     pub exposure: f64,
 }
 
 impl Encounter {
-    /// With a threat whose soft zone the leg never reaches; the distance is not known exactly.
+    /// With a threat whose soft zone the leg never reaches.
     const FAR: Self = Self {
-        clearance: None,
+        depth: 0.0,
         exposure: 0.0,
     };
 }
@@ -94,7 +94,7 @@ impl Threat {
         })
     }
 
-    /// Clearance and exposure at once, cheaply nothing when `leg` is beyond the soft zone.
+    /// Depth and exposure at once, cheaply nothing when `leg` is beyond the soft zone.
     #[must_use]
     pub fn encounter(&self, leg: &Segment) -> Encounter {
         let reached = match &self.shape {
@@ -109,15 +109,12 @@ impl Threat {
         };
         match &self.shape {
             Shape::Cylinder(cylinder) => Encounter {
-                clearance: Some(cylinder.clearance(leg, window)),
+                depth: -cylinder.clearance(leg, window),
                 exposure: cylinder.exposure(leg, window),
             },
             Shape::Polygon(polygon) => {
-                let (clearance, exposure) = polygon.encounter(leg, window);
-                Encounter {
-                    clearance: Some(clearance),
-                    exposure,
-                }
+                let (depth, exposure) = polygon.encounter(leg, window);
+                Encounter { depth, exposure }
             }
         }
     }

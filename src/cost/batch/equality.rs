@@ -117,8 +117,12 @@ impl Choices {
             let corner = |angle: f64, away: f64| {
                 center + nalgebra::Vector2::new(libm::cos(angle), libm::sin(angle)) * away
             };
-            let corners =
-                (0..5).map(|i| corner(1.2 * f64::from(i), size * self.between(20.0, 90.0)));
+            // Some that are convex, some with bays narrower and wider than their soft zones.
+            let count = 3.0 + (9.0 * self.share()).floor();
+            let least = if self.one_in(3.0) { 85.0 } else { 20.0 };
+            let step = std::f64::consts::TAU / count;
+            let angles = (0..12).map(f64::from).take_while(|idx| *idx < count);
+            let corners = angles.map(|idx| corner(step * idx, size * self.between(least, 90.0)));
             Shape::Polygon(Polygon::new(
                 corners.collect(),
                 size * self.between(0.0, 40.0),

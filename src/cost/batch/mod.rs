@@ -2,7 +2,7 @@
 //!
 //! [`Pricer`] asks of [`LANES`] routes side by side what [`Model::assess`] asks of one, and comes to
 //! the same within rounding: what it cannot settle in lanes (a leg that breaks the band above a grid,
-//! a polygon nearby) it leaves to the scalar code, lane by lane. A lane's bits depend on its own route alone,
+//! that enters a polygon) it leaves to the scalar code, lane by lane. A lane's bits depend on its own route alone,
 //! not on its neighbours nor on the width of the processor.
 
 #[cfg(test)]
@@ -12,6 +12,7 @@ mod index;
 mod leg;
 mod peaks;
 mod pyramid;
+mod rings;
 mod route;
 mod stretch;
 mod suspects;

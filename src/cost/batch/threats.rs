@@ -1,13 +1,14 @@
-//! Eq. 4-5 in lanes: discs in closed form, rings by the scalar code where a lane is near.
+//! Eq. 4-5 in lanes: discs in closed form, rings in `rings.rs`.
 
 use pulp::Simd;
 
 use super::Pricer;
 use super::index::Index;
 use super::leg::{Leg, Sight};
-use crate::cost::threat::{SAMPLES, sampled_exposure};
+use super::rings::Ring;
+use crate::cost::threat::SAMPLES;
+use crate::geometry::LEVEL;
 use crate::geometry::lane::{Lane, Mask};
-use crate::geometry::{LEVEL, Rect};
 use crate::scenario::{Quadrature, Scenario};
 use crate::threat::{Cylinder, Shape, Threat};
 
@@ -29,13 +30,18 @@ pub(super) struct Threats {
 #[derive(Debug, Clone)]
 enum Outline {
     Disc(Disc),
-    Ring(Rect),
+    Ring(Ring),
 }
 
-/// A disc between two heights, infinite where it has no limit.
 #[derive(Debug, Clone, Copy)]
 struct Disc {
     outline: Cylinder,
+    span: Span,
+}
+
+/// The heights that a threat reaches over, infinite where it has no limit.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Span {
     base: f64,
     top: f64,
     limited: bool,
@@ -46,11 +52,12 @@ struct Disc {
 pub(super) struct Candidates(Vec<u32>);
 
 /// The part of each leg between the heights of a threat.
-struct Window<S: Simd> {
-    t0: Lane<S>,
-    t1: Lane<S>,
+#[derive(Clone, Copy)]
+pub(super) struct Window<S: Simd> {
+    pub(super) t0: Lane<S>,
+    pub(super) t1: Lane<S>,
     /// Where there is one.
-    some: Mask<S>,
+    pub(super) some: Mask<S>,
 }
 
 impl Threats {
@@ -58,11 +65,11 @@ impl Threats {
         let outline = |threat: &Threat| match &threat.shape {
             Shape::Cylinder(cylinder) => Outline::Disc(Disc {
                 outline: *cylinder,
-                base: threat.base.unwrap_or(f64::NEG_INFINITY),
-                top: threat.top.unwrap_or(f64::INFINITY),
-                limited: threat.base.is_some() || threat.top.is_some(),
+                span: Span::of(threat),
             }),
-            Shape::Polygon(_) => Outline::Ring(threat.extent()),
+            Shape::Polygon(polygon) => {
+                Outline::Ring(Ring::of(polygon, threat.extent(), Span::of(threat)))
+            }
         };
         let many = scenario.threats.len() > FEW_THREATS;
         Self {
@@ -108,7 +115,7 @@ impl Pricer<'_> {
     ) {
         match &self.threats.all[threat_idx] {
             Outline::Disc(disc) => self.disc(disc, leg, exposure, violation),
-            Outline::Ring(extent) => self.ring(threat_idx, extent, leg, exposure, violation),
+            Outline::Ring(ring) => self.ring(threat_idx, ring, leg, exposure, violation),
         }
     }
 
@@ -131,7 +138,7 @@ impl Pricer<'_> {
         if !near.any() {
             return;
         }
-        let window = disc.window(leg);
+        let window = disc.span.window(leg);
         let near = near & window.some;
         let nearest = sight.least_squared_distance(window.t0, window.t1);
         let entered = near & nearest.lt(leg.splat(outline.radius * outline.radius));
@@ -142,60 +149,28 @@ impl Pricer<'_> {
         }
         let crossed = match self.quadrature {
             Quadrature::Integral if (!leg.moves).any() => leg.moves.select(
-                disc.exposure(leg, &window, &sight),
+                exposure_within(outline.influence, leg, &window, &sight),
                 disc.hover_exposure(leg, &window, &sight),
             ),
-            Quadrature::Integral => disc.exposure(leg, &window, &sight),
+            Quadrature::Integral => exposure_within(outline.influence, leg, &window, &sight),
             Quadrature::Paper => disc.sampled_exposure(leg, &sight),
         };
         *exposure = *exposure + near.keep(crossed);
     }
-
-    /// A ring is rarely near; then it is left to the scalar code.
-    #[inline(always)]
-    fn ring<S: Simd>(
-        &self,
-        threat_idx: usize,
-        extent: &Rect,
-        leg: &Leg<S>,
-        exposure: &mut Lane<S>,
-        violation: &mut Lane<S>,
-    ) {
-        let overlap = leg.a.x.min(leg.b.x).le(leg.splat(extent.max.x))
-            & leg.splat(extent.min.x).le(leg.a.x.max(leg.b.x))
-            & leg.a.y.min(leg.b.y).le(leg.splat(extent.max.y))
-            & leg.splat(extent.min.y).le(leg.a.y.max(leg.b.y));
-        if !overlap.any() {
-            return;
-        }
-        let threat = &self.model.scenario.threats[threat_idx];
-        let mut depths = leg.splat(0.0);
-        let met = overlap.map(|lane| {
-            let segment = leg.segment(lane);
-            let encounter = threat.encounter(&segment);
-            let depth = encounter.clearance.map_or(0.0, |clearance| -clearance);
-            depths = depths.set(
-                lane,
-                if depth > self.tolerance.length_m {
-                    depth
-                } else {
-                    0.0
-                },
-            );
-            match self.quadrature {
-                Quadrature::Integral => encounter.exposure,
-                Quadrature::Paper => sampled_exposure(threat, &segment),
-            }
-        });
-        *exposure = *exposure + met;
-        *violation = *violation + depths;
-    }
 }
 
-impl Disc {
+impl Span {
+    fn of(threat: &Threat) -> Self {
+        Self {
+            base: threat.base.unwrap_or(f64::NEG_INFINITY),
+            top: threat.top.unwrap_or(f64::INFINITY),
+            limited: threat.base.is_some() || threat.top.is_some(),
+        }
+    }
+
     /// As `Segment::between_heights`.
     #[inline(always)]
-    fn window<S: Simd>(&self, leg: &Leg<S>) -> Window<S> {
+    pub(super) fn window<S: Simd>(&self, leg: &Leg<S>) -> Window<S> {
         let (zero, one) = (leg.splat(0.0), leg.splat(1.0));
         if !self.limited {
             return Window {
@@ -218,33 +193,9 @@ impl Disc {
             some: some & enter.le(leave),
         }
     }
+}
 
-    /// As `Cylinder::exposure`, of legs that move. The difference of the two asinh is one
-    /// logarithm: with `d0`, `d1` the distances of the ends of a chord of length `c` from the axis,
-    /// the integral of `1 / d` along it is `ln((d0 + d1 + c) / (d0 + d1 - c))`.
-    #[inline(always)]
-    fn exposure<S: Simd>(&self, leg: &Leg<S>, window: &Window<S>, sight: &Sight<S>) -> Lane<S> {
-        let zero = leg.splat(0.0);
-        let influence = self.outline.influence;
-        let across = (sight.x * leg.dy - sight.y * leg.dx) * leg.inverse;
-        let across_square = across * across;
-        let half_square = leg.splat(influence * influence) - across_square;
-        let half_chord = half_square.max(zero).sqrt();
-        let s0 = ((window.t0 - sight.foot) * leg.level).max(-half_chord);
-        let s1 = ((window.t1 - sight.foot) * leg.level).min(half_chord);
-        let chord = s1 - s0;
-        let d0 = (across_square + s0 * s0).sqrt();
-        let d1 = (across_square + s1 * s1).sqrt();
-        let (over, under) = (d0 + d1 + chord, d0 + d1 - chord);
-        let logarithm = over.ln_over(under.max(over * (1.0 / LARGEST_QUOTIENT)));
-        let logarithm = leg
-            .splat(LEVEL)
-            .le(across.abs())
-            .keep(across_square * logarithm);
-        let integral = chord * influence - (s1 * d1 - s0 * d0 + logarithm) * 0.5;
-        (zero.lt(half_square) & s0.lt(s1)).keep(integral * (leg.length * leg.inverse))
-    }
-
+impl Disc {
     /// As `exposure`, of legs that only climb.
     #[inline(always)]
     fn hover_exposure<S: Simd>(
@@ -263,7 +214,7 @@ impl Disc {
         let mut sum = leg.splat(0.0);
         for t in SAMPLES {
             let z = leg.a.z + leg.dz * t;
-            let reached = leg.splat(self.base).le(z) & z.lt(leg.splat(self.top));
+            let reached = leg.splat(self.span.base).le(z) & z.lt(leg.splat(self.span.top));
             sum = sum + reached.keep(self.intensity(sight, leg.splat(t)));
         }
         sum * (1.0 / SAMPLES.len() as f64) * leg.length
@@ -275,4 +226,34 @@ impl Disc {
         let distance = sight.squared_distance(t).sqrt();
         (t.with(self.outline.influence) - distance).max(t.with(0.0))
     }
+}
+
+/// As `Cylinder::exposure` of a soft zone that ends `influence` metres from a point, of legs that move. The difference of the two asinh is one
+/// logarithm: with `d0`, `d1` the distances of the ends of a chord of length `c` from the axis,
+/// the integral of `1 / d` along it is `ln((d0 + d1 + c) / (d0 + d1 - c))`.
+#[inline(always)]
+pub(super) fn exposure_within<S: Simd>(
+    influence: f64,
+    leg: &Leg<S>,
+    window: &Window<S>,
+    sight: &Sight<S>,
+) -> Lane<S> {
+    let zero = leg.splat(0.0);
+    let across = (sight.x * leg.dy - sight.y * leg.dx) * leg.inverse;
+    let across_square = across * across;
+    let half_square = leg.splat(influence * influence) - across_square;
+    let half_chord = half_square.max(zero).sqrt();
+    let s0 = ((window.t0 - sight.foot) * leg.level).max(-half_chord);
+    let s1 = ((window.t1 - sight.foot) * leg.level).min(half_chord);
+    let chord = s1 - s0;
+    let d0 = (across_square + s0 * s0).sqrt();
+    let d1 = (across_square + s1 * s1).sqrt();
+    let (over, under) = (d0 + d1 + chord, d0 + d1 - chord);
+    let logarithm = over.ln_over(under.max(over * (1.0 / LARGEST_QUOTIENT)));
+    let logarithm = leg
+        .splat(LEVEL)
+        .le(across.abs())
+        .keep(across_square * logarithm);
+    let integral = chord * influence - (s1 * d1 - s0 * d0 + logarithm) * 0.5;
+    (zero.lt(half_square) & s0.lt(s1)).keep(integral * (leg.length * leg.inverse))
 }

@@ -2,17 +2,28 @@
 //!
 //! Deliberately absent: which feature of the ring is nearest along a leg, see [`nearest`].
 
+mod depth;
 mod nearest;
+mod zones;
 
 use super::{Cylinder, hover_exposure, intensity};
 use crate::geometry::{LEVEL, Point2, Rect, Segment, ring};
-use nearest::{Kind, Piece, clearance_of, cut};
+pub(crate) use zones::Zone;
+
+use nearest::{Edge, Feature, Kind, Piece, clearance_of, cut};
 
 /// A simple ring that is never entered, and a soft zone outside it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polygon {
     vertices: Vec<Point2>,
+    edges: Vec<Edge>,
+    is_convex: bool,
+    /// `None` where no part of the soft zone is known to belong to one edge or corner.
+    zones: Option<Vec<Zone>>,
     margin: f64,
+    /// Round the ring itself.
+    bounds: Rect,
+    /// Round the soft zone.
     extent: Rect,
 }
 
@@ -24,13 +35,17 @@ impl Polygon {
     /// Without vertices.
     #[must_use]
     pub fn new(vertices: Vec<Point2>, margin: f64) -> Self {
-        let extent = Rect::around(vertices.iter().copied())
-            .expect("a ring has vertices")
-            .grown(margin);
+        let bounds = Rect::around(vertices.iter().copied()).expect("a ring has vertices");
+        let edges = nearest::edges(&vertices);
+        let is_convex = depth::is_convex(&edges);
         Self {
+            is_convex,
+            zones: zones::zones(&vertices, is_convex, margin),
+            extent: bounds.grown(margin),
+            bounds,
             vertices,
+            edges,
             margin,
-            extent,
         }
     }
 
@@ -46,13 +61,27 @@ impl Polygon {
         self.margin
     }
 
+    /// Which part of the soft zone belongs to which edge and corner, where that is known.
+    pub(crate) fn zones(&self) -> Option<&[Zone]> {
+        self.zones.as_deref()
+    }
+
+    /// The box round the ring without its soft zone.
+    pub(crate) fn bounds(&self) -> Rect {
+        self.bounds
+    }
+
     pub(super) fn extent(&self) -> Rect {
         self.extent
     }
 
     /// Whether `point` is strictly inside, by the even-odd rule.
     pub(super) fn contains(&self, point: Point2) -> bool {
-        ring::contains(&self.vertices, point) && self.ring_distance(point) > 0.0
+        let bounds = &self.bounds;
+        (bounds.min.x <= point.x && point.x <= bounds.max.x)
+            && (bounds.min.y <= point.y && point.y <= bounds.max.y)
+            && ring::contains(&self.vertices, point)
+            && self.ring_distance(point) > 0.0
     }
 
     pub(super) fn intensity(&self, point: Point2) -> f64 {
@@ -64,7 +93,7 @@ impl Polygon {
         intensity(self.margin, distance)
     }
 
-    /// Whether the box round `leg` meets the box round the soft zone, and its line the soft zone.
+    /// Whether the box round `leg` meets the box round the soft zone.
     pub(super) fn may_reach(&self, leg: &Segment) -> bool {
         let box_of = |low: f64, high: f64, min: f64, max: f64| low <= max && high >= min;
         box_of(
@@ -77,20 +106,7 @@ impl Polygon {
             leg.a.y.max(leg.b.y),
             self.extent.min.y,
             self.extent.max.y,
-        ) && self.line_may_reach(leg)
-    }
-
-    /// Whether the ring does not lie wholly to one side of the line of `leg`, beyond the margin.
-    fn line_may_reach(&self, leg: &Segment) -> bool {
-        let way = leg.b.xy() - leg.a.xy();
-        let reach = self.margin * way.norm();
-        let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
-        for vertex in &self.vertices {
-            let across = way.perp(&(vertex - leg.a.xy()));
-            least = least.min(across);
-            greatest = greatest.max(across);
-        }
-        least <= reach && greatest >= -reach
+        )
     }
 
     /// Distance to the ring, metres, negative inside.
@@ -116,27 +132,49 @@ impl Polygon {
         self.encounter(leg, window).1
     }
 
-    /// Clearance and exposure of the part `window` of `leg`.
+    /// How deep the part `window` of `leg` goes into the ring, 0 where it does not, and its exposure. Features
+    /// farther away than the soft zone is wide are not looked at.
     pub(super) fn encounter(&self, leg: &Segment, window: (f64, f64)) -> (f64, f64) {
-        let pieces = self.pieces(leg, window);
-        let clearance = clearance_of(&pieces, leg, &self.vertices);
-        let exposure = if self.margin <= 0.0 {
-            0.0
-        } else if leg.horizontal_length() < LEVEL {
-            hover_exposure(leg, window, |point| self.intensity(point))
-        } else {
-            pieces
-                .iter()
-                .map(|piece| self.piece_exposure(leg, piece))
-                .sum()
-        };
-        (clearance, exposure)
+        if window.0 >= window.1 {
+            // A single point, as of a leg that only just rises to the base.
+            let depth = -self.distance(leg.at(window.0).xy());
+            return (depth.max(0.0), 0.0);
+        }
+        let near = nearest::features_near(&self.edges, leg, window, self.margin);
+        // Sides are not told by the nearest features: where edges are nearly in line, rounding may
+        // take one for another beside a vertex, and with it the crossing.
+        let crossings = nearest::crossings(&near, window);
+        let length = leg.horizontal_length();
+        let is_exposed = self.margin > 0.0 && length >= LEVEL && !near.is_empty();
+        let (mut depth, mut exposure, mut from) = (0.0_f64, 0.0, window.0);
+        for to in crossings.into_iter().chain([window.1]) {
+            if self.contains(leg.at(0.5 * (from + to)).xy()) {
+                depth = depth.max(self.depth(leg, (from, to)));
+                exposure += self.margin * (to - from) * leg.length();
+            } else if is_exposed && to > from {
+                exposure += self
+                    .exposure_outside(leg, (from, to))
+                    .unwrap_or_else(|| self.exposure_among(&near, leg, (from, to)));
+            }
+            from = to;
+        }
+        if length < LEVEL && self.margin > 0.0 {
+            exposure = hover_exposure(leg, window, |point| self.intensity(point));
+        }
+        (depth, exposure)
     }
 
+    /// Exposure of the part `window` of `leg`, outside of the ring, wherever one of `features` is the nearest.
+    fn exposure_among(&self, features: &[Feature], leg: &Segment, window: (f64, f64)) -> f64 {
+        let mut exposure = 0.0;
+        cut(features, window, leg.horizontal_length(), &mut |piece| {
+            exposure += self.piece_exposure(leg, &piece);
+        });
+        exposure
+    }
+
+    /// Of a piece outside of the ring.
     fn piece_exposure(&self, leg: &Segment, piece: &Piece) -> f64 {
-        if piece.inside {
-            return self.margin * (piece.t1 - piece.t0) * leg.length();
-        }
         if let Kind::Vertex(center) = piece.nearest.kind {
             let corner = Cylinder {
                 center,
@@ -167,9 +205,11 @@ impl Polygon {
     /// The part `window` of `leg` in order, cut where the nearest feature of the ring changes and
     /// where the leg crosses the ring.
     fn pieces(&self, leg: &Segment, window: (f64, f64)) -> Vec<Piece> {
-        let features = nearest::features(&self.vertices, leg);
+        let features = nearest::features(&self.edges, leg);
         let mut pieces = Vec::new();
-        cut(&features, window, leg.horizontal_length(), &mut pieces);
+        cut(&features, window, leg.horizontal_length(), &mut |piece| {
+            pieces.push(piece);
+        });
         if window.0 >= window.1 {
             // A single point, as of a leg that only just rises to the base.
             let inside = self.contains(leg.at(window.0).xy());
@@ -178,8 +218,6 @@ impl Polygon {
             }
             return pieces;
         }
-        // Sides are not told by the nearest features: where edges are nearly in line, rounding may
-        // take one for another beside a vertex, and with it the crossing.
         let crossings = nearest::crossings(&features, window);
         let mut from = window.0;
         for to in crossings.into_iter().chain([window.1]) {

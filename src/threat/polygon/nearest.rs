@@ -4,8 +4,36 @@
 //! vertices and edges, whose squares are quadratics of the leg's parameter. [`cut`] cuts a leg where
 //! the nearest feature changes; on each piece everything has a closed form.
 
+use nalgebra::Vector2;
+
 use crate::geometry::{LEVEL, Point2, Quadratic, Segment, ring};
 use crate::threat::Cylinder;
+
+/// An edge of a ring, as it is asked for again and again.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Edge {
+    /// The vertex where it begins.
+    pub(super) a: Point2,
+    /// Unit vector from there along it.
+    pub(super) along: Vector2<f64>,
+    pub(super) length: f64,
+}
+
+impl Edge {
+    fn between((a, b): (Point2, Point2)) -> Self {
+        let length = (b - a).norm();
+        Self {
+            a,
+            along: (b - a) / length,
+            length,
+        }
+    }
+}
+
+/// The edges of the ring through `vertices`.
+pub(super) fn edges(vertices: &[Point2]) -> Vec<Edge> {
+    ring::edges(vertices).map(Edge::between).collect()
+}
 
 /// The nearest feature of the ring along a part of a leg.
 #[derive(Debug, Clone, Copy)]
@@ -47,24 +75,64 @@ const FEW_FEATURES: usize = 24;
 /// Parts of a leg shorter than this share of it are not cut further.
 const SHORTEST_PIECE: f64 = 1e-12;
 
-/// The vertices and edges of the ring through `vertices`, as seen from `leg`.
-pub(super) fn features(vertices: &[Point2], leg: &Segment) -> Vec<Feature> {
-    let mut features = Vec::with_capacity(2 * vertices.len());
-    for (a, b) in ring::edges(vertices) {
-        features.push(Feature {
-            kind: Kind::Vertex(a),
-            squared: leg.squared_distance_to(a),
-            valid: (f64::NEG_INFINITY, f64::INFINITY),
-        });
-        features.extend(edge_feature(leg, a, b));
+/// Added to a distance in metres and, times 1e-8, to it for each metre of a leg, so that neither rounding nor
+/// [`NO_TIME`] hides what is as near.
+const HAIR: f64 = 1e-6;
+
+/// The vertices and edges of a ring, as seen from `leg`.
+pub(super) fn features(edges: &[Edge], leg: &Segment) -> Vec<Feature> {
+    let mut features = Vec::with_capacity(2 * edges.len());
+    for edge in edges {
+        edge.add_to(&mut features, leg);
     }
     features
 }
 
-/// The line through `a` and `b` as seen from `leg`, valid where the leg projects between them.
-fn edge_feature(leg: &Segment, a: Point2, b: Point2) -> Option<Feature> {
-    let length = (b - a).norm();
-    let along = (b - a) / length;
+/// Those that come within `reach` metres of the part `window` of `leg`, and maybe some more.
+pub(super) fn features_near(
+    edges: &[Edge],
+    leg: &Segment,
+    window: (f64, f64),
+    reach: f64,
+) -> Vec<Feature> {
+    let (from, to) = (leg.at(window.0).xy(), leg.at(window.1).xy());
+    let way = to - from;
+    let length = way.norm();
+    let reach = reach + HAIR + 1e-8 * length;
+    let beyond = |u: f64, v: f64, low: f64, high: f64| u.max(v) < low || u.min(v) > high;
+    let mut features = Vec::new();
+    for edge in edges {
+        let (u, v) = (from - edge.a, to - edge.a);
+        let (across0, across1) = (edge.along.perp(&u), edge.along.perp(&v));
+        let (along0, along1) = (edge.along.dot(&u), edge.along.dot(&v));
+        // Beside either line, or before or behind the edge.
+        let off = u.perp(&way);
+        let off_end = off - edge.length * edge.along.perp(&way);
+        let far = beyond(across0, across1, -reach, reach)
+            || beyond(along0, along1, -reach, edge.length + reach)
+            || beyond(off, off_end, -reach * length, reach * length);
+        if !far {
+            edge.add_to(&mut features, leg);
+        }
+    }
+    features
+}
+
+impl Edge {
+    /// Add its first vertex and itself, as seen from `leg`.
+    fn add_to(&self, features: &mut Vec<Feature>, leg: &Segment) {
+        features.push(Feature {
+            kind: Kind::Vertex(self.a),
+            squared: leg.squared_distance_to(self.a),
+            valid: (f64::NEG_INFINITY, f64::INFINITY),
+        });
+        features.extend(edge_feature(leg, self));
+    }
+}
+
+/// The line of `edge` as seen from `leg`, valid where the leg projects onto the edge.
+fn edge_feature(leg: &Segment, edge: &Edge) -> Option<Feature> {
+    let Edge { a, along, length } = *edge;
     let (origin, way) = (leg.a.xy() - a, leg.b.xy() - leg.a.xy());
     // Distance from the line and way along it, both linear in t.
     let (across0, across1) = (origin.perp(&along), way.perp(&along));
@@ -189,13 +257,13 @@ pub(super) fn clearance_of(pieces: &[Piece], leg: &Segment, vertices: &[Point2])
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Append the pieces of `window` of a leg of horizontal `length`, in order: the nearest feature at
-/// its middle reigns over a part of it, the rest is cut in turn.
+/// The pieces of `window` of a leg of horizontal `length`, in order: the nearest feature at its middle
+/// reigns over a part of it, the rest is cut in turn.
 pub(super) fn cut(
     features: &[Feature],
     (t0, t1): (f64, f64),
     length: f64,
-    pieces: &mut Vec<Piece>,
+    found: &mut impl FnMut(Piece),
 ) {
     let middle = 0.5 * (t0 + t1);
     let nearest = nearest_at(features, middle);
@@ -219,10 +287,10 @@ pub(super) fn cut(
     };
     let (from, to) = reign(features, nearest, middle, (t0, t1));
     if from - t0 > SHORTEST_PIECE {
-        cut(features, (t0, from), length, pieces);
+        cut(features, (t0, from), length, found);
     }
     let mut push = |t0, t1| {
-        pieces.push(Piece {
+        found(Piece {
             t0,
             t1,
             nearest: *nearest,
@@ -238,7 +306,7 @@ pub(super) fn cut(
         _ => push(from, to),
     }
     if t1 - to > SHORTEST_PIECE {
-        cut(features, (to, t1), length, pieces);
+        cut(features, (to, t1), length, found);
     }
 }
 

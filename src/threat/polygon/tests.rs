@@ -53,6 +53,22 @@ fn a_single_point_may_lie_inside() {
     check(0.2, 3.0);
 }
 
+/// The deepest place along a leg lies where two edges are as near as each other, after a third was looked at.
+#[test]
+fn a_triangle_is_entered_as_deep_as_it_is() {
+    let corners = [0.0, 120.0, 240.0_f64].map(|degrees| {
+        let (sin, cos) = libm::sincos(degrees.to_radians());
+        [40.0 * cos, 40.0 * sin]
+    });
+    let triangle = ring(&corners, 0.0);
+    let leg = leg([11.5, -5.7, 0.0], [-48.2, 41.9, 0.0]);
+    let sampled = (0..=20_000)
+        .map(|step| -triangle.distance(leg.at(f64::from(step) / 20_000.0).xy()))
+        .fold(0.0, f64::max);
+    let (depth, _) = triangle.encounter(&leg, (0.0, 1.0));
+    assert!((depth - sampled).abs() < 0.01, "{depth} {sampled}");
+}
+
 /// Across the square at mid-height: two ramps of the margin outside and 10 m inside.
 #[test]
 fn exposure_across() {
@@ -77,8 +93,10 @@ fn a_tie_at_the_middle_is_seen() {
         5.0,
     );
     let across = leg([-4.0, 10.0, 0.0], [4.0, 10.0, 0.0]);
-    let (clearance, exposure) = bay.encounter(&across, (0.0, 1.0));
+    let clearance = bay.clearance(&across, (0.0, 1.0));
     assert!((clearance - 1.0).abs() < 1e-9, "{clearance}");
+    let (depth, exposure) = bay.encounter(&across, (0.0, 1.0));
+    assert!(depth <= 0.0, "{depth}");
     // T falls from 4 m to 0 at the middle and rises again.
     assert!((exposure - 16.0).abs() < 1e-9, "{exposure}");
 }
@@ -125,11 +143,14 @@ fn sides_that_are_nearly_straight_are_not_entered_unseen() {
             .map(|look| (before + 0.01 * f64::from(look)) / whole)
             .map(|t| -box_in_degrees.distance(leg.at(t).xy()))
             .fold(0.0, f64::max);
-        let depth = (-box_in_degrees.clearance(&leg, (0.0, 1.0))).max(0.0);
-        assert!(
-            depth >= deepest - 1e-6,
-            "step {step}: {depth} of {deepest}, {leg:?}"
-        );
+        let window = (0.0, 1.0);
+        let (depth, _) = box_in_degrees.encounter(&leg, window);
+        for depth in [-box_in_degrees.clearance(&leg, window), depth] {
+            assert!(
+                depth.max(0.0) >= deepest - 1e-6,
+                "step {step}: {depth} of {deepest}, {leg:?}"
+            );
+        }
     }
 }
 
@@ -181,7 +202,12 @@ fn a_ring_of_many_vertices_agrees_with_sums() {
         ([-2000.0, 10.0, 0.0], [1500.0, 300.0, 0.0]),
     ] {
         let leg = leg(a, b);
-        let (clearance, exposure) = flower.encounter(&leg, (0.0, 1.0));
+        let clearance = flower.clearance(&leg, (0.0, 1.0));
+        let (depth, exposure) = flower.encounter(&leg, (0.0, 1.0));
+        assert!(
+            (depth + clearance.min(0.0)).abs() < 1e-7,
+            "{depth} {clearance}"
+        );
         let steps = 100;
         let points = (0..steps).map(|i| leg.at((f64::from(i) + 0.5) / f64::from(steps)).xy());
         let (mut sum, mut signed) = (0.0, f64::INFINITY);
@@ -221,6 +247,47 @@ proptest! {
         prop_assert!((clearance - signed).abs() <= leg.length() / f64::from(steps), "{clearance} {signed}");
         if !star.may_reach(&leg) {
             prop_assert!(exposure.abs() < 1e-12);
+        }
+    }
+
+    /// What is left out for being far away has no part in it: against every piece of the leg, of rings that are
+    /// convex and rings that are not, the leg in the ring, beside it, through it and along its edges.
+    #[test]
+    fn an_encounter_is_that_of_all_pieces(
+        corners in prop::collection::vec(0.4..1.0f64, 3..30), round in 0..2_usize, margin in 0.0..40.0f64,
+        a in prop::array::uniform3(-60.0..60.0f64), b in prop::array::uniform3(-60.0..60.0f64),
+        t0 in 0.0..0.4f64, t1 in 0.6..1.0f64, beside in 0..30_usize,
+    ) {
+        let count = corners.len() as f64;
+        let corner = |(idx, away): (usize, &f64)| {
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * idx as f64 / count);
+            Point2::new(cos, sin) * if round == 0 { 40.0 } else { 40.0 * away }
+        };
+        let vertices: Vec<_> = corners.iter().enumerate().map(corner).collect();
+        let ring = Polygon::new(vertices.clone(), margin);
+        prop_assert!(round == 1 || ring.is_convex);
+        let mut leg = leg(a, b);
+        if let Some(edge) = vertices.get(beside..beside + 2) {
+            let [height, rise] = [leg.a.z, leg.b.z];
+            leg = Segment {
+                a: edge[0].coords.push(height).into(),
+                b: edge[1].coords.push(rise).into(),
+            };
+        }
+        for window in [(t0, t1), (0.0, 1.0), (t0, t0)] {
+            let (depth, exposure) = ring.encounter(&leg, window);
+            let pieces = ring.pieces(&leg, window);
+            let clearance = ring.clearance(&leg, window);
+            let sum: f64 = pieces.iter().map(|piece| {
+                if piece.inside {
+                    margin * (piece.t1 - piece.t0) * leg.length()
+                } else {
+                    ring.piece_exposure(&leg, piece)
+                }
+            }).sum();
+            // Along an edge, pieces tell sides to a share of the leg.
+            prop_assert!((depth + clearance.min(0.0)).abs() < 1e-6, "{depth} {clearance}");
+            prop_assert!((exposure - sum).abs() <= 1e-8 * (1.0 + sum), "{exposure} {sum}");
         }
     }
 

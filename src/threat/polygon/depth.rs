@@ -1,0 +1,101 @@
+//! How deep a leg goes into a ring.
+
+use super::Polygon;
+use super::nearest::{Edge, cut, features_near};
+use crate::geometry::Segment;
+
+/// Whether the simple ring of `edges` turns to the same side at every corner.
+pub(super) fn is_convex(edges: &[Edge]) -> bool {
+    let next = edges.iter().cycle().skip(1);
+    let turns = || {
+        let pairs = edges.iter().zip(next.clone());
+        pairs.map(|(edge, next)| edge.along.perp(&next.along))
+    };
+    turns().all(|turn| turn >= 0.0) || turns().all(|turn| turn <= 0.0)
+}
+
+impl Polygon {
+    /// The greatest distance to the ring of the part `(from, to)` of `leg`, metres, which lies inside.
+    pub(super) fn depth(&self, leg: &Segment, (from, to): (f64, f64)) -> f64 {
+        let middle = self.ring_distance(leg.at(0.5 * (from + to)).xy());
+        if self.is_convex {
+            return self.highest(leg, (from, to)).max(middle);
+        }
+        // The ring is nowhere farther than it would be were the leg to lead straight away from it.
+        let length = leg.horizontal_length();
+        let reach = middle + 0.5 * (to - from) * length;
+        let features = features_near(&self.edges, leg, (from, to), reach);
+        let mut depth = middle;
+        if !features.is_empty() {
+            // Distance grows convexly on each piece, so that its ends hold the greatest depth.
+            cut(&features, (from, to), length, &mut |piece| {
+                let (d0, d1) = piece.end_distances(leg);
+                depth = depth.max(d0).max(d1);
+            });
+        }
+        depth
+    }
+
+    /// As `depth`, of a convex ring: the nearest of the edges' lines is as far, so that the way goes up to
+    /// where one that the leg leaves and one that it nears are as far as each other, and no other nearer.
+    fn highest(&self, leg: &Segment, (from, to): (f64, f64)) -> f64 {
+        let way = leg.b.xy() - leg.a.xy();
+        let line = |edge: &Edge| Line {
+            at_start: edge.along.perp(&(leg.a.xy() - edge.a)),
+            gain: edge.along.perp(&way),
+        };
+        let (mut t, mut highest) = (0.5 * (from + to), 0.0_f64);
+        // All of them see the middle on the same side.
+        let side: f64 = self.edges.iter().map(|edge| line(edge).at(t)).sum();
+        let line = |edge: &Edge| line(edge).times(side.signum());
+        let (mut leaves, mut nears): (Option<Line>, Option<Line>) = (None, None);
+        // Each look but the last finds another line.
+        for _ in 0..self.edges.len() + 2 {
+            let lines = self.edges.iter().map(line);
+            let Some(line) = lines.min_by(|one, other| one.at(t).total_cmp(&other.at(t))) else {
+                break;
+            };
+            highest = highest.max(line.at(t));
+            if line.gain > 0.0 {
+                leaves = Some(line);
+            } else {
+                nears = Some(line);
+            }
+            let next = match (&leaves, &nears) {
+                (Some(one), Some(other)) => one.meets(other).clamp(from, to),
+                (Some(_), None) => to,
+                _ => from,
+            };
+            // There already: it is the highest, or the end of the part is.
+            if (next - t).abs() <= 1e-15 || !next.is_finite() {
+                break;
+            }
+            t = next;
+        }
+        highest
+    }
+}
+
+/// Signed distance from an edge's line along a leg: `at_start + gain * t`.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    at_start: f64,
+    gain: f64,
+}
+
+impl Line {
+    fn at(&self, t: f64) -> f64 {
+        self.at_start + self.gain * t
+    }
+
+    fn times(self, factor: f64) -> Self {
+        Self {
+            at_start: self.at_start * factor,
+            gain: self.gain * factor,
+        }
+    }
+
+    fn meets(&self, other: &Self) -> f64 {
+        (other.at_start - self.at_start) / (self.gain - other.gain)
+    }
+}

@@ -1,0 +1,275 @@
+//! Which parts of a ring's soft zone belong to one edge or one corner alone.
+//!
+//! There the distance to the ring is that to the one feature, so that exposure is a sum over features.
+//! Round a corner that points inwards, and where a part of the ring is close to another, it is not.
+
+use nalgebra::Vector2;
+
+use super::Polygon;
+use crate::geometry::{LEVEL, Point2, Segment, ring};
+use crate::threat::Cylinder;
+
+/// Of rings that are not convex and have more vertices than this, no part is looked at alone.
+const MOST_VERTICES: usize = 256;
+
+/// What is as near to an edge's line, metres, lies on it: beside the edge the other side is the ring's inside.
+const HAIR: f64 = 1e-6;
+
+/// Part of an edge, all of it in most cases, and what of the soft zone it is the nearest to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Zone {
+    /// Where the part begins.
+    pub(crate) a: Point2,
+    /// Unit vector along it.
+    pub(crate) along: Vector2<f64>,
+    pub(crate) length: f64,
+    /// Unit vector out of the ring.
+    pub(crate) outward: Vector2<f64>,
+    /// Along the edge before, where a corner at `a` is the nearest to a part of its own.
+    pub(crate) before: Option<Vector2<f64>>,
+    /// Whether something else may be as near as this part or its corner.
+    pub(crate) is_shared: bool,
+    /// Of a circle round the part.
+    pub(crate) center: Point2,
+    pub(crate) radius: f64,
+}
+
+/// The edges of a ring, each with what it looks like from there.
+struct Sides<'r> {
+    vertices: &'r [Point2],
+    edges: Vec<Side>,
+    margin: f64,
+    is_convex: bool,
+}
+
+struct Side {
+    a: Point2,
+    b: Point2,
+    along: Vector2<f64>,
+    outward: Vector2<f64>,
+    length: f64,
+}
+
+/// Of the simple ring through `vertices` with a soft zone of width `margin`; `None` where no part is alone.
+pub(super) fn zones(vertices: &[Point2], is_convex: bool, margin: f64) -> Option<Vec<Zone>> {
+    let sides = Sides::of(vertices, is_convex, margin);
+    if !sides.is_convex && vertices.len() > MOST_VERTICES {
+        return None;
+    }
+    let mut zones = Vec::new();
+    for idx in 0..vertices.len() {
+        sides.add_zones(idx, &mut zones);
+    }
+    Some(zones)
+}
+
+impl<'r> Sides<'r> {
+    fn of(vertices: &'r [Point2], is_convex: bool, margin: f64) -> Self {
+        let twice_area: f64 = ring::edges(vertices)
+            .map(|(a, b)| (a - vertices[0]).perp(&(b - vertices[0])))
+            .sum();
+        let edge = |(a, b): (Point2, Point2)| {
+            let along = (b - a).normalize();
+            let outward = Vector2::new(along.y, -along.x) * twice_area.signum();
+            Side {
+                a,
+                b,
+                along,
+                outward,
+                length: (b - a).norm(),
+            }
+        };
+        Self {
+            vertices,
+            edges: ring::edges(vertices).map(edge).collect(),
+            margin,
+            is_convex,
+        }
+    }
+
+    fn before(&self, idx: usize) -> &Side {
+        &self.edges[(idx + self.edges.len() - 1) % self.edges.len()]
+    }
+
+    fn after(&self, idx: usize) -> &Side {
+        &self.edges[(idx + 1) % self.edges.len()]
+    }
+
+    /// Whether the corner at the beginning of edge `idx` does.
+    fn points_outwards(&self, idx: usize) -> bool {
+        self.is_convex || self.before(idx).outward.dot(&self.edges[idx].along) <= 0.0
+    }
+
+    fn add_zones(&self, idx: usize, zones: &mut Vec<Zone>) {
+        let edge = &self.edges[idx];
+        let next = (idx + 1) % self.edges.len();
+        // Beside a corner that points inwards, the other edge is as near from some way off.
+        let off = |inwards: bool, other: &Side| {
+            if inwards {
+                // tan of half the angle between the edges, outside.
+                let (cos, sin) = (
+                    edge.along.dot(&other.along),
+                    edge.along.perp(&other.along).abs(),
+                );
+                self.margin * sin / (1.0 + cos).max(1e-9) * (1.0 + 1e-9) + 1e-6
+            } else {
+                0.0
+            }
+        };
+        let from = off(!self.points_outwards(idx), self.before(idx));
+        let to = edge.length - off(!self.points_outwards(next), self.after(idx));
+        let part = |from: f64, to: f64, is_shared: bool| Zone {
+            a: edge.a + edge.along * from,
+            along: edge.along,
+            length: to - from,
+            outward: edge.outward,
+            before: None,
+            is_shared,
+            center: edge.a + edge.along * (0.5 * (from + to)),
+            radius: 0.5 * (to - from),
+        };
+        let first = zones.len();
+        if from >= to || !self.is_alone(idx) {
+            zones.push(part(0.0, edge.length, true));
+        } else {
+            if from > 0.0 {
+                zones.push(part(0.0, from, true));
+            }
+            zones.push(part(from, to, false));
+            if to < edge.length {
+                zones.push(part(to, edge.length, true));
+            }
+        }
+        if self.points_outwards(idx) {
+            if self.is_corner_alone(idx) {
+                zones[first].before = Some(self.before(idx).along);
+            } else {
+                zones.push(part(0.0, 0.0, true));
+            }
+        }
+    }
+
+    /// Whether nothing but its neighbours can be as near as edge `idx` to what lies beside it.
+    fn is_alone(&self, idx: usize) -> bool {
+        let edge = &self.edges[idx];
+        let neighbours = [
+            (idx + self.edges.len() - 1) % self.edges.len(),
+            idx,
+            (idx + 1) % self.edges.len(),
+        ];
+        self.is_convex
+            || (0..self.edges.len())
+                .filter(|other| !neighbours.contains(other))
+                .all(|other| {
+                    let other = &self.edges[other];
+                    is_behind(edge, other) || self.is_far(edge, other)
+                })
+    }
+
+    /// Whether nothing can be as near as the corner at the beginning of edge `idx` to what lies before it.
+    fn is_corner_alone(&self, idx: usize) -> bool {
+        let (before, edge) = (self.before(idx), &self.edges[idx]);
+        let corner = self.vertices[idx];
+        self.is_convex
+            || self.edges.iter().all(|other| {
+                let ends = [other.a, other.b];
+                (is_behind(before, other) && is_behind(edge, other))
+                    || ring::distance(&ends, corner) > self.widest()
+            })
+    }
+
+    fn is_far(&self, one: &Side, other: &Side) -> bool {
+        // Edges of a simple ring do not cross, so that an end of either is nearest.
+        let (ends, others) = ([one.a, one.b], [other.a, other.b]);
+        others
+            .iter()
+            .map(|end| ring::distance(&ends, *end))
+            .chain(ends.iter().map(|end| ring::distance(&others, *end)))
+            .all(|distance| distance > self.widest())
+    }
+
+    /// What is farther apart has no part of the soft zone in common.
+    fn widest(&self) -> f64 {
+        2.0 * self.margin * (1.0 + 1e-9) + 1e-6
+    }
+}
+
+/// Whether `other` lies on the inner side of the line of `edge`.
+fn is_behind(edge: &Side, other: &Side) -> bool {
+    [other.a, other.b]
+        .iter()
+        .all(|end| edge.outward.dot(&(end - edge.a)) <= 1e-9)
+}
+
+impl Polygon {
+    /// Exposure of the part `(from, to)` of `leg`, which moves and lies outside of the ring, as a sum over edges and
+    /// corners; `None` where it may come to what they share.
+    pub(super) fn exposure_outside(&self, leg: &Segment, (from, to): (f64, f64)) -> Option<f64> {
+        let ends = [leg.at(from).xy(), leg.at(to).xy()];
+        let way = ends[1] - ends[0];
+        // Wider by a hair than needed.
+        let reach = self.margin + HAIR + 1e-8 * way.norm();
+        let beyond = |[u, v]: [f64; 2], low: f64, high: f64| u.max(v) < low || u.min(v) > high;
+        let mut exposure = 0.0;
+        for zone in self.zones.as_ref()? {
+            let seen = ends.map(|end| end - zone.a);
+            let along = seen.map(|end| end.dot(&zone.along));
+            let outward = seen.map(|end| end.dot(&zone.outward));
+            if beyond(along, -reach, zone.length + reach) || beyond(outward, -reach, reach) {
+                continue;
+            }
+            if zone.is_shared {
+                return None;
+            }
+            // Shares of the part, from 0 to 1.
+            let beside = clip(along, [0.0, zone.length]);
+            exposure += self.beside_edge(outward, beside) * (to - from) * leg.length();
+            if let Some(before) = zone.before {
+                let past = clip(seen.map(|end| end.dot(&before)), [0.0, f64::INFINITY]);
+                let ahead = clip(along, [f64::NEG_INFINITY, 0.0]);
+                let (enters, leaves) = (past[0].max(ahead[0]), past[1].min(ahead[1]));
+                if enters < leaves {
+                    let corner = Cylinder {
+                        center: zone.a,
+                        radius: 0.0,
+                        influence: self.margin,
+                    };
+                    let at = |share: f64| from + (to - from) * share;
+                    exposure += corner.exposure(leg, (at(enters), at(leaves)));
+                }
+            }
+        }
+        Some(exposure)
+    }
+
+    /// Of a way whose distance from an edge goes from one value to another, the mean of `T` between two shares of
+    /// it times their difference: a trapezium, cut where it reaches the margin.
+    fn beside_edge(&self, [start, end]: [f64; 2], [enters, leaves]: [f64; 2]) -> f64 {
+        let [d0, d1] = [enters, leaves].map(|share| start + (end - start) * share);
+        let (near, far) = (d0.min(d1), d0.max(d1));
+        if enters >= leaves || near >= self.margin || near < -HAIR {
+            return 0.0;
+        }
+        let share = if far <= self.margin {
+            1.0
+        } else {
+            (self.margin - near) / (far - near)
+        };
+        (self.margin - 0.5 * (near + far.min(self.margin))) * share * (leaves - enters)
+    }
+}
+
+/// Between which shares, 0 to 1, what goes evenly from `start` to `end` lies within `[low, high]`; none where the
+/// first is not the lesser.
+fn clip([start, end]: [f64; 2], [low, high]: [f64; 2]) -> [f64; 2] {
+    let gain = end - start;
+    if gain.abs() < LEVEL {
+        return if start >= low && start <= high {
+            [0.0, 1.0]
+        } else {
+            [1.0, 0.0]
+        };
+    }
+    let (one, other) = ((low - start) / gain, (high - start) / gain);
+    [one.min(other).max(0.0), one.max(other).min(1.0)]
+}

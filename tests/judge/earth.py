@@ -26,12 +26,22 @@ class Earth:
 
     def local(self, lat, lon):
         """East and north of the origin, metres."""
-        origin = _centred(self.lat, self.lon, self.height)
-        dx, dy, dz = (a - b for a, b in zip(_centred(lat, lon, self.height), origin))
-        sin_lat, cos_lat = math.sin(math.radians(self.lat)), math.cos(math.radians(self.lat))
-        sin_lon, cos_lon = math.sin(math.radians(self.lon)), math.cos(math.radians(self.lon))
-        east = -sin_lon * dx + cos_lon * dy
-        north = -sin_lat * cos_lon * dx - sin_lat * sin_lon * dy + cos_lat * dz
+        phi, phi0 = math.radians(lat), math.radians(self.lat)
+        way = math.radians(math.remainder(lon - self.lon, 360.0))
+        # All differences are taken before they are multiplied by the earth's radius, of which a billionth of a
+        # metre would be lost otherwise: as much as a path's shortest legs turn by.
+        normal, normal0 = _normal(phi), _normal(phi0)
+        down, down0 = AXIS / normal, AXIS / normal0
+        longer = AXIS * ECCENTRICITY_SQUARED * math.sin(phi + phi0) * math.sin(phi - phi0)
+        longer /= down * down0 * (down + down0)
+        half = 2.0 * math.sin(0.5 * (phi - phi0))
+        cosine, sine = -half * math.sin(0.5 * (phi + phi0)), half * math.cos(0.5 * (phi + phi0))
+        across = longer * math.cos(phi) + (normal0 + self.height) * cosine
+        up = (1.0 - ECCENTRICITY_SQUARED) * (longer * math.sin(phi) + normal0 * sine) + self.height * sine
+        round_axis = (normal + self.height) * math.cos(phi)
+        east = round_axis * math.sin(way)
+        inwards = across - 2.0 * round_axis * math.sin(0.5 * way) ** 2
+        north = math.cos(phi0) * up - math.sin(phi0) * inwards
         return east, north
 
     def flat(self, document):
@@ -101,10 +111,6 @@ def earth_of(document, result):
     return Earth(origin["lat"], origin["lon"], height, complaints)
 
 
-def _centred(lat, lon, height):
-    """Earth-centred metres of a place."""
-    sin_lat, cos_lat = math.sin(math.radians(lat)), math.cos(math.radians(lat))
-    normal = AXIS / math.sqrt(1.0 - ECCENTRICITY_SQUARED * sin_lat * sin_lat)
-    across = (normal + height) * cos_lat
-    up = (normal * (1.0 - ECCENTRICITY_SQUARED) + height) * sin_lat
-    return across * math.cos(math.radians(lon)), across * math.sin(math.radians(lon)), up
+def _normal(lat):
+    """From the axis down the normal, metres, at a latitude in radians."""
+    return AXIS / math.sqrt(1.0 - ECCENTRICITY_SQUARED * math.sin(lat) ** 2)

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 AXIS = 6378137.0
 FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
+# A latitude's last bit is a billionth of a metre: so exact is a place that was written in degrees.
+HAIR = 1e-9
 # Points along each side of an area, of which the greatest rectangle inside is found.
 SIDE = 64
 

@@ -11,9 +11,10 @@ The scenario is the caller's document or the accepted one, over any terrain but 
 import argparse
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
-from earth import earth_of
+from earth import HAIR, earth_of
 from report import Report
 from scenario import Unsupported, load, read_scenario
 from verdict import judge
@@ -105,7 +106,9 @@ def _batches(options):
 def _placed(document, file):
     """The scenario of one result, the result's file, and the plane that both lie on; None in the local frame."""
     earth = earth_of(document, load(file)) if document.get("frame", "local") != "local" else None
-    return read_scenario(earth.scenario(document) if earth else document), file, earth
+    if earth is None:
+        return read_scenario(document), file, None
+    return replace(read_scenario(earth.scenario(document)), hair=HAIR), file, earth
 
 
 def _judge_file(scenario, file, earth):

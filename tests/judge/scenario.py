@@ -47,6 +47,7 @@ class Scenario:
     algorithm: str | None
     seed: int | None
     scale: float  # the diagonal of everything, for tolerances
+    hair: float = 0.0  # how far places may be off that were laid onto the plane, metres
 
     @property
     def slack(self):

@@ -1,8 +1,10 @@
 """The judgement of one result: every figure of the document compared with its definition."""
 
+import math
+
 import geometry as geo
 import route
-from report import Report
+from report import ABSOLUTE, Report
 from spline import Spline
 from threats import route_clearance
 
@@ -111,7 +113,9 @@ def _checks(report, name, claimed, points, scenario):
     heights, angles = route.heights(points, scenario), route.angles(points)
     report.near(f"{name}.min_agl", claimed["min_agl"], heights.least, scenario.scale)
     report.near(f"{name}.max_agl", claimed["max_agl"], heights.greatest, scenario.scale)
-    report.near(f"{name}.max_turn_deg", claimed["max_turn_deg"], angles.turn, 180.0)
+    # Either leg's direction is as uncertain as its ends are, for its length.
+    turned = math.degrees(2.0 * scenario.hair / angles.leg) if angles.leg > 0.0 else 0.0
+    report.near(f"{name}.max_turn_deg", claimed["max_turn_deg"], angles.turn, 180.0 + turned / ABSOLUTE)
     report.near(f"{name}.max_climb_deg", claimed["max_climb_deg"], angles.climb, 90.0)
     report.near(f"{name}.min_leg", claimed["min_leg"], angles.leg, scenario.scale)
 

@@ -1,6 +1,7 @@
 """How schemathesis reads what it does not know by itself."""
 
 import json
+from pathlib import Path
 
 import schemathesis
 
@@ -13,3 +14,16 @@ def lines(_, response):
     """The description says what a line is. Every one must be JSON; one of them is held to it, another for another answer."""
     events = [json.loads(line) for line in response.content.splitlines()] or [END]
     return events[len(response.content) % len(events)]
+
+
+# What seed.py wrote: plans and datasets that others are to find.
+SEEDED = {json.loads(line) for name in ("plans", "datasets") for line in Path(name).read_text().splitlines()}
+
+
+@schemathesis.hook
+def before_call(_, case, kwargs):
+    """Deletes only what requests made."""
+    if case.method.upper() == "DELETE":
+        for name, value in (case.path_parameters or {}).items():
+            if value in SEEDED:
+                case.path_parameters[name] = "another"

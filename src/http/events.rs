@@ -88,17 +88,22 @@ const MAX_EVENT_ID: u64 = (1 << 53) - 1;
 /// The header is a reconnecting browser's and newer than the query of the page's own address.
 fn read_last_event_id(params: &Params, headers: &HeaderMap) -> Result<u64, Problem> {
     const ALLOWED: &str = "the id of an event, a whole number below 2^53";
+    let read = |name: &str, value: &str| {
+        let id = value.parse().ok().filter(|id| *id <= MAX_EVENT_ID);
+        id.ok_or_else(|| params::refused(name, value, ALLOWED))
+    };
+    let query = params.text("last_event_id");
+    let query = query
+        .map(|value| read("last_event_id", value))
+        .transpose()?;
     let header = headers
         .get(LAST_EVENT_ID)
-        .map(|value| String::from_utf8_lossy(value.as_bytes()).into_owned())
+        .map(|value| String::from_utf8_lossy(value.as_bytes()))
         .filter(|value| !value.is_empty());
-    let (name, value) = match (&header, params.text("last_event_id")) {
-        (Some(header), _) => ("last-event-id", header.as_str()),
-        (None, Some(query)) => ("last_event_id", query),
-        (None, None) => return Ok(0),
-    };
-    let id = value.parse().ok().filter(|id| *id <= MAX_EVENT_ID);
-    id.ok_or_else(|| params::refused(name, value, ALLOWED))
+    let header = header
+        .map(|value| read("last-event-id", &value))
+        .transpose()?;
+    Ok(header.or(query).unwrap_or(0))
 }
 
 /// What one open stream holds on to, whether anybody reads it or not.

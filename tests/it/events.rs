@@ -144,6 +144,14 @@ async fn a_cut_stream_resumes_at_every_event_with_neither_loss_nor_repeat() {
             .await
             .expect("an answer");
         assert_eq!(beyond.status(), StatusCode::NO_CONTENT);
+        // The header is heard, and yet the query has to be one.
+        let mistaken = plan
+            .events("?last_event_id=1.5")
+            .header("last-event-id", "1")
+            .send()
+            .await
+            .expect("an answer");
+        assert_eq!(mistaken.status(), StatusCode::BAD_REQUEST);
     })
     .await;
 }

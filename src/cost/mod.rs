@@ -18,6 +18,7 @@ pub use band::Section;
 pub use constraint::{Breach, Constraint, Tolerance};
 pub use fuel::metre;
 pub use heading::turns;
+pub(crate) use threat::SHARE as THREAT_SHARE;
 
 use crate::geometry::{Point3, Segment};
 use crate::scenario::{Quadrature, Scenario};

@@ -6,7 +6,7 @@ use crate::scenario::Quadrature;
 use crate::threat::Threat;
 
 /// The factor 1/5 of Eq. 4.
-pub(super) const SHARE: f64 = 0.2;
+pub(crate) const SHARE: f64 = 0.2;
 
 /// Where Eq. 4 samples a leg. The paper lists four of the five points; all five are used.
 pub(super) const SAMPLES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];

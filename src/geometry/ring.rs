@@ -1,11 +1,28 @@
 //! A simple ring of points: its edges, what lies inside, and how far away it is.
 
-use super::Point2;
+use super::{Point2, Vector2};
 
 /// The edges of `ring`, the last one back to the first point.
 pub fn edges(ring: &[Point2]) -> impl Iterator<Item = (Point2, Point2)> + '_ {
     let next = ring.iter().cycle().skip(1);
     ring.iter().copied().zip(next.copied())
+}
+
+/// Whether the simple `ring` turns to the same side at every corner, of which some may be given twice.
+#[must_use]
+pub fn is_convex(ring: &[Point2]) -> bool {
+    let ways: Vec<Vector2> = edges(ring)
+        .map(|(a, b)| b - a)
+        .filter(|way| *way != Vector2::zeros())
+        .collect();
+    let next = ways.iter().cycle().skip(1);
+    let turns = || {
+        ways.iter()
+            .zip(next.clone())
+            .map(|(way, next)| way.perp(next))
+    };
+    // As a simple ring goes round once, one side is enough.
+    turns().all(|turn| turn >= 0.0) || turns().all(|turn| turn <= 0.0)
 }
 
 /// Whether `point` lies inside `ring`, by the even-odd rule; on the ring itself, either.

@@ -3,7 +3,7 @@
 
 use super::super::arc::{crossing, nearest_points, point_segment};
 use super::super::outline::OutlineShape;
-use super::Prices;
+use super::prices::Prices;
 use super::wall::Wall;
 use crate::geometry::{Point2, ring};
 

@@ -9,24 +9,19 @@
 mod ends;
 mod event;
 mod potential;
+mod prices;
+mod string;
 mod wall;
 
 use std::cell::Cell;
 
-use super::obstacles::Obstacles;
-use super::taut::{Limits, TautString, taut_strings_within};
-use crate::cost::{Tolerance, metre};
-use crate::geometry::Point3;
-use crate::scenario::{Quadrature, Scenario};
+use crate::scenario::Scenario;
 use event::{Event, Kind};
+use prices::Prices;
 use wall::Wall;
 
 /// Covers the rounding of the sums behind a bound, so that it holds in floating point too.
 const ROUNDING: f64 = 1e-9;
-
-/// Ways looked at for one string: beyond a few hundred walls, the search ends with what it has
-/// proven so far.
-const MOST_WAYS: usize = 60_000;
 
 /// Ways looked at in all before the number of events is no longer bisected.
 const MOST_WAYS_IN_ALL: usize = 120_000;
@@ -36,66 +31,6 @@ const MOST_LEVELS: usize = 24;
 
 /// Where the string itself is not this many times as dear as what is known, a potential promises nothing.
 const WORTHWHILE: f64 = 1.02;
-
-/// What a metre costs, and where it is flown.
-#[derive(Debug, Clone, Copy)]
-struct Prices {
-    /// Of a metre, `w`.
-    fuel: f64,
-    /// Of a metre in a soft zone, for each metre of its depth, `s`.
-    exposure: f64,
-    /// Metres by which a feasible route may miss a limit.
-    tolerance: f64,
-    ends: [Point3; 2],
-}
-
-impl Prices {
-    fn of(scenario: &Scenario) -> Self {
-        let exposure = match scenario.planner.quadrature {
-            Quadrature::Integral => scenario.weights.threat * THREAT_SHARE,
-            // Sampled, a soft zone can be crossed for nothing.
-            Quadrature::Paper => 0.0,
-        };
-        Self {
-            fuel: metre(scenario),
-            exposure,
-            tolerance: Tolerance::of(scenario).length_m,
-            ends: [scenario.start, scenario.target],
-        }
-    }
-
-    /// Distance of the ends seen from above, metres.
-    fn direct(&self) -> f64 {
-        (self.ends[1].xy() - self.ends[0].xy()).norm()
-    }
-
-    /// Difference in height of the ends, metres.
-    fn rise(&self) -> f64 {
-        (self.ends[1].z - self.ends[0].z).abs()
-    }
-
-    /// Least cost of fuel for a way of `length` metres seen from above that goes up and down by
-    /// `vertical`.
-    fn climbing(&self, length: f64, vertical: f64) -> f64 {
-        self.fuel * (length * length + vertical * vertical).sqrt()
-    }
-
-    /// Least cost of a way with the rise of the ends that costs so much seen from above.
-    fn climbing_at(&self, cost: f64) -> f64 {
-        let rise = self.fuel * self.rise();
-        (cost * cost + rise * rise).sqrt()
-    }
-
-    /// Length, seen from above, of a way that costs `cost` with the rise of the ends, or a hair more.
-    fn length_of(&self, cost: f64) -> f64 {
-        let slant = cost / self.fuel;
-        let squared = (slant * slant - self.rise() * self.rise()).max(0.0);
-        squared.sqrt() * (1.0 + 1e-9)
-    }
-}
-
-/// The factor 1/5 of Eq. 4.
-const THREAT_SHARE: f64 = 0.2;
 
 /// A proven lower bound on the total cost of any feasible route from start to target, Eq. 1; 0
 /// where fuel costs nothing. The argument is in docs/BOUND.md.
@@ -123,15 +58,18 @@ fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) ->
     let walls = wall::walls(scenario, prices);
     // Seen from above, where the string with these radii is so dear that it could be more than `known`.
     let across = |radii: &[Option<f64>], known: f64| {
-        if known.is_finite() && known < price_of_string(&walls, radii, prices, stop) / WORTHWHILE {
+        let may_gain = known.is_finite()
+            && potential::applies(&walls, prices)
+            && known < string::price(&walls, radii, prices, stop) / WORTHWHILE;
+        if may_gain {
             potential::bound(&walls, prices, &scenario.area, known, stop)
         } else {
             0.0
         }
     };
     let Some(events) = event::events(&walls, prices) else {
-        let radii = cores(&walls);
-        let proven = plain(&walls, &radii, prices, stop);
+        let radii = string::cores(&walls);
+        let proven = string::plain(&walls, &radii, prices, stop);
         return proven.max(prices.climbing_at(across(&radii, proven)));
     };
     let field = Field {
@@ -200,86 +138,6 @@ fn cost_of(events: &[Event], level: usize) -> f64 {
     events.get(level).map_or(f64::INFINITY, |event| event.cost)
 }
 
-/// Without widening anything: where there are too many gaps to look at.
-fn plain(walls: &[Wall], radii: &[Option<f64>], prices: &Prices, stop: &dyn Fn() -> bool) -> f64 {
-    let (length, _) = length(walls, radii, prices, (f64::INFINITY, stop));
-    prices.climbing(length, prices.rise())
-}
-
-/// Radii of nothing but cores.
-fn cores(walls: &[Wall]) -> Vec<Option<f64>> {
-    let radius = |wall: &Wall| wall.toll.is_none().then_some(wall.core);
-    walls.iter().map(radius).collect()
-}
-
-/// What the string round `walls` widened to `radii` costs with all its soft zones, about: more than that
-/// cannot be proven by prices.
-fn price_of_string(
-    walls: &[Wall],
-    radii: &[Option<f64>],
-    prices: &Prices,
-    stop: &dyn Fn() -> bool,
-) -> f64 {
-    if prices.exposure <= 0.0 {
-        return 0.0;
-    }
-    let limits = Limits {
-        most_ways: MOST_WAYS,
-        enough: f64::INFINITY,
-        stop,
-    };
-    let found = taut_strings_within(&scene(walls, radii, prices), 1, limits);
-    let price = |string: &TautString| prices.climbing_at(potential::price(walls, prices, string));
-    found.strings.first().map_or(f64::INFINITY, price)
-}
-
-/// Length of the string round `walls` widened to `radii` (`None` leaves one out), metres, less what
-/// routes may cut off corners, but not below 0; infinite where there is none. Once that is proven to be `enough`, or
-/// `stop` asks for it, what is proven. With it, the ways looked at.
-fn length(
-    walls: &[Wall],
-    radii: &[Option<f64>],
-    prices: &Prices,
-    (enough, stop): (f64, &dyn Fn() -> bool),
-) -> (f64, usize) {
-    let slack = slack(walls, radii, prices);
-    let (shortest, ways) = shortest(&scene(walls, radii, prices), (enough + slack, stop));
-    // Where little is paid for fuel and much for soft zones, corners may be worth more than the way.
-    ((shortest - slack).max(0.0), ways)
-}
-
-fn scene(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> Obstacles {
-    let outlines = walls.iter().zip(radii);
-    Obstacles::new(
-        outlines.map(|(wall, radius)| radius.map(|radius| wall.outline(radius))),
-        prices.ends.map(|end| end.xy()),
-        None,
-    )
-}
-
-fn slack(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> f64 {
-    let kept = walls
-        .iter()
-        .zip(radii)
-        .filter(|(_, radius)| radius.is_some());
-    let length: f64 = kept.map(|(wall, _)| wall.slack(prices.tolerance)).sum();
-    // A way round a corner instead of across it may lie in every soft zone.
-    let dearest: f64 = walls.iter().map(|wall| wall.influence).sum();
-    length * (1.0 + prices.exposure * dearest / prices.fuel)
-}
-
-/// Length that no string in `scene` undercuts, or `enough` of it, and the ways looked at.
-fn shortest(scene: &Obstacles, (enough, stop): (f64, &dyn Fn() -> bool)) -> (f64, usize) {
-    let limits = Limits {
-        most_ways: MOST_WAYS,
-        enough,
-        stop,
-    };
-    let found = taut_strings_within(scene, 1, limits);
-    let first = found.strings.first().map(|string| string.length);
-    (first.unwrap_or(f64::INFINITY).min(found.beyond), found.ways)
-}
-
 /// A scenario as a bound sees it.
 struct Field<'a> {
     scenario: &'a Scenario,
@@ -296,7 +154,8 @@ impl Field<'_> {
     fn level(&self, allowed: &[Event], enough: f64) -> f64 {
         let length_enough = self.prices.length_of(enough);
         let cost = |radii: &[Option<f64>]| {
-            let (length, ways) = length(self.walls, radii, self.prices, (length_enough, self.stop));
+            let (length, ways) =
+                string::length(self.walls, radii, self.prices, (length_enough, self.stop));
             self.ways.set(self.ways.get() + ways);
             self.prices.climbing(length, self.prices.rise())
         };

@@ -3,7 +3,7 @@
 
 use super::super::arc::nearest_points;
 use super::super::outline::{Outline, OutlineShape};
-use super::Prices;
+use super::prices::Prices;
 use crate::geometry::Point2;
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;

@@ -4,16 +4,6 @@ use super::Polygon;
 use super::nearest::{Edge, cut, features_near};
 use crate::geometry::Segment;
 
-/// Whether the simple ring of `edges` turns to the same side at every corner.
-pub(super) fn is_convex(edges: &[Edge]) -> bool {
-    let next = edges.iter().cycle().skip(1);
-    let turns = || {
-        let pairs = edges.iter().zip(next.clone());
-        pairs.map(|(edge, next)| edge.along.perp(&next.along))
-    };
-    turns().all(|turn| turn >= 0.0) || turns().all(|turn| turn <= 0.0)
-}
-
 impl Polygon {
     /// The greatest distance to the ring of the part `(from, to)` of `leg`, metres, which lies inside.
     pub(super) fn depth(&self, leg: &Segment, (from, to): (f64, f64)) -> f64 {

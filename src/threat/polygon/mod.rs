@@ -37,7 +37,7 @@ impl Polygon {
     pub fn new(vertices: Vec<Point2>, margin: f64) -> Self {
         let bounds = Rect::around(vertices.iter().copied()).expect("a ring has vertices");
         let edges = nearest::edges(&vertices);
-        let is_convex = depth::is_convex(&edges);
+        let is_convex = ring::is_convex(&vertices);
         Self {
             is_convex,
             zones: zones::zones(&vertices, is_convex, margin),
@@ -183,8 +183,14 @@ impl Polygon {
             };
             return corner.exposure(leg, (piece.t0, piece.t1));
         }
-        // The distance to an edge's line is linear: a trapezium, cut where it reaches the margin.
+        // The distance to an edge's line is linear.
         let (d0, d1) = piece.end_distances(leg);
+        self.mean_intensity(d0, d1) * (piece.t1 - piece.t0) * leg.length()
+    }
+
+    /// Mean of `T` along a way whose distance goes evenly from `d0` to `d1`: a trapezium, cut where it reaches the
+    /// margin.
+    fn mean_intensity(&self, d0: f64, d1: f64) -> f64 {
         let (near, far) = (d0.min(d1), d0.max(d1));
         if near >= self.margin {
             return 0.0;
@@ -194,8 +200,7 @@ impl Polygon {
         } else {
             (self.margin - near) / (far - near)
         };
-        let mean = self.margin - 0.5 * (near + far.min(self.margin));
-        mean * share * (piece.t1 - piece.t0) * leg.length()
+        (self.margin - 0.5 * (near + far.min(self.margin))) * share
     }
 
     fn ring_distance(&self, point: Point2) -> f64 {

@@ -88,6 +88,11 @@ pub(super) fn features(edges: &[Edge], leg: &Segment) -> Vec<Feature> {
     features
 }
 
+/// How near what must not be missed is looked for that lies within `reach` of a way of `length`, metres.
+pub(super) fn reach(reach: f64, length: f64) -> f64 {
+    reach + HAIR + 1e-8 * length
+}
+
 /// Those that come within `reach` metres of the part `window` of `leg`, and maybe some more.
 pub(super) fn features_near(
     edges: &[Edge],
@@ -98,7 +103,7 @@ pub(super) fn features_near(
     let (from, to) = (leg.at(window.0).xy(), leg.at(window.1).xy());
     let way = to - from;
     let length = way.norm();
-    let reach = reach + HAIR + 1e-8 * length;
+    let reach = self::reach(reach, length);
     let beyond = |u: f64, v: f64, low: f64, high: f64| u.max(v) < low || u.min(v) > high;
     let mut features = Vec::new();
     for edge in edges {

@@ -5,7 +5,7 @@
 
 use nalgebra::Vector2;
 
-use super::Polygon;
+use super::{Polygon, nearest};
 use crate::geometry::{LEVEL, Point2, Segment, ring};
 use crate::threat::Cylinder;
 
@@ -207,8 +207,7 @@ impl Polygon {
     pub(super) fn exposure_outside(&self, leg: &Segment, (from, to): (f64, f64)) -> Option<f64> {
         let ends = [leg.at(from).xy(), leg.at(to).xy()];
         let way = ends[1] - ends[0];
-        // Wider by a hair than needed.
-        let reach = self.margin + HAIR + 1e-8 * way.norm();
+        let reach = nearest::reach(self.margin, way.norm());
         let beyond = |[u, v]: [f64; 2], low: f64, high: f64| u.max(v) < low || u.min(v) > high;
         let mut exposure = 0.0;
         for zone in self.zones.as_ref()? {
@@ -243,19 +242,13 @@ impl Polygon {
     }
 
     /// Of a way whose distance from an edge goes from one value to another, the mean of `T` between two shares of
-    /// it times their difference: a trapezium, cut where it reaches the margin.
+    /// it times their difference.
     fn beside_edge(&self, [start, end]: [f64; 2], [enters, leaves]: [f64; 2]) -> f64 {
         let [d0, d1] = [enters, leaves].map(|share| start + (end - start) * share);
-        let (near, far) = (d0.min(d1), d0.max(d1));
-        if enters >= leaves || near >= self.margin || near < -HAIR {
+        if enters >= leaves || d0.min(d1) < -HAIR {
             return 0.0;
         }
-        let share = if far <= self.margin {
-            1.0
-        } else {
-            (self.margin - near) / (far - near)
-        };
-        (self.margin - 0.5 * (near + far.min(self.margin))) * share * (leaves - enters)
+        self.mean_intensity(d0, d1) * (leaves - enters)
     }
 }
 

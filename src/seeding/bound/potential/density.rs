@@ -2,7 +2,7 @@
 //! what it costs in the cell's middle.
 
 use super::super::super::outline::OutlineShape;
-use super::super::Prices;
+use super::super::prices::Prices;
 use super::super::wall::Wall;
 use super::mesh::{Mesh, REACH};
 use crate::geometry::{Point2, ring};
@@ -119,20 +119,8 @@ pub(super) fn distance(wall: &Wall, point: Point2) -> f64 {
 
 /// Whether that distance is convex.
 fn is_convex(wall: &Wall) -> bool {
-    let OutlineShape::Ring(ring) = &wall.shape else {
-        return true;
-    };
-    // A corner may be given twice.
-    let mut ring = ring.clone();
-    ring.dedup();
-    if ring.first() == ring.last() {
-        ring.pop();
+    match &wall.shape {
+        OutlineShape::Disc(_) => true,
+        OutlineShape::Ring(ring) => ring::is_convex(ring),
     }
-    let count = ring.len();
-    let turn = |i: usize| {
-        let [a, b, c] = [0, 1, 2].map(|step| ring[(i + step) % count]);
-        (b - a).perp(&(c - b))
-    };
-    // Simple as rings are, one that turns one way only goes round once.
-    (0..count).all(|i| turn(i) >= 0.0) || (0..count).all(|i| turn(i) <= 0.0)
 }

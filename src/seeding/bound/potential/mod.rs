@@ -2,36 +2,28 @@
 //! what a metre costs. The argument is section 5 of docs/BOUND.md.
 
 mod density;
+mod first;
 mod marching;
 mod mesh;
+mod region;
 
 use super::super::outline::OutlineShape;
 use super::super::taut::TautString;
+use super::WORTHWHILE;
 use super::event::ramp;
+use super::prices::Prices;
 use super::wall::Wall;
-use super::{Prices, WORTHWHILE};
 use crate::geometry::{Point2, Rect, Vector2};
 use density::Kind;
 use marching::{EXEMPT, Potential};
-use mesh::{HEIGHT, Mesh, REACH};
-
-/// Vertices of the first mesh, about; more where the area is wide for the way, twice as many at most.
-const FIRST: f64 = 1700.0;
-
-/// Sides from start to target in the first mesh, at least.
-const FEWEST_STEPS: f64 = 10.0;
-
-/// As many at most.
-const MOST_STEPS: f64 = 2000.0;
+use mesh::Mesh;
+use region::{sums, widened, within};
 
 /// Triangles of a mesh that is made finer, at most, but for those at the edge.
 const MOST_TRIANGLES: usize = 16_000;
 
 /// Triangles that are marched over in all before the mesh is no longer made finer.
 const MOST_IN_ALL: usize = 80_000;
-
-/// Sides of the longest way that keeps to the first mesh, unless that of the straight one is not much less.
-const LONGEST: f64 = 600.0;
 
 /// Times that the mesh is made finer, at most.
 const MOST_LEVELS: usize = 6;
@@ -45,7 +37,19 @@ const MARGIN: f64 = 3.0;
 /// Points on a string at which soft zones are looked up.
 const SAMPLES: u32 = 256;
 
-/// What no route undercuts at the prices of fuel and soft zones, seen from above; 0 where that
+/// Whether there are soft zones, at prices and between ends for which a potential can prove something.
+pub(super) fn applies(walls: &[Wall], prices: &Prices) -> bool {
+    prices.exposure > 0.0
+        && prices.direct() > 1e5 * prices.tolerance
+        && whole(walls).any(|wall| wall.influence > wall.core)
+}
+
+/// Those that reach over all heights.
+fn whole(walls: &[Wall]) -> impl Iterator<Item = &Wall> {
+    walls.iter().filter(|wall| wall.toll.is_none())
+}
+
+/// What no route undercuts at the prices of fuel and soft zones, seen from above, where it `applies`; 0 where that
 /// is not expected to exceed `known`, which no route undercuts either.
 pub(super) fn bound(
     walls: &[Wall],
@@ -54,14 +58,8 @@ pub(super) fn bound(
     known: f64,
     stop: &dyn Fn() -> bool,
 ) -> f64 {
-    let whole = walls.iter().filter(|wall| wall.toll.is_none());
-    let walls: Vec<Wall> = whole.cloned().collect();
-    let is_soft = walls.iter().any(|wall| wall.influence > wall.core);
-    if prices.exposure <= 0.0 || prices.direct() <= 1e5 * prices.tolerance || !is_soft {
-        return 0.0;
-    }
     let mut scene = Scene {
-        walls,
+        walls: whole(walls).cloned().collect(),
         prices,
         area: area.grown(prices.tolerance),
         cap: f64::INFINITY,
@@ -79,8 +77,7 @@ pub(super) fn bound(
 /// What a string costs seen from above, about.
 pub(super) fn price(walls: &[Wall], prices: &Prices, string: &TautString) -> f64 {
     let depth = |at: Point2| -> f64 {
-        let whole = walls.iter().filter(|wall| wall.toll.is_none());
-        whole
+        whole(walls)
             .map(|wall| (wall.influence - density::distance(wall, at)).max(0.0))
             .sum()
     };
@@ -171,70 +168,6 @@ impl Scene<'_> {
         potential.values[target]
     }
 
-    /// The first mesh: all of the area, or where that is too wide, what of it routes can make use of
-    /// that do not cost as much as the cap.
-    fn first(&mut self) -> Mesh {
-        let ends = self.prices.ends.map(|end| end.xy());
-        let direct = self.prices.direct();
-        let [low, high] = [self.area.min, self.area.max];
-        let size = (high.x - low.x) * (high.y - low.y);
-        let steps = direct / (size / (FIRST * HEIGHT)).sqrt();
-        let steps = steps.ceil().clamp(FEWEST_STEPS, MOST_STEPS);
-        let side = direct / steps;
-        // The sum of the distances from both ends: on the edge of the ellipse that they are the foci of.
-        let sum = |point: Point2| ends.iter().map(|end| (point - end).norm()).sum::<f64>();
-        let corners = [
-            low,
-            Point2::new(high.x, low.y),
-            high,
-            Point2::new(low.x, high.y),
-        ];
-        let mut widest = corners.into_iter().map(sum).fold(0.0, f64::max);
-        let most = 2.0 * FIRST * HEIGHT * side * side;
-        let ellipse = if size > most {
-            (4.0 * most / std::f64::consts::PI).sqrt() * side
-        } else {
-            LONGEST * side
-        };
-        let ellipse = ellipse.max(1.5 * direct);
-        if ellipse < widest {
-            widest = ellipse;
-            self.cap = self.prices.fuel * widest;
-        }
-        // No point whose cell meets a triangle is further than twice the reach from the triangle's middle.
-        let margin = 2.0 * REACH * side * (1.0 + 1e-9);
-        let along = (ends[1] - ends[0]).normalize();
-        let frame = corners.map(|corner| {
-            let offset = corner - ends[0];
-            [offset.dot(&along), along.perp(&offset)]
-        });
-        let over = [0.5 * (widest - direct), 0.5 * widest].map(|over| over + margin);
-        let lowest = |axis: usize| {
-            frame
-                .iter()
-                .map(|at| at[axis])
-                .fold(f64::INFINITY, f64::min)
-        };
-        let highest = |axis: usize| {
-            frame
-                .iter()
-                .map(|at| at[axis])
-                .fold(-f64::INFINITY, f64::max)
-        };
-        Mesh::between(
-            ends,
-            steps,
-            [0, 1].map(|axis| (lowest(axis) - margin).max(-over[axis])),
-            [
-                (highest(0) + margin).min(direct + over[0]),
-                (highest(1) + margin).min(over[1]),
-            ],
-            |middle| {
-                sum(middle) <= widest + 2.0 * margin && Mesh::is_within(&self.area, middle, side)
-            },
-        )
-    }
-
     /// What leaving the circle of that radius round an end costs at least.
     fn out(&self, end: usize, length: f64) -> f64 {
         let at = self.prices.ends[end].xy();
@@ -287,107 +220,10 @@ impl Scene<'_> {
     }
 }
 
-/// The cost below which there are `count` triangles.
-fn within(sums: &[f64], count: usize) -> f64 {
-    let mut sums: Vec<f64> = sums.iter().copied().filter(|sum| sum.is_finite()).collect();
-    if sums.len() <= count {
-        return f64::INFINITY;
-    }
-    *sums.select_nth_unstable_by(count, f64::total_cmp).1
-}
-
-/// What a route costs at least that comes into each triangle, infinite outside the mesh.
-fn sums(mesh: &Mesh, one: &Marched, other: &Marched, prices: &Prices) -> Vec<f64> {
-    let ends = prices.ends.map(|end| end.xy());
-    let near = (EXEMPT + 1.0) * mesh.side;
-    let mut sums = vec![f64::INFINITY; mesh.limits.len()];
-    for triangle in mesh.triangles() {
-        let middle = mesh.middle(triangle);
-        sums[triangle] = if ends.iter().any(|end| (middle - end).norm() < near) {
-            0.0
-        } else {
-            let lowest = lowest_sum(
-                mesh,
-                triangle,
-                &one.potential.values,
-                &other.potential.values,
-            );
-            lowest - one.lost - other.lost
-        };
-    }
-    sums
-}
-
-/// The least in `triangle` of the means over cells of two potentials.
-fn lowest_sum(mesh: &Mesh, triangle: usize, one: &[f64], other: &[f64]) -> f64 {
-    let corners = mesh.corners(triangle);
-    let sum = corners
-        .iter()
-        .map(|corner| one[*corner] + other[*corner])
-        .fold(f64::INFINITY, f64::min);
-    sum + dip(mesh, corners, one) + dip(mesh, corners, other)
-}
-
-/// How far the vertices round a triangle lie below the plane through its corners, at most: a mean
-/// over a cell weighs the values round it so that a plane gives itself.
-fn dip(mesh: &Mesh, [at, one, other]: [usize; 3], values: &[f64]) -> f64 {
-    const ROUND: [[i32; 2]; 9] = [
-        [-1, 0],
-        [-1, 1],
-        [0, -1],
-        [1, -1],
-        [2, -1],
-        [2, 0],
-        [1, 1],
-        [0, 2],
-        [-1, 2],
-    ];
-    let (start, along, across) = (
-        values[at],
-        values[one] - values[at],
-        values[other] - values[at],
-    );
-    if !start.is_finite() {
-        return 0.0;
-    }
-    let turned = if one > at { 1 } else { -1 };
-    let [column, row] = mesh.place(at);
-    ROUND
-        .iter()
-        .map(|[i, j]| {
-            let value = values[mesh.vertex([column + turned * i, row + turned * j])];
-            value - (start + f64::from(*i) * along + f64::from(*j) * across)
-        })
-        .fold(0.0, f64::min)
-}
-
-/// The triangles that a route cheaper than `cap` can come into, and those that touch them; and what
-/// a route costs at least that comes into another one.
-fn widened(mesh: &Mesh, sums: &[f64], cap: f64) -> (Vec<bool>, f64) {
-    let mut is_near = vec![false; mesh.columns * mesh.rows];
-    let mut beyond = f64::INFINITY;
-    for triangle in mesh.triangles() {
-        if sums[triangle] < cap {
-            for corner in mesh.corners(triangle) {
-                is_near[corner] = true;
-            }
-        } else {
-            beyond = beyond.min(sums[triangle]);
-        }
-    }
-    let mut kept = vec![false; mesh.limits.len()];
-    for vertex in (0..is_near.len()).filter(|vertex| is_near[*vertex]) {
-        for (triangle, _) in mesh.round(vertex) {
-            kept[triangle] = true;
-        }
-    }
-    (kept, beyond)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::super::tests::read;
-    use super::super::{Prices, wall};
+    use super::super::wall;
     use super::*;
     use crate::scenario::Scenario;
 

@@ -1,0 +1,62 @@
+//! What a bound pays for a metre.
+
+use crate::cost::{THREAT_SHARE, Tolerance, metre};
+use crate::geometry::Point3;
+use crate::scenario::{Quadrature, Scenario};
+
+/// What a metre costs, and where it is flown.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Prices {
+    /// Of a metre, `w`.
+    pub(super) fuel: f64,
+    /// Of a metre in a soft zone, for each metre of its depth, `s`.
+    pub(super) exposure: f64,
+    /// Metres by which a feasible route may miss a limit.
+    pub(super) tolerance: f64,
+    pub(super) ends: [Point3; 2],
+}
+
+impl Prices {
+    pub(super) fn of(scenario: &Scenario) -> Self {
+        let exposure = match scenario.planner.quadrature {
+            Quadrature::Integral => scenario.weights.threat * THREAT_SHARE,
+            // Sampled, a soft zone can be crossed for nothing.
+            Quadrature::Paper => 0.0,
+        };
+        Self {
+            fuel: metre(scenario),
+            exposure,
+            tolerance: Tolerance::of(scenario).length_m,
+            ends: [scenario.start, scenario.target],
+        }
+    }
+
+    /// Distance of the ends seen from above, metres.
+    pub(super) fn direct(&self) -> f64 {
+        (self.ends[1].xy() - self.ends[0].xy()).norm()
+    }
+
+    /// Difference in height of the ends, metres.
+    pub(super) fn rise(&self) -> f64 {
+        (self.ends[1].z - self.ends[0].z).abs()
+    }
+
+    /// Least cost of fuel for a way of `length` metres seen from above that goes up and down by
+    /// `vertical`.
+    pub(super) fn climbing(&self, length: f64, vertical: f64) -> f64 {
+        self.fuel * (length * length + vertical * vertical).sqrt()
+    }
+
+    /// Least cost of a way with the rise of the ends that costs so much seen from above.
+    pub(super) fn climbing_at(&self, cost: f64) -> f64 {
+        let rise = self.fuel * self.rise();
+        (cost * cost + rise * rise).sqrt()
+    }
+
+    /// Length, seen from above, of a way that costs `cost` with the rise of the ends, or a hair more.
+    pub(super) fn length_of(&self, cost: f64) -> f64 {
+        let slant = cost / self.fuel;
+        let squared = (slant * slant - self.rise() * self.rise()).max(0.0);
+        squared.sqrt() * (1.0 + 1e-9)
+    }
+}

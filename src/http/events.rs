@@ -96,6 +96,7 @@ fn read_last_event_id(params: &Params, headers: &HeaderMap) -> Result<u64, Probl
     let query = query
         .map(|value| read("last_event_id", value))
         .transpose()?;
+    // Some clients send an empty one before the first event.
     let header = headers
         .get(LAST_EVENT_ID)
         .map(|value| String::from_utf8_lossy(value.as_bytes()))

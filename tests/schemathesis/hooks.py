@@ -16,14 +16,19 @@ def lines(_, response):
     return events[len(response.content) % len(events)]
 
 
-# What seed.py wrote: plans and datasets that others are to find.
-SEEDED = {json.loads(line) for name in ("plans", "datasets") for line in Path(name).read_text().splitlines()}
+def names(file):
+    return [json.loads(line) for line in Path(file).read_text().splitlines()]
+
+
+# What seed.py wrote: plans and datasets that others are to find, and those that are there to be deleted.
+SEEDED = {*names("plans"), *names("datasets")}
+SPARE = {"id": names("spare-plans"), "name": names("spare-datasets")}
 
 
 @schemathesis.hook
 def before_call(_, case, kwargs):
-    """Deletes only what requests made."""
+    """Deletes only what requests made, and what is there for it."""
     if case.method.upper() == "DELETE":
         for name, value in (case.path_parameters or {}).items():
             if value in SEEDED:
-                case.path_parameters[name] = "another"
+                case.path_parameters[name] = SPARE[name].pop() if SPARE[name] else "another"

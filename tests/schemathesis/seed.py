@@ -2,7 +2,8 @@
 
     seed.py URL KEY DATASET
 
-Writes their names into files in the working directory, as dictionaries of schemathesis.
+Writes their names into files in the working directory, as dictionaries of schemathesis; and into others, those of plans
+and datasets that are there to be deleted.
 """
 
 import json
@@ -30,6 +31,16 @@ DEGREES = {
     "altitude": {"min": 0, "max": 120},
     "planner": PLANNER,
 }
+# How many of either may be deleted.
+SPARE = 40
+GRID = b"""ncols 2
+nrows 2
+xllcorner 0
+yllcorner 0
+cellsize 10
+1 2
+3 4
+"""
 
 
 def main(url, key, dataset):
@@ -50,6 +61,8 @@ def main(url, key, dataset):
     with open(dataset, "rb") as file:
         named = send("PUT", "/terrains/jacksboro", file.read())
     write("datasets", [named["name"]])
+    write("spare-plans", [ended(LOCAL) for _ in range(SPARE)])
+    write("spare-datasets", [send("PUT", f"/terrains/spare-{i}", GRID)["name"] for i in range(SPARE)])
 
 
 def write(name, values):

@@ -252,9 +252,14 @@ fn along_strings(model: &Model, stop: &dyn Stop) -> Vec<Vec<Point3>> {
 /// Routes over the ground: through a fine net only where the coarse one has none that can be flown as it is, and
 /// far about where the best so far pays much for soft zones; and whether it does.
 fn over_ground(model: &Model, strings: &[Vec<Point3>]) -> (Found, bool) {
-    let mut found = roadmap::routes(model, OVERLAND);
-    let over = best_of(model, &found.routes);
     let strung = best_of(model, strings);
+    let known = strings
+        .iter()
+        .map(|route| price(model, route))
+        .min_by(Fitness::rank)
+        .map_or(f64::INFINITY, |fitness| fitness.cost);
+    let mut found = roadmap::routes(model, OVERLAND, known);
+    let over = best_of(model, &found.routes);
     let best = over
         .into_iter()
         .chain(strung)

@@ -18,7 +18,7 @@ const PLACES: usize = 160;
 /// Over hills, where passes are narrow.
 const PLACES_OVER_HILLS: usize = 320;
 
-/// The net covers all points of which the way over them is at most so many times the direct one.
+/// The net covers all points of which the way over them is at most so many times the direct one, and legs alike.
 const DETOUR: f64 = 1.4;
 
 /// A place has the height that clears a threat from so many steps of the net beside it on.
@@ -27,15 +27,14 @@ const NEAR: f64 = 1.5;
 /// What a waypoint must gain, as a share of the direct way's fuel.
 const WORTH: f64 = 1e-4;
 
-/// Up to `count` routes that differ.
-pub(super) fn routes(model: &Model, count: usize) -> Found {
+/// Up to `count` routes that differ, where one that costs `known` is to be had without, about.
+pub(super) fn routes(model: &Model, count: usize, known: f64) -> Found {
     let places = places(model);
-    let legs_priced = (places.len() * (places.len() - 1) / 2) as u64;
-    let mut legs = Legs::new(model, &places);
+    let mut legs = Legs::new(model, &places, known);
     let trees = [0, places.len() - 1].map(|end| legs.cheapest(end));
     Found {
         routes: net::chains(model, &places, &trees, count),
-        legs_priced,
+        legs_priced: legs.priced,
     }
 }
 
@@ -65,53 +64,62 @@ struct Legs<'p, 's> {
     costs: Vec<Vec<f64>>,
     /// Whether it is known to keep its heights; where those take long to measure, few legs are asked.
     measured: Vec<Vec<bool>>,
+    priced: u64,
 }
 
 impl<'p, 's> Legs<'p, 's> {
-    fn new(model: &Model<'s>, places: &'p [Point3]) -> Self {
+    fn new(model: &Model<'s>, places: &'p [Point3], known: f64) -> Self {
         let scenario = model.scenario;
         let tolerance = model.tolerance.scaled(PRICED_FROM);
         let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).verdicts();
-        let count = places.len();
-        let ends: Vec<(usize, usize)> = (0..count)
-            .flat_map(|a| (a + 1..count).map(move |b| (a, b)))
-            .collect();
-        let [from, to] = net::rows(places, &ends);
-        let mut prices = vec![Price::ZERO; from.len()];
         let hilly = pricer.is_hilly();
-        if hilly {
-            pricer.legs_at_best(&from, &to, &mut prices);
-        } else {
-            pricer.legs(&from, &to, &mut prices);
-        }
-        let own: Vec<(f64, f64)> = places
-            .iter()
-            .map(|&place| model.waypoint(place, tolerance))
-            .collect();
+        let count = places.len();
         let direct = (scenario.target - scenario.start).norm();
         let worth = WORTH * direct * metre(scenario);
+        // Half of what either end costs as a waypoint; the ends of the route cost nothing.
+        let mut own: Vec<f64> = places
+            .iter()
+            .map(|&place| 0.5 * (model.waypoint(place, tolerance).1 + worth))
+            .collect();
+        (own[0], own[count - 1]) = (0.0, 0.0);
+        let away = [scenario.start, scenario.target]
+            .map(|end| -> Vec<f64> { places.iter().map(|place| (place - end).norm()).collect() });
+        let ways = away[0].iter().zip(&away[1]).map(|(one, other)| one + other);
+        // A leg farther about is part of no route that is worth its fuel, and need not be priced.
+        let worthwhile = known / metre(scenario);
+        let farthest = ways.fold(worthwhile.max(DETOUR * direct), f64::max);
+        // One by one of them, as all at once would fill megabytes.
         let mut costs = vec![vec![f64::INFINITY; count]; count];
-        for (idx, &(a, b)) in ends.iter().enumerate() {
-            let (price, lane) = (&prices[idx / LANES], idx % LANES);
-            if price.violation[lane] > 0.0 {
-                continue;
-            }
-            // Half of what either end costs as a waypoint; the ends of the route cost nothing.
-            let of = |place: usize| {
-                if place == 0 || place == count - 1 {
-                    0.0
-                } else {
-                    0.5 * (own[place].1 + worth)
-                }
+        let mut priced = 0;
+        for a in 0..count {
+            let is_near = |b: &usize| {
+                let about = (away[0][a] + away[1][*b]).min(away[0][*b] + away[1][a]);
+                about + (places[*b] - places[a]).norm() <= farthest
             };
-            let cost = price.cost[lane] + of(a) + of(b);
-            (costs[a][b], costs[b][a]) = (cost, cost);
+            let ends: Vec<(usize, usize)> =
+                (a + 1..count).filter(is_near).map(|b| (a, b)).collect();
+            let [from, to] = net::rows(places, &ends);
+            let mut prices = vec![Price::ZERO; from.len()];
+            if hilly {
+                pricer.legs_at_best(&from, &to, &mut prices);
+            } else {
+                pricer.legs(&from, &to, &mut prices);
+            }
+            for (idx, &(_, b)) in ends.iter().enumerate() {
+                let (price, lane) = (&prices[idx / LANES], idx % LANES);
+                if price.violation[lane] <= 0.0 {
+                    let cost = price.cost[lane] + own[a] + own[b];
+                    (costs[a][b], costs[b][a]) = (cost, cost);
+                }
+            }
+            priced += ends.len() as u64;
         }
         Self {
             places,
             pricer,
             costs,
             measured: vec![vec![!hilly; count]; count],
+            priced,
         }
     }
 
@@ -208,7 +216,10 @@ mod tests {
         let scenario = hilly_scenario();
         let model = Model::new(&scenario);
         let places = places(&model);
-        let (mut late, mut early) = (Legs::new(&model, &places), Legs::new(&model, &places));
+        let (mut late, mut early) = (
+            Legs::new(&model, &places, 0.0),
+            Legs::new(&model, &places, 0.0),
+        );
         let all: Vec<usize> = (0..places.len()).collect();
         for place in 0..places.len() {
             early.measure(&all[..place], place);

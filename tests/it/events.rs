@@ -144,6 +144,10 @@ async fn a_cut_stream_resumes_at_every_event_with_neither_loss_nor_repeat() {
             .await
             .expect("an answer");
         assert_eq!(beyond.status(), StatusCode::NO_CONTENT);
+        // Empty, as before the first event, the header asks for nothing.
+        let fresh = plan.events("?rate=0").header("last-event-id", "");
+        let fresh = Stream::open(fresh).await.rest().await;
+        assert_eq!(fresh, plan.read("?rate=0").await);
         // The header is heard, and yet the query has to be one.
         let mistaken = plan
             .events("?last_event_id=1.5")

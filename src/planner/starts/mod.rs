@@ -252,17 +252,14 @@ fn along_strings(model: &Model, stop: &dyn Stop) -> Vec<Vec<Point3>> {
 /// Routes over the ground: through a fine net only where the coarse one has none that can be flown as it is, and
 /// far about where the best so far pays much for soft zones; and whether it does.
 fn over_ground(model: &Model, strings: &[Vec<Point3>]) -> (Found, bool) {
-    let strung = best_of(model, strings);
-    let known = strings
-        .iter()
-        .map(|route| price(model, route))
-        .min_by(Fitness::rank)
-        .map_or(f64::INFINITY, |fitness| fitness.cost);
+    let strings = priced(model, strings);
+    let cheapest = strings.iter().min_by(|one, other| one.0.rank(&other.0));
+    let known = cheapest.map_or(f64::INFINITY, |(fitness, _)| fitness.cost);
     let mut found = roadmap::routes(model, OVERLAND, known);
-    let over = best_of(model, &found.routes);
+    let over = best_of(model, priced(model, &found.routes));
     let best = over
         .into_iter()
-        .chain(strung)
+        .chain(best_of(model, strings))
         .min_by(|one, other| one.0.rank(&other.0));
     let detour = best.and_then(|(_, route)| exposed::detour(model, route));
     if over.is_none() || detour.is_some() {
@@ -281,13 +278,21 @@ fn over_ground(model: &Model, strings: &[Vec<Point3>]) -> (Found, bool) {
     (found, detour.is_some())
 }
 
+/// A route and its price.
+type Priced<'r> = (Fitness, &'r [Point3]);
+
+fn priced<'r>(model: &Model, routes: &'r [Vec<Point3>]) -> Vec<Priced<'r>> {
+    let priced = |route: &'r Vec<Point3>| (price(model, route), route.as_slice());
+    routes.iter().map(priced).collect()
+}
+
 /// The best of `routes` that can be flown as it is.
-fn best_of<'r>(model: &Model, routes: &'r [Vec<Point3>]) -> Option<(Fitness, &'r [Point3])> {
+fn best_of<'r>(model: &Model, routes: Vec<Priced<'r>>) -> Option<Priced<'r>> {
     routes
-        .iter()
-        .filter(|route| route.len() - 2 <= model.scenario.planner.waypoints)
-        .map(|route| (price(model, route), route.as_slice()))
-        .filter(|(fitness, _)| fitness.is_feasible())
+        .into_iter()
+        .filter(|(fitness, route)| {
+            fitness.is_feasible() && route.len() - 2 <= model.scenario.planner.waypoints
+        })
         .min_by(|one, other| one.0.rank(&other.0))
 }
 

@@ -58,15 +58,18 @@ impl Outline {
     /// Distance of `point` to the shape before it is widened, metres; 0 within a ring.
     #[must_use]
     pub fn distance(&self, point: Point2) -> f64 {
-        match &self.shape {
-            OutlineShape::Disc(center) => (point - center).norm(),
-            OutlineShape::Ring(ring) => {
-                if ring::contains(ring, point) {
-                    0.0
-                } else {
-                    ring::distance(ring, point)
-                }
-            }
+        self.shape.distance(point)
+    }
+}
+
+impl OutlineShape {
+    /// Distance of `point`, metres; 0 within a ring.
+    #[must_use]
+    pub fn distance(&self, point: Point2) -> f64 {
+        match self {
+            Self::Disc(center) => (point - center).norm(),
+            Self::Ring(ring) if ring::contains(ring, point) => 0.0,
+            Self::Ring(ring) => ring::distance(ring, point),
         }
     }
 }

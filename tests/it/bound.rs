@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use noctule::cost::{Constraint, Model};
 use noctule::geometry::{Point2, Point3};
-use noctule::planner;
+use noctule::planner::{self, Nobody};
 use noctule::scenario::Scenario;
 use noctule::scenario::json::{self, Rules};
 use noctule::scenario::limits::Limits;
@@ -33,6 +33,7 @@ struct Drawn {
     threat: f64,
     altitude: f64,
     heights: [f64; 2],
+    climb: f64,
     waypoints: usize,
     is_sampled: bool,
     seed: u64,
@@ -102,22 +103,26 @@ fn drawn() -> impl Strategy<Value = Drawn> {
         prop_oneof![1 => Just(0.0), 6 => log(-8.0, 2.0)],
         prop_oneof![1 => Just(0.0), 4 => log(-5.0, 1.0)],
         [0.0..200.0f64, 0.0..200.0f64],
+        prop_oneof![1 => Just(89.0), 2 => 12.0..60.0f64],
         prop_oneof![Just(1_usize), Just(2), Just(3), Just(6), Just(12)],
         prop::bool::weighted(0.1),
         any::<u64>(),
     )
         .prop_map(
-            |(threats, fuel, threat, altitude, heights, waypoints, is_sampled, seed)| Drawn {
-                ends: [[80.0, 120.0], [920.0, 840.0]],
-                threats,
-                scale: 1.0,
-                fuel,
-                threat,
-                altitude,
-                heights,
-                waypoints,
-                is_sampled,
-                seed,
+            |(threats, fuel, threat, altitude, heights, climb, waypoints, is_sampled, seed)| {
+                Drawn {
+                    ends: [[80.0, 120.0], [920.0, 840.0]],
+                    threats,
+                    scale: 1.0,
+                    fuel,
+                    threat,
+                    altitude,
+                    heights,
+                    climb,
+                    waypoints,
+                    is_sampled,
+                    seed,
+                }
             },
         )
 }
@@ -277,9 +282,9 @@ fn scenario(drawn: &Drawn) -> Option<Scenario> {
             "start": {{ "x": {}, "y": {}, "z": {} }}, "target": {{ "x": {}, "y": {}, "z": {} }},
             "area": {{ "min": {{ "x": 0, "y": 0 }}, "max": {{ "x": 1000, "y": 1000 }} }},
             "altitude": {{ "min": 0, "max": 200 }},
-            "vehicle": {{ "max_turn_deg": 180, "max_climb_deg": 89, "fuel_per_km": 1000, "min_leg": 0.001 }},
+            "vehicle": {{ "max_turn_deg": 180, "max_climb_deg": {}, "fuel_per_km": 1000, "min_leg": 0.001 }},
             "weights": {{ "fuel": {}, "threat": {}, "altitude": {} }},
-            "planner": {{ "algorithm": "tms-sba", "waypoints": {}, "parameters": {{ "quadrature": "{}" }} }},
+            "planner": {{ "algorithm": "tms-sba", "waypoints": {}, "population": 40, "iterations": 40, "parameters": {{ "quadrature": "{}" }} }},
             "threats": [{}] }}"#,
         drawn.ends[0][0],
         drawn.ends[0][1],
@@ -287,6 +292,7 @@ fn scenario(drawn: &Drawn) -> Option<Scenario> {
         drawn.ends[1][0],
         drawn.ends[1][1],
         drawn.heights[1],
+        drawn.climb,
         drawn.fuel,
         drawn.threat,
         drawn.altitude,
@@ -494,6 +500,14 @@ fn check(drawn: &Drawn) -> Result<(), TestCaseError> {
                 "{cost} is below the bound {bound}: {route:?}"
             );
         }
+    }
+    let planned = planner::plan(&scenario, &mut Nobody, &Nobody);
+    if planned.feasible {
+        let cost = planned.cost.total;
+        prop_assert!(
+            cost >= bound,
+            "{cost} is below the bound {bound}: {drawn:?}"
+        );
     }
     Ok(())
 }

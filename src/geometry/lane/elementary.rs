@@ -162,13 +162,14 @@ impl<S: Simd> Lane<S> {
     }
 
     /// The logarithm of `self / divisor`, both > 0 and the quotient >= 1 and finite; to 3 units in
-    /// the last place of it or of 1, whichever is greater.
+    /// the last place of it or of 1, whichever is greater. Of others, any number or none.
     #[inline(always)]
     pub(crate) fn ln_over(self, divisor: Self) -> Self {
         // The quotient of the powers of two in both; what is left lies between 1/2 and 2.
         let power = self.zip(divisor, |over, under| {
-            let powers = (over.to_bits() & EXPONENT) + ONE - (under.to_bits() & EXPONENT);
-            f64::from_bits(powers)
+            // In a lane that does not count, the quotient may be anything.
+            let power = (over.to_bits() & EXPONENT).wrapping_add(ONE);
+            f64::from_bits(power.wrapping_sub(under.to_bits() & EXPONENT))
         });
         let exponent = power
             .map(|_, value| f64::from_bits((value.to_bits() >> 52) | COUNTER.to_bits()))
@@ -274,6 +275,17 @@ mod tests {
         check(Exp, 0.0, 0.0, 1.0, 0.0);
         check(LnOver, 3.0, 3.0, 0.0, 0.0);
         check(LnOver, 1e18, 1.0, libm::log(1e18), 64.0);
+    }
+
+    #[test]
+    fn lanes_that_do_not_count_may_hold_anything() {
+        let [mut over, mut under] = [[3.0; LANES]; 2];
+        (over[1], under[1]) = (0.0, 1e300);
+        (over[2], under[2]) = (-2.0, 5.0);
+        let logarithms = apply(LnOver, over, under);
+        for lane in [0, 3, 4, 5, 6, 7] {
+            assert!(logarithms[lane].abs() < 1e-15);
+        }
     }
 
     proptest! {

@@ -22,13 +22,28 @@ pub(super) struct Event {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Kind {
-    /// Pass between two walls whose cores are `apart` metres from each other; twice the same wall
-    /// where a ring nearly closes.
-    Slip { walls: [usize; 2], apart: f64 },
+    /// Pass between two walls whose cores are `apart` metres from each other, where these are nearest; twice
+    /// the same wall where a ring nearly closes.
+    Slip {
+        walls: [usize; 2],
+        apart: f64,
+        between: [Point2; 2],
+    },
     /// Come nearer to a wall than its `dip`.
     Dip { wall: usize },
     /// Fly over or under a wall.
     Pass { wall: usize },
+}
+
+impl Event {
+    /// Those that it has to do with, at times one twice.
+    pub(super) fn walls(&self) -> impl Iterator<Item = usize> + use<> {
+        let walls = match self.kind {
+            Kind::Slip { walls, .. } => walls,
+            Kind::Dip { wall } | Kind::Pass { wall } => [wall, wall],
+        };
+        walls.into_iter()
+    }
 }
 
 /// A convex core: a disc's centre, or an edge of a ring.
@@ -170,6 +185,7 @@ fn gap(one: &Core, other: &Core, walls: &[Wall], prices: &Prices) -> Option<Even
         kind: Kind::Slip {
             walls: [one.wall, other.wall],
             apart,
+            between: [p, q],
         },
         cost: prices.climbing(length, prices.rise()) + extra,
         extra,

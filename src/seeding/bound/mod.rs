@@ -6,6 +6,7 @@
 //! that argument has a gap, and those places are priced one by one. Where soft zones must be crossed, a
 //! potential in the field of all prices proves more; the better of both counts.
 
+mod departure;
 mod ends;
 mod event;
 mod potential;
@@ -16,6 +17,7 @@ mod wall;
 use std::cell::Cell;
 
 use crate::scenario::Scenario;
+use ends::Legs;
 use event::{Event, Kind};
 use prices::Prices;
 use wall::Wall;
@@ -28,6 +30,12 @@ const MOST_WAYS_IN_ALL: usize = 120_000;
 
 /// Bisections on the number of events that a cheaper route may make use of.
 const MOST_LEVELS: usize = 24;
+
+/// What telling first and last legs apart may take.
+const EFFORT: usize = 40_000;
+
+/// Events that are looked at one by one, at most.
+const MOST_ALLOWED: usize = 40;
 
 /// Where the string itself is not this many times as dear as what is known, a potential promises nothing.
 const WORTHWHILE: f64 = 1.02;
@@ -58,14 +66,14 @@ fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) ->
     let walls = wall::walls(scenario, prices);
     // Seen from above, where the string with these radii is so dear that it could be more than `known`.
     let across = |radii: &[Option<f64>], known: f64| {
-        let may_gain = known.is_finite()
-            && potential::applies(&walls, prices)
-            && known < string::price(&walls, radii, prices, stop) / WORTHWHILE;
-        if may_gain {
-            potential::bound(&walls, prices, &scenario.area, known, stop)
-        } else {
-            0.0
+        if !known.is_finite() || !potential::applies(&walls, prices) {
+            return 0.0;
         }
+        let promised = string::price(&walls, radii, prices, stop);
+        if promised <= WORTHWHILE * known {
+            return 0.0;
+        }
+        potential::bound(&walls, prices, &scenario.area, (known, promised), stop)
     };
     let Some(events) = event::events(&walls, prices) else {
         let radii = string::cores(&walls);
@@ -120,17 +128,7 @@ fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) ->
     if ends::are_too_many(&walls) {
         return proven;
     }
-    // The legs of start and target make it dearer still, at times dearer than the next event.
-    for _ in 0..2 {
-        let steep = field.steep(&events[..best], dense);
-        proven = proven.max(steep.min(cost_of(&events, best)));
-        let affordable = events.partition_point(|event| event.cost < steep);
-        if affordable <= best {
-            break;
-        }
-        best = affordable;
-    }
-    proven
+    proven.max(field.one_by_one(&events, dense))
 }
 
 /// Cost of the first event that is not allowed at `level`.
@@ -152,14 +150,14 @@ impl Field<'_> {
     /// What no route undercuts that makes use of `allowed` events at most; `enough` or more where it
     /// costs that much.
     fn level(&self, allowed: &[Event], enough: f64) -> f64 {
-        let length_enough = self.prices.length_of(enough);
-        let cost = |radii: &[Option<f64>]| {
-            let (length, ways) =
-                string::length(self.walls, radii, self.prices, (length_enough, self.stop));
+        let enough_across = self.prices.across(enough);
+        let cost = |radii: &[Option<f64>], spent: &[usize]| {
+            let limits = (enough_across, self.stop);
+            let (cost, ways) = string::cost((self.walls, radii), self.prices, spent, limits);
             self.ways.set(self.ways.get() + ways);
-            self.prices.climbing(length, self.prices.rise())
+            self.prices.climbing_at(cost)
         };
-        let tame = cost(&self.radii(allowed));
+        let tame = cost(&self.radii(allowed), &[]);
         if allowed.is_empty() || tame >= enough {
             return tame;
         }
@@ -172,16 +170,99 @@ impl Field<'_> {
         if extra <= 0.0 || self.ways.get() > MOST_WAYS_IN_ALL {
             return tame;
         }
-        let with = cost(&self.bare(allowed)) + extra;
-        tame.max(with.min(cost(&self.radii(&[]))))
+        let touched: Vec<usize> = allowed.iter().flat_map(Event::walls).collect();
+        let with = cost(&self.bare(allowed), &touched) + extra;
+        tame.max(with.min(cost(&self.radii(&[]), &[])))
     }
 
-    /// As `level`, by the legs that begin at the start and end at the target; no route costs less than
-    /// `dense` seen from above.
-    fn steep(&self, allowed: &[Event], dense: f64) -> f64 {
-        let radii = self.radii(allowed);
-        let walls = (self.walls, &radii[..]);
-        ends::bound(self.scenario, self.prices, walls, dense, self.stop)
+    /// What no route undercuts, event by event, and by the legs that begin at the start and end at the target; none costs
+    /// less than `dense` seen from above.
+    fn one_by_one(&self, events: &[Event], dense: f64) -> f64 {
+        let radii = self.radii(&[]);
+        let least = dense.max(self.across(&radii, &[]));
+        // Of routes that use no event.
+        let mut effort = EFFORT;
+        let mut legs = self.legs(&radii, least, effort / 2);
+        let without = legs.bound(least, f64::INFINITY);
+        effort -= effort / 2 - legs.effort;
+        let affordable = events.partition_point(|event| event.cost < without);
+        let count = affordable.min(MOST_ALLOWED);
+        let proven = without.min(cost_of(events, count));
+        let mut allowed = events[..count].to_vec();
+        // Events that no route uses for less than that leave more of the walls to the others.
+        while !allowed.is_empty() {
+            let radii = self.radii(&allowed);
+            let least = dense.max(self.across(&radii, &[]));
+            let across = |event: &Event| least.max(self.using(event, &radii));
+            let used: Vec<(Event, f64)> = allowed
+                .iter()
+                .map(|event| (*event, across(event)))
+                .collect();
+            let mut legs = self.legs(&radii, least, effort);
+            let cost =
+                |legs: &Legs, (event, across): &(Event, f64)| legs.told(*across).max(event.cost);
+            let cheap = |legs: &Legs| -> Vec<Event> {
+                let cheap = used.iter().filter(|used| cost(legs, used) < proven);
+                cheap.map(|(event, _)| *event).collect()
+            };
+            let mut left = cheap(&legs);
+            if left.len() == used.len() {
+                let cheapest = used
+                    .iter()
+                    .fold(f64::INFINITY, |least, (_, across)| least.min(*across));
+                legs.bound(cheapest, proven);
+                effort = legs.effort;
+                left = cheap(&legs);
+                if left.len() == used.len() || effort == 0 {
+                    return used
+                        .iter()
+                        .map(|used| cost(&legs, used))
+                        .fold(proven, f64::min);
+                }
+            }
+            allowed = left;
+        }
+        proven
+    }
+
+    fn legs<'a>(&'a self, radii: &'a [Option<f64>], least: f64, effort: usize) -> Legs<'a> {
+        let field = (self.walls, radii);
+        Legs::new(
+            self.scenario,
+            self.prices,
+            field,
+            least,
+            (effort, self.stop),
+        )
+    }
+
+    /// What no route undercuts, seen from above, that uses `event`, where each wall counts as hard at one of these `radii`
+    /// whatever else it uses.
+    fn using(&self, event: &Event, radii: &[Option<f64>]) -> f64 {
+        let spent: Vec<usize> = event.walls().collect();
+        match event.kind {
+            // The toll may be what a first or last leg pays.
+            Kind::Pass { .. } => 0.0,
+            Kind::Dip { wall } => {
+                let mut bare = radii.to_vec();
+                bare[wall] = bare[wall].map(|_| self.walls[wall].core);
+                self.across(&bare, &spent) + event.extra
+            }
+            Kind::Slip { walls, between, .. } => {
+                let cores = walls.map(|wall| self.walls[wall].core);
+                let gap = string::Gap::new(between, cores);
+                let field = (self.walls, radii);
+                string::through(field, self.prices, &spent, gap, self.stop) + event.extra
+            }
+        }
+    }
+
+    /// What no route undercuts, seen from above, that goes round the walls widened to `radii`.
+    fn across(&self, radii: &[Option<f64>], spent: &[usize]) -> f64 {
+        let limits = (f64::INFINITY, self.stop);
+        let (cost, ways) = string::cost((self.walls, radii), self.prices, spent, limits);
+        self.ways.set(self.ways.get() + ways);
+        cost
     }
 
     /// How far each wall may be widened so that it counts as hard whatever `allowed` events happen.
@@ -197,7 +278,7 @@ impl Field<'_> {
             }
         }
         for event in allowed {
-            if let Kind::Slip { walls, apart } = event.kind
+            if let Kind::Slip { walls, apart, .. } = event.kind
                 && let [Some(one), Some(other)] = walls.map(|wall| radii[wall])
                 && one + other > apart
             {
@@ -268,6 +349,25 @@ mod tests {
             525.6264,
             0.20,
         );
+    }
+
+    /// A start and a target in soft zones, in the way of each, and three gaps between: the best known has 30 waypoints.
+    #[test]
+    fn within_a_percent_where_soft_zones_are_left_and_gaps_are_passed() {
+        let mut scenario = scenario(
+            r#""threats": [
+                {"kind": "cylinder", "center": {"x": 240, "y": 150}, "radius": 45, "influence": 75},
+                {"kind": "cylinder", "center": {"x": 440, "y": 470}, "radius": 60, "influence": 90},
+                {"kind": "cylinder", "center": {"x": 560, "y": 370}, "radius": 65, "influence": 95},
+                {"kind": "cylinder", "center": {"x": 330, "y": 580}, "radius": 60, "influence": 90},
+                {"kind": "cylinder", "center": {"x": 690, "y": 290}, "radius": 60, "influence": 90},
+                {"kind": "polygon", "margin": 30, "vertices": [{"x": 760, "y": 740}, {"x": 800, "y": 740},
+                    {"x": 800, "y": 780}, {"x": 760, "y": 780}]}
+            ]"#,
+        );
+        (scenario.start.z, scenario.target.z) = (100.0, 100.0);
+        let (bound, best) = (lower_bound(&scenario), 598.893);
+        assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
     }
 
     /// What a route may cut off corners can be worth more than the way; and it may go through what

@@ -53,10 +53,9 @@ impl Prices {
         (cost * cost + rise * rise).sqrt()
     }
 
-    /// Length, seen from above, of a way that costs `cost` with the rise of the ends, or a hair more.
-    pub(super) fn length_of(&self, cost: f64) -> f64 {
-        let slant = cost / self.fuel;
-        let squared = (slant * slant - self.rise() * self.rise()).max(0.0);
-        squared.sqrt() * (1.0 + 1e-9)
+    /// What a way costs seen from above that costs `cost` with the rise of the ends, or a hair more.
+    pub(super) fn across(&self, cost: f64) -> f64 {
+        let rise = self.fuel * self.rise();
+        (cost * cost - rise * rise).max(0.0).sqrt() * (1.0 + 1e-9)
     }
 }

@@ -1,10 +1,13 @@
 //! The taut string round walls that are widened, pulled for a bound.
 
 use super::super::obstacles::Obstacles;
+use super::super::outline::Outline;
 use super::super::taut::{Limits, TautString, TautStrings, taut_strings_within};
+use super::departure::Departure;
 use super::potential;
 use super::prices::Prices;
 use super::wall::Wall;
+use crate::geometry::Point2;
 
 /// Ways looked at for one string: beyond a few hundred walls, the search ends with what it has
 /// proven so far.
@@ -17,8 +20,8 @@ pub(super) fn plain(
     prices: &Prices,
     stop: &dyn Fn() -> bool,
 ) -> f64 {
-    let (length, _) = length(walls, radii, prices, (f64::INFINITY, stop));
-    prices.climbing(length, prices.rise())
+    let (cost, _) = cost((walls, radii), prices, &[], (f64::INFINITY, stop));
+    prices.climbing_at(cost)
 }
 
 /// Radii of nothing but cores.
@@ -35,33 +38,114 @@ pub(super) fn price(
     prices: &Prices,
     stop: &dyn Fn() -> bool,
 ) -> f64 {
-    let found = pulled(&scene(walls, radii, prices), (f64::INFINITY, stop));
-    let price = |string: &TautString| prices.climbing_at(potential::price(walls, prices, string));
+    let ends = departures((walls, radii), prices, &[]);
+    let found = pulled(
+        &scene((walls, radii), ends.map(|end| end.at)),
+        (f64::INFINITY, stop),
+    );
+    let tolls = ends[0].toll + ends[1].toll;
+    let price =
+        |string: &TautString| prices.climbing_at(potential::price(walls, prices, string) + tolls);
     found.strings.first().map_or(f64::INFINITY, price)
 }
 
-/// Length of the string round `walls` widened to `radii` (`None` leaves one out), metres, less what
-/// routes may cut off corners, but not below 0; infinite where there is none. Once that is proven to be `enough`, or
-/// `stop` asks for it, what is proven. With it, the ways looked at.
-pub(super) fn length(
-    walls: &[Wall],
-    radii: &[Option<f64>],
+/// What no route undercuts, seen from above, that goes round `walls` widened to `radii` (`None` leaves one out): the
+/// string, less what routes may cut off corners, but not below 0, and the ways out of soft zones that are not `spent`;
+/// infinite where there is none. Once that is proven to be `enough`, or `stop` asks for it, what is proven. With it, the
+/// ways looked at.
+pub(super) fn cost(
+    (walls, radii): (&[Wall], &[Option<f64>]),
     prices: &Prices,
+    spent: &[usize],
     (enough, stop): (f64, &dyn Fn() -> bool),
 ) -> (f64, usize) {
     let slack = slack(walls, radii, prices);
-    let (shortest, ways) = shortest(&scene(walls, radii, prices), (enough + slack, stop));
+    let ends = departures((walls, radii), prices, spent);
+    let tolls = ends[0].toll + ends[1].toll;
+    let enough = (enough - tolls).max(0.0) / prices.fuel + slack;
+    let (shortest, ways) = shortest(
+        &scene((walls, radii), ends.map(|end| end.at)),
+        (enough, stop),
+    );
     // Where little is paid for fuel and much for soft zones, corners may be worth more than the way.
-    ((shortest - slack).max(0.0), ways)
+    ((prices.fuel * (shortest - slack) + tolls).max(0.0), ways)
 }
 
-fn scene(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> Obstacles {
-    let outlines = walls.iter().zip(radii);
-    Obstacles::new(
-        outlines.map(|(wall, radius)| radius.map(|radius| wall.outline(radius))),
-        prices.ends.map(|end| end.xy()),
-        None,
-    )
+/// Between two cores.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Gap {
+    middle: Point2,
+    /// From there to each core, metres.
+    half: f64,
+}
+
+impl Gap {
+    /// Between shapes that come nearest to each other at two points, which their `cores` are around.
+    pub(super) fn new([p, q]: [Point2; 2], cores: [f64; 2]) -> Self {
+        let along = (q - p).normalize();
+        let (p, q) = (p + along * cores[0], q - along * cores[1]);
+        Self {
+            middle: nalgebra::center(&p, &q),
+            half: 0.5 * (q - p).norm(),
+        }
+    }
+}
+
+/// As `cost`, of routes that lead through `gap`; of the walls on both sides, the soft zones are `spent`.
+pub(super) fn through(
+    (walls, radii): (&[Wall], &[Option<f64>]),
+    prices: &Prices,
+    spent: &[usize],
+    gap: Gap,
+    stop: &dyn Fn() -> bool,
+) -> f64 {
+    // Free to move to the middle of the gap on the way.
+    let radii = narrowed((walls, radii), gap.middle, gap.half);
+    let ends = departures((walls, &radii), prices, spent);
+    let halves: f64 = ends
+        .iter()
+        .map(|end| {
+            let scene = scene((walls, &radii), [end.at, gap.middle]);
+            shortest(&scene, (f64::INFINITY, stop)).0 - gap.half
+        })
+        .sum();
+    let slack = slack(walls, &radii, prices);
+    (prices.fuel * (halves - slack) + ends[0].toll + ends[1].toll).max(0.0)
+}
+
+/// Radii at which no wall comes nearer to a point than so many metres; `None` of those whose shapes do.
+pub(super) fn narrowed(
+    (walls, radii): (&[Wall], &[Option<f64>]),
+    at: Point2,
+    spread: f64,
+) -> Vec<Option<f64>> {
+    let narrowed = |(wall, radius): (&Wall, &Option<f64>)| {
+        let most = wall.distance(at) - spread;
+        radius.map(|radius| radius.min(most)).filter(|_| most > 0.0)
+    };
+    walls.iter().zip(radii).map(narrowed).collect()
+}
+
+/// Both ends as a string sees them.
+fn departures(
+    field: (&[Wall], &[Option<f64>]),
+    prices: &Prices,
+    spent: &[usize],
+) -> [Departure; 2] {
+    let [start, target] = prices.ends.map(|end| (end.xy(), 0.0));
+    [[start, target], [target, start]].map(|ends| Departure::of(field, prices, ends, spent))
+}
+
+/// Walls, none of which is wider than it may be at either end.
+pub(super) fn scene((walls, radii): (&[Wall], &[Option<f64>]), ends: [Point2; 2]) -> Obstacles {
+    let outlines = walls.iter().zip(radii).map(|(wall, radius)| {
+        let outline = wall.outline((*radius)?);
+        Some(Outline {
+            core: outline.core.min(outline.radius),
+            ..outline
+        })
+    });
+    Obstacles::new(outlines, ends, None)
 }
 
 /// Metres by which the string may be shorter since routes may cut off corners, or pay for it.

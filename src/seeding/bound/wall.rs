@@ -1,10 +1,10 @@
 //! Threats as a bound sees them: how far each may be widened for free, and which may be passed by
 //! flying over or under them.
 
-use super::super::arc::nearest_points;
+use super::super::arc::{nearest_points, point_segment, segment_segment};
 use super::super::outline::{Outline, OutlineShape};
 use super::prices::Prices;
-use crate::geometry::Point2;
+use crate::geometry::{Point2, Vector2, ring};
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;
 use crate::threat::{Shape, Threat};
@@ -42,7 +42,79 @@ pub(super) struct Toll {
 pub(super) fn walls(scenario: &Scenario, prices: &Prices) -> Vec<Wall> {
     let heights = Heights::of(scenario);
     let wall = |threat: &Threat| Wall::new(threat, scenario, prices, &heights);
-    scenario.threats.iter().filter_map(wall).collect()
+    let mut walls: Vec<Wall> = scenario.threats.iter().filter_map(wall).collect();
+    let ends = prices.ends.map(|end| end.xy());
+    let first = Around::of(&walls, ends, None, prices);
+    let taken = first.as_ref().map(|first| first.wall);
+    let around = [first, Around::of(&walls, [ends[1], ends[0]], taken, prices)];
+    // Of each end, the way straight out of the wall around it.
+    let out = [0, 1].map(|end| {
+        let farthest = around[end].map(|around| walls[around.wall].out(ends[end], around.radius));
+        (ends[end], farthest.unwrap_or(ends[end]))
+    });
+    for (idx, wall) in walls.iter_mut().enumerate() {
+        let mut most = f64::INFINITY;
+        for end in 0..2 {
+            most = most.min(match around[end] {
+                Some(around) if around.wall == idx => around.radius,
+                _ => wall.distance_to_way(out[end]),
+            });
+        }
+        wall.widen(prices, most);
+    }
+    for end in 0..2 {
+        // What is too near to the other end's way out to be around this one.
+        if let Some(around) = around[end]
+            && !walls[around.wall].is_around(ends[end])
+        {
+            let nearest = walls[around.wall].distance(ends[end]);
+            let wall = &mut walls[around.wall];
+            let most = nearest.min(wall.wide);
+            wall.widen(prices, most);
+        }
+    }
+    walls
+}
+
+/// A wall that may be widened over an end.
+#[derive(Debug, Clone, Copy)]
+struct Around {
+    wall: usize,
+    /// By so much at most: straight out to there, no other wall is in the way.
+    radius: f64,
+}
+
+impl Around {
+    /// Of the walls that can be, the one in whose soft zone the first of `ends` is the deepest, but for the one that is
+    /// `taken`.
+    fn of(
+        walls: &[Wall],
+        ends: [Point2; 2],
+        taken: Option<usize>,
+        prices: &Prices,
+    ) -> Option<Self> {
+        let depth = |wall: usize| walls[wall].influence - walls[wall].distance(ends[0]);
+        let can_be = |idx: &usize| {
+            let wall = &walls[*idx];
+            taken != Some(*idx) && wall.toll.is_none() && wall.is_convex() && depth(*idx) > 0.0
+        };
+        let mut candidates: Vec<usize> = (0..walls.len()).filter(can_be).collect();
+        candidates.sort_by(|one, other| depth(*other).total_cmp(&depth(*one)));
+        candidates.into_iter().find_map(|wall| {
+            let within = walls[wall].distance(ends[0]);
+            let mut widened = walls[wall].clone();
+            let radii = [1.0, 0.75, 0.5, 0.25].map(|share| within + share * depth(wall));
+            let is_possible = |radius: &f64| {
+                let way = (ends[0], widened.out(ends[0], *radius));
+                widened.widen(prices, radius.min(widened.distance(ends[1])));
+                let mut others = walls.iter().enumerate().filter(|(other, _)| *other != wall);
+                widened.is_around(ends[0])
+                    && others.all(|(_, other)| other.distance_to_way(way) > other.core)
+            };
+            let radius = radii.into_iter().find(is_possible)?;
+            Some(Self { wall, radius })
+        })
+    }
 }
 
 impl Wall {
@@ -66,7 +138,7 @@ impl Wall {
                 polygon.margin(),
             ),
         };
-        let mut wall = Self {
+        let wall = Self {
             shape,
             core,
             influence,
@@ -81,20 +153,20 @@ impl Wall {
             // A route may cut through: no obstacle to speak of.
             return None;
         }
-        let outline = wall.outline(0.0);
-        let nearest = [scenario.start, scenario.target]
-            .map(|end| outline.distance(end.xy()))
-            .into_iter()
-            .fold(f64::INFINITY, f64::min);
+        Some(wall)
+    }
+
+    /// Widen it by `most` at most.
+    fn widen(&mut self, prices: &Prices, most: f64) {
         // (w + s (I - r)) r is concave in r, so that its ends decide whether it is w R or more all
         // the way from the core to R.
-        let (w, s) = (prices.fuel, prices.exposure);
-        let reach = influence.min(nearest).max(core);
+        let (w, s, core, influence) = (prices.fuel, prices.exposure, self.core, self.influence);
+        let reach = influence.min(most).max(core);
         let at_core = (w + s * (influence - core).max(0.0)) * core / w;
-        wall.safe = at_core.clamp(core, reach);
-        wall.wide = wall.safe;
-        wall.dip = core;
-        if wall.safe < reach {
+        self.safe = at_core.clamp(core, reach);
+        self.wide = self.safe;
+        self.dip = core;
+        if self.safe < reach {
             // The smaller root of (w + s (I - r)) r = w R.
             let b = w + s * influence;
             let root = b * b - 4.0 * s * w * reach;
@@ -103,12 +175,70 @@ impl Wall {
                 let dip = dip * (1.0 + 1e-9);
                 // The greater root must not lie below R either.
                 if dip < reach && b + root.sqrt() >= 2.0 * s * reach * (1.0 - 1e-12) {
-                    wall.wide = reach;
-                    wall.dip = dip.max(core);
+                    self.wide = reach;
+                    self.dip = dip.max(core);
                 }
             }
         }
-        Some(wall)
+    }
+
+    /// Whether `point` lies in what is added to it by widening, where it is no dip.
+    fn is_around(&self, point: Point2) -> bool {
+        let away = self.distance(point);
+        away > self.core && away >= self.dip && away < self.wide
+    }
+
+    /// Metres to its shape before it is widened, 0 within a ring: what its soft zone is measured by.
+    pub(super) fn distance(&self, point: Point2) -> f64 {
+        self.shape.distance(point)
+    }
+
+    /// Of a straight way to its shape.
+    fn distance_to_way(&self, (a, b): (Point2, Point2)) -> f64 {
+        match &self.shape {
+            OutlineShape::Disc(center) => point_segment(*center, a, b),
+            OutlineShape::Ring(ring) if ring::contains(ring, a) => 0.0,
+            OutlineShape::Ring(ring) => ring::edges(ring)
+                .map(|edge| segment_segment(edge, (a, b)))
+                .fold(f64::INFINITY, f64::min),
+        }
+    }
+
+    /// The place as far from its shape as `radius`, straight out by `point`, which lies outside of the shape.
+    pub(super) fn out(&self, point: Point2, radius: f64) -> Point2 {
+        let nearest = match &self.shape {
+            OutlineShape::Disc(center) => *center,
+            OutlineShape::Ring(ring) => ring::edges(ring)
+                .map(|edge| nearest_points(edge, (point, point)).0)
+                .min_by(|one, other| (one - point).norm().total_cmp(&(other - point).norm()))
+                .unwrap_or(point),
+        };
+        nearest + (point - nearest).normalize() * radius
+    }
+
+    /// How many a ring has.
+    pub(super) fn corners(&self) -> usize {
+        match &self.shape {
+            OutlineShape::Disc(_) => 0,
+            OutlineShape::Ring(ring) => ring.len(),
+        }
+    }
+
+    /// A circle round its shape.
+    pub(super) fn circle(&self) -> (Point2, f64) {
+        let centers = self.centers();
+        let sum: Vector2 = centers.iter().map(|center| center.coords).sum();
+        let middle = Point2::from(sum / centers.len() as f64);
+        let away = centers.iter().map(|center| (center - middle).norm());
+        (middle, away.fold(0.0, f64::max))
+    }
+
+    /// Whether the distance to its shape is convex.
+    pub(super) fn is_convex(&self) -> bool {
+        match &self.shape {
+            OutlineShape::Disc(_) => true,
+            OutlineShape::Ring(ring) => ring::is_convex(ring),
+        }
     }
 
     /// The wall widened by `radius`.

@@ -34,8 +34,8 @@ pub(super) fn price(mesh: &mut Mesh, walls: &[Wall], prices: &Prices, kind: Kind
     };
     let mut distances = 0;
     for wall in walls {
-        let (center, radius) = round(wall);
-        let is_convex = is_convex(wall);
+        let (center, radius) = wall.circle();
+        let is_convex = wall.is_convex();
         let near: Vec<usize> = mesh
             .near(center, radius + wall.influence)
             .filter(|triangle| mesh.limits[*triangle] > 0.0)
@@ -45,7 +45,7 @@ pub(super) fn price(mesh: &mut Mesh, walls: &[Wall], prices: &Prices, kind: Kind
             break;
         }
         for triangle in near {
-            let away = distance(wall, mesh.middle(triangle));
+            let away = wall.distance(mesh.middle(triangle));
             // A route may enter rings by the tolerance, and places are rounded by far less.
             let depth = wall.influence - away - prices.tolerance;
             // The mean over a cell of a concave depth is at most that in its middle; at the edge of the zone,
@@ -67,7 +67,7 @@ pub(super) fn price(mesh: &mut Mesh, walls: &[Wall], prices: &Prices, kind: Kind
 
 /// Take the triangles out of the mesh that no cell of a point of a route meets.
 fn leave_out_core(mesh: &mut Mesh, wall: &Wall, prices: &Prices, kind: Kind) {
-    let (center, radius) = round(wall);
+    let (center, radius) = wall.circle();
     let reach = mesh.side * REACH * (1.0 + 1e-9);
     let near: Vec<usize> = mesh
         .near(center, radius + wall.core)
@@ -92,35 +92,5 @@ fn leave_out_core(mesh: &mut Mesh, wall: &Wall, prices: &Prices, kind: Kind) {
         if is_out {
             mesh.limits[triangle] = 0.0;
         }
-    }
-}
-
-/// A circle round the shape of `wall`.
-fn round(wall: &Wall) -> (Point2, f64) {
-    let centers = wall.centers();
-    let sum = centers
-        .iter()
-        .fold(crate::geometry::Vector2::zeros(), |sum, center| {
-            sum + center.coords
-        });
-    let middle = Point2::from(sum / centers.len() as f64);
-    let away = centers.iter().map(|center| (center - middle).norm());
-    (middle, away.fold(0.0, f64::max))
-}
-
-/// Distance by which a wall's soft zone is priced: 0 within a ring.
-pub(super) fn distance(wall: &Wall, point: Point2) -> f64 {
-    match &wall.shape {
-        OutlineShape::Disc(center) => (point - center).norm(),
-        OutlineShape::Ring(ring) if ring::contains(ring, point) => 0.0,
-        OutlineShape::Ring(ring) => ring::distance(ring, point),
-    }
-}
-
-/// Whether that distance is convex.
-fn is_convex(wall: &Wall) -> bool {
-    match &wall.shape {
-        OutlineShape::Disc(_) => true,
-        OutlineShape::Ring(ring) => ring::is_convex(ring),
     }
 }

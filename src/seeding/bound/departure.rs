@@ -1,0 +1,192 @@
+//! What it costs to leave the soft zones that a route begins in, or, seen backwards, ends in. The argument is section 5
+//! of docs/BOUND.md.
+
+use super::super::outline::OutlineShape;
+use super::prices::Prices;
+use super::wall::Wall;
+use crate::geometry::{Point2, ring};
+use crate::seeding::arc::segment_segment;
+
+/// Parts in which what a metre outwards costs is summed up.
+const PARTS: u32 = 200;
+
+/// An end of a route as the string sees it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Departure {
+    /// On the outside of the widened wall that is around the end, if one is; else the end itself.
+    pub(super) at: Point2,
+    /// What the way out of the soft zones costs at least, on top of the string from there.
+    pub(super) toll: f64,
+}
+
+impl Departure {
+    /// From `end`, round `walls` widened to `radii`, one of which may be around it, to the other end; each of them may be
+    /// any point within so many metres of the one given. Soft zones that are `spent` pay for something else.
+    pub(super) fn of(
+        (walls, radii): (&[Wall], &[Option<f64>]),
+        prices: &Prices,
+        [(end, nearby), (other, spread)]: [(Point2, f64); 2],
+        spent: &[usize],
+    ) -> Self {
+        let (mut at, mut toll) = (end, 0.0);
+        for (idx, wall) in walls.iter().enumerate() {
+            let away = wall.distance(end) + nearby;
+            if away >= wall.influence || wall.toll.is_some() {
+                continue;
+            }
+            let mut used = away;
+            if let Some(radius) = radii[idx].filter(|radius| *radius > away) {
+                at = wall.out(end, radius);
+                let alone = alone((walls, radii), idx, other).max(away);
+                toll += outwards(wall, prices, [away, radius], alone);
+                used = radius;
+            }
+            if !spent.contains(&idx) {
+                let farthest = wall.influence.min(wall.distance(other) - spread);
+                toll += prices.exposure * depths(wall, [used, farthest]);
+            }
+        }
+        Self { at, toll }
+    }
+}
+
+/// Integral of the depth in the soft zone of `wall` from one distance to the next, none of which is beyond it.
+fn depths(wall: &Wall, [from, to]: [f64; 2]) -> f64 {
+    (to - from).max(0.0) * (wall.influence - 0.5 * (from + to))
+}
+
+/// What it costs to come from one distance of `wall` to the next, to which it is widened, on top of going round it there.
+/// Beyond `alone` metres other walls may be gone round.
+fn outwards(wall: &Wall, prices: &Prices, [from, to]: [f64; 2], alone: f64) -> f64 {
+    let part = (to - from) / f64::from(PARTS);
+    let sum: f64 = (0..PARTS)
+        .map(|idx| {
+            let near = from + part * f64::from(idx);
+            let far = near + part;
+            let zone = prices.exposure * (wall.influence - far).max(0.0);
+            let (all, round) = (prices.fuel + zone, prices.fuel * to / near);
+            let outwards = (all * all - round * round).max(0.0).sqrt();
+            if far > alone {
+                outwards.min(zone)
+            } else {
+                outwards
+            }
+        })
+        .sum();
+    part * sum
+}
+
+/// Metres from wall number `idx` within which no route goes round another one.
+fn alone((walls, radii): (&[Wall], &[Option<f64>]), idx: usize, other: Point2) -> f64 {
+    let wall = &walls[idx];
+    let own = radii[idx].unwrap_or(0.0);
+    let near = |(next, radius): (usize, f64)| {
+        let neighbour = &walls[next];
+        let apart = apart(wall, neighbour);
+        if apart >= own + radius {
+            f64::INFINITY
+        } else if radius > neighbour.distance(other) {
+            // It is around the other end: both would make use of the fuel.
+            0.0
+        } else if let (OutlineShape::Disc(_), OutlineShape::Disc(_)) =
+            (&wall.shape, &neighbour.shape)
+        {
+            // The sectors of the other disc that are not within this one begin where the circles cross.
+            let cos = (apart * apart + radius * radius - own * own) / (2.0 * apart * radius);
+            if !(-1.0..=1.0).contains(&cos) {
+                0.0
+            } else if cos > 0.0 {
+                apart * (1.0 - cos * cos).sqrt() * (1.0 - 1e-9)
+            } else {
+                apart
+            }
+        } else {
+            apart - radius
+        }
+    };
+    (0..walls.len())
+        .filter(|next| *next != idx)
+        .filter_map(|next| Some((next, radii[next]?)))
+        .map(near)
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Metres between the shapes of two walls, 0 where one lies within the other.
+fn apart(one: &Wall, other: &Wall) -> f64 {
+    match (&one.shape, &other.shape) {
+        (OutlineShape::Disc(center), _) => other.distance(*center),
+        (_, OutlineShape::Disc(center)) => one.distance(*center),
+        (OutlineShape::Ring(ring), OutlineShape::Ring(next)) => {
+            if ring::contains(ring, next[0]) || ring::contains(next, ring[0]) {
+                return 0.0;
+            }
+            let pairs = ring::edges(ring).flat_map(|edge| {
+                ring::edges(next).map(move |facing| segment_segment(edge, facing))
+            });
+            pairs.fold(f64::INFINITY, f64::min)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::tests::scenario;
+    use super::super::wall::walls;
+    use super::*;
+
+    fn departures(threats: &str, examine: impl Fn(&Prices, [Departure; 2])) {
+        let scenario = scenario(&format!(r#""threats": [{threats}]"#));
+        let prices = Prices::of(&scenario);
+        let walls = walls(&scenario, &prices);
+        let radii: Vec<_> = walls.iter().map(|wall| Some(wall.wide)).collect();
+        let [start, target] = prices.ends.map(|end| (end.xy(), 0.0));
+        let field = (&walls[..], &radii[..]);
+        let of = |ends| Departure::of(field, &prices, ends, &[]);
+        examine(&prices, [of([start, target]), of([target, start])]);
+    }
+
+    /// Straight out of a zone on the far side of its core, as the way leads on: all of it is paid for, but for what
+    /// going round takes at the end.
+    #[test]
+    fn straight_out() {
+        // The target is (600, 700) away from the start.
+        let along = crate::geometry::Vector2::new(600.0, 700.0).normalize();
+        let center = Point2::new(200.0, 100.0) - along * 50.0;
+        let (x, y) = (center.x, center.y);
+        departures(
+            &format!(
+                r#"{{"kind": "cylinder", "center": {{"x": {x}, "y": {y}}}, "radius": 40, "influence": 80}}"#
+            ),
+            |prices, [start, target]| {
+                let out = 30.0;
+                assert!((start.at - (prices.ends[0].xy() + along * out)).norm() < 1e-6);
+                let cost = prices.fuel * out + prices.exposure * 0.5 * out * out;
+                assert!(
+                    start.toll < cost && start.toll > 0.96 * cost,
+                    "{start:?} {cost}"
+                );
+                assert!(target.at == prices.ends[1].xy() && target.toll <= 0.0);
+            },
+        );
+    }
+
+    /// Of two zones one is widened over the end, and the other one pays for the way out alone; a zone that both ends
+    /// are in pays for what one is deeper.
+    #[test]
+    fn out_of_several() {
+        departures(
+            r#"{"kind": "cylinder", "center": {"x": 150, "y": 100}, "radius": 30, "influence": 100},
+               {"kind": "cylinder", "center": {"x": 200, "y": 40}, "radius": 30, "influence": 70},
+               {"kind": "cylinder", "center": {"x": 500, "y": 100}, "radius": 50, "influence": 800}"#,
+            |prices, [start, target]| {
+                assert!((start.at - prices.ends[0].xy()).norm() > 10.0);
+                // The target is 763 metres from the third, the start 300.
+                let deeper = 0.5 * (500.0 * 500.0 - 37.0 * 37.0);
+                let toll = start.toll - prices.exposure * (deeper + 50.0);
+                let alone = prices.fuel * 50.0 + prices.exposure * 1250.0;
+                assert!(toll > 0.6 * alone && toll < 1.01 * alone, "{toll} {alone}");
+                assert!(target.toll <= 0.0);
+            },
+        );
+    }
+}

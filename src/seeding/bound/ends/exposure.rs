@@ -1,0 +1,124 @@
+//! What legs that begin in one place, in a sector of headings, are exposed to at least.
+
+use super::super::super::outline::OutlineShape;
+use super::super::event::ramp;
+use super::super::wall::Wall;
+use crate::geometry::{Point2, Point3, Segment};
+use crate::threat::{Cylinder, Shape, Threat};
+
+/// Pieces of a leg beside a ring of which the exposure is summed up.
+const PIECES: u32 = 24;
+
+/// Exposure to `wall` of every leg as long as that from `from` to `at`, and within `half` radians of it.
+pub(super) fn least(wall: &Wall, (from, at): (Point2, Point2), half: f64) -> f64 {
+    let (center, radius) = wall.circle();
+    let (way, between) = (at - from, center - from);
+    let length = way.norm();
+    if length <= 0.0 || between.norm() >= length + radius + wall.influence {
+        return 0.0;
+    }
+    match wall.shape {
+        OutlineShape::Disc(_) => {
+            // At every point of a leg the centre is the farther the more the leg leads past it.
+            let off = libm::atan2(way.perp(&between).abs(), way.dot(&between));
+            let most = (off + half).min(std::f64::consts::PI);
+            past(wall.influence, length, (between.norm(), most))
+        }
+        OutlineShape::Ring(_) => beside(wall, (from, at), length * half),
+    }
+}
+
+/// Exposure to a disc of a leg of `length` that begins `away` from its centre and leads `off` radians past it.
+fn past(influence: f64, length: f64, (away, off): (f64, f64)) -> f64 {
+    let leg = Segment {
+        a: Point3::origin(),
+        b: Point3::new(length, 0.0, 0.0),
+    };
+    let disc = Threat {
+        name: None,
+        shape: Shape::Cylinder(Cylinder {
+            center: Point2::new(away * libm::cos(off), away * libm::sin(off)),
+            radius: 0.0,
+            influence,
+        }),
+        base: None,
+        top: None,
+    };
+    disc.encounter(&leg).exposure
+}
+
+/// Exposure to a ring of every leg that is nowhere farther than `spread` from the one from `a` to `b`.
+fn beside(wall: &Wall, (a, b): (Point2, Point2), spread: f64) -> f64 {
+    let (center, radius) = wall.circle();
+    let (way, reach) = (b - a, radius + wall.influence);
+    let length = way.norm();
+    // The part of the leg that may be in the zone.
+    let foot = (center - a).dot(&way) / length;
+    let [from, to] = [foot - reach, foot + reach].map(|at| at.clamp(0.0, length));
+    let piece = (to - from) / f64::from(PIECES);
+    let depth = |idx: u32| {
+        let at = a + way * ((from + piece * f64::from(idx)) / length);
+        wall.influence - wall.distance(at) - spread
+    };
+    let is_convex = wall.is_convex();
+    let mut sum = 0.0;
+    let mut before = depth(0);
+    for idx in 1..=PIECES {
+        let after = depth(idx);
+        // The depth beside a convex ring is concave, and changes by no more than a metre a metre beside any.
+        sum += if is_convex && before > 0.0 && after > 0.0 {
+            0.5 * piece * (before + after)
+        } else {
+            ramp(before, 1.0, 0.5 * piece) + ramp(after, 1.0, 0.5 * piece)
+        };
+        before = after;
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::super::tests::scenario;
+    use super::super::super::prices::Prices;
+    use super::super::super::wall::walls;
+    use super::*;
+
+    /// No leg of a sector is exposed less, summed up finely, and one to a disc hardly more where the sector is slim.
+    #[test]
+    fn no_leg_of_a_sector_is_exposed_less() {
+        let scenario = scenario(
+            r#""threats": [
+                {"kind": "cylinder", "center": {"x": 300, "y": 160}, "radius": 40, "influence": 100},
+                {"kind": "polygon", "margin": 60, "vertices": [{"x": 210, "y": 220}, {"x": 290, "y": 240}, {"x": 250, "y": 300}]},
+                {"kind": "polygon", "margin": 50, "vertices": [{"x": 80, "y": 100}, {"x": 160, "y": 60}, {"x": 120, "y": 100}, {"x": 160, "y": 140}]}
+            ]"#,
+        );
+        let walls = walls(&scenario, &Prices::of(&scenario));
+        assert_eq!(walls.len(), 3);
+        let from = scenario.start.xy();
+        let (mut exposed, mut tight) = (0, 0);
+        for (idx, half) in (0_u32..240).zip([0.2, 0.05, 1e-3].into_iter().cycle()) {
+            let (heading, length) = (f64::from(idx) * 0.37, 20.0 + f64::from(idx * 17 % 180));
+            let to = |off: f64| {
+                let angle = heading + off * half;
+                let way = crate::geometry::Vector2::new(libm::cos(angle), libm::sin(angle));
+                from + way * length
+            };
+            for wall in &walls {
+                let least = least(wall, (from, to(0.0)), half);
+                for off in [-1.0, -0.4, 0.0, 0.7, 1.0] {
+                    let way = to(off) - from;
+                    let depths = (0..2000).map(|part| {
+                        let at = from + way * ((f64::from(part) + 0.5) / 2000.0);
+                        (wall.influence - wall.distance(at)).max(0.0)
+                    });
+                    let sum = depths.sum::<f64>() * length / 2000.0;
+                    assert!(least <= sum + 0.02, "{least} {sum}");
+                    exposed += i32::from(least > 1.0);
+                    tight += i32::from(half < 0.01 && sum > 1.0 && least > 0.98 * sum);
+                }
+            }
+        }
+        assert!(exposed > 300 && tight > 100, "{exposed} {tight}");
+    }
+}

@@ -1,0 +1,313 @@
+//! Kinds of first and last legs: what a route costs at least that has such a one.
+
+use nalgebra::Vector2;
+
+use super::super::super::arc::point_segment;
+use super::super::super::outline::OutlineShape;
+use super::super::departure::Departure;
+use super::super::prices::Prices;
+use super::super::string::{narrowed, scene, shortest};
+use super::super::wall::Wall;
+use super::exposure;
+use crate::geometry::{Point2, ring};
+
+/// No string is pulled for sectors that are wider than this share of the way.
+const COARSEST: f64 = 0.04;
+
+/// Sectors to begin with.
+const SECTORS: u32 = 8;
+
+/// First legs of routes, or, seen backwards, last ones.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Kind {
+    /// The middle of their headings, and the half of their range, radians.
+    pub(super) heading: f64,
+    pub(super) half: f64,
+    /// Lengths seen from above, metres; the second may be infinite.
+    pub(super) lengths: [f64; 2],
+    /// No route with such a leg costs less seen from above.
+    pub(super) cost: f64,
+    /// What the leg costs at least on top.
+    pub(super) steepness: f64,
+    /// What the shortest of them cost at least seen from above, less the fuel from their ends to that of the one in the
+    /// middle.
+    pub(super) leg: f64,
+    /// What may be gained by cutting the headings.
+    pub(super) turned: f64,
+    /// Whether a string may tell that the cost is higher.
+    pub(super) is_rough: bool,
+}
+
+impl Kind {
+    /// All legs, of routes that cost `least` or more.
+    pub(super) fn all(least: f64) -> Vec<Self> {
+        let half = std::f64::consts::PI / f64::from(SECTORS);
+        let sector = |sector| Self {
+            heading: 2.0 * half * f64::from(sector),
+            half,
+            lengths: [0.0, f64::INFINITY],
+            cost: least,
+            steepness: 0.0,
+            leg: 0.0,
+            turned: 0.0,
+            is_rough: false,
+        };
+        (0..SECTORS).map(sector).collect()
+    }
+}
+
+/// Where a route begins, or, seen backwards, ends.
+pub(super) struct End<'a> {
+    pub(super) from: Point2,
+    pub(super) to: Point2,
+    /// Metres between it and the middle of the band.
+    pub(super) height: f64,
+    /// Of a metre between the waypoint and the middle of the band.
+    pub(super) weight: f64,
+    /// Metres of climb in a metre seen from above, at most.
+    pub(super) steepest: f64,
+    pub(super) prices: &'a Prices,
+    pub(super) walls: &'a [Wall],
+    pub(super) radii: &'a [Option<f64>],
+    pub(super) slack: f64,
+    pub(super) stop: &'a dyn Fn() -> bool,
+}
+
+impl End<'_> {
+    /// What a leg of `length` metres seen from above costs at least on top of its fuel seen from
+    /// above, waypoint included: it climbs, or its waypoint is off the middle. Falls with `length`.
+    fn steepness(&self, length: f64) -> f64 {
+        if length.is_infinite() {
+            return 0.0;
+        }
+        let (w, weight) = (self.prices.fuel, self.weight);
+        // Flown with the slope at which a metre of climb costs as much as one off the middle.
+        let climbed = if weight < w {
+            let share = weight / w;
+            (length * share / (1.0 - share * share).sqrt()).min(self.height)
+        } else {
+            self.height
+        };
+        let climbed = climbed.min(length * self.steepest);
+        let slant = (length * length + climbed * climbed).sqrt();
+        (w * (slant - length) + weight * (self.height - climbed)).max(0.0)
+    }
+
+    /// What may be gained by looking at `kind` more closely.
+    pub(super) fn gain(&self, kind: &Kind) -> f64 {
+        if kind.is_rough {
+            f64::INFINITY
+        } else {
+            kind.turned.max(self.longer(kind))
+        }
+    }
+
+    /// What may be gained by cutting the lengths of `kind`.
+    fn longer(&self, kind: &Kind) -> f64 {
+        self.steepness(kind.lengths[0]) - kind.steepness
+    }
+
+    /// `kind` in two parts, not yet priced.
+    pub(super) fn parts(&self, kind: &Kind) -> [Kind; 2] {
+        if kind.turned >= self.longer(kind) {
+            let half = 0.5 * kind.half;
+            let part = |side: f64| Kind {
+                heading: kind.heading + side * half,
+                half,
+                ..*kind
+            };
+            return [part(-1.0), part(1.0)];
+        }
+        let [shortest, longest] = kind.lengths;
+        let between = self.length_of(0.5 * (self.steepness(shortest) + kind.steepness));
+        let between = between.clamp(shortest, longest);
+        [[shortest, between], [between, longest]].map(|lengths| Kind { lengths, ..*kind })
+    }
+
+    /// The length from which on a leg's steepness is at most that one, which is not 0.
+    fn length_of(&self, steepness: f64) -> f64 {
+        let (mut low, mut high) = (0.0, (self.to - self.from).norm());
+        while self.steepness(high) > steepness && high < 1e12 {
+            (low, high) = (high, 2.0 * high);
+        }
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if self.steepness(middle) > steepness {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        high
+    }
+
+    /// `kind`, with what its legs cost at least at the price of the straight line from there.
+    pub(super) fn priced(&self, kind: Kind) -> Kind {
+        let [length, longest] = kind.lengths;
+        let steepness = self.steepness(longest);
+        if length <= 0.0 {
+            return Kind { steepness, ..kind };
+        }
+        let (at, spread) = self.reached(&kind);
+        if self.is_blocked(at, spread) {
+            return Kind {
+                cost: f64::INFINITY,
+                ..kind
+            };
+        }
+        let (fuel, share) = (self.prices.fuel, self.prices.exposure);
+        let [least, middle] = self.exposure(at, kind.half);
+        let leg = fuel * (length - spread) + share * least;
+        Kind {
+            cost: kind.cost.max(leg + fuel * (self.to - at).norm()),
+            steepness,
+            leg,
+            turned: 2.0 * fuel * spread + share * (middle - least),
+            is_rough: spread <= COARSEST * (self.to - self.from).norm(),
+            ..kind
+        }
+    }
+
+    /// `kind`, with the price of the string from there, and the ways looked at; one that is proven to be `enough` is not
+    /// pulled to its end.
+    pub(super) fn pulled(&self, kind: Kind, enough: f64) -> (Kind, usize) {
+        let (at, spread) = self.reached(&kind);
+        let (rest, ways) = self.rest(at, spread, enough - kind.steepness - kind.leg);
+        let kind = Kind {
+            cost: kind.cost.max(kind.leg + rest),
+            is_rough: false,
+            ..kind
+        };
+        (kind, ways)
+    }
+
+    /// Where the shortest leg in the middle of `kind` ends, and how far others are from it at most, point by point.
+    fn reached(&self, kind: &Kind) -> (Point2, f64) {
+        let length = kind.lengths[0];
+        let way = Vector2::new(libm::cos(kind.heading), libm::sin(kind.heading)) * length;
+        (self.from + way, length * kind.half)
+    }
+
+    /// The walls that count, and by how much they are widened.
+    fn hard(&self) -> impl Iterator<Item = (&Wall, f64)> {
+        let both = self.walls.iter().zip(self.radii);
+        both.filter_map(|(wall, radius)| Some((wall, (*radius)?)))
+    }
+
+    /// Whether every leg to within `spread` of `at` enters a core.
+    fn is_blocked(&self, at: Point2, spread: f64) -> bool {
+        self.hard().any(|(wall, _)| match &wall.shape {
+            OutlineShape::Disc(center) => {
+                wall.core > spread && point_segment(*center, self.from, at) < wall.core - spread
+            }
+            OutlineShape::Ring(ring) => (1..=16).rev().any(|i| {
+                let point = self.from + (at - self.from) * (f64::from(i) / 16.0);
+                ring::contains(ring, point)
+                    && ring::distance(ring, point) > spread + 2.0 * self.prices.tolerance
+            }),
+        })
+    }
+
+    /// Exposure of all legs to as far as `at` and within `half` radians of it: no less than the first, and of the one to
+    /// `at` about the second.
+    fn exposure(&self, at: Point2, half: f64) -> [f64; 2] {
+        let mut sums = [0.0; 2];
+        for (wall, _) in self.hard() {
+            for (sum, half) in sums.iter_mut().zip([half, 0.0]) {
+                *sum += exposure::least(wall, (self.from, at), half);
+            }
+        }
+        sums
+    }
+
+    /// What no route from within `spread` of `at` to the other end undercuts, but for the fuel of `spread`, or `enough` of
+    /// it, and the ways looked at.
+    fn rest(&self, at: Point2, spread: f64, enough: f64) -> (f64, usize) {
+        // Free to move to the middle of the sector first.
+        let radii = narrowed((self.walls, self.radii), at, spread);
+        let field = (self.walls, &radii[..]);
+        let (here, there) = ((at, spread), (self.to, 0.0));
+        let first = Departure::of(field, self.prices, [here, there], &[]);
+        let last = Departure::of(field, self.prices, [there, here], &[]);
+        let tolls = first.toll + last.toll;
+        let scene = scene(field, [at, last.at]);
+        let enough = (enough - tolls).max(0.0) / self.prices.fuel + self.slack;
+        let (string, ways) = shortest(&scene, (enough, self.stop));
+        (self.prices.fuel * (string - self.slack) + tolls, ways)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::super::tests::scenario;
+    use super::super::super::wall;
+    use super::*;
+
+    /// From (200, 100), 100 m below the middle of the band, at 0.5 a metre and 1 a metre off the middle.
+    fn check(examine: impl Fn(&End)) {
+        let scenario = scenario(
+            r#""threats": [{"kind": "cylinder", "center": {"x": 400, "y": 160}, "radius": 50, "influence": 80}]"#,
+        );
+        let prices = Prices::of(&scenario);
+        let walls = wall::walls(&scenario, &prices);
+        let radii: Vec<_> = walls.iter().map(|wall| Some(wall.wide)).collect();
+        examine(&End {
+            from: prices.ends[0].xy(),
+            to: prices.ends[1].xy(),
+            height: 100.0,
+            weight: 1.0,
+            steepest: 1.0,
+            prices: &prices,
+            walls: &walls,
+            radii: &radii,
+            slack: 0.0,
+            stop: &|| false,
+        });
+    }
+
+    #[test]
+    fn a_short_leg_climbs_no_steeper_than_allowed() {
+        check(|end| {
+            let root = 2.0_f64.sqrt();
+            assert!((end.steepness(0.0) - 100.0).abs() < 1e-9);
+            assert!((end.steepness(40.0) - (20.0 * (root - 1.0) + 60.0)).abs() < 1e-9);
+            assert!((end.steepness(100.0) - 50.0 * (root - 1.0)).abs() < 1e-9);
+            assert!(end.steepness(1000.0) < 2.5 && end.steepness(f64::INFINITY) == 0.0);
+            assert!((end.steepness(end.length_of(33.0)) - 33.0).abs() < 1e-6);
+        });
+    }
+
+    /// However often kinds are cut: all legs are of one, and none is told to cost more than it does.
+    #[test]
+    fn every_leg_is_of_a_kind_that_costs_no_more() {
+        check(|end| {
+            let mut kinds = Kind::all(0.0);
+            for round in 0..200 {
+                let kind = kinds.swap_remove(round * 7 % kinds.len());
+                let parts = end.parts(&kind).map(|part| end.priced(part));
+                kinds.extend(parts.map(|part| end.pulled(part, f64::INFINITY).0));
+            }
+            for idx in 0..400 {
+                let share = f64::from(idx) / 400.0;
+                let (heading, length) = (
+                    share * std::f64::consts::TAU,
+                    1000.0 * (share * 37.0).fract(),
+                );
+                let way = Vector2::new(libm::cos(heading), libm::sin(heading));
+                let at = end.from + way * length;
+                // Nothing is paid but fuel where a leg keeps away from the soft zone, and nothing is in the way from there.
+                let least = end.prices.fuel * (length + (end.to - at).norm());
+                let is_free = [(end.from, at), (at, end.to)]
+                    .iter()
+                    .all(|(a, b)| point_segment(Point2::new(400.0, 160.0), *a, *b) > 80.0);
+                let of = |kind: &&Kind| {
+                    let off = crate::geometry::wrap_angle(heading - kind.heading).abs();
+                    off <= kind.half + 1e-9 && (kind.lengths[0]..=kind.lengths[1]).contains(&length)
+                };
+                let mut own = kinds.iter().filter(of).peekable();
+                assert!(own.peek().is_some());
+                assert!(!is_free || own.all(|kind| kind.cost <= least + 1e-6));
+            }
+        });
+    }
+}

@@ -1,0 +1,163 @@
+//! What start and target at another height than the middle of the band cost on top of the string: a first leg is
+//! straight, so that where the way bends soon, it is short and steep. The argument is section 7 of docs/BOUND.md.
+
+mod exposure;
+mod kind;
+
+use super::prices::Prices;
+use super::string::slack;
+use super::wall::Wall;
+use crate::cost::Tolerance;
+use crate::scenario::Scenario;
+use crate::terrain::Terrain;
+use kind::{End, Kind};
+
+/// With more corners than this, only the difference in height of the ends is made use of.
+const MOST_CORNERS: usize = 80;
+
+/// What two kinds of legs may differ by, as a share of what a route costs, before they are told apart.
+const LEAST: f64 = 1e-3;
+
+/// A kind of leg that is proven to cost so much more than the bound so far is not looked at more closely for now.
+const AHEAD: f64 = 1.03;
+
+/// Effort of a string, besides the ways that are looked at for it and the corners of rings.
+const STRING: usize = 20;
+
+/// So many corners of rings are as much effort as a kind of leg.
+const CORNERS: usize = 3;
+
+/// Whether there are so many corners that legs are not looked at.
+pub(super) fn are_too_many(walls: &[Wall]) -> bool {
+    walls.iter().map(|wall| wall.centers().len()).sum::<usize>() > MOST_CORNERS
+}
+
+/// The first and the last legs of routes round widened walls.
+pub(super) struct Legs<'a> {
+    prices: &'a Prices,
+    /// `None` where legs cost nothing on top.
+    told_apart: Option<([End<'a>; 2], [Vec<Kind>; 2])>,
+    /// Of the rings.
+    corners: usize,
+    /// What may still be spent on them: one for a kind of leg, more for a string. Without any, nothing more is proven.
+    pub(super) effort: usize,
+}
+
+impl<'a> Legs<'a> {
+    /// Of routes that go round `walls` widened to radii, and cost `least` or more seen from above.
+    pub(super) fn new(
+        scenario: &Scenario,
+        prices: &'a Prices,
+        (walls, radii): (&'a [Wall], &'a [Option<f64>]),
+        least: f64,
+        (effort, stop): (usize, &'a dyn Fn() -> bool),
+    ) -> Self {
+        let told_apart = |ground: f64| {
+            let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max) + ground;
+            // A single waypoint ends both legs.
+            let share = if scenario.planner.waypoints > 1 {
+                1.0
+            } else {
+                0.5
+            };
+            let ends = [0, 1].map(|end| End {
+                from: prices.ends[end].xy(),
+                to: prices.ends[1 - end].xy(),
+                height: (prices.ends[end].z - middle).abs(),
+                weight: share * scenario.weights.altitude,
+                steepest: steepest(scenario),
+                prices,
+                walls,
+                radii,
+                slack: slack(walls, radii, prices),
+                stop,
+            });
+            let kinds = [0, 1].map(|_| Kind::all(least));
+            (ends, kinds)
+        };
+        let level = match scenario.terrain {
+            Terrain::Flat(ground) => Some(ground.elevation),
+            _ => None,
+        };
+        let matter = least.is_finite() && scenario.weights.altitude > 0.0 && !are_too_many(walls);
+        Self {
+            prices,
+            told_apart: level.filter(|_| matter).map(told_apart),
+            corners: walls.iter().map(Wall::corners).sum(),
+            effort,
+        }
+    }
+
+    /// What no route undercuts that costs `least` or more seen from above, by what is known of legs.
+    pub(super) fn told(&self, least: f64) -> f64 {
+        let level = self.prices.climbing_at(least);
+        let told_apart = self.told_apart.as_ref();
+        told_apart.map_or(level, |(_, kinds)| cheapest(kinds, least).0.max(level))
+    }
+
+    /// What no route undercuts that costs `least` or more seen from above: of all kinds of first and last legs, the
+    /// cheapest together. These are told apart more finely until it does not matter, until all together cost
+    /// `enough`, or until the effort is spent.
+    pub(super) fn bound(&mut self, least: f64, enough: f64) -> f64 {
+        let level = self.prices.climbing_at(least);
+        let Some((ends, kinds)) = &mut self.told_apart else {
+            return level;
+        };
+        loop {
+            let (cost, worst) = cheapest(kinds, least);
+            let gain = |end: usize| ends[end].gain(&kinds[end][worst[end]]);
+            let end = usize::from(gain(1) > gain(0));
+            let is_fine = gain(end) < LEAST * cost || cost >= enough || level >= enough;
+            if is_fine || self.effort == 0 || (ends[end].stop)() {
+                return cost.max(level);
+            }
+            let kind = kinds[end].remove(worst[end]);
+            let mut keep = |kind: Kind| {
+                let at = kinds[end].partition_point(|other| other.cost <= kind.cost);
+                kinds[end].insert(at, kind);
+            };
+            if kind.is_rough {
+                let (kind, ways) = ends[end].pulled(kind, AHEAD * cost);
+                self.effort = self.effort.saturating_sub(STRING + self.corners + ways);
+                keep(kind);
+            } else {
+                self.effort = self.effort.saturating_sub(1 + self.corners / CORNERS);
+                for part in ends[end].parts(&kind) {
+                    keep(ends[end].priced(part));
+                }
+            }
+        }
+    }
+}
+
+/// Metres that a route may climb in a metre seen from above.
+fn steepest(scenario: &Scenario) -> f64 {
+    let angle = scenario.vehicle.max_climb_deg + Tolerance::of(scenario).angle_deg;
+    libm::tan(angle.min(90.0).to_radians()) * (1.0 + 1e-12)
+}
+
+/// The least that a route can cost whose first leg is one of the first `kinds` and whose last leg is one of the others,
+/// and which these are. Both have the cheapest first.
+fn cheapest(kinds: &[Vec<Kind>; 2], least: f64) -> (f64, [usize; 2]) {
+    let cost = |end: usize, idx: usize| kinds[end].get(idx).map_or(f64::INFINITY, |kind| kind.cost);
+    let steepness = |end: usize, idx: usize| kinds[end][idx].steepness;
+    let (mut found, mut worst) = (f64::INFINITY, [0; 2]);
+    // Of those up to a cost, which rises, the ones that cost least on top.
+    let mut flattest: [Option<usize>; 2] = [None; 2];
+    let mut next = [0; 2];
+    while next[0] < kinds[0].len() || next[1] < kinds[1].len() {
+        let end = usize::from(cost(1, next[1]) < cost(0, next[0]) || next[0] == kinds[0].len());
+        let idx = next[end];
+        next[end] += 1;
+        if flattest[end].is_none_or(|other| steepness(end, idx) < steepness(end, other)) {
+            flattest[end] = Some(idx);
+            if let [Some(first), Some(last)] = flattest {
+                let total = cost(end, idx).max(least) + steepness(0, first) + steepness(1, last);
+                if total < found {
+                    (found, worst) = (total, [first, last]);
+                }
+            }
+        }
+    }
+    (found, worst)
+}

@@ -131,7 +131,7 @@ fn apart(one: &Wall, other: &Wall) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::super::tests::scenario;
-    use super::super::wall::walls;
+    use super::super::around::walls;
     use super::*;
 
     fn departures(threats: &str, examine: impl Fn(&Prices, [Departure; 2])) {

@@ -3,24 +3,27 @@
 //! Seen from above, a soft zone costs so much that going through it is never cheaper than going
 //! round it: its threat can be widened and counts as hard. The string round the widened threats,
 //! priced by its fuel, is then a lower bound for all routes that pass none of the few places where
-//! that argument has a gap, and those places are priced one by one. Where soft zones must be crossed, a
-//! potential in the field of all prices proves more; the better of both counts.
+//! that argument has a gap, and those places are priced one by one; the way out of a soft zone, where an end
+//! lies in one, comes on top. Where soft zones must be crossed, a potential in the field of all prices proves
+//! more; the better of both counts. Last, start and target at another height than the middle of the band cost
+//! what their straight legs do.
 
+mod around;
 mod departure;
 mod ends;
 mod event;
+mod field;
 mod potential;
 mod prices;
 mod string;
+mod toll;
 mod wall;
 
 use std::cell::Cell;
 
 use crate::scenario::Scenario;
-use ends::Legs;
-use event::{Event, Kind};
+use field::{Field, cost_of};
 use prices::Prices;
-use wall::Wall;
 
 /// Covers the rounding of the sums behind a bound, so that it holds in floating point too.
 const ROUNDING: f64 = 1e-9;
@@ -30,12 +33,6 @@ const MOST_WAYS_IN_ALL: usize = 120_000;
 
 /// Bisections on the number of events that a cheaper route may make use of.
 const MOST_LEVELS: usize = 24;
-
-/// What telling first and last legs apart may take.
-const EFFORT: usize = 40_000;
-
-/// Events that are looked at one by one, at most.
-const MOST_ALLOWED: usize = 40;
 
 /// Where the string itself is not this many times as dear as what is known, a potential promises nothing.
 const WORTHWHILE: f64 = 1.02;
@@ -63,7 +60,7 @@ pub fn lower_bound_until(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
 /// The largest cost that can be proven: a route cheaper than it could use only the events that
 /// cost less, and without the others no route is cheaper.
 fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) -> f64 {
-    let walls = wall::walls(scenario, prices);
+    let walls = around::walls(scenario, prices);
     // Seen from above, where the string with these radii is so dear that it could be more than `known`.
     let across = |radii: &[Option<f64>], known: f64| {
         if !known.is_finite() || !potential::applies(&walls, prices) {
@@ -129,191 +126,6 @@ fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) ->
         return proven;
     }
     proven.max(field.one_by_one(&events, dense))
-}
-
-/// Cost of the first event that is not allowed at `level`.
-fn cost_of(events: &[Event], level: usize) -> f64 {
-    events.get(level).map_or(f64::INFINITY, |event| event.cost)
-}
-
-/// A scenario as a bound sees it.
-struct Field<'a> {
-    scenario: &'a Scenario,
-    prices: &'a Prices,
-    walls: &'a [Wall],
-    /// Looked at so far.
-    ways: Cell<usize>,
-    stop: &'a dyn Fn() -> bool,
-}
-
-impl Field<'_> {
-    /// What no route undercuts that makes use of `allowed` events at most; `enough` or more where it
-    /// costs that much.
-    fn level(&self, allowed: &[Event], enough: f64) -> f64 {
-        let enough_across = self.prices.across(enough);
-        let cost = |radii: &[Option<f64>], spent: &[usize]| {
-            let limits = (enough_across, self.stop);
-            let (cost, ways) = string::cost((self.walls, radii), self.prices, spent, limits);
-            self.ways.set(self.ways.get() + ways);
-            self.prices.climbing_at(cost)
-        };
-        let tame = cost(&self.radii(allowed), &[]);
-        if allowed.is_empty() || tame >= enough {
-            return tame;
-        }
-        // Either no event happens, or one does: then its price comes on top, but what it is made
-        // of must not be used twice.
-        let extra = allowed
-            .iter()
-            .map(|event| event.extra)
-            .fold(f64::INFINITY, f64::min);
-        if extra <= 0.0 || self.ways.get() > MOST_WAYS_IN_ALL {
-            return tame;
-        }
-        let touched: Vec<usize> = allowed.iter().flat_map(Event::walls).collect();
-        let with = cost(&self.bare(allowed), &touched) + extra;
-        tame.max(with.min(cost(&self.radii(&[]), &[])))
-    }
-
-    /// What no route undercuts, event by event, and by the legs that begin at the start and end at the target; none costs
-    /// less than `dense` seen from above.
-    fn one_by_one(&self, events: &[Event], dense: f64) -> f64 {
-        let radii = self.radii(&[]);
-        let least = dense.max(self.across(&radii, &[]));
-        // Of routes that use no event.
-        let mut effort = EFFORT;
-        let mut legs = self.legs(&radii, least, effort / 2);
-        let without = legs.bound(least, f64::INFINITY);
-        effort -= effort / 2 - legs.effort;
-        let affordable = events.partition_point(|event| event.cost < without);
-        let count = affordable.min(MOST_ALLOWED);
-        let proven = without.min(cost_of(events, count));
-        let mut allowed = events[..count].to_vec();
-        // Events that no route uses for less than that leave more of the walls to the others.
-        while !allowed.is_empty() {
-            let radii = self.radii(&allowed);
-            let least = dense.max(self.across(&radii, &[]));
-            let across = |event: &Event| least.max(self.using(event, &radii));
-            let used: Vec<(Event, f64)> = allowed
-                .iter()
-                .map(|event| (*event, across(event)))
-                .collect();
-            let mut legs = self.legs(&radii, least, effort);
-            let cost =
-                |legs: &Legs, (event, across): &(Event, f64)| legs.told(*across).max(event.cost);
-            let cheap = |legs: &Legs| -> Vec<Event> {
-                let cheap = used.iter().filter(|used| cost(legs, used) < proven);
-                cheap.map(|(event, _)| *event).collect()
-            };
-            let mut left = cheap(&legs);
-            if left.len() == used.len() {
-                let cheapest = used
-                    .iter()
-                    .fold(f64::INFINITY, |least, (_, across)| least.min(*across));
-                legs.bound(cheapest, proven);
-                effort = legs.effort;
-                left = cheap(&legs);
-                if left.len() == used.len() || effort == 0 {
-                    return used
-                        .iter()
-                        .map(|used| cost(&legs, used))
-                        .fold(proven, f64::min);
-                }
-            }
-            allowed = left;
-        }
-        proven
-    }
-
-    fn legs<'a>(&'a self, radii: &'a [Option<f64>], least: f64, effort: usize) -> Legs<'a> {
-        let field = (self.walls, radii);
-        Legs::new(
-            self.scenario,
-            self.prices,
-            field,
-            least,
-            (effort, self.stop),
-        )
-    }
-
-    /// What no route undercuts, seen from above, that uses `event`, where each wall counts as hard at one of these `radii`
-    /// whatever else it uses.
-    fn using(&self, event: &Event, radii: &[Option<f64>]) -> f64 {
-        let spent: Vec<usize> = event.walls().collect();
-        match event.kind {
-            // The toll may be what a first or last leg pays.
-            Kind::Pass { .. } => 0.0,
-            Kind::Dip { wall } => {
-                let mut bare = radii.to_vec();
-                bare[wall] = bare[wall].map(|_| self.walls[wall].core);
-                self.across(&bare, &spent) + event.extra
-            }
-            Kind::Slip { walls, between, .. } => {
-                let cores = walls.map(|wall| self.walls[wall].core);
-                let gap = string::Gap::new(between, cores);
-                let field = (self.walls, radii);
-                string::through(field, self.prices, &spent, gap, self.stop) + event.extra
-            }
-        }
-    }
-
-    /// What no route undercuts, seen from above, that goes round the walls widened to `radii`.
-    fn across(&self, radii: &[Option<f64>], spent: &[usize]) -> f64 {
-        let limits = (f64::INFINITY, self.stop);
-        let (cost, ways) = string::cost((self.walls, radii), self.prices, spent, limits);
-        self.ways.set(self.ways.get() + ways);
-        cost
-    }
-
-    /// How far each wall may be widened so that it counts as hard whatever `allowed` events happen.
-    fn radii(&self, allowed: &[Event]) -> Vec<Option<f64>> {
-        let mut radii: Vec<Option<f64>> = self.walls.iter().map(|wall| Some(wall.wide)).collect();
-        for event in allowed {
-            match event.kind {
-                Kind::Pass { wall } => radii[wall] = None,
-                Kind::Dip { wall } => {
-                    radii[wall] = radii[wall].map(|radius| radius.min(self.walls[wall].safe));
-                }
-                Kind::Slip { .. } => {}
-            }
-        }
-        for event in allowed {
-            if let Kind::Slip { walls, apart, .. } = event.kind
-                && let [Some(one), Some(other)] = walls.map(|wall| radii[wall])
-                && one + other > apart
-            {
-                // Both shrink alike, but not below their cores.
-                let [core, next] = walls.map(|wall| self.walls[wall].core);
-                let shrunk = (one - 0.5 * (one + other - apart))
-                    .max(core)
-                    .min(apart - next);
-                radii[walls[0]] = Some(shrunk);
-                radii[walls[1]] = Some(other.min(apart - shrunk).min(if walls[0] == walls[1] {
-                    shrunk
-                } else {
-                    other
-                }));
-            }
-        }
-        radii
-    }
-
-    /// The walls with nothing of their soft zones used that `allowed` events touch.
-    fn bare(&self, allowed: &[Event]) -> Vec<Option<f64>> {
-        let mut radii = self.radii(&[]);
-        for event in allowed {
-            match event.kind {
-                Kind::Pass { wall } => radii[wall] = None,
-                Kind::Dip { wall } => radii[wall] = radii[wall].map(|_| self.walls[wall].core),
-                Kind::Slip { walls, .. } => {
-                    for wall in walls {
-                        radii[wall] = radii[wall].map(|_| self.walls[wall].core);
-                    }
-                }
-            }
-        }
-        radii
-    }
 }
 
 #[cfg(test)]

@@ -4,9 +4,9 @@
 use super::super::arc::{nearest_points, point_segment, segment_segment};
 use super::super::outline::{Outline, OutlineShape};
 use super::prices::Prices;
+use super::toll::{Heights, Toll};
 use crate::geometry::{Point2, Vector2, ring};
 use crate::scenario::Scenario;
-use crate::terrain::Terrain;
 use crate::threat::{Shape, Threat};
 
 /// A threat that reaches over all heights, or that costs a toll to pass above or below.
@@ -29,96 +29,8 @@ pub(super) struct Wall {
     pub(super) toll: Option<Toll>,
 }
 
-/// What it takes to pass a threat above or below.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Toll {
-    /// Part of F3 that a waypoint beyond the threat's height costs at least.
-    pub(super) altitude: f64,
-    /// Metres that are climbed and descended at least.
-    pub(super) vertical: f64,
-}
-
-/// All walls of `scenario`.
-pub(super) fn walls(scenario: &Scenario, prices: &Prices) -> Vec<Wall> {
-    let heights = Heights::of(scenario);
-    let wall = |threat: &Threat| Wall::new(threat, scenario, prices, &heights);
-    let mut walls: Vec<Wall> = scenario.threats.iter().filter_map(wall).collect();
-    let ends = prices.ends.map(|end| end.xy());
-    let first = Around::of(&walls, ends, None, prices);
-    let taken = first.as_ref().map(|first| first.wall);
-    let around = [first, Around::of(&walls, [ends[1], ends[0]], taken, prices)];
-    // Of each end, the way straight out of the wall around it.
-    let out = [0, 1].map(|end| {
-        let farthest = around[end].map(|around| walls[around.wall].out(ends[end], around.radius));
-        (ends[end], farthest.unwrap_or(ends[end]))
-    });
-    for (idx, wall) in walls.iter_mut().enumerate() {
-        let mut most = f64::INFINITY;
-        for end in 0..2 {
-            most = most.min(match around[end] {
-                Some(around) if around.wall == idx => around.radius,
-                _ => wall.distance_to_way(out[end]),
-            });
-        }
-        wall.widen(prices, most);
-    }
-    for end in 0..2 {
-        // What is too near to the other end's way out to be around this one.
-        if let Some(around) = around[end]
-            && !walls[around.wall].is_around(ends[end])
-        {
-            let nearest = walls[around.wall].distance(ends[end]);
-            let wall = &mut walls[around.wall];
-            let most = nearest.min(wall.wide);
-            wall.widen(prices, most);
-        }
-    }
-    walls
-}
-
-/// A wall that may be widened over an end.
-#[derive(Debug, Clone, Copy)]
-struct Around {
-    wall: usize,
-    /// By so much at most: straight out to there, no other wall is in the way.
-    radius: f64,
-}
-
-impl Around {
-    /// Of the walls that can be, the one in whose soft zone the first of `ends` is the deepest, but for the one that is
-    /// `taken`.
-    fn of(
-        walls: &[Wall],
-        ends: [Point2; 2],
-        taken: Option<usize>,
-        prices: &Prices,
-    ) -> Option<Self> {
-        let depth = |wall: usize| walls[wall].influence - walls[wall].distance(ends[0]);
-        let can_be = |idx: &usize| {
-            let wall = &walls[*idx];
-            taken != Some(*idx) && wall.toll.is_none() && wall.is_convex() && depth(*idx) > 0.0
-        };
-        let mut candidates: Vec<usize> = (0..walls.len()).filter(can_be).collect();
-        candidates.sort_by(|one, other| depth(*other).total_cmp(&depth(*one)));
-        candidates.into_iter().find_map(|wall| {
-            let within = walls[wall].distance(ends[0]);
-            let mut widened = walls[wall].clone();
-            let radii = [1.0, 0.75, 0.5, 0.25].map(|share| within + share * depth(wall));
-            let is_possible = |radius: &f64| {
-                let way = (ends[0], widened.out(ends[0], *radius));
-                widened.widen(prices, radius.min(widened.distance(ends[1])));
-                let mut others = walls.iter().enumerate().filter(|(other, _)| *other != wall);
-                widened.is_around(ends[0])
-                    && others.all(|(_, other)| other.distance_to_way(way) > other.core)
-            };
-            let radius = radii.into_iter().find(is_possible)?;
-            Some(Self { wall, radius })
-        })
-    }
-}
-
 impl Wall {
-    fn new(
+    pub(super) fn new(
         threat: &Threat,
         scenario: &Scenario,
         prices: &Prices,
@@ -157,7 +69,7 @@ impl Wall {
     }
 
     /// Widen it by `most` at most.
-    fn widen(&mut self, prices: &Prices, most: f64) {
+    pub(super) fn widen(&mut self, prices: &Prices, most: f64) {
         // (w + s (I - r)) r is concave in r, so that its ends decide whether it is w R or more all
         // the way from the core to R.
         let (w, s, core, influence) = (prices.fuel, prices.exposure, self.core, self.influence);
@@ -183,7 +95,7 @@ impl Wall {
     }
 
     /// Whether `point` lies in what is added to it by widening, where it is no dip.
-    fn is_around(&self, point: Point2) -> bool {
+    pub(super) fn is_around(&self, point: Point2) -> bool {
         let away = self.distance(point);
         away > self.core && away >= self.dip && away < self.wide
     }
@@ -194,7 +106,7 @@ impl Wall {
     }
 
     /// Of a straight way to its shape.
-    fn distance_to_way(&self, (a, b): (Point2, Point2)) -> f64 {
+    pub(super) fn distance_to_way(&self, (a, b): (Point2, Point2)) -> f64 {
         match &self.shape {
             OutlineShape::Disc(center) => point_segment(*center, a, b),
             OutlineShape::Ring(ring) if ring::contains(ring, a) => 0.0,
@@ -312,88 +224,4 @@ fn perimeter(ring: &[Point2]) -> f64 {
     (0..count)
         .map(|i| (ring[(i + 1) % count] - ring[i]).norm())
         .sum()
-}
-
-/// The heights in the frame that a route can reach.
-struct Heights {
-    floor: f64,
-    ceiling: f64,
-    /// Elevation of the ground where it is level.
-    level: Option<f64>,
-}
-
-impl Heights {
-    fn of(scenario: &Scenario) -> Self {
-        let (low, high, level) = match &scenario.terrain {
-            Terrain::Flat(flat) => (flat.elevation, flat.elevation, Some(flat.elevation)),
-            Terrain::Peaks(peaks) => {
-                let sum = |part: fn(f64) -> f64| -> f64 {
-                    peaks.peaks.iter().map(|peak| part(peak.height)).sum()
-                };
-                (
-                    peaks.base + sum(|height| height.min(0.0)),
-                    peaks.base + sum(|height| height.max(0.0)),
-                    None,
-                )
-            }
-            Terrain::Grid(grid) => {
-                let nodes = grid.elevations.iter().copied();
-                (
-                    nodes.clone().fold(f64::INFINITY, f64::min),
-                    nodes.fold(f64::NEG_INFINITY, f64::max),
-                    None,
-                )
-            }
-            Terrain::Dem(dem) => {
-                let [low, high] = dem.elevations();
-                (low, high, None)
-            }
-        };
-        let band = scenario.altitude;
-        let ends = [scenario.start, scenario.target]
-            .map(|end| end.z - scenario.terrain.elevation(end.xy()));
-        // Outside the terminal zones, a route keeps to the band; there are none where both ends do.
-        let within = ends.iter().all(|h| (band.min..=band.max).contains(h));
-        let lowest = ends.iter().fold(band.min, |low, h| low.min(*h));
-        let floor = if within { band.min } else { lowest.min(0.0) };
-        let ceiling = ends.iter().fold(band.max, |high, h| high.max(*h));
-        let hair = 1e-3 + 1e-9 * (high.abs() + low.abs() + ceiling.abs());
-        Self {
-            floor: low + floor - hair,
-            ceiling: high + ceiling + hair,
-            level,
-        }
-    }
-
-    /// What it takes to pass `threat` above or below; `None` when there is no room.
-    fn toll(&self, threat: &Threat, scenario: &Scenario) -> Option<Toll> {
-        let (start, target) = (scenario.start.z, scenario.target.z);
-        let weight = scenario.weights.altitude;
-        let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max);
-        // Legs are straight: a route beyond a height has a waypoint beyond it.
-        let toll = |beyond: f64, ends_beyond: bool, up: f64| {
-            let nothing = Toll {
-                altitude: 0.0,
-                vertical: 0.0,
-            };
-            let Some(level) = self.level.filter(|_| !ends_beyond) else {
-                return nothing;
-            };
-            Toll {
-                altitude: weight * (up * (beyond - level - middle)).max(0.0),
-                vertical: (beyond - start).abs() + (beyond - target).abs(),
-            }
-        };
-        let over = threat.top.filter(|top| *top <= self.ceiling);
-        let over = over.map(|top| toll(top, start >= top || target >= top, 1.0));
-        let under = threat.base.filter(|base| *base > self.floor);
-        let under = under.map(|base| toll(base, start < base || target < base, -1.0));
-        match (over, under) {
-            (Some(over), Some(under)) => Some(Toll {
-                altitude: over.altitude.min(under.altitude),
-                vertical: over.vertical.min(under.vertical),
-            }),
-            (over, under) => over.or(under),
-        }
-    }
 }

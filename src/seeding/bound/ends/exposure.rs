@@ -79,8 +79,8 @@ fn beside(wall: &Wall, (a, b): (Point2, Point2), spread: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::super::super::tests::scenario;
+    use super::super::super::around::walls;
     use super::super::super::prices::Prices;
-    use super::super::super::wall::walls;
     use super::*;
 
     /// No leg of a sector is exposed less, summed up finely, and one to a disc hardly more where the sector is slim.

@@ -240,7 +240,7 @@ impl End<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::super::super::tests::scenario;
-    use super::super::super::wall;
+    use super::super::super::around;
     use super::*;
 
     /// From (200, 100), 100 m below the middle of the band, at 0.5 a metre and 1 a metre off the middle.
@@ -249,7 +249,7 @@ mod tests {
             r#""threats": [{"kind": "cylinder", "center": {"x": 400, "y": 160}, "radius": 50, "influence": 80}]"#,
         );
         let prices = Prices::of(&scenario);
-        let walls = wall::walls(&scenario, &prices);
+        let walls = around::walls(&scenario, &prices);
         let radii: Vec<_> = walls.iter().map(|wall| Some(wall.wide)).collect();
         examine(&End {
             from: prices.ends[0].xy(),

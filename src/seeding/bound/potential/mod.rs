@@ -228,7 +228,7 @@ impl Scene<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::super::tests::read;
-    use super::super::wall;
+    use super::super::around;
     use super::*;
     use crate::scenario::Scenario;
 
@@ -253,7 +253,7 @@ mod tests {
 
     fn proven(scenario: &Scenario) -> f64 {
         let prices = Prices::of(scenario);
-        let walls = wall::walls(scenario, &prices);
+        let walls = around::walls(scenario, &prices);
         bound(&walls, &prices, &scenario.area, (0.0, 0.0), &|| false)
     }
 
@@ -263,7 +263,7 @@ mod tests {
         const NODES: i32 = 51;
         let spacing = 20.0;
         let prices = Prices::of(scenario);
-        let walls = wall::walls(scenario, &prices);
+        let walls = around::walls(scenario, &prices);
         let price = |a: Point2, b: Point2| {
             let parts = 8;
             let sum: f64 = (0..parts)
@@ -357,7 +357,7 @@ mod tests {
         );
         let prices = Prices::of(&scenario);
         let mut scene = Scene {
-            walls: wall::walls(&scenario, &prices),
+            walls: around::walls(&scenario, &prices),
             prices: &prices,
             area: scenario.area,
             cap: f64::INFINITY,
@@ -407,7 +407,7 @@ mod tests {
     fn a_way_that_costs_as_much_as_is_known_is_not_looked_at() {
         let scenario = scenario(1.0, &disc(500.0, 930.0, 10.0, 20.0));
         let prices = Prices::of(&scenario);
-        let walls = wall::walls(&scenario, &prices);
+        let walls = around::walls(&scenario, &prices);
         let proven = bound(&walls, &prices, &scenario.area, (600.0, 600.0), &|| false);
         assert!(proven.abs() < f64::EPSILON, "{proven}");
         let stopped = bound(&walls, &prices, &scenario.area, (0.0, 0.0), &|| true);

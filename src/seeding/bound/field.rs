@@ -1,0 +1,202 @@
+//! What is proven of routes that make use of some events.
+
+use std::cell::Cell;
+
+use super::MOST_WAYS_IN_ALL;
+use super::ends::Legs;
+use super::event::{Event, Kind};
+use super::prices::Prices;
+use super::string;
+use super::wall::Wall;
+use crate::scenario::Scenario;
+
+/// What telling first and last legs apart may take.
+const EFFORT: usize = 40_000;
+
+/// Events that are looked at one by one, at most.
+const MOST_ALLOWED: usize = 40;
+
+/// Cost of the first event that is not allowed at `level`.
+pub(super) fn cost_of(events: &[Event], level: usize) -> f64 {
+    events.get(level).map_or(f64::INFINITY, |event| event.cost)
+}
+
+/// A scenario as a bound sees it.
+pub(super) struct Field<'a> {
+    pub(super) scenario: &'a Scenario,
+    pub(super) prices: &'a Prices,
+    pub(super) walls: &'a [Wall],
+    /// Looked at so far.
+    pub(super) ways: Cell<usize>,
+    pub(super) stop: &'a dyn Fn() -> bool,
+}
+
+impl Field<'_> {
+    /// What no route undercuts that makes use of `allowed` events at most; `enough` or more where it
+    /// costs that much.
+    pub(super) fn level(&self, allowed: &[Event], enough: f64) -> f64 {
+        let enough_across = self.prices.across(enough);
+        let cost = |radii: &[Option<f64>], spent: &[usize]| {
+            let limits = (enough_across, self.stop);
+            let (cost, ways) = string::cost((self.walls, radii), self.prices, spent, limits);
+            self.ways.set(self.ways.get() + ways);
+            self.prices.climbing_at(cost)
+        };
+        let tame = cost(&self.radii(allowed), &[]);
+        if allowed.is_empty() || tame >= enough {
+            return tame;
+        }
+        // Either no event happens, or one does: then its price comes on top, but what it is made
+        // of must not be used twice.
+        let extra = allowed
+            .iter()
+            .map(|event| event.extra)
+            .fold(f64::INFINITY, f64::min);
+        if extra <= 0.0 || self.ways.get() > MOST_WAYS_IN_ALL {
+            return tame;
+        }
+        let touched: Vec<usize> = allowed.iter().flat_map(Event::walls).collect();
+        let with = cost(&self.bare(allowed), &touched) + extra;
+        tame.max(with.min(cost(&self.radii(&[]), &[])))
+    }
+
+    /// What no route undercuts, event by event, and by the legs that begin at the start and end at the target; none costs
+    /// less than `dense` seen from above.
+    pub(super) fn one_by_one(&self, events: &[Event], dense: f64) -> f64 {
+        let radii = self.radii(&[]);
+        let least = dense.max(self.across(&radii, &[]));
+        // Of routes that use no event.
+        let mut effort = EFFORT;
+        let mut legs = self.legs(&radii, least, effort / 2);
+        let without = legs.bound(least, f64::INFINITY);
+        effort -= effort / 2 - legs.effort;
+        let affordable = events.partition_point(|event| event.cost < without);
+        let count = affordable.min(MOST_ALLOWED);
+        let proven = without.min(cost_of(events, count));
+        let mut allowed = events[..count].to_vec();
+        // Events that no route uses for less than that leave more of the walls to the others.
+        while !allowed.is_empty() {
+            let radii = self.radii(&allowed);
+            let least = dense.max(self.across(&radii, &[]));
+            let across = |event: &Event| least.max(self.using(event, &radii));
+            let used: Vec<(Event, f64)> = allowed
+                .iter()
+                .map(|event| (*event, across(event)))
+                .collect();
+            let mut legs = self.legs(&radii, least, effort);
+            let cost =
+                |legs: &Legs, (event, across): &(Event, f64)| legs.told(*across).max(event.cost);
+            let cheap = |legs: &Legs| -> Vec<Event> {
+                let cheap = used.iter().filter(|used| cost(legs, used) < proven);
+                cheap.map(|(event, _)| *event).collect()
+            };
+            let mut left = cheap(&legs);
+            if left.len() == used.len() {
+                let cheapest = used
+                    .iter()
+                    .fold(f64::INFINITY, |least, (_, across)| least.min(*across));
+                legs.bound(cheapest, proven);
+                effort = legs.effort;
+                left = cheap(&legs);
+                if left.len() == used.len() || effort == 0 {
+                    return used
+                        .iter()
+                        .map(|used| cost(&legs, used))
+                        .fold(proven, f64::min);
+                }
+            }
+            allowed = left;
+        }
+        proven
+    }
+
+    fn legs<'a>(&'a self, radii: &'a [Option<f64>], least: f64, effort: usize) -> Legs<'a> {
+        let field = (self.walls, radii);
+        Legs::new(
+            self.scenario,
+            self.prices,
+            field,
+            least,
+            (effort, self.stop),
+        )
+    }
+
+    /// What no route undercuts, seen from above, that uses `event`, where each wall counts as hard at one of these `radii`
+    /// whatever else it uses.
+    fn using(&self, event: &Event, radii: &[Option<f64>]) -> f64 {
+        let spent: Vec<usize> = event.walls().collect();
+        match event.kind {
+            // The toll may be what a first or last leg pays.
+            Kind::Pass { .. } => 0.0,
+            Kind::Dip { wall } => {
+                let mut bare = radii.to_vec();
+                bare[wall] = bare[wall].map(|_| self.walls[wall].core);
+                self.across(&bare, &spent) + event.extra
+            }
+            Kind::Slip { walls, between, .. } => {
+                let cores = walls.map(|wall| self.walls[wall].core);
+                let gap = string::Gap::new(between, cores);
+                let field = (self.walls, radii);
+                string::through(field, self.prices, &spent, gap, self.stop) + event.extra
+            }
+        }
+    }
+
+    /// What no route undercuts, seen from above, that goes round the walls widened to `radii`.
+    fn across(&self, radii: &[Option<f64>], spent: &[usize]) -> f64 {
+        let limits = (f64::INFINITY, self.stop);
+        let (cost, ways) = string::cost((self.walls, radii), self.prices, spent, limits);
+        self.ways.set(self.ways.get() + ways);
+        cost
+    }
+
+    /// How far each wall may be widened so that it counts as hard whatever `allowed` events happen.
+    pub(super) fn radii(&self, allowed: &[Event]) -> Vec<Option<f64>> {
+        let mut radii: Vec<Option<f64>> = self.walls.iter().map(|wall| Some(wall.wide)).collect();
+        for event in allowed {
+            match event.kind {
+                Kind::Pass { wall } => radii[wall] = None,
+                Kind::Dip { wall } => {
+                    radii[wall] = radii[wall].map(|radius| radius.min(self.walls[wall].safe));
+                }
+                Kind::Slip { .. } => {}
+            }
+        }
+        for event in allowed {
+            if let Kind::Slip { walls, apart, .. } = event.kind
+                && let [Some(one), Some(other)] = walls.map(|wall| radii[wall])
+                && one + other > apart
+            {
+                // Both shrink alike, but not below their cores.
+                let [core, next] = walls.map(|wall| self.walls[wall].core);
+                let shrunk = (one - 0.5 * (one + other - apart))
+                    .max(core)
+                    .min(apart - next);
+                radii[walls[0]] = Some(shrunk);
+                radii[walls[1]] = Some(other.min(apart - shrunk).min(if walls[0] == walls[1] {
+                    shrunk
+                } else {
+                    other
+                }));
+            }
+        }
+        radii
+    }
+
+    /// The walls with nothing of their soft zones used that `allowed` events touch.
+    fn bare(&self, allowed: &[Event]) -> Vec<Option<f64>> {
+        let mut radii = self.radii(&[]);
+        for event in allowed {
+            match event.kind {
+                Kind::Pass { wall } => radii[wall] = None,
+                Kind::Dip { wall } => radii[wall] = radii[wall].map(|_| self.walls[wall].core),
+                Kind::Slip { walls, .. } => {
+                    for wall in walls {
+                        radii[wall] = radii[wall].map(|_| self.walls[wall].core);
+                    }
+                }
+            }
+        }
+        radii
+    }
+}

@@ -1,0 +1,98 @@
+//! What it costs to pass a threat above or below.
+
+use crate::scenario::Scenario;
+use crate::terrain::Terrain;
+use crate::threat::Threat;
+
+/// What it takes to pass a threat above or below.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Toll {
+    /// Part of F3 that a waypoint beyond the threat's height costs at least.
+    pub(super) altitude: f64,
+    /// Metres that are climbed and descended at least.
+    pub(super) vertical: f64,
+}
+
+/// The heights in the frame that a route can reach.
+pub(super) struct Heights {
+    floor: f64,
+    ceiling: f64,
+    /// Elevation of the ground where it is level.
+    level: Option<f64>,
+}
+
+impl Heights {
+    pub(super) fn of(scenario: &Scenario) -> Self {
+        let (low, high, level) = match &scenario.terrain {
+            Terrain::Flat(flat) => (flat.elevation, flat.elevation, Some(flat.elevation)),
+            Terrain::Peaks(peaks) => {
+                let sum = |part: fn(f64) -> f64| -> f64 {
+                    peaks.peaks.iter().map(|peak| part(peak.height)).sum()
+                };
+                (
+                    peaks.base + sum(|height| height.min(0.0)),
+                    peaks.base + sum(|height| height.max(0.0)),
+                    None,
+                )
+            }
+            Terrain::Grid(grid) => {
+                let nodes = grid.elevations.iter().copied();
+                (
+                    nodes.clone().fold(f64::INFINITY, f64::min),
+                    nodes.fold(f64::NEG_INFINITY, f64::max),
+                    None,
+                )
+            }
+            Terrain::Dem(dem) => {
+                let [low, high] = dem.elevations();
+                (low, high, None)
+            }
+        };
+        let band = scenario.altitude;
+        let ends = [scenario.start, scenario.target]
+            .map(|end| end.z - scenario.terrain.elevation(end.xy()));
+        // Outside the terminal zones, a route keeps to the band; there are none where both ends do.
+        let within = ends.iter().all(|h| (band.min..=band.max).contains(h));
+        let lowest = ends.iter().fold(band.min, |low, h| low.min(*h));
+        let floor = if within { band.min } else { lowest.min(0.0) };
+        let ceiling = ends.iter().fold(band.max, |high, h| high.max(*h));
+        let hair = 1e-3 + 1e-9 * (high.abs() + low.abs() + ceiling.abs());
+        Self {
+            floor: low + floor - hair,
+            ceiling: high + ceiling + hair,
+            level,
+        }
+    }
+
+    /// What it takes to pass `threat` above or below; `None` when there is no room.
+    pub(super) fn toll(&self, threat: &Threat, scenario: &Scenario) -> Option<Toll> {
+        let (start, target) = (scenario.start.z, scenario.target.z);
+        let weight = scenario.weights.altitude;
+        let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max);
+        // Legs are straight: a route beyond a height has a waypoint beyond it.
+        let toll = |beyond: f64, ends_beyond: bool, up: f64| {
+            let nothing = Toll {
+                altitude: 0.0,
+                vertical: 0.0,
+            };
+            let Some(level) = self.level.filter(|_| !ends_beyond) else {
+                return nothing;
+            };
+            Toll {
+                altitude: weight * (up * (beyond - level - middle)).max(0.0),
+                vertical: (beyond - start).abs() + (beyond - target).abs(),
+            }
+        };
+        let over = threat.top.filter(|top| *top <= self.ceiling);
+        let over = over.map(|top| toll(top, start >= top || target >= top, 1.0));
+        let under = threat.base.filter(|base| *base > self.floor);
+        let under = under.map(|base| toll(base, start < base || target < base, -1.0));
+        match (over, under) {
+            (Some(over), Some(under)) => Some(Toll {
+                altitude: over.altitude.min(under.altitude),
+                vertical: over.vertical.min(under.vertical),
+            }),
+            (over, under) => over.or(under),
+        }
+    }
+}

@@ -43,6 +43,14 @@ fn lengths(outlines: &[Outline], ends: [[f64; 2]; 2], k: usize) -> Vec<f64> {
     strings.iter().map(|string| string.length).collect()
 }
 
+/// Which outline a piece rounds.
+fn rounded(piece: &Piece) -> Option<usize> {
+    match piece {
+        Piece::Arc { outline, .. } => Some(*outline),
+        Piece::Straight { .. } => None,
+    }
+}
+
 #[track_caller]
 fn check(outlines: &[Outline], ends: [[f64; 2]; 2], expected: &[f64]) {
     let found = lengths(outlines, ends, expected.len().max(1));
@@ -223,6 +231,24 @@ fn strings_keep_to_the_area() {
     let found = taut_strings(&scene, 3).strings;
     assert_eq!(found.len(), 1);
     assert!(found[0].at(0.5).y > 4.9);
+}
+
+/// Of a great disc, a small one rises, and a string round both comes back to the great one.
+#[test]
+fn a_string_comes_back_to_a_circle() {
+    let outlines = [
+        disc(39.28, -4.78, 13.27),
+        disc(40.49, 2.78, 5.73),
+        disc(66.49, 9.89, 14.03),
+    ];
+    let ends = [[0.0, 0.0], [100.0, 0.0]];
+    let alone = &strings(&outlines, ends, 1)[0];
+    let rounded: Vec<usize> = alone.pieces.iter().filter_map(rounded).collect();
+    assert_eq!(rounded, [0, 1, 0, 2]);
+    for k in 2..=5 {
+        let first = &strings(&outlines, ends, k)[0];
+        assert!((first.length - alone.length).abs() < 1e-9);
+    }
 }
 
 /// Shortest path among points sampled on the circles, by brute force; its ways are a hair

@@ -88,20 +88,29 @@ impl Search<'_> {
         found
     }
 
-    /// Whether a string comes back to a corner in the same sense, or crosses an earlier part of
-    /// itself: it winds round something for nothing.
-    pub(super) fn crosses_itself(&self, way: &Way, straight: &Tangent) -> bool {
+    /// Whether a string that leaves along `arc` winds round a corner for nothing, or crosses an earlier part of itself. It
+    /// may come back to a circle out of which others rise, further on.
+    pub(super) fn crosses_itself(&self, way: &Way, arc: &Arc, straight: &Tangent) -> bool {
+        let signed = |arc: &Arc| arc.on.sense.sign() * arc.turn;
         let mut step = way.step;
+        // By so much the string has turned since it came to the step, and on its circle.
+        let (mut turned, mut own) = (signed(arc), signed(arc));
         loop {
             if self.steps[step].place == way.to {
-                return true;
+                let sense = self.rounding(way.to).sense.sign();
+                let (since, all) = (sense * (turned - own), sense * turned);
+                if since < 0.0 || all >= std::f64::consts::TAU {
+                    return true;
+                }
             }
-            let Some((before, _, earlier)) = &self.steps[step].before else {
+            let Some((before, arc, earlier)) = &self.steps[step].before else {
                 return false;
             };
             if crossing((earlier.from, earlier.to), (straight.from, straight.to)).is_some() {
                 return true;
             }
+            own = signed(arc);
+            turned += own;
             step = *before;
         }
     }

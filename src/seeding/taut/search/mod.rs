@@ -220,7 +220,7 @@ impl<'o> Search<'o> {
         let Some(arc) = self.arc(from, &straight) else {
             return;
         };
-        if self.k > 1 && self.crosses_itself(way, &straight) {
+        if self.k > 1 && self.crosses_itself(way, &arc, &straight) {
             return;
         }
         let (place, length) = (from.place, from.length + arc.length() + straight.length);

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
 use async_nats::jetstream;
+use async_nats::jetstream::context::CreateStreamErrorKind;
 
 use crate::support::nats::{self, Cluster, NatsServer};
 
@@ -13,6 +14,20 @@ async fn client(address: &str) -> jetstream::Context {
         .expect("a namespace");
     let hosts: Vec<_> = hosts.split(',').collect();
     jetstream::new(async_nats::connect(hosts).await.expect("connected"))
+}
+
+/// A stream of `config`. A cluster whose leader changes meanwhile drops the question: it is asked again.
+async fn created(
+    context: &jetstream::Context,
+    config: jetstream::stream::Config,
+) -> jetstream::stream::Stream {
+    for _ in 0..6 {
+        match context.create_stream(config.clone()).await {
+            Err(fault) if fault.kind() == CreateStreamErrorKind::TimedOut => {}
+            stream => return stream.unwrap(),
+        }
+    }
+    panic!("no server made the stream");
 }
 
 fn stream(address: &str, num_replicas: usize) -> jetstream::stream::Config {
@@ -60,7 +75,7 @@ async fn a_cluster_goes_on_without_one_of_its_servers() {
     let mut cluster = Cluster::start();
     let address = cluster.address();
     let context = client(&address).await;
-    let mut stream = context.create_stream(stream(&address, 3)).await.unwrap();
+    let mut stream = created(&context, stream(&address, 3)).await;
     let subject = nats::namespace(&address).to_owned();
     let info = stream.info().await.unwrap().clone();
     let leader = info.cluster.unwrap().leader.unwrap();

@@ -14,7 +14,7 @@ pub(super) fn walls(scenario: &Scenario, prices: &Prices) -> Vec<Wall> {
     let mut walls: Vec<Wall> = scenario.threats.iter().filter_map(wall).collect();
     let ends = prices.ends.map(|end| end.xy());
     let first = Around::of(&walls, ends, None, prices);
-    let taken = first.as_ref().map(|first| first.wall);
+    let taken = first.map(|first| first.wall);
     let around = [first, Around::of(&walls, [ends[1], ends[0]], taken, prices)];
     // Of each end, the way straight out of the wall around it.
     let out = [0, 1].map(|end| {

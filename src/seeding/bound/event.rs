@@ -22,11 +22,10 @@ pub(super) struct Event {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Kind {
-    /// Pass between two walls whose cores are `apart` metres from each other, where these are nearest; twice
-    /// the same wall where a ring nearly closes.
+    /// Pass between two walls where their shapes are nearest to each other; twice the same wall where a ring
+    /// nearly closes.
     Slip {
         walls: [usize; 2],
-        apart: f64,
         between: [Point2; 2],
     },
     /// Come nearer to a wall than its `dip`.
@@ -184,7 +183,6 @@ fn gap(one: &Core, other: &Core, walls: &[Wall], prices: &Prices) -> Option<Even
     Some(Event {
         kind: Kind::Slip {
             walls: [one.wall, other.wall],
-            apart,
             between: [p, q],
         },
         cost: prices.climbing(length, prices.rise()) + extra,

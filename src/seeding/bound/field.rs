@@ -133,7 +133,7 @@ impl Field<'_> {
                 bare[wall] = bare[wall].map(|_| self.walls[wall].core);
                 self.across(&bare, &spent) + event.extra
             }
-            Kind::Slip { walls, between, .. } => {
+            Kind::Slip { walls, between } => {
                 let cores = walls.map(|wall| self.walls[wall].core);
                 let gap = string::Gap::new(between, cores);
                 let field = (self.walls, radii);
@@ -163,7 +163,11 @@ impl Field<'_> {
             }
         }
         for event in allowed {
-            if let Kind::Slip { walls, apart, .. } = event.kind
+            if let Kind::Slip {
+                walls,
+                between: [p, q],
+            } = event.kind
+                && let apart = (q - p).norm()
                 && let [Some(one), Some(other)] = walls.map(|wall| radii[wall])
                 && one + other > apart
             {

@@ -21,19 +21,19 @@ const SECTORS: u32 = 8;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Kind {
     /// The middle of their headings, and the half of their range, radians.
-    pub(super) heading: f64,
-    pub(super) half: f64,
+    heading: f64,
+    half: f64,
     /// Lengths seen from above, metres; the second may be infinite.
-    pub(super) lengths: [f64; 2],
+    lengths: [f64; 2],
     /// No route with such a leg costs less seen from above.
     pub(super) cost: f64,
     /// What the leg costs at least on top.
     pub(super) steepness: f64,
     /// What the shortest of them cost at least seen from above, less the fuel from their ends to that of the one in the
     /// middle.
-    pub(super) leg: f64,
+    leg: f64,
     /// What may be gained by cutting the headings.
-    pub(super) turned: f64,
+    turned: f64,
     /// Whether a string may tell that the cost is higher.
     pub(super) is_rough: bool,
 }
@@ -188,15 +188,15 @@ impl End<'_> {
         (self.from + way, length * kind.half)
     }
 
-    /// The walls that count, and by how much they are widened.
-    fn hard(&self) -> impl Iterator<Item = (&Wall, f64)> {
+    /// The walls that count.
+    fn hard(&self) -> impl Iterator<Item = &Wall> {
         let both = self.walls.iter().zip(self.radii);
-        both.filter_map(|(wall, radius)| Some((wall, (*radius)?)))
+        both.filter_map(|(wall, radius)| radius.map(|_| wall))
     }
 
     /// Whether every leg to within `spread` of `at` enters a core.
     fn is_blocked(&self, at: Point2, spread: f64) -> bool {
-        self.hard().any(|(wall, _)| match &wall.shape {
+        self.hard().any(|wall| match &wall.shape {
             OutlineShape::Disc(center) => {
                 wall.core > spread && point_segment(*center, self.from, at) < wall.core - spread
             }
@@ -212,7 +212,7 @@ impl End<'_> {
     /// `at` about the second.
     fn exposure(&self, at: Point2, half: f64) -> [f64; 2] {
         let mut sums = [0.0; 2];
-        for (wall, _) in self.hard() {
+        for wall in self.hard() {
             for (sum, half) in sums.iter_mut().zip([half, 0.0]) {
                 *sum += exposure::least(wall, (self.from, at), half);
             }

@@ -23,7 +23,7 @@ pub use content::{Checked, Declaration, Identity};
 pub use error::CatalogueError;
 pub use mounted::Mounted;
 pub use shared::Sharing;
-pub use shelf::{Change, Changes, Shelf};
+pub use shelf::{Change, Changes, Shelf, Source};
 pub use shipped::lay_down;
 pub use staged::Staged;
 

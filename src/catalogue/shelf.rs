@@ -4,7 +4,7 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Debug;
-use std::io::{self, Read, Write};
+use std::io::{self, Read, Seek, Write};
 
 /// A place that every node reaches, and that orders what they write.
 ///
@@ -35,7 +35,7 @@ pub trait Shelf: Debug + Send + Sync + 'static {
     ///
     /// # Errors
     /// See above, or that of reading it.
-    fn put(&self, file: &mut dyn Read) -> io::Result<String>;
+    fn put(&self, file: &mut dyn Source) -> io::Result<String>;
 
     /// Write a file to `to`; false when there is none. What fails midway has written some of it.
     ///
@@ -55,6 +55,11 @@ pub trait Shelf: Debug + Send + Sync + 'static {
     /// See above.
     fn discard(&self, file: &str) -> io::Result<()>;
 }
+
+/// A file to be kept: read from its beginning, perhaps more than once.
+pub trait Source: Read + Seek {}
+
+impl<T: Read + Seek> Source for T {}
 
 /// What has been written.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::sync::{Mutex, MutexGuard};
 
-use crate::catalogue::{Change, Changes, Shelf};
+use crate::catalogue::{Change, Changes, Shelf, Source};
 
 /// A shelf in memory.
 #[derive(Default)]
@@ -149,7 +149,7 @@ impl Shelf for Memory {
         self.call(|state, wholly| Ok(state.write(key, None, expected, wholly).is_some()))
     }
 
-    fn put(&self, file: &mut dyn Read) -> io::Result<String> {
+    fn put(&self, file: &mut dyn Source) -> io::Result<String> {
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
         self.call(|state, wholly| {

@@ -262,9 +262,7 @@ impl Maker<'_> {
         };
         let what = format!("object store {}", config.bucket);
         if let Ok(there) = self.context.get_object_store(&config.bucket).await {
-            let beneath = format!("OBJ_{}", config.bucket);
-            let beneath = self.context.get_stream(beneath).await;
-            let beneath = beneath.map_err(|error| failed(&what, &error))?;
+            let beneath = self.beneath(&config.bucket).await?;
             self.raise(&beneath.cached_info().config).await?;
             return Ok(there);
         }
@@ -272,6 +270,13 @@ impl Maker<'_> {
             .create_object_store(config)
             .await
             .map_err(|error| failed(&what, &error))
+    }
+
+    /// The stream of an object store.
+    pub(super) async fn beneath(&self, bucket: &str) -> Result<Stream, StoreError> {
+        let stream = format!("OBJ_{bucket}");
+        let found = self.context.get_stream(&stream).await;
+        found.map_err(|error| failed(&format!("stream {stream}"), &error))
     }
 
     /// Bring what lies beneath a bucket to the replicas that are wanted; never to fewer.

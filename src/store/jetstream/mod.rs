@@ -8,6 +8,7 @@
 mod claim;
 mod connect;
 mod documents;
+mod election;
 mod fetch;
 mod follow;
 mod history;

@@ -1,23 +1,18 @@
 //! The one way in which a plan changes: a step that is written if nobody was faster.
 
-use std::time::Duration;
-
 use async_nats::jetstream::context::PublishErrorKind;
 use async_nats::jetstream::message::PublishMessage;
 use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use bytes::Bytes;
-use tokio::time::Instant;
 
 use super::connect::Servers;
+use super::election::Election;
 use super::leases::Leases;
 use super::record::{Placed, Record, State, Step};
-use super::trouble::failed;
+use super::trouble::{failed, is_outrun};
 use super::view::{Standing, View};
 use crate::job::{Event, PlanId};
 use crate::store::StoreError;
-
-/// How long a step is tried again while the servers do not answer: an election takes a few seconds.
-const PATIENCE: Duration = Duration::from_secs(10);
 
 /// What a step makes of a plan.
 pub(super) struct Change {
@@ -131,8 +126,7 @@ impl Plans<'_> {
         mut standing: Option<Standing>,
         mut change: impl FnMut(Option<&Standing>) -> Result<Option<Change>, StoreError> + Send,
     ) -> Result<Option<Standing>, StoreError> {
-        let until = Instant::now() + PATIENCE;
-        let mut pause = Duration::from_millis(20);
+        let mut election = Election::perhaps();
         loop {
             let Some(change) = change(standing.as_ref())? else {
                 return Ok(standing);
@@ -146,13 +140,11 @@ impl Plans<'_> {
                     Ok(sequence) => break Some(Placed { sequence, step }),
                     Err(PublishError::Outrun) => break self.newest(id).await?,
                     Err(PublishError::Hopeless(error)) => return Err(error),
-                    Err(PublishError::Unanswered(error)) if Instant::now() > until => {
-                        return Err(error);
-                    }
                     // It may have been written. Written again it is refused, and found by its mark.
-                    Err(PublishError::Unanswered(_)) => {
-                        tokio::time::sleep(pause).await;
-                        pause = (pause * 2).min(Duration::from_secs(1));
+                    Err(PublishError::Unanswered(error)) => {
+                        if !election.goes_on().await {
+                            return Err(error);
+                        }
                     }
                 }
             };
@@ -189,14 +181,7 @@ impl Plans<'_> {
         answered
             .map(|ack| ack.sequence)
             .map_err(|error| match error.kind() {
-                PublishErrorKind::WrongLastSequence => PublishError::Outrun,
-                // Servers have a second code for it, which the client does not know.
-                _ if failed("", &error)
-                    .to_string()
-                    .contains("wrong last sequence") =>
-                {
-                    PublishError::Outrun
-                }
+                _ if is_outrun(&error) => PublishError::Outrun,
                 PublishErrorKind::MaxPayloadExceeded => {
                     PublishError::Hopeless(failed(&what(), &error))
                 }

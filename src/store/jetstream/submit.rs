@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use async_nats::jetstream::context::PublishErrorKind;
-use async_nats::jetstream::kv::{CreateErrorKind, Entry, Operation, UpdateErrorKind};
+use async_nats::jetstream::kv::{CreateErrorKind, Entry, Operation};
 use async_nats::jetstream::message::PublishMessage;
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ use super::JetStream;
 use super::lane::Lane;
 use super::record::{Document, Queued, Record};
 use super::steps::Change;
-use super::trouble::failed;
+use super::trouble::{failed, is_outrun};
 use crate::export::sha256_hex;
 use crate::job::{Idempotency, Owner, Plan, PlanId, Submission};
 use crate::store::{IDEMPOTENCY_MS, StoreError, Submitted};
@@ -207,6 +207,7 @@ impl JetStream {
             match keys.create(key, own.clone()).await {
                 Ok(revision) => return Ok(Turn::First { revision }),
                 Err(error) if error.kind() == CreateErrorKind::AlreadyExists => {}
+                Err(error) if is_outrun(&error) => {}
                 Err(error) => return Err(what(&error)),
             }
             let entry = keys.entry(key).await.map_err(|error| what(&error))?;
@@ -226,7 +227,7 @@ impl JetStream {
             }
             match keys.update(key, own, entry.revision).await {
                 Ok(revision) => return Ok(Turn::First { revision }),
-                Err(error) if error.kind() == UpdateErrorKind::WrongLastRevision => {}
+                Err(error) if is_outrun(&error) => {}
                 Err(error) => return Err(what(&error)),
             }
         }

@@ -24,6 +24,33 @@ pub(super) fn refused(what: &str, error: &(impl Display + ?Sized)) -> StoreError
     described(format!("{what}: {error}"))
 }
 
+/// Whether it comes of an election among the servers, or of another short absence: asked again, they answer.
+pub(super) fn passes(error: &StoreError) -> bool {
+    let StoreError::Unavailable {
+        trouble: Trouble::Other,
+        detail,
+    } = error
+    else {
+        return false;
+    };
+    // The last is what the client makes of "no responders" where something is written.
+    [
+        "timed out",
+        "temporarily unavailable",
+        "no responders",
+        "no stream found",
+    ]
+    .iter()
+    .any(|sign| detail.contains(sign))
+}
+
+/// Whether a write was refused since what it builds on has been written over. The servers have two codes
+/// for it, of which the client knows one.
+pub(super) fn is_outrun(error: &(impl Error + 'static)) -> bool {
+    let said = failed("", error).to_string();
+    said.contains("wrong last sequence")
+}
+
 fn described(detail: String) -> StoreError {
     let full = [
         "insufficient",

@@ -212,12 +212,17 @@ impl Cluster {
 
     /// Which of them leads the plans of an address.
     pub(crate) async fn leader(&self, address: &str) -> usize {
+        self.leader_of(&format!("{}-plans", namespace(address)))
+            .await
+    }
+
+    /// Which of them leads a stream.
+    pub(crate) async fn leader_of(&self, stream: &str) -> usize {
         let hosts: Vec<_> = self.servers.iter().map(NatsServer::host).collect();
         let client = async_nats::connect(hosts).await.expect("connected");
         let context = async_nats::jetstream::new(client);
-        let stream = format!("{}-plans", namespace(address));
         loop {
-            if let Ok(mut stream) = context.get_stream(&stream).await
+            if let Ok(mut stream) = context.get_stream(stream).await
                 && let Ok(info) = stream.info().await
                 && let Some(leader) = info.cluster.as_ref().and_then(|one| one.leader.clone())
                 && let Some(found) = self.servers.iter().position(|one| one.name() == leader)

@@ -1,7 +1,7 @@
 //! Datasets that several nodes share, on real servers.
 
 use std::collections::BTreeSet;
-use std::io::{self, Read};
+use std::io::{self, Cursor, Read, Seek, SeekFrom};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -20,9 +20,9 @@ use serde_json::Value;
 use tokio::task::spawn_blocking;
 
 use super::{hill, over, put, put_with};
-use crate::support::api::Api;
-use crate::support::nats::{self, Cluster, NatsServer};
-use crate::support::patience::{PATIENCE, eventually};
+use crate::support::api::{Answer, Api};
+use crate::support::nats::{self, Cluster, NatsServer, namespace};
+use crate::support::patience::{PATIENCE, eventually, in_time};
 use crate::support::plans::until;
 use crate::support::process::Service;
 
@@ -200,7 +200,7 @@ async fn files_of_many_chunks_come_whole() {
         let bytes: Vec<u8> = (0..9_000_001_u32)
             .map(|i| (i / 251).to_le_bytes()[0])
             .collect();
-        let file = shelf.put(&mut &*bytes).expect("put");
+        let file = shelf.put(&mut Cursor::new(&bytes)).expect("put");
         let mut came = Vec::new();
         assert!(shelf.fetch(&file, &mut came).expect("fetched"));
         assert!(came == bytes, "{} bytes came", came.len());
@@ -241,6 +241,12 @@ impl Read for Broken {
     }
 }
 
+impl Seek for Broken {
+    fn seek(&mut self, _: SeekFrom) -> io::Result<u64> {
+        Ok(0)
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn an_upload_that_broke_is_seen_by_nobody_and_removed() {
     let address = nats::address();
@@ -248,10 +254,11 @@ async fn an_upload_that_broke_is_seen_by_nobody_and_removed() {
     put(&node.api, "/terrains/hill", hill(100.0)).await;
     let own = shelf(&address);
     let broken = spawn_blocking(move || own.put(&mut Broken(1 << 20))).await;
-    assert!(broken.expect("no panic").is_err());
+    let error = broken.expect("no panic").expect_err("it broke");
+    assert_eq!(error.to_string(), "broken");
     // What was put, but never came to have a name: its process was killed.
     let own = shelf(&address);
-    let lost = spawn_blocking(move || own.put(&mut "whole".as_bytes())).await;
+    let lost = spawn_blocking(move || own.put(&mut Cursor::new("whole"))).await;
     lost.expect("no panic").expect("put");
     assert_eq!(files(&address).await, 3);
     assert_eq!(node.sweep(BTreeSet::new()).await, 0);
@@ -480,6 +487,52 @@ async fn names_are_the_same_at_once_wherever_they_are_asked_for() {
             "round {round}"
         );
     }
+}
+
+/// Whoever is refused asks again, as any caller would; whoever is answered was told the truth.
+#[tokio::test(flavor = "multi_thread")]
+async fn names_are_the_same_whichever_servers_have_been_lost() {
+    let mut cluster = Cluster::start();
+    let address = cluster.address();
+    let nodes = [(); 2].map(|()| {
+        let shelf = Arc::new(JetStreamShelf::new(settings(&address, 3)));
+        Node::over(shelf, Duration::from_secs(600))
+    });
+    put(&nodes[0].api, "/terrains/hill", hill(1.0)).await;
+    let streams = ["KV", "OBJ"].map(|kind| format!("{kind}_{}-terrains", namespace(&address)));
+    for round in 0_u8..4 {
+        let [here, there] = [0, 1].map(|i| &nodes[usize::from(round + i) % 2].api);
+        let leader = cluster.leader_of(&streams[usize::from(round / 2)]).await;
+        cluster.servers[leader].kill();
+        let height = 10.0 + f64::from(round);
+        let uploaded = answered(async || put(here, "/terrains/hill", hill(height)).await).await;
+        assert!(uploaded.status.is_success(), "{uploaded:?}");
+        let known = answered(async || there.get("/terrains/hill").await).await;
+        assert_eq!(
+            known.json()["sha256"],
+            uploaded.json()["sha256"],
+            "round {round}"
+        );
+        let deleted = answered(async || there.delete("/terrains/hill").await).await;
+        assert!([204, 404].contains(&deleted.status.as_u16()), "{deleted:?}");
+        let gone = answered(async || here.get("/terrains/hill").await).await;
+        assert_eq!(gone.status, 404, "round {round}");
+        cluster.servers[leader].restart();
+    }
+}
+
+/// What is answered when the store is there, asked for until it is.
+async fn answered(ask: impl AsyncFn() -> Answer) -> Answer {
+    in_time(async {
+        loop {
+            let answer = ask().await;
+            if answer.status != 503 {
+                return answer;
+            }
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    })
+    .await
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -1,6 +1,7 @@
 //! What is swept, and what never is.
 
 use std::collections::BTreeSet;
+use std::io::Cursor;
 use std::time::Duration;
 
 use super::{Node, height, naming, two, two_with};
@@ -74,7 +75,7 @@ fn nothing_is_swept_while_a_record_cannot_be_read() {
     let (shelf, a, b) = two();
     a.keep("hill", 1).expect("kept");
     a.keep("hill", 2).expect("kept");
-    shelf.put(&mut "theirs".as_bytes()).expect("put");
+    shelf.put(&mut Cursor::new("theirs")).expect("put");
     shelf.scribble("name.new", r#"{"sum": 7}"#);
     assert_eq!(b.sweep(), 0);
     assert_eq!(shelf.counts(), [3, 0]);

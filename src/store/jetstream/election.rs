@@ -1,0 +1,104 @@
+//! Asking again what the servers did not answer: while they elect a leader, they drop what they are asked.
+
+use std::time::Duration;
+
+use tokio::time::{Instant, sleep};
+
+/// An election takes a few seconds.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Before the first time of asking again; twice as long each time.
+const SHORTEST: Duration = Duration::from_millis(20);
+
+/// Between two times of asking, at most.
+const LONGEST: Duration = Duration::from_secs(1);
+
+/// An election that may be under way.
+pub(super) struct Election {
+    until: Instant,
+    pause: Duration,
+}
+
+impl Election {
+    /// One that began just now, if it did.
+    pub(super) fn perhaps() -> Self {
+        Self {
+            until: Instant::now() + PATIENCE,
+            pause: SHORTEST,
+        }
+    }
+
+    /// Wait before asking again; false when it is no election that they do not answer for.
+    pub(super) async fn goes_on(&mut self) -> bool {
+        if Instant::now() > self.until {
+            return false;
+        }
+        sleep(self.pause).await;
+        self.pause = LONGEST.min(self.pause * 2);
+        true
+    }
+}
+
+/// Do `work` until it is done or fails for what `passes` does not say passes with an election.
+///
+/// # Errors
+/// The last one of `work`.
+pub(super) async fn outlast<T, E>(
+    passes: impl Fn(&E) -> bool,
+    mut work: impl AsyncFnMut() -> Result<T, E>,
+) -> Result<T, E> {
+    let mut election = None;
+    loop {
+        let error = match work().await {
+            Err(error) if passes(&error) => error,
+            done => return done,
+        };
+        if !election
+            .get_or_insert_with(Election::perhaps)
+            .goes_on()
+            .await
+        {
+            return Err(error);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test(start_paused = true)]
+    async fn what_passes_is_asked_again_for_a_few_seconds() {
+        let mut asked = 0;
+        let answer = outlast(
+            |&passes: &bool| passes,
+            async || {
+                asked += 1;
+                if asked < 9 { Err(true) } else { Ok(asked) }
+            },
+        );
+        assert_eq!(answer.await, Ok(9));
+        let begun = Instant::now();
+        let answer = outlast(|&passes: &bool| passes, async || Err::<(), _>(true));
+        assert_eq!(answer.await, Err(true));
+        let waited = begun.elapsed();
+        assert!(
+            waited > PATIENCE && waited < PATIENCE + 2 * LONGEST,
+            "{waited:?}"
+        );
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn what_does_not_pass_is_said_at_once() {
+        let mut asked = 0;
+        let answer = outlast(
+            |&passes: &bool| passes,
+            async || {
+                asked += 1;
+                Err::<(), _>(false)
+            },
+        );
+        assert_eq!(answer.await, Err(false));
+        assert_eq!(asked, 1);
+    }
+}

@@ -1,0 +1,201 @@
+//! Where the nodes share their datasets: records in a bucket, files in an object store.
+//!
+//! Deliberately absent: what is in them (`catalogue`). A file is an object of a name that nothing else
+//! ever has; chunks of one that was never finished are told by the stream alone, and go by their own name.
+
+mod opened;
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::io::{self, Write};
+use std::mem;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use tokio::runtime::Handle;
+
+use self::opened::Opened;
+use super::election::outlast;
+use super::settings::Settings;
+use super::trouble::passes;
+use crate::catalogue::{Changes, Shelf, Source};
+use crate::store::{StoreError, Trouble};
+
+/// Records are read and written so soon, or the servers are away.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// A file that has not been put by then never is: whoever finds its chunks later may remove them.
+const LONGEST_PUT: Duration = Duration::from_secs(30 * 60);
+
+/// A file that has not been fetched by then is asked for again.
+const LONGEST_FETCH: Duration = LONGEST_PUT;
+
+/// Servers that could not be reached a moment ago are taken to be away still.
+const RESPITE: Duration = Duration::from_secs(1);
+
+/// Where the nodes of a namespace share their datasets; connected when something is first asked for.
+///
+/// Its methods block: they may be called from threads that plan or are kept for blocking work, not from
+/// tasks.
+pub struct JetStreamShelf {
+    runtime: Handle,
+    settings: Settings,
+    opening: Mutex<Opening>,
+}
+
+/// How far the connection is.
+#[derive(Default)]
+struct Opening {
+    opened: Option<Arc<Opened>>,
+    failed: Option<(Instant, StoreError)>,
+}
+
+impl JetStreamShelf {
+    /// On the servers of the settings.
+    ///
+    /// # Panics
+    /// Outside a tokio runtime.
+    #[must_use]
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            runtime: Handle::current(),
+            settings,
+            opening: Mutex::default(),
+        }
+    }
+
+    fn opened(&self) -> Result<Arc<Opened>, StoreError> {
+        let mut opening = self.opening.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(opened) = &opening.opened {
+            return Ok(opened.clone());
+        }
+        if let Some((failed, error)) = &opening.failed
+            && failed.elapsed() < RESPITE
+        {
+            return Err(error.clone());
+        }
+        match self.runtime.block_on(Opened::new(&self.settings)) {
+            Ok(opened) => Ok(opening.opened.insert(Arc::new(opened)).clone()),
+            Err(error) => {
+                opening.failed = Some((Instant::now(), error.clone()));
+                Err(error)
+            }
+        }
+    }
+
+    /// Have the servers do something, but wait no longer than that; during an election again and again.
+    fn ask<T, E: Into<Failure>>(
+        &self,
+        patience: Duration,
+        mut work: impl AsyncFnMut(&Opened) -> Result<T, E>,
+    ) -> io::Result<T> {
+        self.once(patience, async |servers| {
+            let passes =
+                |failure: &Failure| matches!(failure, Failure::Servers(error) if passes(error));
+            outlast(passes, async || work(servers).await.map_err(Into::into)).await
+        })
+    }
+
+    fn once<T>(
+        &self,
+        patience: Duration,
+        work: impl AsyncFnOnce(&Opened) -> Result<T, Failure>,
+    ) -> io::Result<T> {
+        let opened = self.opened().map_err(unavailable)?;
+        if !opened.is_connected() {
+            return Err(unavailable(StoreError::unavailable(
+                "no NATS server answers",
+            )));
+        }
+        let done = async { tokio::time::timeout(patience, work(&opened)).await };
+        let done = self.runtime.block_on(done).unwrap_or_else(|_| {
+            let late = StoreError::unavailable("the NATS servers take too long");
+            Err(late.into())
+        });
+        done.map_err(|failure| match failure {
+            Failure::Servers(error) => unavailable(error),
+            Failure::File(error) => error,
+        })
+    }
+}
+
+impl fmt::Debug for JetStreamShelf {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "JetStreamShelf({:?})", self.settings.address)
+    }
+}
+
+impl Shelf for JetStreamShelf {
+    fn changes(&self, after: u64) -> io::Result<Changes> {
+        self.ask(PATIENCE, async |servers| servers.changes(after).await)
+    }
+
+    fn write(&self, key: &str, value: &str, expected: u64) -> io::Result<Option<u64>> {
+        let mut asked = false;
+        self.ask(PATIENCE, async |servers| {
+            let again = mem::replace(&mut asked, true);
+            let written = servers.write(key, value, expected).await;
+            match written {
+                Ok(None) if again => servers.said_already(key, Some(value), expected).await,
+                written => written,
+            }
+        })
+    }
+
+    fn erase(&self, key: &str, expected: u64) -> io::Result<bool> {
+        let mut asked = false;
+        let erased = self.ask(PATIENCE, async |servers| {
+            let again = mem::replace(&mut asked, true);
+            let erased = servers.erase(key, expected).await;
+            match erased {
+                Ok(None) if again => {
+                    let said = servers.said_already(key, None, expected).await;
+                    said.map(|revision| revision.map(drop))
+                }
+                erased => erased,
+            }
+        });
+        Ok(erased?.is_some())
+    }
+
+    fn put(&self, file: &mut dyn Source) -> io::Result<String> {
+        self.ask(LONGEST_PUT, async |servers| servers.put(file).await)
+    }
+
+    fn fetch(&self, file: &str, to: &mut dyn Write) -> io::Result<bool> {
+        // What has been written already cannot be taken back.
+        self.once(LONGEST_FETCH, async |servers| servers.fetch(file, to).await)
+    }
+
+    fn files(&self) -> io::Result<BTreeSet<String>> {
+        self.ask(PATIENCE, async |servers| servers.files().await)
+    }
+
+    fn discard(&self, file: &str) -> io::Result<()> {
+        self.ask(PATIENCE, async |servers| servers.discard(file).await)
+    }
+}
+
+/// Which side failed.
+enum Failure {
+    Servers(StoreError),
+    /// What was to be read or written here.
+    File(io::Error),
+}
+
+impl From<StoreError> for Failure {
+    fn from(error: StoreError) -> Self {
+        Self::Servers(error)
+    }
+}
+
+fn unavailable(error: StoreError) -> io::Error {
+    let kind = match &error {
+        StoreError::Unavailable {
+            trouble: Trouble::Full,
+            ..
+        } => io::ErrorKind::StorageFull,
+        _ => io::ErrorKind::Other,
+    };
+    io::Error::new(kind, error)
+}

@@ -9,9 +9,10 @@ use async_nats::jetstream::stream::{Config, DiscardPolicy, RetentionPolicy, Stor
 use async_nats::jetstream::{self, Context, kv, object_store};
 use async_nats::{Client, ConnectOptions, Event};
 
+use super::election::outlast;
 use super::lane::Version;
 use super::settings::Settings;
-use super::trouble::failed;
+use super::trouble::{failed, passes};
 use crate::job::PlanId;
 use crate::store::{IDEMPOTENCY_MS, Options, StoreError};
 
@@ -107,24 +108,27 @@ impl Servers {
             .query_account()
             .await
             .map_err(|error| failed("JetStream of the NATS server", &error))?;
-        let namespace = settings.address.namespace.clone();
         let make = maker(&context, settings);
+        outlast(passes, async || Self::made(&client, &make, options).await).await
+    }
+
+    async fn made(
+        client: &Client,
+        make: &Maker<'_>,
+        options: &Options,
+    ) -> Result<Self, StoreError> {
+        let kept = Duration::from_millis(IDEMPOTENCY_MS.cast_unsigned()) * 2;
         Ok(Self {
             plans: make.stream(plans(options)).await?,
             jobs: make.stream(jobs(options)).await?,
             documents: make.bucket("documents", Duration::ZERO).await?,
             objects: make.objects("objects").await?,
-            keys: make
-                .bucket(
-                    "keys",
-                    Duration::from_millis(IDEMPOTENCY_MS.cast_unsigned()) * 2,
-                )
-                .await?,
+            keys: make.bucket("keys", kept).await?,
             nodes: make.bucket("nodes", ALIVE).await?,
             tellers: make.bucket("tellers", TELLING).await?,
-            client,
-            context: context.clone(),
-            namespace: namespace.clone(),
+            client: client.clone(),
+            context: make.context.clone(),
+            namespace: make.namespace.to_owned(),
         })
     }
 

@@ -125,6 +125,29 @@ impl Model<'_> {
         }
     }
 
+    /// The heights above ground that are allowed over `at`: those of the band, or of the zones round start and
+    /// target.
+    #[must_use]
+    pub fn heights_over(&self, at: Point2) -> (f64, f64) {
+        let allowed = |zone: &&TerminalZone| {
+            zone.radius > 0.0 && (at - zone.center).norm_squared() <= zone.radius * zone.radius
+        };
+        self.join_heights(self.zones.iter().filter(allowed))
+    }
+
+    /// The heights above ground that are allowed somewhere.
+    #[must_use]
+    pub fn heights_anywhere(&self) -> (f64, f64) {
+        self.join_heights(self.zones.iter().filter(|zone| zone.radius > 0.0))
+    }
+
+    fn join_heights<'z>(&self, zones: impl Iterator<Item = &'z TerminalZone>) -> (f64, f64) {
+        let band = self.scenario.altitude;
+        zones.fold((band.min, band.max), |(floor, ceiling), zone| {
+            (floor.min(zone.floor), ceiling.max(zone.ceiling))
+        })
+    }
+
     /// Least and greatest height above ground of `leg` outside the terminal zones; `None` when it
     /// never leaves them.
     #[must_use]

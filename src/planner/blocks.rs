@@ -330,7 +330,7 @@ mod tests {
             of_lane(&pricer.routes(&points), 0)
         };
         let (mut kept, mut random) = (Kept::of(1), Random::new(5));
-        let moves = Moves::new(scenario);
+        let moves = Moves::new(&model);
         let mut positions = vec![0.0; 37 * dimension];
         let mut known = scenario.clone();
         known.planner.waypoints = 6;

@@ -2,9 +2,9 @@
 
 use super::coding::{Cartesian, Spherical};
 use super::moves::Moves;
+use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::Random;
-use crate::scenario::Scenario;
 
 /// Of so many members, one comes from anywhere; the others are near to a seed.
 const STRANGERS: usize = 4;
@@ -31,9 +31,9 @@ pub(super) struct Guide<'s> {
 
 impl<'s> Guide<'s> {
     /// From `seeds`, each of `waypoints` free waypoints.
-    pub(super) fn new(scenario: &'s Scenario, waypoints: usize, seeds: &[Vec<Point3>]) -> Self {
-        let space = Cartesian::new(scenario, waypoints);
-        let spherical = Spherical::new(scenario, waypoints);
+    pub(super) fn new(model: &Model<'s>, waypoints: usize, seeds: &[Vec<Point3>]) -> Self {
+        let space = Cartesian::with_ends(model, waypoints);
+        let spherical = Spherical::new(model.scenario, waypoints);
         let encode = |route: &Vec<Point3>| {
             let mut position = vec![0.0; space.bounds().dimension()];
             space.encode(route, &mut position);
@@ -42,7 +42,7 @@ impl<'s> Guide<'s> {
         Self {
             seeds: seeds.iter().map(encode).collect(),
             space,
-            moves: Moves::new(scenario),
+            moves: Moves::new(model),
             vectors: vec![0.0; spherical.bounds().dimension()],
             spherical,
             drawn: 0,

@@ -4,16 +4,16 @@
 //! free waypoint. Moves keep heights above ground, so that none asks for the elevation anywhere.
 
 use super::coding::PER_WAYPOINT;
-use crate::geometry::{LEVEL, Point3};
+use crate::cost::Model;
+use crate::geometry::{LEVEL, Point2, Point3};
 use crate::optimizer::Random;
-use crate::scenario::Scenario;
 
 /// x, y, height above ground.
 type Waypoint = [f64; PER_WAYPOINT];
 
 /// Moves of the routes of one scenario.
 pub(super) struct Moves<'s> {
-    scenario: &'s Scenario,
+    model: Model<'s>,
     /// Metres from start to target.
     way: f64,
     start: Waypoint,
@@ -21,10 +21,11 @@ pub(super) struct Moves<'s> {
 }
 
 impl<'s> Moves<'s> {
-    pub(super) fn new(scenario: &'s Scenario) -> Self {
+    pub(super) fn new(model: &Model<'s>) -> Self {
+        let scenario = model.scenario;
         let coded = |end: Point3| [end.x, end.y, end.z - scenario.terrain.elevation(end.xy())];
         Self {
-            scenario,
+            model: model.clone(),
             way: (scenario.target - scenario.start).norm(),
             start: coded(scenario.start),
             target: coded(scenario.target),
@@ -32,7 +33,7 @@ impl<'s> Moves<'s> {
     }
 
     /// Change the route of `position` in one place, by up to about `size` (0 to 1) of the way from
-    /// start to target. It stays within area and band.
+    /// start to target. It stays within the area, and the heights that are allowed there.
     pub(super) fn move_a_part(&self, position: &mut [f64], random: &mut Random, size: f64) {
         let (route, _) = position.as_chunks_mut::<PER_WAYPOINT>();
         let reach = self.way * size * order(random.unit());
@@ -103,7 +104,8 @@ impl<'s> Moves<'s> {
         let height = if random.unit() < 0.5 {
             between(2)
         } else {
-            0.5 * (self.scenario.altitude.min + self.scenario.altitude.max)
+            let band = self.model.scenario.altitude;
+            0.5 * (band.min + band.max)
         };
         route[into] = self.within([between(0) - dy * aside, between(1) + dx * aside, height]);
     }
@@ -116,12 +118,13 @@ impl<'s> Moves<'s> {
     }
 
     fn within(&self, [x, y, height]: Waypoint) -> Waypoint {
-        let (area, band) = (&self.scenario.area, self.scenario.altitude);
-        [
+        let area = &self.model.scenario.area;
+        let at = Point2::new(
             x.clamp(area.min.x, area.max.x),
             y.clamp(area.min.y, area.max.y),
-            height.clamp(band.min, band.max),
-        ]
+        );
+        let (floor, ceiling) = self.model.heights_over(at);
+        [at.x, at.y, height.clamp(floor, ceiling)]
     }
 }
 
@@ -155,9 +158,10 @@ mod tests {
     #[test]
     fn moves_stay_in_the_box_and_reach_every_waypoint() {
         let scenario = scenario();
-        let moves = Moves::new(&scenario);
+        let model = Model::new(&scenario);
+        let moves = Moves::new(&model);
         for waypoints in [1, 2, 3, 10] {
-            let space = Cartesian::new(&scenario, waypoints);
+            let space = Cartesian::with_ends(&model, waypoints);
             let bounds = space.bounds();
             let mut random = Random::new(3);
             let mut base = vec![0.0; bounds.dimension()];

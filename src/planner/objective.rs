@@ -39,8 +39,8 @@ impl<'s> Routes<'s> {
     /// walk is a move of the route.
     pub(super) fn guided(model: &Model<'s>, stop: &'s dyn Stop, seeds: &[Vec<Point3>]) -> Self {
         let waypoints = seeds[0].len() - 2;
-        let coding = Coding::Cartesian(Cartesian::new(model.scenario, waypoints));
-        let guide = Guide::new(model.scenario, waypoints, seeds);
+        let coding = Coding::Cartesian(Cartesian::with_ends(model, waypoints));
+        let guide = Guide::new(model, waypoints, seeds);
         Self::new(coding, Some(guide), model, stop)
     }
 

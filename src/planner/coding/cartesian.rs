@@ -1,8 +1,9 @@
 //! A route as its waypoints: three numbers each, as most planners before the spherical vector have it.
 //!
 //! A position holds N waypoints: x and y within the area, and the height above ground within the
-//! band. Nothing is assumed of how one waypoint lies to the next.
+//! band, or within what the ends allow besides. Nothing is assumed of how one waypoint lies to the next.
 
+use crate::cost::Model;
 use crate::cost::batch::{LANES, PointRow};
 use crate::geometry::{Point2, Point3};
 use crate::optimizer::Bounds;
@@ -22,12 +23,23 @@ impl<'s> Cartesian<'s> {
     /// The coding of routes of `scenario` with so many free waypoints.
     #[must_use]
     pub(in crate::planner) fn new(scenario: &'s Scenario, waypoints: usize) -> Self {
-        let (area, band) = (&scenario.area, scenario.altitude);
+        let band = scenario.altitude;
+        Self::within(scenario, waypoints, (band.min, band.max))
+    }
+
+    /// With room for what only start and target allow, too: lower or higher than the band.
+    #[must_use]
+    pub(in crate::planner) fn with_ends(model: &Model<'s>, waypoints: usize) -> Self {
+        Self::within(model.scenario, waypoints, model.heights_anywhere())
+    }
+
+    fn within(scenario: &'s Scenario, waypoints: usize, (floor, ceiling): (f64, f64)) -> Self {
+        let area = &scenario.area;
         Self {
             scenario,
             bounds: Bounds {
-                lower: [area.min.x, area.min.y, band.min].repeat(waypoints),
-                upper: [area.max.x, area.max.y, band.max].repeat(waypoints),
+                lower: [area.min.x, area.min.y, floor].repeat(waypoints),
+                upper: [area.max.x, area.max.y, ceiling].repeat(waypoints),
             },
         }
     }
@@ -114,5 +126,25 @@ mod tests {
         for (encoded, given) in position.iter().zip(given) {
             assert!((encoded - given).abs() < 1e-9, "{encoded} for {given}");
         }
+    }
+
+    /// Where a vehicle takes off under the band, waypoints may lie under it, too.
+    #[test]
+    fn what_only_the_ends_allow_is_not_cut_off() {
+        let mut scenario = scenario();
+        scenario.altitude.min = 100.0;
+        let model = Model::new(&scenario);
+        let low = scenario.start + (scenario.target - scenario.start) * 0.1;
+        let route = [scenario.start, low, scenario.target];
+        let (floor, ceiling) = model.heights_over(low.xy());
+        assert!((floor..100.0).contains(&low.z), "{low}");
+        let coding = Cartesian::with_ends(&model, 1);
+        assert_eq!(coding.bounds().lower[2], floor);
+        assert_eq!(coding.bounds().upper[2], ceiling);
+        let mut position = [0.0; 3];
+        coding.encode(&route, &mut position);
+        let mut decoded = Vec::new();
+        coding.decode(&position, &mut decoded);
+        assert_eq!(decoded, route);
     }
 }

@@ -21,7 +21,7 @@ use super::polish::{Polish, Steps};
 use super::price::price;
 use super::{Stop, same, why_stop};
 use crate::cost::Model;
-use crate::geometry::{Point2, Point3};
+use crate::geometry::{LEVEL, Point2, Point3, Vector2};
 use crate::optimizer::Fitness;
 use crate::scenario::{Scenario, Seeding, WarmStart};
 use crate::seeding::{Obstacles, Outline, TautString, steep_ground, taut_strings_until};
@@ -255,10 +255,11 @@ fn over_ground(model: &Model, strings: &[Vec<Point3>]) -> (Found, bool) {
     let strings = priced(model, strings);
     let cheapest = strings.iter().min_by(|one, other| one.0.rank(&other.0));
     let known = cheapest.map_or(f64::INFINITY, |(fitness, _)| fitness.cost);
-    let mut found = roadmap::routes(model, OVERLAND, known);
+    let (mut found, few) = roadmap::routes(model, OVERLAND, known);
     let over = best_of(model, priced(model, &found.routes));
     let best = over
         .into_iter()
+        .chain(best_of(model, priced(model, &few)))
         .chain(best_of(model, strings))
         .min_by(|one, other| one.0.rank(&other.0));
     let detour = best.and_then(|(_, route)| exposed::detour(model, route));
@@ -272,6 +273,7 @@ fn over_ground(model: &Model, strings: &[Vec<Point3>]) -> (Found, bool) {
         found.routes.extend(trails.routes);
         found.legs_priced += trails.legs_priced;
     }
+    found.routes.extend(few);
     let rounded = |route: &Vec<Point3>| rounded::rounded(model.scenario, route);
     let turned: Vec<_> = found.routes.iter().filter_map(rounded).collect();
     found.routes.extend(turned);
@@ -319,6 +321,15 @@ fn lifted(scenario: &Scenario, point: Point2, share: f64) -> Point3 {
         z = z.clamp(end.z - reach, end.z + reach);
     }
     Point3::new(point.x, point.y, z)
+}
+
+/// Whether a turn from the first leg between `corner`'s points into the second is no sharper than that of which
+/// `sharpest` is the cosine.
+fn may_turn(corner: [Point3; 3], sharpest: f64) -> bool {
+    let [before, at, after] = corner.map(|point| point.xy());
+    let [one, other]: [Vector2; 2] = [at - before, after - at];
+    let lengths = one.norm() * other.norm();
+    lengths < LEVEL * LEVEL || one.dot(&other) >= sharpest * lengths
 }
 
 /// Metres the vehicle may climb in a metre seen from above, less a hair.

@@ -5,6 +5,12 @@ use crate::cost::batch::{LANES, PointRow};
 use crate::geometry::{Point2, Point3, Vector2};
 use crate::scenario::Scenario;
 
+/// Chains that are nowhere farther apart, as a share of the direct way, are one.
+pub(super) const NEAR: f64 = 2.0 * super::super::SAME;
+
+/// Chains that lead another way are somewhere so far apart.
+const APART: f64 = 0.12;
+
 /// What a search for ways gave.
 #[derive(Default)]
 pub(super) struct Found {
@@ -115,25 +121,34 @@ pub(super) fn chains(
         .filter(|(cost, _)| cost.is_finite())
         .collect();
     over.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
-    let mut chains: Vec<Vec<Point3>> = Vec::new();
-    for (_, place) in over {
+    let through = |place: usize| -> Vec<Point3> {
         let mut chain = from_start.trace(place);
         chain.reverse();
         chain.extend(from_target.trace(place).into_iter().skip(1));
-        let chain: Vec<Point3> = chain.into_iter().map(|idx| places[idx]).collect();
-        if !chains.iter().any(|other| is_near(model, &chain, other)) {
-            chains.push(chain);
-        }
-        if chains.len() == count {
-            break;
+        chain.into_iter().map(|idx| places[idx]).collect()
+    };
+    let mut chains: Vec<Vec<Point3>> = Vec::new();
+    // First those that lead another way altogether.
+    for (count, reach) in [(count / 2, APART), (count, NEAR)] {
+        for &(_, place) in &over {
+            if chains.len() >= count {
+                break;
+            }
+            let chain = through(place);
+            if !chains
+                .iter()
+                .any(|other| is_near(model, &chain, other, reach))
+            {
+                chains.push(chain);
+            }
         }
     }
     chains
 }
 
-/// Whether every waypoint of `chain` lies near to a leg of `other`.
-fn is_near(model: &Model, chain: &[Point3], other: &[Point3]) -> bool {
-    let reach = 2.0 * super::super::SAME * (model.scenario.target - model.scenario.start).norm();
+/// Whether every waypoint of `chain` lies within `reach`, a share of the direct way, of a leg of `other`.
+pub(super) fn is_near(model: &Model, chain: &[Point3], other: &[Point3], reach: f64) -> bool {
+    let reach = reach * (model.scenario.target - model.scenario.start).norm();
     chain.iter().all(|point| {
         other.windows(2).any(|ends| {
             let way = ends[1] - ends[0];

@@ -8,121 +8,256 @@ use crate::optimizer::Fitness;
 use crate::planner::price::PRICED_FROM;
 
 /// Of the places of `chain`, those that make the best route of as many free waypoints as a coarse one may have, and how
-/// many legs were priced to tell.
+/// many legs were priced to tell. Turns are looked at only where those of the best are too sharp.
 pub(super) fn thin(model: &Model, pricer: &Pricer, chain: &[Point3]) -> (Vec<Point3>, u64) {
-    let last = chain.len() - 1;
-    let ends: Vec<(usize, usize)> = (0..last)
-        .flat_map(|a| (a + 1..=last).map(move |b| (a, b)))
-        .collect();
-    let [from, to] = net::rows(chain, &ends);
-    let mut prices = vec![Price::ZERO; from.len()];
-    pricer.first_legs(&from, &to, ends.len(), &mut prices);
-    let tolerance = model.tolerance.scaled(PRICED_FROM);
-    let own: Vec<(f64, f64)> = chain
-        .iter()
-        .map(|&place| model.waypoint(place, tolerance))
-        .collect();
-    // The best way to each place, by so many legs.
-    let mut best = vec![(Fitness::WORST, 0); chain.len()];
-    best[0] = (
-        Fitness {
-            violation: 0.0,
-            cost: 0.0,
-        },
-        0,
-    );
-    let mut ways = vec![best];
-    let most = model.scenario.planner.waypoints.min(MOST_COARSE);
-    for _ in 0..=most.min(last - 1) {
-        let known = &ways[ways.len() - 1];
-        let mut best = vec![(Fitness::WORST, 0); chain.len()];
+    let legs = Legs::new(model, pricer, chain);
+    let best = legs.best();
+    let route = if legs.may_turn_along(&best) {
+        best
+    } else {
+        legs.best_to_turn_along().unwrap_or(best)
+    };
+    let priced = (chain.len() * (chain.len() - 1) / 2) as u64;
+    let route = route.into_iter().map(|place| chain[place]).collect();
+    (route, priced)
+}
+
+/// The legs from each place of a chain to each later one.
+struct Legs<'c> {
+    chain: &'c [Point3],
+    /// By where they begin, then by how many places later they end, less one; with their ends as waypoints.
+    worth: Vec<Vec<Fitness>>,
+    /// As many legs a route may have.
+    most: usize,
+    /// Cosine of the sharpest turn.
+    sharpest: f64,
+}
+
+impl<'c> Legs<'c> {
+    fn new(model: &Model, pricer: &Pricer, chain: &'c [Point3]) -> Self {
+        let last = chain.len() - 1;
+        let ends: Vec<(usize, usize)> = (0..last)
+            .flat_map(|a| (a + 1..=last).map(move |b| (a, b)))
+            .collect();
+        let [from, to] = net::rows(chain, &ends);
+        let mut prices = vec![Price::ZERO; from.len()];
+        pricer.first_legs(&from, &to, ends.len(), &mut prices);
+        let tolerance = model.tolerance.scaled(PRICED_FROM);
+        let mut own: Vec<(f64, f64)> = chain
+            .iter()
+            .map(|&place| model.waypoint(place, tolerance))
+            .collect();
+        own[last] = (0.0, 0.0);
+        let mut worth = vec![Vec::new(); chain.len()];
         for (idx, &(a, b)) in ends.iter().enumerate() {
             let (price, lane) = (&prices[idx / LANES], idx % LANES);
-            let at_end = if b == last { (0.0, 0.0) } else { own[b] };
-            let way = Fitness {
-                violation: known[a].0.violation + price.violation[lane] + at_end.0,
-                cost: known[a].0.cost + price.cost[lane] + at_end.1,
-            };
-            if known[a].0.cost.is_finite() && way.beats(&best[b].0) {
-                best[b] = (way, a);
+            worth[a].push(Fitness {
+                violation: price.violation[lane] + own[b].0,
+                cost: price.cost[lane] + own[b].1,
+            });
+        }
+        let scenario = model.scenario;
+        let most = scenario.planner.waypoints.min(MOST_COARSE) + 1;
+        Self {
+            chain,
+            worth,
+            most: most.min(last),
+            sharpest: libm::cos(scenario.vehicle.max_turn_deg.to_radians()),
+        }
+    }
+
+    fn last(&self) -> usize {
+        self.chain.len() - 1
+    }
+
+    /// The places of the best route, turns apart.
+    fn best(&self) -> Vec<usize> {
+        // The best way to each place, by so many legs.
+        let mut best = vec![(Fitness::WORST, 0); self.chain.len()];
+        best[0].0 = Fitness {
+            violation: 0.0,
+            cost: 0.0,
+        };
+        let mut ways = vec![best];
+        for _ in 0..self.most {
+            let known = &ways[ways.len() - 1];
+            let mut best = vec![(Fitness::WORST, 0); self.chain.len()];
+            for (a, legs) in self.worth.iter().enumerate() {
+                if known[a].0.cost.is_infinite() {
+                    continue;
+                }
+                for (leg, b) in legs.iter().zip(a + 1..) {
+                    let way = Fitness {
+                        violation: known[a].0.violation + leg.violation,
+                        cost: known[a].0.cost + leg.cost,
+                    };
+                    if way.beats(&best[b].0) {
+                        best[b] = (way, a);
+                    }
+                }
+            }
+            ways.push(best);
+        }
+        let last = self.last();
+        let mut legs = 1;
+        for count in 2..ways.len() {
+            if ways[count][last].0.beats(&ways[legs][last].0) {
+                legs = count;
             }
         }
-        ways.push(best);
-    }
-    let mut legs = 1;
-    for count in 2..ways.len() {
-        if ways[count][last].0.beats(&ways[legs][last].0) {
-            legs = count;
+        let mut route = vec![last];
+        for way in ways[1..=legs].iter().rev() {
+            route.push(way[route[route.len() - 1]].1);
         }
+        route.reverse();
+        route
     }
-    let mut route = vec![chain[last]];
-    let mut at = last;
-    for way in ways[1..=legs].iter().rev() {
-        at = way[at].1;
-        route.push(chain[at]);
+
+    /// The places of the cheapest route that breaks no limit, if there is one.
+    fn best_to_turn_along(&self) -> Option<Vec<usize>> {
+        let (count, last) = (self.chain.len(), self.last());
+        // The cheapest way to each place from each before it, by so many legs, and the place before that.
+        let nowhere = vec![(f64::INFINITY, 0); count * count];
+        let mut first = nowhere.clone();
+        for (leg, b) in self.worth[0].iter().zip(1..) {
+            if leg.is_feasible() {
+                first[b] = (leg.cost, 0);
+            }
+        }
+        let mut ways = vec![first];
+        while ways.len() < self.most {
+            let known = &ways[ways.len() - 1];
+            let mut best = nowhere.clone();
+            for a in 0..last {
+                for b in a + 1..last {
+                    let cost = known[a * count + b].0;
+                    if cost.is_infinite() {
+                        continue;
+                    }
+                    for (leg, c) in self.worth[b].iter().zip(b + 1..) {
+                        let cost = cost + leg.cost;
+                        let known = &mut best[b * count + c];
+                        if leg.is_feasible() && cost < known.0 && self.may_turn([a, b, c]) {
+                            *known = (cost, a);
+                        }
+                    }
+                }
+            }
+            ways.push(best);
+        }
+        let ends = (0..ways.len()).flat_map(|legs| (0..last).map(move |a| (legs, a)));
+        let cost = |&(legs, a): &(usize, usize)| ways[legs][a * count + last].0;
+        let (legs, mut at) = ends.min_by(|one, other| cost(one).total_cmp(&cost(other)))?;
+        if cost(&(legs, at)).is_infinite() {
+            return None;
+        }
+        let mut route = vec![last, at];
+        for way in ways[1..=legs].iter().rev() {
+            let next = route[route.len() - 2];
+            at = way[at * count + next].1;
+            route.push(at);
+        }
+        route.reverse();
+        Some(route)
     }
-    route.reverse();
-    (route, ends.len() as u64)
+
+    fn may_turn_along(&self, route: &[usize]) -> bool {
+        route
+            .windows(3)
+            .all(|corner| self.may_turn([corner[0], corner[1], corner[2]]))
+    }
+
+    fn may_turn(&self, corner: [usize; 3]) -> bool {
+        super::may_turn(corner.map(|place| self.chain[place]), self.sharpest)
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::may_turn;
     use super::*;
     use crate::planner::tests::scenario;
+    use crate::scenario::Scenario;
 
-    /// Of a chain those places are kept that make the best route there is through them.
+    /// A chain that leaves the direct way at once, and what its legs cost by the way they are defined, turns apart.
+    fn astray(scenario: &Scenario) -> Vec<Point3> {
+        let between = [
+            (0.15, 130.0),
+            (0.3, 170.0),
+            (0.5, 150.0),
+            (0.6, 140.0),
+            (0.8, 110.0),
+        ];
+        let way = scenario.target - scenario.start;
+        let place = |(share, aside): (f64, f64)| {
+            scenario.start + way * share + nalgebra::Vector3::new(-aside, aside, 60.0)
+        };
+        std::iter::once(scenario.start)
+            .chain(between.map(place))
+            .chain([scenario.target])
+            .collect()
+    }
+
+    fn sum_of_legs(model: &Model, route: &[Point3]) -> Fitness {
+        let scenario = model.scenario;
+        let tolerance = model.tolerance.scaled(PRICED_FROM);
+        let mut sum = Fitness {
+            violation: 0.0,
+            cost: 0.0,
+        };
+        for ends in route.windows(2) {
+            let (violation, cost) =
+                model.leg(ends[0], ends[1], scenario.planner.quadrature, tolerance);
+            let own = if ends[1] == scenario.target {
+                (0.0, 0.0)
+            } else {
+                model.waypoint(ends[1], tolerance)
+            };
+            sum.violation += violation + own.0;
+            sum.cost += cost + own.1;
+        }
+        sum
+    }
+
+    fn thinned(scenario: &Scenario) -> (Fitness, Vec<Point3>) {
+        let model = Model::new(scenario);
+        let tolerance = model.tolerance.scaled(PRICED_FROM);
+        let pricer = Pricer::new(&model, scenario.planner.quadrature, tolerance).verdicts();
+        let (thin, priced) = thin(&model, &pricer, &astray(scenario));
+        assert_eq!(priced, 6 * 7 / 2);
+        assert!((3..=4).contains(&thin.len()));
+        (sum_of_legs(&model, &thin), thin)
+    }
+
+    /// Of a chain those places are kept that make the best route through them that the vehicle can turn along.
     #[test]
     fn a_chain_is_thinned_to_the_best_of_its_places() {
         let mut scenario = scenario();
         scenario.planner.waypoints = 2;
-        let model = Model::new(&scenario);
-        let place = |share: f64, aside: f64| {
-            let way = scenario.target - scenario.start;
-            scenario.start + way * share + nalgebra::Vector3::new(-aside, aside, 60.0)
-        };
-        let between = [
-            place(0.15, 130.0),
-            place(0.3, 170.0),
-            place(0.5, 150.0),
-            place(0.6, 140.0),
-            place(0.8, 110.0),
-        ];
-        let mut chain = vec![scenario.start];
-        chain.extend(between);
-        chain.push(scenario.target);
-        let tolerance = model.tolerance.scaled(PRICED_FROM);
-        let pricer = Pricer::new(&model, scenario.planner.quadrature, tolerance).verdicts();
-        let (thin, priced) = thin(&model, &pricer, &chain);
-        assert_eq!(priced, 6 * 7 / 2);
-        assert!((3..=4).contains(&thin.len()));
-        // Turns apart, which join two legs.
-        let legs = |route: &[Point3]| {
-            let tolerance = model.tolerance.scaled(PRICED_FROM);
-            let quadrature = scenario.planner.quadrature;
-            let mut sum = Fitness {
-                violation: 0.0,
-                cost: 0.0,
+        let mut costs = Vec::new();
+        for sharpest in [180.0_f64, 60.0] {
+            scenario.vehicle.max_turn_deg = sharpest;
+            let model = Model::new(&scenario);
+            let chain = astray(&scenario);
+            let turns_along = |route: &[Point3]| {
+                let sharpest = libm::cos(sharpest.to_radians());
+                let mut corners = route.windows(3);
+                corners.all(|corner| may_turn([corner[0], corner[1], corner[2]], sharpest))
             };
-            for ends in route.windows(2) {
-                let (violation, cost) = model.leg(ends[0], ends[1], quadrature, tolerance);
-                let own = model.waypoint(ends[1], tolerance);
-                let own = if ends[1] == scenario.target {
-                    (0.0, 0.0)
-                } else {
-                    own
-                };
-                sum.violation += violation + own.0;
-                sum.cost += cost + own.1;
+            let (found, thin) = thinned(&scenario);
+            assert!(found.is_feasible() && turns_along(&thin));
+            for a in 1..6 {
+                let one = [chain[0], chain[a], chain[6]];
+                let two = (a + 1..6).map(|b| vec![chain[0], chain[a], chain[b], chain[6]]);
+                for other in std::iter::once(one.to_vec()).chain(two) {
+                    let sum = sum_of_legs(&model, &other);
+                    let is_cheaper = sum.is_feasible() && sum.cost < found.cost - 1e-9;
+                    assert!(!(is_cheaper && turns_along(&other)));
+                }
             }
-            sum
-        };
-        let found = legs(&thin);
-        for a in 1..6 {
-            assert!(!legs(&[chain[0], chain[a], chain[6]]).beats(&found));
-            for b in a + 1..6 {
-                let other = legs(&[chain[0], chain[a], chain[b], chain[6]]);
-                assert!(other.cost >= found.cost - 1e-9 || other.violation >= found.violation);
-            }
+            costs.push(found.cost);
         }
+        // To turn softly costs more here.
+        assert!(costs[1] > 1.001 * costs[0], "{costs:?}");
     }
 }

@@ -3,10 +3,13 @@
 //!
 //! Taut strings know threats, but neither mountains nor what crossing a soft zone costs. Here every
 //! leg between two of some hundred places is priced as it is, those that break a limit left out, and
-//! the cheapest chains from start to target are found; turns alone are not looked at.
+//! the cheapest chains from start to target are found; turns, and how many legs there may be, are looked at only where
+//! the cheapest of all cannot be flown as it is (`few`).
 
-use super::levels;
+mod few;
+
 use super::net::{self, Found, Tree};
+use super::{levels, may_turn};
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::cost::{Model, metre};
 use crate::geometry::Point3;
@@ -27,15 +30,34 @@ const NEAR: f64 = 1.5;
 /// What a waypoint must gain, as a share of the direct way's fuel.
 const WORTH: f64 = 1e-4;
 
-/// Up to `count` routes that differ, where one that costs `known` is to be had without, about.
-pub(super) fn routes(model: &Model, count: usize, known: f64) -> Found {
+/// Chains of few legs, at most.
+const FEW: usize = 4;
+
+/// Up to `count` routes that differ, where one that costs `known` is to be had without, about; and where not even
+/// the first of them can be flown as it is, some of so few legs and so soft turns that they can.
+pub(super) fn routes(model: &Model, count: usize, known: f64) -> (Found, Vec<Vec<Point3>>) {
     let places = places(model);
     let mut legs = Legs::new(model, &places, known);
     let trees = [0, places.len() - 1].map(|end| legs.cheapest(end));
-    Found {
-        routes: net::chains(model, &places, &trees, count),
-        legs_priced: legs.priced,
-    }
+    let routes = net::chains(model, &places, &trees, count);
+    let most = model.scenario.planner.waypoints + 1;
+    let can_be_flown = |chain: &Vec<Point3>| {
+        let turns = (2..chain.len())
+            .all(|idx| legs.may_turn([idx - 2, idx - 1, idx].map(|idx| chain[idx])));
+        chain.len() <= most + 1 && turns
+    };
+    let few = if routes.first().is_none_or(can_be_flown) {
+        Vec::new()
+    } else {
+        let is_like = |one: &[Point3], other: &[Point3]| net::is_near(model, one, other, net::NEAR);
+        few::chains(&mut legs, most, FEW, is_like)
+    };
+    let legs_priced = legs.priced;
+    let found = Found {
+        routes,
+        legs_priced,
+    };
+    (found, few)
 }
 
 /// Start, a net of spots in the middle of the band, target.
@@ -65,6 +87,8 @@ struct Legs<'p, 's> {
     /// Whether it is known to keep its heights; where those take long to measure, few legs are asked.
     measured: Vec<Vec<bool>>,
     priced: u64,
+    /// Cosine of the sharpest turn.
+    sharpest: f64,
 }
 
 impl<'p, 's> Legs<'p, 's> {
@@ -120,7 +144,13 @@ impl<'p, 's> Legs<'p, 's> {
             costs,
             measured: vec![vec![!hilly; count]; count],
             priced,
+            sharpest: libm::cos(scenario.vehicle.max_turn_deg.to_radians()),
         }
+    }
+
+    /// Whether the vehicle may turn at the middle one of three points.
+    fn may_turn(&self, corner: [Point3; 3]) -> bool {
+        may_turn(corner, self.sharpest)
     }
 
     /// Measure the heights of the legs from `before` to `place`.

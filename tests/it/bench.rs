@@ -220,6 +220,80 @@ fn quality_is_measured_against_the_best_known() {
 }
 
 #[test]
+fn random_scenarios_are_measured_against_the_best_of_their_runs() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let path = |name: &str| directory.path().join(name);
+    let measure = |out: &str, first: &str, scenarios: &str| {
+        let (out, kept) = (path(out), path("kept"));
+        let arguments = [
+            &[
+                "bench",
+                "random",
+                "--family",
+                "agility,discs",
+                "--longer",
+                "1",
+            ][..],
+            &["--first", first, "--scenarios", scenarios, "--seeds", "1"],
+            &["--out", out.to_str().expect("UTF-8")],
+            &["--keep", kept.to_str().expect("UTF-8")],
+        ];
+        let done = run(&arguments.concat(), "");
+        assert_eq!(done.status.code(), Some(0), "{done:?}");
+    };
+    measure("both", "3", "2");
+    measure("second", "4", "1");
+
+    let runs = path("both").join("random-runs.csv");
+    let names = ["discs-3", "discs-4", "agility-3", "agility-4"];
+    assert_eq!(column(&runs, "scenario"), names);
+    // A scenario is its seed's own, whichever come before it.
+    let (all, alone) = (
+        essence(&runs),
+        essence(&path("second").join("random-runs.csv")),
+    );
+    assert_eq!([&all[1], &all[3]], [&alone[0], &alone[1]]);
+
+    let costs = numbers(&column(&runs, "cost"));
+    let references = numbers(&column(&runs, "reference"));
+    let gaps: Vec<f64> = costs
+        .iter()
+        .zip(&references)
+        .map(|(cost, reference)| 100.0 * (cost / reference - 1.0))
+        .collect();
+    assert!(gaps.iter().all(|gap| *gap >= 0.0), "{gaps:?}");
+    let families = path("both").join("random-families.csv");
+    let told = numbers(&column(&families, "mean gap %"));
+    for (told, gaps) in told.iter().zip(gaps.chunks(2)) {
+        assert!(
+            (told - (gaps[0] + gaps[1]) / 2.0).abs() < 1e-9,
+            "{told} {gaps:?}"
+        );
+    }
+
+    // What was kept can be planned, with the same outcome.
+    let plan = run(
+        &[
+            "plan",
+            path("kept").join("discs-4.json").to_str().expect("UTF-8"),
+        ],
+        "",
+    );
+    let result: Value = serde_json::from_slice(&plan.stdout).expect("a result");
+    assert_eq!(result["feasible"], true);
+    let again = result["cost"]["total"].as_f64().expect("a cost");
+    assert_eq!(again.to_bits(), costs[1].to_bits());
+
+    let refused = run(&["bench", "random", "--family", "clouds"], "");
+    assert_eq!(refused.status.code(), Some(1));
+    let told = String::from_utf8(refused.stderr).expect("UTF-8");
+    assert!(
+        told.contains("clouds") && told.contains("polygons"),
+        "{told}"
+    );
+}
+
+#[test]
 fn speed_has_its_tables() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let out = directory.path().to_str().expect("UTF-8");

@@ -112,6 +112,17 @@ fn rules() -> Rules {
 }
 
 impl Case {
+    /// A document of our own making, under its own name.
+    pub(super) fn drawn(document: Value) -> Self {
+        let name = document["name"].as_str().unwrap_or_default();
+        Self {
+            name: name.to_owned(),
+            best_known: None,
+            file: name.into(),
+            document,
+        }
+    }
+
     /// The scenario with its own planner.
     ///
     /// # Errors

@@ -10,6 +10,7 @@ mod paper;
 mod price;
 mod progress;
 mod quality;
+mod random;
 mod rank_sum;
 mod report;
 mod serve;
@@ -18,7 +19,7 @@ mod summary;
 mod table;
 mod trial;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
@@ -34,6 +35,8 @@ pub(super) enum Command {
     Paper(paper::Arguments),
     /// The planner with its default settings: distance to the best known routes and to the proven bound
     Quality(quality::Arguments),
+    /// The planner with its default settings on random scenarios: distance to the best of many runs and to the proven bound
+    Random(random::Arguments),
     /// Routes priced in a second, by waypoints, threats and population
     Speed(speed::Arguments),
     /// The service under load: requests, refusals, streams and plans a second, beside a bare handler
@@ -47,12 +50,19 @@ pub(super) enum Command {
 /// What all measurements are asked.
 #[derive(Args)]
 struct Common {
-    /// Directory for Markdown, CSV and SVG files [default: Markdown to standard output]
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    output: Output,
     /// Scenario documents, or names of shipped ones [default: paper-1 paper-2 paper-3 paper-4]
     #[arg(long, value_name = "FILE", num_args = 1..)]
     scenario: Vec<PathBuf>,
+}
+
+/// Where a report goes.
+#[derive(Args)]
+struct Output {
+    /// Directory for Markdown, CSV and SVG files [default: Markdown to standard output]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
 }
 
 /// Do what is asked, and say by the exit code how it went.
@@ -75,10 +85,10 @@ pub(super) fn run(command: &Command) -> anyhow::Result<u8> {
                 serve::measure(arguments, cases)
             })
         }),
-        Command::Cluster(arguments) => cluster::measure(arguments).and_then(|report| {
-            write(&report, arguments.output.out.as_deref(), "cluster")
-                .context("cannot write the report")
-        }),
+        Command::Random(arguments) => random::measure(arguments)
+            .and_then(|report| write(&report, &arguments.output, "random")),
+        Command::Cluster(arguments) => cluster::measure(arguments)
+            .and_then(|report| write(&report, &arguments.output, "cluster")),
         Command::Price(arguments) => price::run(arguments),
     };
     let Err(error) = done else {
@@ -101,12 +111,13 @@ fn report(
     measure: impl FnOnce(&[Case]) -> anyhow::Result<Report>,
 ) -> anyhow::Result<()> {
     let report = measure(&case::cases(&common.scenario)?)?;
-    write(&report, common.out.as_deref(), name).context("cannot write the report")
+    write(&report, &common.output, name)
 }
 
-fn write(report: &Report, out: Option<&Path>, name: &str) -> anyhow::Result<()> {
-    match out {
-        Some(directory) => Ok(report.save(directory, name)?),
+fn write(report: &Report, output: &Output, name: &str) -> anyhow::Result<()> {
+    let written = match &output.out {
+        Some(directory) => report.save(directory, name).map_err(Into::into),
         None => report.print(),
-    }
+    };
+    written.context("cannot write the report")
 }

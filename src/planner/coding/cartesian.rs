@@ -139,8 +139,9 @@ mod tests {
         let (floor, ceiling) = model.heights_over(low.xy());
         assert!((floor..100.0).contains(&low.z), "{low}");
         let coding = Cartesian::with_ends(&model, 1);
-        assert_eq!(coding.bounds().lower[2], floor);
-        assert_eq!(coding.bounds().upper[2], ceiling);
+        let bounds = coding.bounds();
+        let heights = [bounds.lower[2], bounds.upper[2]].map(f64::to_bits);
+        assert_eq!(heights, [floor, ceiling].map(f64::to_bits));
         let mut position = [0.0; 3];
         coding.encode(&route, &mut position);
         let mut decoded = Vec::new();

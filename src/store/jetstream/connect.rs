@@ -109,7 +109,10 @@ impl Servers {
             .await
             .map_err(|error| failed("JetStream of the NATS server", &error))?;
         let make = maker(&context, settings);
-        outlast(passes, async || Self::made(&client, &make, options).await).await
+        let made = outlast(passes, async || {
+            Box::pin(Self::made(&client, &make, options)).await
+        });
+        made.await
     }
 
     async fn made(

@@ -13,10 +13,10 @@ use clap::Args;
 use uuid::Uuid;
 
 use self::work::{CALLERS, Nodes, WORKERS};
-use super::progress;
 use super::report::Report;
 use super::summary::median;
 use super::table::{Cell, Table};
+use super::{Output, progress};
 use crate::config::Address;
 use crate::store::jetstream::Settings;
 
@@ -51,13 +51,6 @@ pub(in crate::cli) struct Arguments {
     time_s: u32,
     #[command(flatten)]
     pub(super) output: Output,
-}
-
-#[derive(Args)]
-pub(super) struct Output {
-    /// Directory for Markdown and CSV files [default: Markdown to standard output]
-    #[arg(long, value_name = "DIR")]
-    pub(super) out: Option<std::path::PathBuf>,
 }
 
 impl Arguments {

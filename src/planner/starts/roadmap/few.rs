@@ -78,9 +78,10 @@ pub(super) fn chains(
         if left == 0 {
             continue;
         }
-        for next in 1..=target {
-            let cost = chain.cost + legs.costs[chain.place][next];
-            let least = cost + rest[left - 1][next];
+        let onward = legs.costs[chain.place].iter().zip(&rest[left - 1]);
+        for (next, (leg, rest)) in onward.enumerate().skip(1) {
+            let cost = chain.cost + leg;
+            let least = cost + rest;
             if least.is_finite()
                 && (idx == 0
                     || legs.may_turn([before, chain.place, next].map(|place| legs.places[place])))

@@ -10,6 +10,7 @@ mod guide;
 mod kept;
 mod log;
 mod moves;
+mod newton;
 mod objective;
 mod outcome;
 mod polish;

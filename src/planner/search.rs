@@ -1,6 +1,7 @@
 //! How a run searches: the algorithm alone, or guided by routes to start from.
 
 use super::log::Log;
+use super::newton::Newton;
 use super::objective::Routes;
 use super::polish::{Polish, Steps};
 use super::starts::Starts;
@@ -88,6 +89,13 @@ fn finish(model: &Model, reason: StopReason, log: &mut Log) -> StopReason {
     if model.scenario.planner.polish && reason != StopReason::Converged {
         let mut route = log.route.clone();
         if let Some(fitness) = polish(model, &mut route, LAST_STEPS, log) {
+            log.offer(&route, fitness);
+        }
+        let mut newton = Newton::new(model, log.stop);
+        if log.best.is_feasible() && newton.is_felt(&log.route) {
+            let mut route = log.route.clone();
+            let fitness = newton.improve(&mut route);
+            log.evaluations += newton.evaluations;
             log.offer(&route, fitness);
         }
         log.last_point();

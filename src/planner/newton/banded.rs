@@ -1,0 +1,100 @@
+//! Systems of equations whose unknowns are tied to near ones alone.
+
+/// Unknowns that are tied lie at most so far apart: three waypoints of three coordinates each.
+const REACH: usize = 8;
+
+/// A symmetric matrix, its lower half: of each row the entries up to the diagonal, which is the last.
+#[derive(Clone)]
+pub(super) struct Banded {
+    rows: Vec<[f64; REACH + 1]>,
+}
+
+impl Banded {
+    pub(super) fn zero(size: usize) -> Self {
+        Self {
+            rows: vec![[0.0; REACH + 1]; size],
+        }
+    }
+
+    /// Add `value` at row `i` and column `j`; above the diagonal nothing is kept.
+    pub(super) fn add(&mut self, i: usize, j: usize, value: f64) {
+        if j <= i {
+            self.rows[i][REACH + j - i] += value;
+        }
+    }
+
+    /// The solution for `right` when `shift` is added to the diagonal; `None` unless all is positive then.
+    pub(super) fn solve(&self, shift: f64, right: &[f64]) -> Option<Vec<f64>> {
+        let factor = self.factor(shift)?;
+        let mut solution = right.to_vec();
+        for i in 0..solution.len() {
+            for j in i.saturating_sub(REACH)..i {
+                solution[i] -= factor[i][REACH + j - i] * solution[j];
+            }
+            solution[i] /= factor[i][REACH];
+        }
+        for i in (0..solution.len()).rev() {
+            solution[i] /= factor[i][REACH];
+            for j in i.saturating_sub(REACH)..i {
+                solution[j] -= factor[i][REACH + j - i] * solution[i];
+            }
+        }
+        Some(solution)
+    }
+
+    /// Cholesky's factor.
+    fn factor(&self, shift: f64) -> Option<Vec<[f64; REACH + 1]>> {
+        let mut factor = self.rows.clone();
+        for i in 0..factor.len() {
+            factor[i][REACH] += shift;
+            let first = i.saturating_sub(REACH);
+            for j in first..=i {
+                let known = (first.max(j.saturating_sub(REACH))..j)
+                    .map(|k| factor[i][REACH + k - i] * factor[j][REACH + k - j])
+                    .sum::<f64>();
+                let left = factor[i][REACH + j - i] - known;
+                factor[i][REACH + j - i] = if j < i {
+                    left / factor[j][REACH]
+                } else if left > 0.0 {
+                    left.sqrt()
+                } else {
+                    return None;
+                };
+            }
+        }
+        Some(factor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optimizer::Random;
+
+    #[test]
+    fn solutions_solve() {
+        let mut random = Random::new(3);
+        for size in [1, 2, 8, 9, 10, 40] {
+            let mut matrix = Banded::zero(size);
+            let mut full = vec![vec![0.0; size]; size];
+            for i in 0..size {
+                for j in i.saturating_sub(REACH)..=i {
+                    let value = if i == j {
+                        12.0
+                    } else {
+                        random.between(-1.0, 1.0)
+                    };
+                    matrix.add(i, j, value);
+                    (full[i][j], full[j][i]) = (value, value);
+                }
+            }
+            let right: Vec<f64> = (0..size).map(|_| random.between(-5.0, 5.0)).collect();
+            let solution = matrix.solve(0.5, &right).expect("positive");
+            for (i, right) in right.iter().enumerate() {
+                let sum: f64 = full[i].iter().zip(&solution).map(|(a, x)| a * x).sum();
+                assert!((sum + 0.5 * solution[i] - right).abs() < 1e-12, "{size}");
+            }
+            assert!(matrix.solve(-40.0, &right).is_none());
+        }
+    }
+}

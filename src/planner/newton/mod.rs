@@ -34,6 +34,10 @@ struct Place {
 /// Multipliers are set so many times at most.
 const ROUNDS: usize = 14;
 
+/// A route that costs more than another by this share is given up as dear, after so many rounds.
+const HOPE: f64 = 0.01;
+const SURE: usize = 2;
+
 /// Where breaches shrink to no less than this share, time after time, no way within the limits is near.
 const LOST: f64 = 0.7;
 
@@ -61,6 +65,12 @@ const MENDS: usize = 8;
 
 /// Of a square metre beyond a limit the share that a square metre of moving counts as.
 const LEAST: f64 = 1e-9;
+
+/// Searches with a waypoint put elsewhere, at most.
+const DEALS: usize = 20;
+
+/// Legs that it may be put on.
+const PLACES: usize = 4;
 
 /// What is gained in a round that is worth another, as a share of the cost.
 const WORTH: f64 = 1e-6;
@@ -127,20 +137,51 @@ impl<'m, 's> Newton<'m, 's> {
     /// Improve `route`; as it is, where nothing better that keeps the limits is found.
     pub(super) fn improve(&mut self, route: &mut Vec<Point3>) -> Fitness {
         let mut best = price(self.model, route);
+        let mut forces = Vec::new();
         for rate in RATES {
-            let found = self.search(route, rate);
-            let fitness = price(self.model, &found);
-            self.evaluations += 2;
-            if fitness.beats(&best) {
-                best = fitness;
-                *route = found;
+            let found = self.search(route, rate, f64::INFINITY);
+            if self.take(found, route, &mut best, &mut forces) {
+                break;
+            }
+        }
+        let mut left = DEALS;
+        while left > 0 && !forces.is_empty() {
+            let mut better = false;
+            for deal in deals(&forces, route) {
+                left -= 1;
+                let found = self.search(&deal, RATES[0], best.cost);
+                better = self.take(found, route, &mut best, &mut forces);
+                if better || left == 0 {
+                    break;
+                }
+            }
+            if !better {
                 break;
             }
         }
         best
     }
 
-    fn search(&mut self, route: &[Point3], rate: f64) -> Vec<Point3> {
+    /// Keep what a search `found` if it is better than the best so far, the `route`.
+    fn take(
+        &mut self,
+        (found, forces): (Vec<Point3>, Vec<f64>),
+        route: &mut Vec<Point3>,
+        best: &mut Fitness,
+        kept: &mut Vec<f64>,
+    ) -> bool {
+        let fitness = price(self.model, &found);
+        self.evaluations += 1;
+        let better = fitness.beats(best);
+        if better {
+            (*route, *best, *kept) = (found, fitness, forces);
+        }
+        better
+    }
+
+    /// The best route near `route`, and what is felt of limits along each of its legs; given up where it would cost
+    /// more than `known`.
+    fn search(&mut self, route: &[Point3], rate: f64, known: f64) -> (Vec<Point3>, Vec<f64>) {
         let way = self.way();
         let limits = Limits::of(self.model, route.len() - 2);
         let all = limits.all(route.len());
@@ -153,9 +194,11 @@ impl<'m, 's> Newton<'m, 's> {
         let mut places = self.places(route);
         let mut damping = metre(self.model.scenario) / (1e-2 * way);
         let (mut worst, mut cost, mut lost) = (f64::INFINITY, f64::INFINITY, 0);
-        for _ in 0..ROUNDS {
+        for round in 0..ROUNDS {
             let merit = self.descend(&mut places, &limits, &prices, &mut damping);
-            if why_stop(self.model.scenario, self.stop).is_some() {
+            // What is still beyond limits makes a route cheap, and costs more from round to round.
+            let is_dear = round >= SURE && merit.value > known * (1.0 + HOPE);
+            if is_dear || why_stop(self.model.scenario, self.stop).is_some() {
                 break;
             }
             let route = self.route(&places);
@@ -183,7 +226,7 @@ impl<'m, 's> Newton<'m, 's> {
         }
         self.settle(&mut places, 20.0 * prices.rounding);
         self.mend(&mut places, &limits, &prices.limits);
-        self.route(&places)
+        (self.route(&places), prices.felt(route.len() - 1))
     }
 
     /// Put heights that are `near` the middle of the band there: its kink was rounded off.
@@ -394,6 +437,24 @@ impl<'m, 's> Newton<'m, 's> {
     }
 }
 
+impl Prices {
+    /// What a metre more would save along each leg by the limits that hold it.
+    fn felt(&self, legs: usize) -> Vec<f64> {
+        let mut felt = vec![0.0; legs];
+        for (limit, multiplier) in self.limits.iter().zip(&self.multipliers) {
+            match *limit {
+                Limit::Climb { leg, .. } => felt[leg] += multiplier,
+                Limit::Turn { at, .. } => {
+                    felt[at - 1] += multiplier;
+                    felt[at] += multiplier;
+                }
+                Limit::Short { .. } | Limit::Height { .. } | Limit::Edge { .. } => {}
+            }
+        }
+        felt
+    }
+}
+
 impl Equations {
     fn new(free: usize) -> Self {
         Self {
@@ -446,6 +507,28 @@ impl Equations {
     fn bring_back<const SIZE: usize>(&mut self, first: usize, gradient: &[f64; SIZE], by: f64) {
         self.press(first, gradient, by, 1.0);
     }
+}
+
+/// `route` with its least waypoint put where limits are felt most: one for each of a few legs.
+fn deals(felt: &[f64], route: &[Point3]) -> Vec<Vec<Point3>> {
+    let detour = |idx: &usize| {
+        let [before, at, after] = [route[idx - 1], route[*idx], route[idx + 1]];
+        (at - before).norm() + (after - at).norm() - (after - before).norm()
+    };
+    let Some(spare) = (1..route.len() - 1).min_by(|a, b| detour(a).total_cmp(&detour(b))) else {
+        return Vec::new();
+    };
+    let mut legs: Vec<usize> = (0..felt.len())
+        .filter(|&leg| leg != spare && leg + 1 != spare && felt[leg] > 0.0)
+        .collect();
+    legs.sort_by(|&a, &b| felt[b].total_cmp(&felt[a]).then(a.cmp(&b)));
+    let dealt = |&leg: &usize| {
+        let mut dealt = route.to_vec();
+        dealt.insert(leg + 1, nalgebra::center(&route[leg], &route[leg + 1]));
+        dealt.remove(if spare > leg { spare + 1 } else { spare });
+        dealt
+    };
+    legs.iter().take(PLACES).map(dealt).collect()
 }
 
 /// Move all free `places` by `step`.

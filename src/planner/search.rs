@@ -41,7 +41,7 @@ pub(super) fn plain(model: &Model, log: &mut Log) -> StopReason {
     let scenario = model.scenario;
     let iterations = 0..=scenario.planner.iterations;
     let (_, reason) = run(model, &mut routes, iterations, log);
-    finish(model, reason, log)
+    finish(model, reason, &[], log)
 }
 
 /// From `starts`, best first: bats about coarse routes, then about whole ones, then polish.
@@ -75,35 +75,52 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
             }
         }
     }
-    let elites = whole(elites, log);
+    let mut elites = whole(elites, log);
     if reason == StopReason::Iterations {
         let mut routes = Routes::guided(model, log.stop, &elites);
         let first = if turning > 0 { turning + 1 } else { 0 };
-        (_, reason) = run(model, &mut routes, first..=settings.iterations, log);
+        let (search, why) = run(model, &mut routes, first..=settings.iterations, log);
+        elites.extend(distinct(model, &routes, search.as_ref()));
+        reason = why;
     }
-    finish(model, reason, log)
+    finish(model, reason, &elites, log)
 }
 
-/// Polish the best route, as the last point of the curve, unless it is good enough already; it may be after.
-fn finish(model: &Model, reason: StopReason, log: &mut Log) -> StopReason {
+/// Polish the best route, as the last point of the curve, unless it is good enough already; it may be after. Where the
+/// vehicle's limits decide its shape, others that led elsewhere may become better.
+fn finish(model: &Model, reason: StopReason, others: &[Vec<Point3>], log: &mut Log) -> StopReason {
     if model.scenario.planner.polish && reason != StopReason::Converged {
         let mut route = log.route.clone();
         if let Some(fitness) = polish(model, &mut route, LAST_STEPS, log) {
             log.offer(&route, fitness);
         }
-        let mut newton = Newton::new(model, log.stop);
-        if log.best.is_feasible() && newton.is_felt(&log.route) {
-            let mut route = log.route.clone();
-            let fitness = newton.improve(&mut route);
-            log.evaluations += newton.evaluations;
-            log.offer(&route, fitness);
-        }
+        bring_home(model, others, log);
         log.last_point();
     }
     if reason == StopReason::Iterations && log.has_converged() {
         return StopReason::Converged;
     }
     reason
+}
+
+/// The last metres of a route that turns or climbs as sharply as it may.
+fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
+    let mut newton = Newton::new(model, log.stop);
+    let mut route = log.route.clone();
+    let is_done = log.best.is_feasible() && !newton.is_felt(&route);
+    if is_done || why_stop(model.scenario, log.stop).is_some() {
+        return;
+    }
+    let mut elsewhere: Vec<Vec<Point3>> = Vec::new();
+    for other in others {
+        let is_near = |known: &Vec<Point3>| same(model.scenario, known, other);
+        if !is_near(&route) && !elsewhere.iter().any(is_near) {
+            elsewhere.push(other.clone());
+        }
+    }
+    let fitness = newton.improve(&mut route, &elsewhere);
+    log.evaluations += newton.evaluations;
+    log.offer(&route, fitness);
 }
 
 /// Improve `route` by `steps`, if the scenario asks for polish.

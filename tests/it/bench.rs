@@ -266,7 +266,7 @@ fn random_scenarios_are_measured_against_the_best_of_their_runs() {
     let told = numbers(&column(&families, "mean gap %"));
     for (told, gaps) in told.iter().zip(gaps.chunks(2)) {
         assert!(
-            (told - (gaps[0] + gaps[1]) / 2.0).abs() < 1e-9,
+            (told - f64::midpoint(gaps[0], gaps[1])).abs() < 1e-9,
             "{told} {gaps:?}"
         );
     }

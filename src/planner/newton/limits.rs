@@ -52,6 +52,23 @@ pub(super) struct Limits<'m, 's> {
     way: f64,
 }
 
+/// All limits of a route of so many waypoints, ends included.
+pub(super) fn all(points: usize) -> Vec<Limit> {
+    let both = [-1.0, 1.0];
+    let legs = (0..points - 1).flat_map(|leg| {
+        let climbs = both.map(|sign| Limit::Climb { leg, sign });
+        climbs.into_iter().chain([Limit::Short { leg }])
+    });
+    let free = (1..points - 1).flat_map(|at| {
+        let turns = both.map(|sign| Limit::Turn { at, sign });
+        let heights = both.map(|sign| Limit::Height { at, sign });
+        let edges = [0, 1].map(|axis| both.map(|sign| Limit::Edge { at, axis, sign }));
+        let edges = edges.into_iter().flatten();
+        turns.into_iter().chain(heights).chain(edges)
+    });
+    legs.chain(free).collect()
+}
+
 impl<'m, 's> Limits<'m, 's> {
     pub(super) fn of(model: &'m Model<'s>, waypoints: usize) -> Self {
         let scenario = model.scenario;
@@ -65,23 +82,6 @@ impl<'m, 's> Limits<'m, 's> {
             arm: way / (waypoints + 1) as f64,
             way,
         }
-    }
-
-    /// All of a route of so many waypoints, ends included.
-    pub(super) fn all(&self, points: usize) -> Vec<Limit> {
-        let both = [-1.0, 1.0];
-        let legs = (0..points - 1).flat_map(|leg| {
-            let climbs = both.map(|sign| Limit::Climb { leg, sign });
-            climbs.into_iter().chain([Limit::Short { leg }])
-        });
-        let free = (1..points - 1).flat_map(|at| {
-            let turns = both.map(|sign| Limit::Turn { at, sign });
-            let heights = both.map(|sign| Limit::Height { at, sign });
-            let edges = [0, 1].map(|axis| both.map(|sign| Limit::Edge { at, axis, sign }));
-            let edges = edges.into_iter().flatten();
-            turns.into_iter().chain(heights).chain(edges)
-        });
-        legs.chain(free).collect()
     }
 
     /// Metres beyond `limit`; negative within.
@@ -188,10 +188,10 @@ impl<'m, 's> Limits<'m, 's> {
             for i in 0..2 {
                 for (end, toward) in [(way_idx, -1.0), (way_idx + 1, 1.0)] {
                     slope.gradient[3 * end + i] += factor * toward * by[i];
-                    for j in 0..2 {
+                    for (j, second) in second[i].iter().enumerate() {
                         for (other, against) in [(way_idx, -1.0), (way_idx + 1, 1.0)] {
                             slope.curvature[3 * end + i][3 * other + j] +=
-                                factor * toward * against * second[i][j];
+                                factor * toward * against * second;
                         }
                     }
                 }

@@ -1,0 +1,82 @@
+//! Linear equations for a step of all free waypoints at once.
+
+use super::Place;
+use super::banded::Banded;
+
+/// Linear equations for a step of all free waypoints.
+pub(super) struct Equations {
+    free: usize,
+    /// Second derivatives.
+    pub(super) matrix: Banded,
+    /// Negative first ones.
+    pub(super) down: Vec<f64>,
+}
+
+impl Equations {
+    pub(super) fn new(free: usize) -> Self {
+        Self {
+            free,
+            matrix: Banded::zero(3 * free),
+            down: vec![0.0; 3 * free],
+        }
+    }
+
+    /// The unknown that coordinate `idx` from those of waypoint `first` on is; none of start and target.
+    fn unknown(&self, first: usize, idx: usize) -> Option<usize> {
+        let at = first + idx / 3;
+        (at >= 1 && at <= self.free).then(|| 3 * (at - 1) + idx % 3)
+    }
+
+    /// Add a figure that depends on waypoints from `first` on, by its derivatives.
+    pub(super) fn add<const SIZE: usize>(
+        &mut self,
+        first: usize,
+        gradient: &[f64; SIZE],
+        curvature: &[[f64; SIZE]; SIZE],
+    ) {
+        for i in 0..SIZE {
+            let Some(row) = self.unknown(first, i) else {
+                continue;
+            };
+            self.down[row] -= gradient[i];
+            for (j, value) in curvature[i].iter().enumerate() {
+                if let Some(column) = self.unknown(first, j) {
+                    self.matrix.add(row, column, *value);
+                }
+            }
+        }
+    }
+
+    /// Add a penalty by the `gradient` of what it is for: so great a `force`, which grows by `rate` a metre.
+    pub(super) fn press<const SIZE: usize>(
+        &mut self,
+        first: usize,
+        gradient: &[f64; SIZE],
+        force: f64,
+        rate: f64,
+    ) {
+        let push = gradient.map(|slope| force * slope);
+        let stiff = gradient.map(|one| gradient.map(|other| rate * one * other));
+        self.add(first, &push, &stiff);
+    }
+
+    /// Ask for a figure to become so much less.
+    pub(super) fn bring_back<const SIZE: usize>(
+        &mut self,
+        first: usize,
+        gradient: &[f64; SIZE],
+        by: f64,
+    ) {
+        self.press(first, gradient, by, 1.0);
+    }
+}
+
+/// Move all free `places` by `step`.
+pub(super) fn advance(places: &mut [Place], step: &[f64]) {
+    let last = places.len() - 1;
+    for (place, step) in places[1..last].iter_mut().zip(step.chunks(3)) {
+        for (axis, step) in step.iter().enumerate() {
+            place.at[axis] += step;
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! The derivatives are those of what is made smaller, and what comes of a route is better and keeps the limits.
+
+use super::equations::advance;
+use super::*;
+use crate::optimizer::Random;
+use crate::planner::Nobody;
+use crate::planner::polish::{Polish, Steps};
+use crate::planner::tests::{hilly_scenario, radar, scenario};
+use crate::scenario::Scenario;
+
+/// A vehicle that turns so little that hardly anything else shapes its routes.
+fn stiff() -> Scenario {
+    let mut scenario = scenario();
+    scenario.vehicle.max_turn_deg = 16.0;
+    scenario.vehicle.min_leg = 25.0;
+    scenario.planner.waypoints = 8;
+    (scenario.start.z, scenario.target.z) = (100.0, 100.0);
+    // The first is in the way at once.
+    scenario.threats = vec![radar(270.0, 180.0, 75.0), radar(560.0, 520.0, 110.0)];
+    scenario
+}
+
+/// From start to target in an arc, at a random height of the band, all places off by up to `off` metres.
+fn arc(scenario: &Scenario, free: usize, bulge: f64, off: f64, random: &mut Random) -> Vec<Point3> {
+    let way = scenario.target - scenario.start;
+    let mut route = vec![scenario.start];
+    for idx in 1..=free {
+        let share = idx as f64 / (free + 1) as f64;
+        let mut at = scenario.start + way * share;
+        let aside = bulge * libm::sin(std::f64::consts::PI * share);
+        at.x -= aside * way.y / way.norm() + random.between(-off, off);
+        at.y += aside * way.x / way.norm() + random.between(-off, off);
+        let height = 100.0 + random.between(-off, off);
+        at.z = scenario.terrain.elevation(at.xy()) + height;
+        route.push(at);
+    }
+    route.push(scenario.target);
+    route
+}
+
+/// Along random directions, what the equations say and what two steps show.
+#[test]
+fn derivatives_are_those_of_the_merit() {
+    let mut random = Random::new(11);
+    for (scenario, accuracy) in [(stiff(), 1e-2), (hilly_scenario(), 0.15)] {
+        let model = Model::new(&scenario);
+        let mut newton = Newton::new(&model, &Nobody);
+        for _ in 0..20 {
+            let route = arc(&scenario, 6, 300.0, 25.0, &mut random);
+            let limits = Limits::of(&model, 6);
+            let mut prices = Prices::new(route.len(), 0.05, 5.0);
+            for multiplier in &mut prices.multipliers {
+                *multiplier = random.between(0.0, 0.3);
+            }
+            let mut places = newton.places(&route);
+            let equations = newton.equations(&mut places, &limits, &prices);
+            let direction: Vec<f64> = (0..18).map(|_| random.between(-1.0, 1.0)).collect();
+            let mut merit = |size: f64| {
+                let mut moved = places.clone();
+                let step: Vec<f64> = direction.iter().map(|part| part * size).collect();
+                advance(&mut moved, &step);
+                newton.merit(&moved, &limits, &prices).value
+            };
+            let size = 1e-3;
+            let [back, own, on] = [-size, 0.0, size].map(&mut merit);
+            let slope = (on - back) / (2.0 * size);
+            let down: f64 = equations
+                .down
+                .iter()
+                .zip(&direction)
+                .map(|(down, part)| down * part)
+                .sum();
+            assert!(
+                (slope + down).abs() < 1e-4 * (1.0 + slope.abs()),
+                "{slope} {down}"
+            );
+            let bend = (on - 2.0 * own + back) / (size * size);
+            let product = equations.matrix.times(&direction);
+            let expected: f64 = product
+                .iter()
+                .zip(&direction)
+                .map(|(one, other)| one * other)
+                .sum();
+            let scale = 1.0 + bend.abs().max(expected.abs());
+            assert!(
+                (bend - expected).abs() < accuracy * scale,
+                "{bend} {expected}"
+            );
+        }
+    }
+}
+
+/// Whatever a route looks like to begin with, it ends at the one that is best about there, within the limits.
+#[test]
+fn routes_that_lead_one_way_end_as_one() {
+    let scenario = stiff();
+    let model = Model::new(&scenario);
+    let mut random = Random::new(5);
+    let mut costs = Vec::new();
+    for _ in 0..6 {
+        let mut route = arc(&scenario, 8, -230.0, 8.0, &mut random);
+        let fitness = Newton::new(&model, &Nobody).improve(&mut route, &[]);
+        assert!(fitness.is_feasible(), "{fitness:?}");
+        assert_eq!(fitness.cost.to_bits(), price(&model, &route).cost.to_bits());
+        costs.push(fitness.cost);
+    }
+    let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+    assert!(costs.iter().all(|cost| *cost < 1.01 * least), "{costs:?}");
+}
+
+/// What the lattice leaves of a route whose turns are at their limit is far from the best.
+#[test]
+fn a_bend_is_moved_as_a_whole() {
+    let scenario = stiff();
+    let model = Model::new(&scenario);
+    let mut route = arc(&scenario, 8, -230.0, 12.0, &mut Random::new(2));
+    let steps = Steps {
+        from: 0.01,
+        to: 5e-5,
+        gain: 5e-6,
+        violation_m: f64::INFINITY,
+    };
+    let polished = Polish::new(&model, &Nobody).descend(&mut route, steps);
+    let mut newton = Newton::new(&model, &Nobody);
+    assert!(newton.is_felt(&route));
+    let brought = newton.improve(&mut route, &[]);
+    assert!(brought.is_feasible());
+    assert!(
+        brought.cost < 0.98 * polished.cost,
+        "{brought:?} {polished:?}"
+    );
+    assert!(newton.evaluations > 0);
+}
+
+/// Another route takes the place of the first if more comes of it, and only then.
+#[test]
+fn the_better_one_of_several_is_taken() {
+    let scenario = stiff();
+    let model = Model::new(&scenario);
+    let mut random = Random::new(9);
+    let (left, right) = (
+        arc(&scenario, 8, 240.0, 0.0, &mut random),
+        arc(&scenario, 8, -240.0, 0.0, &mut random),
+    );
+    let improved = |first: &[Point3], others: &[Vec<Point3>]| {
+        let mut route = first.to_vec();
+        Newton::new(&model, &Nobody).improve(&mut route, others)
+    };
+    let alone = [improved(&left, &[]), improved(&right, &[])];
+    let both = [
+        improved(&left, std::slice::from_ref(&right)),
+        improved(&right, std::slice::from_ref(&left)),
+    ];
+    for (alone, both) in alone.iter().zip(&both) {
+        assert!(!alone.beats(both), "{alone:?} {both:?}");
+    }
+}
+
+#[test]
+fn limits_that_nothing_comes_near_are_not_felt() {
+    let mut scenario = scenario();
+    scenario.threats.clear();
+    scenario.start.z = 100.0;
+    scenario.target.z = 100.0;
+    let model = Model::new(&scenario);
+    let route = [
+        scenario.start,
+        nalgebra::center(&scenario.start, &scenario.target),
+        scenario.target,
+    ];
+    assert!(!Newton::new(&model, &Nobody).is_felt(&route));
+}

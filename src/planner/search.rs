@@ -19,6 +19,9 @@ const ELITES: usize = 4;
 /// A route that goes on costs at most this share more than the best.
 const PROMISING: f64 = 0.05;
 
+/// Starts that compete in the end where the vehicle's limits decide, at most.
+const RIVALS: usize = 8;
+
 /// Of the polish between the stages.
 const COARSE_STEPS: Steps = Steps {
     from: 0.02,
@@ -62,6 +65,7 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         }
         routes
     };
+    let best_starts = starts.routes[..starts.routes.len().min(RIVALS)].to_vec();
     let mut elites = starts.routes;
     let mut reason = StopReason::Iterations;
     if turning > 0 {
@@ -83,11 +87,12 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         elites.extend(distinct(model, &routes, search.as_ref()));
         reason = why;
     }
+    elites.extend(best_starts);
     finish(model, reason, &elites, log)
 }
 
 /// Polish the best route, as the last point of the curve, unless it is good enough already; it may be after. Where the
-/// vehicle's limits decide its shape, others that led elsewhere may become better.
+/// vehicle's limits decide its shape, `others` that lead elsewhere may become better.
 fn finish(model: &Model, reason: StopReason, others: &[Vec<Point3>], log: &mut Log) -> StopReason {
     if model.scenario.planner.polish && reason != StopReason::Converged {
         let mut route = log.route.clone();
@@ -113,9 +118,10 @@ fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
     }
     let mut elsewhere: Vec<Vec<Point3>> = Vec::new();
     for other in others {
-        let is_near = |known: &Vec<Point3>| same(model.scenario, known, other);
+        let other = starts::with_waypoints(model, other.clone(), route.len() - 2);
+        let is_near = |known: &Vec<Point3>| same(model.scenario, known, &other);
         if !is_near(&route) && !elsewhere.iter().any(is_near) {
-            elsewhere.push(other.clone());
+            elsewhere.push(other);
         }
     }
     let fitness = newton.improve(&mut route, &elsewhere);

@@ -65,8 +65,8 @@ const KEPT: f64 = 1e-6;
 /// with the first, which lets a route bend more freely, it lost its way.
 const RATES: [f64; 2] = [5.0, 500.0];
 
-/// Searches with a waypoint put elsewhere, at most.
-const DEALS: usize = 20;
+/// A metre flown counts this share of the other weights at least, in the scales of the method.
+const FREE: f64 = 0.01;
 
 /// What is gained in a round that is worth another, as a share of the cost.
 const WORTH: f64 = 1e-6;
@@ -117,25 +117,29 @@ impl<'m, 's> Newton<'m, 's> {
             }
         }
         for other in others {
-            let found = self.search(other, RATES[0], best.cost);
-            self.take(found, route, &mut best, &mut forces);
+            if !self.is_spent() {
+                let found = self.search(other, RATES[0], known(best));
+                self.take(found, route, &mut best, &mut forces);
+            }
         }
-        let mut left = DEALS;
-        while left > 0 && !forces.is_empty() {
-            let mut better = false;
+        let mut better = !forces.is_empty();
+        while better {
+            better = false;
             for deal in deals(&forces, route) {
-                left -= 1;
-                let found = self.search(&deal, RATES[0], best.cost);
-                better = self.take(found, route, &mut best, &mut forces);
-                if better || left == 0 {
+                if better || self.is_spent() {
                     break;
                 }
-            }
-            if !better {
-                break;
+                let found = self.search(&deal, RATES[0], known(best));
+                better = self.take(found, route, &mut best, &mut forces);
             }
         }
         best
+    }
+
+    /// Whether as much was priced as the bats were asked to.
+    fn is_spent(&self) -> bool {
+        let settings = &self.model.scenario.planner;
+        self.evaluations >= (settings.population * settings.iterations) as u64
     }
 
     /// Keep what a search `found` if it is better than the best so far, the `route`.
@@ -146,9 +150,13 @@ impl<'m, 's> Newton<'m, 's> {
         best: &mut Fitness,
         kept: &mut Vec<f64>,
     ) -> bool {
+        let is_finite = |point: &Point3| point.coords.iter().all(|value| value.is_finite());
+        if !found.iter().all(is_finite) {
+            return false;
+        }
         let fitness = price(self.model, &found);
         self.evaluations += 1;
-        let better = fitness.beats(best);
+        let better = fitness.cost.is_finite() && fitness.beats(best);
         if better {
             (*route, *best, *kept) = (found, fitness, forces);
         }
@@ -160,8 +168,10 @@ impl<'m, 's> Newton<'m, 's> {
     fn search(&mut self, route: &[Point3], rate: f64, known: f64) -> (Vec<Point3>, Vec<f64>) {
         let way = self.way();
         let limits = Limits::of(self.model, route.len() - 2);
-        // A metre flown, over the hundredth of the way.
-        let dear = metre(self.model.scenario) / (1e-2 * way);
+        // A metre flown, over the hundredth of the way; where fuel is for nothing, a little of what else counts.
+        let weights = &self.model.scenario.weights;
+        let least = FREE * weights.threat.max(weights.altitude);
+        let dear = metre(self.model.scenario).max(least) / (1e-2 * way);
         let mut prices = Prices::new(route.len(), rate * dear, 1e-3 * way);
         let mut places = self.places(route);
         let mut damping = dear;
@@ -235,5 +245,14 @@ impl<'m, 's> Newton<'m, 's> {
             point.z += ground;
         }
         route
+    }
+}
+
+/// What a route may cost that is still to become better than the best.
+fn known(best: Fitness) -> f64 {
+    if best.is_feasible() {
+        best.cost
+    } else {
+        f64::INFINITY
     }
 }

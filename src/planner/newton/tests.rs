@@ -14,6 +14,7 @@ fn stiff() -> Scenario {
     scenario.vehicle.max_turn_deg = 16.0;
     scenario.vehicle.min_leg = 25.0;
     scenario.planner.waypoints = 8;
+    (scenario.planner.population, scenario.planner.iterations) = (200, 200);
     (scenario.start.z, scenario.target.z) = (100.0, 100.0);
     // The first is in the way at once.
     scenario.threats = vec![radar(270.0, 180.0, 75.0), radar(560.0, 520.0, 110.0)];
@@ -169,4 +170,42 @@ fn limits_that_nothing_comes_near_are_not_felt() {
         scenario.target,
     ];
     assert!(!Newton::new(&model, &Nobody).is_felt(&route));
+}
+
+/// Weights of nothing, ends above each other and other rims give a route as good as before, or a better one.
+#[test]
+fn what_counts_for_nothing_does_no_harm() {
+    let mut random = Random::new(4);
+    for (fuel, threat, altitude) in [
+        (0.0, 1.0, 1.0),
+        (0.0, 0.0, 1.0),
+        (0.0, 0.0, 0.0),
+        (1.0, 0.0, 0.0),
+    ] {
+        let mut scenario = stiff();
+        scenario.weights.fuel = fuel;
+        scenario.weights.threat = threat;
+        scenario.weights.altitude = altitude;
+        for free in [1, 2, 9] {
+            scenario.planner.waypoints = free;
+            let model = Model::new(&scenario);
+            let mut routes = vec![arc(&scenario, free, 200.0, 30.0, &mut random)];
+            // All waypoints in one place.
+            routes.push(routes[0].clone());
+            let at = routes[1][1];
+            routes[1][1..=free].fill(at);
+            for mut route in routes {
+                let before = price(&model, &route);
+                let after = Newton::new(&model, &Nobody).improve(&mut route, &[]);
+                assert!(!before.beats(&after), "{before:?} {after:?}");
+                assert_eq!(route.len(), free + 2);
+                assert!(
+                    route
+                        .iter()
+                        .flat_map(|point| point.iter())
+                        .all(|value| value.is_finite())
+                );
+            }
+        }
+    }
 }

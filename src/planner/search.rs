@@ -80,11 +80,14 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         }
     }
     let mut elites = whole(elites, log);
+    // What spare waypoints cost is not seen in coarse routes: one that was left may be the best of all.
+    let best_starts = whole(best_starts, log);
     if reason == StopReason::Iterations {
         let mut routes = Routes::guided(model, log.stop, &elites);
         let first = if turning > 0 { turning + 1 } else { 0 };
         let (search, why) = run(model, &mut routes, first..=settings.iterations, log);
-        elites.extend(distinct(model, &routes, search.as_ref()));
+        // The best of the swarm first.
+        elites.splice(0..0, distinct(model, &routes, search.as_ref()));
         reason = why;
     }
     elites.extend(best_starts);
@@ -95,9 +98,13 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
 /// vehicle's limits decide its shape, `others` that lead elsewhere may become better.
 fn finish(model: &Model, reason: StopReason, others: &[Vec<Point3>], log: &mut Log) -> StopReason {
     if model.scenario.planner.polish && reason != StopReason::Converged {
-        let mut route = log.route.clone();
-        if let Some(fitness) = polish(model, &mut route, LAST_STEPS, log) {
-            log.offer(&route, fitness);
+        let mut candidates = vec![log.route.clone()];
+        // Where the best so far is as a search began, what its bats came to may be better when polished.
+        candidates.extend(others.first().filter(|other| **other != log.route).cloned());
+        for mut route in candidates {
+            if let Some(fitness) = polish(model, &mut route, LAST_STEPS, log) {
+                log.offer(&route, fitness);
+            }
         }
         bring_home(model, others, log);
         log.last_point();
@@ -118,10 +125,9 @@ fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
     }
     let mut elsewhere: Vec<Vec<Point3>> = Vec::new();
     for other in others {
-        let other = starts::with_waypoints(model, other.clone(), route.len() - 2);
-        let is_near = |known: &Vec<Point3>| same(model.scenario, known, &other);
+        let is_near = |known: &Vec<Point3>| same(model.scenario, known, other);
         if !is_near(&route) && !elsewhere.iter().any(is_near) {
-            elsewhere.push(other);
+            elsewhere.push(other.clone());
         }
     }
     let fitness = newton.improve(&mut route, &elsewhere);

@@ -270,6 +270,39 @@ fn a_threat_is_flown_over_by_no_more_waypoints_than_it_takes() {
     assert!(outcome.cost.total < 812.0, "{}", outcome.cost.total);
 }
 
+/// Where spare waypoints are dear, coarse routes that stay low look cheap: what a search began with may be better than all
+/// that its bats come to, and is not lost.
+#[test]
+fn a_longer_run_is_no_dearer_than_its_starts() {
+    let mut scenario = scenario();
+    scenario.planner.seeding = Seeding::Tangent;
+    scenario.planner.polish = true;
+    scenario.start = Point3::new(485.0, 500.0, 0.0);
+    scenario.target = Point3::new(515.0, 500.0, 0.0);
+    scenario.altitude.max = 400.0;
+    scenario.vehicle.max_climb_deg = 8.0;
+    scenario.vehicle.min_leg = 30.0 / 210.0;
+    scenario.threats = vec![
+        radar(126.0, 705.0, 19.0),
+        radar(247.0, 999.0, 24.0),
+        radar(642.0, 459.0, 35.0),
+        radar(495.0, 192.0, 52.0),
+        radar(90.0, 234.0, 16.0),
+        radar(267.0, 408.0, 56.0),
+    ];
+    scenario.planner.waypoints = 20;
+    scenario.planner.seed = 1;
+    let cost = |iterations: usize| {
+        let mut scenario = scenario.clone();
+        scenario.planner.iterations = iterations;
+        let outcome = plan(&scenario, &mut Nobody, &Nobody);
+        assert!(outcome.feasible);
+        outcome.cost.total
+    };
+    let (starts, longer) = (cost(1), cost(60));
+    assert!(longer < 1.001 * starts, "{longer} {starts}");
+}
+
 #[test]
 fn an_impossible_scenario_ends_with_its_violations() {
     let mut scenario = scenario();

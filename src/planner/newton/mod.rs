@@ -43,7 +43,7 @@ struct Place {
 const ROUNDS: usize = 14;
 
 /// A route that costs more than another by this share is given up as dear, after so many rounds.
-const HOPE: f64 = 0.01;
+const HOPE: f64 = 0.02;
 const SURE: usize = 2;
 
 /// No round begins with a damping greater than this, in metres flown over the hundredth of the way.

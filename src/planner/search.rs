@@ -1,7 +1,7 @@
 //! How a run searches: the algorithm alone, or guided by routes to start from.
 
 use super::log::Log;
-use super::newton::Newton;
+use super::newton::{self, Newton};
 use super::objective::Routes;
 use super::polish::{Polish, Steps};
 use super::starts::Starts;
@@ -65,12 +65,14 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         }
         routes
     };
-    let best_starts = starts.routes[..starts.routes.len().min(RIVALS)].to_vec();
+    let mut best_starts = Vec::new();
     let mut elites = starts.routes;
     let mut reason = StopReason::Iterations;
     if turning > 0 {
         let mut routes = Routes::guided(model, log.stop, &elites);
         let (search, why) = run(model, &mut routes, 0..=turning, log);
+        best_starts = elites;
+        best_starts.truncate(RIVALS);
         elites = distinct(model, &routes, search.as_ref());
         reason = why;
         if reason == StopReason::Iterations {
@@ -117,9 +119,8 @@ fn finish(model: &Model, reason: StopReason, others: &[Vec<Point3>], log: &mut L
 
 /// The last metres of a route that turns or climbs as sharply as it may.
 fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
-    let mut newton = Newton::new(model, log.stop);
     let mut route = log.route.clone();
-    let is_done = log.best.is_feasible() && !newton.is_felt(&route);
+    let is_done = log.best.is_feasible() && !newton::is_felt(model, &route);
     if is_done || why_stop(model.scenario, log.stop).is_some() {
         return;
     }
@@ -130,6 +131,7 @@ fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
             elsewhere.push(other.clone());
         }
     }
+    let mut newton = Newton::new(model, log.stop);
     let fitness = newton.improve(&mut route, &elsewhere);
     log.evaluations += newton.evaluations;
     log.offer(&route, fitness);

@@ -172,34 +172,16 @@ fn table(all: &[Runs]) -> Table {
 fn raw(all: &[Runs]) -> Table {
     let rows = all.iter().flat_map(|runs| {
         runs.trials.iter().map(|trial| {
-            vec![
-                Cell::text(&runs.case.name),
-                Cell::count(runs.waypoints),
-                Cell::Number(trial.seed as f64, 0),
-                Cell::text(trial.feasible.to_string()),
-                Cell::Number(trial.fitness.cost, 4),
-                Cell::Number(trial.fitness.violation, 4),
-                Cell::number(trial.gap, 6),
-                Cell::Number(trial.evaluations as f64, 0),
-                Cell::Number(trial.cpu_ms, 3),
-            ]
+            let mut row = vec![Cell::text(&runs.case.name), Cell::count(runs.waypoints)];
+            row.extend(trial.cells());
+            row
         })
     });
     Table {
         name: "runs",
         title: "Runs".to_owned(),
         note: "Every run.".to_owned(),
-        columns: vec![
-            "scenario",
-            "N",
-            "seed",
-            "is_feasible",
-            "cost",
-            "violation",
-            "proven_gap",
-            "evaluations",
-            "CPU ms",
-        ],
+        columns: [&["scenario", "N"], &Trial::COLUMNS[..]].concat(),
         rows: rows.collect(),
     }
 }

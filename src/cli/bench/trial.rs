@@ -3,6 +3,7 @@
 use std::cmp::Ordering;
 
 use super::clock::Stopwatch;
+use super::table::Cell;
 use crate::optimizer::Fitness;
 use crate::planner::{self, Nobody};
 use crate::scenario::Scenario;
@@ -24,6 +25,30 @@ pub(super) struct Trial {
 }
 
 impl Trial {
+    /// What [`Trial::cells`] are.
+    pub(super) const COLUMNS: [&str; 7] = [
+        "seed",
+        "is_feasible",
+        "cost",
+        "violation",
+        "proven_gap",
+        "evaluations",
+        "CPU ms",
+    ];
+
+    /// A row of a table of runs.
+    pub(super) fn cells(&self) -> [Cell; 7] {
+        [
+            Cell::Number(self.seed as f64, 0),
+            Cell::text(self.feasible.to_string()),
+            Cell::Number(self.fitness.cost, 4),
+            Cell::Number(self.fitness.violation, 4),
+            Cell::number(self.gap, 6),
+            Cell::Number(self.evaluations as f64, 0),
+            Cell::Number(self.cpu_ms, 3),
+        ]
+    }
+
     /// Its cost; none without a feasible route.
     pub(super) fn cost(&self) -> Option<f64> {
         self.feasible.then_some(self.fitness.cost)

@@ -44,6 +44,19 @@ pub struct PointRow {
 }
 
 impl PointRow {
+    /// `points` in rows; lanes that are left over repeat the first of theirs.
+    #[must_use]
+    pub fn of(points: impl Iterator<Item = Point3>) -> Vec<Self> {
+        let mut rows: Vec<Self> = Vec::new();
+        for (idx, point) in points.enumerate() {
+            if idx % LANES == 0 {
+                rows.push(Self::splat(point));
+            }
+            rows[idx / LANES].set(idx % LANES, point);
+        }
+        rows
+    }
+
     /// `point` in every lane.
     #[must_use]
     pub fn splat(point: Point3) -> Self {

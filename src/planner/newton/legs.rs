@@ -50,6 +50,9 @@ const MIXED: [(usize, usize, usize, usize); 15] = [
     (2, 5, 5, 5),
 ];
 
+/// Legs that are priced for the derivatives of one.
+pub(super) const LEGS_EACH: u64 = (FIRST.len() + MIXED.len()) as u64;
+
 /// A leg by its ends.
 #[derive(Clone, Copy)]
 pub(super) struct Slopes {
@@ -154,7 +157,7 @@ impl Legs<'_, '_> {
 
     /// Cost of each leg; and, if that is asked for, how far it is beyond what is not asked of a vehicle.
     fn price(&self, ends: &[[Point3; 2]], limits: bool) -> Vec<(f64, f64)> {
-        let [from, to] = [0, 1].map(|end| rows(ends.iter().map(|ends| ends[end])));
+        let [from, to] = [0, 1].map(|end| PointRow::of(ends.iter().map(|ends| ends[end])));
         let mut prices = vec![Price::ZERO; from.len()];
         if limits {
             self.pricer.first_legs(&from, &to, ends.len(), &mut prices);
@@ -178,21 +181,10 @@ impl Legs<'_, '_> {
 /// Less is rounding, metres.
 const NOTHING: f64 = 1e-9;
 
-fn rows(points: impl Iterator<Item = Point3>) -> Vec<PointRow> {
-    let mut rows: Vec<PointRow> = Vec::new();
-    for (idx, point) in points.enumerate() {
-        if idx % LANES == 0 {
-            rows.push(PointRow::splat(point));
-        }
-        rows[idx / LANES].set(idx % LANES, point);
-    }
-    rows
-}
-
 /// The elevation of the ground below `points`.
 pub(super) fn ground(pricer: &Pricer, points: &[Point3]) -> Vec<f64> {
     let mut found: Vec<Row> = Vec::new();
-    pricer.ground(&rows(points.iter().copied()), &mut found);
+    pricer.ground(&PointRow::of(points.iter().copied()), &mut found);
     let each = found.into_iter().flatten();
     each.take(points.len()).collect()
 }

@@ -6,6 +6,7 @@
 use super::Place;
 use crate::cost::Model;
 use crate::geometry::{Point3, Vector2, wrap_angle};
+use crate::planner::starts::steepest;
 use nalgebra::Vector3;
 
 /// Coordinates of three waypoints.
@@ -76,7 +77,7 @@ impl<'m, 's> Limits<'m, 's> {
         let way = (scenario.target - scenario.start).norm();
         Self {
             model,
-            steepest: libm::tan(vehicle.max_climb_deg.to_radians()) * (1.0 - HAIR),
+            steepest: steepest(scenario),
             max_turn: vehicle.max_turn_deg.to_radians() * (1.0 - HAIR),
             min_leg: vehicle.min_leg * (1.0 + HAIR),
             arm: way / (waypoints + 1) as f64,
@@ -128,35 +129,17 @@ impl<'m, 's> Limits<'m, 's> {
                 let way = (route[leg + 1] - route[leg]).xy();
                 let length = way.norm().max(HEADLESS * self.way);
                 let along = way / length;
-                let mut slope = Slope::from(leg);
-                for (end, toward) in [(0, -1.0), (1, 1.0)] {
-                    let ground = places[leg + end].slope;
-                    for axis in 0..2 {
-                        slope.gradient[3 * end + axis] =
-                            toward * (sign * ground[axis] - self.steepest * along[axis]);
-                    }
-                    slope.gradient[3 * end + 2] = toward * sign;
-                }
-                slope.stretch(
-                    Vector3::new(along.x, along.y, 0.0),
-                    2,
-                    -self.steepest / length,
-                );
+                let away = -self.steepest * along;
+                let mut slope = Slope::of_leg(leg, Vector3::new(away.x, away.y, sign), places);
+                let along = Vector3::new(along.x, along.y, 0.0);
+                slope.stretch(along, 2, -self.steepest / length);
                 slope
             }
             Limit::Short { leg } => {
                 let way = route[leg + 1] - route[leg];
                 let length = way.norm().max(HEADLESS * self.way);
                 let along = way / length;
-                let mut slope = Slope::from(leg);
-                for (end, toward) in [(0, -1.0), (1, 1.0)] {
-                    let ground = places[leg + end].slope;
-                    for axis in 0..2 {
-                        slope.gradient[3 * end + axis] =
-                            -toward * (along[axis] + along.z * ground[axis]);
-                    }
-                    slope.gradient[3 * end + 2] = -toward * along.z;
-                }
+                let mut slope = Slope::of_leg(leg, -along, places);
                 slope.stretch(along, 3, -1.0 / length);
                 slope
             }
@@ -212,6 +195,20 @@ impl Slope {
             gradient: [0.0; NEAR],
             curvature: [[0.0; NEAR]; NEAR],
         }
+    }
+
+    /// Of a figure that changes by `change` with the leg's end, east, north and up, and against it with its beginning.
+    fn of_leg(leg: usize, change: Vector3<f64>, places: &[Place]) -> Self {
+        let mut slope = Self::from(leg);
+        for (end, toward) in [(0, -1.0), (1, 1.0)] {
+            // Heights are above ground, which rises with the way.
+            let ground = places[leg + end].slope;
+            for axis in 0..2 {
+                slope.gradient[3 * end + axis] = toward * (change[axis] + change.z * ground[axis]);
+            }
+            slope.gradient[3 * end + 2] = toward * change.z;
+        }
+        slope
     }
 
     /// Add the second derivatives of a length along `along`, by the first `axes` coordinates of its ends, times `factor`.

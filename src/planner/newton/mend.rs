@@ -1,6 +1,7 @@
 //! The last micrometres: from a route that is all but within its limits to one that is.
 
 use super::equations::{Equations, advance};
+use super::legs::LEGS_EACH;
 use super::limits::{Limit, Limits};
 use super::{Newton, Place};
 
@@ -34,7 +35,7 @@ impl Newton<'_, '_> {
         let mut held = vec![false; all.len()];
         for _ in 0..MENDS {
             let slopes = self.legs().slopes(places);
-            self.evaluations += 28;
+            self.evaluations += LEGS_EACH;
             let route = self.route(places);
             let mut equations = Equations::new(free);
             let mut is_beyond = false;

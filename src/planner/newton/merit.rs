@@ -1,6 +1,7 @@
 //! What the method makes smaller: the cost, and what limits that are broken or felt add to it.
 
 use super::equations::Equations;
+use super::legs::LEGS_EACH;
 use super::limits::{self, Limit, Limits, NEAR};
 use super::{Newton, Place};
 use crate::geometry::Point3;
@@ -92,8 +93,7 @@ impl Newton<'_, '_> {
         let free = places.len() - 2;
         let mut equations = Equations::new(free);
         let slopes = self.legs().slopes(places);
-        // As many legs for each.
-        self.evaluations += 28;
+        self.evaluations += LEGS_EACH;
         for (leg, slopes) in slopes.iter().enumerate() {
             equations.add(leg, &slopes.gradient, &slopes.curvature);
             if slopes.beyond > 0.0 {

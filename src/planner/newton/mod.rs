@@ -94,17 +94,6 @@ impl<'m, 's> Newton<'m, 's> {
         }
     }
 
-    /// Whether a limit of the vehicle has a say in the shape of `route`.
-    pub(super) fn is_felt(&self, route: &[Point3]) -> bool {
-        let limits = Limits::of(self.model, route.len() - 2);
-        let places = self.places(route);
-        let reach = -FELT * self.way() / (route.len() - 1) as f64;
-        limits::all(route.len()).into_iter().any(|limit| {
-            matches!(limit, Limit::Climb { .. } | Limit::Turn { .. })
-                && limits.beyond(limit, &places, route) > reach
-        })
-    }
-
     /// Improve `route`, or put in its place what becomes of one of `others`; as it is, where nothing better that
     /// keeps the limits is found.
     pub(super) fn improve(&mut self, route: &mut Vec<Point3>, others: &[Vec<Point3>]) -> Fitness {
@@ -246,6 +235,18 @@ impl<'m, 's> Newton<'m, 's> {
         }
         route
     }
+}
+
+/// Whether the limits of turning and climbing have a say in the shape of `route`.
+pub(super) fn is_felt(model: &Model, route: &[Point3]) -> bool {
+    let limits = Limits::of(model, route.len() - 2);
+    let way = (model.scenario.target - model.scenario.start).norm();
+    let reach = -FELT * way / (route.len() - 1) as f64;
+    limits::all(route.len()).into_iter().any(|limit| {
+        // Neither asks for heights above ground.
+        matches!(limit, Limit::Climb { .. } | Limit::Turn { .. })
+            && limits.beyond(limit, &[], route) > reach
+    })
 }
 
 /// What a route may cost that is still to become better than the best.

@@ -123,7 +123,7 @@ fn a_bend_is_moved_as_a_whole() {
     };
     let polished = Polish::new(&model, &Nobody).descend(&mut route, steps);
     let mut newton = Newton::new(&model, &Nobody);
-    assert!(newton.is_felt(&route));
+    assert!(is_felt(&model, &route));
     let brought = newton.improve(&mut route, &[]);
     assert!(brought.is_feasible());
     assert!(
@@ -169,7 +169,7 @@ fn limits_that_nothing_comes_near_are_not_felt() {
         nalgebra::center(&scenario.start, &scenario.target),
         scenario.target,
     ];
-    assert!(!Newton::new(&model, &Nobody).is_felt(&route));
+    assert!(!is_felt(&model, &route));
 }
 
 /// Weights of nothing, ends above each other and other rims give a route as good as before, or a better one.

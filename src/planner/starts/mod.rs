@@ -333,6 +333,6 @@ fn may_turn(corner: [Point3; 3], sharpest: f64) -> bool {
 }
 
 /// Metres the vehicle may climb in a metre seen from above, less a hair.
-fn steepest(scenario: &Scenario) -> f64 {
+pub(super) fn steepest(scenario: &Scenario) -> f64 {
     libm::tan(scenario.vehicle.max_climb_deg.to_radians()) * (1.0 - 1e-9)
 }

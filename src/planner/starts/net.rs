@@ -1,7 +1,7 @@
 //! What ways over the ground have in common: a net of spots, and the cheapest chains through it.
 
 use crate::cost::Model;
-use crate::cost::batch::{LANES, PointRow};
+use crate::cost::batch::PointRow;
 use crate::geometry::{Point2, Point3, Vector2};
 use crate::scenario::Scenario;
 
@@ -64,17 +64,8 @@ pub(super) fn spots(scenario: &Scenario, count: usize, detour: f64) -> Spots {
 
 /// Legs between `places`, by the numbers of their `ends`: from and to, side by side.
 pub(super) fn rows(places: &[Point3], ends: &[(usize, usize)]) -> [Vec<PointRow>; 2] {
-    let side = |end: fn(&(usize, usize)) -> usize| {
-        let row = |ends: &[(usize, usize)]| {
-            // Lanes that are left over repeat a leg.
-            let mut row = PointRow::splat(places[end(&ends[0])]);
-            for (lane, ends) in ends.iter().enumerate() {
-                row.set(lane, places[end(ends)]);
-            }
-            row
-        };
-        ends.chunks(LANES).map(row).collect()
-    };
+    let side =
+        |end: fn(&(usize, usize)) -> usize| PointRow::of(ends.iter().map(|ends| places[end(ends)]));
     [side(|ends| ends.0), side(|ends| ends.1)]
 }
 

@@ -230,36 +230,17 @@ fn misses(all: &[Runs]) -> Table {
 fn raw(all: &[Runs]) -> Table {
     let rows = all.iter().flat_map(|runs| {
         runs.trials.iter().map(|trial| {
-            vec![
-                Cell::text(&runs.case.name),
-                Cell::count(runs.waypoints),
-                Cell::Number(trial.seed as f64, 0),
-                Cell::text(trial.feasible.to_string()),
-                Cell::Number(trial.fitness.cost, 4),
-                Cell::Number(trial.fitness.violation, 4),
-                Cell::number(runs.reference, 4),
-                Cell::number(trial.gap, 6),
-                Cell::Number(trial.evaluations as f64, 0),
-                Cell::Number(trial.cpu_ms, 3),
-            ]
+            let mut row = vec![Cell::text(&runs.case.name), Cell::count(runs.waypoints)];
+            row.extend(trial.cells());
+            row.push(Cell::number(runs.reference, 4));
+            row
         })
     });
     Table {
         name: "runs",
         title: "Runs".to_owned(),
         note: "Every run with default settings.".to_owned(),
-        columns: vec![
-            "scenario",
-            "N",
-            "seed",
-            "is_feasible",
-            "cost",
-            "violation",
-            "reference",
-            "proven_gap",
-            "evaluations",
-            "CPU ms",
-        ],
+        columns: [&["scenario", "N"], &Trial::COLUMNS[..], &["reference"]].concat(),
         rows: rows.collect(),
     }
 }

@@ -69,12 +69,17 @@ impl Index {
         let Some(around) = Rect::around(ends) else {
             return;
         };
-        let apart: usize = legs
-            .clone()
-            .map(|leg| self.cells(&box_of(&leg)).count())
-            .sum();
-        if self.cells(&around).count() <= 2 * apart {
+        let together = self.cells(&around).count();
+        let cells_of = |leg: Segment| self.cells(&box_of(&leg)).count();
+        // Each leg has one cell at least.
+        if together <= 2 * legs.clone().count()
+            || together <= 2 * legs.clone().map(cells_of).sum::<usize>()
+        {
             self.find_in(&around, found);
+            if together == 1 {
+                // In order, and each once.
+                return;
+            }
         } else {
             legs.for_each(|leg| self.find_in(&box_of(&leg), found));
         }

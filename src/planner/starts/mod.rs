@@ -4,6 +4,7 @@
 mod climbs;
 mod count;
 mod exposed;
+mod few;
 mod known;
 mod levels;
 mod net;

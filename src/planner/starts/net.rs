@@ -112,25 +112,32 @@ pub(super) fn chains(
         .filter(|(cost, _)| cost.is_finite())
         .collect();
     over.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
-    let through = |place: usize| -> Vec<Point3> {
+    let through = |place: usize| -> Vec<usize> {
         let mut chain = from_start.trace(place);
         chain.reverse();
         chain.extend(from_target.trace(place).into_iter().skip(1));
-        chain.into_iter().map(|idx| places[idx]).collect()
+        chain
     };
     let mut chains: Vec<Vec<Point3>> = Vec::new();
     // First those that lead another way altogether.
     for (count, reach) in [(count / 2, APART), (count, NEAR)] {
+        let reach = reach * (model.scenario.target - model.scenario.start).norm();
+        // Most chains lead over places that others led over.
+        let mut is_near: Vec<Vec<Option<bool>>> = vec![vec![None; places.len()]; chains.len()];
         for &(_, place) in &over {
             if chains.len() >= count {
                 break;
             }
             let chain = through(place);
-            if !chains
-                .iter()
-                .any(|other| is_near(model, &chain, other, reach))
-            {
-                chains.push(chain);
+            let is_known = chains.iter().zip(&mut is_near).any(|(other, is_near)| {
+                let mut all = chain.iter();
+                all.all(|&at| {
+                    *is_near[at].get_or_insert_with(|| is_point_near(places[at], other, reach))
+                })
+            });
+            if !is_known {
+                chains.push(chain.into_iter().map(|idx| places[idx]).collect());
+                is_near.push(vec![None; places.len()]);
             }
         }
     }
@@ -140,11 +147,15 @@ pub(super) fn chains(
 /// Whether every waypoint of `chain` lies within `reach`, a share of the direct way, of a leg of `other`.
 pub(super) fn is_near(model: &Model, chain: &[Point3], other: &[Point3], reach: f64) -> bool {
     let reach = reach * (model.scenario.target - model.scenario.start).norm();
-    chain.iter().all(|point| {
-        other.windows(2).any(|ends| {
-            let way = ends[1] - ends[0];
-            let share = ((point - ends[0]).dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
-            (ends[0] + way * share - point).norm() <= reach
-        })
+    let mut points = chain.iter();
+    points.all(|point| is_point_near(*point, other, reach))
+}
+
+/// Whether a point lies within `reach` metres of a leg of `chain`.
+fn is_point_near(point: Point3, chain: &[Point3], reach: f64) -> bool {
+    chain.windows(2).any(|ends| {
+        let way = ends[1] - ends[0];
+        let share = ((point - ends[0]).dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
+        (ends[0] + way * share - point).norm() <= reach
     })
 }

@@ -1,11 +1,14 @@
 //! A chain of many short legs as a route of few waypoints.
 
-use super::{MOST_COARSE, net};
+use super::{MOST_COARSE, few, net};
 use crate::cost::Model;
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
 use crate::planner::price::PRICED_FROM;
+
+/// Routes along a chain looked at for one that can be turned along, at most.
+const EFFORT: usize = 40_000;
 
 /// Of the places of `chain`, those that make the best route of as many free waypoints as a coarse one may have, and how
 /// many legs were priced to tell. Turns are looked at only where those of the best are too sharp.
@@ -113,52 +116,26 @@ impl<'c> Legs<'c> {
         route
     }
 
-    /// The places of the cheapest route that breaks no limit, if there is one.
+    /// The places of the cheapest route that breaks no limit, if it is found.
     fn best_to_turn_along(&self) -> Option<Vec<usize>> {
-        let (count, last) = (self.chain.len(), self.last());
-        // The cheapest way to each place from each before it, by so many legs, and the place before that.
-        let nowhere = vec![(f64::INFINITY, 0); count * count];
-        let mut first = nowhere.clone();
-        for (leg, b) in self.worth[0].iter().zip(1..) {
-            if leg.is_feasible() {
-                first[b] = (leg.cost, 0);
-            }
-        }
-        let mut ways = vec![first];
-        while ways.len() < self.most {
-            let known = &ways[ways.len() - 1];
-            let mut best = nowhere.clone();
-            for a in 0..last {
-                for b in a + 1..last {
-                    let cost = known[a * count + b].0;
-                    if cost.is_infinite() {
-                        continue;
-                    }
-                    for (leg, c) in self.worth[b].iter().zip(b + 1..) {
-                        let cost = cost + leg.cost;
-                        let known = &mut best[b * count + c];
-                        if leg.is_feasible() && cost < known.0 && self.may_turn([a, b, c]) {
-                            *known = (cost, a);
-                        }
-                    }
+        let count = self.chain.len();
+        let mut legs = Feasible {
+            legs: self,
+            costs: vec![vec![f64::INFINITY; count]; count],
+        };
+        for (costs, (a, worth)) in legs.costs.iter_mut().zip(self.worth.iter().enumerate()) {
+            for (cost, leg) in costs[(a + 1).min(count)..].iter_mut().zip(worth) {
+                if leg.is_feasible() {
+                    *cost = leg.cost;
                 }
             }
-            ways.push(best);
         }
-        let ends = (0..ways.len()).flat_map(|legs| (0..last).map(move |a| (legs, a)));
-        let cost = |&(legs, a): &(usize, usize)| ways[legs][a * count + last].0;
-        let (legs, mut at) = ends.min_by(|one, other| cost(one).total_cmp(&cost(other)))?;
-        if cost(&(legs, at)).is_infinite() {
-            return None;
-        }
-        let mut route = vec![last, at];
-        for way in ways[1..=legs].iter().rev() {
-            let next = route[route.len() - 2];
-            at = way[at * count + next].1;
-            route.push(at);
-        }
-        route.reverse();
-        Some(route)
+        let mut route = None;
+        few::chains(&mut legs, (self.most, EFFORT), |chain| {
+            route = Some(chain);
+            true
+        });
+        route
     }
 
     fn may_turn_along(&self, route: &[usize]) -> bool {
@@ -169,6 +146,31 @@ impl<'c> Legs<'c> {
 
     fn may_turn(&self, corner: [usize; 3]) -> bool {
         super::may_turn(corner.map(|place| self.chain[place]), self.sharpest)
+    }
+}
+
+/// Those that break no limit.
+struct Feasible<'l, 'c> {
+    legs: &'l Legs<'c>,
+    /// From each place to each; infinite where there is none.
+    costs: Vec<Vec<f64>>,
+}
+
+impl few::Legs for Feasible<'_, '_> {
+    fn places(&self) -> usize {
+        self.costs.len()
+    }
+
+    fn onward(&self, from: usize) -> &[f64] {
+        &self.costs[from]
+    }
+
+    fn cost(&mut self, from: usize, to: usize) -> f64 {
+        self.costs[from][to]
+    }
+
+    fn may_turn(&self, corner: [usize; 3]) -> bool {
+        self.legs.may_turn(corner)
     }
 }
 

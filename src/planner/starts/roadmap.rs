@@ -6,10 +6,8 @@
 //! the cheapest chains from start to target are found; turns, and how many legs there may be, are looked at only where
 //! the cheapest of all cannot be flown as it is (`few`).
 
-mod few;
-
 use super::net::{self, Found, Tree};
-use super::{levels, may_turn};
+use super::{few, levels, may_turn};
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::cost::{Model, metre};
 use crate::geometry::Point3;
@@ -33,6 +31,12 @@ const WORTH: f64 = 1e-4;
 /// Chains of few legs, at most.
 const FEW: usize = 4;
 
+/// Chains of more legs are as good as those of any number.
+const MOST_LEGS: usize = 12;
+
+/// Chains of few legs looked at, at most.
+const EFFORT: usize = 4_000;
+
 /// Up to `count` routes that differ, where one that costs `known` is to be had without, about; and where not even
 /// the first of them can be flown as it is, some of so few legs and so soft turns that they can.
 pub(super) fn routes(model: &Model, count: usize, known: f64) -> (Found, Vec<Vec<Point3>>) {
@@ -42,15 +46,14 @@ pub(super) fn routes(model: &Model, count: usize, known: f64) -> (Found, Vec<Vec
     let routes = net::chains(model, &places, &trees, count);
     let most = model.scenario.planner.waypoints + 1;
     let can_be_flown = |chain: &Vec<Point3>| {
-        let turns = (2..chain.len())
-            .all(|idx| legs.may_turn([idx - 2, idx - 1, idx].map(|idx| chain[idx])));
+        let mut corners = chain.windows(3);
+        let turns = corners.all(|ends| may_turn([ends[0], ends[1], ends[2]], legs.sharpest));
         chain.len() <= most + 1 && turns
     };
     let few = if routes.first().is_none_or(can_be_flown) {
         Vec::new()
     } else {
-        let is_like = |one: &[Point3], other: &[Point3]| net::is_near(model, one, other, net::NEAR);
-        few::chains(&mut legs, most, FEW, is_like)
+        legs.few(model, most.min(MOST_LEGS))
     };
     let legs_priced = legs.priced;
     let found = Found {
@@ -148,9 +151,19 @@ impl<'p, 's> Legs<'p, 's> {
         }
     }
 
-    /// Whether the vehicle may turn at the middle one of three points.
-    fn may_turn(&self, corner: [Point3; 3]) -> bool {
-        may_turn(corner, self.sharpest)
+    /// The cheapest chains of at most `most` legs that the vehicle can turn along, none like another.
+    fn few(&mut self, model: &Model, most: usize) -> Vec<Vec<Point3>> {
+        let places = self.places;
+        let mut found: Vec<Vec<Point3>> = Vec::new();
+        few::chains(self, (most, EFFORT), |chain| {
+            let chain: Vec<Point3> = chain.into_iter().map(|place| places[place]).collect();
+            let is_like = |other: &Vec<Point3>| net::is_near(model, &chain, other, net::NEAR);
+            if !found.iter().any(is_like) {
+                found.push(chain);
+            }
+            found.len() == FEW
+        });
+        found
     }
 
     /// Measure the heights of the legs from `before` to `place`.
@@ -232,6 +245,27 @@ impl<'p, 's> Legs<'p, 's> {
             }
         }
         few.into_iter().map(|(_, other)| other).collect()
+    }
+}
+
+impl few::Legs for Legs<'_, '_> {
+    fn places(&self) -> usize {
+        self.places.len()
+    }
+
+    fn onward(&self, from: usize) -> &[f64] {
+        &self.costs[from]
+    }
+
+    fn cost(&mut self, from: usize, to: usize) -> f64 {
+        if !self.measured[from][to] {
+            self.measure(&[from], to);
+        }
+        self.costs[from][to]
+    }
+
+    fn may_turn(&self, corner: [usize; 3]) -> bool {
+        may_turn(corner.map(|place| self.places[place]), self.sharpest)
     }
 }
 

@@ -2,13 +2,13 @@
 //! problem document.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use axum::body::Body;
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
 use axum::middleware::Next;
-use axum::response::Response;
+use axum::response::{IntoResponse as _, Response};
 use tracing::{Instrument, Span};
 use uuid::Uuid;
 
@@ -84,19 +84,35 @@ fn traceparent_of(headers: &HeaderMap) -> Option<TraceParent> {
         .ok()
 }
 
+/// The whole answer where no request was read that could be answered.
+pub(super) fn refuse(problem: &Problem, instruments: &Instruments) -> Response<String> {
+    let id = Uuid::now_v7().to_string();
+    let (mut head, _) = problem.clone().into_response().into_parts();
+    let body = problem.document(&id);
+    describe(&mut head.headers, &body);
+    dress(&mut head.headers, &id);
+    let status = head.status.as_u16();
+    let metrics = &instruments.metrics;
+    metrics.answered("", None, status, Duration::ZERO);
+    tracing::debug!(request_id = id, status, "no request could be read");
+    Response::from_parts(head, body)
+}
+
 fn write_problem(response: &mut Response, problem: &Problem, id: &str, method: &Method) {
     let body = problem.document(id);
-    let headers = response.headers_mut();
-    headers.insert(
-        header::CONTENT_TYPE,
-        HeaderValue::from_static("application/problem+json"),
-    );
-    headers.insert(header::CONTENT_LENGTH, HeaderValue::from(body.len()));
+    describe(response.headers_mut(), &body);
     *response.body_mut() = if method == Method::HEAD {
         Body::empty()
     } else {
         Body::from(body)
     };
+}
+
+/// Headers of a problem document.
+fn describe(headers: &mut HeaderMap, document: &str) {
+    let media_type = HeaderValue::from_static("application/problem+json");
+    headers.insert(header::CONTENT_TYPE, media_type);
+    headers.insert(header::CONTENT_LENGTH, HeaderValue::from(document.len()));
 }
 
 /// Headers of every answer.

@@ -6,6 +6,7 @@
 mod complaints;
 mod socket;
 pub(super) mod traffic;
+mod unread;
 
 use std::convert::Infallible;
 use std::fmt::Display;
@@ -52,6 +53,9 @@ pub struct Settings {
 /// Pause after a failed accept, such as when file descriptors run out.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
+/// A request of HTTP/1 may have so many bytes before its body; what is read at once with the last of them, too.
+const HEAD_BYTES: usize = 64 * 1024;
+
 /// What an HTTP/2 connection begins with, RFC 9113 section 3.4.
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 
@@ -77,7 +81,8 @@ pub async fn serve(
         };
         match arrival {
             Ok((stream, place)) => {
-                let answer = answer(stream, router.clone(), phase.clone(), times);
+                let socket = Socket::new(stream, settings.instruments.clone());
+                let answer = answer(socket, router.clone(), phase.clone(), times);
                 let counted = settings.instruments.metrics.connection();
                 tokio::spawn(async move {
                     answer.await;
@@ -123,27 +128,19 @@ async fn accept(
 }
 
 /// Answer the requests of one connection.
-async fn answer(
-    stream: TcpStream,
-    router: Router,
-    mut phase: watch::Receiver<Phase>,
-    times: Times,
-) {
+async fn answer(socket: Socket, router: Router, mut phase: watch::Receiver<Phase>, times: Times) {
     let http1 = tokio::select! {
         // Who has asked already is answered.
         biased;
-        http1 = speaks_http1(&stream) => http1,
+        http1 = speaks_http1(&socket.stream) => http1,
         () = stopping(&mut phase) => return,
         () = tokio::time::sleep(times.idle) => {
             tracing::debug!("a connection sent nothing");
             return;
         }
     };
-    let traffic = Arc::new(Traffic::new());
-    let socket = TokioIo::new(Socket {
-        stream,
-        traffic: traffic.clone(),
-    });
+    let traffic = socket.traffic.clone();
+    let socket = TokioIo::new(socket);
     let watched = traffic.clone();
     let service = service_fn(move |request: Request<Incoming>| {
         let busy = watched.clone().begin();
@@ -154,6 +151,7 @@ async fn answer(
         let mut builder = http1::Builder::new();
         builder
             .timer(TokioTimer::new())
+            .max_buf_size(HEAD_BYTES)
             .header_read_timeout(times.idle);
         // Without what the other version needs: whatever is held here, every open stream holds.
         let connection = builder.serve_connection(socket, service);
@@ -163,6 +161,7 @@ async fn answer(
         builder
             .http1()
             .timer(TokioTimer::new())
+            .max_buf_size(HEAD_BYTES)
             .header_read_timeout(times.idle);
         builder
             .http2()

@@ -35,6 +35,7 @@ mod store_versions;
 mod support;
 mod svg;
 mod terrains;
+mod unread;
 mod warm_start;
 mod webhook;
 mod worker;

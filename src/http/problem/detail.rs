@@ -25,6 +25,10 @@ impl Problem {
             } => {
                 format!("line {line}, column {column}, at {pointer}: {detail}")
             }
+            Self::Malformed => "the request line or a header is none of HTTP/1.1 (RFC 9112)".to_owned(),
+            Self::HeadTooLarge(limit) => {
+                format!("address and headers may have {limit} bytes together, and headers be 100")
+            }
             Self::BodyIncomplete => "the connection ended before the body did".to_owned(),
             Self::BodyNotGzip(detail) => format!("content-encoding is gzip, but: {detail}"),
             Self::InvalidParameter { detail, .. }

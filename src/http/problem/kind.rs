@@ -37,6 +37,16 @@ impl Problem {
     #[expect(clippy::too_many_lines, reason = "one table")]
     pub(super) fn kind(&self) -> Kind {
         match self {
+            Self::Malformed => (
+                StatusCode::BAD_REQUEST,
+                "malformed-request",
+                "The request is not HTTP",
+            ),
+            Self::HeadTooLarge(_) => (
+                StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE,
+                "head-too-large",
+                "The request's head is too large",
+            ),
             Self::InvalidJson { .. } => (
                 StatusCode::BAD_REQUEST,
                 "invalid-json",

@@ -27,6 +27,10 @@ use crate::store::{Tombstone, Trouble};
 /// Everything that a request can be refused for.
 #[derive(Debug, Clone)]
 pub(super) enum Problem {
+    /// What came is no request of HTTP.
+    Malformed,
+    /// Address and headers are too long, or too many; the limit in bytes.
+    HeadTooLarge(usize),
     /// No route has this path.
     NoSuchResource(String),
     /// This node only runs plans, and has no route for the path.

@@ -1,4 +1,4 @@
-//! A caller's socket that says how much is taken from it.
+//! A caller's socket that says how much is taken from it, and what was wrong with a request that cannot be read.
 
 use std::io::{self, IoSlice};
 use std::pin::Pin;
@@ -9,14 +9,49 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
 
 use super::traffic::Traffic;
+use super::unread;
+use crate::telemetry::Instruments;
 
 /// What is written to it counts as traffic once the system has taken it.
 pub(super) struct Socket {
     pub(super) stream: TcpStream,
     pub(super) traffic: Arc<Traffic>,
+    instruments: Arc<Instruments>,
+    /// What is left to be said in place of the last that was written.
+    instead: Vec<u8>,
 }
 
 impl Socket {
+    pub(super) fn new(stream: TcpStream, instruments: Arc<Instruments>) -> Self {
+        Self {
+            stream,
+            traffic: Arc::new(Traffic::new()),
+            instruments,
+            instead: Vec::new(),
+        }
+    }
+
+    /// Whether something else is said in place of `bytes`, which then count as written.
+    fn is_told_better(&mut self, bytes: &[u8]) -> bool {
+        let Some(told) = unread::told_better(bytes, &self.instruments) else {
+            return false;
+        };
+        self.instead = told;
+        true
+    }
+
+    fn poll_instead(&mut self, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        while !self.instead.is_empty() {
+            let stream = Pin::new(&mut self.stream);
+            let written = ready!(stream.poll_write(context, &self.instead))?;
+            if written == 0 {
+                return Poll::Ready(Err(io::ErrorKind::WriteZero.into()));
+            }
+            self.instead.drain(..written);
+        }
+        Poll::Ready(Ok(()))
+    }
+
     fn counted(&self, written: io::Result<usize>) -> Poll<io::Result<usize>> {
         if let Ok(bytes) = &written {
             self.traffic.sent(*bytes);
@@ -41,6 +76,10 @@ impl AsyncWrite for Socket {
         context: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
+        ready!(self.poll_instead(context))?;
+        if self.is_told_better(bytes) {
+            return self.counted(Ok(bytes.len()));
+        }
         let written = ready!(Pin::new(&mut self.stream).poll_write(context, bytes));
         self.counted(written)
     }
@@ -50,6 +89,12 @@ impl AsyncWrite for Socket {
         context: &mut Context<'_>,
         slices: &[IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
+        ready!(self.poll_instead(context))?;
+        if let [bytes] = slices
+            && self.is_told_better(bytes)
+        {
+            return self.counted(Ok(bytes.len()));
+        }
         let written = ready!(Pin::new(&mut self.stream).poll_write_vectored(context, slices));
         self.counted(written)
     }
@@ -59,10 +104,12 @@ impl AsyncWrite for Socket {
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        ready!(self.poll_instead(context))?;
         Pin::new(&mut self.stream).poll_flush(context)
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        ready!(self.poll_instead(context))?;
         Pin::new(&mut self.stream).poll_shutdown(context)
     }
 }

@@ -110,7 +110,7 @@ pub struct Ended {
 }
 
 impl Metrics {
-    /// A request was answered. `route` is the template, `None` when no route has the path.
+    /// A request was answered, or something that is none. `route` is the template, `None` when no route has the path.
     pub fn answered(&self, method: &str, route: Option<&str>, status: u16, took: Duration) {
         const METHODS: [&str; 5] = ["GET", "POST", "DELETE", "PUT", "HEAD"];
         let known = METHODS.into_iter().find(|known| *known == method);

@@ -1,0 +1,34 @@
+//! Requests that hyper refuses before anybody sees them: what it answers says nothing but a status, and nothing
+//! that can be set would make it say more.
+
+use std::str;
+
+use super::HEAD_BYTES;
+use crate::http::problem::Problem;
+use crate::http::request_id;
+use crate::telemetry::Instruments;
+
+/// What is said in place of `bytes`, if those are such an answer.
+pub(super) fn told_better(bytes: &[u8], instruments: &Instruments) -> Option<Vec<u8>> {
+    let text = str::from_utf8(bytes).ok()?;
+    // Answers of the service have more lines between these two.
+    let (status, rest) = text.split_once("\r\nconnection: close\r\ncontent-length: 0\r\n")?;
+    let problem = match status.strip_prefix("HTTP/1.1 ")?.get(..3)? {
+        "400" => Problem::Malformed,
+        "414" | "431" => Problem::HeadTooLarge(HEAD_BYTES),
+        _ => return None,
+    };
+    let answer = request_id::refuse(&problem, instruments);
+    let (head, body) = answer.into_parts();
+    let (code, reason) = (head.status.as_str(), head.status.canonical_reason()?);
+    let mut told = format!("HTTP/1.1 {code} {reason}\r\nconnection: close\r\n").into_bytes();
+    for (name, value) in &head.headers {
+        for part in [name.as_str().as_bytes(), b": ", value.as_bytes(), b"\r\n"] {
+            told.extend_from_slice(part);
+        }
+    }
+    // The date, and the end of the head.
+    told.extend_from_slice(rest.as_bytes());
+    told.extend_from_slice(body.as_bytes());
+    Some(told)
+}

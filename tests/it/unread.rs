@@ -1,0 +1,108 @@
+//! Requests that are none: refused before any handler sees them, with a problem document all the same.
+
+use serde_json::Value;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::TcpStream;
+
+use crate::support::patience::in_time;
+use crate::support::process::Service;
+
+/// Everything that comes back for `bytes` until the service closes the connection.
+async fn answers(service: &Service, bytes: &[u8]) -> String {
+    let mut stream = TcpStream::connect(service.address())
+        .await
+        .expect("connected");
+    stream.write_all(bytes).await.expect("sent");
+    let mut answers = String::new();
+    let read = in_time(stream.read_to_string(&mut answers)).await;
+    read.expect("an answer");
+    answers
+}
+
+/// The last of some answers is a problem of that type, and well-formed.
+fn expect_problem(answers: &str, status: u16, slug: &str) {
+    let begin = answers.rfind("HTTP/1.1 4").expect("a status line");
+    let parts = answers[begin..].split_once("\r\n\r\n");
+    let (head, body) = parts.expect("a head and a body");
+    let lines: Vec<&str> = head.lines().collect();
+    let header = |name: &str| {
+        let of = |line: &&str| {
+            let (found, value) = line.split_once(": ")?;
+            found.eq_ignore_ascii_case(name).then(|| value.to_owned())
+        };
+        let mut values = lines[1..].iter().filter_map(of);
+        let value = values.next();
+        assert!(values.next().is_none(), "{name} twice: {head}");
+        value.unwrap_or_else(|| panic!("no {name}: {head}"))
+    };
+    assert_eq!(lines[0].split(' ').nth(1), Some(&*status.to_string()));
+    assert_eq!(header("content-type"), "application/problem+json");
+    assert_eq!(header("content-length"), body.len().to_string());
+    assert_eq!(header("connection"), "close");
+    assert_eq!(header("cache-control"), "no-store");
+    assert_eq!(header("x-content-type-options"), "nosniff");
+    assert!(!header("date").is_empty());
+    let problem: Value = serde_json::from_str(body).expect("JSON");
+    assert_eq!(problem["type"], format!("/problems/{slug}"));
+    assert_eq!(problem["status"], status);
+    assert_eq!(problem["instance"], header("x-request-id"));
+}
+
+#[tokio::test]
+async fn what_is_no_request_gets_a_problem() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &[]);
+    for request in [
+        "GARBAGE\r\n\r\n",
+        "\x16\x03\x01\x02",
+        "GET / HTTP/3.1\r\nhost: localhost\r\n\r\n",
+        "GET / HTTP/1.1\r\nhost : localhost\r\n\r\n",
+        "GET /\x01 HTTP/1.1\r\nhost: localhost\r\n\r\n",
+        "POST /plans HTTP/1.1\r\nhost: localhost\r\ncontent-length: many\r\n\r\n",
+        "POST /plans HTTP/1.1\r\nhost: localhost\r\ncontent-length: 5\r\ncontent-length: 6\r\n\r\n",
+        "POST /plans HTTP/1.1\r\nhost: localhost\r\ntransfer-encoding: folded\r\n\r\n",
+    ] {
+        let answer = answers(&service, request.as_bytes()).await;
+        assert!(
+            answer.starts_with("HTTP/1.1 400 Bad Request\r\n"),
+            "{answer}"
+        );
+        expect_problem(&answer, 400, "malformed-request");
+    }
+    let metrics = service.bytes("/metrics").await;
+    let metrics = str::from_utf8(&metrics).expect("UTF-8");
+    let counted = r#"{method="OTHER",route="unmatched",status="400"} 8"#;
+    assert!(metrics.contains(counted), "{metrics}");
+}
+
+#[tokio::test]
+async fn a_head_too_large_gets_a_problem() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &[]);
+    // As much as fits is read at once, so that what is a little longer may do.
+    let long = "a".repeat(2 * 64 * 1024);
+    let many: String = (0..101).map(|idx| format!("x-{idx}: 1\r\n")).collect();
+    for request in [
+        format!("GET /{long} HTTP/1.1\r\nhost: localhost\r\n\r\n"),
+        format!("GET /livez HTTP/1.1\r\nhost: localhost\r\nx: {long}\r\n\r\n"),
+        format!("GET /livez HTTP/1.1\r\n{many}\r\n"),
+    ] {
+        let answer = answers(&service, request.as_bytes()).await;
+        expect_problem(&answer, 431, "head-too-large");
+    }
+    let well = "a".repeat(60 * 1024);
+    let request =
+        format!("GET /livez HTTP/1.1\r\nhost: localhost\r\nx: {well}\r\nconnection: close\r\n\r\n");
+    let answer = answers(&service, request.as_bytes()).await;
+    assert!(answer.starts_with("HTTP/1.1 200 OK\r\n"), "{answer}");
+}
+
+#[tokio::test]
+async fn what_follows_a_request_and_is_none_gets_a_problem_of_its_own() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &[]);
+    let request = "GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\nGARBAGE\r\n\r\n";
+    let both = answers(&service, request.as_bytes()).await;
+    assert!(both.starts_with("HTTP/1.1 200 OK\r\n"), "{both}");
+    expect_problem(&both, 400, "malformed-request");
+}

@@ -66,7 +66,7 @@ fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) ->
         if !known.is_finite() || !potential::applies(&walls, prices) {
             return 0.0;
         }
-        let promised = string::price(&walls, radii, prices, stop);
+        let promised = string::price(&walls, radii, prices, &scenario.area, stop);
         if promised <= WORTHWHILE * known {
             return 0.0;
         }

@@ -7,7 +7,7 @@ use super::departure::Departure;
 use super::potential;
 use super::prices::Prices;
 use super::wall::Wall;
-use crate::geometry::Point2;
+use crate::geometry::{Point2, Rect};
 
 /// Ways looked at for one string: beyond a few hundred walls, the search ends with what it has
 /// proven so far.
@@ -31,11 +31,12 @@ pub(super) fn cores(walls: &[Wall]) -> Vec<Option<f64>> {
 }
 
 /// What the string round `walls` widened to `radii` costs with all its soft zones, about: more than that
-/// cannot be proven by prices.
+/// cannot be proven by prices. Infinite where it leaves the area.
 pub(super) fn price(
     walls: &[Wall],
     radii: &[Option<f64>],
     prices: &Prices,
+    area: &Rect,
     stop: &dyn Fn() -> bool,
 ) -> f64 {
     let ends = departures((walls, radii), prices, &[]);
@@ -44,8 +45,9 @@ pub(super) fn price(
         (f64::INFINITY, stop),
     );
     let tolls = ends[0].toll + ends[1].toll;
-    let price =
-        |string: &TautString| prices.climbing_at(potential::price(walls, prices, string) + tolls);
+    let price = |string: &TautString| {
+        prices.climbing_at(potential::price(walls, prices, area, string) + tolls)
+    };
     found.strings.first().map_or(f64::INFINITY, price)
 }
 

@@ -37,6 +37,9 @@ const MARGIN: f64 = 3.0;
 /// A string this many times as dear as what is known promises more, whatever is estimated.
 const FAR: f64 = 1.5;
 
+/// Share of the direct way by which a string may leave the area: a way within it is about as long.
+const OUTSIDE: f64 = 0.01;
+
 /// Points on a string at which soft zones are looked up.
 const SAMPLES: u32 = 256;
 
@@ -79,15 +82,19 @@ pub(super) fn bound(
     if proven.is_finite() { proven } else { 0.0 }
 }
 
-/// What a string costs seen from above, about.
-pub(super) fn price(walls: &[Wall], prices: &Prices, string: &TautString) -> f64 {
+/// What a string costs seen from above, about; infinite where it leaves the area, of which strings know nothing.
+pub(super) fn price(walls: &[Wall], prices: &Prices, area: &Rect, string: &TautString) -> f64 {
     let depth = |at: Point2| -> f64 {
         whole(walls)
             .map(|wall| (wall.influence - wall.distance(at)).max(0.0))
             .sum()
     };
-    let middles = (0..SAMPLES).map(|part| string.at((f64::from(part) + 0.5) / f64::from(SAMPLES)));
-    let depths: f64 = middles.map(depth).sum();
+    let middle = |part| string.at((f64::from(part) + 0.5) / f64::from(SAMPLES));
+    let outside = OUTSIDE * prices.direct();
+    if (0..SAMPLES).any(|part| area.excess(middle(part)) > outside) {
+        return f64::INFINITY;
+    }
+    let depths: f64 = (0..SAMPLES).map(|part| depth(middle(part))).sum();
     string.length * (prices.fuel + prices.exposure * depths / f64::from(SAMPLES))
 }
 

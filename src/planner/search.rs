@@ -22,6 +22,9 @@ const PROMISING: f64 = 0.05;
 /// Starts that compete in the end where the vehicle's limits decide, at most.
 const RIVALS: usize = 8;
 
+/// Over hills, so many waypoints are more than there are bends: where the spare ones lie costs something.
+const ROOMY: usize = 16;
+
 /// Of the polish between the stages.
 const COARSE_STEPS: Steps = Steps {
     from: 0.02,
@@ -117,15 +120,17 @@ fn finish(model: &Model, reason: StopReason, others: &[Vec<Point3>], log: &mut L
     reason
 }
 
-/// The last metres of a route that turns or climbs as sharply as it may.
+/// The last metres of a route that turns or climbs as sharply as it may, or has many waypoints over hills.
 fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
     let mut route = log.route.clone();
-    let is_done = log.best.is_feasible() && !newton::is_felt(model, &route);
+    let is_free = log.best.is_feasible() && !newton::is_felt(model, &route);
+    let is_level = model.scenario.terrain.is_flat();
+    let is_done = is_free && (is_level || model.scenario.planner.waypoints < ROOMY);
     if is_done || why_stop(model.scenario, log.stop).is_some() {
         return;
     }
     let mut elsewhere: Vec<Vec<Point3>> = Vec::new();
-    for other in others {
+    for other in others.iter().filter(|_| !is_free) {
         let is_near = |known: &Vec<Point3>| same(model.scenario, known, other);
         if !is_near(&route) && !elsewhere.iter().any(is_near) {
             elsewhere.push(other.clone());

@@ -1,4 +1,6 @@
+use super::newton::Newton;
 use super::*;
+use crate::cost::Model;
 use crate::geometry::{Point2, Rect};
 use crate::scenario::{AltitudeBand, Frame, PlannerSettings, Seeding, Vehicle, WarmStart, Weights};
 use crate::terrain::{Flat, Peak, Peaks, Terrain};
@@ -301,6 +303,44 @@ fn a_longer_run_is_no_dearer_than_its_starts() {
     };
     let (starts, longer) = (cost(1), cost(60));
     assert!(longer < 1.001 * starts, "{longer} {starts}");
+}
+
+/// Where waypoints cost nothing but the way up and down hills, moving them one by one leaves some of it.
+#[test]
+fn many_waypoints_over_hills_are_moved_together() {
+    let mut scenario = scenario();
+    scenario.planner.seeding = Seeding::Tangent;
+    scenario.planner.polish = true;
+    scenario.start = Point3::new(277.9, 144.1, 32.4);
+    scenario.target = Point3::new(819.0, 858.1, 86.5);
+    scenario.threats.clear();
+    let peak = |x, y, height, wide, deep| Peak {
+        center: Point2::new(x, y),
+        height,
+        spread: Point2::new(wide, deep),
+    };
+    scenario.terrain = Terrain::Peaks(Peaks {
+        base: 0.0,
+        peaks: vec![
+            peak(529.0, 788.0, 293.0, 129.0, 141.0),
+            peak(536.0, 458.0, 241.0, 87.0, 97.0),
+            peak(522.0, 341.0, 289.0, 149.0, 126.0),
+        ],
+    });
+    scenario.altitude = AltitudeBand {
+        min: 60.0,
+        max: 260.0,
+    };
+    scenario.vehicle.min_leg = 3.6;
+    scenario.planner.waypoints = 24;
+    scenario.planner.seed = 1;
+    (scenario.planner.population, scenario.planner.iterations) = (40, 40);
+    let outcome = plan(&scenario, &mut Nobody, &Nobody);
+    let model = Model::new(&scenario);
+    let mut route = outcome.waypoints.clone();
+    let better = Newton::new(&model, &Nobody).improve(&mut route, &[]);
+    let gain = 1.0 - better.cost / outcome.cost.total;
+    assert!(outcome.feasible && gain < 1e-4, "{gain}");
 }
 
 #[test]

@@ -128,7 +128,7 @@ mod tests {
     use crate::optimizer::Random;
     use crate::planner::starts::may_turn;
 
-    const SHARPEST: f64 = 0.6;
+    const SHARPEST: f64 = 0.0;
 
     /// Legs between random points, some of which turn out not to be there.
     struct Net {
@@ -150,7 +150,7 @@ mod tests {
             let mut is_there = vec![vec![true; count]; count];
             for (from, to) in (0..count).flat_map(|from| (1..count).map(move |to| (from, to))) {
                 if from != to && random.between(0.0, 1.0) < 0.8 {
-                    let longer = random.between(1.0, 2.0);
+                    let longer = random.between(1.0, 3.0);
                     costs[from][to] = longer * (points[to] - points[from]).norm();
                     is_there[from][to] = random.between(0.0, 1.0) < 0.8;
                 }
@@ -237,18 +237,21 @@ mod tests {
                 before = best;
             }
         }
-        assert!(found > 100 && dearer > 20, "{found} {dearer}");
+        assert!(found > 100 && dearer > 5, "{found} {dearer}");
     }
 
     #[test]
     fn chains_come_the_cheapest_first() {
-        let mut net = Net::of(9, 3);
-        let mut costs = Vec::new();
-        chains(&mut net, (4, 10_000), |chain| {
-            costs.push(Net::of(9, 3).price(&chain));
-            costs.len() == 5
-        });
-        assert_eq!(costs.len(), 5);
-        assert!(costs.is_sorted(), "{costs:?}");
+        let mut found = 0;
+        for seed in 1..=20 {
+            let mut costs = Vec::new();
+            chains(&mut Net::of(9, seed), (4, 10_000), |chain| {
+                costs.push(Net::of(9, seed).price(&chain));
+                costs.len() == 3
+            });
+            assert!(costs.len() <= 3 && costs.is_sorted(), "{costs:?}");
+            found += costs.len();
+        }
+        assert!(found > 30, "{found}");
     }
 }

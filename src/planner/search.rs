@@ -129,8 +129,9 @@ fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
     if is_done || why_stop(model.scenario, log.stop).is_some() {
         return;
     }
+    let others = if is_free { &[] } else { others };
     let mut elsewhere: Vec<Vec<Point3>> = Vec::new();
-    for other in others.iter().filter(|_| !is_free) {
+    for other in others {
         let is_near = |known: &Vec<Point3>| same(model.scenario, known, other);
         if !is_near(&route) && !elsewhere.iter().any(is_near) {
             elsewhere.push(other.clone());

@@ -8,11 +8,20 @@ use crate::http::problem::Problem;
 use crate::http::request_id;
 use crate::telemetry::Instruments;
 
+/// No such answer is longer.
+const MOST: usize = 200;
+
 /// What is said in place of `bytes`, if those are such an answer.
 pub(super) fn told_better(bytes: &[u8], instruments: &Instruments) -> Option<Vec<u8>> {
+    if bytes.len() > MOST || !bytes.starts_with(b"HTTP/1.1 4") {
+        return None;
+    }
     let text = str::from_utf8(bytes).ok()?;
-    // Answers of the service have more lines between these two.
+    // Answers of the service have more lines than these, and the date.
     let (status, rest) = text.split_once("\r\nconnection: close\r\ncontent-length: 0\r\n")?;
+    if !rest.starts_with("date: ") || rest.matches("\r\n").count() != 2 {
+        return None;
+    }
     let problem = match status.strip_prefix("HTTP/1.1 ")?.get(..3)? {
         "400" => Problem::Malformed,
         "414" | "431" => Problem::HeadTooLarge(HEAD_BYTES),
@@ -27,7 +36,7 @@ pub(super) fn told_better(bytes: &[u8], instruments: &Instruments) -> Option<Vec
             told.extend_from_slice(part);
         }
     }
-    // The date, and the end of the head.
+    // It ends the head.
     told.extend_from_slice(rest.as_bytes());
     told.extend_from_slice(body.as_bytes());
     Some(told)

@@ -25,6 +25,10 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// Between two such questions, at first and at most.
 const PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(2)];
 
+/// How much lower than the others' the priority of a planning thread is, and of those that it starts.
+#[cfg(target_os = "linux")]
+const POLITE: i32 = 5;
+
 /// While it waits, a thread looks so often whether it shall stop.
 const LOOK: Duration = Duration::from_millis(50);
 
@@ -76,6 +80,15 @@ pub(super) struct Thread {
     tasks: std::sync::mpsc::Sender<Task>,
 }
 
+/// Let other threads of this process go first: a plan takes long anyway, and whoever asks something meanwhile waits for
+/// an answer of a millisecond. Elsewhere than on Linux that would hold back all of them.
+fn step_back() {
+    #[cfg(target_os = "linux")]
+    if let Err(error) = rustix::process::nice(POLITE) {
+        tracing::debug!(%error, "planning goes on at the priority of serving");
+    }
+}
+
 /// A plan to be planned.
 struct Task {
     plan: Plan,
@@ -91,6 +104,7 @@ impl Thread {
     pub(super) fn start(name: String, engine: Engine) -> std::io::Result<Self> {
         let (tasks, inbox) = std::sync::mpsc::channel::<Task>();
         thread::Builder::new().name(name).spawn(move || {
+            step_back();
             for task in inbox {
                 task.run(&engine);
             }

@@ -482,3 +482,27 @@ fn without_times(document: &ResultDocument) -> String {
     document.timing.run_ms = 0.0;
     document.to_json()
 }
+
+/// Whoever asks something while every core plans is not to wait for a turn.
+#[cfg(target_os = "linux")]
+#[tokio::test(flavor = "multi_thread")]
+async fn planning_lets_others_go_first() {
+    let priority = || rustix::process::getpriority_process(None).unwrap();
+    on_every_backend(10, async |store| {
+        let seen = Arc::new(Mutex::new(Vec::new()));
+        let (planning, seen_there) = (deterministic(10), Arc::clone(&seen));
+        let engine: Engine = Arc::new(move |scenario, observer, stop| {
+            seen_there.lock().unwrap().push(priority());
+            planning(scenario, observer, stop)
+        });
+        let pool = pool(store, 1, engine);
+        for _ in 0..2 {
+            let id = submit(&**store, "{}").await;
+            assert_eq!(ended(&**store, id).await, Status::Succeeded);
+        }
+        let lower = (priority() + 5).min(19);
+        assert_eq!(*seen.lock().unwrap(), [lower, lower]);
+        pool.drain(AGES).await;
+    })
+    .await;
+}

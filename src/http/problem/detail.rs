@@ -25,7 +25,7 @@ impl Problem {
             } => {
                 format!("line {line}, column {column}, at {pointer}: {detail}")
             }
-            Self::Malformed => "the request line or a header is none of HTTP/1.1 (RFC 9112)".to_owned(),
+            Self::Malformed => "its first line, a header or the length of its body cannot be read, see RFC 9112".to_owned(),
             Self::HeadTooLarge(limit) => {
                 format!("address and headers may have {limit} bytes together, and headers be 100")
             }

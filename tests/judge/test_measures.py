@@ -87,6 +87,17 @@ class CylinderThreat(unittest.TestCase):
     def test_through_the_axis_the_cost_goes_on_growing(self):
         self.assertAlmostEqual(leg_integral(cylinder(), (-9.0, 0.0, 0.0), (9.0, 0.0, 0.0)), 25.0, delta=1e-9)
 
+    def test_a_leg_far_from_the_origin_takes_no_longer(self):
+        away = (3_000_016.2, 3_000_024.7)
+        ring = [(x + away[0], y + away[1]) for x, y in ((0.0, 0.0), (1.5, 0.1), (1.4, 1.6), (0.1, 1.3))]
+        here = square(margin=0.3, ring=[(x - away[0], y - away[1]) for x, y in ring])
+        there = square(margin=0.3, ring=ring)
+        for a, b in (((-1.0, -0.12), (2.0, -0.07)), ((-0.5, 1.7), (2.0, 1.5)), ((1.6, -1.0), (1.7, 2.0))):
+            near = leg_integral(here, (*a, 0.0), (*b, 0.0))
+            ends = [(x + away[0], y + away[1], 0.0) for x, y in (a, b)]
+            self.assertGreater(near, 0.05)
+            self.assertAlmostEqual(leg_integral(there, *ends), near, delta=1e-7)
+
     def test_a_vertical_leg(self):
         self.assertAlmostEqual(leg_integral(cylinder(), (3.0, 0.0, 0.0), (3.0, 0.0, 10.0)), 20.0, delta=1e-9)
         limited = cylinder(base=2.0, top=6.0)

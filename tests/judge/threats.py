@@ -168,7 +168,9 @@ def leg_integral(threat, a, b, shrink=0.0):
     if cuts is None:
         return 0.0
     price = lambda t: threat.price_at(geo.lerp(a, b, t))
-    return length * integrate_pieces(price, *part, cuts, PRECISION * threat.influence)
+    # Far from the origin T is known no better than the places where it is looked up.
+    rounding = 8.0 * max(math.ulp(coordinate) for end in (a, b) for coordinate in end[:2])
+    return length * integrate_pieces(price, *part, cuts, max(PRECISION * threat.influence, rounding))
 
 
 def leg_samples(threat, a, b, shrink=0.0):

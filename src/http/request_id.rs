@@ -85,10 +85,10 @@ fn traceparent_of(headers: &HeaderMap) -> Option<TraceParent> {
 }
 
 /// The whole answer where no request was read that could be answered.
-pub(super) fn refuse(problem: &Problem, instruments: &Instruments) -> Response<String> {
+pub(super) fn refuse(problem: Problem, instruments: &Instruments) -> Response<String> {
     let id = Uuid::now_v7().to_string();
-    let (mut head, _) = problem.clone().into_response().into_parts();
     let body = problem.document(&id);
+    let (mut head, _) = problem.into_response().into_parts();
     describe(&mut head.headers, &body);
     dress(&mut head.headers, &id);
     let status = head.status.as_u16();

@@ -27,8 +27,7 @@ pub(super) fn told_better(bytes: &[u8], instruments: &Instruments) -> Option<Vec
         "414" | "431" => Problem::HeadTooLarge(HEAD_BYTES),
         _ => return None,
     };
-    let answer = request_id::refuse(&problem, instruments);
-    let (head, body) = answer.into_parts();
+    let (head, body) = request_id::refuse(problem, instruments).into_parts();
     let (code, reason) = (head.status.as_str(), head.status.canonical_reason()?);
     let mut told = format!("HTTP/1.1 {code} {reason}\r\nconnection: close\r\n").into_bytes();
     for (name, value) in &head.headers {

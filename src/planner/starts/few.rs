@@ -15,8 +15,10 @@ pub(super) trait Legs {
     /// What the leg from one place to each costs at least; infinite where there is none.
     fn onward(&self, from: usize) -> &[f64];
 
-    /// What a leg costs.
-    fn cost(&mut self, from: usize, to: usize) -> f64;
+    /// What a leg costs, where that is only looked at when its turn comes.
+    fn cost(&mut self, from: usize, to: usize) -> f64 {
+        self.onward(from)[to]
+    }
 
     /// Whether the vehicle may turn at the middle one of three places.
     fn may_turn(&self, corner: [usize; 3]) -> bool;

@@ -333,6 +333,12 @@ fn may_turn(corner: [Point3; 3], sharpest: f64) -> bool {
     lengths < LEVEL * LEVEL || one.dot(&other) >= sharpest * lengths
 }
 
+/// Whether all turns of `chain` are such.
+fn may_turn_along(chain: &[Point3], sharpest: f64) -> bool {
+    let mut corners = chain.windows(3);
+    corners.all(|corner| may_turn([corner[0], corner[1], corner[2]], sharpest))
+}
+
 /// Metres the vehicle may climb in a metre seen from above, less a hair.
 pub(super) fn steepest(scenario: &Scenario) -> f64 {
     libm::tan(scenario.vehicle.max_climb_deg.to_radians()) * (1.0 - 1e-9)

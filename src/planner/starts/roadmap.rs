@@ -7,7 +7,7 @@
 //! the cheapest of all cannot be flown as it is (`few`).
 
 use super::net::{self, Found, Tree};
-use super::{few, levels, may_turn};
+use super::{few, levels, may_turn, may_turn_along};
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::cost::{Model, metre};
 use crate::geometry::Point3;
@@ -45,11 +45,8 @@ pub(super) fn routes(model: &Model, count: usize, known: f64) -> (Found, Vec<Vec
     let trees = [0, places.len() - 1].map(|end| legs.cheapest(end));
     let routes = net::chains(model, &places, &trees, count);
     let most = model.scenario.planner.waypoints + 1;
-    let can_be_flown = |chain: &Vec<Point3>| {
-        let mut corners = chain.windows(3);
-        let turns = corners.all(|ends| may_turn([ends[0], ends[1], ends[2]], legs.sharpest));
-        chain.len() <= most + 1 && turns
-    };
+    let can_be_flown =
+        |chain: &Vec<Point3>| chain.len() <= most + 1 && may_turn_along(chain, legs.sharpest);
     let few = if routes.first().is_none_or(can_be_flown) {
         Vec::new()
     } else {

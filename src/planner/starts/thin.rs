@@ -1,6 +1,6 @@
 //! A chain of many short legs as a route of few waypoints.
 
-use super::{MOST_COARSE, few, net};
+use super::{MOST_COARSE, few, may_turn, may_turn_along, net};
 use crate::cost::Model;
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::geometry::Point3;
@@ -14,14 +14,14 @@ const EFFORT: usize = 40_000;
 /// many legs were priced to tell. Turns are looked at only where those of the best are too sharp.
 pub(super) fn thin(model: &Model, pricer: &Pricer, chain: &[Point3]) -> (Vec<Point3>, u64) {
     let legs = Legs::new(model, pricer, chain);
-    let best = legs.best();
-    let route = if legs.may_turn_along(&best) {
-        best
-    } else {
-        legs.best_to_turn_along().unwrap_or(best)
-    };
+    let points = |route: Vec<usize>| route.into_iter().map(|place| chain[place]).collect();
+    let mut route: Vec<Point3> = points(legs.best());
+    if !may_turn_along(&route, legs.sharpest)
+        && let Some(softer) = legs.best_to_turn_along()
+    {
+        route = points(softer);
+    }
     let priced = (chain.len() * (chain.len() - 1) / 2) as u64;
-    let route = route.into_iter().map(|place| chain[place]).collect();
     (route, priced)
 }
 
@@ -137,16 +137,6 @@ impl<'c> Legs<'c> {
         });
         route
     }
-
-    fn may_turn_along(&self, route: &[usize]) -> bool {
-        route
-            .windows(3)
-            .all(|corner| self.may_turn([corner[0], corner[1], corner[2]]))
-    }
-
-    fn may_turn(&self, corner: [usize; 3]) -> bool {
-        super::may_turn(corner.map(|place| self.chain[place]), self.sharpest)
-    }
 }
 
 /// Those that break no limit.
@@ -165,18 +155,14 @@ impl few::Legs for Feasible<'_, '_> {
         &self.costs[from]
     }
 
-    fn cost(&mut self, from: usize, to: usize) -> f64 {
-        self.costs[from][to]
-    }
-
     fn may_turn(&self, corner: [usize; 3]) -> bool {
-        self.legs.may_turn(corner)
+        let legs = self.legs;
+        may_turn(corner.map(|place| legs.chain[place]), legs.sharpest)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::may_turn;
     use super::*;
     use crate::planner::tests::scenario;
     use crate::scenario::Scenario;
@@ -241,11 +227,8 @@ mod tests {
             scenario.vehicle.max_turn_deg = sharpest;
             let model = Model::new(&scenario);
             let chain = astray(&scenario);
-            let turns_along = |route: &[Point3]| {
-                let sharpest = libm::cos(sharpest.to_radians());
-                let mut corners = route.windows(3);
-                corners.all(|corner| may_turn([corner[0], corner[1], corner[2]], sharpest))
-            };
+            let sharpest = libm::cos(sharpest.to_radians());
+            let turns_along = |route: &[Point3]| may_turn_along(route, sharpest);
             let (found, thin) = thinned(&scenario);
             assert!(found.is_feasible() && turns_along(&thin));
             for a in 1..6 {

@@ -94,6 +94,18 @@ impl Wall {
         }
     }
 
+    /// The same wall elsewhere.
+    pub(super) fn moved(&self, by: Vector2) -> Self {
+        let shape = match &self.shape {
+            OutlineShape::Disc(center) => OutlineShape::Disc(center + by),
+            OutlineShape::Ring(ring) => OutlineShape::Ring(ring.iter().map(|at| at + by).collect()),
+        };
+        Self {
+            shape,
+            ..self.clone()
+        }
+    }
+
     /// Whether `point` lies in what is added to it by widening, where it is no dip.
     pub(super) fn is_around(&self, point: Point2) -> bool {
         let away = self.distance(point);

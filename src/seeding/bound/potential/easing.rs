@@ -1,0 +1,103 @@
+//! Less slope where there is too much: the few places where the values that a march left are too steep for a
+//! quadratic are made to share it with those about them.
+
+use super::mesh::Mesh;
+use super::slopes::{gradients, response, steepness};
+
+/// Times that the places are gone over, at most.
+const SWEEPS: usize = 20;
+
+/// How many times as steep as allowed is well enough.
+const ENOUGH: f64 = 1.003;
+
+/// How much further than well enough a place is eased that is not, so that it need not be again.
+const BEYOND: f64 = 0.999;
+
+/// Change `values` but for those of the first `fixed` nodes so that triangles are no steeper than their `limits`, as
+/// far as it goes: by Newton's method for each node alone, on the squares of what is too much.
+pub(super) fn ease(mesh: &Mesh, limits: &[[f64; 6]], values: &mut [f64], fixed: usize) {
+    let is_steep = |triangle: usize, values: &[f64]| {
+        let of = &mesh.triangles[triangle];
+        steepness(of, &limits[triangle], &of.of(values)) > ENOUGH
+    };
+    let mut asked: Vec<usize> = (0..mesh.triangles.len()).collect();
+    // In which sweep each was met last.
+    let mut met = (vec![0; values.len()], vec![0; mesh.triangles.len()]);
+    for sweep in 1..=SWEEPS {
+        asked.retain(|triangle| is_steep(*triangle, values));
+        if asked.is_empty() {
+            return;
+        }
+        let mut next = Vec::new();
+        for node in asked
+            .iter()
+            .flat_map(|triangle| mesh.triangles[*triangle].nodes)
+        {
+            if node < fixed || std::mem::replace(&mut met.0[node], sweep) == sweep {
+                continue;
+            }
+            values[node] -= excess(mesh, limits, values, node);
+            for &(triangle, _) in mesh.round(node) {
+                if std::mem::replace(&mut met.1[triangle], sweep) != sweep {
+                    next.push(triangle);
+                }
+            }
+        }
+        asked = next;
+    }
+}
+
+/// By how much the value of `node` is too high for the slopes about it, as one step of Newton's method sees it.
+fn excess(mesh: &Mesh, limits: &[[f64; 6]], values: &[f64], node: usize) -> f64 {
+    let (mut slope, mut curvature) = (0.0, 0.0);
+    for &(triangle, which) in mesh.round(node) {
+        let of = &mesh.triangles[triangle];
+        let gradients = gradients(of, &of.of(values));
+        let allowed = limits[triangle].map(|limit| limit * limit * (ENOUGH * ENOUGH * BEYOND));
+        let is_too_steep = |at: usize| gradients[at].norm_squared() > allowed[at];
+        if !(0..6).any(is_too_steep) {
+            continue;
+        }
+        let response = response(of, which);
+        for at in (0..6).filter(|at| is_too_steep(*at)) {
+            // Half of the square of c, with c how much the square of a slope exceeds what is allowed.
+            let too_much = gradients[at].norm_squared() / allowed[at] - 1.0;
+            let change = 2.0 * gradients[at].dot(&response[at]) / allowed[at];
+            slope += too_much * change;
+            curvature +=
+                change * change + too_much * 2.0 * response[at].norm_squared() / allowed[at];
+        }
+    }
+    // Neither can be told of triangles that are too slim.
+    let excess = slope / curvature;
+    if excess.is_finite() { excess } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point2;
+
+    #[test]
+    fn a_spike_is_shared_with_what_lies_about_it() {
+        let at = |i: u32, j: u32| Point2::new(f64::from(i), f64::from(j));
+        let vertices: Vec<Point2> = (0..=10)
+            .flat_map(|j| (0..=10).map(move |i| at(i, j)))
+            .collect();
+        let mesh = Mesh::new(&vertices, |_| false).expect("they are apart");
+        let limits = vec![[1.0; 6]; mesh.triangles.len()];
+        let mut values: Vec<f64> = mesh.nodes.iter().map(|node| 0.9 * node.x).collect();
+        let spike = 60;
+        values[spike] += 0.5;
+        let steepest = |values: &[f64]| {
+            let each = mesh.triangles.iter().zip(&limits);
+            each.map(|(triangle, limits)| steepness(triangle, limits, &triangle.of(values)))
+                .fold(0.0, f64::max)
+        };
+        let (before, first) = (steepest(&values), values[0]);
+        ease(&mesh, &limits, &mut values, 2);
+        let after = steepest(&values);
+        assert!(before > 1.5 && after < 1.01, "{before} {after}");
+        assert!((values[0] - first).abs() < f64::EPSILON);
+    }
+}

@@ -1,0 +1,152 @@
+//! What a metre costs, and where no route can be.
+
+use super::super::super::arc::{point_segment, segment_segment};
+use super::super::super::outline::OutlineShape;
+use super::super::prices::Prices;
+use super::super::wall::Wall;
+use super::cells::Cells;
+use super::mesh::PARTS;
+use crate::geometry::{Point2, Rect, ring};
+
+/// Cells in which walls are looked up.
+const CELLS: usize = 1024;
+
+/// Discs and corners of rings in all cells, at most; walls beyond are left out.
+const MOST_ENTRIES: usize = 200_000;
+
+/// Walls with their soft zones, by place.
+pub(super) struct Zones<'a> {
+    pub(super) walls: &'a [Wall],
+    prices: &'a Prices,
+    cells: Cells,
+    /// Of each cell, the walls whose soft zones or cores come into it.
+    near: Vec<Vec<usize>>,
+}
+
+impl<'a> Zones<'a> {
+    pub(super) fn new(walls: &'a [Wall], prices: &'a Prices, rect: Rect) -> Self {
+        let cells = Cells::about(rect, CELLS);
+        let mut near = vec![Vec::new(); cells.count()];
+        let mut entries = 0;
+        for (idx, wall) in walls.iter().enumerate() {
+            let (center, radius) = wall.circle();
+            let reach = radius + wall.influence.max(wall.core);
+            let more = cells.within(center, reach).count() * wall.centers().len();
+            if rect.excess(center) > reach || entries + more > MOST_ENTRIES {
+                continue;
+            }
+            entries += more;
+            for cell in cells.within(center, reach) {
+                near[cell].push(idx);
+            }
+        }
+        Self {
+            walls,
+            prices,
+            cells,
+            near,
+        }
+    }
+
+    /// Where they are looked up.
+    pub(super) fn rect(&self) -> Rect {
+        self.cells.rect
+    }
+
+    /// Metres by which a feasible route may miss a limit.
+    pub(super) fn tolerance(&self) -> f64 {
+        self.prices.tolerance
+    }
+
+    /// Those that may be felt at a place.
+    pub(super) fn near(&self, place: Point2) -> impl Iterator<Item = &'a Wall> {
+        self.near[self.cells.of(place)]
+            .iter()
+            .map(|wall| &self.walls[*wall])
+    }
+
+    /// In each node of a triangle what a metre costs there at most, so that between the nodes of each of its parts a
+    /// metre costs no less than what is linear between them.
+    pub(super) fn limits(&self, places: &[Point2; 6]) -> [f64; 6] {
+        let middle = middle(places);
+        let mut sums = [[self.prices.fuel; 3]; PARTS.len()];
+        for wall in self.near(middle) {
+            // The depth in the zone of a disc or of an edge is concave: nowhere less than what is linear between nodes.
+            let away = part(wall, middle);
+            let depths =
+                places.map(|place| wall.influence - away.distance(place) - self.prices.tolerance);
+            for (sums, part) in sums.iter_mut().zip(PARTS) {
+                if part.iter().all(|node| depths[*node] >= 0.0) {
+                    for (sum, node) in sums.iter_mut().zip(part) {
+                        *sum += self.prices.exposure * depths[node];
+                    }
+                }
+            }
+        }
+        let mut limits = [f64::INFINITY; 6];
+        for (sums, part) in sums.iter().zip(PARTS) {
+            for (sum, node) in sums.iter().zip(part) {
+                limits[node] = limits[node].min(*sum);
+            }
+        }
+        limits
+    }
+
+    /// Whether no route comes into the triangle with these corners.
+    pub(super) fn leave_out(&self, corners: &[Point2; 3]) -> bool {
+        let tolerance = self.prices.tolerance;
+        self.near(middle(corners)).any(|wall| match &wall.shape {
+            OutlineShape::Disc(center) => corners
+                .iter()
+                .all(|corner| (corner - center).norm() <= wall.core),
+            // A route may enter by the tolerance.
+            OutlineShape::Ring(ring) => {
+                corners.iter().all(|corner| ring::contains(ring, *corner))
+                    && ring::edges(ring).all(|edge| {
+                        ring::edges(corners)
+                            .all(|side| segment_segment(edge, side) >= 1.5 * tolerance)
+                    })
+            }
+        })
+    }
+
+    /// Whether a place is so deep in a core that no triangle with that corner matters.
+    pub(super) fn is_deep(&self, place: Point2) -> bool {
+        let least = 4.0 * self.prices.tolerance;
+        self.near(place).any(|wall| match &wall.shape {
+            OutlineShape::Disc(center) => (place - center).norm() < wall.core - least,
+            OutlineShape::Ring(ring) => {
+                ring::contains(ring, place) && ring::distance(ring, place) > least
+            }
+        })
+    }
+}
+
+/// What of a wall its depth is measured from: a point or an edge.
+struct Part(Point2, Point2);
+
+impl Part {
+    fn distance(&self, place: Point2) -> f64 {
+        if self.0 == self.1 {
+            (place - self.0).norm()
+        } else {
+            point_segment(place, self.0, self.1)
+        }
+    }
+}
+
+/// The part of `wall` that is nearest to a place.
+fn part(wall: &Wall, place: Point2) -> Part {
+    let parts = match &wall.shape {
+        OutlineShape::Disc(center) => return Part(*center, *center),
+        OutlineShape::Ring(ring) => ring::edges(ring).map(|(a, b)| Part(a, b)),
+    };
+    parts
+        .min_by(|one, other| one.distance(place).total_cmp(&other.distance(place)))
+        .expect("a ring has edges")
+}
+
+/// The middle of the first three.
+fn middle(corners: &[Point2]) -> Point2 {
+    Point2::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0)
+}

@@ -22,6 +22,7 @@ mod wall;
 use std::cell::Cell;
 
 use crate::scenario::Scenario;
+use event::Event;
 use field::{Field, cost_of};
 use prices::Prices;
 
@@ -36,6 +37,9 @@ const MOST_LEVELS: usize = 24;
 
 /// Where the string itself is not this many times as dear as what is known, a potential promises nothing.
 const WORTHWHILE: f64 = 1.02;
+
+/// Where the string with its climbs is not this many times as dear as what is known, nothing more is looked for.
+const CLOSE: f64 = 1.01;
 
 /// A proven lower bound on the total cost of any feasible route from start to target, Eq. 1; 0
 /// where fuel costs nothing. The argument is in docs/BOUND.md.
@@ -57,25 +61,20 @@ pub fn lower_bound_until(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
     bound * (1.0 - ROUNDING)
 }
 
-/// The largest cost that can be proven: a route cheaper than it could use only the events that
-/// cost less, and without the others no route is cheaper.
+/// The largest cost that can be proven: by strings round walls, by a potential, and by the legs that leave the ends.
 fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) -> f64 {
     let walls = around::walls(scenario, prices);
-    // Seen from above, where the string with these radii is so dear that it could be more than `known`.
-    let across = |radii: &[Option<f64>], known: f64| {
-        if !known.is_finite() || !potential::applies(&walls, prices) {
-            return 0.0;
-        }
-        let promised = string::price(&walls, radii, prices, &scenario.area, stop);
-        if promised <= WORTHWHILE * known {
-            return 0.0;
-        }
-        potential::bound(&walls, prices, &scenario.area, (known, promised), stop)
-    };
     let Some(events) = event::events(&walls, prices) else {
         let radii = string::cores(&walls);
         let proven = string::plain(&walls, &radii, prices, stop);
-        return proven.max(prices.climbing_at(across(&radii, proven)));
+        let promise = || string::promise(&walls, &radii, prices, &scenario.area, stop);
+        if !proven.is_finite() || !potential::applies(&walls, prices) {
+            return proven;
+        }
+        let known = (proven, promise().cost);
+        let proof = potential::prove(&walls, prices, &scenario.area, known, stop);
+        let dense = proof.map_or(0.0, |proof| proof.total());
+        return proven.max(prices.climbing_at(dense));
     };
     let field = Field {
         scenario,
@@ -84,12 +83,23 @@ fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) ->
         ways: Cell::new(0),
         stop,
     };
+    let (proven, used) = without_others(&field, &events);
+    if stop() {
+        proven
+    } else {
+        proven.max(crossing(&field, &events, &events[..used], proven))
+    }
+}
+
+/// The largest cost that strings prove: a route cheaper than it could use only the events that cost less, and without
+/// the others no route is cheaper; and how many events these are.
+fn without_others(field: &Field, events: &[Event]) -> (f64, usize) {
     // The first level at which the next event costs as much as can be proven without it; beyond
     // it, less can be proven.
     let (mut low, mut high) = (0, events.len());
     let (mut proven, mut level, mut best) = (0.0_f64, 0, 0);
     for _ in 0..MOST_LEVELS {
-        let next = cost_of(&events, level);
+        let next = cost_of(events, level);
         // The string without any event is pulled to its end: it tells which events matter at all.
         let enough = if level == 0 { f64::INFINITY } else { next };
         let bound = field.level(&events[..level], enough);
@@ -108,30 +118,66 @@ fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) ->
                 high = events.partition_point(|event| event.cost < bound).max(low);
             }
         }
-        if stop() {
-            return proven;
-        }
         // At the highest level first: there, all that is proven is the bound itself.
         level = if level == 0 {
             high
-        } else if field.ways.get() > MOST_WAYS_IN_ALL {
+        } else if field.ways.get() > MOST_WAYS_IN_ALL || (field.stop)() {
             break;
         } else {
             usize::midpoint(low, high)
         };
     }
-    let dense = across(&field.radii(&events[..best]), proven);
-    proven = proven.max(prices.climbing_at(dense));
-    if ends::are_too_many(&walls) {
-        return proven;
+    (proven, best)
+}
+
+/// What is proven beyond that by a potential where soft zones may have to be crossed, and by legs; strings that use some
+/// events at most prove what is `known`.
+fn crossing(field: &Field, events: &[Event], used: &[Event], known: f64) -> f64 {
+    let Field {
+        scenario,
+        prices,
+        walls,
+        stop,
+        ..
+    } = *field;
+    if !known.is_finite() || !potential::applies(walls, prices) {
+        return legs(field, events, 0.0);
     }
-    proven.max(field.one_by_one(&events, dense))
+    let promise = string::promise(walls, &field.radii(used), prices, &scenario.area, stop);
+    let prove = |known: f64| {
+        let known = (known, promise.cost);
+        potential::prove(walls, prices, &scenario.area, known, stop)
+    };
+    let over = |proof| ends::over(proof, scenario, prices, walls, stop);
+    if let Some(proof) = prove(known) {
+        let dense = proof.total();
+        let level = prices.climbing_at(dense);
+        return level.max(legs(field, events, dense)).max(over(proof));
+    }
+    let known = known.max(legs(field, events, 0.0));
+    // Not for its own sake, but for what the legs that leave the ends cost beyond it.
+    let climbing = ends::climbing(scenario, prices, walls, promise.bends, stop);
+    if climbing <= 0.0 || promise.cost + climbing <= CLOSE * known {
+        return known;
+    }
+    prove(0.0).map_or(known, |proof| known.max(over(proof)))
+}
+
+/// What no route undercuts by the events one by one and by the legs of strings, where none costs less than `dense` seen
+/// from above; 0 where there are too many corners.
+fn legs(field: &Field, events: &[Event], dense: f64) -> f64 {
+    if ends::are_too_many(field.walls) {
+        0.0
+    } else {
+        field.one_by_one(events, dense)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::tests::{read, scenario};
     use super::*;
+    use crate::geometry::Point3;
 
     /// Best routes known, from long searches: upper bounds of the optimum.
     #[test]
@@ -180,6 +226,23 @@ mod tests {
         (scenario.start.z, scenario.target.z) = (100.0, 100.0);
         let (bound, best) = (lower_bound(&scenario), 598.893);
         assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
+    }
+
+    /// A start low in two wide soft zones, out of which every leg climbs: the best known has 20 waypoints.
+    #[test]
+    fn within_two_percent_where_a_leg_climbs_in_soft_zones() {
+        let mut scenario = scenario(
+            r#""threats": [
+                {"kind": "cylinder", "center": {"x": 344, "y": 72}, "radius": 17, "influence": 252},
+                {"kind": "cylinder", "center": {"x": 156, "y": 557}, "radius": 30, "influence": 107},
+                {"kind": "cylinder", "center": {"x": 642, "y": 264}, "radius": 34, "influence": 276},
+                {"kind": "cylinder", "center": {"x": 413, "y": 238}, "radius": 50, "influence": 140}
+            ]"#,
+        );
+        scenario.start = Point3::new(237.0, 222.0, 28.0);
+        scenario.target = Point3::new(743.0, 892.0, 89.0);
+        let (bound, best) = (lower_bound(&scenario), 976.19);
+        assert!(bound <= best && bound > 0.98 * best, "{bound} {best}");
     }
 
     /// What a route may cut off corners can be worth more than the way; and it may go through what

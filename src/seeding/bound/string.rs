@@ -2,7 +2,7 @@
 
 use super::super::obstacles::Obstacles;
 use super::super::outline::Outline;
-use super::super::taut::{Limits, TautString, TautStrings, taut_strings_within};
+use super::super::taut::{Limits, Piece, TautStrings, taut_strings_within};
 use super::departure::Departure;
 use super::potential;
 use super::prices::Prices;
@@ -30,25 +30,49 @@ pub(super) fn cores(walls: &[Wall]) -> Vec<Option<f64>> {
     walls.iter().map(radius).collect()
 }
 
-/// What the string round `walls` widened to `radii` costs with all its soft zones, about: more than that
-/// cannot be proven by prices. Infinite where it leaves the area.
-pub(super) fn price(
+/// What is hoped for: more than that cannot be proven.
+pub(super) struct Promise {
+    /// What the string costs with all its soft zones, about; infinite where it leaves the area.
+    pub(super) cost: f64,
+    /// Where it bends first after the start and last before the target.
+    pub(super) bends: [Point2; 2],
+}
+
+/// What the string round `walls` widened to `radii` promises.
+pub(super) fn promise(
     walls: &[Wall],
     radii: &[Option<f64>],
     prices: &Prices,
     area: &Rect,
     stop: &dyn Fn() -> bool,
-) -> f64 {
+) -> Promise {
     let ends = departures((walls, radii), prices, &[]);
     let found = pulled(
         &scene((walls, radii), ends.map(|end| end.at)),
         (f64::INFINITY, stop),
     );
-    let tolls = ends[0].toll + ends[1].toll;
-    let price = |string: &TautString| {
-        prices.climbing_at(potential::price(walls, prices, area, string) + tolls)
+    let [start, target] = prices.ends.map(|end| end.xy());
+    let mut promise = Promise {
+        cost: f64::INFINITY,
+        bends: [target, start],
     };
-    found.strings.first().map_or(f64::INFINITY, price)
+    if let Some(string) = found.strings.first() {
+        let price = |length: f64, at: &dyn Fn(f64) -> Point2| {
+            potential::price(walls, prices, area, (length, at))
+        };
+        // Straight out of the soft zone that an end lies in.
+        let out = |end: usize| {
+            let from = prices.ends[end].xy();
+            let way = ends[end].at - from;
+            price(way.norm(), &|share| from + way * share)
+        };
+        let across = price(string.length, &|share| string.at(share)) + out(0) + out(1);
+        promise.cost = prices.climbing_at(across);
+        if let [Piece::Straight { to, .. }, .., Piece::Straight { from, .. }] = &string.pieces[..] {
+            promise.bends = [*to, *from];
+        }
+    }
+    promise
 }
 
 /// What no route undercuts, seen from above, that goes round `walls` widened to `radii` (`None` leaves one out): the

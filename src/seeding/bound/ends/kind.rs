@@ -36,6 +36,8 @@ pub(super) struct Kind {
     turned: f64,
     /// Whether a string may tell that the cost is higher.
     pub(super) is_rough: bool,
+    /// What the soft zones along the shortest of them cost at least.
+    exposed: f64,
 }
 
 impl Kind {
@@ -51,6 +53,7 @@ impl Kind {
             leg: 0.0,
             turned: 0.0,
             is_rough: false,
+            exposed: 0.0,
         };
         (0..SECTORS).map(sector).collect()
     }
@@ -74,13 +77,15 @@ pub(super) struct End<'a> {
 }
 
 impl End<'_> {
-    /// What a leg of `length` metres seen from above costs at least on top of its fuel seen from
+    /// What a leg of `length` metres seen from above that is `exposed` costs at least on top of what it costs seen from
     /// above, waypoint included: it climbs, or its waypoint is off the middle. Falls with `length`.
-    fn steepness(&self, length: f64) -> f64 {
+    fn steepness(&self, length: f64, exposed: f64) -> f64 {
         if length.is_infinite() {
             return 0.0;
         }
-        let (w, weight) = (self.prices.fuel, self.weight);
+        // Climbing lengthens a leg in soft zones as it does elsewhere.
+        let dearer = if length > 0.0 { exposed / length } else { 0.0 };
+        let (w, weight) = (self.prices.fuel + dearer, self.weight);
         // Flown with the slope at which a metre of climb costs as much as one off the middle.
         let climbed = if weight < w {
             let share = weight / w;
@@ -91,6 +96,11 @@ impl End<'_> {
         let climbed = climbed.min(length * self.steepest);
         let slant = (length * length + climbed * climbed).sqrt();
         (w * (slant - length) + weight * (self.height - climbed)).max(0.0)
+    }
+
+    /// What a level leg to `at` costs more since it cannot be level, about.
+    pub(super) fn climbing_to(&self, at: Point2) -> f64 {
+        self.steepness((at - self.from).norm(), self.exposed(at, 0.0)[0])
     }
 
     /// What may be gained by looking at `kind` more closely.
@@ -104,7 +114,7 @@ impl End<'_> {
 
     /// What may be gained by cutting the lengths of `kind`.
     fn longer(&self, kind: &Kind) -> f64 {
-        self.steepness(kind.lengths[0]) - kind.steepness
+        self.steepness(kind.lengths[0], kind.exposed) - kind.steepness
     }
 
     /// `kind` in two parts, not yet priced.
@@ -119,20 +129,21 @@ impl End<'_> {
             return [part(-1.0), part(1.0)];
         }
         let [shortest, longest] = kind.lengths;
-        let between = self.length_of(0.5 * (self.steepness(shortest) + kind.steepness));
+        let steepest = self.steepness(shortest, kind.exposed);
+        let between = self.length_of(0.5 * (steepest + kind.steepness), kind.exposed);
         let between = between.clamp(shortest, longest);
         [[shortest, between], [between, longest]].map(|lengths| Kind { lengths, ..*kind })
     }
 
-    /// The length from which on a leg's steepness is at most that one, which is not 0.
-    fn length_of(&self, steepness: f64) -> f64 {
+    /// The length from which on the steepness of a leg that is `exposed` is at most that one, which is not 0.
+    fn length_of(&self, steepness: f64, exposed: f64) -> f64 {
         let (mut low, mut high) = (0.0, (self.to - self.from).norm());
-        while self.steepness(high) > steepness && high < 1e12 {
+        while self.steepness(high, exposed) > steepness && high < 1e12 {
             (low, high) = (high, 2.0 * high);
         }
         for _ in 0..40 {
             let middle = 0.5 * (low + high);
-            if self.steepness(middle) > steepness {
+            if self.steepness(middle, exposed) > steepness {
                 low = middle;
             } else {
                 high = middle;
@@ -144,8 +155,8 @@ impl End<'_> {
     /// `kind`, with what its legs cost at least at the price of the straight line from there.
     pub(super) fn priced(&self, kind: Kind) -> Kind {
         let [length, longest] = kind.lengths;
-        let steepness = self.steepness(longest);
         if length <= 0.0 {
+            let steepness = self.steepness(longest, 0.0);
             return Kind { steepness, ..kind };
         }
         let (at, spread) = self.reached(&kind);
@@ -155,15 +166,44 @@ impl End<'_> {
                 ..kind
             };
         }
-        let (fuel, share) = (self.prices.fuel, self.prices.exposure);
-        let [least, middle] = self.exposure(at, kind.half);
-        let leg = fuel * (length - spread) + share * least;
+        let fuel = self.prices.fuel;
+        let [exposed, middle] = self.exposed(at, kind.half);
+        let leg = fuel * (length - spread) + exposed;
         Kind {
             cost: kind.cost.max(leg + fuel * (self.to - at).norm()),
-            steepness,
+            steepness: self.steepness(longest, exposed),
             leg,
-            turned: 2.0 * fuel * spread + share * (middle - least),
+            turned: 2.0 * fuel * spread + (middle - exposed),
             is_rough: spread <= COARSEST * (self.to - self.from).norm(),
+            exposed,
+            ..kind
+        }
+    }
+
+    /// `kind`, with what its legs cost at least beyond the `rise` of a potential on the way to any place within so many
+    /// metres of another.
+    pub(super) fn beyond(&self, kind: Kind, rise: &dyn Fn(Point2, f64) -> Option<f64>) -> Kind {
+        let [length, longest] = kind.lengths;
+        if length <= 0.0 {
+            let steepness = self.steepness(longest, 0.0);
+            return Kind { steepness, ..kind };
+        }
+        let (at, spread) = self.reached(&kind);
+        let highest = rise(at, spread).filter(|_| !self.is_blocked(at, spread));
+        let Some(highest) = highest else {
+            return Kind {
+                cost: f64::INFINITY,
+                ..kind
+            };
+        };
+        let fuel = self.prices.fuel;
+        let [exposed, middle] = self.exposed(at, kind.half);
+        Kind {
+            cost: kind.cost.max(fuel * length + exposed - highest),
+            steepness: self.steepness(longest, exposed),
+            // The potential is at least as steep as fuel is dear, about.
+            turned: fuel * spread + (middle - exposed),
+            exposed,
             ..kind
         }
     }
@@ -208,13 +248,13 @@ impl End<'_> {
         })
     }
 
-    /// Exposure of all legs to as far as `at` and within `half` radians of it: no less than the first, and of the one to
-    /// `at` about the second.
-    fn exposure(&self, at: Point2, half: f64) -> [f64; 2] {
+    /// What the soft zones cost of all legs to as far as `at` and within `half` radians of it: no less than the first, and
+    /// of the one to `at` about the second.
+    fn exposed(&self, at: Point2, half: f64) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for wall in self.hard() {
             for (sum, half) in sums.iter_mut().zip([half, 0.0]) {
-                *sum += exposure::least(wall, (self.from, at), half);
+                *sum += self.prices.exposure * exposure::least(wall, (self.from, at), half);
             }
         }
         sums
@@ -269,11 +309,25 @@ mod tests {
     fn a_short_leg_climbs_no_steeper_than_allowed() {
         check(|end| {
             let root = 2.0_f64.sqrt();
-            assert!((end.steepness(0.0) - 100.0).abs() < 1e-9);
-            assert!((end.steepness(40.0) - (20.0 * (root - 1.0) + 60.0)).abs() < 1e-9);
-            assert!((end.steepness(100.0) - 50.0 * (root - 1.0)).abs() < 1e-9);
-            assert!(end.steepness(1000.0) < 2.5 && end.steepness(f64::INFINITY) == 0.0);
-            assert!((end.steepness(end.length_of(33.0)) - 33.0).abs() < 1e-6);
+            assert!((end.steepness(0.0, 0.0) - 100.0).abs() < 1e-9);
+            assert!((end.steepness(40.0, 0.0) - (20.0 * (root - 1.0) + 60.0)).abs() < 1e-9);
+            assert!((end.steepness(100.0, 0.0) - 50.0 * (root - 1.0)).abs() < 1e-9);
+            assert!(end.steepness(1000.0, 0.0) < 2.5 && end.steepness(f64::INFINITY, 0.0) == 0.0);
+            assert!((end.steepness(end.length_of(33.0, 0.0), 0.0) - 33.0).abs() < 1e-6);
+        });
+    }
+
+    #[test]
+    fn climbing_costs_more_in_soft_zones() {
+        check(|end| {
+            // A metre costs 2 in place of 0.5: as much is climbed as a metre of climb costs one off the middle.
+            let climbed = 100.0 / 3.0_f64.sqrt();
+            let slant = (1e4 + climbed * climbed).sqrt();
+            let expected = 2.0 * (slant - 100.0) + 100.0 - climbed;
+            assert!((end.steepness(100.0, 150.0) - expected).abs() < 1e-9);
+            assert!(end.steepness(100.0, 150.0) > 3.0 * end.steepness(100.0, 0.0));
+            let length = end.length_of(33.0, 150.0);
+            assert!((end.steepness(length, 150.0) - 33.0).abs() < 1e-6);
         });
     }
 

@@ -1,13 +1,17 @@
 //! What start and target at another height than the middle of the band cost on top of the string: a first leg is
 //! straight, so that where the way bends soon, it is short and steep. The argument is section 7 of docs/BOUND.md.
 
+mod excess;
 mod exposure;
 mod kind;
 
+pub(super) use excess::over;
+
 use super::prices::Prices;
-use super::string::slack;
+use super::string::{cores, slack};
 use super::wall::Wall;
 use crate::cost::Tolerance;
+use crate::geometry::Point2;
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;
 use kind::{End, Kind};
@@ -52,37 +56,13 @@ impl<'a> Legs<'a> {
         least: f64,
         (effort, stop): (usize, &'a dyn Fn() -> bool),
     ) -> Self {
-        let told_apart = |ground: f64| {
-            let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max) + ground;
-            // A single waypoint ends both legs.
-            let share = if scenario.planner.waypoints > 1 {
-                1.0
-            } else {
-                0.5
-            };
-            let ends = [0, 1].map(|end| End {
-                from: prices.ends[end].xy(),
-                to: prices.ends[1 - end].xy(),
-                height: (prices.ends[end].z - middle).abs(),
-                weight: share * scenario.weights.altitude,
-                steepest: steepest(scenario),
-                prices,
-                walls,
-                radii,
-                slack: slack(walls, radii, prices),
-                stop,
-            });
-            let kinds = [0, 1].map(|_| Kind::all(least));
-            (ends, kinds)
-        };
-        let level = match scenario.terrain {
-            Terrain::Flat(ground) => Some(ground.elevation),
-            _ => None,
-        };
-        let matter = least.is_finite() && scenario.weights.altitude > 0.0 && !are_too_many(walls);
+        let matter = least.is_finite() && !are_too_many(walls);
+        let ends = matter
+            .then(|| ends(scenario, prices, (walls, radii), stop))
+            .flatten();
         Self {
             prices,
-            told_apart: level.filter(|_| matter).map(told_apart),
+            told_apart: ends.map(|ends| (ends, [0, 1].map(|_| Kind::all(least)))),
             corners: walls.iter().map(Wall::corners).sum(),
             effort,
         }
@@ -128,6 +108,54 @@ impl<'a> Legs<'a> {
             }
         }
     }
+}
+
+/// Both ends on level ground, where waypoints off the middle of the band cost something; `None` elsewhere.
+fn ends<'a>(
+    scenario: &Scenario,
+    prices: &'a Prices,
+    (walls, radii): (&'a [Wall], &'a [Option<f64>]),
+    stop: &'a dyn Fn() -> bool,
+) -> Option<[End<'a>; 2]> {
+    let Terrain::Flat(ground) = &scenario.terrain else {
+        return None;
+    };
+    let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max) + ground.elevation;
+    // A single waypoint ends both legs.
+    let share = if scenario.planner.waypoints > 1 {
+        1.0
+    } else {
+        0.5
+    };
+    (scenario.weights.altitude > 0.0).then(|| {
+        [0, 1].map(|end| End {
+            from: prices.ends[end].xy(),
+            to: prices.ends[1 - end].xy(),
+            height: (prices.ends[end].z - middle).abs(),
+            weight: share * scenario.weights.altitude,
+            steepest: steepest(scenario),
+            prices,
+            walls,
+            radii,
+            slack: slack(walls, radii, prices),
+            stop,
+        })
+    })
+}
+
+/// What a string that bends first and last there costs more since its ends are off the middle of the band, about.
+pub(super) fn climbing(
+    scenario: &Scenario,
+    prices: &Prices,
+    walls: &[Wall],
+    bends: [Point2; 2],
+    stop: &dyn Fn() -> bool,
+) -> f64 {
+    let radii = cores(walls);
+    let ends = ends(scenario, prices, (walls, &radii), stop);
+    ends.map_or(0.0, |[start, target]| {
+        start.climbing_to(bends[0]) + target.climbing_to(bends[1])
+    })
 }
 
 /// Metres that a route may climb in a metre seen from above.

@@ -52,10 +52,19 @@ impl Cells {
         ]
     }
 
+    /// All cells that come into the rectangle round these places.
+    pub(super) fn round(&self, places: [Point2; 3]) -> impl Iterator<Item = usize> + use<> {
+        let rect = Rect::around(places).unwrap_or(self.rect);
+        self.between([self.at(rect.min), self.at(rect.max)])
+    }
+
     /// All cells that come within `reach` of a place in both directions.
     pub(super) fn within(&self, place: Point2, reach: f64) -> impl Iterator<Item = usize> + use<> {
         let reach = Vector2::new(reach, reach);
-        let [low, high] = [self.at(place - reach), self.at(place + reach)];
+        self.between([self.at(place - reach), self.at(place + reach)])
+    }
+
+    fn between(&self, [low, high]: [[usize; 2]; 2]) -> impl Iterator<Item = usize> + use<> {
         let columns = self.columns;
         (low[1]..=high[1])
             .flat_map(move |row| (low[0]..=high[0]).map(move |column| row * columns + column))

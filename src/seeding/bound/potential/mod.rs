@@ -6,17 +6,19 @@ mod easing;
 mod levels;
 mod marching;
 mod mesh;
+mod proof;
 mod slopes;
 mod spacing;
 mod vertices;
 mod zones;
 
-use super::super::taut::TautString;
 use super::WORTHWHILE;
 use super::prices::Prices;
 use super::wall::Wall;
 use crate::geometry::{Point2, Rect};
+use levels::Levels;
 use mesh::{Mesh, PARTS};
+pub(super) use proof::Proof;
 use slopes::steepness;
 use spacing::Spacing;
 use zones::Zones;
@@ -69,15 +71,18 @@ fn whole(walls: &[Wall]) -> impl Iterator<Item = &Wall> {
     walls.iter().filter(|wall| wall.toll.is_none())
 }
 
-/// What no route undercuts at the prices of fuel and soft zones, seen from above, where it `applies`; 0 where that
-/// is not expected to exceed `known`, which no route undercuts either. A string costs what is `promised`.
-pub(super) fn bound(
+/// What proves what no route undercuts at the prices of fuel and soft zones, seen from above, where it `applies`; `None`
+/// where that is not expected to exceed `known`, which no route undercuts either. A string costs what is `promised`.
+pub(super) fn prove(
     walls: &[Wall],
     prices: &Prices,
     area: &Rect,
     (known, promised): (f64, f64),
     stop: &dyn Fn() -> bool,
-) -> f64 {
+) -> Option<Proof> {
+    if promised <= WORTHWHILE * known {
+        return None;
+    }
     // From the start on, where places are rounded least.
     let origin = prices.ends[0].xy().coords;
     let walls: Vec<Wall> = whole(walls).map(|wall| wall.moved(-origin)).collect();
@@ -91,16 +96,14 @@ pub(super) fn bound(
     let mut spacing = Spacing::even(rect, &zones, FIRST);
     for level in 1..=MOST_MESHES {
         let vertices = vertices::lay(ends, &zones, &spacing);
-        let Some(priced) = Priced::over(&vertices, &zones, &spacing) else {
-            return 0.0;
-        };
+        let priced = Priced::over(&vertices, &zones, &spacing)?;
         let costs = priced.costs();
         let estimate = costs[0][1];
         // The first mesh is too coarse for narrow gaps, through which an estimate leaks.
         let is_near = prices.climbing_at(estimate) < WORTHWHILE * known && promised < FAR * known;
         // Nothing leads to the target, or nothing is to be gained.
         if !estimate.is_finite() || (level == 1 && is_near) || stop() {
-            return 0.0;
+            return None;
         }
         let is_enough = prices.direct() > STEPS * spacing.side;
         let next = if is_enough { FINE } else { FIRST };
@@ -110,31 +113,45 @@ pub(super) fn bound(
         }
     }
     let vertices = vertices::lay(ends, &zones, &spacing);
-    proven(vertices, &zones, &spacing, stop).min(cap)
+    let steep = steepest(vertices, &zones, &spacing, stop)?;
+    Some(Proof::new(steep, cap, (origin, rect)))
 }
 
-/// What no way between the first two of `vertices` undercuts that stays among them, with more of them where the
-/// triangles are too large for what they must rise by.
-fn proven(
+/// The potential over the first two of `vertices` that rises the most, with more of them where the triangles are too
+/// large for what they must rise by.
+fn steepest(
     mut vertices: Vec<Point2>,
     zones: &Zones,
     spacing: &Spacing,
     stop: &dyn Fn() -> bool,
-) -> f64 {
-    let mut best = 0.0_f64;
+) -> Option<(Mesh, Vec<f64>, Levels)> {
+    let mut best: Option<(Mesh, Vec<f64>, Levels)> = None;
     for round in 0..=MOST_ROUNDS {
         let Some(priced) = Priced::over(&vertices, zones, spacing) else {
             break;
         };
         let potential = priced.potential();
-        let proven = levels::proven(&priced.mesh, &priced.limits, &potential);
-        best = best.max(proven);
-        let room = MOST_VERTICES.saturating_sub(vertices.len());
-        let is_enough = proven >= NEARLY * (potential[1] - potential[0]);
-        if round == MOST_ROUNDS || room == 0 || is_enough || stop() {
+        let rise = potential[1] - potential[0];
+        // Nothing leads to the target.
+        if !(rise > 0.0 && rise.is_finite()) {
             break;
         }
-        vertices.extend(priced.between(&potential).into_iter().take(room));
+        let levels = Levels::new(&priced.mesh, &priced.limits, &potential);
+        let proven = levels.total();
+        let room = MOST_VERTICES.saturating_sub(vertices.len());
+        let is_last = round == MOST_ROUNDS || room == 0 || proven >= NEARLY * rise || stop();
+        if !is_last {
+            vertices.extend(priced.between(&potential).into_iter().take(room));
+        }
+        if best
+            .as_ref()
+            .is_none_or(|(_, _, other)| proven > other.total())
+        {
+            best = Some((priced.mesh, potential, levels));
+        }
+        if is_last {
+            break;
+        }
     }
     best
 }
@@ -233,20 +250,26 @@ impl Priced {
     }
 }
 
-/// What a string costs seen from above, about; infinite where it leaves the area, of which strings know nothing.
-pub(super) fn price(walls: &[Wall], prices: &Prices, area: &Rect, string: &TautString) -> f64 {
+/// What a way costs seen from above, about, that is at places told by their shares of its length; infinite where it
+/// leaves the area, of which strings know nothing.
+pub(super) fn price(
+    walls: &[Wall],
+    prices: &Prices,
+    area: &Rect,
+    (length, at): (f64, &dyn Fn(f64) -> Point2),
+) -> f64 {
     let depth = |at: Point2| -> f64 {
         whole(walls)
             .map(|wall| (wall.influence - wall.distance(at)).max(0.0))
             .sum()
     };
-    let middle = |part| string.at((f64::from(part) + 0.5) / f64::from(SAMPLES));
+    let middle = |part| at((f64::from(part) + 0.5) / f64::from(SAMPLES));
     let outside = OUTSIDE * prices.direct();
     if (0..SAMPLES).any(|part| area.excess(middle(part)) > outside) {
         return f64::INFINITY;
     }
     let depths: f64 = (0..SAMPLES).map(|part| depth(middle(part))).sum();
-    string.length * (prices.fuel + prices.exposure * depths / f64::from(SAMPLES))
+    length * (prices.fuel + prices.exposure * depths / f64::from(SAMPLES))
 }
 
 #[cfg(test)]
@@ -255,7 +278,7 @@ mod tests {
     use super::super::super::tests::read;
     use super::super::around;
     use super::*;
-    use crate::geometry::ring;
+    use crate::geometry::{Vector2, ring};
     use crate::scenario::Scenario;
 
     /// From (200, 500) to (800, 500), `fuel` a metre, in a square of a kilometre.
@@ -277,16 +300,15 @@ mod tests {
         )
     }
 
-    fn proven(scenario: &Scenario) -> f64 {
+    fn proof(scenario: &Scenario, known: (f64, f64), stop: bool) -> Option<Proof> {
         let prices = Prices::of(scenario);
         let walls = around::walls(scenario, &prices);
-        bound(
-            &walls,
-            &prices,
-            &scenario.area,
-            (0.0, f64::INFINITY),
-            &|| false,
-        )
+        prove(&walls, &prices, &scenario.area, known, &|| stop)
+    }
+
+    fn proven(scenario: &Scenario) -> f64 {
+        let proof = proof(scenario, (0.0, f64::INFINITY), false);
+        proof.expect("there is a way").total()
     }
 
     /// The cheapest way over a lattice of `NODES` nodes a side with legs in 32 directions, each
@@ -384,7 +406,8 @@ mod tests {
         let vertices = vertices::lay(ends, &zones, &spacing);
         let priced = Priced::over(&vertices, &zones, &spacing).expect("they are apart");
         let costs = priced.costs();
-        let proven = super::proven(vertices, &zones, &spacing, &|| false);
+        let steepest = steepest(vertices, &zones, &spacing, &|| false);
+        let proven = steepest.expect("there is a way").2.total();
         for cost in [costs[0][1], costs[1][0]] {
             assert!(
                 proven <= cost * 1.01 && proven > 0.95 * cost,
@@ -465,14 +488,62 @@ mod tests {
         .join(", ")
     }
 
+    /// A straight leg into or out of any place costs no less than the potential rises by on it.
+    #[test]
+    fn no_leg_costs_less_than_the_rise() {
+        let scenario = scenario(0.2, &zones());
+        let prices = Prices::of(&scenario);
+        let walls = around::walls(&scenario, &prices);
+        let mut proof = proof(&scenario, (0.0, f64::INFINITY), false).expect("there is a way");
+        proof.look_up();
+        let mut tight = 0;
+        for end in [0, 1] {
+            let from = prices.ends[end].xy();
+            assert!(
+                proof
+                    .rise(end, from, 0.0)
+                    .is_some_and(|rise| rise.abs() < 1e-6)
+            );
+            let rise = |at: Point2, spread: f64| proof.rise(end, at, spread).expect("it is free");
+            let other = rise(prices.ends[1 - end].xy(), 0.0);
+            assert!((other - proof.total()).abs() < 1e-6, "{other}");
+            for idx in 0..400 {
+                let share = f64::from(idx) / 400.0;
+                let (sin, cos) = libm::sincos(share * std::f64::consts::TAU);
+                let to = from + Vector2::new(cos, sin) * (400.0 * (share * 37.0).fract());
+                let place = |part: i32| from + (to - from) * ((f64::from(part) + 0.5) / 1000.0);
+                let is_free = |at: Point2| walls.iter().all(|wall| wall.distance(at) > wall.core);
+                if !(0..1000)
+                    .all(|part| is_free(place(part)) && scenario.area.contains(place(part)))
+                {
+                    continue;
+                }
+                let depth = |at: Point2| -> f64 {
+                    let depths = walls
+                        .iter()
+                        .map(|wall| (wall.influence - wall.distance(at)).max(0.0));
+                    depths.sum()
+                };
+                let depths = (0..1000).map(|part| depth(place(part))).sum::<f64>() / 1000.0;
+                let cost = (to - from).norm() * (prices.fuel + prices.exposure * depths);
+                let to_there = rise(to, 0.0);
+                assert!(
+                    to_there <= cost * (1.0 + 1e-4) + 1e-6,
+                    "{to_there} {cost} to {to}"
+                );
+                tight += u32::from(to_there > 0.95 * cost);
+                // Of all places about it, one rises as much or more.
+                let about = rise(to + Vector2::new(3.0, -2.0), 4.0);
+                assert!(about >= to_there - 1e-6, "{about} {to_there}");
+            }
+        }
+        assert!(tight > 20, "{tight}");
+    }
+
     #[test]
     fn a_way_that_costs_as_much_as_is_known_is_not_looked_at() {
         let scenario = scenario(1.0, &disc(500.0, 930.0, 10.0, 20.0));
-        let prices = Prices::of(&scenario);
-        let walls = around::walls(&scenario, &prices);
-        let proven = bound(&walls, &prices, &scenario.area, (600.0, 600.0), &|| false);
-        assert!(proven.abs() < f64::EPSILON, "{proven}");
-        let stopped = bound(&walls, &prices, &scenario.area, (0.0, 0.0), &|| true);
-        assert!(stopped <= 600.0, "{stopped}");
+        assert!(proof(&scenario, (600.0, 600.0), false).is_none());
+        assert!(proof(&scenario, (0.0, 0.0), true).is_none());
     }
 }

@@ -10,7 +10,7 @@ use crate::geometry::{Point2, Rect};
 const WIDER: [(f64, f64); 3] = [(1.1, 1.0), (2.0, 2.0), (4.0, 4.0)];
 
 /// How many times as dear as the cheapest a route is expected to be taken for at least where prices are lowered.
-const SPARE: f64 = 1.02;
+const SPARE: f64 = 1.05;
 
 /// Share of a price that is always left.
 const LEAST_SHARE: f64 = 0.4;

@@ -1,0 +1,73 @@
+//! What first and last legs cost beyond what a potential rises by on the way.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::super::potential::Proof;
+use super::super::prices::Prices;
+use super::super::string::cores;
+use super::super::wall::Wall;
+use super::kind::{End, Kind};
+use super::{MOST_CORNERS, ends};
+use crate::geometry::Point2;
+use crate::scenario::Scenario;
+
+/// What a kind of leg may be off by, as a share of what is proven, before it is told apart.
+const LEAST: f64 = 3e-4;
+
+/// Kinds of legs that are looked at, for each end; fewer among more than `MOST_CORNERS`.
+const EFFORT: usize = 1500;
+
+/// What no route undercuts by `proof` and by the legs from and to ends that are off the middle of the band: the potential
+/// rises by no more than the way costs seen from above, and both legs are straight and climb; 0 where that costs nothing.
+pub(in super::super) fn over(
+    mut proof: Proof,
+    scenario: &Scenario,
+    prices: &Prices,
+    walls: &[Wall],
+    stop: &dyn Fn() -> bool,
+) -> f64 {
+    let radii = cores(walls);
+    let Some(ends) = ends(scenario, prices, (walls, &radii), stop) else {
+        return 0.0;
+    };
+    proof.look_up();
+    let fine = LEAST * proof.total();
+    let corners: usize = walls.iter().map(|wall| wall.centers().len()).sum();
+    let effort = EFFORT * MOST_CORNERS / corners.max(MOST_CORNERS);
+    let excess = |end: usize| {
+        let rise = |at, spread| proof.rise(end, at, spread);
+        least(&ends[end], &rise, (fine, effort))
+    };
+    proof.with(excess(0) + excess(1))
+}
+
+/// The least that a leg costs beyond the `rise`, as fine as asked for unless that takes more effort.
+fn least(
+    end: &End,
+    rise: &dyn Fn(Point2, f64) -> Option<f64>,
+    (fine, effort): (f64, usize),
+) -> f64 {
+    let mut kinds = Vec::new();
+    let mut cheapest = BinaryHeap::new();
+    let keep = |kind: Kind, kinds: &mut Vec<Kind>, cheapest: &mut BinaryHeap<_>| {
+        // Bits of numbers that are not negative are ordered as they are.
+        let total = (kind.cost + kind.steepness).max(0.0);
+        cheapest.push((Reverse(total.to_bits()), kinds.len()));
+        kinds.push(kind);
+    };
+    for kind in Kind::all(0.0) {
+        keep(end.beyond(kind, rise), &mut kinds, &mut cheapest);
+    }
+    while let Some((Reverse(total), idx)) = cheapest.pop() {
+        let kind = kinds[idx];
+        let is_fine = end.gain(&kind) < fine || kind.cost.is_infinite();
+        if is_fine || kinds.len() > effort || (end.stop)() {
+            return f64::from_bits(total);
+        }
+        for part in end.parts(&kind) {
+            keep(end.beyond(part, rise), &mut kinds, &mut cheapest);
+        }
+    }
+    0.0
+}

@@ -35,11 +35,8 @@ const MOST_WAYS_IN_ALL: usize = 120_000;
 /// Bisections on the number of events that a cheaper route may make use of.
 const MOST_LEVELS: usize = 24;
 
-/// Where the string itself is not this many times as dear as what is known, a potential promises nothing.
+/// Where the string itself, with its climbs, is not this many times as dear as what is known, a potential promises nothing.
 const WORTHWHILE: f64 = 1.02;
-
-/// Where the string with its climbs is not this many times as dear as what is known, nothing more is looked for.
-const CLOSE: f64 = 1.01;
 
 /// A proven lower bound on the total cost of any feasible route from start to target, Eq. 1; 0
 /// where fuel costs nothing. The argument is in docs/BOUND.md.
@@ -155,9 +152,10 @@ fn crossing(field: &Field, events: &[Event], used: &[Event], known: f64) -> f64 
         return level.max(legs(field, events, dense)).max(over(proof));
     }
     let known = known.max(legs(field, events, 0.0));
-    // Not for its own sake, but for what the legs that leave the ends cost beyond it.
+    // Not for its own sake, but for what the legs that leave the ends cost beyond it: by bending later, a route may climb
+    // for half as much as a string.
     let climbing = ends::climbing(scenario, prices, walls, promise.bends, stop);
-    if climbing <= 0.0 || promise.cost + climbing <= CLOSE * known {
+    if climbing <= 0.0 || promise.cost + 0.5 * climbing <= WORTHWHILE * known {
         return known;
     }
     prove(0.0).map_or(known, |proof| known.max(over(proof)))

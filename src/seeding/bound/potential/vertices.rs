@@ -34,6 +34,9 @@ const MOST_EDGES: usize = 1500;
 /// Vertices along edges, at most.
 const MOST_ALONG: usize = 6000;
 
+/// Places along edges that are tried, about, at most.
+const MOST_TRIED: usize = 50_000;
+
 /// Corners of a ring that vertices are laid along, at most.
 const MOST_CORNERS: usize = 100;
 
@@ -64,10 +67,9 @@ pub(super) fn lay(ends: [Point2; 2], zones: &Zones, spacing: &Spacing) -> Vec<Po
     let mut edges: Vec<Edge> = ring::edges(&corners)
         .map(|(a, b)| Edge::new(Line::Straight(a, b)))
         .collect();
-    let simple = walls
-        .iter()
-        .enumerate()
-        .filter(|(_, wall)| wall.corners() <= MOST_CORNERS);
+    let is_simple = |wall: &Wall| wall.corners() <= MOST_CORNERS;
+    let simple =
+        (walls.iter().enumerate()).filter(|(idx, wall)| zones.counts[*idx] && is_simple(wall));
     for (idx, wall) in simple {
         edges_of(wall, tolerance, &mut |line, reach| {
             edges.push(Edge {
@@ -97,14 +99,16 @@ pub(super) fn lay(ends: [Point2; 2], zones: &Zones, spacing: &Spacing) -> Vec<Po
             }
         }
     }
+    let mut tried = 0;
     for edge in &edges {
-        if laid.places.len() > MOST_ALONG {
+        if laid.places.len() > MOST_ALONG || tried > MOST_TRIED {
             break;
         }
         let length = edge.line.length();
         let mut along = 0.0;
         while along < length {
             let place = edge.line.at(along);
+            tried += 1;
             let asked = spacing.at(place);
             let step = asked.min(BENT * edge.line.radius()).max(CLOSEST * asked);
             let outside = rect.excess(place);

@@ -14,9 +14,14 @@ const CELLS: usize = 1024;
 /// Discs and corners of rings in all cells, at most; walls beyond are left out.
 const MOST_ENTRIES: usize = 200_000;
 
+/// Walls in a cell, at most.
+const MOST_IN_CELL: usize = 100;
+
 /// Walls with their soft zones, by place.
 pub(super) struct Zones<'a> {
     pub(super) walls: &'a [Wall],
+    /// Whether each is in any cell.
+    pub(super) counts: Vec<bool>,
     prices: &'a Prices,
     cells: Cells,
     /// Of each cell, the walls whose soft zones or cores come into it.
@@ -27,6 +32,7 @@ impl<'a> Zones<'a> {
     pub(super) fn new(walls: &'a [Wall], prices: &'a Prices, rect: Rect) -> Self {
         let cells = Cells::about(rect, CELLS);
         let mut near = vec![Vec::new(); cells.count()];
+        let mut counts = vec![false; walls.len()];
         let mut entries = 0;
         for (idx, wall) in walls.iter().enumerate() {
             let (center, radius) = wall.circle();
@@ -37,11 +43,15 @@ impl<'a> Zones<'a> {
             }
             entries += more;
             for cell in cells.within(center, reach) {
-                near[cell].push(idx);
+                if near[cell].len() < MOST_IN_CELL {
+                    near[cell].push(idx);
+                    counts[idx] = true;
+                }
             }
         }
         Self {
             walls,
+            counts,
             prices,
             cells,
             near,

@@ -474,6 +474,22 @@ mod tests {
         );
     }
 
+    #[test]
+    fn thousands_of_discs_at_one_place_are_no_more_work() {
+        let mut scenario = scenario(0.2, &disc(500.0, 480.0, 20.0, 100.0));
+        let same = scenario.threats[0].clone();
+        scenario.threats.extend((0..3000).map(|_| same.clone()));
+        let prices = Prices::of(&scenario);
+        let walls = around::walls(&scenario, &prices);
+        let zones = Zones::new(&walls, &prices, scenario.area);
+        let near = zones.near(Point2::new(500.0, 480.0)).count();
+        assert!((50..=100).contains(&near), "{near}");
+        let spacing = Spacing::even(scenario.area, &zones, 1000);
+        let ends = prices.ends.map(|end| end.xy());
+        let vertices = vertices::lay(ends, &zones, &spacing).len();
+        assert!((500..2000).contains(&vertices), "{vertices}");
+    }
+
     /// Over both ends, between them, on a ring with a bay and beyond the area.
     fn zones() -> String {
         [

@@ -11,6 +11,9 @@ const LEVELS: usize = 4096;
 /// Share by which a sum of a few products may be off.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
+/// A triangle so many times as long as it is wide is too slim for its slopes to be told.
+const SLIMMEST: f64 = 1e9;
+
 /// A potential made flatter, or steeper, level by level, so that no triangle that takes a level is steeper there than its
 /// limits.
 #[derive(Debug)]
@@ -38,15 +41,22 @@ impl Levels {
             if !values[0].is_finite() || most < low || least > high {
                 continue;
             }
-            // What rounding can make of slopes: of values, and of the shape of slim triangles.
+            let steepness = steepness(triangle, limits, &values);
+            // What rounding can make of it: of values, and of the shape of slim triangles.
             let rates: f64 = triangle.rates.iter().map(Vector2::norm).sum();
             let [a, b, c, ..] = mesh.places(triangle);
-            let extent = (b - a).norm() + (c - a).norm();
+            let slimness = rates * ((b - a).norm() + (c - a).norm());
             let least_limit = limits.iter().copied().fold(f64::INFINITY, f64::min);
-            let steepness = steepness(triangle, limits, &values);
-            let rounding = ROUNDING * rates * (greatest / least_limit + extent * steepness);
+            let by_values = ROUNDING * rates * greatest / least_limit;
+            let steepness = steepness * (1.0 + ROUNDING * slimness) + by_values;
+            // Too slim for anything to be told, which is no number, is as steep as can be.
+            let steepness = if slimness < SLIMMEST && steepness.is_finite() {
+                steepness
+            } else {
+                f64::INFINITY
+            };
             for steepest in &mut steepest[level(least)..=level(most)] {
-                *steepest = steepest.max(steepness + rounding);
+                *steepest = steepest.max(steepness);
             }
         }
         let mut height = 0.0;
@@ -89,6 +99,18 @@ mod tests {
         vertices.extend((1..100).map(|i| Point2::new(10.0 * f64::from(i), 0.0)));
         vertices.extend((0..=100).map(|i| Point2::new(10.0 * f64::from(i), 10.0)));
         Mesh::new(&vertices, |_| false).expect("they are apart")
+    }
+
+    /// A triangle of which rounding leaves no area: what it rises by is not known, and taken for nothing.
+    #[test]
+    fn a_triangle_that_is_too_slim_takes_its_levels_away() {
+        let vertices = [[0.0, 0.0], [1000.0, 0.0], [500.0, 1e-8], [500.0, 400.0]];
+        let mesh = Mesh::new(&vertices.map(Point2::from), |_| false).expect("they are apart");
+        assert_eq!(mesh.triangles.len(), 3);
+        let limits = vec![[1.0; 6]; mesh.triangles.len()];
+        let values: Vec<f64> = mesh.nodes.iter().map(|node| node.x).collect();
+        let found = Levels::new(&mesh, &limits, &values).total();
+        assert!(found.abs() < f64::EPSILON, "{found}");
     }
 
     #[test]

@@ -9,6 +9,9 @@ use crate::geometry::{Point2, Rect, Vector2};
 /// Cells in which triangles are looked up.
 const CELLS: usize = 2000;
 
+/// Share of its terms by which a sum may be off, and more.
+const ROUNDING: f64 = 1e-9;
+
 /// A potential that is nowhere steeper than what a metre costs.
 pub(in super::super) struct Proof {
     mesh: Mesh,
@@ -85,9 +88,10 @@ impl Proof {
         let corners = self.mesh.places(triangle);
         let mut shares = [0.0; 3];
         for (corner, share) in shares.iter_mut().enumerate() {
-            let rate = &triangle.rates[corner];
-            *share = 1.0 + rate.dot(&(at - corners[corner]));
-            if *share < -spread * rate.norm() - 1e-9 {
+            let (rate, way) = (&triangle.rates[corner], at - corners[corner]);
+            *share = 1.0 + rate.dot(&way);
+            let rounding = ROUNDING * (1.0 + rate.norm() * way.norm());
+            if *share < -spread * rate.norm() - rounding {
                 return None;
             }
         }
@@ -96,12 +100,15 @@ impl Proof {
             return None;
         }
         // Taylor's series about `at`, which ends with the second derivatives.
-        let mut value: f64 = (0..3)
-            .map(|corner| values[corner] * shares[corner] * (2.0 * shares[corner] - 1.0))
-            .sum();
-        for (middle, [one, other]) in (3..).zip(SIDES) {
-            value += 4.0 * values[middle] * shares[one] * shares[other];
+        let mut terms = [0.0; 6];
+        for corner in 0..3 {
+            terms[corner] = values[corner] * shares[corner] * (2.0 * shares[corner] - 1.0);
         }
+        for (middle, [one, other]) in (3..).zip(SIDES) {
+            terms[middle] = 4.0 * values[middle] * shares[one] * shares[other];
+        }
+        let value: f64 = terms.iter().sum();
+        let size: f64 = terms.iter().map(|term| term.abs()).sum();
         let gradients = gradients(triangle, &values);
         let corners = || gradients.iter().zip(&triangle.rates).zip(shares);
         let slope: Vector2 = corners()
@@ -111,7 +118,7 @@ impl Proof {
             .map(|((gradient, rate), _)| gradient * rate.transpose())
             .sum();
         let change = spread * (slope.norm() + 0.5 * spread * bend.norm());
-        let change = change + 1e-9 * (value.abs() + change);
+        let change = change + ROUNDING * (size + change);
         if change.is_nan() {
             return Some([least, most]);
         }

@@ -42,6 +42,27 @@ impl Rect {
         self.excess(point) <= 0.0
     }
 
+    /// Whether the two have a point in common.
+    #[must_use]
+    pub fn meets(&self, other: &Self) -> bool {
+        self.min.x <= other.max.x
+            && self.max.x >= other.min.x
+            && self.min.y <= other.max.y
+            && self.max.y >= other.min.y
+    }
+
+    /// The corners, counter-clockwise from the south-west on.
+    #[must_use]
+    pub fn corners(&self) -> [Point2; 4] {
+        let [low, high] = [self.min, self.max];
+        [
+            low,
+            Point2::new(high.x, low.y),
+            high,
+            Point2::new(low.x, high.y),
+        ]
+    }
+
     /// The point inside nearest to `point`.
     #[must_use]
     pub fn nearest(&self, point: Point2) -> Point2 {

@@ -94,13 +94,13 @@ impl Index {
     }
 
     fn find_in(&self, own: &Rect, found: &mut Vec<u32>) {
-        if !meet(own, &self.extent) {
+        if !own.meets(&self.extent) {
             return;
         }
         for cell in self.cells(own).iter(self.columns) {
             let range = self.starts[cell] as usize..self.starts[cell + 1] as usize;
             let near = self.threats[range].iter();
-            found.extend(near.filter(|threat| meet(own, &self.boxes[**threat as usize])));
+            found.extend(near.filter(|threat| own.meets(&self.boxes[**threat as usize])));
         }
     }
 
@@ -151,8 +151,4 @@ fn side(count: usize) -> usize {
 )]
 fn onto(cells: f64, count: usize) -> usize {
     cells.clamp(0.0, (count - 1) as f64) as usize
-}
-
-fn meet(a: &Rect, b: &Rect) -> bool {
-    a.min.x <= b.max.x && a.max.x >= b.min.x && a.min.y <= b.max.y && a.max.y >= b.min.y
 }

@@ -15,6 +15,7 @@ mod event;
 mod field;
 mod potential;
 mod prices;
+mod promise;
 mod string;
 mod toll;
 mod wall;
@@ -25,6 +26,7 @@ use crate::scenario::Scenario;
 use event::Event;
 use field::{Field, cost_of};
 use prices::Prices;
+use promise::promise;
 
 /// Covers the rounding of the sums behind a bound, so that it holds in floating point too.
 const ROUNDING: f64 = 1e-9;
@@ -64,11 +66,11 @@ fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) ->
     let Some(events) = event::events(&walls, prices) else {
         let radii = string::cores(&walls);
         let proven = string::plain(&walls, &radii, prices, stop);
-        let promise = || string::promise(&walls, &radii, prices, &scenario.area, stop);
+        let promised = || promise(&walls, &radii, prices, &scenario.area, stop);
         if !proven.is_finite() || !potential::applies(&walls, prices) {
             return proven;
         }
-        let known = (proven, promise().cost);
+        let known = (proven, promised().cost);
         let proof = potential::prove(&walls, prices, &scenario.area, known, stop);
         let dense = proof.map_or(0.0, |proof| proof.total());
         return proven.max(prices.climbing_at(dense));
@@ -140,7 +142,7 @@ fn crossing(field: &Field, events: &[Event], used: &[Event], known: f64) -> f64 
     if !known.is_finite() || !potential::applies(walls, prices) {
         return legs(field, events, 0.0);
     }
-    let promise = string::promise(walls, &field.radii(used), prices, &scenario.area, stop);
+    let promise = promise(walls, &field.radii(used), prices, &scenario.area, stop);
     let prove = |known: f64| {
         let known = (known, promise.cost);
         potential::prove(walls, prices, &scenario.area, known, stop)

@@ -2,12 +2,11 @@
 
 use super::super::obstacles::Obstacles;
 use super::super::outline::Outline;
-use super::super::taut::{Limits, Piece, TautStrings, taut_strings_within};
+use super::super::taut::{Limits, TautStrings, taut_strings_within};
 use super::departure::Departure;
-use super::potential;
 use super::prices::Prices;
 use super::wall::Wall;
-use crate::geometry::{Point2, Rect};
+use crate::geometry::Point2;
 
 /// Ways looked at for one string: beyond a few hundred walls, the search ends with what it has
 /// proven so far.
@@ -28,51 +27,6 @@ pub(super) fn plain(
 pub(super) fn cores(walls: &[Wall]) -> Vec<Option<f64>> {
     let radius = |wall: &Wall| wall.toll.is_none().then_some(wall.core);
     walls.iter().map(radius).collect()
-}
-
-/// What is hoped for: more than that cannot be proven.
-pub(super) struct Promise {
-    /// What the string costs with all its soft zones, about; infinite where it leaves the area.
-    pub(super) cost: f64,
-    /// Where it bends first after the start and last before the target.
-    pub(super) bends: [Point2; 2],
-}
-
-/// What the string round `walls` widened to `radii` promises.
-pub(super) fn promise(
-    walls: &[Wall],
-    radii: &[Option<f64>],
-    prices: &Prices,
-    area: &Rect,
-    stop: &dyn Fn() -> bool,
-) -> Promise {
-    let ends = departures((walls, radii), prices, &[]);
-    let found = pulled(
-        &scene((walls, radii), ends.map(|end| end.at)),
-        (f64::INFINITY, stop),
-    );
-    let [start, target] = prices.ends.map(|end| end.xy());
-    let mut promise = Promise {
-        cost: f64::INFINITY,
-        bends: [target, start],
-    };
-    if let Some(string) = found.strings.first() {
-        let price = |length: f64, at: &dyn Fn(f64) -> Point2| {
-            potential::price(walls, prices, area, (length, at))
-        };
-        // Straight out of the soft zone that an end lies in.
-        let out = |end: usize| {
-            let from = prices.ends[end].xy();
-            let way = ends[end].at - from;
-            price(way.norm(), &|share| from + way * share)
-        };
-        let across = price(string.length, &|share| string.at(share)) + out(0) + out(1);
-        promise.cost = prices.climbing_at(across);
-        if let [Piece::Straight { to, .. }, .., Piece::Straight { from, .. }] = &string.pieces[..] {
-            promise.bends = [*to, *from];
-        }
-    }
-    promise
 }
 
 /// What no route undercuts, seen from above, that goes round `walls` widened to `radii` (`None` leaves one out): the
@@ -153,7 +107,7 @@ pub(super) fn narrowed(
 }
 
 /// Both ends as a string sees them.
-fn departures(
+pub(super) fn departures(
     field: (&[Wall], &[Option<f64>]),
     prices: &Prices,
     spent: &[usize],
@@ -196,7 +150,7 @@ pub(super) fn shortest(
     (first.unwrap_or(f64::INFINITY).min(found.beyond), found.ways)
 }
 
-fn pulled(scene: &Obstacles, (enough, stop): (f64, &dyn Fn() -> bool)) -> TautStrings {
+pub(super) fn pulled(scene: &Obstacles, (enough, stop): (f64, &dyn Fn() -> bool)) -> TautStrings {
     let limits = Limits {
         most_ways: MOST_WAYS,
         enough,

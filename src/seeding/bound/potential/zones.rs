@@ -19,9 +19,9 @@ const MOST_IN_CELL: usize = 100;
 
 /// Walls with their soft zones, by place.
 pub(super) struct Zones<'a> {
-    pub(super) walls: &'a [Wall],
+    walls: &'a [Wall],
     /// Whether each is in any cell.
-    pub(super) counts: Vec<bool>,
+    counts: Vec<bool>,
     prices: &'a Prices,
     cells: Cells,
     /// Of each cell, the walls whose soft zones or cores come into it.
@@ -68,6 +68,12 @@ impl<'a> Zones<'a> {
         self.prices.tolerance
     }
 
+    /// Those that count.
+    pub(super) fn counted(&self) -> impl Iterator<Item = &'a Wall> {
+        let walls = self.walls.iter().zip(&self.counts);
+        walls.filter_map(|(wall, counts)| counts.then_some(wall))
+    }
+
     /// Those that may be felt at a place.
     pub(super) fn near(&self, place: Point2) -> impl Iterator<Item = &'a Wall> {
         self.near[self.cells.of(place)]
@@ -82,9 +88,9 @@ impl<'a> Zones<'a> {
         let mut sums = [[self.prices.fuel; 3]; PARTS.len()];
         for wall in self.near(middle) {
             // The depth in the zone of a disc or of an edge is concave: nowhere less than what is linear between nodes.
-            let away = part(wall, middle);
-            let depths =
-                places.map(|place| wall.influence - away.distance(place) - self.prices.tolerance);
+            let (a, b) = part(wall, middle);
+            let depths = places
+                .map(|place| wall.influence - point_segment(place, a, b) - self.prices.tolerance);
             for (sums, part) in sums.iter_mut().zip(PARTS) {
                 if part.iter().all(|node| depths[*node] >= 0.0) {
                     for (sum, node) in sums.iter_mut().zip(part) {
@@ -132,27 +138,15 @@ impl<'a> Zones<'a> {
     }
 }
 
-/// What of a wall its depth is measured from: a point or an edge.
-struct Part(Point2, Point2);
-
-impl Part {
-    fn distance(&self, place: Point2) -> f64 {
-        if self.0 == self.1 {
-            (place - self.0).norm()
-        } else {
-            point_segment(place, self.0, self.1)
-        }
-    }
-}
-
-/// The part of `wall` that is nearest to a place.
-fn part(wall: &Wall, place: Point2) -> Part {
-    let parts = match &wall.shape {
-        OutlineShape::Disc(center) => return Part(*center, *center),
-        OutlineShape::Ring(ring) => ring::edges(ring).map(|(a, b)| Part(a, b)),
+/// What of `wall` is nearest to a place: a point, as both ends of an edge, or an edge.
+fn part(wall: &Wall, place: Point2) -> (Point2, Point2) {
+    let edges = match &wall.shape {
+        OutlineShape::Disc(center) => return (*center, *center),
+        OutlineShape::Ring(ring) => ring::edges(ring),
     };
-    parts
-        .min_by(|one, other| one.distance(place).total_cmp(&other.distance(place)))
+    let away = |(a, b): &(Point2, Point2)| point_segment(place, *a, *b);
+    edges
+        .min_by(|one, other| away(one).total_cmp(&away(other)))
         .expect("a ring has edges")
 }
 

@@ -128,7 +128,9 @@ impl Threat {
         }
     }
 
-    fn reaches(&self, z: f64) -> bool {
+    /// Whether it is there at that height.
+    #[must_use]
+    pub fn reaches(&self, z: f64) -> bool {
         self.base.is_none_or(|base| z >= base) && self.top.is_none_or(|top| z < top)
     }
 }

@@ -14,6 +14,7 @@ mod rounded;
 mod tangents;
 mod thin;
 mod trails;
+mod ways;
 mod worth;
 
 pub(super) use count::{spread, with_waypoints};
@@ -56,7 +57,7 @@ const FAR_ABOUT: usize = 16;
 /// A start this much dearer than the best one refined, as a share, is not worth refining.
 const HOPELESS: f64 = 0.08;
 
-/// Where soft zones are dear, a small shift changes more of what it costs.
+/// Where soft zones are dear or many, a small shift changes more of what it costs.
 const HOPELESS_IN_ZONES: f64 = 0.3;
 
 /// By which a start is pulled into place.
@@ -93,8 +94,8 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
         shapes.extend(along_strings(model, stop));
         // Who brings a route has been over the hills already.
         if !warm {
-            let (found, exposed) = over_ground(model, &shapes);
-            if exposed {
+            let (found, rough) = over_ground(model, &shapes);
+            if rough {
                 hopeless = HOPELESS_IN_ZONES;
             }
             let climbs = climbs::routes(model);
@@ -251,12 +252,19 @@ fn along_strings(model: &Model, stop: &dyn Stop) -> Vec<Vec<Point3>> {
 }
 
 /// Routes over the ground: through a fine net only where the coarse one has none that can be flown as it is, and
-/// far about where the best so far pays much for soft zones; and whether it does.
+/// far about where the best so far pays much for soft zones, and in crowds along the ways between the threats; and
+/// whether there are such zones or crowds.
 fn over_ground(model: &Model, strings: &[Vec<Point3>]) -> (Found, bool) {
     let strings = priced(model, strings);
     let cheapest = strings.iter().min_by(|one, other| one.0.rank(&other.0));
     let known = cheapest.map_or(f64::INFINITY, |(fitness, _)| fitness.cost);
     let (mut found, few) = roadmap::routes(model, OVERLAND, known);
+    let is_crowd = ways::are_worth_a_look(model);
+    if is_crowd {
+        let ways = ways::routes(model);
+        found.routes.extend(ways.routes);
+        found.legs_priced += ways.legs_priced;
+    }
     let over = best_of(model, priced(model, &found.routes));
     let best = over
         .into_iter()
@@ -278,7 +286,7 @@ fn over_ground(model: &Model, strings: &[Vec<Point3>]) -> (Found, bool) {
     let rounded = |route: &Vec<Point3>| rounded::rounded(model.scenario, route);
     let turned: Vec<_> = found.routes.iter().filter_map(rounded).collect();
     found.routes.extend(turned);
-    (found, detour.is_some())
+    (found, detour.is_some() || is_crowd)
 }
 
 /// A route and its price.

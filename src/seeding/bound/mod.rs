@@ -25,6 +25,7 @@ use std::cell::Cell;
 use crate::scenario::Scenario;
 use event::Event;
 use field::{Field, cost_of};
+pub use potential::cheap_ways;
 use prices::Prices;
 use promise::promise;
 

@@ -13,7 +13,7 @@ pub(super) struct Family {
 }
 
 /// All kinds.
-pub(super) const FAMILIES: [Family; 8] = [
+pub(super) const FAMILIES: [Family; 9] = [
     Family {
         name: "discs",
         about: "3 to 12 discs with soft zones, weights and vehicle of the paper",
@@ -23,6 +23,11 @@ pub(super) const FAMILIES: [Family; 8] = [
         name: "crowd",
         about: "20 to 60 discs, soft zones of 5 to 100 m, any weights",
         draw: crowd,
+    },
+    Family {
+        name: "minefield",
+        about: "40 to 80 discs that let something through between any two, in gaps of 3 m and more",
+        draw: minefield,
     },
     Family {
         name: "passable",
@@ -127,6 +132,35 @@ fn crowd(scene: &mut Scene) {
     for _ in 0..scene.between(20, 60) {
         let radius = scene.random.between(15.0, 55.0);
         scene.disc(radius, margin);
+    }
+}
+
+fn minefield(scene: &mut Scene) {
+    scene.waypoints = scene.between(6, 40);
+    let (gap, margin) = (
+        scene.random.between(3.0, 20.0),
+        scene.random.between(10.0, 45.0),
+    );
+    let count = scene.between(40, 80);
+    // So many fit in by far; where one does not, another is drawn.
+    for _ in 0..100 * count {
+        if scene.threats.len() == count {
+            break;
+        }
+        let radius = scene.random.between(15.0, 45.0);
+        let before = scene.threats.len();
+        scene.disc(radius, margin);
+        let is_free = |one: &Threat, other: &Threat| {
+            let [x, y] = [0, 1].map(|axis| one.center[axis] - other.center[axis]);
+            libm::hypot(x, y) >= one.radius + other.radius + gap
+        };
+        let (others, last) = scene.threats.split_at(before);
+        if last
+            .iter()
+            .any(|last| !others.iter().all(|other| is_free(last, other)))
+        {
+            scene.threats.pop();
+        }
     }
 }
 

@@ -12,17 +12,19 @@ mod proof;
 mod slopes;
 mod spacing;
 mod vertices;
+mod ways;
 mod zones;
 
 use super::WORTHWHILE;
 use super::prices::Prices;
 use super::wall::Wall;
-use crate::geometry::{Point2, Rect};
+use crate::geometry::{Point2, Rect, Vector2};
 use levels::Levels;
 use mesh::Mesh;
 use priced::Priced;
 pub(super) use proof::Proof;
 use spacing::Spacing;
+pub use ways::cheap_ways;
 use zones::Zones;
 
 /// Vertices of a mesh that tells where the cheapest routes are, about.
@@ -76,16 +78,10 @@ pub(super) fn prove(
     if promised <= WORTHWHILE * known {
         return None;
     }
-    // From the start on, where places are rounded least.
-    let origin = prices.ends[0].xy().coords;
-    let walls: Vec<Wall> = whole(walls).map(|wall| wall.moved(-origin)).collect();
-    let ends = prices.ends.map(|end| end.xy() - origin);
-    let area = Rect {
-        min: area.min - origin,
-        max: area.max - origin,
-    };
-    let (rect, cap) = region(ends, &area.grown(2.0 * prices.tolerance), prices, promised);
-    let zones = Zones::new(&walls, prices, rect);
+    let plane = Plane::new(whole(walls).cloned(), prices, area);
+    let (ends, area) = (plane.ends, plane.area.grown(2.0 * prices.tolerance));
+    let (rect, cap) = region(ends, &area, prices, promised);
+    let zones = Zones::new(&plane.walls, prices, rect);
     let mut spacing = Spacing::even(rect, &zones, FIRST);
     for level in 1..=MOST_MESHES {
         let vertices = vertices::lay(ends, &zones, &spacing);
@@ -107,7 +103,31 @@ pub(super) fn prove(
     }
     let vertices = vertices::lay(ends, &zones, &spacing);
     let steep = steepest(vertices, &zones, &spacing, stop)?;
-    Some(Proof::new(steep, cap, (origin, rect)))
+    Some(Proof::new(steep, cap, (plane.origin, rect)))
+}
+
+/// What is seen from above, measured from the start on, where places are rounded least.
+struct Plane {
+    /// Where the start is.
+    origin: Vector2,
+    walls: Vec<Wall>,
+    ends: [Point2; 2],
+    area: Rect,
+}
+
+impl Plane {
+    fn new(walls: impl Iterator<Item = Wall>, prices: &Prices, area: &Rect) -> Self {
+        let origin = prices.ends[0].xy().coords;
+        Self {
+            origin,
+            walls: walls.map(|wall| wall.moved(-origin)).collect(),
+            ends: prices.ends.map(|end| end.xy() - origin),
+            area: Rect {
+                min: area.min - origin,
+                max: area.max - origin,
+            },
+        }
+    }
 }
 
 /// The potential over the first two of `vertices` that rises the most, with more of them where the triangles are too

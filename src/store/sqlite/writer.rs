@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use rusqlite::Connection;
+use tokio::runtime::Handle;
 use tokio::sync::{oneshot, watch};
 
 use super::claims::{Claimer, Claims, When};
@@ -103,6 +104,7 @@ impl Writer {
             changes,
             records,
             messages: messages.clone(),
+            runtime: Handle::try_current().ok(),
             waiting: VecDeque::new(),
             leases: HashMap::new(),
             queued: 0,
@@ -185,6 +187,8 @@ struct Desk {
     changes: Arc<Changes>,
     records: Arc<Records>,
     messages: Sender<Message>,
+    /// Where those wait who are answered; `None` when the store was opened outside of it.
+    runtime: Option<Handle>,
     /// Claimers, in the order in which they came.
     waiting: VecDeque<Claimer>,
     /// How each running plan's worker is told to stop.
@@ -281,8 +285,20 @@ impl Desk {
         if let Err(error) = &durable {
             tracing::error!(%error, operations = batch.len(), "a write failed");
         }
-        for operation in batch {
-            operation.answer(durable.as_ref().copied());
+        self.answer(batch, durable);
+    }
+
+    /// To wake a task from outside of the runtime costs calls of the system for each, so many are woken from within.
+    fn answer(&self, batch: Vec<Box<dyn Operation>>, durable: Result<(), StoreError>) {
+        let is_one = batch.len() == 1;
+        let answer = move || {
+            for operation in batch {
+                operation.answer(durable.as_ref().copied());
+            }
+        };
+        match &self.runtime {
+            Some(runtime) if !is_one => drop(runtime.spawn(async { answer() })),
+            _ => answer(),
         }
     }
 

@@ -1,6 +1,7 @@
 //! A body: the right media type, plain or gzip, not too long either way, not too slow.
 
 use std::io::Read as _;
+use std::time::Duration;
 
 use axum::body::Body;
 use axum::http::{HeaderMap, header};
@@ -18,10 +19,7 @@ pub(super) async fn read_json(
     headers: &HeaderMap,
     body: Body,
 ) -> Result<Bytes, Problem> {
-    if !is_json(headers) {
-        return Err(unsupported(headers, "application/json"));
-    }
-    read(state, headers, body).await
+    Announced::json(state, headers)?.read(body).await
 }
 
 /// The whole body, and whether it is said to be JSON or XML.
@@ -41,7 +39,8 @@ pub(super) async fn read_json_or_xml(
             return Err(unsupported(headers, allowed));
         }
     };
-    Ok((read(state, headers, body).await?, syntax))
+    let announced = Announced::of(state, headers)?;
+    Ok((announced.read(body).await?, syntax))
 }
 
 fn unsupported(headers: &HeaderMap, allowed: &'static str) -> Problem {
@@ -50,26 +49,53 @@ fn unsupported(headers: &HeaderMap, allowed: &'static str) -> Problem {
     Problem::UnsupportedMediaType { found, allowed }
 }
 
-async fn read(state: &AppState, headers: &HeaderMap, body: Body) -> Result<Bytes, Problem> {
-    let (limit, timeout) = (state.rules.limits.body_bytes, state.body_timeout);
-    let coding = Coding::of(headers)?;
-    if announced_length(headers).is_some_and(|length| length > limit as u64) {
-        return Err(Problem::BodyTooLarge(limit));
+/// A body as its headers announce it, and how it will be held to that.
+pub(super) struct Announced {
+    coding: Coding,
+    limit: usize,
+    timeout: Duration,
+}
+
+impl Announced {
+    /// Of a request whose body must be JSON.
+    pub(super) fn json(state: &AppState, headers: &HeaderMap) -> Result<Self, Problem> {
+        if !is_json(headers) {
+            return Err(unsupported(headers, "application/json"));
+        }
+        Self::of(state, headers)
     }
-    let sent = match tokio::time::timeout(timeout, Limited::new(body, limit).collect()).await {
-        Ok(Ok(collected)) => collected.to_bytes(),
-        Ok(Err(error)) if error.is::<LengthLimitError>() => {
+
+    fn of(state: &AppState, headers: &HeaderMap) -> Result<Self, Problem> {
+        let limit = state.rules.limits.body_bytes;
+        let coding = Coding::of(headers)?;
+        if announced_length(headers).is_some_and(|length| length > limit as u64) {
             return Err(Problem::BodyTooLarge(limit));
         }
-        Ok(Err(error)) => {
-            tracing::debug!(%error, "a body broke off");
-            return Err(Problem::BodyIncomplete);
+        Ok(Self {
+            coding,
+            limit,
+            timeout: state.body_timeout,
+        })
+    }
+
+    /// The whole body.
+    pub(super) async fn read(&self, body: Body) -> Result<Bytes, Problem> {
+        let (limit, timeout) = (self.limit, self.timeout);
+        let sent = match tokio::time::timeout(timeout, Limited::new(body, limit).collect()).await {
+            Ok(Ok(collected)) => collected.to_bytes(),
+            Ok(Err(error)) if error.is::<LengthLimitError>() => {
+                return Err(Problem::BodyTooLarge(limit));
+            }
+            Ok(Err(error)) => {
+                tracing::debug!(%error, "a body broke off");
+                return Err(Problem::BodyIncomplete);
+            }
+            Err(_) => return Err(Problem::BodyTooSlow(timeout)),
+        };
+        match self.coding {
+            Coding::Plain => Ok(sent),
+            Coding::Gzip => off_thread::run(move || unpack(&sent, limit)).await?,
         }
-        Err(_) => return Err(Problem::BodyTooSlow(timeout)),
-    };
-    match coding {
-        Coding::Plain => Ok(sent),
-        Coding::Gzip => off_thread::run(move || unpack(&sent, limit)).await?,
     }
 }
 

@@ -4,15 +4,17 @@
 //! same machine is let in there, and with it every page whose name has been made to lead there
 //! (DNS rebinding); such a page cannot hide that name, for the browser sends it.
 
+use std::future::ready;
 use std::net::{Ipv4Addr, Ipv6Addr};
 use std::sync::Arc;
 
-use axum::extract::{Request, State};
+use axum::extract::Request;
 use axum::http::uri::Authority;
 use axum::http::{HeaderMap, Uri, Version, header};
-use axum::middleware::Next;
-use axum::response::{IntoResponse, Response};
+use axum::response::IntoResponse as _;
+use futures_util::FutureExt as _;
 
+use super::around::{Answering, Around, Next};
 use super::auth;
 use super::browser::Origins;
 use super::problem::Problem;
@@ -90,14 +92,20 @@ fn is_of_this_machine(host: &str, known: &[String]) -> bool {
 }
 
 /// The layer before all routes, for what is asked of every address; one, for each costs every request.
-pub(super) async fn hold(State(hosts): State<Hosts>, request: Request, next: Next) -> Response {
-    let uri = request.uri();
-    let checked = hosts
-        .check(uri, request.version(), request.headers())
-        .and_then(|()| auth::refuse_key_in_url(uri));
-    match checked {
-        Ok(()) => next.run(request).await,
-        Err(problem) => problem.into_response(),
+#[derive(Clone)]
+pub(super) struct Hold(pub(super) Hosts);
+
+impl Around for Hold {
+    fn answer<S: Next>(&self, request: Request, next: &mut S) -> Answering {
+        let uri = request.uri();
+        let checked = self
+            .0
+            .check(uri, request.version(), request.headers())
+            .and_then(|()| auth::refuse_key_in_url(uri));
+        match checked {
+            Ok(()) => Box::pin(next.run(request).map(Ok)),
+            Err(problem) => Box::pin(ready(Ok(problem.into_response()))),
+        }
     }
 }
 

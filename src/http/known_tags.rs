@@ -1,5 +1,9 @@
 //! Which versions a caller has already.
 
+use std::convert::Infallible;
+
+use axum::extract::OptionalFromRequestParts;
+use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderValue, header};
 
 /// The entity tags of `If-None-Match`.
@@ -23,5 +27,13 @@ impl KnownTags {
         self.0
             .iter()
             .any(|known| known == "*" || opaque(known) == tag)
+    }
+}
+
+impl<S: Sync> OptionalFromRequestParts<S> for KnownTags {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Option<Self>, Infallible> {
+        Ok(Self::of(&parts.headers))
     }
 }

@@ -4,6 +4,7 @@
 //! the worker's threads, and storage, which sits behind [`Store`].
 
 mod accept;
+mod around;
 pub mod auth;
 mod body;
 mod browser;
@@ -46,7 +47,6 @@ use axum::Router;
 use axum::body::Body;
 use axum::handler::Handler;
 use axum::http::{StatusCode, Uri, header};
-use axum::middleware::from_fn_with_state;
 use axum::response::Response;
 use axum::routing::{self, MethodRouter};
 use tokio::sync::watch;
@@ -65,6 +65,7 @@ pub use terrains::Terrains;
 use crate::scenario::json::Rules;
 use crate::store::{Stats, SteadyClock, Store};
 use crate::telemetry::Instruments;
+use around::Layered;
 use auth::{Access, Needs};
 use problem::Problem;
 
@@ -204,7 +205,7 @@ fn assemble<T: 'static>(
     let router = routes
         .into_iter()
         .fold(Router::new(), |router, route| {
-            let gate = from_fn_with_state((access.clone(), route.needs), auth::gate);
+            let gate = Layered(auth::Gate::new(access.clone(), route.needs));
             router.route(route.path, route.handler.route_layer(gate))
         })
         .method_not_allowed_fallback(async || Problem::MethodNotAllowed)
@@ -249,13 +250,13 @@ fn unwrap_uncompressed(mut answer: Response<CompressionBody<Body>>) -> Response 
 fn wrap(router: Router, cors: &Origins, hosts: Hosts, instruments: Arc<Instruments>) -> Router {
     // The outermost first. One stack, for the router puts what it is given in a box of its own for each request.
     let layers = ServiceBuilder::new()
-        .layer(from_fn_with_state(instruments, request_id::assign))
+        .layer(Layered(request_id::Assign(instruments)))
         .layer(cors.layer())
         .layer(CatchPanicLayer::custom(problem::after_panic))
         .layer(MapResponseLayer::new(unwrap_uncompressed))
         .layer(CompressionLayer::new().compress_when(worth_compressing()))
         .layer(MapResponseLayer::new(note_status))
-        .layer(from_fn_with_state(hosts, hosts::hold));
+        .layer(Layered(hosts::Hold(hosts)));
     router.layer(layers)
 }
 

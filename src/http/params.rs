@@ -109,6 +109,17 @@ pub(super) fn ticket_of(uri: &Uri) -> Option<(String, Option<PlanId>)> {
     Some((ticket, Uuid::try_parse(id).ok()))
 }
 
+/// Of a request that may have no parameters.
+pub(super) struct NoParams;
+
+impl<S: Send + Sync> FromRequestParts<S> for NoParams {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+        Params::read(&parts.uri, &[]).map(|_| Self)
+    }
+}
+
 /// The `{id}` of the path. What cannot be an id names no plan.
 pub(super) struct Id(pub(super) PlanId);
 

@@ -1,18 +1,21 @@
 //! `Prefer: wait=N`, RFC 7240: how long the caller would rather wait than ask again.
 
+use std::convert::Infallible;
 use std::time::Duration;
 
+use axum::extract::OptionalFromRequestParts;
+use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 
 const PREFER: HeaderName = HeaderName::from_static("prefer");
 pub(super) const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
 
 /// Longest wait, seconds; a longer one is cut to this.
-pub(super) const MAX_WAIT_S: u64 = 30;
+pub(super) const MAX_WAIT_S: u8 = 30;
 
 /// A wait that was asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Wait(u64);
+pub(super) struct Wait(u8);
 
 impl Wait {
     /// The first readable `wait` of the headers; a malformed preference counts as none.
@@ -25,16 +28,26 @@ impl Wait {
             .filter_map(|preference| preference.split(';').next()?.split_once('='))
             .find(|(name, _)| name.trim().eq_ignore_ascii_case("wait"))
             .and_then(|(_, value)| value.trim().trim_matches('"').parse().ok())
-            .map(|seconds: u64| Self(seconds.min(MAX_WAIT_S)))
+            .map(|seconds: u64| {
+                Self(u8::try_from(seconds).map_or(MAX_WAIT_S, |s| s.min(MAX_WAIT_S)))
+            })
     }
 
     pub(super) fn duration(self) -> Duration {
-        Duration::from_secs(self.0)
+        Duration::from_secs(self.0.into())
     }
 
     /// The value of `Preference-Applied`.
     pub(super) fn applied(self) -> HeaderValue {
         HeaderValue::from_str(&format!("wait={}", self.0)).expect("digits are visible ASCII")
+    }
+}
+
+impl<S: Sync> OptionalFromRequestParts<S> for Wait {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Option<Self>, Infallible> {
+        Ok(Self::of(&parts.headers))
     }
 }
 

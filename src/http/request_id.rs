@@ -5,13 +5,14 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use axum::body::Body;
-use axum::extract::{MatchedPath, Request, State};
+use axum::extract::{MatchedPath, Request};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
-use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
-use tracing::{Instrument, Span};
+use futures_util::FutureExt as _;
+use tracing::{Instrument, Level, Span};
 use uuid::Uuid;
 
+use super::around::{Answering, Around, Next};
 use super::problem::Problem;
 use super::{auth, browser};
 use crate::telemetry::traceparent::{self, TraceParent};
@@ -23,38 +24,41 @@ const X_REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 const MAX_LENGTH: usize = 128;
 
 /// The outermost layer: every answer leaves through here.
-pub(super) async fn assign(
-    State(instruments): State<Arc<Instruments>>,
-    route: Option<MatchedPath>,
-    mut request: Request,
-    next: Next,
-) -> Response {
-    let id = of_caller(request.headers()).unwrap_or_else(|| Uuid::now_v7().to_string());
-    let method = request.method().clone();
-    let path = printable(request.uri().path()).to_owned();
-    let caller = traceparent_of(request.headers());
-    let (span, origin) = spans::of_request(id.clone(), caller);
-    request.extensions_mut().insert(origin);
-    async move {
+#[derive(Clone)]
+pub(super) struct Assign(pub(super) Arc<Instruments>);
+
+impl Around for Assign {
+    fn answer<S: Next>(&self, mut request: Request, next: &mut S) -> Answering {
         let begun = Instant::now();
-        let mut response = next.run(request).await;
-        if let Some(problem) = response.extensions_mut().remove::<Problem>() {
-            write_problem(&mut response, &problem, &id, &method);
-        }
-        dress(response.headers_mut(), &id);
-        let took = begun.elapsed();
-        let route = route.as_ref().map(MatchedPath::as_str);
-        let status = response.status().as_u16();
-        instruments
-            .metrics
-            .answered(method.as_str(), route, status, took);
-        spans::answered(&Span::current(), method.as_str(), route, status);
-        let duration_ms = took.as_secs_f64() * 1e3;
-        tracing::debug!(%method, path, status, duration_ms, "answered");
-        response
+        let id = of_caller(request.headers()).unwrap_or_else(|| Uuid::now_v7().to_string());
+        let method = request.method().clone();
+        let path = tracing::enabled!(Level::DEBUG)
+            .then(|| printable(request.uri().path()).to_owned())
+            .unwrap_or_default();
+        let route = request.extensions().get::<MatchedPath>().cloned();
+        let caller = traceparent_of(request.headers());
+        let (span, origin) = spans::of_request(id.clone(), caller);
+        request.extensions_mut().insert(origin);
+        let answering = span.in_scope(|| next.run(request));
+        let instruments = Arc::clone(&self.0);
+        let answered = answering.map(move |mut answer| {
+            if let Some(problem) = answer.extensions_mut().remove::<Problem>() {
+                write_problem(&mut answer, &problem, &id, &method);
+            }
+            dress(answer.headers_mut(), &id);
+            let took = begun.elapsed();
+            let route = route.as_ref().map(MatchedPath::as_str);
+            let status = answer.status().as_u16();
+            instruments
+                .metrics
+                .answered(method.as_str(), route, status, took);
+            spans::answered(&Span::current(), method.as_str(), route, status);
+            let duration_ms = took.as_secs_f64() * 1e3;
+            tracing::debug!(%method, path, status, duration_ms, "answered");
+            Ok(answer)
+        });
+        Box::pin(answered.instrument(span))
     }
-    .instrument(span)
-    .await
 }
 
 /// The path as it may be written down.

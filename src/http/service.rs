@@ -91,7 +91,7 @@ pub(super) async fn limits(State(state): State<AppState>, uri: Uri) -> Result<Re
         workers: state.capacity.all_workers(stats.as_ref()),
         queue: state.capacity.queue,
         page: plans::MAX_PAGE,
-        wait_s: prefer::MAX_WAIT_S,
+        wait_s: prefer::MAX_WAIT_S.into(),
         event_rate_hz: *events::RATES_HZ.end(),
         streams: access.streams,
         streams_per_key: access.streams_per_key,

@@ -49,6 +49,11 @@ impl Route {
     }
 }
 
+/// Whether [`resolve`] has something to do.
+pub(super) fn names_a_plan(scenario: &Scenario) -> bool {
+    matches!(scenario.planner.warm_start, Some(WarmStart::Plan(_)))
+}
+
 /// Put the waypoints of the plan that `scenario` starts from into it.
 ///
 /// # Errors

@@ -13,13 +13,15 @@ mod scope;
 mod streams;
 mod ticket;
 
+use std::future::ready;
 use std::sync::Arc;
 use std::time::Duration;
 
-use axum::extract::{Request, State};
+use axum::extract::Request;
 use axum::http::{HeaderMap, Uri, header};
-use axum::middleware::Next;
-use axum::response::{IntoResponse, Response};
+use axum::response::IntoResponse as _;
+use futures_util::FutureExt as _;
+use futures_util::future::Either;
 use jiff::Timestamp;
 use tokio::sync::watch;
 use tokio::time::Instant;
@@ -33,6 +35,7 @@ pub(super) use allowance::Allowance;
 pub(super) use keys::{Digest, holds_a_key};
 pub(super) use streams::{Permit, TooMany};
 
+use super::around::{Answering, Around, Next};
 use super::caller::Caller;
 use super::params::ticket_of;
 use super::problem::Problem;
@@ -281,24 +284,38 @@ fn secret(headers: &HeaderMap) -> Result<&[u8], Unauthorized> {
 }
 
 /// The layer before one route.
-pub(super) async fn gate(
-    State((access, needs)): State<(Access, Needs)>,
-    mut request: Request,
-    next: Next,
-) -> Response {
-    let (mut response, taken) = match access.admit(needs, request.uri(), request.headers()) {
-        Ok(Admitted { caller, taken }) => {
-            if let Some(caller) = caller {
-                request.extensions_mut().insert(caller);
-            }
-            (next.run(request).await, taken)
-        }
-        Err(Refused { problem, taken }) => (problem.into_response(), taken),
-    };
-    if let Some(taken) = taken {
-        taken.allowance().write(response.headers_mut());
+#[derive(Clone)]
+pub(super) struct Gate(Arc<(Access, Needs)>);
+
+impl Gate {
+    pub(super) fn new(access: Access, needs: Needs) -> Self {
+        Self(Arc::new((access, needs)))
     }
-    response
+}
+
+impl Around for Gate {
+    fn answer<S: Next>(&self, mut request: Request, next: &mut S) -> Answering {
+        let (access, needs) = &*self.0;
+        let (refused, taken) = match access.admit(*needs, request.uri(), request.headers()) {
+            Ok(Admitted { caller, taken }) => {
+                if let Some(caller) = caller {
+                    request.extensions_mut().insert(caller);
+                }
+                (None, taken)
+            }
+            Err(Refused { problem, taken }) => (Some(problem), taken),
+        };
+        let answering = match refused {
+            Some(problem) => Either::Left(ready(problem.into_response())),
+            None => Either::Right(next.run(request)),
+        };
+        Box::pin(answering.map(move |mut answer| {
+            if let Some(taken) = taken {
+                taken.allowance().write(answer.headers_mut());
+            }
+            Ok(answer)
+        }))
+    }
 }
 
 /// For every route: an address is written down by proxies, browsers and logs, so a key in one has been

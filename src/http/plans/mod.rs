@@ -6,7 +6,7 @@ mod submit;
 use std::time::Duration;
 
 use axum::extract::State;
-use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use tokio::time::Instant;
 
@@ -15,7 +15,7 @@ pub(super) use submit::submit;
 
 use super::caller::Caller;
 use super::known_tags::KnownTags;
-use super::params::{Id, Params};
+use super::params::{Id, NoParams};
 use super::phase::stopping;
 use super::prefer::{PREFERENCE_APPLIED, Wait};
 use super::problem::Problem;
@@ -31,27 +31,28 @@ pub(super) async fn show(
     State(state): State<AppState>,
     caller: Caller,
     Id(id): Id,
-    uri: Uri,
-    headers: HeaderMap,
+    _: NoParams,
+    wait: Option<Wait>,
+    known: Option<KnownTags>,
 ) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
     let mut plan = caller.plan(&*state.store, id).await?;
-    let wait = Wait::of(&headers);
-    let known = KnownTags::of(&headers);
     if let Some(wait) = wait {
         // Who knows a version waits for another one; who knows none waits for the end.
-        plan = wait_for(&state, id, wait.duration(), |plan| match &known {
+        let changed = wait_for(&state, id, wait.duration(), |plan| match &known {
             Some(known) => !known.contain(&etag(plan)),
             None => plan.status.is_final(),
-        })
-        .await?;
+        });
+        // Few wait, and the others' futures need not have room for it.
+        plan = Box::pin(changed).await?;
     }
 
     let tag = etag(&plan);
     let mut response = if known.is_some_and(|known| known.contain(&tag)) {
         StatusCode::NOT_MODIFIED.into_response()
     } else {
-        shown(&state, plan).await?
+        let retry_after = retry_after(&state, &plan).await?;
+        let retry_after = retry_after.map(|seconds| [(header::RETRY_AFTER, seconds)]);
+        (retry_after, StatusDocument::from(plan)).into_response()
     };
     let headers = response.headers_mut();
     headers.insert(header::ETAG, tag);
@@ -63,13 +64,12 @@ pub(super) async fn show(
     Ok(response)
 }
 
-async fn shown(state: &AppState, plan: Plan) -> Result<Response, Problem> {
+async fn retry_after(state: &AppState, plan: &Plan) -> Result<Option<HeaderValue>, Problem> {
     if plan.status.is_final() {
-        return Ok(StatusDocument::from(plan).into_response());
+        return Ok(None);
     }
-    let seconds = retry::for_end(&plan, &state.store.stats().await?, state.capacity);
-    let retry_after = [(header::RETRY_AFTER, HeaderValue::from(seconds))];
-    Ok((retry_after, StatusDocument::from(plan)).into_response())
+    let seconds = retry::for_end(plan, &state.store.stats().await?, state.capacity);
+    Ok(Some(HeaderValue::from(seconds)))
 }
 
 /// `POST /plans/{id}/cancel`.
@@ -77,9 +77,8 @@ pub(super) async fn cancel(
     State(state): State<AppState>,
     caller: Caller,
     Id(id): Id,
-    uri: Uri,
+    _: NoParams,
 ) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
     caller.plan(&*state.store, id).await?;
     let plan = state.store.request_cancel(id, state.clock.now_ms()).await?;
     let status = if plan.status.is_final() {
@@ -95,9 +94,8 @@ pub(super) async fn delete(
     State(state): State<AppState>,
     caller: Caller,
     Id(id): Id,
-    uri: Uri,
+    _: NoParams,
 ) -> Result<StatusCode, Problem> {
-    Params::read(&uri, &[])?;
     match caller.plan(&*state.store, id).await {
         Ok(_) => state.store.delete(id, state.clock.now_ms()).await?,
         // Whoever asks again had no answer the first time.

@@ -1,147 +1,188 @@
 //! `POST /plans`: from a document to a plan on disk.
 
-use axum::body::Body;
-use axum::extract::{Extension, State};
-use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
+use std::future::ready;
+
+use axum::extract::{Request, State};
+use axum::http::request::Parts;
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
+use futures_util::future::{BoxFuture, Either};
 
 use super::wait_for;
+use crate::http::body::Announced;
 use crate::http::caller::Caller;
-use crate::http::idempotency::IDEMPOTENCY_REPLAYED;
+use crate::http::idempotency::{IDEMPOTENCY_REPLAYED, Once};
 use crate::http::params::Params;
 use crate::http::prefer::{PREFERENCE_APPLIED, Wait};
 use crate::http::problem::Problem;
 use crate::http::status::{StatusDocument, location};
-use crate::http::{AppState, Phase, body, off_thread, retry, warm_start, webhook};
+use crate::http::{AppState, Phase, off_thread, retry, warm_start, webhook};
 use crate::job::{self, Idempotency, Plan, Submission};
-use crate::scenario::json;
+use crate::scenario::{Scenario, json};
 use crate::store::{StoreError, Submitted};
 use crate::telemetry::{Origin, spans};
 use crate::terrain::Terrain;
 
-/// `POST /plans`.
-pub(in crate::http) async fn submit(
+/// `POST /plans`. What is asked is read before the future begins, which holds what is left of the request alone.
+pub(in crate::http) fn submit(
     State(state): State<AppState>,
     caller: Caller,
-    uri: Uri,
-    Extension(origin): Extension<Origin>,
-    headers: HeaderMap,
-    body: Body,
-) -> Result<Response, Problem> {
-    let params = Params::read(&uri, &["validate_only"])?;
-    let validate_only = params
-        .parse("validate_only", "true or false")?
-        .unwrap_or(false);
-    if !validate_only {
-        refuse_when_draining(&state).await?;
-    }
-    let webhook = webhook::asked(state.webhooks.as_ref(), &headers)?;
-    let once = state.in_flight.begin(&caller, &headers)?;
-    let bytes = body::read_json(&state, &headers, body).await?;
-    let idempotency = once.as_ref().map(|once| once.with(&bytes));
-    let Submitted { plan, replayed } = match accept(&state, &caller, bytes).await {
-        Ok(submission) if validate_only => return Ok(valid(&submission)),
-        Ok(submission) => {
-            let submission = Submission {
-                webhook,
-                idempotency,
-                ..submission
-            };
-            hand_in(&state, origin, submission).await?
-        }
-        // What it names may have gone since it was accepted.
-        Err(refusal) if !validate_only => repeated(&state, &caller, idempotency)
-            .await?
-            .ok_or(refusal)?,
-        Err(refusal) => return Err(refusal),
+    request: Request,
+) -> impl Future<Output = Result<Response, Problem>> {
+    let (head, body) = request.into_parts();
+    let asked = match Asked::of(&state, &caller, head) {
+        Ok(asked) => asked,
+        Err(refusal) => return Either::Left(ready(Err(refusal))),
     };
-    drop(once);
+    Either::Right(async move {
+        if !asked.validate_only {
+            refuse_when_draining(&state).await?;
+        }
+        let bytes = asked.announced.read(body).await?;
+        let idempotency = asked.once.as_ref().map(|once| once.with(&bytes));
+        let submitting: BoxFuture<'_, _> = match accept(&state, &caller, bytes).await {
+            Ok(submission) if asked.validate_only => return Ok(valid(&submission)),
+            Ok(submission) => {
+                let submission = Submission {
+                    webhook: asked.webhook,
+                    idempotency,
+                    ..submission
+                };
+                Box::pin(hand_in(&state, asked.origin, submission))
+            }
+            Err(refusal) if asked.validate_only => return Err(refusal),
+            Err(refusal) => Box::pin(repeated(&state, &caller, idempotency, refusal)),
+        };
+        let Submitted { plan, replayed } = submitting.await?;
+        drop(asked.once);
 
-    let address = HeaderValue::from_str(&location(plan.id)).expect("an id is visible ASCII");
-    let mut answer = answer(&state, &headers, plan, address).await?;
-    if replayed {
-        answer
-            .headers_mut()
-            .insert(IDEMPOTENCY_REPLAYED, HeaderValue::from_static("true"));
-    }
-    Ok(answer)
+        let address = HeaderValue::from_str(&location(plan.id)).expect("an id is visible ASCII");
+        let mut answer = match asked.wait {
+            Some(wait) => Box::pin(ended(&state, wait, plan, address)).await?,
+            None => accepted(plan, address),
+        };
+        if replayed {
+            answer
+                .headers_mut()
+                .insert(IDEMPOTENCY_REPLAYED, HeaderValue::from_static("true"));
+        }
+        Ok(answer)
+    })
 }
 
-/// The plan of a request that came before.
+/// What a request says beside its document.
+struct Asked {
+    validate_only: bool,
+    webhook: Option<String>,
+    once: Option<Once>,
+    wait: Option<Wait>,
+    announced: Announced,
+    /// `None` for a request that came past the layer that leaves it.
+    origin: Option<Origin>,
+}
+
+impl Asked {
+    fn of(state: &AppState, caller: &Caller, mut head: Parts) -> Result<Self, Problem> {
+        let params = Params::read(&head.uri, &["validate_only"])?;
+        let validate_only = params.parse("validate_only", "true or false")?;
+        Ok(Self {
+            validate_only: validate_only.unwrap_or(false),
+            webhook: webhook::asked(state.webhooks.as_ref(), &head.headers)?,
+            once: state.in_flight.begin(caller, &head.headers)?,
+            wait: Wait::of(&head.headers),
+            announced: Announced::json(state, &head.headers)?,
+            origin: head.extensions.remove(),
+        })
+    }
+}
+
+/// The plan of a request that came before, for what this one names may have gone since. `refusal` when none did.
 async fn repeated(
     state: &AppState,
     caller: &Caller,
     idempotency: Option<Idempotency>,
-) -> Result<Option<Submitted>, Problem> {
+    refusal: Problem,
+) -> Result<Submitted, Problem> {
     let Some(idempotency) = idempotency else {
-        return Ok(None);
+        return Err(refusal);
     };
     let owner = caller.owner.as_ref();
     let plan = state.store.repeated(owner, &idempotency).await?;
-    Ok(plan.map(|plan| {
-        spans::name_plan(plan.id);
-        tracing::info!("accepted before");
-        Submitted {
-            plan,
-            replayed: true,
-        }
-    }))
+    let plan = plan.ok_or(refusal)?;
+    spans::name_plan(plan.id);
+    tracing::info!("accepted before");
+    Ok(Submitted {
+        plan,
+        replayed: true,
+    })
 }
 
 /// Make a plan durable, or say when there may be room for it.
-async fn hand_in(
+fn hand_in(
     state: &AppState,
-    origin: Origin,
+    origin: Option<Origin>,
     submission: Submission,
-) -> Result<Submitted, Problem> {
+) -> impl Future<Output = Result<Submitted, Problem>> {
     let id = submission.id;
-    // Before it can be claimed.
-    state.instruments.origins.remember(id, origin);
-    let submitted = state.store.submit(submission).await;
-    if !matches!(&submitted, Ok(submitted) if !submitted.replayed) {
-        state.instruments.origins.forget(id);
+    if let Some(origin) = origin {
+        // Before it can be claimed.
+        state.instruments.origins.remember(id, origin);
     }
-    match submitted {
-        Ok(submitted) => {
-            spans::name_plan(submitted.plan.id);
-            if submitted.replayed {
-                tracing::info!("accepted before");
-            } else {
-                state.instruments.metrics.accepted();
-                tracing::info!("accepted");
+    let submitting = state.store.submit(submission);
+    async move {
+        match submitting.await {
+            Ok(submitted) => {
+                spans::name_plan(submitted.plan.id);
+                if submitted.replayed {
+                    state.instruments.origins.forget(id);
+                    tracing::info!("accepted before");
+                } else {
+                    state.instruments.metrics.accepted();
+                    tracing::info!("accepted");
+                }
+                Ok(submitted)
             }
-            Ok(submitted)
+            Err(error) => {
+                state.instruments.origins.forget(id);
+                Err(Box::pin(refusal(state, error)).await)
+            }
         }
-        Err(StoreError::QueueFull { queued }) => {
-            let retry_after_s = retry::for_room(&state.store.stats().await?, state.capacity);
-            Err(Problem::QueueFull {
-                queued,
-                retry_after_s,
-            })
-        }
-        Err(StoreError::QuotaReached { active, quota }) => {
-            let retry_after_s = retry::for_room(&state.store.stats().await?, state.capacity);
-            Err(Problem::QuotaReached {
-                active,
-                quota,
-                retry_after_s,
-            })
-        }
-        Err(error) => Err(error.into()),
     }
 }
 
-/// What an accepted plan is answered with, as soon as the caller wants it.
-async fn answer(
+/// What a plan is refused with that the store did not take.
+async fn refusal(state: &AppState, error: StoreError) -> Problem {
+    let room = async || -> Result<u64, StoreError> {
+        Ok(retry::for_room(&state.store.stats().await?, state.capacity))
+    };
+    match error {
+        StoreError::QueueFull { queued } => match room().await {
+            Ok(retry_after_s) => Problem::QueueFull {
+                queued,
+                retry_after_s,
+            },
+            Err(error) => error.into(),
+        },
+        StoreError::QuotaReached { active, quota } => match room().await {
+            Ok(retry_after_s) => Problem::QuotaReached {
+                active,
+                quota,
+                retry_after_s,
+            },
+            Err(error) => error.into(),
+        },
+        error => error.into(),
+    }
+}
+
+/// The plan's end, or that it was accepted when that does not come in time.
+async fn ended(
     state: &AppState,
-    headers: &HeaderMap,
+    wait: Wait,
     plan: Plan,
     address: HeaderValue,
 ) -> Result<Response, Problem> {
-    let Some(wait) = Wait::of(headers) else {
-        return Ok(accepted(plan, address));
-    };
     let plan = wait_for(state, plan.id, wait.duration(), |plan| {
         plan.status.is_final()
     })
@@ -191,41 +232,51 @@ fn may_name_a_dataset(document: &[u8]) -> bool {
     document.contains(&b'\\') || document.windows(word.len()).any(|part| part == word)
 }
 
-/// Read a document into a submission, off the threads that answer unless it is short.
+/// Read a document into a submission. Most are short and name nothing that has to be looked up.
 async fn accept(state: &AppState, caller: &Caller, document: Bytes) -> Result<Submission, Problem> {
+    if document.len() <= SHORT && !may_name_a_dataset(&document) {
+        let scenario = json::read(&document, &state.rules, job::draw_seed())?;
+        if !warm_start::names_a_plan(&scenario) {
+            return Ok(submission(scenario, caller.clone(), state.clock.now_ms()));
+        }
+    }
+    Box::pin(accept_slowly(state, caller, document)).await
+}
+
+/// Read any document into a submission, off the threads that answer.
+async fn accept_slowly(
+    state: &AppState,
+    caller: &Caller,
+    document: Bytes,
+) -> Result<Submission, Problem> {
     let rules = state.rules.clone();
-    let short = document.len() <= SHORT;
     let reads_files = may_name_a_dataset(&document);
     let read = move || json::read(&document, &rules, job::draw_seed());
     let mut scenario = if reads_files {
         state.terrains.read(read).await?
-    } else if short {
-        read()
     } else {
         off_thread::run(read).await?
     }?;
     warm_start::resolve(state, caller, &mut scenario).await?;
-    let Caller { owner, quota, .. } = caller.clone();
-    let created_ms = state.clock.now_ms();
-    let submission = move || Submission {
-        id: job::new_id(created_ms),
+    let (caller, now_ms) = (caller.clone(), state.clock.now_ms());
+    off_thread::run(move || submission(scenario, caller, now_ms)).await
+}
+
+fn submission(scenario: Scenario, caller: Caller, now_ms: i64) -> Submission {
+    Submission {
+        id: job::new_id(now_ms),
         scenario: json::write(&scenario),
         work: scenario.planner.work(),
         name: scenario.name,
         algorithm: scenario.planner.algorithm,
         seed: scenario.planner.seed,
         iterations: scenario.planner.iterations as u64,
-        created_ms,
-        owner,
-        quota,
+        created_ms: now_ms,
+        owner: caller.owner,
+        quota: caller.quota,
         webhook: None,
         idempotency: None,
         dataset: dataset(&scenario.terrain),
-    };
-    if short {
-        Ok(submission())
-    } else {
-        off_thread::run(submission).await
     }
 }
 

@@ -34,6 +34,28 @@ impl Plan {
         }
     }
 
+    /// This record as it was when it had been accepted as number `queue_position`.
+    #[must_use]
+    pub fn as_accepted(self, queue_position: u64) -> Self {
+        Self {
+            status: Status::Queued,
+            stop_reason: None,
+            feasible: None,
+            best_cost: None,
+            progress: 0.0,
+            iteration: 0,
+            evaluations: 0,
+            queue_position: Some(queue_position),
+            started_ms: None,
+            finished_ms: None,
+            expires_ms: None,
+            cancel_requested: false,
+            error: None,
+            revision: 1,
+            ..self
+        }
+    }
+
     /// A worker begins with it: queued -> running.
     ///
     /// # Errors
@@ -198,6 +220,27 @@ mod tests {
         };
         assert_eq!(again, fresh);
         assert_eq!(plan.revision, 4);
+    }
+
+    #[test]
+    fn whatever_happened_it_is_known_how_a_plan_was_accepted() {
+        let mut plan = accepted();
+        plan.start(2_000).expect("queued may run");
+        plan.advance(&[point(50, Some(470.0))]);
+        plan.request_cancel();
+        plan.end(Status::Cancelled, 3_000)
+            .expect("running may be cancelled");
+        plan.stop_reason = Some("cancelled".to_owned());
+        plan.expires_ms = Some(4_000);
+        assert_eq!(plan.as_accepted(3), accepted());
+        let mut failed = accepted();
+        failed.start(2_000).expect("queued may run");
+        let failure = Failure {
+            kind: "worker-lost".to_owned(),
+            detail: String::new(),
+        };
+        failed.fail(failure, 3_000).expect("running may fail");
+        assert_eq!(failed.as_accepted(3), accepted());
     }
 
     #[test]

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use noctule::job::Status;
+use noctule::job::{Event, Status};
 use noctule::store::sqlite::SqliteStore;
 use noctule::store::{Options, Store, StoreError};
 use tempfile::TempDir;
@@ -60,7 +60,7 @@ async fn a_newer_schema_is_refused_and_left_alone() {
     drop(database);
     let message = refusal(directory.path());
     assert!(
-        message.contains("schema version 99") && message.contains("up to 6"),
+        message.contains("schema version 99") && message.contains("up to 7"),
         "{message}"
     );
     let database = rusqlite::Connection::open(&file).unwrap();
@@ -134,6 +134,34 @@ async fn a_person_can_read_the_file() {
         row,
         (id, "succeeded".to_owned(), 471.2, submission.scenario, true)
     );
+}
+
+/// It has no row of its own: whatever became of the plan since, it is told as it was.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plan_s_acceptance_is_told_to_the_last_bit() {
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let mut accepted = Vec::new();
+    for _ in 0..3 {
+        let submitted = store.submit(submission()).await.unwrap();
+        accepted.push(submitted.plan);
+    }
+    let lease = store.claim().await.unwrap();
+    let told = vec![point(3, Some(480.0))];
+    store.append(&lease, told).await.unwrap();
+    let end = ending(Status::Succeeded).at(12_000);
+    store.finish(&lease, end).await.unwrap();
+    store.claim().await.unwrap();
+    store.close().await;
+
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    for plan in accepted {
+        let page = store.events(plan.id, 0, 1).await.unwrap();
+        assert_eq!((page.forgotten, page.events[0].id), (0, 1));
+        assert_eq!(page.events[0].event, Event::Status(Box::new(plan.clone())));
+        let rest = store.events(plan.id, 1, 10).await.unwrap();
+        assert!(rest.events.first().is_none_or(|second| second.id == 2));
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -244,7 +272,7 @@ async fn one_that_fails_half_done_leaves_nothing_and_spoils_nobody() {
     assert!(positions.eq((1..=90).map(Some)));
     let orphans: i64 = database
         .query_row(
-            "SELECT (SELECT count(*) FROM plans) + (SELECT count(*) FROM events) - 180",
+            "SELECT (SELECT count(*) FROM plans) + (SELECT count(*) FROM scenarios) - 180",
             [],
             |row| row.get(0),
         )

@@ -7,7 +7,7 @@ use tokio::sync::watch;
 
 use super::read::missing;
 use super::row::{COLUMNS, PlanRow};
-use super::transaction::{Batch, Effect, Transaction};
+use super::transaction::{Effect, Transaction};
 use super::{idempotency, removal, webhooks};
 use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Status, Submission};
@@ -33,22 +33,21 @@ pub(super) fn submit(
     let mut row = PlanRow {
         seq: 0,
         attempt: 0,
-        last_event: 0,
+        // That of its acceptance.
+        last_event: 1,
         forgotten: 0,
         bytes: submission.scenario.len() as u64,
         lost: 0,
         plan: Plan::accepted(submission, tx.queued + 1),
     };
-    let status = Event::Status(Box::new(row.plan.clone()));
-    let told = Batch::of(&mut row, &[status])?;
     row.insert(tx.connection, submission.dataset.as_deref())?;
-    tx.keep(&row, &told)?;
     tx.connection
         .prepare_cached("INSERT INTO scenarios (plan_seq, document) VALUES (?1, ?2)")?
         .execute(params![row.seq, submission.scenario])?;
     idempotency::remember(tx, submission)?;
     webhooks::keep(tx, row.seq, submission)?;
     tx.queued += 1;
+    tx.effects.push(Effect::Changed(row.plan.id));
     Ok(Submitted {
         plan: row.plan,
         replayed: false,

@@ -210,11 +210,13 @@ pub(super) fn events(
     limit: usize,
     now_ms: i64,
 ) -> Result<EventPage, StoreError> {
-    let plan: Option<(i64, i64)> = connection
-        .prepare_cached("SELECT seq, forgotten FROM plans WHERE id = ?1")?
-        .query_row([id.to_string()], |row| Ok((row.get(0)?, row.get(1)?)))
+    let plan: Option<(i64, i64, Option<i64>)> = connection
+        .prepare_cached("SELECT seq, forgotten, place FROM plans WHERE id = ?1")?
+        .query_row([id.to_string()], |row| {
+            Ok((row.get(0)?, row.get(1)?, row.get(2)?))
+        })
         .optional()?;
-    let Some((seq, forgotten)) = plan else {
+    let Some((seq, forgotten, place)) = plan else {
         return Err(missing(connection, id, now_ms)?);
     };
     let after = i64::try_from(after).unwrap_or(i64::MAX);
@@ -223,6 +225,13 @@ pub(super) fn events(
     )?;
     let mut rows = statement.query([seq, after])?;
     let mut events = Vec::new();
+    if let (0, 0, Some(place)) = (after, forgotten, place) {
+        let accepted = get(connection, id, now_ms)?.as_accepted(place.cast_unsigned());
+        events.push(NumberedEvent {
+            id: 1,
+            event: Event::Status(Box::new(accepted)),
+        });
+    }
     while events.len() < limit
         && let Some(row) = rows.next()?
     {

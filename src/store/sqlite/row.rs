@@ -96,7 +96,8 @@ impl PlanRow {
         Ok(self)
     }
 
-    /// Add it to the table; its `seq` is given by the table.
+    /// Add it to the table; its `seq` is given by the table. The event of its acceptance needs no row of its own:
+    /// [`Plan::as_accepted`] tells it.
     pub(super) fn insert(
         &mut self,
         connection: &Connection,
@@ -106,8 +107,8 @@ impl PlanRow {
         connection
             .prepare_cached(
                 "INSERT INTO plans (id, owner, name, status, progress, iteration, iterations, evaluations, \
-                 algorithm, seed, created_ms, cancel_requested, revision, attempt, last_event, bytes, dataset) \
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17)",
+                 algorithm, seed, created_ms, cancel_requested, revision, attempt, last_event, bytes, dataset, place) \
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18)",
             )?
             .execute(params![
                 plan.id.to_string(),
@@ -127,6 +128,7 @@ impl PlanRow {
                 self.last_event.cast_signed(),
                 self.bytes.cast_signed(),
                 dataset,
+                plan.queue_position.map(u64::cast_signed),
             ])?;
         self.seq = connection.last_insert_rowid();
         Ok(())

@@ -118,6 +118,9 @@ ALTER TABLE events ADD COLUMN packed BLOB; -- what a search tells, as bytes; bat
     "
 ALTER TABLE plans ADD COLUMN lost INTEGER NOT NULL DEFAULT 0; -- runs that ended with their process
 ",
+    "
+ALTER TABLE plans ADD COLUMN place INTEGER; -- in the queue as it was accepted; NULL where events has event 1
+",
 ];
 
 /// Bring the file up to this version; refuse those of a newer one.

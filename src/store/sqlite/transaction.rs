@@ -81,7 +81,7 @@ impl Transaction<'_> {
     }
 
     /// Write a batch of events; the plan's row must be there.
-    pub(super) fn keep(&mut self, row: &PlanRow, batch: &Batch) -> Result<(), StoreError> {
+    fn keep(&mut self, row: &PlanRow, batch: &Batch) -> Result<(), StoreError> {
         self.connection
             .prepare_cached(
                 "INSERT INTO events (plan_seq, last_id, first_id, batch, packed) VALUES (?1, ?2, ?3, ?4, ?5)",
@@ -98,6 +98,8 @@ impl Transaction<'_> {
         if row.last_event - row.forgotten <= kept.saturating_add(kept / 2) {
             return Ok(());
         }
+        // The first of all goes with the plan's row.
+        row.forgotten = row.forgotten.max(1);
         let oldest = (row.last_event - kept).cast_signed();
         let (last_id, bytes): (Option<i64>, Option<i64>) = self
             .connection
@@ -118,7 +120,7 @@ impl Transaction<'_> {
 }
 
 /// A row of the table of events.
-pub(super) struct Batch {
+struct Batch {
     first_id: i64,
     last_id: i64,
     text: String,
@@ -127,7 +129,7 @@ pub(super) struct Batch {
 
 impl Batch {
     /// The next events of a plan, counted in its row.
-    pub(super) fn of(row: &mut PlanRow, events: &[Event]) -> Result<Self, StoreError> {
+    fn of(row: &mut PlanRow, events: &[Event]) -> Result<Self, StoreError> {
         let packed = packed::pack(events);
         let text = match packed {
             Some(_) => String::new(),

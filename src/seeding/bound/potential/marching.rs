@@ -5,6 +5,16 @@ use std::collections::BinaryHeap;
 
 use super::mesh::{Mesh, PARTS, Triangle};
 
+/// Of each node of a triangle, the parts that have it, and which of their corners it is.
+const PARTS_ROUND: [&[(usize, usize)]; 6] = [
+    &[(0, 0)],
+    &[(1, 1)],
+    &[(2, 2)],
+    &[(0, 1), (1, 0), (3, 2)],
+    &[(1, 2), (2, 1), (3, 0)],
+    &[(0, 2), (2, 0), (3, 1)],
+];
+
 /// What the cheapest way from the node `from` to each node costs where a metre in the parts of a triangle costs
 /// `prices`; infinite where none leads.
 pub(super) fn march(mesh: &Mesh, prices: &[[f64; 4]], from: usize) -> Vec<f64> {
@@ -25,10 +35,8 @@ pub(super) fn march(mesh: &Mesh, prices: &[[f64; 4]], from: usize) -> Vec<f64> {
         is_known[node] = true;
         for &(triangle, which) in mesh.round(node) {
             let (nodes, shape) = (&mesh.triangles[triangle].nodes, &shapes[triangle]);
-            for (part, price) in PARTS.iter().zip(prices[triangle]) {
-                let Some(here) = part.iter().position(|corner| *corner == which) else {
-                    continue;
-                };
+            for &(part, here) in PARTS_ROUND[which] {
+                let (part, price) = (PARTS[part], prices[triangle][part]);
                 for (next, third) in [
                     ((here + 1) % 3, (here + 2) % 3),
                     ((here + 2) % 3, (here + 1) % 3),
@@ -123,6 +131,16 @@ mod tests {
             .collect();
         let middle = |[a, b, c]: &[Point2; 3]| Point2::from((a.coords + b.coords + c.coords) / 3.0);
         Mesh::new(&vertices, |corners| left_out(middle(corners))).expect("they are apart")
+    }
+
+    #[test]
+    fn every_part_is_round_each_of_its_corners() {
+        for (part, nodes) in PARTS.iter().enumerate() {
+            for (corner, node) in nodes.iter().enumerate() {
+                assert!(PARTS_ROUND[*node].contains(&(part, corner)));
+            }
+        }
+        assert_eq!(PARTS_ROUND.map(<[_]>::len).iter().sum::<usize>(), 12);
     }
 
     #[test]

@@ -115,7 +115,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let coarse = if warm || low {
         settings.waypoints
     } else {
-        bends(model, &shapes).min(settings.waypoints)
+        bends(model, &shapes, hopeless).min(settings.waypoints)
     };
     let mut starts = Starts {
         routes: Vec::new(),
@@ -188,8 +188,8 @@ fn refine(
     *priced = refined;
 }
 
-/// Bends of the routes that may still win, at most.
-fn bends(model: &Model, shapes: &[Vec<Point3>]) -> usize {
+/// Bends of the routes that may still win, at most: those that are less than `hopeless` dearer than the best.
+fn bends(model: &Model, shapes: &[Vec<Point3>], hopeless: f64) -> usize {
     let priced: Vec<(Fitness, usize)> = shapes
         .iter()
         .map(|route| (price(model, route), route.len() - 2))
@@ -207,7 +207,7 @@ fn bends(model: &Model, shapes: &[Vec<Point3>]) -> usize {
     priced
         .into_iter()
         .filter(|(fitness, _)| {
-            fitness.violation <= best.violation && fitness.cost <= best.cost * (1.0 + HOPELESS)
+            fitness.violation <= best.violation && fitness.cost <= best.cost * (1.0 + hopeless)
         })
         .map(|(_, bends)| bends)
         .fold(least, usize::max)

@@ -42,13 +42,13 @@ pub fn cheap_ways(scenario: &Scenario, height: f64, most: usize) -> Vec<Vec<Poin
     let Some(priced) = Priced::over(&vertices, &zones, &spacing) else {
         return Vec::new();
     };
-    let known: Vec<&Wall> = zones.counted().collect();
+    let told_apart: Vec<&Wall> = zones.counted().collect();
     let ways = Ways {
         costs: priced.costs(),
         priced,
     };
     let to_scenario = |at: Point2| at + plane.origin;
-    ways.differing(&known, most)
+    ways.differing(&told_apart, most)
         .into_iter()
         .map(|way| way.into_iter().map(to_scenario).collect())
         .collect()

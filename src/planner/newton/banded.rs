@@ -6,7 +6,7 @@ const REACH: usize = 8;
 /// A symmetric matrix, its lower half: of each row the entries up to the diagonal, which is the last.
 #[derive(Clone)]
 pub(super) struct Banded {
-    rows: Vec<[f64; REACH + 1]>,
+    pub(super) rows: Vec<[f64; REACH + 1]>,
 }
 
 impl Banded {
@@ -39,9 +39,13 @@ impl Banded {
         product
     }
 
-    /// The solution for `right` when `shift` is added to the diagonal; `None` unless all is positive then.
-    pub(super) fn solve(&self, shift: f64, right: &[f64]) -> Option<Vec<f64>> {
-        let factor = self.factor(shift)?;
+    /// The solution for `right` when `shifts` are added to the diagonal; `None` unless all is positive then.
+    pub(super) fn solve(
+        &self,
+        shifts: impl Iterator<Item = f64>,
+        right: &[f64],
+    ) -> Option<Vec<f64>> {
+        let factor = self.factor(shifts)?;
         let mut solution = right.to_vec();
         for i in 0..solution.len() {
             for j in i.saturating_sub(REACH)..i {
@@ -59,9 +63,9 @@ impl Banded {
     }
 
     /// Cholesky's factor.
-    fn factor(&self, shift: f64) -> Option<Vec<[f64; REACH + 1]>> {
+    fn factor(&self, shifts: impl Iterator<Item = f64>) -> Option<Vec<[f64; REACH + 1]>> {
         let mut factor = self.rows.clone();
-        for i in 0..factor.len() {
+        for (i, shift) in (0..factor.len()).zip(shifts) {
             factor[i][REACH] += shift;
             let first = i.saturating_sub(REACH);
             for j in first..=i {
@@ -86,6 +90,7 @@ impl Banded {
 mod tests {
     use super::*;
     use crate::optimizer::Random;
+    use std::iter::repeat;
 
     #[test]
     fn solutions_solve() {
@@ -103,12 +108,12 @@ mod tests {
                 }
             }
             let right: Vec<f64> = (0..size).map(|_| random.between(-5.0, 5.0)).collect();
-            let solution = matrix.solve(0.5, &right).expect("positive");
+            let solution = matrix.solve(repeat(0.5), &right).expect("positive");
             let product = matrix.times(&solution);
             for ((own, product), right) in solution.iter().zip(product).zip(&right) {
                 assert!((product + 0.5 * own - right).abs() < 1e-12, "{size}");
             }
-            assert!(matrix.solve(-40.0, &right).is_none());
+            assert!(matrix.solve(repeat(-40.0), &right).is_none());
         }
     }
 }

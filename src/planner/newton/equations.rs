@@ -10,6 +10,8 @@ pub(super) struct Equations {
     pub(super) matrix: Banded,
     /// Negative first ones.
     pub(super) down: Vec<f64>,
+    /// How much what a coordinate costs bends with it, all bends counting alike.
+    pub(super) stiffness: Vec<f64>,
 }
 
 impl Equations {
@@ -18,6 +20,7 @@ impl Equations {
             free,
             matrix: Banded::zero(3 * free),
             down: vec![0.0; 3 * free],
+            stiffness: vec![0.0; 3 * free],
         }
     }
 
@@ -39,6 +42,7 @@ impl Equations {
                 continue;
             };
             self.down[row] -= gradient[i];
+            self.stiffness[row] += curvature[i][i].abs();
             for (j, value) in curvature[i].iter().enumerate() {
                 if let Some(column) = self.unknown(first, j) {
                     self.matrix.add(row, column, *value);

@@ -3,6 +3,7 @@
 use super::Place;
 use crate::cost::batch::{LANES, PointRow, Price, Pricer, Row};
 use crate::geometry::Point3;
+use nalgebra::{Cholesky, Matrix6, SymmetricEigen};
 
 /// East, north and up, of both ends of a leg.
 pub(super) const ENDS: usize = 6;
@@ -52,6 +53,9 @@ const MIXED: [(usize, usize, usize, usize); 15] = [
 
 /// Legs that are priced for the derivatives of one.
 pub(super) const LEGS_EACH: u64 = (FIRST.len() + MIXED.len()) as u64;
+
+/// What bends the other way by no more than this share of the most is as good as flat.
+const FLAT: f64 = 1e-2;
 
 /// A leg by its ends.
 #[derive(Clone, Copy)]
@@ -117,6 +121,7 @@ impl Legs<'_, '_> {
             let value = (both.0 - apart + own.0) / (step * step);
             (slopes.curvature[i][j], slopes.curvature[j][i]) = (value, value);
         }
+        slopes.curvature = convex(&slopes.curvature);
         slopes
     }
 
@@ -176,6 +181,22 @@ impl Legs<'_, '_> {
         };
         ends.iter().enumerate().map(of).collect()
     }
+}
+
+/// `curvature` without what bends the other way. Where a leg touches the edge of a soft zone, what it costs has no second
+/// derivative, and differences along both of two coordinates may see a zone that those along each do not.
+fn convex(curvature: &[[f64; ENDS]; ENDS]) -> [[f64; ENDS]; ENDS] {
+    let matrix = Matrix6::from_fn(|i, j| curvature[i][j]);
+    let greatest = matrix.diagonal().amax();
+    if Cholesky::new(matrix + Matrix6::identity() * (FLAT * greatest)).is_some() {
+        return *curvature;
+    }
+    let mut eigen = SymmetricEigen::new(matrix);
+    for value in &mut eigen.eigenvalues {
+        *value = value.max(0.0);
+    }
+    let convex = eigen.recompose();
+    std::array::from_fn(|i| std::array::from_fn(|j| convex[(i, j)]))
 }
 
 /// Less is rounding, metres.

@@ -1,5 +1,7 @@
 //! The last micrometres: from a route that is all but within its limits to one that is.
 
+use std::iter::repeat;
+
 use super::equations::{Equations, advance};
 use super::legs::LEGS_EACH;
 use super::limits::{Limit, Limits};
@@ -15,18 +17,6 @@ const MARGIN: f64 = 5e-9;
 const LEAST: f64 = 1e-9;
 
 impl Newton<'_, '_> {
-    /// Put heights that are `near` the middle of the band there: its kink was rounded off.
-    pub(super) fn settle(&self, places: &mut [Place], near: f64) {
-        let band = self.model.scenario.altitude;
-        let middle = 0.5 * (band.min + band.max);
-        let last = places.len() - 1;
-        for place in &mut places[1..last] {
-            if (place.at.z - middle).abs() < near {
-                place.at.z = middle;
-            }
-        }
-    }
-
     /// Move `places` as little as brings them within `all` limits: Gauss and Newton's method on what is beyond.
     pub(super) fn mend(&mut self, places: &mut [Place], limits: &Limits, all: &[Limit]) {
         let margin = MARGIN * self.way();
@@ -57,7 +47,7 @@ impl Newton<'_, '_> {
             if !is_beyond {
                 break;
             }
-            let Some(step) = equations.matrix.solve(LEAST, &equations.down) else {
+            let Some(step) = equations.matrix.solve(repeat(LEAST), &equations.down) else {
                 break;
             };
             advance(places, &step);

@@ -4,7 +4,6 @@ use super::equations::Equations;
 use super::legs::LEGS_EACH;
 use super::limits::{self, Limit, Limits, NEAR};
 use super::{Newton, Place};
-use crate::geometry::Point3;
 
 /// What the method makes smaller, at one place.
 pub(super) struct Merit {
@@ -18,27 +17,20 @@ pub(super) struct Prices {
     pub(super) limits: Vec<Limit>,
     pub(super) multipliers: Vec<f64>,
     pub(super) rate: f64,
-    /// Kinks of the altitude cost are rounded off so far about, metres.
-    pub(super) rounding: f64,
+    /// What being off the middle of the band is felt to cost at each point, a metre: at the kink, anything up to its weight
+    /// to either side.
+    pub(super) lifts: Vec<f64>,
 }
 
 impl Prices {
     /// Of a route of so many points, ends included, before any limit is felt.
-    pub(super) fn new(points: usize, rate: f64, rounding: f64) -> Self {
+    pub(super) fn new(points: usize, rate: f64) -> Self {
         let limits = limits::all(points);
         Self {
             multipliers: vec![0.0; limits.len()],
             limits,
             rate,
-            rounding,
-        }
-    }
-
-    /// Feel each limit by as much as `route` is beyond it.
-    pub(super) fn feel(&mut self, limits: &Limits, places: &[Place], route: &[Point3]) {
-        for (limit, multiplier) in self.limits.iter().zip(&mut self.multipliers) {
-            let beyond = limits.beyond(*limit, places, route);
-            *multiplier = (*multiplier + self.rate * beyond).max(0.0);
+            lifts: vec![0.0; points],
         }
     }
 
@@ -60,6 +52,29 @@ impl Prices {
 }
 
 impl Newton<'_, '_> {
+    /// Feel each limit by as much as `places` are beyond it, and heights by how far they are off the middle of the band.
+    pub(super) fn feel(&self, limits: &Limits, places: &[Place], prices: &mut Prices) {
+        let route = self.route(places);
+        for (limit, multiplier) in prices.limits.iter().zip(&mut prices.multipliers) {
+            let beyond = limits.beyond(*limit, places, &route);
+            *multiplier = (*multiplier + prices.rate * beyond).max(0.0);
+        }
+        for (place, lift) in places.iter().zip(&mut prices.lifts) {
+            [_, *lift, _] = self.altitude(place, *lift, prices.rate);
+        }
+    }
+
+    /// Put heights in the middle of the band that its kink holds there.
+    pub(super) fn settle(&self, places: &mut [Place], lifts: &[f64]) {
+        let last = places.len() - 1;
+        for (place, lift) in places[1..last].iter_mut().zip(free(lifts)) {
+            let [off, weight] = self.off(place);
+            if lift.abs() < weight {
+                place.at.z -= off;
+            }
+        }
+    }
+
     pub(super) fn merit(&mut self, places: &[Place], limits: &Limits, prices: &Prices) -> Merit {
         self.evaluations += 1;
         let route = self.route(places);
@@ -71,8 +86,12 @@ impl Newton<'_, '_> {
             merit.value += cost + 0.5 * prices.rate * beyond * beyond;
             merit.worst = merit.worst.max(beyond);
         }
-        for place in &places[1..places.len() - 1] {
-            merit.value += self.altitude(place, prices)[0];
+        for (place, lift) in free(places).iter().zip(free(&prices.lifts)) {
+            let [value, _, stiffness] = self.altitude(place, *lift, prices.rate);
+            merit.value += value;
+            if stiffness > 0.0 {
+                merit.worst = merit.worst.max(self.off(place)[0].abs());
+            }
         }
         for (limit, multiplier) in prices.limits.iter().zip(&prices.multipliers) {
             let beyond = limits.beyond(*limit, places, &route);
@@ -90,8 +109,7 @@ impl Newton<'_, '_> {
         limits: &Limits,
         prices: &Prices,
     ) -> Equations {
-        let free = places.len() - 2;
-        let mut equations = Equations::new(free);
+        let mut equations = Equations::new(places.len() - 2);
         let slopes = self.legs().slopes(places);
         self.evaluations += LEGS_EACH;
         for (leg, slopes) in slopes.iter().enumerate() {
@@ -100,8 +118,8 @@ impl Newton<'_, '_> {
                 equations.press(leg, &slopes.away, prices.rate * slopes.beyond, prices.rate);
             }
         }
-        for (idx, place) in places[1..=free].iter().enumerate() {
-            let [_, slope, curvature] = self.altitude(place, prices);
+        for (idx, (place, lift)) in free(places).iter().zip(free(&prices.lifts)).enumerate() {
+            let [_, slope, curvature] = self.altitude(place, *lift, prices.rate);
             equations.down[3 * idx + 2] -= slope;
             equations.matrix.add(3 * idx + 2, 3 * idx + 2, curvature);
         }
@@ -119,17 +137,26 @@ impl Newton<'_, '_> {
         equations
     }
 
-    /// The altitude cost of a waypoint, its kink rounded off, and its derivatives by the height.
-    fn altitude(&self, place: &Place, prices: &Prices) -> [f64; 3] {
-        let scenario = self.model.scenario;
-        let off = place.at.z - 0.5 * (scenario.altitude.min + scenario.altitude.max);
-        let round = prices.rounding;
-        let far = (off * off + round * round).sqrt();
-        let weight = scenario.weights.altitude;
-        [
-            weight * far,
-            weight * off / far,
-            weight * round * round / (far * far * far),
-        ]
+    /// What the height of a waypoint costs, and its derivatives by it. The kink in the middle of the band is felt like
+    /// limits to both sides, but for no more than the weight.
+    fn altitude(&self, place: &Place, lift: f64, rate: f64) -> [f64; 3] {
+        let [off, weight] = self.off(place);
+        let felt = lift + rate * off;
+        let force = felt.clamp(-weight, weight);
+        let more = force - lift;
+        let value = force * off - more * more / (2.0 * rate);
+        [value, force, if felt.abs() < weight { rate } else { 0.0 }]
     }
+
+    /// How far a waypoint is above the middle of the band, and what a metre of that costs.
+    fn off(&self, place: &Place) -> [f64; 2] {
+        let scenario = self.model.scenario;
+        let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max);
+        [place.at.z - middle, scenario.weights.altitude]
+    }
+}
+
+/// All but the first and the last.
+fn free<T>(of: &[T]) -> &[T] {
+    &of[1..of.len() - 1]
 }

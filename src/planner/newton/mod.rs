@@ -43,11 +43,14 @@ struct Place {
 const ROUNDS: usize = 14;
 
 /// A route that costs more than another by this share is given up as dear, after so many rounds.
-const HOPE: f64 = 0.02;
+const HOPE: f64 = 0.003;
 const SURE: usize = 2;
 
-/// No round begins with a damping greater than this, in metres flown over the hundredth of the way.
-const STIFFEST: f64 = 1e6;
+/// A search begins with this damping, as a share of how much the cost bends with each coordinate,
+const DAMPING: f64 = 0.1;
+
+/// and no round with a greater one.
+const MOST_DAMPING: f64 = 1e2;
 
 /// Where breaches shrink to no less than this share, time after time, no way within the limits is near.
 const LOST: f64 = 0.7;
@@ -68,8 +71,11 @@ const RATES: [f64; 2] = [5.0, 500.0];
 /// A metre flown counts this share of the other weights at least, in the scales of the method.
 const FREE: f64 = 0.01;
 
+/// How many times as dear breaches become that have not shrunk to a quarter.
+const DEARER: f64 = 3.0;
+
 /// What is gained in a round that is worth another, as a share of the cost.
-const WORTH: f64 = 1e-6;
+const WORTH: f64 = 3e-6;
 
 /// Searches for the best route near one.
 pub(super) struct Newton<'m, 's> {
@@ -105,24 +111,32 @@ impl<'m, 's> Newton<'m, 's> {
                 break;
             }
         }
+        self.deal(route, &mut best, &mut forces);
         for other in others {
-            if !self.is_spent() {
-                let found = self.search(other, RATES[0], known(best));
-                self.take(found, route, &mut best, &mut forces);
+            if self.is_spent() {
+                break;
             }
-        }
-        let mut better = !forces.is_empty();
-        while better {
-            better = false;
-            for deal in deals(&forces, route) {
-                if better || self.is_spent() {
-                    break;
-                }
-                let found = self.search(&deal, RATES[0], known(best));
-                better = self.take(found, route, &mut best, &mut forces);
+            let found = self.search(other, RATES[0], known(best));
+            if self.take(found, route, &mut best, &mut forces) {
+                self.deal(route, &mut best, &mut forces);
             }
         }
         best
+    }
+
+    /// Put waypoints of `route` where limits are felt, for as long as that makes it better.
+    fn deal(&mut self, route: &mut Vec<Point3>, best: &mut Fitness, forces: &mut Vec<f64>) {
+        let mut better = !forces.is_empty();
+        while better {
+            better = false;
+            for deal in deals(forces, route) {
+                if better || self.is_spent() {
+                    break;
+                }
+                let found = self.search(&deal, RATES[0], known(*best));
+                better = self.take(found, route, best, forces);
+            }
+        }
     }
 
     /// Whether as much was priced as the bats were asked to.
@@ -157,13 +171,9 @@ impl<'m, 's> Newton<'m, 's> {
     fn search(&mut self, route: &[Point3], rate: f64, known: f64) -> (Vec<Point3>, Vec<f64>) {
         let way = self.way();
         let limits = Limits::of(self.model, route.len() - 2);
-        // A metre flown, over the hundredth of the way; where fuel is for nothing, a little of what else counts.
-        let weights = &self.model.scenario.weights;
-        let least = FREE * weights.threat.max(weights.altitude);
-        let dear = metre(self.model.scenario).max(least) / (1e-2 * way);
-        let mut prices = Prices::new(route.len(), rate * dear, 1e-3 * way);
+        let mut prices = Prices::new(route.len(), rate * self.dear());
         let mut places = self.places(route);
-        let mut damping = dear;
+        let mut damping = DAMPING;
         let (mut worst, mut cost, mut lost) = (f64::INFINITY, f64::INFINITY, 0);
         for round in 0..ROUNDS {
             let merit = self.descend(&mut places, &limits, &prices, &mut damping);
@@ -172,14 +182,14 @@ impl<'m, 's> Newton<'m, 's> {
             if is_dear || why_stop(self.model.scenario, self.stop).is_some() {
                 break;
             }
-            prices.feel(&limits, &places, &self.route(&places));
-            damping = damping.min(STIFFEST * dear);
+            self.feel(&limits, &places, &mut prices);
+            damping = damping.min(MOST_DAMPING);
             let gained = (cost - merit.value).abs();
             if merit.worst < KEPT * way && gained < WORTH * merit.value.abs() {
                 break;
             }
             if merit.worst > 0.25 * worst {
-                prices.rate *= 5.0;
+                prices.rate *= DEARER;
                 lost = if merit.worst > LOST * worst {
                     lost + 1
                 } else {
@@ -190,9 +200,8 @@ impl<'m, 's> Newton<'m, 's> {
                 }
             }
             (worst, cost) = (merit.worst, merit.value);
-            prices.rounding = (0.3 * prices.rounding).max(1e-7 * way);
         }
-        self.settle(&mut places, 20.0 * prices.rounding);
+        self.settle(&mut places, &prices.lifts);
         self.mend(&mut places, &limits, &prices.limits);
         (self.route(&places), prices.felt(route.len() - 1))
     }
@@ -204,6 +213,13 @@ impl<'m, 's> Newton<'m, 's> {
             min_leg: self.model.scenario.vehicle.min_leg,
             tolerance: self.model.tolerance.scaled(PRICED_FROM).length_m,
         }
+    }
+
+    /// A metre flown, over the hundredth of the way; where fuel is for nothing, a little of what else counts.
+    fn dear(&self) -> f64 {
+        let weights = &self.model.scenario.weights;
+        let least = FREE * weights.threat.max(weights.altitude);
+        metre(self.model.scenario).max(least) / (1e-2 * self.way())
     }
 
     fn way(&self) -> f64 {

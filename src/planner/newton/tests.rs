@@ -43,15 +43,20 @@ fn arc(scenario: &Scenario, free: usize, bulge: f64, off: f64, random: &mut Rand
 #[test]
 fn derivatives_are_those_of_the_merit() {
     let mut random = Random::new(11);
-    for (scenario, accuracy) in [(stiff(), 1e-2), (hilly_scenario(), 0.15)] {
+    let mut free = stiff();
+    free.threats.clear();
+    for (scenario, accuracy) in [(free, 1e-2), (stiff(), 1e-2), (hilly_scenario(), 0.15)] {
         let model = Model::new(&scenario);
         let mut newton = Newton::new(&model, &Nobody);
         for _ in 0..20 {
             let route = arc(&scenario, 6, 300.0, 25.0, &mut random);
             let limits = Limits::of(&model, 6);
-            let mut prices = Prices::new(route.len(), 0.05, 5.0);
+            let mut prices = Prices::new(route.len(), 0.05);
             for multiplier in &mut prices.multipliers {
                 *multiplier = random.between(0.0, 0.3);
+            }
+            for lift in &mut prices.lifts {
+                *lift = random.between(-1.0, 1.0);
             }
             let mut places = newton.places(&route);
             let equations = newton.equations(&mut places, &limits, &prices);
@@ -83,10 +88,11 @@ fn derivatives_are_those_of_the_merit() {
                 .map(|(one, other)| one * other)
                 .sum();
             let scale = 1.0 + bend.abs().max(expected.abs());
-            assert!(
-                (bend - expected).abs() < accuracy * scale,
-                "{bend} {expected}"
-            );
+            assert!(bend - expected < accuracy * scale, "{bend} {expected}");
+            // What bends the other way in soft zones and over hills is left out.
+            if scenario.threats.is_empty() && scenario.terrain.is_flat() {
+                assert!(expected - bend < accuracy * scale, "{bend} {expected}");
+            }
         }
     }
 }

@@ -41,6 +41,9 @@ const MOST_LEVELS: usize = 24;
 /// Where the string itself, with its climbs, is not this many times as dear as what is known, a potential promises nothing.
 const WORTHWHILE: f64 = 1.02;
 
+/// A potential that proves so many times what strings do leaves nothing to the legs of these.
+const BEYOND_STRINGS: f64 = 1.04;
+
 /// A proven lower bound on the total cost of any feasible route from start to target, Eq. 1; 0
 /// where fuel costs nothing. The argument is in docs/BOUND.md.
 #[must_use]
@@ -151,8 +154,12 @@ fn crossing(field: &Field, events: &[Event], used: &[Event], known: f64) -> f64 
     let over = |proof| ends::over(proof, scenario, prices, walls, stop);
     if let Some(proof) = prove(known) {
         let dense = proof.total();
-        let level = prices.climbing_at(dense);
-        return level.max(legs(field, events, dense)).max(over(proof));
+        let level = prices.climbing_at(dense).max(over(proof));
+        // Legs of strings that are far too cheap prove nothing.
+        if dense > BEYOND_STRINGS * known {
+            return level;
+        }
+        return level.max(legs(field, events, dense));
     }
     let known = known.max(legs(field, events, 0.0));
     // Not for its own sake, but for what the legs that leave the ends cost beyond it: by bending later, a route may climb

@@ -2,7 +2,7 @@
 //! quadratic are made to share it with those about them.
 
 use super::mesh::Mesh;
-use super::slopes::{gradients, response, steepness};
+use super::slopes::{gradients, response};
 
 /// Times that the places are gone over, at most.
 const SWEEPS: usize = 20;
@@ -16,9 +16,16 @@ const BEYOND: f64 = 0.999;
 /// Change `values` but for those of the first `fixed` nodes so that triangles are no steeper than their `limits`, as
 /// far as it goes: by Newton's method for each node alone, on the squares of what is too much.
 pub(super) fn ease(mesh: &Mesh, limits: &[[f64; 6]], values: &mut [f64], fixed: usize) {
+    // Of slopes that are allowed.
+    let squares: Vec<[f64; 6]> = limits
+        .iter()
+        .map(|limits| limits.map(|limit| limit * limit * (ENOUGH * ENOUGH)))
+        .collect();
     let is_steep = |triangle: usize, values: &[f64]| {
         let of = &mesh.triangles[triangle];
-        steepness(of, &limits[triangle], &of.of(values)) > ENOUGH
+        let gradients = gradients(of, &of.of(values));
+        let mut each = gradients.iter().zip(&squares[triangle]);
+        each.any(|(gradient, allowed)| gradient.norm_squared() > *allowed)
     };
     let mut asked: Vec<usize> = (0..mesh.triangles.len()).collect();
     // In which sweep each was met last.
@@ -36,7 +43,7 @@ pub(super) fn ease(mesh: &Mesh, limits: &[[f64; 6]], values: &mut [f64], fixed: 
             if node < fixed || std::mem::replace(&mut met.0[node], sweep) == sweep {
                 continue;
             }
-            values[node] -= excess(mesh, limits, values, node);
+            values[node] -= excess(mesh, &squares, values, node);
             for &(triangle, _) in mesh.round(node) {
                 if std::mem::replace(&mut met.1[triangle], sweep) != sweep {
                     next.push(triangle);
@@ -48,12 +55,12 @@ pub(super) fn ease(mesh: &Mesh, limits: &[[f64; 6]], values: &mut [f64], fixed: 
 }
 
 /// By how much the value of `node` is too high for the slopes about it, as one step of Newton's method sees it.
-fn excess(mesh: &Mesh, limits: &[[f64; 6]], values: &[f64], node: usize) -> f64 {
+fn excess(mesh: &Mesh, squares: &[[f64; 6]], values: &[f64], node: usize) -> f64 {
     let (mut slope, mut curvature) = (0.0, 0.0);
     for &(triangle, which) in mesh.round(node) {
         let of = &mesh.triangles[triangle];
         let gradients = gradients(of, &of.of(values));
-        let allowed = limits[triangle].map(|limit| limit * limit * (ENOUGH * ENOUGH * BEYOND));
+        let allowed = squares[triangle].map(|square| square * BEYOND);
         let is_too_steep = |at: usize| gradients[at].norm_squared() > allowed[at];
         if !(0..6).any(is_too_steep) {
             continue;
@@ -75,6 +82,7 @@ fn excess(mesh: &Mesh, limits: &[[f64; 6]], values: &[f64], node: usize) -> f64 
 
 #[cfg(test)]
 mod tests {
+    use super::super::slopes::steepness;
     use super::*;
     use crate::geometry::Point2;
 

@@ -15,14 +15,17 @@ const PARTS_ROUND: [&[(usize, usize)]; 6] = [
     &[(0, 2), (2, 0), (3, 1)],
 ];
 
-/// What the cheapest way from the node `from` to each node costs where a metre in the parts of a triangle costs
-/// `prices`; infinite where none leads.
-pub(super) fn march(mesh: &Mesh, prices: &[[f64; 4]], from: usize) -> Vec<f64> {
-    let shapes: Vec<Shape> = mesh
-        .triangles
-        .iter()
+/// What the cheapest ways from the first node and from the second to each node cost where a metre in the parts of a
+/// triangle costs `prices`; infinite where none leads.
+pub(super) fn march(mesh: &Mesh, prices: &[[f64; 4]]) -> [Vec<f64>; 2] {
+    let triangles = mesh.triangles.iter();
+    let shapes: Vec<Shape> = triangles
         .map(|triangle| Shape::of(mesh, triangle))
         .collect();
+    [0, 1].map(|end| march_from(end, mesh, &shapes, prices))
+}
+
+fn march_from(from: usize, mesh: &Mesh, shapes: &[Shape], prices: &[[f64; 4]]) -> Vec<f64> {
     let mut costs = vec![f64::INFINITY; mesh.nodes.len()];
     let mut is_known = vec![false; mesh.nodes.len()];
     let mut heap = BinaryHeap::new();
@@ -47,7 +50,8 @@ pub(super) fn march(mesh: &Mesh, prices: &[[f64; 4]], from: usize) -> Vec<f64> {
                     }
                     // A side between two corners is named for the third.
                     let straight = costs[node] + price * shape.sides[third];
-                    let cost = if is_known[beside] {
+                    let least = costs[node].min(costs[beside]) + price * shape.feet[next][1];
+                    let cost = if is_known[beside] && least < costs[reached] {
                         let side = if here == (next + 1) % 3 {
                             [node, beside]
                         } else {
@@ -146,7 +150,7 @@ mod tests {
     #[test]
     fn as_far_as_the_straight_line() {
         let mesh = square(20, |_| false);
-        let costs = march(&mesh, &vec![[3.0; 4]; mesh.triangles.len()], 0);
+        let [costs, _] = march(&mesh, &vec![[3.0; 4]; mesh.triangles.len()]);
         for (node, cost) in mesh.nodes.iter().zip(&costs) {
             let straight = 3.0 * node.coords.norm();
             assert!(
@@ -160,7 +164,7 @@ mod tests {
     fn round_what_is_left_out() {
         // A wall with a way round its upper end.
         let mesh = square(20, |at| (10.0..11.0).contains(&at.x) && at.y < 15.0);
-        let costs = march(&mesh, &vec![[1.0; 4]; mesh.triangles.len()], 0);
+        let [costs, _] = march(&mesh, &vec![[1.0; 4]; mesh.triangles.len()]);
         let to = mesh
             .nodes
             .iter()
@@ -170,7 +174,7 @@ mod tests {
         assert!((round..1.06 * round).contains(&cost), "{cost} {round}");
         // Nothing leads into what is walled in.
         let mesh = square(20, |at| (10.0..11.0).contains(&at.x));
-        let costs = march(&mesh, &vec![[1.0; 4]; mesh.triangles.len()], 0);
+        let [costs, _] = march(&mesh, &vec![[1.0; 4]; mesh.triangles.len()]);
         assert!(costs.iter().any(|cost| cost.is_infinite()));
     }
 }

@@ -44,7 +44,7 @@ impl Priced {
 
     /// What the cheapest ways to each node cost from either end, about.
     pub(super) fn costs(&self) -> [Vec<f64>; 2] {
-        [0, 1].map(|end| marching::march(&self.mesh, &self.prices, end))
+        marching::march(&self.mesh, &self.prices)
     }
 
     /// A potential that is hardly anywhere steeper than the limits.

@@ -5,7 +5,7 @@
 //! leg and by how many they have: A*, with what the rest costs at least with as many legs as are left, turns apart.
 
 use std::cmp::Reverse;
-use std::collections::{BinaryHeap, HashMap};
+use std::collections::BinaryHeap;
 
 /// Legs between numbered places, of which the first is the start and the last the target.
 pub(super) trait Legs {
@@ -50,8 +50,7 @@ pub(super) fn chains(
         cost: 0.0,
     }];
     let mut open = BinaryHeap::from([Reverse((rest[most][0].to_bits(), 0))]);
-    // By the last leg: what those cost that went on from it, and how many they had.
-    let mut known: HashMap<(usize, usize), Vec<(f64, usize)>> = HashMap::new();
+    let mut known = Known::new(target + 1, most);
     for _ in 0..effort {
         let Some(Reverse((_, idx))) = open.pop() else {
             break;
@@ -59,12 +58,10 @@ pub(super) fn chains(
         let chain: Chain = all[idx];
         let before = all[chain.before].place;
         if idx > 0 {
-            let others = known.entry((before, chain.place)).or_default();
-            let is_worse = |&(cost, legs): &(f64, usize)| cost <= chain.cost && legs <= chain.legs;
-            if legs.cost(before, chain.place).is_infinite() || others.iter().any(is_worse) {
+            let is_undercut = known.least(before, &chain) < chain.cost;
+            if is_undercut || legs.cost(before, chain.place).is_infinite() {
                 continue;
             }
-            others.push((chain.cost, chain.legs));
         }
         if chain.place == target {
             if is_last(traced(&all, idx)) {
@@ -78,17 +75,58 @@ pub(super) fn chains(
         }
         let onward = legs.onward(chain.place).iter().zip(&rest[left - 1]);
         for (next, (leg, rest)) in onward.enumerate().skip(1) {
-            let cost = chain.cost + leg;
-            let least = cost + rest;
-            if least.is_finite() && (idx == 0 || legs.may_turn([before, chain.place, next])) {
+            let further = Chain {
+                place: next,
+                before: idx,
+                legs: chain.legs + 1,
+                cost: chain.cost + leg,
+            };
+            let least = further.cost + rest;
+            if least.is_finite()
+                && further.cost < known.least(chain.place, &further)
+                && (idx == 0 || legs.may_turn([before, chain.place, next]))
+            {
+                known.note(chain.place, &further);
                 open.push(Reverse((least.to_bits(), all.len())));
-                all.push(Chain {
-                    place: next,
-                    before: idx,
-                    legs: chain.legs + 1,
-                    cost,
-                });
+                all.push(further);
             }
+        }
+    }
+}
+
+/// What chains cost that are known, by their last leg and by how many they have.
+struct Known {
+    places: usize,
+    most: usize,
+    /// Of each place that chains go on from: by the next, what the cheapest of at most 0, 1, … legs costs.
+    onward: Vec<Vec<f64>>,
+}
+
+impl Known {
+    fn new(places: usize, most: usize) -> Self {
+        Self {
+            places,
+            most,
+            onward: vec![Vec::new(); places],
+        }
+    }
+
+    /// What the cheapest costs that comes from the place `from` to where `chain` ends, in no more legs.
+    fn least(&self, from: usize, chain: &Chain) -> f64 {
+        let onward = &self.onward[from];
+        let idx = chain.place * (self.most + 1) + chain.legs;
+        onward.get(idx).copied().unwrap_or(f64::INFINITY)
+    }
+
+    /// Know a `chain` that comes from the place `from`.
+    fn note(&mut self, from: usize, chain: &Chain) {
+        let counts = self.most + 1;
+        let onward = &mut self.onward[from];
+        if onward.is_empty() {
+            *onward = vec![f64::INFINITY; self.places * counts];
+        }
+        for least in &mut onward[chain.place * counts..][chain.legs..counts] {
+            *least = least.min(chain.cost);
         }
     }
 }

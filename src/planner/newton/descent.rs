@@ -37,79 +37,85 @@ impl Newton<'_, '_> {
         damping: &mut f64,
     ) -> Merit {
         let mut merit = self.merit(places, limits, prices);
-        let mut growth = 2.0;
-        let soft = SOFT * self.dear();
         for _ in 0..STEPS {
-            let Equations {
-                matrix,
-                down,
-                stiffness,
-                ..
-            } = self.equations(places, limits, prices);
-            let shifts = |damping: f64| stiffness.iter().map(move |stiff| damping * (stiff + soft));
-            let mut gained = None;
-            for _ in 0..TRIES {
-                let Some(step) = matrix.solve(shifts(*damping), &down) else {
-                    *damping *= growth;
-                    growth *= 2.0;
-                    continue;
-                };
-                let expected: f64 = step
-                    .iter()
-                    .zip(&down)
-                    .zip(shifts(*damping))
-                    .map(|((step, down), shift)| 0.5 * step * (shift * step + down))
-                    .sum();
-                if expected < NO_GAIN * merit.value.abs() {
-                    return merit;
-                }
-                let mut trial = places.clone();
-                advance(&mut trial, &step);
-                let next = self.merit(&trial, limits, prices);
-                let ratio = (merit.value - next.value) / expected;
-                if ratio > TAKEN {
-                    (*places, merit) = (trial, next);
-                    if ratio > AHEAD {
-                        self.go_on(places, &mut merit, &step, limits, prices);
-                    }
-                    gained = Some(ratio);
-                    break;
-                }
-                *damping *= growth;
-                growth *= 2.0;
-            }
-            let Some(ratio) = gained else {
+            let equations = self.equations(places, limits, prices);
+            let way = (limits, prices);
+            let Some(ratio) = self.step(&equations, places, &mut merit, way, damping) else {
                 break;
             };
             let cube = 2.0 * ratio - 1.0;
             *damping *= (1.0 - cube * cube * cube).clamp(0.2, 2.0);
             *damping = damping.max(LEAST_DAMPING);
-            growth = 2.0;
         }
         merit
+    }
+
+    /// Damp a step until it gains, take it, and tell how many times what was expected it gains; `None` where too little
+    /// is expected of any.
+    fn step(
+        &mut self,
+        equations: &Equations,
+        places: &mut Vec<Place>,
+        merit: &mut Merit,
+        (limits, prices): (&Limits, &Prices),
+        damping: &mut f64,
+    ) -> Option<f64> {
+        let soft = SOFT * self.dear();
+        let mut growth = 2.0;
+        for _ in 0..TRIES {
+            if let Some((step, expected)) = equations.damped(*damping, soft) {
+                if expected < NO_GAIN * merit.value.abs() {
+                    return None;
+                }
+                let before = merit.value;
+                if self.gains(&step, TAKEN * expected, places, merit, (limits, prices)) {
+                    let ratio = (before - merit.value) / expected;
+                    if ratio > AHEAD {
+                        self.go_on(step, places, merit, (limits, prices));
+                    }
+                    return Some(ratio);
+                }
+            }
+            *damping *= growth;
+            growth *= 2.0;
+        }
+        None
     }
 
     /// Go on along `step`, twice as far each time, for as long as that gains.
     fn go_on(
         &mut self,
+        mut step: Vec<f64>,
         places: &mut Vec<Place>,
         merit: &mut Merit,
-        step: &[f64],
-        limits: &Limits,
-        prices: &Prices,
+        way: (&Limits, &Prices),
     ) {
-        let mut step = step.to_vec();
         for _ in 0..DOUBLINGS {
-            let mut trial = places.clone();
-            advance(&mut trial, &step);
-            let next = self.merit(&trial, limits, prices);
-            if next.value >= merit.value {
+            if !self.gains(&step, 0.0, places, merit, way) {
                 return;
             }
-            (*places, *merit) = (trial, next);
             for part in &mut step {
                 *part *= 2.0;
             }
         }
+    }
+
+    /// Whether `step` gains more than `least`; then it is taken.
+    fn gains(
+        &mut self,
+        step: &[f64],
+        least: f64,
+        places: &mut Vec<Place>,
+        merit: &mut Merit,
+        (limits, prices): (&Limits, &Prices),
+    ) -> bool {
+        let mut trial = places.clone();
+        advance(&mut trial, step);
+        let next = self.merit(&trial, limits, prices);
+        let gains = merit.value - next.value > least;
+        if gains {
+            (*places, *merit) = (trial, next);
+        }
+        gains
     }
 }

@@ -11,7 +11,7 @@ pub(super) struct Equations {
     /// Negative first ones.
     pub(super) down: Vec<f64>,
     /// How much what a coordinate costs bends with it, all bends counting alike.
-    pub(super) stiffness: Vec<f64>,
+    stiffness: Vec<f64>,
 }
 
 impl Equations {
@@ -62,6 +62,18 @@ impl Equations {
         let push = gradient.map(|slope| force * slope);
         let stiff = gradient.map(|one| gradient.map(|other| rate * one * other));
         self.add(first, &push, &stiff);
+    }
+
+    /// The step that is damped in proportion to the stiffness of each unknown, `soft` more, and what is expected to be gained
+    /// by it; `None` where that is not enough for the matrix to be positive.
+    pub(super) fn damped(&self, damping: f64, soft: f64) -> Option<(Vec<f64>, f64)> {
+        let shifts = || self.stiffness.iter().map(|stiff| damping * (stiff + soft));
+        let step = self.matrix.solve(shifts(), &self.down)?;
+        let parts = step.iter().zip(&self.down).zip(shifts());
+        let expected = parts
+            .map(|((step, down), shift)| 0.5 * step * (shift * step + down))
+            .sum();
+        Some((step, expected))
     }
 
     /// Ask for a figure to become so much less.

@@ -67,7 +67,7 @@ def result(document, free):
         "feasible": not faults,
         "stop_reason": "iterations",
         "cost": cost,
-        "bound": {"lower": lower, "gap": None if faults else cost["total"] / lower - 1.0},
+        "bound": {"lower": lower, "gap": cost["total"] / lower - 1.0 if lower else None},
         "waypoints": [point(place) for place in points],
         "legs": [
             {"length": geo.distance(a, b), "turn_deg": turn, "climb_deg": geo.climb(a, b)}

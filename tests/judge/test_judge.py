@@ -112,6 +112,15 @@ class Truth(Case):
             self.assertIn(kind, [violation["kind"] for violation in result["checks"]["violations"]])
             self.agrees(result)
 
+    def test_of_heights_that_are_rounded(self):
+        # In the middle of the band, where fuel is for nothing: all that is left to pay for is how heights are rounded.
+        nothing = {"weights": {"fuel": 0, "threat": 1, "altitude": 1}, "threats": []}
+        result = honest.result(SCENARIO | nothing, [(x, y, 55.0) for x, y, _ in FREE])
+        self.assertEqual(result["cost"]["total"], 0.0)
+        for off, is_told in ((1e-12, False), (1e-6, True)):
+            complaints = self.complaints(put(result, ("cost", "altitude"), lambda _, off=off: off), **nothing)
+            self.assertEqual(any("cost.altitude" in complaint for complaint in complaints), is_told)
+
     def test_of_a_route_out_of_an_area_that_the_service_chose(self):
         # The scenario says nothing of it, so the claim cannot be told from a lie.
         result = honest.result(SCENARIO, [(100.0, 155.0, 60.0), (200.0, 155.0, 60.0)])

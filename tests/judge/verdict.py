@@ -93,7 +93,9 @@ def _terms(report, name, claimed, points, scenario, price):
     low, high = price(points, scenario), None
     if scenario.threats and any(threat.band.base > -1e300 or threat.band.top < 1e300 for threat in scenario.threats):
         low, high = (price(points, scenario, shrink=shrink) for shrink in (hair, -hair))
-    scale = low["total"]
+    # Heights are told above the sea: where the middle of the band costs nothing, their rounding does.
+    rounded = scenario.weights["altitude"] * max(abs(point[2]) for point in points)
+    scale = max(low["total"], rounded)
     for term in ("fuel", "threat", "altitude", "total"):
         report.near(f"{name}.{term}", claimed[term], low[term], scale, high and high[term])
 

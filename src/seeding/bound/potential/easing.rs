@@ -10,6 +10,9 @@ const SWEEPS: usize = 20;
 /// How many times as steep as allowed is well enough.
 const ENOUGH: f64 = 1.003;
 
+/// Share of a step of Newton's method that is taken: the nodes about it move, too.
+const TAKEN: f64 = 0.8;
+
 /// How much further than well enough a place is eased that is not, so that it need not be again.
 const BEYOND: f64 = 0.999;
 
@@ -43,7 +46,7 @@ pub(super) fn ease(mesh: &Mesh, limits: &[[f64; 6]], values: &mut [f64], fixed: 
             if node < fixed || std::mem::replace(&mut met.0[node], sweep) == sweep {
                 continue;
             }
-            values[node] -= excess(mesh, &squares, values, node);
+            values[node] -= TAKEN * excess(mesh, &squares, values, node);
             for &(triangle, _) in mesh.round(node) {
                 if std::mem::replace(&mut met.1[triangle], sweep) != sweep {
                     next.push(triangle);

@@ -43,7 +43,7 @@ const FINE: usize = 2500;
 const MOST_VERTICES: usize = 6000;
 
 /// Times that vertices are added, at most.
-const MOST_ROUNDS: usize = 4;
+const MOST_ROUNDS: usize = 3;
 
 /// Share of what a potential rises by that is worth no more vertices.
 const NEARLY: f64 = 0.985;

@@ -6,7 +6,7 @@ const REACH: usize = 8;
 /// A symmetric matrix, its lower half: of each row the entries up to the diagonal, which is the last.
 #[derive(Clone)]
 pub(super) struct Banded {
-    pub(super) rows: Vec<[f64; REACH + 1]>,
+    rows: Vec<[f64; REACH + 1]>,
 }
 
 impl Banded {

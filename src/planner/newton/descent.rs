@@ -39,8 +39,8 @@ impl Newton<'_, '_> {
         let mut merit = self.merit(places, limits, prices);
         for _ in 0..STEPS {
             let equations = self.equations(places, limits, prices);
-            let way = (limits, prices);
-            let Some(ratio) = self.step(&equations, places, &mut merit, way, damping) else {
+            let rules = (limits, prices);
+            let Some(ratio) = self.step(&equations, places, &mut merit, rules, damping) else {
                 break;
             };
             let cube = 2.0 * ratio - 1.0;
@@ -57,7 +57,7 @@ impl Newton<'_, '_> {
         equations: &Equations,
         places: &mut Vec<Place>,
         merit: &mut Merit,
-        (limits, prices): (&Limits, &Prices),
+        rules: (&Limits, &Prices),
         damping: &mut f64,
     ) -> Option<f64> {
         let soft = SOFT * self.dear();
@@ -68,10 +68,10 @@ impl Newton<'_, '_> {
                     return None;
                 }
                 let before = merit.value;
-                if self.gains(&step, TAKEN * expected, places, merit, (limits, prices)) {
+                if self.gains(&step, TAKEN * expected, places, merit, rules) {
                     let ratio = (before - merit.value) / expected;
                     if ratio > AHEAD {
-                        self.go_on(step, places, merit, (limits, prices));
+                        self.go_on(step, places, merit, rules);
                     }
                     return Some(ratio);
                 }
@@ -88,10 +88,10 @@ impl Newton<'_, '_> {
         mut step: Vec<f64>,
         places: &mut Vec<Place>,
         merit: &mut Merit,
-        way: (&Limits, &Prices),
+        rules: (&Limits, &Prices),
     ) {
         for _ in 0..DOUBLINGS {
-            if !self.gains(&step, 0.0, places, merit, way) {
+            if !self.gains(&step, 0.0, places, merit, rules) {
                 return;
             }
             for part in &mut step {

@@ -96,7 +96,6 @@ pub(super) fn chains(
 
 /// What chains cost that are known, by their last leg and by how many they have.
 struct Known {
-    places: usize,
     most: usize,
     /// Of each place that chains go on from: by the next, what the cheapest of at most 0, 1, … legs costs.
     onward: Vec<Vec<f64>>,
@@ -105,7 +104,6 @@ struct Known {
 impl Known {
     fn new(places: usize, most: usize) -> Self {
         Self {
-            places,
             most,
             onward: vec![Vec::new(); places],
         }
@@ -120,10 +118,10 @@ impl Known {
 
     /// Know a `chain` that comes from the place `from`.
     fn note(&mut self, from: usize, chain: &Chain) {
-        let counts = self.most + 1;
+        let (places, counts) = (self.onward.len(), self.most + 1);
         let onward = &mut self.onward[from];
         if onward.is_empty() {
-            *onward = vec![f64::INFINITY; self.places * counts];
+            *onward = vec![f64::INFINITY; places * counts];
         }
         for least in &mut onward[chain.place * counts..][chain.legs..counts] {
             *least = least.min(chain.cost);

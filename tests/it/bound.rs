@@ -132,7 +132,7 @@ fn log(low: f64, high: f64) -> impl Strategy<Value = f64> {
     (low..high).prop_map(libm::exp2)
 }
 
-/// A soft zone that an end lies in, at times at its very edge or at its core.
+/// A soft zone that an end lies in, at times at its very edge or at its core, and at times under its top or over its base.
 fn over(end: [f64; 2]) -> impl Strategy<Value = String> {
     (
         0.0..std::f64::consts::TAU,
@@ -140,8 +140,9 @@ fn over(end: [f64; 2]) -> impl Strategy<Value = String> {
         log(-9.0, 6.0),
         prop_oneof![1 => Just(0.0), 8 => log(-9.0, 9.5)],
         prop::option::weighted(0.4, prop::collection::vec((0.2..1.0f64, 0.1..1.0f64), 3..8)),
+        heights(),
     )
-        .prop_map(move |(angle, radius, gap, depth, corners)| {
+        .prop_map(move |(angle, radius, gap, depth, corners, heights)| {
             let away = radius + gap;
             let (x, y) = (
                 end[0] + away * libm::cos(angle),
@@ -149,7 +150,7 @@ fn over(end: [f64; 2]) -> impl Strategy<Value = String> {
             );
             let Some(corners) = corners else {
                 return format!(
-                    r#"{{"kind": "cylinder", "center": {{"x": {x}, "y": {y}}}, "radius": {radius}, "influence": {}}}"#,
+                    r#"{{"kind": "cylinder", "center": {{"x": {x}, "y": {y}}}, "radius": {radius}, "influence": {}{heights}}}"#,
                     away + depth
                 );
             };
@@ -165,7 +166,7 @@ fn over(end: [f64; 2]) -> impl Strategy<Value = String> {
                 })
                 .collect();
             format!(
-                r#"{{"kind": "polygon", "vertices": [{}], "margin": {}}}"#,
+                r#"{{"kind": "polygon", "vertices": [{}], "margin": {}{heights}}}"#,
                 vertices.join(", "),
                 gap + depth
             )

@@ -2,6 +2,7 @@
 //! of docs/BOUND.md.
 
 use super::super::outline::OutlineShape;
+use super::event::ramp;
 use super::prices::Prices;
 use super::wall::Wall;
 use crate::geometry::{Point2, ring};
@@ -9,6 +10,16 @@ use crate::seeding::arc::segment_segment;
 
 /// Parts in which what a metre outwards costs is summed up.
 const PARTS: u32 = 200;
+
+/// Where a way begins or ends.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    pub(super) at: Point2,
+    /// It may be any point within so many metres instead.
+    pub(super) spread: f64,
+    /// The end of the whole route that it is, if it is one: 0 is the start.
+    pub(super) end: Option<usize>,
+}
 
 /// An end of a route as the string sees it.
 #[derive(Debug, Clone, Copy)]
@@ -20,34 +31,54 @@ pub(super) struct Departure {
 }
 
 impl Departure {
-    /// From `end`, round `walls` widened to `radii`, one of which may be around it, to the other end; each of them may be
-    /// any point within so many metres of the one given. Soft zones that are `spent` pay for something else.
+    /// From `place`, round `walls` widened to `radii`, one of which may be around it, to the `other`. Soft zones that are
+    /// `spent` pay for something else.
     pub(super) fn of(
         (walls, radii): (&[Wall], &[Option<f64>]),
         prices: &Prices,
-        [(end, nearby), (other, spread)]: [(Point2, f64); 2],
+        [place, other]: [Place; 2],
         spent: &[usize],
     ) -> Self {
-        let (mut at, mut toll) = (end, 0.0);
+        let (mut at, mut toll) = (place.at, 0.0);
+        let between = (other.at - place.at).norm() - place.spread - other.spread;
         for (idx, wall) in walls.iter().enumerate() {
-            let away = wall.distance(end) + nearby;
-            if away >= wall.influence || wall.toll.is_some() {
+            let away = wall.distance(place.at) + place.spread;
+            if away >= wall.influence {
+                continue;
+            }
+            if wall.toll.is_some() && radii[idx].is_none() {
+                // It may be passed, but not at once.
+                let stay = place.end.map_or(0.0, |end| wall.stays[end].min(between));
+                if !spent.contains(&idx) {
+                    toll += prices.exposure * ramp(wall.influence - away, 1.0, stay.max(0.0));
+                }
                 continue;
             }
             let mut used = away;
             if let Some(radius) = radii[idx].filter(|radius| *radius > away) {
-                at = wall.out(end, radius);
-                let alone = alone((walls, radii), idx, other).max(away);
+                at = wall.out(place.at, radius);
+                let alone = alone((walls, radii), idx, other.at).max(away);
                 toll += outwards(wall, prices, [away, radius], alone);
                 used = radius;
             }
             if !spent.contains(&idx) {
-                let farthest = wall.influence.min(wall.distance(other) - spread);
+                let farthest = wall.influence.min(wall.distance(other.at) - other.spread);
                 toll += prices.exposure * depths(wall, [used, farthest]);
             }
         }
         Self { at, toll }
     }
+}
+
+/// What a route pays at least in the soft zones of those `walls` that it may pass, before it can after the start and
+/// before the target.
+pub(super) fn early(walls: &[Wall], prices: &Prices) -> f64 {
+    let passable = walls.iter().filter(|wall| wall.toll.is_some());
+    let exposed = passable.flat_map(|wall| {
+        let ends = prices.ends.iter().zip(wall.stays);
+        ends.map(|(end, stay)| ramp(wall.influence - wall.distance(end.xy()), 1.0, stay))
+    });
+    prices.exposure * exposed.sum::<f64>()
 }
 
 /// Integral of the depth in the soft zone of `wall` from one distance to the next, none of which is beyond it.
@@ -132,6 +163,7 @@ fn apart(one: &Wall, other: &Wall) -> f64 {
 mod tests {
     use super::super::super::tests::scenario;
     use super::super::around::walls;
+    use super::super::string::departures as ends_of;
     use super::*;
 
     fn departures(threats: &str, examine: impl Fn(&Prices, [Departure; 2])) {
@@ -139,10 +171,7 @@ mod tests {
         let prices = Prices::of(&scenario);
         let walls = walls(&scenario, &prices);
         let radii: Vec<_> = walls.iter().map(|wall| Some(wall.wide)).collect();
-        let [start, target] = prices.ends.map(|end| (end.xy(), 0.0));
-        let field = (&walls[..], &radii[..]);
-        let of = |ends| Departure::of(field, &prices, ends, &[]);
-        examine(&prices, [of([start, target]), of([target, start])]);
+        examine(&prices, ends_of((&walls, &radii), &prices, &[]));
     }
 
     /// Straight out of a zone on the far side of its core, as the way leads on: all of it is paid for, but for what
@@ -168,6 +197,26 @@ mod tests {
                 assert!(target.at == prices.ends[1].xy() && target.toll <= 0.0);
             },
         );
+    }
+
+    /// A start 20 m deep in the zone of a threat whose top is 30 m above it, and a climb of 45 degrees: no route is over it
+    /// within 30 m. Where the top is 10 m above, half of what leaving costs is paid all the same.
+    #[test]
+    fn no_route_is_over_a_threat_at_once() {
+        for (top, paid) in [(30.0, 200.0), (10.0, 150.0)] {
+            let scenario = scenario(&format!(
+                r#""threats": [{{"kind": "cylinder", "center": {{"x": 200, "y": 0}}, "radius": 90, "influence": 120, "top": {top}}}]"#
+            ));
+            let prices = Prices::of(&scenario);
+            let walls = walls(&scenario, &prices);
+            let [start, target] = ends_of((&walls, &[None]), &prices, &[]);
+            let paid = prices.exposure * paid;
+            assert!((start.toll - paid).abs() < 1e-4 * paid, "{start:?} {paid}");
+            assert!(target.toll <= 0.0 && start.at == prices.ends[0].xy());
+            assert!((early(&walls, &prices) - start.toll).abs() < 1e-9);
+            // It pays for something else.
+            assert!(ends_of((&walls, &[None]), &prices, &[0])[0].toll <= 0.0);
+        }
     }
 
     /// Of two zones one is widened over the end, and the other one pays for the way out alone; a zone that both ends

@@ -3,6 +3,7 @@
 
 use super::super::arc::{crossing, nearest_points, point_segment};
 use super::super::outline::OutlineShape;
+use super::departure::early;
 use super::prices::Prices;
 use super::wall::Wall;
 use crate::geometry::{Point2, ring};
@@ -57,12 +58,13 @@ struct Core {
 /// All events, cheapest first; `None` when there are too many to tell.
 pub(super) fn events(walls: &[Wall], prices: &Prices) -> Option<Vec<Event>> {
     let mut events = gaps(walls, prices)?;
+    let early = early(walls, prices);
     for (idx, wall) in walls.iter().enumerate() {
         if let Some(toll) = wall.toll {
             let vertical = toll.vertical.max(prices.rise());
             events.push(Event {
                 kind: Kind::Pass { wall: idx },
-                cost: prices.climbing(prices.direct(), vertical) + toll.altitude,
+                cost: prices.climbing(prices.direct(), vertical) + toll.altitude + early,
                 extra: toll.altitude,
             });
         }

@@ -76,7 +76,8 @@ fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) ->
         }
         let known = (proven, promised().cost);
         let proof = potential::prove(&walls, prices, &scenario.area, known, stop);
-        let dense = proof.map_or(0.0, |proof| proof.total());
+        let early = departure::early(&walls, prices);
+        let dense = proof.map_or(0.0, |proof| proof.total() + early);
         return proven.max(prices.climbing_at(dense));
     };
     let field = Field {
@@ -153,7 +154,7 @@ fn crossing(field: &Field, events: &[Event], used: &[Event], known: f64) -> f64 
     };
     let over = |proof| ends::over(proof, scenario, prices, walls, stop);
     if let Some(proof) = prove(known) {
-        let dense = proof.total();
+        let dense = proof.total() + departure::early(walls, prices);
         let level = prices.climbing_at(dense).max(over(proof));
         // Legs of strings that are far too cheap prove nothing.
         if dense > BEYOND_STRINGS * known {
@@ -251,6 +252,22 @@ mod tests {
         scenario.target = Point3::new(743.0, 892.0, 89.0);
         let (bound, best) = (lower_bound(&scenario), 976.19);
         assert!(bound <= best && bound > 0.98 * best, "{bound} {best}");
+    }
+
+    /// Ends low in soft zones that could be flown over if there were room to climb: the best known has 30 waypoints.
+    #[test]
+    fn within_a_percent_where_what_may_be_passed_cannot_be_at_once() {
+        let mut scenario = scenario(
+            r#""threats": [
+                {"kind": "cylinder", "center": {"x": 166, "y": 232}, "radius": 58, "influence": 85, "top": 106},
+                {"kind": "cylinder", "center": {"x": 270, "y": 483}, "radius": 54, "influence": 93, "top": 154}
+            ]"#,
+        );
+        scenario.start = Point3::new(162.0, 168.0, 19.0);
+        scenario.target = Point3::new(820.0, 844.0, 139.0);
+        (scenario.weights.fuel, scenario.weights.altitude) = (0.3, 3.0);
+        let (bound, best) = (lower_bound(&scenario), 395.560);
+        assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
     }
 
     /// What a route may cut off corners can be worth more than the way; and it may go through what

@@ -1,6 +1,7 @@
 //! What may be hoped for: the string's own price.
 
 use super::super::taut::Piece;
+use super::departure::early;
 use super::potential::whole;
 use super::prices::Prices;
 use super::string::{departures, pulled, scene};
@@ -47,7 +48,10 @@ pub(super) fn promise(
             let way = ends[end].at - from;
             price(way.norm(), &|share| from + way * share)
         };
-        let across = price(string.length, &|share| string.at(share)) + out(0) + out(1);
+        let across = price(string.length, &|share| string.at(share))
+            + out(0)
+            + out(1)
+            + early(walls, prices);
         promise.cost = prices.climbing_at(across);
         if let [Piece::Straight { to, .. }, .., Piece::Straight { from, .. }] = &string.pieces[..] {
             promise.bends = [*to, *from];

@@ -3,7 +3,7 @@
 use super::super::obstacles::Obstacles;
 use super::super::outline::Outline;
 use super::super::taut::{Limits, TautStrings, taut_strings_within};
-use super::departure::Departure;
+use super::departure::{Departure, Place};
 use super::prices::Prices;
 use super::wall::Wall;
 use crate::geometry::Point2;
@@ -112,7 +112,11 @@ pub(super) fn departures(
     prices: &Prices,
     spent: &[usize],
 ) -> [Departure; 2] {
-    let [start, target] = prices.ends.map(|end| (end.xy(), 0.0));
+    let [start, target] = [0, 1].map(|end| Place {
+        at: prices.ends[end].xy(),
+        spread: 0.0,
+        end: Some(end),
+    });
     [[start, target], [target, start]].map(|ends| Departure::of(field, prices, ends, spent))
 }
 

@@ -1,5 +1,6 @@
-//! What it costs to pass a threat above or below.
+//! What it costs to pass a threat above or below, and how soon that can be.
 
+use crate::cost::Tolerance;
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;
 use crate::threat::Threat;
@@ -11,6 +12,28 @@ pub(super) struct Toll {
     pub(super) altitude: f64,
     /// Metres that are climbed and descended at least.
     pub(super) vertical: f64,
+}
+
+/// Metres that a route may climb in a metre seen from above.
+pub(super) fn steepest(scenario: &Scenario) -> f64 {
+    let angle = scenario.vehicle.max_climb_deg + Tolerance::of(scenario).angle_deg;
+    libm::tan(angle.min(90.0).to_radians()) * (1.0 + 1e-12)
+}
+
+/// Metres seen from above that a route flies at the heights of `threat` at least, after the start and before the target:
+/// what climbing or descending out of them takes, but no more than half of the straight way.
+pub(super) fn stays(threat: &Threat, scenario: &Scenario) -> [f64; 2] {
+    let (start, target) = (scenario.start, scenario.target);
+    let half = 0.5 * (target.xy() - start.xy()).norm();
+    [start.z, target.z].map(|z| {
+        let (down, up) = (
+            threat.base.map_or(f64::INFINITY, |base| z - base),
+            threat.top.map_or(f64::INFINITY, |top| top - z),
+        );
+        let hair = 1e-9 * (1.0 + z.abs());
+        let vertical = (down.min(up) - hair).max(0.0);
+        (vertical / steepest(scenario)).min(half)
+    })
 }
 
 /// The heights in the frame that a route can reach.

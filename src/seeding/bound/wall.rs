@@ -4,7 +4,7 @@
 use super::super::arc::{nearest_points, point_segment, segment_segment};
 use super::super::outline::{Outline, OutlineShape};
 use super::prices::Prices;
-use super::toll::{Heights, Toll};
+use super::toll::{Heights, Toll, stays};
 use crate::geometry::{Point2, Vector2, ring};
 use crate::scenario::Scenario;
 use crate::threat::{Shape, Threat};
@@ -27,6 +27,9 @@ pub(super) struct Wall {
     /// Cost of a route that passes above or below, beyond fuel for the way seen from above; `None`
     /// when there is no room.
     pub(super) toll: Option<Toll>,
+    /// Metres seen from above that a route flies at its heights at least, after the start and before the target; what
+    /// matters of a wall that may be passed.
+    pub(super) stays: [f64; 2],
 }
 
 impl Wall {
@@ -58,6 +61,7 @@ impl Wall {
             dip: 0.0,
             safe: 0.0,
             toll,
+            stays: stays(threat, scenario),
         };
         if let OutlineShape::Ring(ring) = &wall.shape
             && (wall.slack(slack) >= perimeter(ring) || is_thin(ring, 2.0 * slack))

@@ -4,7 +4,8 @@ use nalgebra::Vector2;
 
 use super::super::super::arc::point_segment;
 use super::super::super::outline::OutlineShape;
-use super::super::departure::Departure;
+use super::super::departure::{Departure, Place};
+use super::super::event::ramp;
 use super::super::prices::Prices;
 use super::super::string::{narrowed, scene, shortest};
 use super::super::wall::Wall;
@@ -61,6 +62,8 @@ impl Kind {
 
 /// Where a route begins, or, seen backwards, ends.
 pub(super) struct End<'a> {
+    /// 0 of the start, 1 of the target.
+    pub(super) which: usize,
     pub(super) from: Point2,
     pub(super) to: Point2,
     /// Metres between it and the middle of the band.
@@ -168,7 +171,7 @@ impl End<'_> {
         }
         let fuel = self.prices.fuel;
         let [exposed, middle] = self.exposed(at, kind.half);
-        let leg = fuel * (length - spread) + exposed;
+        let leg = fuel * (length - spread) + exposed + self.later(length);
         Kind {
             cost: kind.cost.max(leg + fuel * (self.to - at).norm()),
             steepness: self.steepness(longest, exposed),
@@ -185,8 +188,11 @@ impl End<'_> {
     pub(super) fn beyond(&self, kind: Kind, rise: &dyn Fn(Point2, f64) -> Option<f64>) -> Kind {
         let [length, longest] = kind.lengths;
         if length <= 0.0 {
-            let steepness = self.steepness(longest, 0.0);
-            return Kind { steepness, ..kind };
+            return Kind {
+                cost: self.later(length),
+                steepness: self.steepness(longest, 0.0),
+                ..kind
+            };
         }
         let (at, spread) = self.reached(&kind);
         let highest = rise(at, spread).filter(|_| !self.is_blocked(at, spread));
@@ -199,7 +205,9 @@ impl End<'_> {
         let fuel = self.prices.fuel;
         let [exposed, middle] = self.exposed(at, kind.half);
         Kind {
-            cost: kind.cost.max(fuel * length + exposed - highest),
+            cost: kind
+                .cost
+                .max(fuel * length + exposed + self.later(length) - highest),
             steepness: self.steepness(longest, exposed),
             // The potential is at least as steep as fuel is dear, about.
             turned: fuel * spread + (middle - exposed),
@@ -228,23 +236,51 @@ impl End<'_> {
         (self.from + way, length * kind.half)
     }
 
-    /// The walls that count.
-    fn hard(&self) -> impl Iterator<Item = &Wall> {
+    /// The walls that count, each with the metres from here on for which it does.
+    fn counting(&self) -> impl Iterator<Item = (&Wall, f64)> {
         let both = self.walls.iter().zip(self.radii);
-        both.filter_map(|(wall, radius)| radius.map(|_| wall))
+        let counts = both.map(|(wall, radius)| {
+            let stay = radius.map_or(wall.stays[self.which], |_| f64::INFINITY);
+            (wall, stay)
+        });
+        counts.filter(|(_, stay)| *stay > 0.0)
+    }
+
+    /// How far a leg to `at` leads in so many metres.
+    fn at_most(&self, at: Point2, metres: f64) -> Point2 {
+        let way = at - self.from;
+        let length = way.norm();
+        if metres < length {
+            self.from + way * (metres / length)
+        } else {
+            at
+        }
+    }
+
+    /// What is paid at least, after a leg of `length`, in the zones of walls that cannot be passed yet.
+    fn later(&self, length: f64) -> f64 {
+        let passable = self.counting().filter(|(_, stay)| stay.is_finite());
+        let exposed = passable.map(|(wall, stay)| {
+            let depth = wall.influence - wall.distance(self.from);
+            ramp(depth, 1.0, stay) - ramp(depth, 1.0, stay.min(length))
+        });
+        self.prices.exposure * exposed.sum::<f64>()
     }
 
     /// Whether every leg to within `spread` of `at` enters a core.
     fn is_blocked(&self, at: Point2, spread: f64) -> bool {
-        self.hard().any(|wall| match &wall.shape {
-            OutlineShape::Disc(center) => {
-                wall.core > spread && point_segment(*center, self.from, at) < wall.core - spread
+        self.counting().any(|(wall, stay)| {
+            let at = self.at_most(at, stay);
+            match &wall.shape {
+                OutlineShape::Disc(center) => {
+                    wall.core > spread && point_segment(*center, self.from, at) < wall.core - spread
+                }
+                OutlineShape::Ring(ring) => (1..=16).rev().any(|i| {
+                    let point = self.from + (at - self.from) * (f64::from(i) / 16.0);
+                    ring::contains(ring, point)
+                        && ring::distance(ring, point) > spread + 2.0 * self.prices.tolerance
+                }),
             }
-            OutlineShape::Ring(ring) => (1..=16).rev().any(|i| {
-                let point = self.from + (at - self.from) * (f64::from(i) / 16.0);
-                ring::contains(ring, point)
-                    && ring::distance(ring, point) > spread + 2.0 * self.prices.tolerance
-            }),
         })
     }
 
@@ -252,7 +288,8 @@ impl End<'_> {
     /// of the one to `at` about the second.
     fn exposed(&self, at: Point2, half: f64) -> [f64; 2] {
         let mut sums = [0.0; 2];
-        for wall in self.hard() {
+        for (wall, stay) in self.counting() {
+            let at = self.at_most(at, stay);
             for (sum, half) in sums.iter_mut().zip([half, 0.0]) {
                 *sum += self.prices.exposure * exposure::least(wall, (self.from, at), half);
             }
@@ -266,7 +303,16 @@ impl End<'_> {
         // Free to move to the middle of the sector first.
         let radii = narrowed((self.walls, self.radii), at, spread);
         let field = (self.walls, &radii[..]);
-        let (here, there) = ((at, spread), (self.to, 0.0));
+        let here = Place {
+            at,
+            spread,
+            end: None,
+        };
+        let there = Place {
+            at: self.to,
+            spread: 0.0,
+            end: Some(1 - self.which),
+        };
         let first = Departure::of(field, self.prices, [here, there], &[]);
         let last = Departure::of(field, self.prices, [there, here], &[]);
         let tolls = first.toll + last.toll;
@@ -292,6 +338,7 @@ mod tests {
         let walls = around::walls(&scenario, &prices);
         let radii: Vec<_> = walls.iter().map(|wall| Some(wall.wide)).collect();
         examine(&End {
+            which: 0,
             from: prices.ends[0].xy(),
             to: prices.ends[1].xy(),
             height: 100.0,
@@ -315,6 +362,38 @@ mod tests {
             assert!(end.steepness(1000.0, 0.0) < 2.5 && end.steepness(f64::INFINITY, 0.0) == 0.0);
             assert!((end.steepness(end.length_of(33.0, 0.0), 0.0) - 33.0).abs() < 1e-6);
         });
+    }
+
+    /// Beneath the top for 60 m, a leg is as exposed, and as blocked, as one so long; a shorter one leaves something to
+    /// those after it.
+    #[test]
+    fn a_leg_is_under_a_top_for_as_long_as_it_climbs() {
+        let scenario = scenario(
+            r#""threats": [{"kind": "cylinder", "center": {"x": 260, "y": 100}, "radius": 30, "influence": 100, "top": 60}]"#,
+        );
+        let prices = Prices::of(&scenario);
+        let walls = around::walls(&scenario, &prices);
+        let end = End {
+            which: 0,
+            from: prices.ends[0].xy(),
+            to: prices.ends[1].xy(),
+            height: 100.0,
+            weight: 1.0,
+            steepest: 1.0,
+            prices: &prices,
+            walls: &walls,
+            radii: &[None],
+            slack: 0.0,
+            stop: &|| false,
+        };
+        let to = |length: f64| end.from - Vector2::new(0.0, length);
+        let exposed = |length: f64| end.exposed(to(length), 0.0)[0];
+        assert!(exposed(30.0) < exposed(60.0) && exposed(60.0) > 0.0);
+        assert!((exposed(90.0) - exposed(60.0)).abs() < 1e-3);
+        assert!(end.later(0.0) > end.later(30.0) && end.later(30.0) > 0.0);
+        assert!(end.later(60.0) < 1e-4 * end.later(0.0));
+        let over = end.from + Vector2::new(90.0, 0.0);
+        assert!(end.is_blocked(over, 0.0) && !end.is_blocked(to(90.0), 0.0));
     }
 
     #[test]

@@ -9,8 +9,8 @@ pub(super) use excess::over;
 
 use super::prices::Prices;
 use super::string::{cores, slack};
+use super::toll::steepest;
 use super::wall::Wall;
-use crate::cost::Tolerance;
 use crate::geometry::Point2;
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;
@@ -129,6 +129,7 @@ fn ends<'a>(
     };
     (scenario.weights.altitude > 0.0).then(|| {
         [0, 1].map(|end| End {
+            which: end,
             from: prices.ends[end].xy(),
             to: prices.ends[1 - end].xy(),
             height: (prices.ends[end].z - middle).abs(),
@@ -156,12 +157,6 @@ pub(super) fn climbing(
     ends.map_or(0.0, |[start, target]| {
         start.climbing_to(bends[0]) + target.climbing_to(bends[1])
     })
-}
-
-/// Metres that a route may climb in a metre seen from above.
-fn steepest(scenario: &Scenario) -> f64 {
-    let angle = scenario.vehicle.max_climb_deg + Tolerance::of(scenario).angle_deg;
-    libm::tan(angle.min(90.0).to_radians()) * (1.0 + 1e-12)
 }
 
 /// The least that a route can cost whose first leg is one of the first `kinds` and whose last leg is one of the others,

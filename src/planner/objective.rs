@@ -1,5 +1,8 @@
 //! Routes as an optimizer sees them: positions in, fitness out.
 
+use std::sync::Mutex;
+use std::thread;
+
 use super::Stop;
 use super::blocks::{Blocks, Pricers};
 use super::coding::{Cartesian, Coding};
@@ -17,9 +20,8 @@ pub(super) struct Routes<'s> {
     pub(super) coding: Coding<'s>,
     /// Of a guided search.
     guide: Option<Guide<'s>>,
-    pub(super) model: Model<'s>,
     pricers: Pricers<'s>,
-    /// Of each thread.
+    /// Of each thread that prices.
     kept: Vec<Kept>,
     pub(super) watch: Watch<'s>,
 }
@@ -59,21 +61,21 @@ impl<'s> Routes<'s> {
         } else {
             0
         };
-        let threads = settings.threads.max(1);
+        // More would have nothing to do.
+        let blocks = settings.population.div_ceil(LANES);
+        let threads = settings.threads.clamp(1, blocks.max(1));
         Self {
             coding,
             guide,
             pricers,
-            model: model.clone(),
-            kept: (0..threads).map(|_| Kept::of(legs)).collect(),
+            kept: (0..threads).map(|_| Kept::of(legs / threads)).collect(),
             watch: Watch::new(model.scenario, stop),
         }
     }
 
     fn price(&mut self, positions: &[f64], rivals: Option<&[Fitness]>, fitness: &mut [Fitness]) {
-        let threads = self.model.scenario.planner.threads;
-        if threads > 1 && fitness.len() >= WORTH_THREADS {
-            return self.side_by_side(threads, positions, rivals, fitness);
+        if self.kept.len() > 1 && fitness.len() >= WORTH_THREADS {
+            return self.side_by_side(positions, rivals, fitness);
         }
         let watch = &mut self.watch;
         Blocks::new(&self.coding, &self.pricers, &mut self.kept[0]).price(
@@ -87,7 +89,6 @@ impl<'s> Routes<'s> {
     /// Price all positions on several threads, as many at once as may be between two looks at the clock.
     fn side_by_side(
         &mut self,
-        threads: usize,
         positions: &[f64],
         rivals: Option<&[Fitness]>,
         fitness: &mut [Fitness],
@@ -102,34 +103,43 @@ impl<'s> Routes<'s> {
             if self.watch.may_price(fitness.len()) {
                 let first = idx * at_once;
                 let rivals = rivals.map(|all| &all[first..first + fitness.len()]);
-                self.share_out(threads, positions, rivals, fitness);
+                self.share_out(positions, rivals, fitness);
             } else {
                 fitness.fill(Fitness::WORST);
             }
         }
     }
 
-    /// Each thread prices a run of whole blocks; no price depends on which.
+    /// Each thread, this one among them, prices runs of whole blocks as long as there are any; no price depends on which.
+    /// Where no more threads can be had, the others do the work.
     fn share_out(
         &mut self,
-        threads: usize,
         positions: &[f64],
         rivals: Option<&[Fitness]>,
         fitness: &mut [Fitness],
     ) {
         let (coding, pricers) = (&self.coding, &self.pricers);
         let dimension = coding.bounds().dimension();
+        let threads = self.kept.len();
         let share = fitness.len().div_ceil(threads).next_multiple_of(LANES);
-        std::thread::scope(|scope| {
-            let shares = positions.chunks(share * dimension).zip(&mut self.kept);
-            for (idx, ((positions, kept), fitness)) in
-                shares.zip(fitness.chunks_mut(share)).enumerate()
-            {
-                let rivals = rivals.map(|all| &all[idx * share..idx * share + fitness.len()]);
-                scope.spawn(move || {
-                    Blocks::new(coding, pricers, kept).price(positions, rivals, fitness, |_| true);
-                });
+        let shares = positions.chunks(share * dimension).zip(&mut self.kept);
+        let shares = Mutex::new(shares.zip(fitness.chunks_mut(share)).enumerate());
+        let next = || shares.lock().expect("taking one never panics").next();
+        let price = || {
+            while let Some((idx, ((positions, kept), fitness))) = next() {
+                let first = idx * share;
+                let rivals = rivals.map(|all| &all[first..first + fitness.len()]);
+                Blocks::new(coding, pricers, kept).price(positions, rivals, fitness, |_| true);
             }
+        };
+        thread::scope(|scope| {
+            for _ in 1..threads {
+                let more = thread::Builder::new().spawn_scoped(scope, price);
+                if more.is_err() {
+                    break;
+                }
+            }
+            price();
         });
     }
 }

@@ -9,12 +9,13 @@ use bytes::Bytes;
 use flate2::write::MultiGzDecoder;
 use futures_util::StreamExt as _;
 use tokio::sync::mpsc;
+use tokio::task::spawn_blocking;
 use tokio::time::Instant;
 
 use crate::catalogue::Staged;
+use crate::http::AppState;
 use crate::http::body::{Coding, announced_length};
 use crate::http::problem::Problem;
-use crate::http::{AppState, off_thread};
 
 /// Bytes a second that must come on the whole: who sends less holds a place for nothing.
 const SLOWEST: f64 = 8.0 * 1024.0;
@@ -46,11 +47,13 @@ pub(super) async fn receive(
     let staged = state.terrains.ask(move |catalogue| catalogue.stage(limit));
     let sink = Sink::new(staged.await?, coding);
     let (pieces, coming) = mpsc::channel(PIECES);
-    let writing = tokio::spawn(off_thread::run(move || write(sink, coming)));
+    let span = tracing::Span::current();
+    // It waits for its caller most of the time, and must not keep work from a core meanwhile.
+    let writing = spawn_blocking(move || span.in_scope(|| write(sink, coming)));
     let sent = send(body, &pieces, timeout).await;
     // What was cut off ends without its end, and is removed.
     drop(pieces);
-    let written = writing.await.unwrap_or(Err(Problem::Internal))?;
+    let written = writing.await.unwrap_or(Err(Problem::Internal));
     drop(place);
     sent?;
     written

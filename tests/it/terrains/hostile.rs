@@ -1,18 +1,26 @@
 //! Files that are none, bodies that are too long or break off: a problem, and nothing left behind.
 
 use std::io::Write as _;
+use std::path::Path;
 use std::sync::Arc;
 
+use axum::body::Body;
+use axum::http::Method;
+use bytes::Bytes;
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use futures_util::StreamExt as _;
+use futures_util::future::join_all;
+use futures_util::stream;
 use noctule::http;
+use serde_json::json;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
 use super::{hill, jacksboro, kept, put, put_with};
 use crate::support::api::Api;
 use crate::support::elevations::write_tiff;
-use crate::support::patience::eventually;
+use crate::support::patience::{PATIENCE, eventually, in_time};
 use crate::support::process::Service;
 use crate::support::server::Server;
 
@@ -285,6 +293,44 @@ async fn a_body_that_stalls_is_given_up() {
         .await;
     answer.expect_problem(408, "request-timeout");
     nothing_comes_in(&api).await;
+}
+
+/// As many as may come at once.
+#[tokio::test]
+async fn uploads_that_stall_keep_nobody_else_waiting() {
+    let mut api = Api::new();
+    api.state.body_timeout = PATIENCE;
+    api.router = http::router(api.state.clone());
+    let stall = async |name| {
+        let begins = stream::iter([Ok::<_, std::io::Error>(Bytes::from_static(b"ncols 41"))]);
+        let body = Body::from_stream(begins.chain(stream::pending()));
+        let uri = format!("/terrains/{name}");
+        api.send(Method::PUT, &uri, &[], body).await
+    };
+    let others = async {
+        eventually(async || begun(&api.uploads()) == 4).await;
+        assert_eq!(api.get("/terrains").await.status, 200);
+        let sketch = json!({"type": "FeatureCollection", "features": []});
+        let answer = api.post("/scenarios:convert", &sketch).await;
+        answer.expect_problem(422, "no-scenario");
+    };
+    tokio::select! {
+        answers = join_all(["a", "b", "c", "d"].map(stall)) => panic!("nothing ended: {answers:?}"),
+        () = in_time(others) => {}
+    }
+}
+
+/// Of how many uploads something is on the disk.
+fn begun(uploads: &Path) -> usize {
+    let coming = std::fs::read_dir(uploads.join("incoming")).expect("it is there");
+    let lengths = coming.map(|entry| {
+        entry
+            .and_then(|entry| entry.metadata())
+            .map(|file| file.len())
+    });
+    lengths
+        .filter(|length| length.as_ref().is_ok_and(|bytes| *bytes > 0))
+        .count()
 }
 
 #[tokio::test]

@@ -18,6 +18,7 @@ use tokio::sync::mpsc;
 
 use crate::support::api::{Answer, Api};
 use crate::support::description::check_schema;
+use crate::support::faulty_store::FaultyStore;
 use crate::support::patience::{eventually, in_time};
 use crate::support::process::Service;
 use crate::support::run;
@@ -224,17 +225,45 @@ async fn a_receiver_that_is_gone_hears_no_more() {
     run::complete(&*api.store, Vec::new()).await;
     let _sender = sender(&api, true);
     receiver.next().await;
-    loop {
-        let due = api
-            .store
-            .due_webhooks(i64::MAX, 10)
-            .await
-            .expect("readable");
-        if due.is_empty() {
-            break;
-        }
-        tokio::task::yield_now().await;
+    nothing_is_due(&api).await;
+}
+
+async fn nothing_is_due(api: &Api) {
+    eventually(async || {
+        let due = api.store.due_webhooks(i64::MAX, 10).await;
+        due.expect("readable").is_empty()
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn what_cannot_be_written_down_at_once_is_told_no_more_often() {
+    let api = Api::with_webhooks(settings(true));
+    let mut receiver = Receiver::new(&[]).await;
+    submit(&api, &receiver.url).await;
+    run::complete(&*api.store, Vec::new()).await;
+    let faulty = Arc::new(FaultyStore::new(api.store.clone()));
+    let _sender = Sender::start(faulty, settings(true), wall_clock());
+    receiver.next().await;
+    nothing_is_due(&api).await;
+    assert!(receiver.messages.try_recv().is_err(), "it was told twice");
+}
+
+#[tokio::test]
+async fn an_end_whose_telling_broke_is_told_again() {
+    let api = Api::with_webhooks(settings(true));
+    let mut receiver = Receiver::new(&[]).await;
+    let plan = submit(&api, &receiver.url)
+        .await
+        .header("location")
+        .to_owned();
+    run::complete(&*api.store, Vec::new()).await;
+    let broken = Arc::new(FaultyStore::that_panics(api.store.clone()));
+    let _sender = Sender::start(broken, settings(true), wall_clock());
+    for _ in 0..2 {
+        check(&receiver.next().await, &plan);
     }
+    nothing_is_due(&api).await;
 }
 
 #[tokio::test]

@@ -8,11 +8,13 @@ mod client;
 mod retry;
 mod secret;
 
-use std::collections::HashSet;
+use std::collections::HashMap;
+use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use futures_util::FutureExt as _;
 use jiff::Timestamp;
 use serde::Serialize;
 use tokio::task::{JoinHandle, JoinSet};
@@ -38,6 +40,9 @@ const LOOK: Duration = Duration::from_millis(500);
 
 /// Webhooks on their way at once.
 const AT_ONCE: usize = 64;
+
+/// Pauses between tries to write down what came of one: the first, and the longest.
+const WRITING_PAUSES: [Duration; 2] = [Duration::from_millis(250), Duration::from_secs(60)];
 
 /// How webhooks are sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -106,15 +111,15 @@ struct Delivery {
 async fn deliver_all(delivery: Arc<Delivery>) {
     let mut looks = tokio::time::interval(LOOK);
     looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let mut on_their_way = HashSet::new();
+    let mut on_their_way = HashMap::new();
     let mut tasks = JoinSet::new();
     loop {
         tokio::select! {
             _ = looks.tick() => {}
-            Some(done) = tasks.join_next() => {
-                if let Ok(id) = done {
-                    on_their_way.remove(&id);
-                }
+            Some(ended) = tasks.join_next_with_id() => {
+                // One that broke is no longer on its way either.
+                let task = ended.map_or_else(|broken| broken.id(), |(task, ())| task);
+                on_their_way.remove(&task);
                 continue;
             }
         }
@@ -127,9 +132,11 @@ async fn deliver_all(delivery: Arc<Delivery>) {
             }
         };
         for webhook in due {
-            if tasks.len() < AT_ONCE && on_their_way.insert(webhook.plan.id) {
+            let id = webhook.plan.id;
+            if tasks.len() < AT_ONCE && !on_their_way.values().any(|other| *other == id) {
                 let delivery = delivery.clone();
-                tasks.spawn(async move { delivery.deliver(webhook).await });
+                let task = tasks.spawn(async move { delivery.deliver(webhook).await });
+                on_their_way.insert(task.id(), id);
             }
         }
     }
@@ -137,9 +144,12 @@ async fn deliver_all(delivery: Arc<Delivery>) {
 
 impl Delivery {
     /// Try once, and write down what came of it.
-    async fn deliver(&self, webhook: Webhook) -> PlanId {
+    async fn deliver(&self, webhook: Webhook) {
         let (id, tries) = (webhook.plan.id, webhook.tries + 1);
-        let pause_ms = match self.try_once(webhook).await {
+        // What breaks counts as tried, or it would break again at the next look.
+        let trying = AssertUnwindSafe(self.try_once(webhook)).catch_unwind();
+        let broke = |_| Err(std::io::Error::other("sending it broke"));
+        let pause_ms = match trying.await.unwrap_or_else(broke) {
             Ok(status) if status.is_success() => {
                 tracing::info!(plan_id = %id, tries, "the webhook got through");
                 None
@@ -152,12 +162,22 @@ impl Delivery {
             Err(error) => again(id, tries, &error.to_string()),
         };
         let next_ms = pause_ms.map(|pause_ms| (self.clock)() + pause_ms);
-        match self.store.webhook_tried(id, next_ms).await {
+        self.write_down(id, next_ms).await;
+    }
+
+    /// Again and again while the store fails: a webhook whose try is not written down is still due, and the next
+    /// look would send it once more.
+    async fn write_down(&self, id: PlanId, next_ms: Option<i64>) {
+        let [mut pause, longest] = WRITING_PAUSES;
+        while let Err(error) = self.store.webhook_tried(id, next_ms).await {
             // Of a plan that has been deleted meanwhile nobody wants to hear.
-            Ok(()) | Err(StoreError::NotFound(_) | StoreError::Gone(_)) => {}
-            Err(error) => tracing::warn!(plan_id = %id, %error, "a webhook will be sent once more"),
+            if matches!(error, StoreError::NotFound(_) | StoreError::Gone(_)) {
+                return;
+            }
+            tracing::warn!(plan_id = %id, %error, "a webhook's try is not written down yet; trying again");
+            tokio::time::sleep(pause).await;
+            pause = longest.min(2 * pause);
         }
-        id
     }
 
     async fn try_once(&self, webhook: Webhook) -> std::io::Result<StatusCode> {

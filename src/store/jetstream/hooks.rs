@@ -82,7 +82,10 @@ impl JetStream {
                 Ok(Some(Change::silent(State::Kept(record))))
             })
             .await;
-        self.let_tell(id).await;
+        // No other node may send again what has yet to be written down.
+        if !matches!(tried, Err(StoreError::Unavailable { .. })) {
+            self.let_tell(id).await;
+        }
         match tried {
             Ok(_) | Err(StoreError::NotFound(_)) => Ok(()),
             Err(error) => Err(error),

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use futures_util::TryStreamExt as _;
 use noctule::config::Address;
-use noctule::job::{Event, Status};
+use noctule::job::{Event, Status, Submission};
 use noctule::store::jetstream::Settings;
 use noctule::store::{Store, StoreError};
 
@@ -82,6 +82,32 @@ async fn a_server_that_stops_answering_is_told_and_waited_for() {
     server.resume();
     until_sound(&*store).await;
     assert_eq!(store.claim().await.unwrap().plan.id, id);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_webhook_is_its_tellers_until_the_try_is_written_down() {
+    let mut server = NatsServer::start();
+    let address = server.address();
+    let (store, follower) = tokio::join!(open(&address), open(&address));
+    let with_webhook = Submission {
+        webhook: Some("https://hooks.example/".to_owned()),
+        ..submission()
+    };
+    let id = store.submit(with_webhook).await.unwrap().plan.id;
+    store.request_cancel(id, 0).await.unwrap();
+    until(&*follower, id, |plan| plan.status == Status::Cancelled).await;
+    let due = async |node: &dyn Store| node.due_webhooks(i64::MAX, 10).await.unwrap().len();
+    assert_eq!(due(&*store).await, 1);
+
+    server.kill();
+    let tried = store.webhook_tried(id, Some(0)).await;
+    assert_eq!(kind(tried), Err("unavailable"));
+    server.restart();
+    until_sound(&*store).await;
+    until_sound(&*follower).await;
+    assert_eq!(due(&*follower).await, 0);
+    persist(|| store.webhook_tried(id, Some(0))).await;
+    assert_eq!(due(&*follower).await, 1);
 }
 
 #[tokio::test(flavor = "multi_thread")]

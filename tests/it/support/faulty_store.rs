@@ -1,4 +1,4 @@
-//! A store that fails at every other step of a run, and is sound otherwise.
+//! A store that fails at every other step of a run or of a webhook, and is sound otherwise.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,6 +14,7 @@ use tokio::sync::watch;
 pub(crate) struct FaultyStore {
     sound: Arc<dyn Store>,
     steps: AtomicU64,
+    panics: bool,
 }
 
 impl FaultyStore {
@@ -21,12 +22,22 @@ impl FaultyStore {
         Self {
             sound,
             steps: AtomicU64::new(0),
+            panics: false,
+        }
+    }
+
+    /// Which breaks where the other one fails.
+    pub(crate) fn that_panics(sound: Arc<dyn Store>) -> Self {
+        Self {
+            panics: true,
+            ..Self::new(sound)
         }
     }
 
     /// Fails for the first, third, fifth caller and so on.
     fn stumble(&self) -> Result<(), StoreError> {
         match self.steps.fetch_add(1, Ordering::SeqCst) % 2 {
+            0 if self.panics => panic!("as it shall"),
             0 => Err(StoreError::unavailable("disk full")),
             _ => Ok(()),
         }
@@ -117,6 +128,7 @@ impl Store for FaultyStore {
     }
 
     async fn webhook_tried(&self, id: PlanId, next_ms: Option<i64>) -> Result<(), StoreError> {
+        self.stumble()?;
         self.sound.webhook_tried(id, next_ms).await
     }
 

@@ -11,6 +11,7 @@ use noctule::store::{Options, Retention};
 use serde_json::{Value, json};
 
 use crate::support::api::Api;
+use crate::support::patience::eventually;
 use crate::support::{run, scenario};
 
 #[tokio::test]
@@ -111,6 +112,24 @@ async fn a_caller_who_prefers_to_wait_gets_the_end() {
         StatusCode::ACCEPTED,
         "it did not end in time"
     );
+    assert!(!answer.headers.contains_key("preference-applied"));
+}
+
+#[tokio::test]
+async fn a_plan_that_is_deleted_while_its_caller_waits_was_accepted() {
+    let api = Api::new();
+    let headers = [("content-type", "application/json"), ("prefer", "wait=30")];
+    let waiting = api.send(Method::POST, "/plans", &headers, scenario().to_string());
+    let deleting = async {
+        let only = async || api.get("/plans").await.json()["plans"][0]["links"]["self"].clone();
+        eventually(async || only().await.is_string()).await;
+        let address = only().await.as_str().expect("it is one").to_owned();
+        assert_eq!(api.delete(&address).await.status, 204);
+        address
+    };
+    let (answer, address) = tokio::join!(waiting, deleting);
+    assert_eq!(answer.status, StatusCode::ACCEPTED, "{answer:?}");
+    assert_eq!(answer.header("location"), address);
     assert!(!answer.headers.contains_key("preference-applied"));
 }
 

@@ -59,7 +59,7 @@ pub(in crate::http) fn submit(
 
         let address = HeaderValue::from_str(&location(plan.id)).expect("an id is visible ASCII");
         let mut answer = match asked.wait {
-            Some(wait) => Box::pin(ended(&state, wait, plan, address)).await?,
+            Some(wait) => Box::pin(ended(&state, wait, plan, address)).await,
             None => accepted(plan, address),
         };
         if replayed {
@@ -176,25 +176,20 @@ async fn refusal(state: &AppState, error: StoreError) -> Problem {
     }
 }
 
-/// The plan's end, or that it was accepted when that does not come in time.
-async fn ended(
-    state: &AppState,
-    wait: Wait,
-    plan: Plan,
-    address: HeaderValue,
-) -> Result<Response, Problem> {
-    let plan = wait_for(state, plan.id, wait.duration(), |plan| {
-        plan.status.is_final()
-    })
-    .await?;
-    if !plan.status.is_final() {
-        return Ok(accepted(plan, address));
+/// The plan's end, or that it was accepted when that does not come in time or cannot be told.
+async fn ended(state: &AppState, wait: Wait, plan: Plan, address: HeaderValue) -> Response {
+    let is_over = |plan: &Plan| plan.status.is_final();
+    let waited = wait_for(state, plan.id, wait.duration(), is_over).await;
+    // What is on the disk was accepted, whatever the store says of it since.
+    let plan = waited.unwrap_or(plan);
+    if !is_over(&plan) {
+        return accepted(plan, address);
     }
     let ended = [
         (header::LOCATION, address),
         (PREFERENCE_APPLIED, wait.applied()),
     ];
-    Ok((ended, StatusDocument::from(plan)).into_response())
+    (ended, StatusDocument::from(plan)).into_response()
 }
 
 fn accepted(plan: Plan, address: HeaderValue) -> Response {

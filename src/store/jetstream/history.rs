@@ -45,7 +45,8 @@ impl History {
         }
     }
 
-    fn last(&self) -> u64 {
+    /// Id of the newest event.
+    pub(super) fn last(&self) -> u64 {
         self.batches.back().map_or(self.before, |batch| batch.last)
     }
 
@@ -179,7 +180,7 @@ impl Histories {
         self.touched(id).filter(|history| history.complete)
     }
 
-    /// Keep what was read from the stream.
+    /// Keep it, in place of what there was.
     pub(super) fn put(&mut self, id: PlanId, mut history: History) {
         self.take(id);
         self.touches += 1;
@@ -215,7 +216,8 @@ mod tests {
 
     use super::*;
     use crate::job::{Status, Submission};
-    use crate::store::jetstream::record::{Document, Queued, Record};
+    use crate::store::jetstream::known::Known;
+    use crate::store::jetstream::record::{Document, Placed, Queued, Record};
 
     fn record() -> Record {
         let submission = Submission::example();
@@ -277,6 +279,25 @@ mod tests {
         assert_eq!(page.events.len(), 4);
         histories.push(Uuid::nil(), &steps[4]);
         assert_eq!(histories.page(Uuid::nil(), 0, 100), None);
+    }
+
+    #[test]
+    fn a_history_that_was_read_before_the_last_step_came_is_not_kept() {
+        let (id, steps) = (Uuid::nil(), steps(3));
+        let mut known = Known::new(usize::MAX);
+        for (sequence, step) in (1..).zip(steps.clone()) {
+            known.stand(id, &Placed { sequence, step });
+        }
+        let mut read = History::whole();
+        for step in &steps[..2] {
+            read.push(step, usize::MAX);
+        }
+        known.keep_history(id, read.clone());
+        assert_eq!(known.histories.page(id, 0, 100), None);
+        read.push(&steps[2], usize::MAX);
+        known.keep_history(id, read);
+        let page = known.histories.page(id, 0, 100).expect("it is whole");
+        assert_eq!(page.events.len(), 4);
     }
 
     #[test]

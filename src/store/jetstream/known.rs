@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::sync::Arc;
 
-use super::history::Histories;
+use super::history::{Histories, History};
 use super::lane::{Lane, Version};
 use super::record::{Placed, Record, State};
 use super::turns::{self, Lanes};
@@ -84,6 +84,15 @@ impl Known {
         self.unlist(id);
         self.plans.remove(&id);
         self.histories.take(id);
+    }
+
+    /// Keep what was read from the stream of a plan's events, unless it has told more meanwhile: that found no history
+    /// to be added to, and would be missing from this one for good.
+    pub(super) fn keep_history(&mut self, id: PlanId, history: History) {
+        let told = self.kept(id).map(|record| record.last_event);
+        if told.is_some_and(|last| last <= history.last()) {
+            self.histories.put(id, history);
+        }
     }
 
     pub(super) fn standing(&self, id: PlanId) -> Option<Standing> {

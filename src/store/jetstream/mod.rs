@@ -249,7 +249,7 @@ impl Store for JetStreamStore {
         }
         let history = store.read_history(id).await?;
         let incumbent = history.incumbent(record.attempt);
-        store.view.known().histories.put(id, history);
+        store.view.known().keep_history(id, history);
         Ok(incumbent)
     }
 
@@ -266,7 +266,7 @@ impl Store for JetStreamStore {
         }
         let history = store.read_history(id).await?;
         let page = history.page(after, limit);
-        store.view.known().histories.put(id, history);
+        store.view.known().keep_history(id, history);
         Ok(page)
     }
 

@@ -182,6 +182,10 @@ async fn damage_that_is_met_on_the_way_closes_the_store_until_it_is_mended() {
         .expect("the documents are long");
     file.write_all_at(&[0xff; 4], part as u64).unwrap();
     assert!(!upkeep::check(directory.path()).unwrap().faults.is_empty());
+    // No half of a backup is left.
+    let backups = TempDir::new().unwrap();
+    upkeep::backup(directory.path(), &backups.path().join("backup.db")).unwrap_err();
+    assert_eq!(std::fs::read_dir(backups.path()).unwrap().count(), 0);
 
     let store = Reopening::start(open).await;
     store.stats().await.expect("the rest is sound");

@@ -134,18 +134,22 @@ pub fn backup(data_dir: &Path, to: &Path) -> Result<(), StoreError> {
     name.push(".part");
     let part = to.with_file_name(name);
     let _ = std::fs::remove_file(&part);
-    connection.execute("VACUUM INTO ?1", [part.to_string_lossy()])?;
-    let finished = File::open(&part)
-        .and_then(|file| file.sync_all())
-        .and_then(|()| std::fs::rename(&part, to))
-        .and_then(|()| {
-            let directory = to.parent().filter(|parent| !parent.as_os_str().is_empty());
-            File::open(directory.unwrap_or(Path::new(".")))?.sync_all()
-        });
-    if finished.is_err() {
+    let written = connection
+        .execute("VACUUM INTO ?1", [part.to_string_lossy()])
+        .map_err(StoreError::from)
+        .and_then(|_| put_in_place(&part, to).map_err(unusable));
+    if written.is_err() {
         let _ = std::fs::remove_file(&part);
     }
-    finished.map_err(unusable)
+    written
+}
+
+/// Give a whole file its name, both of them on the disk when this returns.
+fn put_in_place(part: &Path, to: &Path) -> std::io::Result<()> {
+    File::open(part)?.sync_all()?;
+    std::fs::rename(part, to)?;
+    let directory = to.parent().filter(|parent| !parent.as_os_str().is_empty());
+    File::open(directory.unwrap_or(Path::new(".")))?.sync_all()
 }
 
 fn open(data_dir: &Path) -> Result<Connection, StoreError> {

@@ -12,7 +12,7 @@ pub enum Status {
     Running,
     /// It has a result, feasible or not.
     Succeeded,
-    /// The planner broke; the plan says how.
+    /// It has no result and gets none; the plan says which [`FailureKind`](super::FailureKind) it is.
     Failed,
     /// Ended on request, with the best route so far if it had begun.
     Cancelled,

@@ -1,7 +1,8 @@
 //! The service's face: one table of routes, handlers by resource, one table of problems.
 //!
 //! Handlers extract, call one thing and convert. Deliberately absent: planning, which happens on
-//! the worker's threads, and storage, which sits behind [`Store`].
+//! the worker's threads (`partial` alone asks the planner what a route would be delivered as), and
+//! storage, which sits behind [`Store`].
 
 mod accept;
 mod around;

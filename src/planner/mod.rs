@@ -1,4 +1,4 @@
-//! From a scenario to a route: the one loop, and what comes out of it.
+//! From a scenario to a route: what the search and the bound beside it come to, priced, smoothed and certified.
 //!
 //! Plain functions: no async, no store, no clock of their own.
 

@@ -5,7 +5,7 @@ use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 
 use super::caller::Caller;
-use super::params::{self, Id, Params};
+use super::params::{self, Id, NoParams, Params};
 use super::problem::Problem;
 use super::{AppState, accept, off_thread, partial, retry};
 use crate::export::{self, Format, OPTIONS, Options, ResultInput, file_name};
@@ -19,9 +19,8 @@ pub(super) async fn scenario(
     State(state): State<AppState>,
     caller: Caller,
     Id(id): Id,
-    uri: Uri,
+    _: NoParams,
 ) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
     caller.plan(&*state.store, id).await?;
     let document = state.store.scenario(id).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], document).into_response())

@@ -1,17 +1,16 @@
 //! `GET /metrics`: what Prometheus reads.
 
 use axum::extract::State;
-use axum::http::{Uri, header};
+use axum::http::header;
 use axum::response::{IntoResponse, Response};
 
 use super::AppState;
-use super::params::Params;
+use super::params::NoParams;
 use super::problem::Problem;
 use crate::telemetry::metrics::{MEDIA_TYPE, Queue};
 
 /// Answers also when the store does not: the operator needs it then.
-pub(super) async fn show(State(state): State<AppState>, uri: Uri) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
+pub(super) async fn show(State(state): State<AppState>, _: NoParams) -> Result<Response, Problem> {
     let stats = state.store.stats().await;
     let stats = stats
         .inspect_err(|error| tracing::warn!(%error, "the queue could not be counted"))

@@ -3,9 +3,9 @@
 use axum::Json;
 use axum::body::Body;
 use axum::extract::State;
-use axum::http::{HeaderMap, Uri};
+use axum::http::HeaderMap;
 
-use super::params::Params;
+use super::params::NoParams;
 use super::problem::Problem;
 use super::{AppState, body, off_thread};
 use crate::import::{self, Conversion};
@@ -13,11 +13,10 @@ use crate::import::{self, Conversion};
 /// `POST /scenarios:convert`.
 pub(super) async fn convert(
     State(state): State<AppState>,
-    uri: Uri,
+    _: NoParams,
     headers: HeaderMap,
     body: Body,
 ) -> Result<Json<Conversion>, Problem> {
-    Params::read(&uri, &[])?;
     let (text, syntax) = body::read_json_or_xml(&state, &headers, body).await?;
     let conversion = off_thread::run(move || import::convert(&text, syntax)).await??;
     Ok(Json(conversion))

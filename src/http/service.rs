@@ -2,26 +2,26 @@
 
 use axum::Json;
 use axum::extract::State;
-use axum::http::Uri;
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::params::Params;
+use super::params::NoParams;
 use super::problem::Problem;
 use super::{AppState, Phase, events, plans, prefer, retry};
 use crate::optimizer::{self, Algorithm, Parameter};
 use crate::scenario::json::{COMMON, CommonParameter, Takes};
 
 /// `GET /livez`: the process answers.
-pub(super) async fn livez(uri: Uri) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
+pub(super) async fn livez(_: NoParams) -> Result<Response, Problem> {
     Ok(ok())
 }
 
 /// `GET /readyz`: it takes plans.
-pub(super) async fn readyz(State(state): State<AppState>, uri: Uri) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
+pub(super) async fn readyz(
+    State(state): State<AppState>,
+    _: NoParams,
+) -> Result<Response, Problem> {
     if *state.phase.borrow() != Phase::Serving {
         let retry_after_s = retry::for_room(&state.store.stats().await?, state.capacity);
         return Err(Problem::Draining { retry_after_s });
@@ -38,8 +38,7 @@ fn ok() -> Response {
 }
 
 /// `GET /version`.
-pub(super) async fn version(uri: Uri) -> Result<Json<Value>, Problem> {
-    Params::read(&uri, &[])?;
+pub(super) async fn version(_: NoParams) -> Result<Json<Value>, Problem> {
     Ok(Json(json!({
         "name": env!("CARGO_PKG_NAME"),
         "version": env!("CARGO_PKG_VERSION"),
@@ -71,8 +70,10 @@ struct LimitsDocument {
 }
 
 /// `GET /limits`.
-pub(super) async fn limits(State(state): State<AppState>, uri: Uri) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
+pub(super) async fn limits(
+    State(state): State<AppState>,
+    _: NoParams,
+) -> Result<Response, Problem> {
     let limits = state.rules.limits;
     let access = state.access.settings();
     let stats = state.store.stats().await.ok();
@@ -176,8 +177,7 @@ impl From<&CommonParameter> for ParameterDocument {
 }
 
 /// `GET /algorithms`.
-pub(super) async fn algorithms(uri: Uri) -> Result<Json<AlgorithmsDocument>, Problem> {
-    Params::read(&uri, &[])?;
+pub(super) async fn algorithms(_: NoParams) -> Result<Json<AlgorithmsDocument>, Problem> {
     Ok(Json(AlgorithmsDocument {
         parameters: COMMON.iter().map(Into::into).collect(),
         algorithms: optimizer::ALL.iter().map(Into::into).collect(),

@@ -9,7 +9,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::params::Params;
+use super::params::NoParams;
 use super::problem::Problem;
 
 /// Name and document, in the order in which they are offered.
@@ -57,22 +57,24 @@ impl Entry {
 }
 
 /// `GET /scenarios`.
-pub(super) async fn list(uri: Uri) -> Result<Json<ScenariosDocument>, Problem> {
+pub(super) async fn list(_: NoParams) -> Result<Json<ScenariosDocument>, Problem> {
     static ENTRIES: LazyLock<Vec<Entry>> = LazyLock::new(|| {
         SHIPPED
             .iter()
             .map(|(name, text)| Entry::of(name, text))
             .collect()
     });
-    Params::read(&uri, &[])?;
     Ok(Json(ScenariosDocument {
         scenarios: ENTRIES.clone(),
     }))
 }
 
 /// `GET /scenarios/{name}`: a document as it may be posted.
-pub(super) async fn show(uri: Uri, name: Option<Path<String>>) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
+pub(super) async fn show(
+    uri: Uri,
+    name: Option<Path<String>>,
+    _: NoParams,
+) -> Result<Response, Problem> {
     let wanted = name.map(|Path(name)| name).unwrap_or_default();
     let Some((_, text)) = SHIPPED.iter().find(|(name, _)| *name == wanted) else {
         return Err(Problem::NoSuchResource(uri.path().to_owned()));

@@ -2,12 +2,12 @@
 
 use axum::Json;
 use axum::extract::State;
-use axum::http::{StatusCode, Uri};
+use axum::http::StatusCode;
 use serde::Serialize;
 
 use super::AppState;
 use super::caller::Caller;
-use super::params::{Id, Params};
+use super::params::{Id, NoParams};
 use super::problem::Problem;
 use super::status::location;
 
@@ -24,9 +24,8 @@ pub(super) async fn issue(
     State(state): State<AppState>,
     caller: Caller,
     Id(id): Id,
-    uri: Uri,
+    _: NoParams,
 ) -> Result<(StatusCode, Json<TicketDocument>), Problem> {
-    Params::read(&uri, &[])?;
     caller.plan(&*state.store, id).await?;
     let (ticket, until) = state.access.ticket(id, &caller)?;
     let document = TicketDocument {

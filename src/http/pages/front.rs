@@ -14,7 +14,7 @@ use flate2::write::GzEncoder;
 
 use crate::export::sha256_hex;
 use crate::http::known_tags::KnownTags;
-use crate::http::params::Params;
+use crate::http::params::NoParams;
 use crate::http::problem::Problem;
 
 /// Scripts and styles of its own, requests to where it comes from, pictures that it makes itself.
@@ -122,8 +122,11 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
 }
 
 /// `GET /`.
-pub(in crate::http) async fn front(uri: Uri, headers: HeaderMap) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
+pub(in crate::http) async fn front(
+    uri: Uri,
+    _: NoParams,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
     serve("index.html", &uri, &headers)
 }
 
@@ -131,9 +134,9 @@ pub(in crate::http) async fn front(uri: Uri, headers: HeaderMap) -> Result<Respo
 pub(in crate::http) async fn file(
     uri: Uri,
     name: Option<Path<String>>,
+    _: NoParams,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
     serve(
         &name.map(|Path(name)| name).unwrap_or_default(),
         &uri,
@@ -145,9 +148,9 @@ pub(in crate::http) async fn file(
 pub(in crate::http) async fn vendored(
     uri: Uri,
     name: Option<Path<String>>,
+    _: NoParams,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
     let name = name.map(|Path(name)| name).unwrap_or_default();
     serve(&format!("vendor/{name}"), &uri, &headers)
 }

@@ -18,7 +18,7 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 
-use super::params::Params;
+use super::params::NoParams;
 use super::problem::Problem;
 
 /// The description of this service.
@@ -35,31 +35,31 @@ static DESCRIPTION: LazyLock<Value> = LazyLock::new(|| {
 });
 
 /// `GET /openapi.yaml`.
-pub(super) async fn openapi_yaml(uri: Uri) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
+pub(super) async fn openapi_yaml(_: NoParams) -> Result<Response, Problem> {
     Ok(([(header::CONTENT_TYPE, "application/yaml")], OPENAPI_YAML).into_response())
 }
 
 /// `GET /openapi.json`.
-pub(super) async fn openapi_json(uri: Uri) -> Result<Response, Problem> {
+pub(super) async fn openapi_json(_: NoParams) -> Result<Response, Problem> {
     static JSON: LazyLock<String> = LazyLock::new(|| DESCRIPTION.to_string());
-    Params::read(&uri, &[])?;
     Ok(([(header::CONTENT_TYPE, "application/json")], JSON.as_str()).into_response())
 }
 
 /// `GET /docs`.
-pub(super) async fn docs(uri: Uri) -> Result<Response, Problem> {
+pub(super) async fn docs(_: NoParams) -> Result<Response, Problem> {
     static PAGE: LazyLock<String> = LazyLock::new(|| {
         let title = "Noctule: reference of the HTTP interface";
         page(title, &reference::body(&DESCRIPTION))
     });
-    Params::read(&uri, &[])?;
     Ok(html(&PAGE))
 }
 
 /// `GET /problems/{slug}`: what the `type` of a problem leads to.
-pub(super) async fn problem(uri: Uri, slug: Option<Path<String>>) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
+pub(super) async fn problem(
+    uri: Uri,
+    slug: Option<Path<String>>,
+    _: NoParams,
+) -> Result<Response, Problem> {
     let section = slug.as_ref().and_then(|Path(slug)| section(slug));
     let Some(text) = section else {
         return Err(Problem::NoSuchResource(uri.path().to_owned()));

@@ -24,7 +24,7 @@ use document::TerrainDocument;
 
 use super::caller::Caller;
 use super::known_tags::KnownTags;
-use super::params::{self, Params};
+use super::params::{self, NoParams, Params};
 use super::problem::Problem;
 use super::{AppState, off_thread};
 use crate::catalogue::{
@@ -239,8 +239,7 @@ struct TerrainsDocument {
 }
 
 /// `GET /terrains`.
-pub(super) async fn list(State(state): State<AppState>, uri: Uri) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
+pub(super) async fn list(State(state): State<AppState>, _: NoParams) -> Result<Response, Problem> {
     let entries = state.terrains.ask(|catalogue| catalogue.list()).await?;
     let uses = state.store.datasets_in_use().await?;
     let terrains = entries.into_iter();
@@ -262,10 +261,9 @@ fn active(uses: &[crate::store::DatasetUse], sha256: Option<&str>) -> u64 {
 pub(super) async fn show(
     State(state): State<AppState>,
     Name(name): Name,
-    uri: Uri,
+    _: NoParams,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    Params::read(&uri, &[])?;
     let catalogue = state.terrains.catalogue.clone();
     let entry = one_of_few(&state.terrains.checks, move || catalogue.entry(&name)).await??;
     let content = entry.sha256.clone();
@@ -322,10 +320,9 @@ pub(super) async fn delete(
     State(state): State<AppState>,
     caller: Caller,
     Name(name): Name,
-    uri: Uri,
+    _: NoParams,
     headers: HeaderMap,
 ) -> Result<StatusCode, Problem> {
-    Params::read(&uri, &[])?;
     check_name(&name)?;
     let naming = naming(&state, name, &caller, &headers);
     let asked = naming.clone();

@@ -39,6 +39,7 @@ use super::around::{Answering, Around, Next};
 use super::caller::Caller;
 use super::params::ticket_of;
 use super::problem::Problem;
+use crate::config;
 use crate::job::{Owner, PlanId};
 use crate::telemetry::spans;
 use rate::{Buckets, Taken};
@@ -237,9 +238,14 @@ impl Access {
 
 impl Default for Settings {
     fn default() -> Self {
+        let config::Http {
+            streams,
+            streams_per_key,
+            ..
+        } = config::Http::default();
         Self {
-            streams: 10_000,
-            streams_per_key: 1_000,
+            streams,
+            streams_per_key,
             ticket_life: Duration::from_secs(600),
         }
     }

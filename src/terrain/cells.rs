@@ -107,6 +107,12 @@ impl<Z: Copy + Into<f64>> Cells<'_, Z> {
     }
 }
 
+/// The `t` at which `a + (b - a) t` is `value`; infinite when nowhere.
+pub(super) fn share_of_way(a: f64, b: f64, value: f64) -> f64 {
+    let t = (value - a) / (b - a);
+    if t.is_nan() { f64::INFINITY } else { t }
+}
+
 /// The columns, or the rows, that a way from `a` to `b` crosses.
 pub(super) struct Walk {
     /// The one where it is.

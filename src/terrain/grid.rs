@@ -3,7 +3,7 @@
 //! A leg's least and greatest height above it is exact.
 
 use super::HeightRange;
-use super::cells::Cells;
+use super::cells::{Cells, share_of_way};
 use crate::geometry::{Point2, Rect, Segment};
 
 /// Elevations at nodes, row-major from south to north; the ground between them is bilinear.
@@ -89,12 +89,6 @@ impl Grid {
         let offset = (point - self.origin) / self.cell;
         (offset.x, offset.y)
     }
-}
-
-/// The `t` at which `a + (b - a) t` is `value`; infinite when nowhere.
-fn share_of_way(a: f64, b: f64, value: f64) -> f64 {
-    let t = (value - a) / (b - a);
-    if t.is_nan() { f64::INFINITY } else { t }
 }
 
 #[cfg(test)]

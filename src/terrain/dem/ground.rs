@@ -13,7 +13,7 @@ use super::{DemError, Raster};
 use crate::geometry::geodesy::TangentPlane;
 use crate::geometry::{Point2, Point3, Rect, Segment};
 use crate::terrain::HeightRange;
-use crate::terrain::cells::{Cells, Place};
+use crate::terrain::cells::{Cells, Place, share_of_way};
 
 /// What a chord may add to or take from a height, metres.
 const CHORD_M: f64 = 2.5e-4;
@@ -383,12 +383,6 @@ fn steepest(raster: &Raster) -> f64 {
         }
     }
     f64::from(most[0]) + f64::from(most[1])
-}
-
-/// The `t` at which `a + (b - a) t` is `value`; infinite when nowhere.
-fn share_of_way(a: f64, b: f64, value: f64) -> f64 {
-    let t = (value - a) / (b - a);
-    if t.is_nan() { f64::INFINITY } else { t }
 }
 
 /// Without its samples.

@@ -144,11 +144,12 @@ fn side(count: usize) -> usize {
     ((0.5 * (count as f64).sqrt()) as usize).clamp(1, 64)
 }
 
+/// The cell of a coordinate in cells; beyond an edge, that of the edge.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "clamped to the cells first; what is not a number becomes 0"
 )]
-fn onto(cells: f64, count: usize) -> usize {
+pub(super) fn onto(cells: f64, count: usize) -> usize {
     cells.clamp(0.0, (count - 1) as f64) as usize
 }

@@ -1,6 +1,5 @@
 //! What stands for a dataset: its bytes, and what was declared that they do not say.
 
-use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -9,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::Staged;
+use crate::export::hex;
 use crate::terrain::dem::{self, Dataset, Declared, DemError, Format, Metadata, Survey};
 
 /// What a file does not say of itself and somebody else did.
@@ -100,11 +100,7 @@ impl Identity {
                 self.add(format!("\n{name}={value}").as_bytes());
             }
         }
-        let digits = self.0.finalize();
-        digits.iter().fold(String::new(), |mut hex, byte| {
-            write!(hex, "{byte:02x}").expect("writing to a string cannot fail");
-            hex
-        })
+        hex(&self.0.finalize())
     }
 }
 

@@ -12,19 +12,19 @@ mod error;
 mod file_name;
 mod geojson;
 mod gpx;
+mod hex;
 mod kml;
 mod mission;
 mod options;
 mod outline;
-mod sha256;
 mod svg;
 mod words;
 
 pub use delivery::Delivery;
 pub use error::{ExportError, OptionFault};
 pub use file_name::file_name;
+pub use hex::{hex, sha256_hex};
 pub use options::{Altitude, Firmware, OPTIONS, OptionRule, Options};
-pub use sha256::sha256_hex;
 
 use crate::scenario::json::Rules;
 

@@ -1,8 +1,7 @@
 //! Secrets that nobody can guess.
 
-use std::fmt::Write as _;
-
 use super::keys::PREFIX;
+use crate::export::hex;
 
 /// A new key.
 ///
@@ -16,10 +15,7 @@ pub fn key() -> Result<String, getrandom::Error> {
 pub(super) fn random_hex() -> Result<String, getrandom::Error> {
     let mut bytes = [0_u8; 32];
     getrandom::fill(&mut bytes)?;
-    Ok(bytes.iter().fold(String::new(), |mut text, byte| {
-        write!(text, "{byte:02x}").expect("writing to a string cannot fail");
-        text
-    }))
+    Ok(hex(&bytes))
 }
 
 #[cfg(test)]

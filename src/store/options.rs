@@ -1,6 +1,7 @@
 //! What a store is opened with.
 
 use super::clock::{Clock, wall_clock};
+use crate::job::Plan;
 
 /// What a store is opened with.
 #[derive(Clone)]
@@ -38,4 +39,12 @@ pub struct Retention {
     pub plans: Option<u64>,
     /// Bytes of their documents and events.
     pub bytes: Option<u64>,
+}
+
+impl Retention {
+    /// What becomes the `expires_ms` of a plan that has just ended.
+    pub(super) fn expires_ms(self, plan: &Plan) -> Option<i64> {
+        let (finished_ms, age_ms) = plan.finished_ms.zip(self.age_ms)?;
+        Some(finished_ms.saturating_add(age_ms))
+    }
 }

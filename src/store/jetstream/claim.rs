@@ -239,7 +239,7 @@ impl JetStream {
                     Status::Running => {
                         record.lost += 1;
                         if lost::end(&mut record.plan, record.lost.into(), now_ms)? {
-                            record.ended(self.options.retention.age_ms);
+                            record.ended(self.options.retention);
                             return Ok(Some(Change::told(record)));
                         }
                         record.plan.requeue()?;

@@ -12,7 +12,7 @@ use uuid::Uuid;
 use super::lane::Lane;
 use super::steps::Change;
 use crate::job::{Event, NumberedEvent, Owner, Plan, PlanId, Status, Submission};
-use crate::store::{StoreError, Tombstone};
+use crate::store::{Retention, StoreError, Tombstone};
 
 /// A step, as it is written.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -129,12 +129,10 @@ impl Record {
     }
 
     /// It has ended: its time runs, and its end is to be told.
-    pub(super) fn ended(&mut self, age_ms: Option<i64>) {
-        let finished_ms = self.plan.finished_ms;
-        let expires_ms = finished_ms.zip(age_ms);
-        self.plan.expires_ms = expires_ms.map(|(end, age)| end.saturating_add(age));
+    pub(super) fn ended(&mut self, retention: Retention) {
+        self.plan.expires_ms = retention.expires_ms(&self.plan);
         if let Some(hook) = &mut self.webhook {
-            hook.due_ms = finished_ms;
+            hook.due_ms = self.plan.finished_ms;
         }
     }
 

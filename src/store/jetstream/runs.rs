@@ -112,7 +112,7 @@ impl JetStream {
                     record.bytes += bytes;
                     record.result = Some(result.clone());
                 }
-                record.ended(self.options.retention.age_ms);
+                record.ended(self.options.retention);
                 Ok(Some(Change {
                     events: last.to_vec(),
                     ..Change::told(record)
@@ -137,7 +137,7 @@ impl JetStream {
                 if record.plan.cancel_requested {
                     record.plan.cancel(now_ms)?;
                     back = AckKind::Ack;
-                    record.ended(self.options.retention.age_ms);
+                    record.ended(self.options.retention);
                 } else {
                     record.plan.requeue()?;
                     record.plan.queue_position = Some(self.view.known().position(record.place));
@@ -164,7 +164,7 @@ impl JetStream {
                     Status::Queued => {
                         record.plan.cancel(now_ms)?;
                         waited = Some(record.place);
-                        record.ended(self.options.retention.age_ms);
+                        record.ended(self.options.retention);
                     }
                     Status::Running if !record.plan.cancel_requested => {
                         record.plan.request_cancel();

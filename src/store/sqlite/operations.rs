@@ -293,9 +293,7 @@ fn tell_status(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreE
 
 /// The caller has just ended the plan. From now on its time runs.
 fn tell_end(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
-    let age_ms = tx.options.retention.age_ms;
-    let expires_ms = row.plan.finished_ms.zip(age_ms);
-    row.plan.expires_ms = expires_ms.map(|(end, age)| end.saturating_add(age));
+    row.plan.expires_ms = tx.options.retention.expires_ms(&row.plan);
     let status = Event::Status(Box::new(row.plan.clone()));
     let end = Event::End(row.plan.status);
     webhooks::make_due(tx, row)?;

@@ -211,7 +211,6 @@ pub(super) fn request_cancel(
 }
 
 pub(super) fn delete(tx: &mut Transaction<'_>, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
-    removal::bury_for_good(tx, now_ms)?;
     let Some(row) = PlanRow::load(tx.connection, id)? else {
         return match missing(tx.connection, id, now_ms)? {
             StoreError::Gone(_) => Ok(()),

@@ -1,6 +1,6 @@
 //! Plans whose time has come, and what remains of the removed ones.
 
-use rusqlite::params;
+use rusqlite::{Params, params};
 
 use super::idempotency;
 use super::transaction::{Effect, Transaction};
@@ -58,8 +58,8 @@ fn beyond_limits(tx: &Transaction<'_>, at_most: usize) -> Result<Vec<Ended>, Sto
     let oldest = ended(
         tx,
         "SELECT seq, id, owner, bytes FROM plans INDEXED BY plans_ended \
-         WHERE finished_ms IS NOT NULL AND seq > ?1 ORDER BY finished_ms LIMIT ?2",
-        [0, at_most.cast_signed() as i64],
+         WHERE finished_ms IS NOT NULL ORDER BY finished_ms LIMIT ?1",
+        [at_most.cast_signed() as i64],
     )?;
     let beyond = oldest.into_iter().take_while(|plan| {
         let too_many = plans > max_plans || bytes > max_bytes;
@@ -70,7 +70,11 @@ fn beyond_limits(tx: &Transaction<'_>, at_most: usize) -> Result<Vec<Ended>, Sto
     Ok(beyond.collect())
 }
 
-fn ended(tx: &Transaction<'_>, sql: &str, parameters: [i64; 2]) -> Result<Vec<Ended>, StoreError> {
+fn ended(
+    tx: &Transaction<'_>,
+    sql: &str,
+    parameters: impl Params,
+) -> Result<Vec<Ended>, StoreError> {
     let mut statement = tx.connection.prepare_cached(sql)?;
     let rows = statement.query_map(parameters, |row| {
         Ok(Ended {

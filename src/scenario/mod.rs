@@ -115,10 +115,14 @@ impl PlannerSettings {
     /// population * iterations * waypoints, as [`limits::Limits::work`] bounds it.
     #[must_use]
     pub fn work(&self) -> u64 {
-        [self.population, self.iterations, self.waypoints]
-            .iter()
-            .fold(1_u64, |work, factor| work.saturating_mul(*factor as u64))
+        work([self.population, self.iterations, self.waypoints])
     }
+}
+
+/// The product of what makes a search long.
+fn work(factors: [usize; 3]) -> u64 {
+    let grow = |work: u64, factor: usize| work.saturating_mul(factor as u64);
+    factors.into_iter().fold(1, grow)
 }
 
 #[cfg(test)]

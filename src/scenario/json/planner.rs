@@ -1,7 +1,7 @@
 //! `planner`: the algorithm, its size, its seed and its constants.
 
 use crate::geometry::Point3;
-use crate::scenario::{PlannerSettings, Seeding, Smoothing, WarmStart};
+use crate::scenario::{PlannerSettings, Seeding, Smoothing, WarmStart, work};
 
 use super::chart::Chart;
 use super::fault::Faults;
@@ -233,9 +233,7 @@ fn smoothing(at: At<'_>, faults: &mut Faults) -> Option<Smoothing> {
 
 /// population * iterations * waypoints against the operator's limit.
 fn check_work(path: &Path<'_>, factors: [usize; 3], limit: u64, faults: &mut Faults) {
-    let work = factors
-        .iter()
-        .fold(1_u64, |work, factor| work.saturating_mul(*factor as u64));
+    let work = work(factors);
     if work > limit {
         let [population, iterations, waypoints] = factors;
         faults.add(path, "too-much-work", || {

@@ -1,9 +1,10 @@
-//! `noctule serve`: put the parts together, and take them apart in the right order.
+//! `noctule serve`: put the parts together and set them going; `ending` takes them apart.
 
 mod backend;
 mod datasets;
 mod descriptors;
 mod ending;
+mod parts;
 
 use std::io::Write as _;
 use std::net::SocketAddr;
@@ -12,21 +13,20 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, anyhow};
+use axum::Router;
 use tokio::net::{TcpListener, TcpSocket};
 use tokio::sync::watch;
-use tokio::time::Instant;
 
-use self::ending::{Signals, Times};
-use super::{access, exit, files};
+use self::ending::{Running, Signals};
+use self::parts::Callers;
+use super::{access, files};
 use crate::config::{self, Config, Flags};
-use crate::http::webhook::{self, Secret, Sender};
-use crate::http::{self, Capacity, InFlight, Origins, Parts, Phase, Terrains};
+use crate::http::webhook::Sender;
+use crate::http::{self, Parts, Phase};
 use crate::job::{Failure, FailureKind};
 use crate::planner;
 use crate::scenario::json::{self, Refusal, Rules};
-use crate::store::measured::MeasuredStore;
-use crate::store::{self, SteadyClock, Store};
-use crate::telemetry::{self, Instruments};
+use crate::telemetry;
 use crate::worker::{self, Engine, Pool, Sweeper, Unplanned};
 
 /// Callers that may wait to be let in; Linux allows as many since 5.4. Who comes when there are more
@@ -62,94 +62,66 @@ pub(super) fn start(config: &Config) -> anyhow::Result<()> {
 }
 
 async fn serve(config: &Config) -> anyhow::Result<()> {
-    let mut signals = Signals::new()?;
+    let signals = Signals::new()?;
     let max_connections = descriptors::connections(config.http.max_connections);
-    let access = access::open(config)?;
-    let cors =
-        Origins::read(&config.cors_origins).map_err(|fault| anyhow!("cors_origins: {fault}"))?;
-    let hosts = access::hosts(config, &access, &cors);
-    let webhooks = webhooks(&config.webhook)?;
+    let callers = Callers::read(config)?;
     let listener =
         listen(config.listen).with_context(|| format!("cannot listen on {}", config.listen))?;
-    let instruments = Arc::new(Instruments::default());
-    let clock = SteadyClock::following(store::wall_clock());
-    let store = backend::open(config, clock.clock()).await?;
-    let store: Arc<dyn Store> = Arc::new(MeasuredStore::new(store, instruments.clone()));
-    let catalogue = datasets::open(config, &instruments).await?;
-    let rules = planner::rules(config.limits).with_datasets(catalogue.clone());
-    let rules = Arc::new(rules);
-    let settings = worker::Settings {
-        workers: slots(config),
-        clock: clock.clock(),
-        instruments: instruments.clone(),
-    };
-    let pool = Pool::start(store.clone(), settings, engine(rules.clone()));
-    let sweeper = Sweeper::start(store.clone(), catalogue.clone(), clock.clock());
-    let sender = webhooks
-        .clone()
-        .filter(|_| config.role.serves())
-        .map(|settings| Sender::start(store.clone(), settings, clock.clock()));
     let (phase, watched) = watch::channel(Phase::Serving);
-    let parts = Parts {
-        store: store.clone(),
-        rules,
-        terrains: Terrains::new(catalogue),
-        capacity: Capacity {
-            workers: slots(config),
-            queue: config.queue,
-        },
-        in_flight: InFlight::default(),
-        clock,
-        body_timeout: config.http.body_timeout,
-        access: access.clone(),
-        webhooks: webhooks.clone(),
-        cors,
-        hosts,
-        phase: watched.clone(),
-        instruments: instruments.clone(),
-    };
-    let router = if config.role.serves() {
-        http::router(parts)
-    } else {
-        http::upkeep_router(parts)
-    };
-    access::reload_on_hangup(config, access)?;
+    let parts = parts::open(config, callers, watched.clone()).await?;
+    let store = parts.store.clone();
+    let pool = pool(&parts);
+    let sweeper = sweeper(&parts);
+    let sender = sender(config, &parts);
+    access::reload_on_hangup(config, parts.access.clone())?;
     announce(&listener)?;
-    let times = Times::within(config.grace);
     let settings = http::server::Settings {
         head_timeout: config.http.head_timeout,
         body_timeout: config.http.body_timeout,
         max_connections,
         patience: LAST_ANSWERS,
-        instruments,
+        instruments: parts.instruments.clone(),
     };
+    let router = router(config, parts);
     let server = tokio::spawn(http::server::serve(listener, router, watched, settings));
+    let running = Running {
+        phase,
+        pool,
+        server,
+        sweeper,
+        sender,
+        store,
+    };
+    running.end_on(signals, config.grace).await
+}
 
-    let name = signals.next().await;
-    let signalled = Instant::now();
-    tracing::info!(
-        signal = name,
-        grace_s = config.grace.as_secs_f64(),
-        "shutting down"
-    );
-    tokio::spawn(async move {
-        signals.next().await;
-        tracing::warn!("a second signal, leaving at once");
-        std::process::exit(exit::FAILED.into());
-    });
-    phase.send_replace(Phase::Draining);
-    ending::drain(pool, &times).await;
-    phase.send_replace(Phase::Stopping);
-    if let Ok(ended) = tokio::time::timeout_at(signalled + times.answers, server).await {
-        ended.context("the server broke")?;
+fn pool(parts: &Parts) -> Pool {
+    let settings = worker::Settings {
+        workers: parts.capacity.workers,
+        clock: parts.clock.clock(),
+        instruments: parts.instruments.clone(),
+    };
+    let engine = engine(parts.rules.clone());
+    Pool::start(parts.store.clone(), settings, engine)
+}
+
+fn sweeper(parts: &Parts) -> Sweeper {
+    let catalogue = parts.terrains.catalogue.clone();
+    Sweeper::start(parts.store.clone(), catalogue, parts.clock.clock())
+}
+
+/// `None` where nobody is told, or other nodes do it.
+fn sender(config: &Config, parts: &Parts) -> Option<Sender> {
+    let settings = parts.webhooks.clone().filter(|_| config.role.serves());
+    settings.map(|settings| Sender::start(parts.store.clone(), settings, parts.clock.clock()))
+}
+
+fn router(config: &Config, parts: Parts) -> Router {
+    if config.role.serves() {
+        http::router(parts)
+    } else {
+        http::upkeep_router(parts)
     }
-    drop((sweeper, sender));
-    store.close().await;
-    tracing::info!(
-        duration_ms = signalled.elapsed().as_secs_f64() * 1e3,
-        "shut down"
-    );
-    Ok(())
 }
 
 /// What the pool runs: the accepted document, read again, and planned.
@@ -190,20 +162,6 @@ fn slots(config: &Config) -> usize {
 fn data_dir(config: &Config) -> anyhow::Result<PathBuf> {
     let data_dir = config.data_dir.clone();
     data_dir.context("the user has no home; name a directory with --data-dir")
-}
-
-/// How ends of plans are told; `None` when nobody is.
-fn webhooks(config: &config::Webhook) -> anyhow::Result<Option<webhook::Settings>> {
-    let Some(path) = &config.secret_file else {
-        return Ok(None);
-    };
-    let place = || format!("the webhook secret of {}", path.display());
-    let text = std::fs::read_to_string(path).with_context(place)?;
-    let secret = Secret::read(&text).map_err(|allowed| anyhow!("{} {allowed}", place()))?;
-    Ok(Some(webhook::Settings {
-        secret,
-        allow_private: config.allow_private,
-    }))
 }
 
 /// Take the address, for as many callers at once as the system lets wait.

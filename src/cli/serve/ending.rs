@@ -1,15 +1,71 @@
-//! The end of a service: the signals that ask for it, and how its time is spent.
+//! The end of a service: the signals that ask for it, the order in which it is taken apart, and how its time is spent.
 
+use std::sync::Arc;
 use std::time::Duration;
 
+use anyhow::Context as _;
 use tokio::signal::unix::{Signal, SignalKind, signal};
+use tokio::sync::watch;
+use tokio::task::JoinHandle;
+use tokio::time::{Instant, timeout, timeout_at};
 
-use crate::worker::Pool;
+use crate::cli::exit;
+use crate::http::Phase;
+use crate::http::webhook::Sender;
+use crate::store::Store;
+use crate::worker::{Pool, Sweeper};
+
+/// What has been set going.
+pub(super) struct Running {
+    pub(super) phase: watch::Sender<Phase>,
+    pub(super) pool: Pool,
+    pub(super) server: JoinHandle<()>,
+    pub(super) sweeper: Sweeper,
+    pub(super) sender: Option<Sender>,
+    pub(super) store: Arc<dyn Store>,
+}
+
+impl Running {
+    /// Take it apart in the right order once a signal asks for it, in `grace` at most.
+    pub(super) async fn end_on(self, mut signals: Signals, grace: Duration) -> anyhow::Result<()> {
+        let name = signals.next().await;
+        let signalled = Instant::now();
+        tracing::info!(
+            signal = name,
+            grace_s = grace.as_secs_f64(),
+            "shutting down"
+        );
+        leave_on_another(signals);
+        let times = Times::within(grace);
+        self.phase.send_replace(Phase::Draining);
+        drain(self.pool, &times).await;
+        self.phase.send_replace(Phase::Stopping);
+        if let Ok(ended) = timeout_at(signalled + times.answers, self.server).await {
+            ended.context("the server broke")?;
+        }
+        drop((self.sweeper, self.sender));
+        self.store.close().await;
+        tracing::info!(
+            duration_ms = signalled.elapsed().as_secs_f64() * 1e3,
+            "shut down"
+        );
+        Ok(())
+    }
+}
+
+/// Who asks twice does not want to wait.
+fn leave_on_another(mut signals: Signals) {
+    tokio::spawn(async move {
+        signals.next().await;
+        tracing::warn!("a second signal, leaving at once");
+        std::process::exit(exit::FAILED.into());
+    });
+}
 
 /// Let runs finish, then give them back; without those that do not heed their stop in time, which
 /// the next process finds as after a crash.
-pub(super) async fn drain(pool: Pool, times: &Times) {
-    if tokio::time::timeout(times.runs + times.giving_back, pool.drain(times.runs))
+async fn drain(pool: Pool, times: &Times) {
+    if timeout(times.runs + times.giving_back, pool.drain(times.runs))
         .await
         .is_err()
     {
@@ -18,18 +74,18 @@ pub(super) async fn drain(pool: Pool, times: &Times) {
 }
 
 /// How the grace period is spent.
-pub(super) struct Times {
+struct Times {
     /// Runs may finish until then.
-    pub(super) runs: Duration,
+    runs: Duration,
     /// Then they are stopped and given back.
-    pub(super) giving_back: Duration,
+    giving_back: Duration,
     /// Connections may finish their answers until then; what remains is for the store.
-    pub(super) answers: Duration,
+    answers: Duration,
 }
 
 impl Times {
     /// The last quarter, at most two seconds, is for giving back, for connections, and for the store.
-    pub(super) fn within(grace: Duration) -> Self {
+    fn within(grace: Duration) -> Self {
         let reserve = (grace / 4).min(Duration::from_secs(2));
         Self {
             runs: grace.saturating_sub(reserve),

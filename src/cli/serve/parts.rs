@@ -1,0 +1,90 @@
+//! What the service is made of, as the configuration says.
+
+use std::sync::Arc;
+
+use anyhow::{Context as _, anyhow};
+use tokio::sync::watch;
+
+use super::{backend, datasets, slots};
+use crate::cli::access;
+use crate::config::{self, Config};
+use crate::http::auth::Access;
+use crate::http::webhook::{self, Secret};
+use crate::http::{Capacity, Hosts, InFlight, Origins, Parts, Phase, Terrains};
+use crate::planner;
+use crate::store::measured::MeasuredStore;
+use crate::store::{self, SteadyClock};
+use crate::telemetry::Instruments;
+
+/// Who may call, and who is told: what can be wrong of the configuration, read before anything is taken or opened.
+pub(super) struct Callers {
+    access: Access,
+    cors: Origins,
+    hosts: Hosts,
+    webhooks: Option<webhook::Settings>,
+}
+
+impl Callers {
+    pub(super) fn read(config: &Config) -> anyhow::Result<Self> {
+        let access = access::open(config)?;
+        let cors = Origins::read(&config.cors_origins)
+            .map_err(|fault| anyhow!("cors_origins: {fault}"))?;
+        Ok(Self {
+            hosts: access::hosts(config, &access, &cors),
+            access,
+            cors,
+            webhooks: webhooks(&config.webhook)?,
+        })
+    }
+}
+
+/// Open the store and the datasets, and put all of it together.
+pub(super) async fn open(
+    config: &Config,
+    callers: Callers,
+    phase: watch::Receiver<Phase>,
+) -> anyhow::Result<Parts> {
+    let instruments = Arc::new(Instruments::default());
+    let clock = SteadyClock::following(store::wall_clock());
+    let store = backend::open(config, clock.clock()).await?;
+    let catalogue = datasets::open(config, &instruments).await?;
+    let rules = planner::rules(config.limits).with_datasets(catalogue.clone());
+    let Callers {
+        access,
+        cors,
+        hosts,
+        webhooks,
+    } = callers;
+    Ok(Parts {
+        store: Arc::new(MeasuredStore::new(store, instruments.clone())),
+        rules: Arc::new(rules),
+        terrains: Terrains::new(catalogue),
+        capacity: Capacity {
+            workers: slots(config),
+            queue: config.queue,
+        },
+        in_flight: InFlight::default(),
+        clock,
+        body_timeout: config.http.body_timeout,
+        access,
+        webhooks,
+        cors,
+        hosts,
+        phase,
+        instruments,
+    })
+}
+
+/// How ends of plans are told; `None` when nobody is.
+fn webhooks(config: &config::Webhook) -> anyhow::Result<Option<webhook::Settings>> {
+    let Some(path) = &config.secret_file else {
+        return Ok(None);
+    };
+    let place = || format!("the webhook secret of {}", path.display());
+    let text = std::fs::read_to_string(path).with_context(place)?;
+    let secret = Secret::read(&text).map_err(|allowed| anyhow!("{} {allowed}", place()))?;
+    Ok(Some(webhook::Settings {
+        secret,
+        allow_private: config.allow_private,
+    }))
+}

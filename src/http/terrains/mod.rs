@@ -6,32 +6,30 @@
 mod document;
 mod elevations;
 mod receive;
+mod upload;
 
 use std::sync::Arc;
 
 use axum::Json;
-use axum::body::Body;
 use axum::extract::{FromRequestParts, Path, State};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use tokio::sync::Semaphore;
 
 pub(super) use elevations::elevations;
+pub(super) use upload::put;
 
 use document::TerrainDocument;
 
 use super::caller::Caller;
 use super::known_tags::KnownTags;
-use super::params::{self, NoParams, Params};
+use super::params::{self, NoParams};
 use super::problem::Problem;
 use super::{AppState, off_thread};
-use crate::catalogue::{
-    Catalogue, CatalogueError, Claim, Declaration, Entry, Expected, Kept, Naming, Tally,
-};
+use crate::catalogue::{Catalogue, CatalogueError, Claim, Entry, Expected, Naming, Tally};
 use crate::export::sha256_hex;
-use crate::terrain::dem::Format;
 use crate::terrain::is_dataset_name;
 
 /// Uploads at the same time; more wait, as long as a body may pause.
@@ -131,64 +129,6 @@ fn naming(state: &AppState, name: String, caller: &Caller, headers: &HeaderMap) 
     }
 }
 
-/// `PUT /terrains/{name}`.
-pub(super) async fn put(
-    State(state): State<AppState>,
-    caller: Caller,
-    Name(name): Name,
-    uri: Uri,
-    headers: HeaderMap,
-    body: Body,
-) -> Result<Response, Problem> {
-    let params = Params::read(&uri, &["crs", "format", "filename"])?;
-    check_name(&name)?;
-    if let Some(filename) = params.text("filename")
-        && filename.chars().count() > MAX_FILENAME_CHARS
-    {
-        let allowed = format!("at most {MAX_FILENAME_CHARS} characters");
-        return Err(params::refused("filename", filename, &allowed));
-    }
-    let format = params.text("format").map(read_format).transpose()?;
-    let declaration = Declaration {
-        crs: params.text("crs").map(str::to_owned),
-        filename: Some(params.text("filename").unwrap_or(&name).to_owned()),
-    };
-    let naming = naming(&state, name, &caller, &headers);
-    // Before a long body has been sent for nothing.
-    let asked = naming.clone();
-    let terrains = &state.terrains;
-    terrains
-        .ask(move |catalogue| catalogue.permit(&asked))
-        .await?;
-    let staged = receive::receive(&state, &headers, body).await?;
-    let check = move || staged.check(format, declaration);
-    let checked = one_of_few(&terrains.checks, check).await??;
-    let sha256 = checked.sha256().to_owned();
-    let (kept, entry) = terrains
-        .ask(move |catalogue| {
-            let kept = catalogue.keep(checked, &naming)?;
-            Ok((kept, catalogue.entry(&naming.name)?))
-        })
-        .await?;
-    tracing::info!(name = entry.name, sha256, ?kept, "a dataset was uploaded");
-    let status = match kept {
-        Kept::Created => StatusCode::CREATED,
-        Kept::Replaced | Kept::Unchanged => StatusCode::OK,
-    };
-    let content = entry.sha256.as_deref().map(etag);
-    let document = document(&state, entry).await?;
-    let mut answer = tagged(json(document), content);
-    *answer.status_mut() = status;
-    if kept == Kept::Created {
-        let location = HeaderValue::from_str(uri.path()).expect("a path is visible ASCII");
-        answer.headers_mut().insert(header::LOCATION, location);
-    }
-    Ok(answer)
-}
-
-/// Of a file, as its uploader calls it.
-const MAX_FILENAME_CHARS: usize = 200;
-
 /// What no dataset can be called is told from what none is called.
 fn check_name(name: &str) -> Result<(), Problem> {
     if is_dataset_name(name) {
@@ -196,12 +136,6 @@ fn check_name(name: &str) -> Result<(), Problem> {
     }
     let allowed = "1 to 64 lower-case letters, digits, - and _, the first a letter or a digit";
     Err(params::refused("name", name, allowed))
-}
-
-fn read_format(name: &str) -> Result<Format, Problem> {
-    let found = document::FORMATS.iter().find(|(known, _)| *known == name);
-    let format = found.map(|(_, format)| *format);
-    format.ok_or_else(|| params::refused("format", name, "geotiff, asc or hgt"))
 }
 
 /// What `If-Match` and `If-None-Match` say.

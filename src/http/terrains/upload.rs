@@ -1,0 +1,116 @@
+//! `PUT /terrains/{name}`: from a file to a dataset.
+
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
+use axum::response::Response;
+
+use super::receive::receive;
+use super::{Name, Terrains, check_name, document, etag, json, naming, one_of_few, tagged};
+use crate::catalogue::{Checked, Declaration, Entry, Kept, Naming, Staged};
+use crate::http::AppState;
+use crate::http::caller::Caller;
+use crate::http::params::{self, Params};
+use crate::http::problem::Problem;
+use crate::terrain::dem::Format;
+
+/// Of a file, as its uploader calls it.
+const MAX_FILENAME_CHARS: usize = 200;
+
+/// `PUT /terrains/{name}`.
+pub(in crate::http) async fn put(
+    State(state): State<AppState>,
+    caller: Caller,
+    Name(name): Name,
+    uri: Uri,
+    headers: HeaderMap,
+    body: Body,
+) -> Result<Response, Problem> {
+    let said = Said::read(&name, &uri)?;
+    let naming = naming(&state, name, &caller, &headers);
+    // Before a long body has been sent for nothing.
+    permit(&state.terrains, naming.clone()).await?;
+    let staged = receive(&state, &headers, body).await?;
+    let checked = check(&state.terrains, staged, said).await?;
+    let (kept, entry) = keep(&state.terrains, checked, naming).await?;
+    let answer = answer(&state, entry).await?;
+    Ok(match kept {
+        Kept::Created => created(answer, &uri),
+        Kept::Replaced | Kept::Unchanged => answer,
+    })
+}
+
+/// What its uploader says of a file.
+struct Said {
+    /// `None` where the file tells.
+    format: Option<Format>,
+    declaration: Declaration,
+}
+
+impl Said {
+    fn read(name: &str, uri: &Uri) -> Result<Self, Problem> {
+        let params = Params::read(uri, &["crs", "format", "filename"])?;
+        check_name(name)?;
+        let filename = params.text("filename").unwrap_or(name);
+        if filename.chars().count() > MAX_FILENAME_CHARS {
+            let allowed = format!("at most {MAX_FILENAME_CHARS} characters");
+            return Err(params::refused("filename", filename, &allowed));
+        }
+        Ok(Self {
+            format: params.text("format").map(read_format).transpose()?,
+            declaration: Declaration {
+                crs: params.text("crs").map(str::to_owned),
+                filename: Some(filename.to_owned()),
+            },
+        })
+    }
+}
+
+fn read_format(name: &str) -> Result<Format, Problem> {
+    let found = document::FORMATS.iter().find(|(known, _)| *known == name);
+    let format = found.map(|(_, format)| *format);
+    format.ok_or_else(|| params::refused("format", name, "geotiff, asc or hgt"))
+}
+
+async fn permit(terrains: &Terrains, naming: Naming) -> Result<(), Problem> {
+    terrains
+        .ask(move |catalogue| catalogue.permit(&naming))
+        .await
+}
+
+/// Read it through.
+async fn check(terrains: &Terrains, staged: Staged, said: Said) -> Result<Checked, Problem> {
+    let check = move || staged.check(said.format, said.declaration);
+    Ok(one_of_few(&terrains.checks, check).await??)
+}
+
+/// Give it its name.
+async fn keep(
+    terrains: &Terrains,
+    checked: Checked,
+    naming: Naming,
+) -> Result<(Kept, Entry), Problem> {
+    let sha256 = checked.sha256().to_owned();
+    let (kept, entry) = terrains
+        .ask(move |catalogue| {
+            let kept = catalogue.keep(checked, &naming)?;
+            Ok((kept, catalogue.entry(&naming.name)?))
+        })
+        .await?;
+    tracing::info!(name = entry.name, sha256, ?kept, "a dataset was uploaded");
+    Ok((kept, entry))
+}
+
+/// What the name stands for now.
+async fn answer(state: &AppState, entry: Entry) -> Result<Response, Problem> {
+    let content = entry.sha256.as_deref().map(etag);
+    let document = document(state, entry).await?;
+    Ok(tagged(json(document), content))
+}
+
+fn created(mut answer: Response, uri: &Uri) -> Response {
+    *answer.status_mut() = StatusCode::CREATED;
+    let location = HeaderValue::from_str(uri.path()).expect("a path is visible ASCII");
+    answer.headers_mut().insert(header::LOCATION, location);
+    answer
+}

@@ -2,19 +2,19 @@
 
 use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 
 use super::document::{Corners, Place};
-use super::{Name, etag};
+use super::{Name, etag, tagged};
 use crate::geometry::geodesy::{LatLon, wrapped};
 use crate::http::AppState;
 use crate::http::known_tags::KnownTags;
 use crate::http::params::{self, Params};
 use crate::http::problem::Problem;
-use crate::terrain::DatasetError;
 use crate::terrain::dem::Degrees;
+use crate::terrain::{DatasetError, Datasets};
 
 /// Samples along one side at most.
 const MOST_LOOKS_ALONG: usize = 512;
@@ -45,47 +45,73 @@ pub(in crate::http) async fn elevations(
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let params = Params::read(&uri, &PARAMETERS)?;
-    let (columns, rows) = (looks(&params, "columns")?, looks(&params, "rows")?);
-    if columns * rows > MOST_LOOKS {
-        let allowed = format!("at most {MOST_LOOKS} divided by columns");
-        return Err(params::refused("rows", &rows.to_string(), &allowed));
+    let asked = Asked::read(name.clone(), &uri)?;
+    let (datasets, known) = (state.rules.datasets.clone(), KnownTags::of(&headers));
+    let sampled = state
+        .terrains
+        .read(move || asked.sample(&*datasets, known.as_ref()))
+        .await?;
+    let (tag, document) = sampled.map_err(|error| refusal(error, &name))?;
+    let answer = match document {
+        Some(document) => Json(document).into_response(),
+        None => StatusCode::NOT_MODIFIED.into_response(),
+    };
+    Ok(tagged(answer, Some(tag)))
+}
+
+/// What is asked of a dataset.
+struct Asked {
+    name: String,
+    sha256: Option<String>,
+    /// `None` is all of it.
+    area: Option<Degrees>,
+    columns: usize,
+    rows: usize,
+}
+
+impl Asked {
+    fn read(name: String, uri: &Uri) -> Result<Self, Problem> {
+        let params = Params::read(uri, &PARAMETERS)?;
+        let (columns, rows) = (looks(&params, "columns")?, looks(&params, "rows")?);
+        if columns * rows > MOST_LOOKS {
+            let allowed = format!("at most {MOST_LOOKS} divided by columns");
+            return Err(params::refused("rows", &rows.to_string(), &allowed));
+        }
+        Ok(Self {
+            name,
+            sha256: params.text("sha256").map(str::to_owned),
+            area: area(&params)?,
+            columns,
+            rows,
+        })
     }
-    let area = area(&params)?;
-    let (asked, sha256) = (name.clone(), params.text("sha256").map(str::to_owned));
-    let datasets = state.rules.datasets.clone();
-    let known = KnownTags::of(&headers);
-    let sampled = state.terrains.read(move || {
-        let found = datasets.find(&asked, sha256.as_deref())?;
+
+    /// The content's entity tag, and its samples for who does not know them.
+    fn sample(
+        self,
+        datasets: &dyn Datasets,
+        known: Option<&KnownTags>,
+    ) -> Result<(HeaderValue, Option<ElevationsDocument>), DatasetError> {
+        let found = datasets.find(&self.name, self.sha256.as_deref())?;
         let tag = etag(&found.sha256);
         if known.is_some_and(|known| known.contain(&tag)) {
             return Ok((tag, None));
         }
-        let area = area.unwrap_or(found.dataset.metadata().degrees);
-        let places: Vec<LatLon> = places(area, columns, rows).collect();
-        let elevations = found.dataset.sample(&places)?;
+        let area = self.area.unwrap_or(found.dataset.metadata().degrees);
+        let places: Vec<LatLon> = places(area, self.columns, self.rows).collect();
+        let elevations = found.dataset.sample(&places)?.into_iter();
         let document = ElevationsDocument {
-            name: asked,
+            name: self.name,
             sha256: found.sha256,
             area: Corners::of(area),
-            columns,
-            rows,
+            columns: self.columns,
+            rows: self.rows,
             elevations: elevations
-                .into_iter()
                 .map(|elevation| elevation.map(to_the_centimetre))
                 .collect(),
         };
         Ok((tag, Some(document)))
-    });
-    let (tag, document) = sampled.await?.map_err(|error| refusal(error, &name))?;
-    let mut answer = match document {
-        Some(document) => Json(document).into_response(),
-        None => StatusCode::NOT_MODIFIED.into_response(),
-    };
-    let headers = answer.headers_mut();
-    headers.insert(header::ETAG, tag);
-    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
-    Ok(answer)
+    }
 }
 
 fn refusal(error: DatasetError, name: &str) -> Problem {

@@ -1,11 +1,12 @@
 //! `planner`: the algorithm, its size, its seed and its constants.
 
 use crate::geometry::Point3;
+use crate::scenario::limits::Limits;
 use crate::scenario::{PlannerSettings, Seeding, Smoothing, WarmStart, work};
 
 use super::chart::Chart;
 use super::fault::Faults;
-use super::fields::nearest;
+use super::fields::{Fields, nearest};
 use super::parameters::{Parameters, parameters};
 use super::path::Path;
 use super::ranges::{DEGREE, MIN_POPULATION, SEED, SPACING, TIME_LIMIT_MS};
@@ -54,34 +55,7 @@ pub(super) fn planner(
             algorithm(at, rules, faults)
         }),
     };
-    let size = |name: &'static str, limit: usize| {
-        move |at: At<'_>, faults: &mut Faults| {
-            let min = if name == "population" {
-                MIN_POPULATION
-            } else {
-                1
-            };
-            at.count(min, (name, limit), faults)
-        }
-    };
-    let waypoints = fields.or(
-        "waypoints",
-        DEFAULT_WAYPOINTS,
-        faults,
-        size("waypoints", limits.waypoints),
-    );
-    let population = fields.or(
-        "population",
-        DEFAULT_POPULATION,
-        faults,
-        size("population", limits.population),
-    );
-    let iterations = fields.or(
-        "iterations",
-        DEFAULT_ITERATIONS,
-        faults,
-        size("iterations", limits.iterations),
-    );
+    let sizes = sizes(&fields, limits, faults);
     // The modulus holds whatever is drawn to the range of a seed.
     let seed = fields.or("seed", drawn_seed % (1 << 53), faults, |at, faults| {
         at.whole(SEED, faults)
@@ -109,16 +83,8 @@ pub(super) fn planner(
     let parameters = fields.or("parameters", Parameters::default(), faults, |at, faults| {
         parameters(at, algorithm, faults)
     });
-    if let (Some(waypoints), Some(population), Some(iterations)) =
-        (waypoints, population, iterations)
-    {
-        check_work(
-            at.path,
-            [population, iterations, waypoints],
-            limits.work,
-            faults,
-        );
-    }
+    check_work(at.path, sizes, limits.work, faults);
+    let [population, iterations, waypoints] = sizes;
     let parameters = parameters?;
     Some(PlannerSettings {
         algorithm: algorithm?.name.to_owned(),
@@ -136,6 +102,24 @@ pub(super) fn planner(
         threads: parameters.threads,
         parameters: parameters.constants,
     })
+}
+
+/// Population, iterations and waypoints.
+fn sizes(fields: &Fields<'_>, limits: &Limits, faults: &mut Faults) -> [Option<usize>; 3] {
+    let mut size = |name, default, least, most| {
+        fields.or(name, default, faults, |at, faults| {
+            at.count(least, (name, most), faults)
+        })
+    };
+    let waypoints = size("waypoints", DEFAULT_WAYPOINTS, 1, limits.waypoints);
+    let population = size(
+        "population",
+        DEFAULT_POPULATION,
+        MIN_POPULATION,
+        limits.population,
+    );
+    let iterations = size("iterations", DEFAULT_ITERATIONS, 1, limits.iterations);
+    [population, iterations, waypoints]
 }
 
 fn algorithm<'r>(at: At<'_>, rules: &'r Rules, faults: &mut Faults) -> Option<&'r AlgorithmRule> {
@@ -231,11 +215,13 @@ fn smoothing(at: At<'_>, faults: &mut Faults) -> Option<Smoothing> {
     })
 }
 
-/// population * iterations * waypoints against the operator's limit.
-fn check_work(path: &Path<'_>, factors: [usize; 3], limit: u64, faults: &mut Faults) {
-    let work = work(factors);
+/// population * iterations * waypoints against the operator's limit, once all of them could be read.
+fn check_work(path: &Path<'_>, sizes: [Option<usize>; 3], limit: u64, faults: &mut Faults) {
+    let [Some(population), Some(iterations), Some(waypoints)] = sizes else {
+        return;
+    };
+    let work = work([population, iterations, waypoints]);
     if work > limit {
-        let [population, iterations, waypoints] = factors;
         faults.add(path, "too-much-work", || {
             format!(
                 "population * iterations * waypoints is {population} * {iterations} * {waypoints} = {work}, \

@@ -4,7 +4,7 @@ use crate::cost::Model;
 use crate::geometry::Point3;
 
 /// From start to target through `points`, in which the ends may be named; points outside of the
-/// area or the band are brought in.
+/// area or of the heights that are allowed there are brought in.
 pub(super) fn route(model: &Model, points: &[Point3]) -> Vec<Point3> {
     let scenario = model.scenario;
     let near =
@@ -20,18 +20,40 @@ pub(super) fn route(model: &Model, points: &[Point3]) -> Vec<Point3> {
     {
         free = rest;
     }
-    let band = scenario.altitude;
     let inside = |point: &Point3| {
         let at = scenario.area.nearest(point.xy());
         let ground = scenario.terrain.elevation(at);
-        Point3::new(
-            at.x,
-            at.y,
-            point.z.clamp(ground + band.min, ground + band.max),
-        )
+        let (floor, ceiling) = model.heights_over(at);
+        Point3::new(at.x, at.y, point.z.clamp(ground + floor, ground + ceiling))
     };
     std::iter::once(scenario.start)
         .chain(free.iter().map(inside))
         .chain(std::iter::once(scenario.target))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::tests::scenario;
+    use crate::scenario::AltitudeBand;
+
+    /// A climb from the ground to a band that begins at 100 m, and a point far from the start that is too low.
+    #[test]
+    fn a_known_climb_to_the_band_stays_one() {
+        let mut scenario = scenario();
+        scenario.start.z = 0.0;
+        scenario.altitude = AltitudeBand {
+            min: 100.0,
+            max: 200.0,
+        };
+        let model = Model::new(&scenario);
+        let way = (scenario.target - scenario.start).xy().normalize();
+        let at = |metres: f64, z: f64| {
+            let at = scenario.start.xy() + way * metres;
+            Point3::new(at.x, at.y, z)
+        };
+        let route = route(&model, &[at(30.0, 30.0), at(400.0, 30.0)]);
+        assert!((route[1].z - 30.0).abs() < 1e-9 && (route[2].z - 100.0).abs() < 1e-9);
+    }
 }

@@ -82,6 +82,7 @@ pub(super) struct Starts {
 /// Where the search of `model` starts; `None` for the algorithm alone.
 pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let settings = &model.scenario.planner;
+    let is_over = || why_stop(model.scenario, stop).is_some();
     let known = match &settings.warm_start {
         Some(WarmStart::Waypoints(points)) => Some(known::route(model, points)),
         Some(WarmStart::Plan(_)) | None => None,
@@ -94,11 +95,11 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
         shapes.extend(along_strings(model, stop));
         // Who brings a route has been over the hills already.
         if !warm {
-            let (found, rough) = over_ground(model, &shapes);
+            let (found, rough) = over_ground(model, &shapes, &is_over);
             if rough {
                 hopeless = HOPELESS_IN_ZONES;
             }
-            let climbs = climbs::routes(model);
+            let climbs = climbs::routes(model, &is_over);
             legs_priced = found.legs_priced + climbs.legs_priced;
             shapes.extend(found.routes);
             if !climbs.routes.is_empty() {
@@ -253,15 +254,19 @@ fn along_strings(model: &Model, stop: &dyn Stop) -> Vec<Vec<Point3>> {
 
 /// Routes over the ground: through a fine net only where the coarse one has none that can be flown as it is, and
 /// far about where the best so far pays much for soft zones, and in crowds along the ways between the threats; and
-/// whether there are such zones or crowds.
-fn over_ground(model: &Model, strings: &[Vec<Point3>]) -> (Found, bool) {
+/// whether there are such zones or crowds. What has been found once `is_over`.
+fn over_ground(
+    model: &Model,
+    strings: &[Vec<Point3>],
+    is_over: &dyn Fn() -> bool,
+) -> (Found, bool) {
     let strings = priced(model, strings);
     let cheapest = strings.iter().min_by(|one, other| one.0.rank(&other.0));
     let known = cheapest.map_or(f64::INFINITY, |(fitness, _)| fitness.cost);
     let (mut found, few) = roadmap::routes(model, OVERLAND, known);
     let is_crowd = ways::are_worth_a_look(model);
-    if is_crowd {
-        let ways = ways::routes(model);
+    if is_crowd && !is_over() {
+        let ways = ways::routes(model, is_over);
         found.routes.extend(ways.routes);
         found.legs_priced += ways.legs_priced;
     }
@@ -278,7 +283,7 @@ fn over_ground(model: &Model, strings: &[Vec<Point3>]) -> (Found, bool) {
         } else {
             OVERLAND
         };
-        let trails = trails::routes(model, detour, count);
+        let trails = trails::routes(model, detour, count, is_over);
         found.routes.extend(trails.routes);
         found.legs_priced += trails.legs_priced;
     }

@@ -35,9 +35,18 @@ const REACH: f64 = 2.1;
 
 /// Up to `count` routes that differ through each of its nets, of at most as many free waypoints as `model` asks for:
 /// over what is near to the direct way, or over all that is within `detour` times as far, if that is more.
-pub(super) fn routes(model: &Model, detour: Option<f64>, count: usize) -> Found {
+/// Fewer once `is_over`.
+pub(super) fn routes(
+    model: &Model,
+    detour: Option<f64>,
+    count: usize,
+    is_over: &dyn Fn() -> bool,
+) -> Found {
     let mut found = Found::default();
     for spots in nets(model.scenario, detour.filter(|&detour| detour > DETOUR)) {
+        if is_over() {
+            break;
+        }
         let mut net = Net::new(model, &spots);
         let trees = [0, net.places.len() - 1].map(|end| net.cheapest(end));
         found.legs_priced += net.legs_priced;
@@ -322,7 +331,7 @@ mod tests {
         let can_be_flown = |route: &&Vec<Point3>| price(&model, route).is_feasible();
         let coarse = roadmap::routes(&model, 8, f64::INFINITY).0.routes;
         assert_eq!(coarse.iter().filter(can_be_flown).count(), 0);
-        let fine = routes(&model, None, 8).routes;
+        let fine = routes(&model, None, 8, &|| false).routes;
         assert!(fine.iter().filter(can_be_flown).count() > 0);
         for route in &fine {
             assert!(route.len() <= 14);
@@ -362,7 +371,7 @@ mod tests {
         };
         let [coarse, fine] = [
             roadmap::routes(&model, 8, f64::INFINITY).0,
-            routes(&model, None, 8),
+            routes(&model, None, 8, &|| false),
         ]
         .map(best);
         assert!(!coarse.is_feasible());

@@ -24,8 +24,8 @@ pub(super) fn are_worth_a_look(model: &Model) -> bool {
     model.scenario.terrain.is_flat() && model.scenario.threats.len() >= CROWD
 }
 
-/// Routes of at most as many free waypoints as `model` asks for, each along another way.
-pub(super) fn routes(model: &Model) -> Found {
+/// Routes of at most as many free waypoints as `model` asks for, each along another way; fewer once `is_over`.
+pub(super) fn routes(model: &Model, is_over: &dyn Fn() -> bool) -> Found {
     let scenario = model.scenario;
     let tolerance = model.tolerance.scaled(PRICED_FROM);
     let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).verdicts();
@@ -34,6 +34,9 @@ pub(super) fn routes(model: &Model) -> Found {
     let height = ground + 0.5 * (band.min + band.max);
     let mut found = Found::default();
     for way in cheap_ways(scenario, height, MOST) {
+        if is_over() {
+            break;
+        }
         let places = way.iter().map(|at| lifted(scenario, *at, 0.5));
         let mut chain: Vec<Point3> = places.collect();
         let last = chain.len() - 1;
@@ -95,7 +98,7 @@ mod tests {
                 let prices = flown.map(|route| price(&model, route));
                 prices.min_by(Fitness::rank).unwrap_or(Fitness::WORST)
             };
-            let ways = best(&routes(&model).routes);
+            let ways = best(&routes(&model, &|| false).routes);
             let others = best(&roadmap::routes(&model, 8, f64::INFINITY).0.routes);
             let others = [others, best(&along_strings(&model, &Nobody))];
             assert!(ways.is_feasible());

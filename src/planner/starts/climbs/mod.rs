@@ -9,6 +9,7 @@ mod places;
 mod ways;
 
 use super::net::Found;
+use super::steepest;
 use crate::cost::Model;
 use crate::scenario::Scenario;
 use ways::Ways;
@@ -44,11 +45,17 @@ struct Climb {
 }
 
 /// Routes that are long enough to climb, of no more waypoints than `model` asks for; none where the direct way is
-/// long enough.
-pub(super) fn routes(model: &Model) -> Found {
+/// long enough. Once `is_over`, those that have been found.
+pub(super) fn routes(model: &Model, is_over: &dyn Fn() -> bool) -> Found {
+    if is_over() {
+        return Found::default();
+    }
     let mut found = ways(model, BETWEEN);
     if model.scenario.weights.altitude > 0.0 {
         for share in SHARES {
+            if is_over() {
+                break;
+            }
             let higher = ways(model, share);
             found.legs_priced += higher.legs_priced;
             if !higher.routes.is_empty() {
@@ -104,11 +111,6 @@ impl Climb {
     }
 }
 
-/// Tangent of the steepest climb that is planned with.
-fn steepest(scenario: &Scenario) -> f64 {
-    libm::tan(scenario.vehicle.max_climb_deg.to_radians()) * (1.0 - 1e-9)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -143,7 +145,11 @@ mod tests {
     #[test]
     fn a_way_that_is_long_enough_is_left_alone() {
         for shape in [[900.0, 0.0, 45.0, 60.0], [400.0, 200.0, 45.0, 60.0]] {
-            assert!(routes(&Model::new(&steep(shape, 10))).routes.is_empty());
+            assert!(
+                routes(&Model::new(&steep(shape, 10)), &|| false)
+                    .routes
+                    .is_empty()
+            );
         }
     }
 
@@ -158,7 +164,7 @@ mod tests {
         ] {
             let scenario = steep(shape, waypoints);
             let model = Model::new(&scenario);
-            let routes = routes(&model).routes;
+            let routes = routes(&model, &|| false).routes;
             let flown = |route: &&Vec<Point3>| price(&model, route).is_feasible();
             assert!(routes.iter().any(|route| flown(&route)), "{shape:?}");
             for route in &routes {

@@ -45,7 +45,7 @@ const COARSE: usize = 4;
 /// Over hills, where every leg must also follow the ground.
 const COARSE_OVER_HILLS: usize = 7;
 
-/// Free waypoints of a coarse route at most.
+/// Free waypoints of a coarse route at most, unless there is none so good of so few.
 const MOST_COARSE: usize = 20;
 
 /// Routes taken from the net of places.
@@ -189,7 +189,8 @@ fn refine(
     *priced = refined;
 }
 
-/// Bends of the routes that may still win, at most: those that are less than `hopeless` dearer than the best.
+/// Bends of the routes that may still win, at most: those that are less than `hopeless` dearer than the best. So many that
+/// the one with the fewest keeps its own.
 fn bends(model: &Model, shapes: &[Vec<Point3>], hopeless: f64) -> usize {
     let priced: Vec<(Fitness, usize)> = shapes
         .iter()
@@ -205,14 +206,12 @@ fn bends(model: &Model, shapes: &[Vec<Point3>], hopeless: f64) -> usize {
     } else {
         COARSE_OVER_HILLS
     };
-    priced
-        .into_iter()
-        .filter(|(fitness, _)| {
-            fitness.violation <= best.violation && fitness.cost <= best.cost * (1.0 + hopeless)
-        })
-        .map(|(_, bends)| bends)
-        .fold(least, usize::max)
-        .min(MOST_COARSE)
+    let may_win = priced.iter().filter(|(fitness, _)| {
+        fitness.violation <= best.violation && fitness.cost <= best.cost * (1.0 + hopeless)
+    });
+    let bends = may_win.map(|(_, bends)| *bends);
+    let fewest = bends.clone().min().unwrap_or(0);
+    bends.fold(least, usize::max).min(fewest.max(MOST_COARSE))
 }
 
 /// Routes with as few waypoints as each needs, along the taut strings of several scenes: round the

@@ -10,41 +10,59 @@ use crate::planner::price::PRICED_FROM;
 /// Routes along a chain looked at for one that can be turned along, at most.
 const EFFORT: usize = 40_000;
 
+/// Of a chain of no more places all legs are priced at once.
+const SHORT: usize = 64;
+
+/// Of a longer one so many legs from each place are, the shortest first, until all of them break limits: a long leg
+/// through thousands of threats is dear to price, and hardly ever one to keep.
+const AT_ONCE: usize = 16;
+
+/// A route of as many legs as a coarse one may have that costs this share more than one of any number is too coarse.
+const FAR_FROM: f64 = 0.02;
+
+/// Nothing flown yet.
+const NOTHING: Fitness = Fitness {
+    violation: 0.0,
+    cost: 0.0,
+};
+
 /// Of the places of `chain`, those that make the best route of as many free waypoints as a coarse one may have, and how
 /// many legs were priced to tell. Turns are looked at only where those of the best are too sharp.
 pub(super) fn thin(model: &Model, pricer: &Pricer, chain: &[Point3]) -> (Vec<Point3>, u64) {
-    let legs = Legs::new(model, pricer, chain);
+    let all = chain.len();
+    let at_once = if all > SHORT { AT_ONCE } else { all };
+    let mut legs = Legs::new(model, pricer, chain, at_once);
+    let mut priced = legs.count();
+    let best = legs.best().unwrap_or_else(|| {
+        legs = Legs::new(model, pricer, chain, all);
+        priced += legs.count();
+        legs.best().expect("one leg leads from start to target")
+    });
     let points = |route: Vec<usize>| route.into_iter().map(|place| chain[place]).collect();
-    let mut route: Vec<Point3> = points(legs.best());
+    let mut route: Vec<Point3> = points(best);
     if !may_turn_along(&route, legs.sharpest)
-        && let Some(softer) = legs.best_to_turn_along()
+        && let Some(softer) = legs.best_to_turn_along(route.len() - 1)
     {
         route = points(softer);
     }
-    let priced = (chain.len() * (chain.len() - 1) / 2) as u64;
     (route, priced)
 }
 
-/// The legs from each place of a chain to each later one.
+/// The legs from each place of a chain to later ones.
 struct Legs<'c> {
     chain: &'c [Point3],
     /// By where they begin, then by how many places later they end, less one; with their ends as waypoints.
     worth: Vec<Vec<Fitness>>,
-    /// As many legs a route may have.
+    /// As many legs a whole route may have.
     most: usize,
     /// Cosine of the sharpest turn.
     sharpest: f64,
 }
 
 impl<'c> Legs<'c> {
-    fn new(model: &Model, pricer: &Pricer, chain: &'c [Point3]) -> Self {
+    /// From each place so many, and as many more as long as any of these breaks no limit.
+    fn new(model: &Model, pricer: &Pricer, chain: &'c [Point3], at_once: usize) -> Self {
         let last = chain.len() - 1;
-        let ends: Vec<(usize, usize)> = (0..last)
-            .flat_map(|a| (a + 1..=last).map(move |b| (a, b)))
-            .collect();
-        let [from, to] = net::rows(chain, &ends);
-        let mut prices = vec![Price::ZERO; from.len()];
-        pricer.first_legs(&from, &to, ends.len(), &mut prices);
         let tolerance = model.tolerance.scaled(PRICED_FROM);
         let mut own: Vec<(f64, f64)> = chain
             .iter()
@@ -52,15 +70,31 @@ impl<'c> Legs<'c> {
             .collect();
         own[last] = (0.0, 0.0);
         let mut worth = vec![Vec::new(); chain.len()];
-        for (idx, &(a, b)) in ends.iter().enumerate() {
-            let (price, lane) = (&prices[idx / LANES], idx % LANES);
-            worth[a].push(Fitness {
-                violation: price.violation[lane] + own[b].0,
-                cost: price.cost[lane] + own[b].1,
+        let mut open: Vec<usize> = (0..last).collect();
+        for first in (1..=last).step_by(at_once) {
+            if open.is_empty() {
+                break;
+            }
+            let onward = |a: usize| a + first..=(a + first + at_once - 1).min(last);
+            let onward = |&a: &usize| onward(a).map(move |b| (a, b));
+            let ends: Vec<(usize, usize)> = open.iter().flat_map(onward).collect();
+            let [from, to] = net::rows(chain, &ends);
+            let mut prices = vec![Price::ZERO; from.len()];
+            pricer.first_legs(&from, &to, ends.len(), &mut prices);
+            for (idx, &(a, b)) in ends.iter().enumerate() {
+                let (price, lane) = (&prices[idx / LANES], idx % LANES);
+                worth[a].push(Fitness {
+                    violation: price.violation[lane] + own[b].0,
+                    cost: price.cost[lane] + own[b].1,
+                });
+            }
+            open.retain(|&a| {
+                let latest = worth[a].get(first - 1..).unwrap_or_default();
+                latest.iter().any(Fitness::is_feasible)
             });
         }
         let scenario = model.scenario;
-        let most = scenario.planner.waypoints.min(MOST_COARSE) + 1;
+        let most = scenario.planner.waypoints + 1;
         Self {
             chain,
             worth,
@@ -73,51 +107,80 @@ impl<'c> Legs<'c> {
         self.chain.len() - 1
     }
 
-    /// The places of the best route, turns apart.
-    fn best(&self) -> Vec<usize> {
-        // The best way to each place, by so many legs.
-        let mut best = vec![(Fitness::WORST, 0); self.chain.len()];
-        best[0].0 = Fitness {
-            violation: 0.0,
-            cost: 0.0,
-        };
-        let mut ways = vec![best];
-        for _ in 0..self.most {
-            let known = &ways[ways.len() - 1];
-            let mut best = vec![(Fitness::WORST, 0); self.chain.len()];
-            for (a, legs) in self.worth.iter().enumerate() {
-                if known[a].0.cost.is_infinite() {
-                    continue;
-                }
-                for (leg, b) in legs.iter().zip(a + 1..) {
-                    let way = Fitness {
-                        violation: known[a].0.violation + leg.violation,
-                        cost: known[a].0.cost + leg.cost,
-                    };
-                    if way.beats(&best[b].0) {
-                        best[b] = (way, a);
-                    }
-                }
-            }
-            ways.push(best);
-        }
+    /// How many are known.
+    fn count(&self) -> u64 {
+        self.worth.iter().map(|legs| legs.len() as u64).sum()
+    }
+
+    /// The places of the best route, turns apart; `None` where there is none of so few legs. It has no more legs than a
+    /// coarse one unless that is far from as good as any number.
+    fn best(&self) -> Option<Vec<usize>> {
         let last = self.last();
+        let any = self.of_any_number();
+        let is_near = |way: &Fitness| {
+            way.violation <= any.violation && way.cost <= any.cost * (1.0 + FAR_FROM)
+        };
+        // The best way to each place, by so many legs.
+        let mut ways = vec![vec![(Fitness::WORST, 0); self.chain.len()]];
+        ways[0][0].0 = NOTHING;
         let mut legs = 1;
-        for count in 2..ways.len() {
-            if ways[count][last].0.beats(&ways[legs][last].0) {
+        for count in 1..=self.most {
+            let best = self.one_more(&ways[count - 1]);
+            let is_better = count == 1 || best[last].0.beats(&ways[legs][last].0);
+            ways.push(best);
+            if is_better {
                 legs = count;
             }
+            if count >= MOST_COARSE + 1 && is_near(&ways[legs][last].0) {
+                break;
+            }
+        }
+        if ways[legs][last].0.cost.is_infinite() {
+            return None;
         }
         let mut route = vec![last];
         for way in ways[1..=legs].iter().rev() {
             route.push(way[route[route.len() - 1]].1);
         }
         route.reverse();
-        route
+        Some(route)
     }
 
-    /// The places of the cheapest route that breaks no limit, if it is found.
-    fn best_to_turn_along(&self) -> Option<Vec<usize>> {
+    /// The best way to each place by one leg more than `known`, and where that begins.
+    fn one_more(&self, known: &[(Fitness, usize)]) -> Vec<(Fitness, usize)> {
+        let mut best = vec![(Fitness::WORST, 0); known.len()];
+        for (a, legs) in self.worth.iter().enumerate() {
+            if known[a].0.cost.is_infinite() {
+                continue;
+            }
+            for (leg, b) in legs.iter().zip(a + 1..) {
+                let way = further(known[a].0, leg);
+                if way.beats(&best[b].0) {
+                    best[b] = (way, a);
+                }
+            }
+        }
+        best
+    }
+
+    /// What the best way of any number of legs costs.
+    fn of_any_number(&self) -> Fitness {
+        let mut best = vec![Fitness::WORST; self.chain.len()];
+        best[0] = NOTHING;
+        for (a, legs) in self.worth.iter().enumerate() {
+            for (leg, b) in legs.iter().zip(a + 1..) {
+                let way = further(best[a], leg);
+                if way.beats(&best[b]) {
+                    best[b] = way;
+                }
+            }
+        }
+        best[self.last()]
+    }
+
+    /// The places of the cheapest route that breaks no limit, if it is found: of `about` so many legs, or as few as of a
+    /// coarse one.
+    fn best_to_turn_along(&self, about: usize) -> Option<Vec<usize>> {
         let count = self.chain.len();
         let mut legs = Feasible {
             legs: self,
@@ -131,11 +194,20 @@ impl<'c> Legs<'c> {
             }
         }
         let mut route = None;
-        few::chains(&mut legs, (self.most, EFFORT), |chain| {
+        let most = self.most.min(about.max(MOST_COARSE + 1));
+        few::chains(&mut legs, (most, EFFORT), |chain| {
             route = Some(chain);
             true
         });
         route
+    }
+}
+
+/// What a way costs with one more `leg`.
+fn further(way: Fitness, leg: &Fitness) -> Fitness {
+    Fitness {
+        violation: way.violation + leg.violation,
+        cost: way.cost + leg.cost,
     }
 }
 
@@ -164,7 +236,7 @@ impl few::Legs for Feasible<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::planner::tests::scenario;
+    use crate::planner::tests::{radar, scenario};
     use crate::scenario::Scenario;
 
     /// A chain that leaves the direct way at once, and what its legs cost by the way they are defined, turns apart.
@@ -244,5 +316,42 @@ mod tests {
         }
         // To turn softly costs more here.
         assert!(costs[1] > 1.001 * costs[0], "{costs:?}");
+    }
+
+    /// Half round a disc in steps of a few metres, no leg of which may cut across; and one that needs longer legs than
+    /// those that are looked at first, as a route of one waypoint does.
+    #[test]
+    fn of_a_long_chain_long_legs_that_break_limits_are_not_priced() {
+        let mut scenario = scenario();
+        scenario.start = Point3::new(200.0, 500.0, 100.0);
+        scenario.target = Point3::new(800.0, 500.0, 100.0);
+        scenario.threats = vec![radar(500.0, 500.0, 290.0)];
+        let places = 120;
+        let chain: Vec<Point3> = (0..=places)
+            .map(|place| {
+                let angle = std::f64::consts::PI * (1.0 - f64::from(place) / f64::from(places));
+                Point3::new(
+                    500.0 + 300.0 * libm::cos(angle),
+                    500.0 + 300.0 * libm::sin(angle),
+                    100.0,
+                )
+            })
+            .collect();
+        let all = (places * (places + 1) / 2) as u64;
+        for (waypoints, most) in [(20, 2 * all / 3), (1, 2 * all)] {
+            scenario.planner.waypoints = waypoints;
+            let model = Model::new(&scenario);
+            let tolerance = model.tolerance.scaled(PRICED_FROM);
+            let pricer = Pricer::new(&model, scenario.planner.quadrature, tolerance).verdicts();
+            let (route, priced) = thin(&model, &pricer, &chain);
+            let best = Legs::new(&model, &pricer, &chain, chain.len()).best();
+            let best: Vec<Point3> = best
+                .expect("one leg is one")
+                .iter()
+                .map(|at| chain[*at])
+                .collect();
+            assert_eq!(route, best);
+            assert!(priced < most, "{priced} of {all}");
+        }
     }
 }

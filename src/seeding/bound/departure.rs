@@ -1,12 +1,12 @@
 //! What it costs to leave the soft zones that a route begins in, or, seen backwards, ends in. The argument is section 5
 //! of docs/BOUND.md.
 
-use super::super::outline::OutlineShape;
 use super::event::ramp;
 use super::prices::Prices;
 use super::wall::Wall;
 use crate::geometry::{Point2, ring};
 use crate::seeding::arc::segment_segment;
+use crate::seeding::outline::OutlineShape;
 
 /// Parts in which what a metre outwards costs is summed up.
 const PARTS: u32 = 200;

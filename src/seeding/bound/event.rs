@@ -1,12 +1,12 @@
 //! What a route would have to do to beat the string round the widened walls, and what that costs
 //! at least: slip between two walls, cut a corner, fly over or under.
 
-use super::super::arc::{crossing, nearest_points, point_segment};
-use super::super::outline::OutlineShape;
 use super::departure::early;
 use super::prices::Prices;
 use super::wall::Wall;
 use crate::geometry::{Point2, ring};
+use crate::seeding::arc::{crossing, nearest_points, point_segment};
+use crate::seeding::outline::OutlineShape;
 
 /// Pairs of cores looked at before the search for gaps gives up.
 const MOST_PAIRS: usize = 300_000;
@@ -220,7 +220,7 @@ fn is_closed(wall: &Wall, one: &Core, other: &Core, p: Point2, q: Point2) -> boo
     if (one.edge + 1) % count == other.edge || (other.edge + 1) % count == one.edge {
         return true;
     }
-    let edges = || (0..count).map(|i| (ring[i], ring[(i + 1) % count]));
+    let edges = || ring::edges(ring);
     if edges().any(|(a, b)| (a == p && b == q) || (a == q && b == p)) {
         return true;
     }

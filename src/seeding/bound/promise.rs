@@ -1,12 +1,12 @@
 //! What may be hoped for: the string's own price.
 
-use super::super::taut::Piece;
 use super::departure::early;
 use super::potential::whole;
 use super::prices::Prices;
 use super::string::{departures, pulled, scene};
 use super::wall::Wall;
 use crate::geometry::{Point2, Rect};
+use crate::seeding::taut::Piece;
 
 /// Share of the direct way by which a string may leave the area: a way within it is about as long.
 const OUTSIDE: f64 = 0.01;

@@ -1,12 +1,12 @@
 //! The taut string round walls that are widened, pulled for a bound.
 
-use super::super::obstacles::Obstacles;
-use super::super::outline::Outline;
-use super::super::taut::{Limits, TautStrings, taut_strings_within};
 use super::departure::{Departure, Place};
 use super::prices::Prices;
 use super::wall::Wall;
 use crate::geometry::Point2;
+use crate::seeding::obstacles::Obstacles;
+use crate::seeding::outline::Outline;
+use crate::seeding::taut::{Limits, TautStrings, taut_strings_within};
 
 /// Ways looked at for one string: beyond a few hundred walls, the search ends with what it has
 /// proven so far.

@@ -1,12 +1,12 @@
 //! Threats as a bound sees them: how far each may be widened for free, and which may be passed by
 //! flying over or under them.
 
-use super::super::arc::{nearest_points, point_segment, segment_segment};
-use super::super::outline::{Outline, OutlineShape};
 use super::prices::Prices;
 use super::toll::{Heights, Toll, stays};
 use crate::geometry::{Point2, Vector2, ring};
 use crate::scenario::Scenario;
+use crate::seeding::arc::{nearest_points, point_segment, segment_segment};
+use crate::seeding::outline::{Outline, OutlineShape};
 use crate::threat::{Shape, Threat};
 
 /// A threat that reaches over all heights, or that costs a toll to pass above or below.
@@ -236,8 +236,5 @@ fn is_thin(ring: &[Point2], least: f64) -> bool {
 }
 
 fn perimeter(ring: &[Point2]) -> f64 {
-    let count = ring.len();
-    (0..count)
-        .map(|i| (ring[(i + 1) % count] - ring[i]).norm())
-        .sum()
+    ring::edges(ring).map(|(a, b)| (b - a).norm()).sum()
 }

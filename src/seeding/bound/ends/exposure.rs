@@ -1,9 +1,9 @@
 //! What legs that begin in one place, in a sector of headings, are exposed to at least.
 
-use super::super::super::outline::OutlineShape;
 use super::super::event::ramp;
 use super::super::wall::Wall;
 use crate::geometry::{Point2, Point3, Segment};
+use crate::seeding::outline::OutlineShape;
 use crate::threat::{Cylinder, Shape, Threat};
 
 /// Pieces of a leg beside a ring of which the exposure is summed up.

@@ -2,8 +2,6 @@
 
 use nalgebra::Vector2;
 
-use super::super::super::arc::point_segment;
-use super::super::super::outline::OutlineShape;
 use super::super::departure::{Departure, Place};
 use super::super::event::ramp;
 use super::super::prices::Prices;
@@ -11,6 +9,8 @@ use super::super::string::{narrowed, scene, shortest};
 use super::super::wall::Wall;
 use super::exposure;
 use crate::geometry::{Point2, ring};
+use crate::seeding::arc::point_segment;
+use crate::seeding::outline::OutlineShape;
 
 /// No string is pulled for sectors that are wider than this share of the way.
 const COARSEST: f64 = 0.04;

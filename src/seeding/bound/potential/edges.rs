@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use super::super::super::arc::crossing;
-use super::super::super::outline::OutlineShape;
 use super::super::wall::Wall;
 use super::zones::Zones;
 use crate::geometry::{Point2, Rect, Vector2, ring};
+use crate::seeding::arc::crossing;
+use crate::seeding::outline::OutlineShape;
 
 /// Corners of a ring whose edges are told, at most.
 const MOST_CORNERS: usize = 100;

@@ -1,12 +1,12 @@
 //! Potentials against lattices of legs, and what they are made of against prices at many places.
 
-use super::super::super::outline::OutlineShape;
 use super::super::super::tests::read;
 use super::super::around;
 use super::mesh::PARTS;
 use super::*;
 use crate::geometry::{Vector2, ring};
 use crate::scenario::Scenario;
+use crate::seeding::outline::OutlineShape;
 
 /// From (200, 500) to (800, 500), `fuel` a metre, in a square of a kilometre.
 fn scenario(fuel: f64, threats: &str) -> Scenario {

@@ -1,13 +1,13 @@
 //! Where the vertices of a mesh are: along the edges of soft zones, of cores and of the area, where these cross, and
 //! evenly in between. A mesh may have any vertices; those that lie well make it prove much.
 
-use super::super::super::outline::OutlineShape;
 use super::super::wall::Wall;
 use super::cells::Cells;
 use super::edges::{self, Edge};
 use super::spacing::Spacing;
 use super::zones::Zones;
 use crate::geometry::{Point2, Vector2};
+use crate::seeding::outline::OutlineShape;
 
 /// Share of the radius of a circle by which vertices on it are apart at most,
 const BENT: f64 = 0.6;

@@ -1,12 +1,12 @@
 //! What a metre costs, and where no route can be.
 
-use super::super::super::arc::{point_segment, segment_segment};
-use super::super::super::outline::OutlineShape;
 use super::super::prices::Prices;
 use super::super::wall::Wall;
 use super::cells::Cells;
 use super::mesh::PARTS;
 use crate::geometry::{Point2, Rect, ring};
+use crate::seeding::arc::{point_segment, segment_segment};
+use crate::seeding::outline::OutlineShape;
 
 /// Cells in which walls are looked up.
 const CELLS: usize = 1024;

@@ -22,6 +22,19 @@ const FAR: f64 = 1.0;
 /// A waypoint that costs more than this share of the direct way's fuel is not put on its leg unless there is no other place.
 const DEAR: f64 = 1e-3;
 
+/// So many spare waypoints may share one way to the middle of the band; over hills it leads up and down anyway.
+const SEVERAL: usize = 2;
+
+/// Ways off a leg to the middle of the band and back: shares of it, and whether the way is up there or on the leg, as it
+/// must be under a threat.
+const RISES: [&[(f64, bool)]; 5] = [
+    &[(0.5, true)],
+    &[(0.25, true), (0.5, false)],
+    &[(0.5, true), (0.75, false)],
+    &[(0.25, false), (0.5, true)],
+    &[(0.5, false), (0.75, true)],
+];
+
 /// Costs nearer than this are the same.
 const NOTHING: f64 = 1e-9;
 
@@ -32,14 +45,32 @@ pub(in crate::planner) fn with_waypoints(
     waypoints: usize,
 ) -> Vec<Point3> {
     leave_out(model, &mut route, waypoints + 2);
+    let few = waypoints + 2 - route.len() < SEVERAL;
+    let (filled, added) = filled(model, route.clone(), waypoints);
+    if few || added <= dear(model) || !model.scenario.terrain.is_flat() {
+        return filled;
+    }
+    // One that leaves its leg for the middle of the band is dear by itself, and may make room for all others.
+    let raised = with_one_raised(model, route, waypoints);
+    if price(model, &raised).beats(&price(model, &filled)) {
+        raised
+    } else {
+        filled
+    }
+}
+
+/// `route` with spare waypoints, each where it costs the least as the route is by then, and what they add.
+fn filled(model: &Model, mut route: Vec<Point3>, waypoints: usize) -> (Vec<Point3>, f64) {
     let mut splits: Vec<Split> = route
         .windows(2)
         .map(|ends| Split::of(model, ends[0], ends[1]))
         .collect();
+    let mut added = 0.0;
     while route.len() < waypoints + 2 {
         let best = (0..splits.len())
             .min_by(|&a, &b| splits[a].rank(&splits[b]).then(a.cmp(&b)))
             .expect("a route has a leg");
+        added += splits[best].added.cost;
         route.insert(best + 1, splits[best].at);
         let (before, at, after) = (route[best], route[best + 1], route[best + 2]);
         splits.splice(
@@ -47,7 +78,45 @@ pub(in crate::planner) fn with_waypoints(
             [Split::of(model, before, at), Split::of(model, at, after)],
         );
     }
-    route
+    (route, added)
+}
+
+/// As [`filled`], but that the first leaves its leg for the middle of the band, where this costs the least.
+fn with_one_raised(model: &Model, mut route: Vec<Point3>, waypoints: usize) -> Vec<Point3> {
+    let room = waypoints + 2 - route.len();
+    let ways = route.windows(2).enumerate().flat_map(|(leg, ends)| {
+        let ways = RISES.iter().filter(move |way| way.len() < room);
+        ways.map(move |way| (leg, raised(model, (ends[0], ends[1]), way)))
+    });
+    let cheapest = ways.min_by(|(_, (one, _)), (_, (other, _))| one.rank(other));
+    if let Some((leg, (_, points))) = cheapest {
+        route.splice(leg + 1..leg + 1, points);
+    }
+    filled(model, route, waypoints).0
+}
+
+/// The leg between `ends` by `way`: what it changes, and the points on it.
+fn raised(model: &Model, (a, b): (Point3, Point3), way: &[(f64, bool)]) -> (Fitness, Vec<Point3>) {
+    let point = |&(share, is_raised): &(f64, bool)| {
+        let at = a + (b - a) * share;
+        if is_raised {
+            lifted(model.scenario, at.xy(), 0.5)
+        } else {
+            at
+        }
+    };
+    let points: Vec<Point3> = way.iter().map(point).collect();
+    let whole: Vec<Point3> = std::iter::once(a)
+        .chain(points.iter().copied())
+        .chain([b])
+        .collect();
+    (change(model, &[a, b], &whole), points)
+}
+
+/// More than this a waypoint must not cost to be put on its leg as a matter of course.
+fn dear(model: &Model) -> f64 {
+    let way = (model.scenario.target - model.scenario.start).norm();
+    DEAR * way * metre(model.scenario)
 }
 
 /// `route` with waypoints that lie on one place spread along its legs, or a hair apart where that is dearer; as it is,
@@ -133,7 +202,7 @@ impl Split {
             .into_iter()
             .reduce(Self::cheaper)
             .expect("three places");
-        if on_leg.added.cost > DEAR * way * metre(model.scenario) {
+        if on_leg.added.cost > dear(model) {
             on_leg.cheaper(Self::off_leg(model, a, b))
         } else {
             on_leg
@@ -336,6 +405,26 @@ mod tests {
         assert!(many.violation <= 0.0);
         // Each would cost 30 or more on the leg.
         assert!(many.cost < few.cost + 3.0, "{few:?} {many:?}");
+    }
+
+    /// One that goes up to the middle of the band costs more than one on the leg, and makes room there for all others.
+    #[test]
+    fn spare_waypoints_share_one_way_up() {
+        let mut scenario = scenario();
+        (scenario.start.z, scenario.target.z) = (30.0, 80.0);
+        scenario.weights.altitude = 0.1;
+        scenario.threats.clear();
+        let model = Model::new(&scenario);
+        let few = vec![scenario.start, scenario.target];
+        let (one_by_one, added) = filled(&model, few.clone(), 10);
+        assert!(added > 15.0, "{added}");
+        let many = with_waypoints(&model, few.clone(), 10);
+        let [few, one_by_one, many] = [few, one_by_one, many].map(|route| price(&model, &route));
+        assert!(
+            many.violation <= 0.0 && many.cost < few.cost + 6.0,
+            "{few:?} {many:?}"
+        );
+        assert!(one_by_one.cost > many.cost + 10.0);
     }
 
     #[test]

@@ -106,7 +106,10 @@ fn geometry(draft: &mut Draft, at: &str, facts: &Facts, value: &GeometryValue) {
 }
 
 fn point(draft: &mut Draft, at: &str, facts: &Facts, position: &Position) {
-    match Place::new(position[0], position[1]) {
+    let Some([lon, lat]) = degrees(position) else {
+        return draft.leave(at, "a point that is not longitude and latitude");
+    };
+    match Place::new(lon, lat) {
         Ok(place) => draft.point(at, facts, place, position.as_slice().get(2).copied()),
         Err(reason) => draft.leave(at, reason),
     }
@@ -120,6 +123,16 @@ fn polygon(draft: &mut Draft, at: &str, facts: &Facts, rings: &[Vec<Position>]) 
         let hole = format!("{at}: hole {index}");
         draft.leave(hole, "the hole of a polygon: all of it is kept clear of");
     }
-    let ring: Vec<[f64; 2]> = outer.iter().map(|corner| [corner[0], corner[1]]).collect();
-    draft.polygon(at, facts, &ring);
+    match outer.iter().map(degrees).collect::<Option<Vec<_>>>() {
+        Some(ring) => draft.polygon(at, facts, &ring),
+        None => draft.leave(at, "a corner that is not longitude and latitude"),
+    }
+}
+
+/// East and north; of what lies in a ring, the library does not ask that it has both.
+fn degrees(position: &Position) -> Option<[f64; 2]> {
+    let [lon, lat, ..] = position.as_slice() else {
+        return None;
+    };
+    Some([*lon, *lat])
 }

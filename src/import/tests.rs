@@ -150,6 +150,13 @@ fn what_a_feature_gets_wrong_is_listed() {
             "a polygon without a ring",
         ),
         (
+            feature(
+                json!({}),
+                json!({"type": "Polygon", "coordinates": [[[1], [2], [3]]]}),
+            ),
+            "a corner that is not longitude and latitude",
+        ),
+        (
             feature(json!({}), json!(null)),
             "a feature without geometry",
         ),
@@ -165,6 +172,7 @@ fn what_a_feature_gets_wrong_is_listed() {
         json!({"type": "Feature", "geometry": {"type": "Point", "coordinates": ["x"]}, "properties": {}}),
         json!({"type": "Feature", "geometry": {"type": "Blob"}, "properties": {}}),
         json!({"type": "Feature", "geometry": {"type": "Point", "coordinates": [1]}, "properties": {}}),
+        json!({"type": "Feature", "geometry": {"type": "MultiPolygon", "coordinates": [[[[1, 1], [2], []]]]}, "properties": {}}),
     ] {
         let mut features = ends();
         features.push(broken.clone());

@@ -77,6 +77,19 @@ proptest! {
         }
     }
 
+    /// A position of a plan or a GeoJSON has fewer numbers.
+    #[test]
+    fn short_positions_never_break_the_readers(which: prop::sample::Index, left in 0..3_usize) {
+        for file in [GEOJSON, PLAN] {
+            let begins = |at: &usize| file[*at..].starts_with(|c: char| c.is_ascii_digit());
+            let lists: Vec<_> = file.match_indices('[').map(|(at, _)| at + 1).filter(begins).collect();
+            let at = *which.get(&lists);
+            let (numbers, rest) = file[at..].split_once(']').expect("a list ends");
+            let numbers: Vec<_> = numbers.split(',').take(left).collect();
+            use_up([&file[..at], &numbers.join(","), "]", rest].concat().as_bytes());
+        }
+    }
+
     /// A number of a plan or a GeoJSON is another value.
     #[test]
     fn other_values_never_break_the_readers(which: prop::sample::Index, with in prop::sample::select(vec![

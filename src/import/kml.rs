@@ -16,6 +16,9 @@ const MOST_NODES: u32 = 2_000_000;
 /// Levels of geometries within geometries.
 const DEEPEST: usize = 16;
 
+/// Letters of a placemark's name by which it is listed.
+const LONGEST_NAME: usize = 60;
+
 /// What a document may hold beside placemarks, and no scenario has.
 const NOT_READ: [&str; 6] = [
     "GroundOverlay",
@@ -49,19 +52,43 @@ pub(super) fn convert(text: &[u8]) -> Result<Conversion, ImportError> {
         .children()
         .find(|node| is(node, "Document"))
         .and_then(|node| text_of(&node, "name"));
+    let mut rows = Rows {
+        text,
+        pos: 0,
+        row: 1,
+    };
     for node in root.descendants() {
         if is(&node, "Placemark") {
-            placemark(&mut draft, &node);
+            placemark(&mut draft, &node, rows.of(&node));
         } else if let Some(name) = NOT_READ.iter().find(|name| is(&node, name)) {
-            draft.leave(line(&node), format!("a {name}, which is not read"));
+            let at = format!("line {}", rows.of(&node));
+            draft.leave(at, format!("a {name}, which is not read"));
         }
     }
     draft.finish()
 }
 
-fn placemark(draft: &mut Draft, node: &Node) {
+/// Lines of nodes in the order of the document, each counted on from the one before.
+struct Rows<'t> {
+    text: &'t str,
+    pos: usize,
+    row: usize,
+}
+
+impl Rows<'_> {
+    fn of(&mut self, node: &Node) -> usize {
+        let begin = node.range().start;
+        self.row += self.text[self.pos..begin].matches('\n').count();
+        self.pos = begin;
+        self.row
+    }
+}
+
+fn placemark(draft: &mut Draft, node: &Node, row: usize) {
     let facts = facts(node);
-    let at = format!("{}: {}", line(node), facts.name().unwrap_or("Placemark"));
+    let name = facts.name().unwrap_or("Placemark");
+    let name: String = name.chars().take(LONGEST_NAME).collect();
+    let at = format!("line {row}: {name}");
     let mut shapes = node.children().filter(is_shape).peekable();
     if shapes.peek().is_none() {
         draft.leave(&at, "a placemark without geometry");
@@ -133,9 +160,10 @@ fn point(draft: &mut Draft, at: &str, facts: &Facts, node: &Node) {
 
 fn polygon(draft: &mut Draft, at: &str, facts: &Facts, node: &Node) {
     let boundary = |name| node.children().find(move |child| is(child, name));
-    for hole in node.children().filter(|child| is(child, "innerBoundaryIs")) {
-        let why = "the hole of a polygon: all of it is kept clear of";
-        draft.leave(line(&hole), why);
+    let holes = node.children().filter(|child| is(child, "innerBoundaryIs"));
+    for (index, _) in holes.enumerate() {
+        let hole = format!("{at}: hole {index}");
+        draft.leave(hole, "the hole of a polygon: all of it is kept clear of");
     }
     let ring = boundary("outerBoundaryIs")
         .and_then(|outer| outer.children().find(|child| is(child, "LinearRing")));
@@ -173,19 +201,24 @@ fn coordinates(node: &Node) -> Result<Vec<[f64; 3]>, String> {
 }
 
 /// Name and extended data.
+///
+/// What lies deeper than data may is not looked at: of placemarks within each other's data, the innermost
+/// would be looked at once for each.
 fn facts(placemark: &Node) -> Facts {
     let mut facts = Facts::default();
-    let extended = placemark.children().filter(|node| is(node, "ExtendedData"));
-    for node in extended.flat_map(|extended| extended.descendants()) {
-        let value = if is(&node, "Data") {
-            text_of(&node, "value")
-        } else if is(&node, "SimpleData") {
-            node.text().map(str::to_owned)
-        } else {
-            continue;
-        };
+    let mut say = |node: &Node, value: Option<String>| {
         if let (Some(name), Some(value)) = (node.attribute("name"), value) {
             facts.0.insert(name.to_owned(), Value::String(value));
+        }
+    };
+    let extended = placemark.children().filter(|node| is(node, "ExtendedData"));
+    for node in extended.flat_map(|extended| extended.children()) {
+        if is(&node, "Data") {
+            say(&node, text_of(&node, "value"));
+        } else if is(&node, "SchemaData") {
+            for simple in node.children().filter(|child| is(child, "SimpleData")) {
+                say(&simple, simple.text().map(str::to_owned));
+            }
         }
     }
     if let Some(name) = text_of(placemark, "name") {
@@ -203,9 +236,4 @@ fn text_of(node: &Node, name: &str) -> Option<String> {
     let child = node.children().find(|child| is(child, name))?;
     let text: String = child.children().filter_map(|part| part.text()).collect();
     Some(text.trim().to_owned())
-}
-
-fn line(node: &Node) -> String {
-    let row = node.document().text_pos_at(node.range().start).row;
-    format!("line {row}")
 }

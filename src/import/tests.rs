@@ -263,7 +263,7 @@ fn placemarks_of_kml() {
         [
             "line 3: a NetworkLink, which is not read",
             "line 7: radar: said and not used: colour",
-            "line 12: the hole of a polygon: all of it is kept clear of",
+            "line 10: town: hole 0: the hole of a polygon: all of it is kept clear of",
             "line 10: town: a line: points and polygons make a scenario",
             "line 14: odd: coordinates are \"8.5;47.3\", must be longitude,latitude,altitude",
             "line 15: empty: a placemark without geometry",

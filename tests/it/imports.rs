@@ -1,7 +1,7 @@
 //! Files to convert that nobody would write: they are read or refused. What the readers make of sound files is
 //! tested beside them.
 
-use noctule::import::{Syntax, convert};
+use noctule::import::{ImportError, Syntax, convert};
 use proptest::prelude::*;
 
 use crate::support::patience::at_little_cost;
@@ -50,6 +50,29 @@ fn whole_they_are_read() {
         let threats = read.scenario["threats"].as_array().expect("a list");
         assert!(threats.len() >= 2, "{file}");
     }
+}
+
+/// Broad or deep, each costs what its length does.
+#[test]
+fn long_files_are_read_soon() {
+    let check = |many: usize, open: &str, close: &str| {
+        let text = format!("<kml>{}{}</kml>", open.repeat(many), close.repeat(many));
+        let refused = at_little_cost(|| convert(text.as_bytes(), Syntax::Xml));
+        let Err(ImportError::NoScenario { unused, .. }) = refused else {
+            panic!("{refused:?}");
+        };
+        let counted = unused.last().expect("what is not used");
+        assert_eq!(
+            counted.reason,
+            format!("{} more are not listed", many - 1000)
+        );
+    };
+    check(200_000, "<Placemark/>", "");
+    check(
+        200_000,
+        "<Placemark><ExtendedData>",
+        "</ExtendedData></Placemark>",
+    );
 }
 
 fn use_up(bytes: &[u8]) {

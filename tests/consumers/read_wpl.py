@@ -1,5 +1,6 @@
 """QGC WPL 110, read by pymavlink."""
 
+import math
 import unittest
 
 from pymavlink import mavutil, mavwp
@@ -26,6 +27,8 @@ class Waypoints(unittest.TestCase):
                 self.assertEqual(commands[-1], MAV.MAV_CMD_NAV_LAND)
                 self.assertEqual(set(commands[2:-1]), {MAV.MAV_CMD_NAV_WAYPOINT})
                 self.assertEqual([item.current for item in items], [1] + [0] * (len(items) - 1))
+                yaws = [item.param4 for item in items if item.command != MAV.MAV_CMD_DO_CHANGE_SPEED]
+                self.assertTrue(all(map(math.isnan, yaws)))
                 target = route.path("msl")[-1]
                 for item in items[-2:]:
                     self.assertLessEqual(off((item.y, item.x, 0), (*target[:2], 0))[0], 1e-7)

@@ -28,17 +28,29 @@ pub(in crate::export) fn write(
     let home = (options.firmware == Firmware::ArduPilot).then_some(home);
     let mut text = "QGC WPL 110\n".to_owned();
     for (index, item) in home.iter().chain(&mission.items).enumerate() {
-        line(&mut text, index, item);
+        line(&mut text, index, item, left(options.firmware));
     }
     Ok(text)
 }
 
-fn line(text: &mut String, index: usize, item: &Item) {
+/// What leaves a parameter to the autopilot: a yaw of 0 orders PX4 to face north, and ArduPilot nothing.
+fn left(firmware: Firmware) -> &'static str {
+    match firmware {
+        // In the case that QGroundControl writes and reads it in.
+        Firmware::Px4 => "nan",
+        Firmware::ArduPilot => "0",
+    }
+}
+
+fn line(text: &mut String, index: usize, item: &Item, left: &str) {
     let Item { command, frame, .. } = item;
     let current = u8::from(index == 0);
     let _ = write!(text, "{index}\t{current}\t{frame}\t{command}");
     for param in item.params {
-        let _ = write!(text, "\t{}", param.unwrap_or(0.0));
+        let _ = match param {
+            Some(value) => write!(text, "\t{value}"),
+            None => write!(text, "\t{left}"),
+        };
     }
     let place = item
         .place

@@ -1,7 +1,7 @@
 //! What an autopilot is told to do, one command an item.
 
 use super::reduce::{self, Shape, reduce};
-use crate::cost::Model;
+use crate::cost::{Model, Tolerance};
 use crate::export::chart::{Chart, rounded};
 use crate::export::{Altitude, Delivery, ExportError, Firmware, Options};
 use crate::geometry::{Point3, Segment};
@@ -213,7 +213,7 @@ fn is_open(delivery: &Delivery, point: Point3) -> bool {
         a: on_ground(delivery, point),
         b: point,
     };
-    let tolerance = Model::new(&delivery.scenario).tolerance.length_m;
+    let tolerance = Tolerance::of(&delivery.scenario).length_m;
     let threats = &delivery.scenario.threats;
     threats.iter().all(|threat| {
         threat

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::items::{Item, Mission, Place, mission};
+use crate::cost::Tolerance;
 use crate::export::chart::Chart;
 use crate::export::{Altitude, Delivery, ExportError, Firmware, Options, outline};
 use crate::geometry::{Point3, Segment};
@@ -107,9 +108,10 @@ fn simple(index: usize, item: &Item, mode: u8) -> Value {
 /// The threats as fences, and those that cannot be: a fence has no height, so that one above or
 /// below which the mission passes would stop it.
 fn fence(delivery: &Delivery, chart: &Chart, mission: &Mission) -> (Value, Vec<Value>) {
+    let tolerance_m = Tolerance::of(&delivery.scenario).length_m;
     let (mut circles, mut polygons, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
     for (index, threat) in delivery.scenario.threats.iter().enumerate() {
-        if is_passed_at_another_height(threat, &mission.route) {
+        if is_passed_at_another_height(threat, &mission.route, tolerance_m) {
             left_out.push(json!({"threat": index, "name": threat.name}));
             continue;
         }
@@ -133,7 +135,8 @@ fn fence(delivery: &Delivery, chart: &Chart, mission: &Mission) -> (Value, Vec<V
     (fence, left_out)
 }
 
-fn is_passed_at_another_height(threat: &Threat, route: &[Point3]) -> bool {
+/// Whether `route` would enter a threat that had neither base nor top, by more than a feasible one may.
+fn is_passed_at_another_height(threat: &Threat, route: &[Point3], tolerance_m: f64) -> bool {
     if threat.base.is_none() && threat.top.is_none() {
         return false;
     }
@@ -147,6 +150,42 @@ fn is_passed_at_another_height(threat: &Threat, route: &[Point3]) -> bool {
             a: ends[0],
             b: ends[1],
         };
-        everywhere.clearance(&leg).is_some_and(|clear| clear < 0.0)
+        everywhere
+            .clearance(&leg)
+            .is_some_and(|clear| clear < -tolerance_m)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point2;
+    use crate::threat::Cylinder;
+
+    #[test]
+    fn what_is_flown_round_is_not_passed_at_another_height() {
+        let route = [
+            Point3::new(-500.0, 0.0, 50.0),
+            Point3::new(500.0, 0.0, 50.0),
+        ];
+        let check = |radius: f64, top: Option<f64>, expected: bool| {
+            let threat = Threat {
+                name: None,
+                shape: Shape::Cylinder(Cylinder {
+                    center: Point2::new(0.0, 100.0),
+                    radius,
+                    influence: radius,
+                }),
+                base: None,
+                top,
+            };
+            let passed = is_passed_at_another_height(&threat, &route, 1e-6);
+            assert_eq!(passed, expected, "{radius} {top:?}");
+        };
+        check(99.0, Some(40.0), false);
+        // As near as a feasible route may come.
+        check(100.0 + 5e-7, Some(40.0), false);
+        check(100.1, Some(40.0), true);
+        check(100.1, None, false);
+    }
 }

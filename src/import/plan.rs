@@ -14,6 +14,10 @@ const TAKEOFFS: [u64; 2] = [22, 84];
 const LANDINGS: [u64; 2] = [21, 85];
 const CHANGE_SPEED: u64 = 178;
 
+/// Of MAVLink's `SPEED_TYPE`: through the air and over ground, which are one without wind. The others are of
+/// climbs and descents.
+const ALONG: [f64; 2] = [0.0, 1.0];
+
 /// Of MAVLink's `MAV_TYPE`: it flies at its cruise speed, all else at its hover speed.
 const FIXED_WING: u64 = 1;
 
@@ -81,28 +85,35 @@ fn stops(draft: &mut Draft, items: &[Value], home: Option<(Place, f64)>) -> Vec<
             draft.leave(at, format!("a complex item ({kind}), which is not read"));
             continue;
         }
-        let command = item["command"].as_u64().unwrap_or_default();
-        let moves = [&WAYPOINTS[..], &TAKEOFFS, &LANDINGS];
-        if moves.iter().any(|commands| commands.contains(&command)) {
-            match stop(&at, item, command, home) {
-                Ok(stop) => stops.push(stop),
-                Err(reason) => draft.leave(at, reason),
+        let used = match item["command"].as_u64().unwrap_or_default() {
+            command if moves(command) => {
+                stop(&at, item, command, home).map(|stop| stops.push(stop))
             }
-        } else if command == CHANGE_SPEED && draft_speed(draft, item) {
-        } else {
-            draft.leave(at, format!("command {command}, which no scenario has"));
+            CHANGE_SPEED => changed_speed(item).map(|speed| draft.cruise_speed = Some(speed)),
+            command => Err(format!("command {command}, which no scenario has")),
+        };
+        if let Err(reason) = used {
+            draft.leave(at, reason);
         }
     }
     stops
 }
 
-/// Whether the item sets the speed of the mission.
-fn draft_speed(draft: &mut Draft, item: &Value) -> bool {
-    let speed = item["params"][1].as_f64().filter(|speed| *speed > 0.0);
-    if speed.is_some() {
-        draft.cruise_speed = speed;
+fn moves(command: u64) -> bool {
+    let moves = [&WAYPOINTS[..], &TAKEOFFS, &LANDINGS];
+    moves.iter().any(|commands| commands.contains(&command))
+}
+
+/// Metres a second along the way.
+fn changed_speed(item: &Value) -> Result<f64, String> {
+    let [kind, speed] = [0, 1].map(|index| &item["params"][index]);
+    if !kind.as_f64().is_some_and(|kind| ALONG.contains(&kind)) {
+        return Err(format!(
+            "a speed of type {kind}, must be 0 (air) or 1 (ground)"
+        ));
     }
-    speed.is_some()
+    let along = speed.as_f64().filter(|speed| *speed > 0.0);
+    along.ok_or_else(|| format!("speed is {speed}, must be > 0"))
 }
 
 fn stop(at: &str, item: &Value, command: u64, home: Option<(Place, f64)>) -> Result<Stop, String> {

@@ -331,6 +331,39 @@ fn missions_and_fences_of_a_plan() {
 }
 
 #[test]
+fn speeds_of_a_plan() {
+    let check = |params: Value, expected: Result<f64, &str>| {
+        let plan = json!({
+            "fileType": "Plan",
+            "mission": {"hoverSpeed": 5, "plannedHomePosition": [47.3, 8.5, 480], "items": [
+                {"type": "SimpleItem", "command": 178, "frame": 2, "params": params},
+                {"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, null, 47.4, 8.6, 30]}]},
+        });
+        let found = convert(plan.to_string().as_bytes(), Syntax::Json).expect("a scenario");
+        let (speed, reasons) = match expected {
+            Ok(speed) => (speed, vec![]),
+            Err(reason) => (5.0, vec![format!("/mission/items/0: {reason}")]),
+        };
+        assert_eq!(found.scenario["vehicle"]["cruise_speed"], speed, "{params}");
+        assert_eq!(unused(&found), reasons);
+    };
+    check(json!([0, 12, -1, 0, 0, 0, 0]), Ok(12.0));
+    check(json!([1.0, 12.5, -1, 0, 0, 0, 0]), Ok(12.5));
+    for kind in [json!(2), json!(3), json!(null)] {
+        let reason = format!("a speed of type {kind}, must be 0 (air) or 1 (ground)");
+        check(json!([kind, 12, -1, 0, 0, 0, 0]), Err(&reason));
+    }
+    check(
+        json!([1, -1, 50, 0, 0, 0, 0]),
+        Err("speed is -1, must be > 0"),
+    );
+    check(
+        json!([]),
+        Err("a speed of type null, must be 0 (air) or 1 (ground)"),
+    );
+}
+
+#[test]
 fn hostile_files_are_refused_and_soon() {
     let bomb =
         "<!DOCTYPE kml [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;&a;&a;\">]><kml>&b;</kml>";

@@ -314,3 +314,22 @@ fn across_the_date_line_a_line_is_cut() {
     assert_eq!(pieces[1][0][0], -180.0);
     assert_eq!(first[1], pieces[1][0][1]);
 }
+
+#[test]
+fn along_the_date_line_a_line_is_whole() {
+    let document = json!({
+        "frame": "wgs84",
+        "start": {"lat": -16.80, "lon": 180, "alt": 30},
+        "target": {"lat": -16.82, "lon": -180, "alt": 30},
+        "altitude": {"min": 10, "max": 100},
+        "planner": {"smoothing": {"degree": 1, "spacing": 700}},
+    });
+    let plan = plan(&document, &[(-16.81, 180.0, 40.0)]);
+    let text = write(&plan, "geojson", &[]).expect("a plan");
+    let read: Value = serde_json::from_str(&text).expect("JSON");
+    let path = &read["features"][0]["geometry"];
+    assert_eq!(path["type"], "LineString");
+    for position in path["coordinates"].as_array().expect("a line") {
+        assert_eq!(position[0], 180.0, "{path}");
+    }
+}

@@ -9,6 +9,7 @@ type Place = Vec<f64>;
 
 /// A line; in pieces when it crosses.
 pub(super) fn line(places: &[Place]) -> GeometryValue {
+    let places = on_one_side(places);
     let mut pieces: Vec<Vec<Position>> = vec![Vec::new()];
     for (index, place) in places.iter().enumerate() {
         if let Some(before) = index.checked_sub(1).map(|before| &places[before])
@@ -30,6 +31,19 @@ pub(super) fn line(places: &[Place]) -> GeometryValue {
         pieces.retain(|piece| piece.len() > 1);
         GeometryValue::new_multi_line_string(pieces)
     }
+}
+
+/// The same line, its places on the meridian itself on the side where the one before is: to the other and
+/// back would be a step of nothing.
+fn on_one_side(places: &[Place]) -> Vec<Place> {
+    let mut places = places.to_vec();
+    for index in 1..places.len() {
+        let before = places[index - 1][0];
+        if places[index][0].abs() >= 180.0 {
+            places[index][0] = 180.0_f64.copysign(before);
+        }
+    }
+    places
 }
 
 /// A ring, the first corner not repeated; in two halves when it crosses.
@@ -124,6 +138,27 @@ mod tests {
                 vec![179.0, 1.0],
             ]),
             r#"{"type":"MultiPolygon","coordinates":[[[[179.0,0.0],[180.0,0.0],[180.0,1.0],[179.0,1.0],[179.0,0.0]]],[[[-180.0,0.0],[-179.0,0.0],[-179.0,1.0],[-180.0,1.0],[-180.0,0.0]]]]}"#,
+        );
+    }
+
+    #[test]
+    fn along_the_meridian_nothing_crosses() {
+        check(
+            &line(&[vec![180.0, 1.0], vec![-180.0, 2.0], vec![180.0, 3.0]]),
+            r#"{"type":"LineString","coordinates":[[180.0,1.0],[180.0,2.0],[180.0,3.0]]}"#,
+        );
+        check(
+            &line(&[
+                vec![179.0, 1.0],
+                vec![-180.0, 2.0],
+                vec![180.0, 3.0],
+                vec![179.0, 4.0],
+            ]),
+            r#"{"type":"LineString","coordinates":[[179.0,1.0],[180.0,2.0],[180.0,3.0],[179.0,4.0]]}"#,
+        );
+        check(
+            &line(&[vec![179.0, 1.0], vec![-180.0, 2.0], vec![-179.0, 3.0]]),
+            r#"{"type":"MultiLineString","coordinates":[[[179.0,1.0],[180.0,2.0],[180.0,2.0]],[[-180.0,2.0],[-179.0,3.0]]]}"#,
         );
     }
 

@@ -56,7 +56,9 @@ pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
 
 fn mark(chart: &Chart, point: Point3) -> Waypoint {
     let fix = chart.fix(point);
-    let mut mark = Waypoint::new(Point::new(fix.lon, fix.lat));
+    // To GPX, the 180th meridian is the westernmost one.
+    let lon = if fix.lon >= 180.0 { -180.0 } else { fix.lon };
+    let mut mark = Waypoint::new(Point::new(lon, fix.lat));
     mark.elevation = Some(fix.msl_m);
     mark.geoidheight = Some(chart.undulation_m());
     mark

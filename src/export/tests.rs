@@ -332,4 +332,8 @@ fn along_the_date_line_a_line_is_whole() {
     for position in path["coordinates"].as_array().expect("a line") {
         assert_eq!(position[0], 180.0, "{path}");
     }
+    // A longitude of GPX is less than 180.
+    let text = write(&plan, "gpx", &[]).expect("a plan");
+    assert!(text.contains("lon=\"-180"), "{text}");
+    assert!(!text.contains("lon=\"180"), "{text}");
 }

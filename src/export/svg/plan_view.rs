@@ -79,14 +79,7 @@ pub(super) const AREA_EDGE: &str =
 fn threats(canvas: &mut Canvas, threats: &[Threat], map: &MapScale) {
     let seen: Vec<&Threat> = threats
         .iter()
-        .filter(|threat| {
-            let extent = threat.extent();
-            let (view, inside) = (&map.view, &extent);
-            inside.min.x <= view.max.x
-                && inside.max.x >= view.min.x
-                && inside.min.y <= view.max.y
-                && inside.max.y >= view.min.y
-        })
+        .filter(|threat| map.view.meets(&threat.extent()))
         .collect();
     canvas.group("g", SOFT, |canvas| {
         for threat in &seen {

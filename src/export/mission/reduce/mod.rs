@@ -77,19 +77,12 @@ fn within_reach(scenario: &Scenario, path: &[Point3], reach: f64) -> Vec<crate::
             Some(Rect::around(run.iter().map(Point3::xy))?.grown(reach))
         })
         .collect();
-    let meets = |extent: &Rect| boxes.iter().any(|run| overlap(run, extent));
+    let meets = |extent: &Rect| boxes.iter().any(|run| run.meets(extent));
     let threats = scenario.threats.iter();
     threats
         .filter(|threat| meets(&threat.extent()))
         .cloned()
         .collect()
-}
-
-fn overlap(one: &Rect, other: &Rect) -> bool {
-    one.min.x <= other.max.x
-        && other.min.x <= one.max.x
-        && one.min.y <= other.max.y
-        && other.min.y <= one.max.y
 }
 
 fn corners_of(scenario: &Scenario, path: &[Point3], shape: Shape) -> Vec<Corner> {

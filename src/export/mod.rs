@@ -180,9 +180,15 @@ impl Format {
     /// [`ExportError::Option`] when they contradict each other; [`ExportError::Damaged`] when the
     /// documents are none that this program wrote, or do not belong together.
     pub fn write(&self, input: &ResultInput, options: &Options) -> Result<String, ExportError> {
-        if self.is_stored() {
-            return Ok(input.result.to_owned());
+        match self.write {
+            Write::Stored => Ok(input.result.to_owned()),
+            Write::Plain(write) => Ok(write(&self.delivery(input, options)?, options)),
+            Write::Mission(write) => write(&self.delivery(input, options)?, options),
         }
+    }
+
+    /// The plan, if it may be written so.
+    fn delivery(&self, input: &ResultInput, options: &Options) -> Result<Delivery, ExportError> {
         let delivery = Delivery::read(input)?;
         if self.geodetic && delivery.chart.is_none() {
             return Err(ExportError::NoGeodeticFrame { format: self.name });
@@ -190,11 +196,7 @@ impl Format {
         if self.flown && !delivery.result.feasible && !options.allow_infeasible {
             return Err(ExportError::Infeasible { format: self.name });
         }
-        match self.write {
-            Write::Stored => Ok(input.result.to_owned()),
-            Write::Plain(write) => Ok(write(&delivery, options)),
-            Write::Mission(write) => write(&delivery, options),
-        }
+        Ok(delivery)
     }
 }
 

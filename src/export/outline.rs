@@ -1,6 +1,7 @@
 //! Threats as maps show them: rings of degrees.
 
 use super::chart::{Chart, Fix};
+use crate::geometry::ring::twice_area;
 use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};
 
@@ -35,14 +36,8 @@ fn circle(center: Point2, radius: f64) -> Vec<Point2> {
 }
 
 fn counterclockwise(vertices: &[Point2]) -> Vec<Point2> {
-    let next = vertices.iter().cycle().skip(1);
-    let doubled_area: f64 = vertices
-        .iter()
-        .zip(next)
-        .map(|(here, next)| here.x * next.y - next.x * here.y)
-        .sum();
     let mut corners = vertices.to_vec();
-    if doubled_area < 0.0 {
+    if twice_area(vertices) < 0.0 {
         corners.reverse();
     }
     corners

@@ -8,6 +8,15 @@ pub fn edges(ring: &[Point2]) -> impl Iterator<Item = (Point2, Point2)> + '_ {
     ring.iter().copied().zip(next.copied())
 }
 
+/// Twice the area of the simple `ring`, square metres; negative where it goes round clockwise.
+#[must_use]
+pub fn twice_area(ring: &[Point2]) -> f64 {
+    // Of triangles at the first point, so that no digits are lost far from the origin.
+    edges(ring)
+        .map(|(a, b)| (a - ring[0]).perp(&(b - ring[0])))
+        .sum()
+}
+
 /// Whether the simple `ring` turns to the same side at every corner, of which some may be given twice.
 #[must_use]
 pub fn is_convex(ring: &[Point2]) -> bool {
@@ -72,5 +81,10 @@ mod tests {
         check(4.0, 5.0, true, 4.0);
         check(13.0, 14.0, false, 5.0);
         check(5.0, -2.0, false, 2.0);
+        let mut clockwise = ring;
+        clockwise.reverse();
+        for (ring, expected) in [(ring, 200.0), (clockwise, -200.0)] {
+            assert!((twice_area(&ring) - expected).abs() < 1e-12);
+        }
     }
 }

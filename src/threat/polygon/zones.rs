@@ -65,12 +65,10 @@ pub(super) fn zones(vertices: &[Point2], is_convex: bool, margin: f64) -> Option
 
 impl<'r> Sides<'r> {
     fn of(vertices: &'r [Point2], is_convex: bool, margin: f64) -> Self {
-        let twice_area: f64 = ring::edges(vertices)
-            .map(|(a, b)| (a - vertices[0]).perp(&(b - vertices[0])))
-            .sum();
+        let turning = ring::twice_area(vertices).signum();
         let edge = |(a, b): (Point2, Point2)| {
             let along = (b - a).normalize();
-            let outward = Vector2::new(along.y, -along.x) * twice_area.signum();
+            let outward = Vector2::new(along.y, -along.x) * turning;
             Side {
                 a,
                 b,

@@ -29,7 +29,7 @@ pub use outcome::{
 };
 pub use rules::rules;
 
-pub use smoothing::binds as binds_paths;
+pub(crate) use smoothing::keeps_limits;
 
 pub use crate::cost::CostFigures;
 

@@ -188,7 +188,7 @@ fn corners_alone(route: &[Point3], spacing: f64) -> Vec<Sample> {
 }
 
 /// Whether a path is held to nothing that `points` break.
-fn keeps_limits(model: &Model, points: &[Point3]) -> bool {
+pub(crate) fn keeps_limits(model: &Model, points: &[Point3]) -> bool {
     let mut keeps = true;
     model.assess(points, Quadrature::Integral, model.tolerance, |breach| {
         keeps &= !binds(&breach);
@@ -223,8 +223,7 @@ fn bisect(spline: &BSpline, spacing: f64, start: Sample, end: Sample, samples: &
 
 /// Whether a path is held to what `breach` breaks: its samples are no waypoints, whose legs have a
 /// least length and whose places an area, and its chords may be a hair steeper than the curve.
-#[must_use]
-pub fn binds(breach: &Breach) -> bool {
+fn binds(breach: &Breach) -> bool {
     match breach.constraint {
         Constraint::Threat | Constraint::Altitude | Constraint::Terrain | Constraint::Turn => true,
         Constraint::Climb => breach.amount > CHORD_CLIMB_SLACK,

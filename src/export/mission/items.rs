@@ -1,10 +1,11 @@
 //! What an autopilot is told to do, one command an item.
 
-use super::reduce::{self, Shape, reduce};
+use super::reduce::{Shape, reduce};
 use crate::cost::{Model, Tolerance};
 use crate::export::chart::{Chart, rounded};
 use crate::export::{Altitude, Delivery, ExportError, Firmware, Options};
 use crate::geometry::{Point3, Segment};
+use crate::planner::keeps_limits;
 
 /// Commands of MAVLink's `MAV_CMD`.
 const NAV_WAYPOINT: u16 = 16;
@@ -169,7 +170,7 @@ fn route(delivery: &Delivery, options: &Options) -> Result<Vec<Point3>, ExportEr
         return Ok(course);
     }
     let model = Model::new(&delivery.scenario);
-    if !reduce::keeps(&model, &course) {
+    if !keeps_limits(&model, &course) {
         return Err(ExportError::Unflyable(format!(
             "a take-off to {} m above ground leads into what the route keeps clear of: takeoff=0 leaves it out",
             options.takeoff_m

@@ -7,8 +7,8 @@
 
 use crate::cost::{Model, turns};
 use crate::geometry::{Point3, Rect};
-use crate::planner;
-use crate::scenario::{Quadrature, Scenario};
+use crate::planner::keeps_limits;
+use crate::scenario::Scenario;
 
 /// Share of the tolerance by which corners on the path are chosen, and by which others lie beside it.
 const THINNING: f64 = 0.125;
@@ -55,17 +55,8 @@ pub(super) fn reduce(scenario: &Scenario, path: &[Point3], shape: Shape) -> Vec<
     };
     let reduced = reduction
         .fewest(&reduction.choice())
-        .filter(|corners| keeps(&Model::new(scenario), corners));
+        .filter(|corners| keeps_limits(&Model::new(scenario), corners));
     reduced.unwrap_or_else(|| path.to_vec())
-}
-
-/// Whether `route` keeps what a path is held to.
-pub(super) fn keeps(model: &Model, route: &[Point3]) -> bool {
-    let mut kept = true;
-    model.assess(route, Quadrature::Integral, model.tolerance, |breach| {
-        kept &= !planner::binds_paths(&breach);
-    });
-    kept
 }
 
 /// The threats that a leg within `reach` metres of `path` may meet.
@@ -267,7 +258,7 @@ impl Reduction<'_> {
 
     /// Whether the leg by itself keeps what a path is held to.
     fn is_free(&self, from: &Corner, to: &Corner) -> bool {
-        keeps(&self.model, &[from.point, to.point])
+        keeps_limits(&self.model, &[from.point, to.point])
     }
 
     /// How far the samples between two corners are from the leg at most; `None` when that is more

@@ -34,7 +34,7 @@ fn hugging(
     let ends = (scenario.start, scenario.target);
     let route = std::iter::once(ends.0).chain(free).chain([ends.1]);
     let path = smoothed(route.collect());
-    if !keeps(&Model::new(&scenario), &path) {
+    if !keeps_limits(&Model::new(&scenario), &path) {
         return None;
     }
     for &(sample, left, radius) in touched {
@@ -52,7 +52,7 @@ fn hugging(
             top: None,
         };
         scenario.threats.push(disc);
-        if !keeps(&Model::new(&scenario), &path) {
+        if !keeps_limits(&Model::new(&scenario), &path) {
             scenario.threats.pop();
         }
     }
@@ -94,7 +94,7 @@ proptest! {
             let shape = Shape { tolerance_m, follows_ground };
             let corners = reduce(&scenario, &path, shape);
             prop_assert!(farthest(&path, &corners) <= tolerance_m);
-            prop_assert!(keeps(&Model::new(&scenario), &corners));
+            prop_assert!(keeps_limits(&Model::new(&scenario), &corners));
             prop_assert_eq!(corners[0], path[0]);
             prop_assert_eq!(corners[corners.len() - 1], path[path.len() - 1]);
             prop_assert!(corners.len() <= path.len());
@@ -163,7 +163,7 @@ fn an_arc_along_a_threat_takes_few_legs() {
             Point3::new(500.0 + 200.0 * cos, 200.0 * sin, 150.0)
         })
         .collect();
-    assert!(keeps(&Model::new(&scenario), &path));
+    assert!(keeps_limits(&Model::new(&scenario), &path));
     let shape = Shape {
         tolerance_m: 1.0,
         follows_ground: false,

@@ -26,7 +26,7 @@ pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale) {
         canvas.text(place, &font.anchor("end"), &steps.label(y));
     }
     let title = Font::new(11.0, MUTED).anchor("middle");
-    let (east_title, north_title) = titles(&drawing.scenario.frame);
+    let (east_title, north_title) = titles(&drawing.delivery.scenario.frame);
     canvas.turned_text(
         (16.0, frame.top + frame.height / 2.0),
         -90.0,

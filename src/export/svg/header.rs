@@ -6,7 +6,11 @@ use super::{Drawing, LEFT, RIGHT, WIDTH, figure, metres};
 
 /// Pixels from the top of the sheet to the plan's frame.
 pub(super) fn height(drawing: &Drawing) -> f64 {
-    if drawing.result.feasible { 78.0 } else { 114.0 }
+    if drawing.delivery.result.feasible {
+        78.0
+    } else {
+        114.0
+    }
 }
 
 pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing) {
@@ -19,7 +23,7 @@ pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing) {
         &facts,
         &facts.fit(&facts_line(drawing), width),
     );
-    if !drawing.result.feasible {
+    if !drawing.delivery.result.feasible {
         let banner = Area {
             left: LEFT,
             top: 72.0,
@@ -35,7 +39,7 @@ pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing) {
 
 /// Such as `tms-sba, seed 4 · cost 471.2 · length 921 m · least clearance 3.1 m (threat 2)`.
 fn facts_line(drawing: &Drawing) -> String {
-    let result = &drawing.result;
+    let result = &drawing.delivery.result;
     let length = match &result.path {
         Some(path) => path.length,
         None => result.legs.iter().map(|leg| leg.length).sum(),
@@ -50,7 +54,7 @@ fn facts_line(drawing: &Drawing) -> String {
 }
 
 fn clearance(drawing: &Drawing) -> String {
-    let checks = &drawing.result.checks;
+    let checks = &drawing.delivery.result.checks;
     let measures = checks.path.as_ref().unwrap_or(&checks.waypoints);
     if measures.clearance.is_empty() {
         return "no threats".to_owned();
@@ -73,7 +77,7 @@ fn clearance(drawing: &Drawing) -> String {
 
 /// What is wrong with an infeasible route.
 fn verdict(drawing: &Drawing) -> String {
-    let violations = &drawing.result.checks.violations;
+    let violations = &drawing.delivery.result.checks.violations;
     let Some(first) = violations.first() else {
         return "NOT FEASIBLE".to_owned();
     };

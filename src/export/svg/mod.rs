@@ -19,10 +19,8 @@ use canvas::{Area, Canvas};
 use relief::Relief;
 use scale::MapScale;
 
-use super::document::ResultDocument;
 use super::{Delivery, Options};
 use crate::geometry::{Point3, Rect};
-use crate::scenario::Scenario;
 
 /// Of the sheet, pixels.
 const WIDTH: f64 = 900.0;
@@ -44,21 +42,12 @@ const ASPECT: (f64, f64) = (0.66, 1.05);
 
 /// What is drawn.
 struct Drawing<'d> {
-    scenario: &'d Scenario,
-    result: &'d ResultDocument,
-    waypoints: &'d [Point3],
-    /// What is flown; none when infeasible.
-    path: Option<&'d [Point3]>,
+    delivery: &'d Delivery,
 }
 
 /// Draw a plan.
 pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
-    let drawing = Drawing {
-        scenario: &delivery.scenario,
-        result: &delivery.result,
-        waypoints: &delivery.waypoints,
-        path: delivery.path.as_deref(),
-    };
+    let drawing = Drawing { delivery };
     let map = drawing.map(header::height(&drawing));
     let profile_frame = Area {
         left: LEFT,
@@ -76,7 +65,7 @@ pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
     canvas.title(drawing.name());
     canvas.rect(&everything, "fill=\"#fff\"");
     header::draw(&mut canvas, &drawing);
-    let relief = Relief::of(&drawing.scenario.terrain, &map);
+    let relief = Relief::of(&drawing.delivery.scenario.terrain, &map);
     plan_view::draw(&mut canvas, &drawing, &relief, &map);
     sidebar::draw(&mut canvas, &drawing, &relief, &map.frame);
     profile::draw(&mut canvas, &drawing, profile_frame);
@@ -85,16 +74,12 @@ pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
 
 impl Drawing<'_> {
     fn name(&self) -> &str {
-        self.scenario.name.as_deref().unwrap_or("unnamed scenario")
-    }
-
-    /// What the vehicle does, as far as is known: the path, else the waypoints.
-    fn course(&self) -> &[Point3] {
-        self.path.unwrap_or(self.waypoints)
+        let name = self.delivery.scenario.name.as_deref();
+        name.unwrap_or("unnamed scenario")
     }
 
     fn route_color(&self) -> &'static str {
-        if self.result.feasible {
+        if self.delivery.result.feasible {
             palette::ROUTE
         } else {
             palette::BROKEN
@@ -103,7 +88,7 @@ impl Drawing<'_> {
 
     /// Indices of what breaks a constraint: of each `leg` or of each `waypoint`.
     fn broken(&self, place: &str) -> Vec<usize> {
-        let places = self.result.checks.violations.iter();
+        let places = self.delivery.result.checks.violations.iter();
         let mut indices: Vec<usize> = places
             .filter_map(|violation| violation.place.strip_prefix(place)?.trim().parse().ok())
             .collect();
@@ -113,8 +98,11 @@ impl Drawing<'_> {
 
     /// The area and the route with a little room, in a frame of a pleasant shape.
     fn map(&self, top: f64) -> MapScale {
-        let ends = [self.scenario.area.min, self.scenario.area.max];
-        let route = self.waypoints.iter().map(Point3::xy);
+        let ends = [
+            self.delivery.scenario.area.min,
+            self.delivery.scenario.area.max,
+        ];
+        let route = self.delivery.waypoints.iter().map(Point3::xy);
         let shown = Rect::around(ends.into_iter().chain(route)).expect("an area has corners");
         let (width, height) = (shown.max.x - shown.min.x, shown.max.y - shown.min.y);
         let shown = shown.grown((0.02 * width.max(height)).max(0.5));

@@ -22,23 +22,26 @@ pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, relief: &Relief, map:
     canvas.group("g", "clip-path=\"url(#plan)\"", |canvas| {
         relief.draw(canvas, frame);
         outside(canvas, drawing, map);
-        threats(canvas, &drawing.scenario.threats, map);
+        threats(canvas, &drawing.delivery.scenario.threats, map);
         route(canvas, drawing, map);
     });
     canvas.rect(frame, &format!("fill=\"none\" stroke=\"{INK}\""));
     axes::draw(canvas, drawing, map);
 
     let mut labels = Labels::within(*frame);
-    for line in [Some(&drawing.waypoints), drawing.path.as_ref()]
-        .into_iter()
-        .flatten()
+    for line in [
+        Some(&drawing.delivery.waypoints),
+        drawing.delivery.path.as_ref(),
+    ]
+    .into_iter()
+    .flatten()
     {
         labels.reserve_line(&spots(line, map));
     }
     let [nw, ne, se, sw] = area_corners(drawing, map);
     labels.reserve_line(&[nw, ne, se, sw, nw]);
     end_names(canvas, drawing, map, &mut labels);
-    threat_names(canvas, &drawing.scenario.threats, map, &mut labels);
+    threat_names(canvas, &drawing.delivery.scenario.threats, map, &mut labels);
     waypoint_numbers(canvas, drawing, map, &mut labels);
     relief.label(canvas, &mut labels);
 }
@@ -65,7 +68,7 @@ fn outside(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale) {
 }
 
 fn area_corners(drawing: &Drawing, map: &MapScale) -> [Spot; 4] {
-    let area = &drawing.scenario.area;
+    let area = &drawing.delivery.scenario.area;
     let (west, north) = map.spot(Point2::new(area.min.x, area.max.y));
     let (east, south) = map.spot(Point2::new(area.max.x, area.min.y));
     [(west, north), (east, north), (east, south), (west, south)]
@@ -154,8 +157,8 @@ fn outline(vertices: &[Point2], map: &MapScale) -> String {
 }
 
 fn route(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale) {
-    let waypoints = spots(drawing.waypoints, map);
-    if let Some(path) = &drawing.path {
+    let waypoints = spots(&drawing.delivery.waypoints, map);
+    if let Some(path) = &drawing.delivery.path {
         let data = polyline(&thinned(&spots(path, map)));
         canvas.path(&data, &format!("{CASING} stroke-width=\"6\""));
         canvas.path(
@@ -249,8 +252,8 @@ pub(super) fn thinned(line: &[Spot]) -> Vec<Spot> {
 fn end_names(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale, labels: &mut Labels) {
     let font = Font::new(12.0, INK).bold().halo();
     let ends = [
-        (drawing.scenario.start, "start"),
-        (drawing.scenario.target, "target"),
+        (drawing.delivery.scenario.start, "start"),
+        (drawing.delivery.scenario.target, "target"),
     ];
     for (point, _) in ends {
         labels.reserve(Area::about(map.spot(point.xy()), (16.0, 16.0)));
@@ -265,8 +268,9 @@ fn waypoint_numbers(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale, labe
     let calm = Font::new(10.0, INK).halo();
     let alarmed = Font::new(11.0, BROKEN).bold().halo();
     let broken = drawing.broken("leg");
-    let inner = drawing.waypoints.len() - 1;
-    for (idx, point) in drawing.waypoints.iter().enumerate().take(inner).skip(1) {
+    let waypoints = &drawing.delivery.waypoints;
+    let inner = waypoints.len() - 1;
+    for (idx, point) in waypoints.iter().enumerate().take(inner).skip(1) {
         let font = if broken.contains(&idx) {
             &alarmed
         } else {

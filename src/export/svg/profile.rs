@@ -45,7 +45,7 @@ impl Scale {
 }
 
 pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, frame: Area) {
-    let course = drawing.course();
+    let course = drawing.delivery.course();
     let ways = ways(course);
     let stations = stations(drawing, course, &ways);
     let scale = Scale {
@@ -61,7 +61,7 @@ pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, frame: Area) {
     canvas.group("g", "clip-path=\"url(#profile)\"", |canvas| {
         band(canvas, drawing, &stations, &scale);
         canvas.group("g", CROSSED, |canvas| {
-            for threat in &drawing.scenario.threats {
+            for threat in &drawing.delivery.scenario.threats {
                 crossings(canvas, threat, &stations, &scale);
             }
         });
@@ -105,7 +105,7 @@ fn stations(drawing: &Drawing, course: &[Point3], ways: &[f64]) -> Vec<Station> 
         Station {
             way,
             at,
-            ground: drawing.scenario.terrain.elevation(at),
+            ground: drawing.delivery.scenario.terrain.elevation(at),
         }
     };
     (0..STATIONS).map(station).collect()
@@ -113,12 +113,13 @@ fn stations(drawing: &Drawing, course: &[Point3], ways: &[f64]) -> Vec<Station> 
 
 /// Room for ground and route, and for the band unless it would flatten both.
 fn heights(drawing: &Drawing, stations: &[Station]) -> (f64, f64) {
-    let band = drawing.scenario.altitude;
+    let band = drawing.delivery.scenario.altitude;
     let ground = stations.iter().map(|station| station.ground);
     let route = drawing
+        .delivery
         .course()
         .iter()
-        .chain(drawing.waypoints)
+        .chain(&drawing.delivery.waypoints)
         .map(|point| point.z);
     let (min, max) = ground
         .chain(route)
@@ -156,7 +157,7 @@ fn axes(canvas: &mut Canvas, scale: &Scale, drawing: &Drawing) {
     let title = font.anchor("middle");
     let middle = frame.top + frame.height / 2.0;
     canvas.turned_text((16.0, middle), -90.0, &title, "height, m");
-    let along = if drawing.path.is_some() {
+    let along = if drawing.delivery.path.is_some() {
         "path"
     } else {
         "waypoints"
@@ -177,7 +178,7 @@ pub(super) const ALLOWED: &str = "fill=\"#8fb8d8\" fill-opacity=\"0.28\"";
 pub(super) const ALLOWED_EDGE: &str = "fill=\"none\" stroke=\"#8fb8d8\" stroke-dasharray=\"5 3\"";
 
 fn band(canvas: &mut Canvas, drawing: &Drawing, stations: &[Station], scale: &Scale) {
-    let band = drawing.scenario.altitude;
+    let band = drawing.delivery.scenario.altitude;
     let [floor, ceiling] = [band.min, band.max].map(|above| over_ground(stations, above, scale));
     let allowed: Vec<Spot> = floor.iter().chain(ceiling.iter().rev()).copied().collect();
     canvas.path(&ring(&allowed), ALLOWED);
@@ -251,9 +252,9 @@ fn flown(
         &polyline(&thinned(course)),
         &format!("{line} stroke=\"{color}\" stroke-width=\"2.5\""),
     );
-    let marks: Vec<Spot> = if drawing.path.is_some() {
-        let ways = abreast(drawing.waypoints, stations);
-        let points = drawing.waypoints.iter().zip(ways);
+    let marks: Vec<Spot> = if drawing.delivery.path.is_some() {
+        let ways = abreast(&drawing.delivery.waypoints, stations);
+        let points = drawing.delivery.waypoints.iter().zip(ways);
         points
             .map(|(point, way)| scale.spot(way, point.z))
             .collect()

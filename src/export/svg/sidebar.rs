@@ -36,18 +36,22 @@ type Mark = fn(&mut Canvas, Spot);
 
 /// What occurs in the drawing.
 fn legend(drawing: &Drawing) -> Vec<(&'static str, Mark)> {
-    let threats = &drawing.scenario.threats;
-    let feasible = drawing.result.feasible;
+    let threats = &drawing.delivery.scenario.threats;
+    let feasible = drawing.delivery.result.feasible;
     let rows: [(bool, &'static str, Mark); 11] = [
         (true, "start", start),
         (true, "target", target),
-        (drawing.path.is_some(), "path flown", |canvas, at| {
-            across(
-                canvas,
-                at,
-                &format!("stroke=\"{ROUTE}\" stroke-width=\"3\""),
-            );
-        }),
+        (
+            drawing.delivery.path.is_some(),
+            "path flown",
+            |canvas, at| {
+                across(
+                    canvas,
+                    at,
+                    &format!("stroke=\"{ROUTE}\" stroke-width=\"3\""),
+                );
+            },
+        ),
         (feasible, "waypoints and legs", |canvas, at| {
             across(canvas, at, STRAIGHT);
             waypoint(canvas, at);
@@ -160,7 +164,7 @@ fn heights(canvas: &mut Canvas, relief: &Relief, column: &Area, y: f64) -> f64 {
 }
 
 fn figures(canvas: &mut Canvas, drawing: &Drawing, column: &Area, top: f64) {
-    let result = &drawing.result;
+    let result = &drawing.delivery.result;
     let legs = &result.checks.waypoints;
     let measures = result.checks.path.as_ref().unwrap_or(legs);
     let gap = result.bound.gap.map(|gap| format!("{:.1} %", 100.0 * gap));

@@ -2,23 +2,11 @@
 
 use serde_json::{Value, json};
 
-use super::facts::Facts;
+use super::facts::{Facts, OF_A_THREAT};
 use super::{Assumed, Conversion, ImportError, Unused};
 
 /// Entries of a list of unused things; the last one counts the rest.
 const MOST_UNUSED: usize = 1000;
-
-/// Names of facts of a threat.
-const OF_A_THREAT: [&str; 8] = [
-    "base",
-    "center",
-    "influence",
-    "kind",
-    "margin",
-    "name",
-    "radius",
-    "top",
-];
 
 /// The usual ceiling for unmanned aircraft, metres above ground.
 const CEILING_M: f64 = 120.0;

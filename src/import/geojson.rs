@@ -63,7 +63,7 @@ fn feature(draft: &mut Draft, at: &str, value: JsonValue) {
         Ok(feature) => feature,
         Err(error) => return draft.leave(at, error.to_string()),
     };
-    let facts = Facts(feature.properties.unwrap_or_default());
+    let facts = Facts::of(feature.properties.unwrap_or_default());
     match feature.geometry {
         None => draft.leave(at, "a feature without geometry"),
         Some(shape) => geometry(draft, at, &facts, &shape.value),

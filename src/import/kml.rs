@@ -4,7 +4,7 @@
 //! A document type, by which XML grows without bound, is refused; nothing that is linked is fetched.
 
 use roxmltree::{Document, Node, ParsingOptions};
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use super::draft::{Draft, Place};
 use super::facts::Facts;
@@ -15,9 +15,6 @@ const MOST_NODES: u32 = 2_000_000;
 
 /// Levels of geometries within geometries.
 const DEEPEST: usize = 16;
-
-/// Letters of a placemark's name by which it is listed.
-const LONGEST_NAME: usize = 60;
 
 /// What a document may hold beside placemarks, and no scenario has.
 const NOT_READ: [&str; 6] = [
@@ -86,9 +83,7 @@ impl Rows<'_> {
 
 fn placemark(draft: &mut Draft, node: &Node, row: usize) {
     let facts = facts(node);
-    let name = facts.name().unwrap_or("Placemark");
-    let name: String = name.chars().take(LONGEST_NAME).collect();
-    let at = format!("line {row}: {name}");
+    let at = format!("line {row}: {}", facts.name().unwrap_or("Placemark"));
     let mut shapes = node.children().filter(is_shape).peekable();
     if shapes.peek().is_none() {
         draft.leave(&at, "a placemark without geometry");
@@ -205,10 +200,10 @@ fn coordinates(node: &Node) -> Result<Vec<[f64; 3]>, String> {
 /// What lies deeper than data may is not looked at: of placemarks within each other's data, the innermost
 /// would be looked at once for each.
 fn facts(placemark: &Node) -> Facts {
-    let mut facts = Facts::default();
+    let mut said = Map::new();
     let mut say = |node: &Node, value: Option<String>| {
         if let (Some(name), Some(value)) = (node.attribute("name"), value) {
-            facts.0.insert(name.to_owned(), Value::String(value));
+            said.insert(name.to_owned(), Value::String(value));
         }
     };
     let extended = placemark.children().filter(|node| is(node, "ExtendedData"));
@@ -222,9 +217,9 @@ fn facts(placemark: &Node) -> Facts {
         }
     }
     if let Some(name) = text_of(placemark, "name") {
-        facts.0.insert("name".to_owned(), Value::String(name));
+        said.insert("name".to_owned(), Value::String(name));
     }
-    facts
+    Facts::of(said)
 }
 
 fn is(node: &Node, name: &str) -> bool {

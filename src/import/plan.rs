@@ -179,7 +179,7 @@ fn fences(draft: &mut Draft, fence: &Value) {
         if excludes(draft, &at, circle) {
             let shape = &circle["circle"];
             let center = &shape["center"];
-            let facts = Facts(Map::from_iter([(
+            let facts = Facts::of(Map::from_iter([(
                 "radius".to_owned(),
                 shape["radius"].clone(),
             )]));

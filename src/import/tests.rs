@@ -364,6 +364,30 @@ fn speeds_of_a_plan() {
 }
 
 #[test]
+fn what_is_said_of_many_shapes_is_short() {
+    let polygons = vec![json!([[[1, 1], [2, 1], [2, 2]]]); 1000];
+    let check = |properties: Value, expected: &str| {
+        let mut features = ends();
+        let coordinates = polygons.clone();
+        features.push(feature(
+            properties,
+            json!({"type": "MultiPolygon", "coordinates": coordinates}),
+        ));
+        let found = geojson(&features.into()).expect("a scenario");
+        let answer = serde_json::to_string(&found).expect("JSON");
+        assert!(answer.contains(expected), "{}", &answer[..2000]);
+        assert!(answer.len() < 1_000_000, "{}", answer.len());
+    };
+    let long = "x".repeat(100_000);
+    check(json!({"name": long}), &"x".repeat(200));
+    check(json!({"margin": long}), "must be a number");
+    check(json!({"margin": vec![1; 10_000]}), "must be a number");
+    check(json!({&long: 1}), "said and not used");
+    let many: serde_json::Map<_, _> = (0..10_000).map(|n| (format!("n{n}"), json!(n))).collect();
+    check(many.into(), "9990 more");
+}
+
+#[test]
 fn hostile_files_are_refused_and_soon() {
     let bomb =
         "<!DOCTYPE kml [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;&a;&a;\">]><kml>&b;</kml>";

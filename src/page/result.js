@@ -17,14 +17,15 @@ export function showResult(root, { result, scenario, status, refusal, geodetic }
     root.replaceChildren();
     return;
   }
-  root.replaceChildren(
+  const parts = [
     verdict(result, scenario, acts),
     takeaway(result, geodetic, acts),
     costs(result, scenario),
     clearances(result, scenario),
     legs(result, acts),
     origin(result, status),
-  );
+  ];
+  root.replaceChildren(...parts.filter((part) => part !== null));
 }
 
 function verdict(result, scenario, acts) {
@@ -85,6 +86,7 @@ function costs({ cost: terms, bound }, scenario) {
       el('tr', {}, el('th', { scope: 'row' }, 'Proven bound'), el('td', {}, cost(bound.lower)), el('td', {}, bound.gap === null ? '–' : `gap ${share(bound.gap)}`)))));
 }
 
+/** None without threats. */
 function clearances({ checks, path }, scenario) {
   const { waypoints } = checks;
   if (!waypoints.clearance.length) return null;

@@ -110,6 +110,14 @@ test('the result is read: cost, gap, clearances, legs, as the interface has them
   await page.done();
 });
 
+test('the result of a scenario without threats says nothing of them', async () => {
+  const page = await open(chrome, `${site.url}#plan=${await made(site.url, { ...SMALL, threats: [] })}`);
+  await page.waitForSelector('.verdict.good');
+  assert.equal(await page.locator('#clearance-head').count(), 0);
+  assert.doesNotMatch(await page.textContent('#result'), /null/);
+  await page.done();
+});
+
 test('a route that breaks something cannot be mistaken, and its faults have places', async () => {
   const id = await made(site.url, WALLED);
   const page = await open(chrome, `${site.url}#plan=${id}`);

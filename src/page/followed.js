@@ -58,7 +58,7 @@ export class Followed extends EventTarget {
   #heard(kind, data) {
     if (kind === 'status') {
       // A run that starts over tells its points anew.
-      if (data.status === 'queued' && !this.result) this.points = this.incumbents = [];
+      if (data.status === 'queued' && !this.result) Object.assign(this, { points: [], incumbents: [] });
       this.status = data;
       this.#tell('status');
     } else if (kind === 'convergence') {

@@ -181,8 +181,8 @@ test('a search that starts over is shown from its new beginning', async () => {
   await drawn(page, FIRST);
   await choose(page, 'paper-4', LONG);
   const event = (kind, data) => `event: ${kind}\ndata: ${JSON.stringify(data)}\n\n`;
-  const told = (iteration) => event('incumbent', { iteration, cost: 500, feasible: true, waypoints: [{ x: 200, y: 200, z: 0 }, { x: 800, y: 800, z: 150 }] })
-    + event('convergence', { iteration, best_cost: 500, mean_cost: 600, feasible_fraction: 1 });
+  const told = (iteration) => event('convergence', { iteration, best_cost: 500, mean_cost: 600, feasible_fraction: 1 })
+    + event('incumbent', { iteration, cost: 500, feasible: true, waypoints: [{ x: 200, y: 200, z: 0 }, { x: 800, y: 800, z: 150 }] });
   await page.route('**/events?*', async (route) => {
     const status = await ask(site.url, new URL(route.request().url()).pathname.replace('/events', ''));
     const as = (state) => event('status', { ...status, status: state });

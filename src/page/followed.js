@@ -15,6 +15,8 @@ export class Followed extends EventTarget {
   incumbents = [];
   connected = true;
   lostBecause = null;
+  #opened = null;
+  #closed = false;
   #stop = null;
 
   /** `status` and `scenario` where they are known already. */
@@ -29,11 +31,27 @@ export class Followed extends EventTarget {
   get latest() { return this.incumbents.at(-1) ?? null; }
 
   /** Fetches what there is, and follows what is to come. */
-  async open() {
+  open() {
+    this.#opened ??= this.#begin();
+    return this.#opened;
+  }
+
+  close() {
+    this.#closed = true;
+    this.#stop?.();
+  }
+
+  async cancel() {
+    this.status = await ask(`/plans/${this.id}/cancel`, { method: 'POST' });
+    this.#tell('status');
+  }
+
+  async #begin() {
     const [status, scenario] = await Promise.all([
       this.status ?? ask(`/plans/${this.id}`),
       this.scenario ?? ask(`/plans/${this.id}/scenario`),
     ]);
+    if (this.#closed) return this;
     Object.assign(this, { status, scenario });
     this.#tell('status');
     if (this.ended) await this.#finish();
@@ -46,13 +64,6 @@ export class Followed extends EventTarget {
       });
     }
     return this;
-  }
-
-  close() { this.#stop?.(); }
-
-  async cancel() {
-    this.status = await ask(`/plans/${this.id}/cancel`, { method: 'POST' });
-    this.#tell('status');
   }
 
   #heard(kind, data) {
@@ -85,6 +96,7 @@ export class Followed extends EventTarget {
       // Cancelled before the first route.
       this.refusal = refusal;
     }
+    if (this.#closed) return;
     this.#tell('end');
     if (this.result) this.#recall(this.result.timing.run_ms / 1000);
   }

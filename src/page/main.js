@@ -99,11 +99,7 @@ const editor = new Editor(by('scenario'), draft, {
 const plans = new Plans(by('plans'), {
   open: (status) => attempt(() => open(status.id)),
   compare: (status, yes) => attempt(() => compare(status.id, yes, status.name)),
-  removed: (id) => {
-    stage.compared.get(id)?.plan.close();
-    if (stage.compared.delete(id)) stage.redraw();
-    remember();
-  },
+  removed: (id) => lift(id),
 }, () => ({ shown: stage.plan?.id ?? null, compared: new Map([...stage.compared].map(([id, other]) => [id, other.color])) }));
 
 // -- Saying ----------------------------------------------------------------------------------------
@@ -326,29 +322,48 @@ onSchemeChange(() => {
   stage.drawSearch();
 });
 
-async function compare(id, yes, name) {
-  if (!yes) {
-    stage.compared.get(id)?.plan.close();
-    stage.compared.delete(id);
-    stage.redraw();
-    stage.drawSearch();
-  } else {
-    if (stage.compared.size === OTHERS) throw new Said(`At most ${OTHERS} plans can be laid over one.`);
-    const plan = await new Followed(id).open();
-    const { algorithm, seed } = plan.status;
-    plan.addEventListener('news', () => {
-      stage.redraw();
-      stage.drawSearch();
-    });
-    lay(plan, name && name === stage.plan?.status?.name ? `${algorithm}, seed ${seed}` : name || `${algorithm}, seed ${seed}`);
-  }
+/** Takes away what is laid over. */
+function lift(id) {
+  stage.compared.get(id)?.plan.close();
+  if (!stage.compared.delete(id)) return;
+  stage.redraw();
+  stage.drawSearch();
   plans.mark();
   remember();
 }
 
+async function compare(id, yes, name) {
+  if (!yes) {
+    lift(id);
+    return;
+  }
+  if (stage.compared.has(id)) return;
+  if (stage.compared.size === OTHERS) throw new Said(`At most ${OTHERS} plans can be laid over one.`);
+  const plan = new Followed(id);
+  plan.addEventListener('news', () => {
+    stage.redraw();
+    stage.drawSearch();
+  });
+  // Before it has opened, so that it can be taken away, and is not laid over twice.
+  lay(plan, name || id.slice(0, 8));
+  plans.mark();
+  const laid = () => stage.compared.get(id)?.plan === plan;
+  try {
+    await plan.open();
+  } catch (refusal) {
+    if (!laid()) return;
+    lift(id);
+    throw refusal;
+  }
+  if (!laid() || (name && name !== stage.plan?.status?.name)) return;
+  const { algorithm, seed } = plan.status;
+  stage.compared.get(id).name = `${algorithm}, seed ${seed}`;
+  stage.drawSearch();
+}
+
 async function open(id) {
   const plan = stage.compared.get(id)?.plan ?? new Followed(id);
-  if (!plan.scenario) await plan.open();
+  await plan.open();
   begin(plan.scenario, plan);
   plans.mark();
 }

@@ -36,6 +36,69 @@ test('two plans are laid over one another in scene and chart', async () => {
   await page.done();
 });
 
+/** Holds the answers to what matches; `release()` lets them through, and promises that the page has them. */
+async function held(page, pattern) {
+  let waiting = [];
+  await page.route(pattern, (route) => (waiting ? waiting.push(route) : route.continue()));
+  return async () => {
+    const all = waiting;
+    waiting = null;
+    await Promise.all(all.map(async (route) => {
+      const answered = page.waitForResponse((response) => response.request() === route.request());
+      await route.continue();
+      await (await answered).finished();
+    }));
+  };
+}
+
+test('what is taken away before it has opened stays away, and what is laid over twice is there once', async () => {
+  const named = (name) => made(site.url, { ...SMALL, name });
+  const [first, early] = [await named('first'), await named('early')];
+  await named('late');
+  const page = await open(chrome, `${site.url}#plan=${first}`);
+  await page.waitForSelector('.verdict');
+  const asked = [];
+  page.on('request', (request) => asked.push(new URL(request.url()).pathname));
+  await page.click('#tab-plans');
+  const tick = page.locator('[aria-label="Lay early over"]');
+  const openings = () => asked.filter((path) => path === `/plans/${early}/scenario`).length;
+  let release = await held(page, `**/plans/${early}`);
+  await tick.check();
+  await tick.uncheck();
+  await release();
+  await page.check('[aria-label="Lay late over"]');
+  await page.waitForFunction(() => globalThis.noctule.scene().routes.length > 1 && /late/.test(document.getElementById('legend').textContent));
+  assert.doesNotMatch(await page.textContent('#legend'), /early/);
+  assert.equal((await scene(page)).routes.length, 2);
+  assert.equal(openings(), 1);
+  release = await held(page, `**/plans/${early}`);
+  await tick.check();
+  // The list is read anew meanwhile, and knows of it.
+  await page.waitForResponse(/plans[?]limit/);
+  await page.waitForResponse(/plans[?]limit/);
+  assert.ok(await tick.isChecked());
+  await release();
+  await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 3);
+  assert.equal(openings(), 2);
+  await page.done();
+});
+
+test('a plan that is left before it has opened is not followed', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  const followed = [];
+  page.on('request', (request) => { if (request.url().includes('/events?')) followed.push(request.url().match(/plans\/([^/]+)/)[1]); });
+  const release = await held(page, /plans\/[^/]+\/scenario/);
+  await page.click('#plan');
+  await page.waitForFunction(() => location.hash.includes('plan='));
+  await page.selectOption('#source', 'paper-1');
+  await drawn(page, 3);
+  await release();
+  const id = await plan(page);
+  assert.deepEqual([...new Set(followed)], [id]);
+  await page.done();
+});
+
 test('a threat moves, and the plan is made anew from the route there was', async () => {
   const page = await open(chrome, `${site.url}#plan=${await made(site.url, SMALL)}`);
   await page.waitForSelector('.verdict');

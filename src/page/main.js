@@ -99,7 +99,10 @@ const editor = new Editor(by('scenario'), draft, {
 const plans = new Plans(by('plans'), {
   open: (status) => attempt(() => open(status.id)),
   compare: (status, yes) => attempt(() => compare(status.id, yes, status.name)),
-  removed: (id) => lift(id),
+  removed: (id) => {
+    if (stage.plan?.id === id) show(null);
+    lift(id);
+  },
 }, () => ({ shown: stage.plan?.id ?? null, compared: new Map([...stage.compared].map(([id, other]) => [id, other.color])) }));
 
 // -- Saying ----------------------------------------------------------------------------------------
@@ -215,7 +218,7 @@ function show(plan) {
   plan?.addEventListener('news', ({ detail }) => plan === stage.plan && heard(plan, detail));
   if (plan) for (const what of ['status', 'search']) heard(plan, what);
   else {
-    by('state').hidden = true;
+    by('state').hidden = by('stale').hidden = true;
     by('cancel').hidden = by('replan').hidden = true;
     by('figures').replaceChildren(el('p', { class: 'faint' }, 'Press Plan, and watch the swarm look for a route.'));
     showResult(by('result'), {}, {});

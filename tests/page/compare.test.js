@@ -140,6 +140,26 @@ test('the list has states, a filter and pages, and lets go', async () => {
   await other.stop();
 });
 
+test('a running plan that is removed is not shown any longer', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  await fill(page, '/planner/iterations', '100000');
+  await page.click('#plan');
+  await page.waitForSelector('#cancel:not([hidden])');
+  await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 1);
+  await fill(page, '/planner/iterations', '50');
+  await page.waitForSelector('#stale:not([hidden])');
+  await page.click('#tab-plans');
+  await page.click('.plans tr.chosen button[title=Remove]');
+  await page.waitForSelector('#cancel', { state: 'hidden' });
+  await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 0);
+  assert.ok(await page.isHidden('#state'));
+  assert.ok(await page.isHidden('#stale'));
+  assert.match(await page.textContent('#figures'), /Press Plan/);
+  assert.equal(await page.evaluate(() => location.hash), '');
+  await page.done();
+});
+
 test('a plan is taken away: formats, scenario, picture, link', async () => {
   const page = await open(chrome, `${site.url}#plan=${await made(site.url, SMALL)}`);
   await page.waitForSelector('.verdict');

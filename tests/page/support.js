@@ -18,7 +18,7 @@ const ARGUMENTS = [
 const PATIENCE_MS = 600000;
 
 /** What the browser itself notes about answers that the page expects: refusals are shown in the page. */
-const EXPECTED = /Failed to load resource: the server responded with a status of (401|404|409|422)|GPU stall due to ReadPixels/;
+const EXPECTED = /Failed to load resource: the server responded with a status of (401|404|409|410|422)|GPU stall due to ReadPixels/;
 
 /** Starts the program on a port of its own. Returns `{url, stop}`. */
 export async function service(...settings) {

@@ -81,6 +81,8 @@ export class Followed extends EventTarget {
       this.#tell('incumbent');
     } else if (kind === 'end') {
       this.connected = true;
+      // Of a plan that was removed nothing more can be asked.
+      this.status = { ...this.status, status: data.status };
       if (!this.result) this.#finish();
     }
   }

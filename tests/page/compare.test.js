@@ -160,6 +160,22 @@ test('a running plan that is removed is not shown any longer', async () => {
   await page.done();
 });
 
+test('a running plan that is removed elsewhere is told to have ended', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  await fill(page, '/planner/iterations', '100000');
+  await page.click('#plan');
+  await page.waitForSelector('#cancel:not([hidden])');
+  await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 1);
+  const id = await page.evaluate(() => new URLSearchParams(location.hash.slice(1)).get('plan'));
+  await fetch(`${site.url}/plans/${id}`, { method: 'DELETE' });
+  await page.waitForSelector('.verdict.bad');
+  assert.match(await page.textContent('.verdict'), /was deleted/);
+  assert.equal(await page.textContent('#state'), 'cancelled');
+  assert.ok(await page.isHidden('#cancel'));
+  await page.done();
+});
+
 test('a plan is taken away: formats, scenario, picture, link', async () => {
   const page = await open(chrome, `${site.url}#plan=${await made(site.url, SMALL)}`);
   await page.waitForSelector('.verdict');

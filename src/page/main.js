@@ -256,11 +256,11 @@ function verdict(plan) {
 function figures(plan) {
   const { status, latest, result: end } = plan;
   const state = by('state');
-  const active = ['queued', 'running'].includes(status?.status);
+  const active = ['queued', 'running'].includes(status?.status) && !plan.lostBecause;
   const name = end && !end.feasible ? 'infeasible' : status?.status ?? 'opening';
   state.hidden = false;
   state.className = `state ${name}`;
-  state.textContent = plan.connected ? name : 'reconnecting';
+  state.textContent = plan.connected ? name : plan.lostBecause ? 'lost' : 'reconnecting';
   by('cancel').hidden = !active;
   by('cancel').disabled = Boolean(status?.cancel_requested);
   by('replan').hidden = !end;

@@ -1,6 +1,6 @@
 // A plan's events, followed to the end: a lost connection is taken up again where it was cut.
 
-import { Refused, eventsAddress } from './api.js';
+import { Refused, ask, eventsAddress } from './api.js';
 
 /** No eye sees more. */
 export const RATE_HZ = 20;
@@ -11,18 +11,21 @@ const KINDS = ['status', 'convergence', 'incumbent', 'gap', 'end'];
  * `rateHz` points a second at most, 0 for all.
  *
  * The browser itself takes up a connection that broke, with the last id; what it gives up, an answer that is no
- * stream, such as that to a ticket whose time is over, is asked for again here.
+ * stream, such as that to a ticket whose time is over, is asked for again here, for as long as there is the plan.
  */
 export function follow(id, heard, connected, rateHz = RATE_HZ) {
   let source = null;
   let last = 0;
   let over = false;
+  let refused = false;
   let wait_ms = 500;
   let timer;
 
   async function open() {
     let address;
     try {
+      // An EventSource does not say why it was refused.
+      if (refused) await ask(`/plans/${id}`);
       address = await eventsAddress(id, last, rateHz);
     } catch (refusal) {
       const hopeless = refusal instanceof Refused && [401, 403, 404, 410].includes(refusal.status);
@@ -34,12 +37,15 @@ export function follow(id, heard, connected, rateHz = RATE_HZ) {
     source = new EventSource(address);
     source.onopen = () => {
       wait_ms = 500;
+      refused = false;
       connected(true);
     };
     source.onerror = () => {
       if (over) return;
       connected(false);
-      if (source.readyState === EventSource.CLOSED) again();
+      if (source.readyState !== EventSource.CLOSED) return;
+      refused = true;
+      again();
     };
     for (const kind of KINDS) {
       source.addEventListener(kind, (event) => {

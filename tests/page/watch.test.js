@@ -95,6 +95,25 @@ test('a lost connection says so, and is taken up again without a loss', async ()
   line.stop();
 });
 
+test('a plan that is gone is not asked for again and again', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  await choose(page, 'paper-4', LONG);
+  let streams = 0;
+  await page.route('**/events?*', async (route) => {
+    streams += 1;
+    const address = new URL(route.request().url());
+    await fetch(new URL(address.pathname.replace('/events', ''), site.url), { method: 'DELETE' });
+    await route.continue();
+  });
+  await page.click('#plan');
+  await page.waitForFunction(() => /was deleted/.test(document.getElementById('notice').textContent));
+  assert.equal(await page.textContent('#state'), 'lost');
+  assert.ok(await page.isHidden('#cancel'));
+  assert.equal(streams, 1);
+  await page.done();
+});
+
 test('the result is read: cost, gap, clearances, legs, as the interface has them', async () => {
   const id = await made(site.url, SMALL);
   const result = await ask(site.url, `/plans/${id}/result`);

@@ -17,14 +17,15 @@ export class Followed extends EventTarget {
   lostBecause = null;
   #opened = null;
   #closed = false;
-  #stop = null;
+  #aside;
+  #stream = null;
 
-  /** `status` and `scenario` where they are known already. */
-  constructor(id, status = null, scenario = null) {
+  /** `status` where it is known already; `aside` what is laid over another: all of those share a connection. */
+  constructor(id, { status = null, aside = false } = {}) {
     super();
     this.id = id;
     this.status = status;
-    this.scenario = scenario;
+    this.#aside = aside;
   }
 
   get ended() { return ['succeeded', 'failed', 'cancelled'].includes(this.status?.status); }
@@ -38,7 +39,13 @@ export class Followed extends EventTarget {
 
   close() {
     this.#closed = true;
-    this.#stop?.();
+    this.#stream?.stop();
+  }
+
+  /** It is aside no longer. */
+  forward() {
+    this.#aside = false;
+    this.#stream?.forward();
   }
 
   async cancel() {
@@ -49,19 +56,19 @@ export class Followed extends EventTarget {
   async #begin() {
     const [status, scenario] = await Promise.all([
       this.status ?? ask(`/plans/${this.id}`),
-      this.scenario ?? ask(`/plans/${this.id}/scenario`),
+      ask(`/plans/${this.id}/scenario`),
     ]);
     if (this.#closed) return this;
     Object.assign(this, { status, scenario });
     this.#tell('status');
     if (this.ended) await this.#finish();
     else {
-      this.#stop = follow(this.id, (kind, data) => this.#heard(kind, data), (connected, why) => {
+      this.#stream = follow(this.id, (kind, data) => this.#heard(kind, data), (connected, why) => {
         // What has ended lacks nothing but its history.
         if (this.ended && this.result) return;
         Object.assign(this, { connected, lostBecause: why ?? null });
         this.#tell('connection');
-      });
+      }, { aside: this.#aside });
     }
     return this;
   }
@@ -109,14 +116,14 @@ export class Followed extends EventTarget {
     const rate = (4 * MOST_INCUMBENTS) / Math.max(seconds, 1e-3);
     if (this.incumbents.length && rate <= RATE_HZ) return;
     let all = [];
-    this.#stop = follow(this.id, (kind, data) => {
+    this.#stream = follow(this.id, (kind, data) => {
       if (kind === 'status' && data.status === 'queued') all = [];
       else if (kind === 'incumbent') all = kept(all, data);
       else if (kind === 'end') {
         this.incumbents = all;
         this.#tell('history');
       }
-    }, () => {}, rate > MOST_HZ ? 0 : rate);
+    }, () => {}, { rateHz: rate > MOST_HZ ? 0 : rate, aside: this.#aside });
   }
 
   #tell(what) {

@@ -189,7 +189,7 @@ async function submit(warm) {
     const sent = draft.document;
     const status = await ask('/plans', { method: 'POST', body: { ...draft.document, planner } });
     if (warm && before) lay(before, `before: ${before.status.name ?? before.id.slice(0, 8)}`);
-    const plan = new Followed(status.id, status);
+    const plan = new Followed(status.id, { status });
     show(plan);
     planned = sent;
     by('stale').hidden = draft.document === sent;
@@ -213,6 +213,7 @@ function show(plan) {
   const before = stage.plan;
   if (before && before !== plan && !stage.compared.has(before.id)) before.close();
   if (plan && stage.compared.delete(plan.id)) plans.mark();
+  plan?.forward();
   stage.front(plan);
   again.offer(plan);
   plan?.addEventListener('news', ({ detail }) => plan === stage.plan && heard(plan, detail));
@@ -342,7 +343,7 @@ async function compare(id, yes, name) {
   }
   if (stage.compared.has(id)) return;
   if (stage.compared.size === OTHERS) throw new Said(`At most ${OTHERS} plans can be laid over one.`);
-  const plan = new Followed(id);
+  const plan = new Followed(id, { aside: true });
   plan.addEventListener('news', () => {
     stage.redraw();
     stage.drawSearch();

@@ -99,6 +99,32 @@ test('a plan that is left before it has opened is not followed', async () => {
   await page.done();
 });
 
+test('five running plans over a sixth leave the page a connection', async () => {
+  const other = await service('--workers', '6');
+  const ids = [];
+  for (let n = 0; n < 6; n += 1) {
+    const { id } = await ask(other.url, '/plans', { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify({ ...SMALL, name: `plan ${n}`, planner: { ...SMALL.planner, iterations: 100000 } }) });
+    ids.push(id);
+  }
+  const page = await open(chrome, `${other.url}#plan=${ids[0]}&with=${ids.slice(1).join('+')}`);
+  // Each has had its turn.
+  await page.waitForFunction(() => globalThis.noctule?.scene()?.routes.length === 6);
+  await page.click('#cancel');
+  await page.waitForSelector('.verdict');
+  assert.equal((await scene(page)).routes.length, 6);
+  // One of them comes to the front, with all that it has told.
+  await page.click('#tab-plans');
+  await page.click(`[data-key="open ${ids[3]}"]`);
+  await page.waitForFunction(() => document.getElementById('state').textContent === 'running');
+  const before_ = await page.evaluate(() => globalThis.noctule.history().points);
+  assert.ok(before_ > 0);
+  await page.waitForFunction((count) => globalThis.noctule.history().points > count + 20, before_);
+  await page.click('#cancel');
+  await page.waitForSelector('.verdict');
+  await page.done();
+  await other.stop();
+});
+
 test('a threat moves, and the plan is made anew from the route there was', async () => {
   const page = await open(chrome, `${site.url}#plan=${await made(site.url, SMALL)}`);
   await page.waitForSelector('.verdict');

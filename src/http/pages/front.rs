@@ -67,7 +67,7 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 37] = [
+static FILES: [File; 38] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
@@ -99,6 +99,7 @@ static FILES: [File; 37] = [
     file!("stream.js"),
     file!("strip.js"),
     file!("tools.js"),
+    file!("turns.js"),
     file!("volumes.js"),
     file!("way.js"),
     file!("words.js"),

@@ -18,9 +18,9 @@ export function frameOf(document, before = null) {
   const [first, second] = axes(document);
   const middle = [first, second].map((axis) => {
     const box = [document.area?.min?.[axis], document.area?.max?.[axis]].filter(Number.isFinite);
-    // Across the antimeridian the east is the smaller one.
-    if (axis === 'lon' && box[1] < box[0]) box[1] += 360;
     const ends = box.length === 2 ? box : [document.start?.[axis], document.target?.[axis]].filter(Number.isFinite);
+    // Across the antimeridian the east is the smaller one: of an area always, of start and target where they are nearer that way.
+    if (axis === 'lon' && (ends === box ? box[1] < box[0] : Math.abs(ends[1] - ends[0]) > 180)) ends[ends[0] < ends[1] ? 0 : 1] += 360;
     return ends.length ? ends.reduce((sum, value) => sum + value, 0) / ends.length : 0;
   });
   const geodetic = isGeodetic(document);
@@ -61,6 +61,8 @@ function tangentPlane(lat, lon) {
       found.lat += (p.y - at.y) / north;
       found.lon += (p.x - at.x) / east;
     }
+    // Beyond the antimeridian they count on from the other side.
+    found.lon -= 360 * Math.round(found.lon / 360);
     return found;
   };
   return { geodetic: true, to, from, step: () => ({ across: east, along: north }) };

@@ -84,9 +84,10 @@ const editor = new Editor(by('scenario'), draft, {
   addCorner: (index) => {
     const pointer = `/threats/${index}/vertices`;
     const { vertices } = draft.document.threats[index];
-    const [a, b] = [vertices[0], vertices.at(-1)];
+    const [a, b] = [vertices[0], vertices.at(-1)].map(stage.frame.to);
     const [first, second] = axes(draft.document);
-    draft.set(pointer, [...vertices, { [first]: (a[first] + b[first]) / 2, [second]: (a[second] + b[second]) / 2 }]);
+    const middle = written(draft.document, stage.frame.from({ x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, z: 0 }));
+    draft.set(pointer, [...vertices, { [first]: middle[first], [second]: middle[second] }]);
   },
   addPeak: () => {
     const { peaks = [] } = draft.document.terrain;

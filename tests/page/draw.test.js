@@ -114,6 +114,37 @@ test('a scenario is drawn by hand, taken back and done again', async () => {
   await page.done();
 });
 
+test('a scenario across the antimeridian is drawn and placed where it is', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  for (const [from, to] of [[179.99, -179.98], [-179.99, 179.98]]) {
+    const crossing = {
+      name: `from ${from}`, frame: 'wgs84', start: { lat: -16.5, lon: from, alt: 60 }, target: { lat: -16.5, lon: to, alt: 60 },
+      threats: [{ kind: 'cylinder', center: { lat: -16.5, lon: 180 }, radius: 200 }], altitude: { min: 20, max: 120 },
+    };
+    await page.setInputFiles('#file', { name: 'crossing.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(crossing)) });
+    await page.waitForFunction((name) => globalThis.noctule.document().name === name, crossing.name);
+    await drawn(page, 1);
+    await settled(page);
+    const [start, target] = await page.evaluate((ends) => ends.map(globalThis.noctule.toMetres), [crossing.start, crossing.target]);
+    const east = Math.sign(to - from) * -1;
+    // A degree has 106.7 km there.
+    assert.ok(Math.abs((target.x - start.x) * east - 3203) < 20, JSON.stringify([start, target]));
+    assert.ok(Math.abs(start.x + target.x) < 1 && Math.abs(start.y) < 1, 'the middle is between them');
+    for (const x of [-1500, 1500]) {
+      await page.click('[data-tool=target]');
+      const { x: left, y: top } = await groundPoint(page, x, 300);
+      await page.mouse.click(left, top);
+      const { lon } = (await document_(page)).target;
+      const wanted = x > 0 ? -179.981 : 179.981;
+      assert.ok(Math.abs(lon - wanted) < 0.012, `${lon} for ${x} m east`);
+      await page.click('#undo');
+      await settled(page);
+    }
+  }
+  await page.done();
+});
+
 test('faults stand where they are, in the words of the service', async () => {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);

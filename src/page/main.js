@@ -154,7 +154,6 @@ async function openFile(file) {
 
 let checking = null;
 const check = calmly(VALIDATE_MS, async () => {
-  checking?.abort();
   checking = new AbortController();
   const { signal } = checking;
   try {
@@ -162,7 +161,7 @@ const check = calmly(VALIDATE_MS, async () => {
     editor.mark([]);
     editor.show(scenario);
     by('plan').removeAttribute('aria-describedby');
-    await stage.sample(draft.document);
+    await stage.sample(scenario, signal);
   } catch (refusal) {
     if (refusal.problem?.errors) editor.mark(refusal.problem.errors);
     else if (refusal instanceof Refused && refusal.status !== 401) tell(refusal.message);
@@ -175,6 +174,8 @@ draft.addEventListener('change', () => {
   by('stale').hidden = !stage.plan || draft.document === planned;
   by('title').textContent = draft.document.name ?? '';
   document.title = draft.document.name ? `${draft.document.name} · Noctule` : 'Noctule';
+  // What is still on its way is about what was.
+  checking?.abort();
   check();
 });
 

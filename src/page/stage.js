@@ -25,6 +25,8 @@ export class Stage {
   #groundKey = null;
   #scenery = null;
   #sampled = null;
+  /** The dataset that the camera has been turned to. */
+  #framed = null;
   #threats = [];
   #trailed = null;
   #ways = new WeakMap();
@@ -42,6 +44,7 @@ export class Stage {
     this.draft.addEventListener('change', ({ detail }) => {
       if (detail.why === 'replaced') {
         this.frame = null;
+        this.#framed = null;
         this.#fresh = true;
         this.selected = null;
       }
@@ -109,16 +112,20 @@ export class Stage {
     return Number.isFinite(x) ? Math.max(0, z - this.ground.at(x, y)) : 0;
   }
 
-  /** What the service knows of a dataset's ground, so that it can be drawn. */
-  async sample(document) {
-    if (document.terrain?.kind !== 'dataset') return;
-    const key = JSON.stringify([document.terrain.name, document.area]);
-    if (this.#sampled?.key === key) return;
-    const ground = await ask(`/scenarios:ground?columns=${SAMPLES}&rows=${SAMPLES}`, { method: 'POST', body: document });
-    this.#sampled = { key, name: document.terrain.name, ground };
-    this.#groundKey = null;
-    this.#fresh = true;
-    this.redraw();
+  /** What the service knows of a dataset's ground, so that it can be drawn: under the area of a validated scenario, which the draft need not have. */
+  async sample(scenario, signal) {
+    const { terrain, area } = scenario;
+    if (terrain.kind !== 'dataset') return;
+    const key = JSON.stringify([terrain, area]);
+    if (this.#sampled?.key !== key) {
+      const ground = await ask(`/scenarios:ground?columns=${SAMPLES}&rows=${SAMPLES}`, { method: 'POST', body: scenario, signal });
+      this.#sampled = { key, name: terrain.name, ground };
+      this.#groundKey = null;
+      // Where the area follows what is dragged, the camera stays where it is.
+      this.#fresh ||= this.#framed !== terrain.name;
+      this.redraw();
+    }
+    this.#framed = terrain.name;
   }
 
   /** The plan's route in metres: its path, or its waypoints, or the best so far. */

@@ -5,7 +5,7 @@ import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
-import { SMALL, browser, FIRST, document_, drawn, drop, fill, groundPoint, open, scene, service, settled } from './support.js';
+import { SMALL, ask, browser, FIRST, document_, drawn, drop, fill, groundPoint, open, scene, service, settled } from './support.js';
 
 let site;
 let chrome;
@@ -187,6 +187,36 @@ test('the ground of a dataset is drawn as the service has it', async () => {
   assert.ok(ground > 300 && ground < start.alt + 1, `the ground at the start, ${ground} m, is below it`);
   await page.evaluate(() => { for (const part of document.querySelectorAll('details')) part.open = true; });
   assert.equal(await page.inputValue('[data-pointer="/terrain/name"]'), 'jacksboro', 'and can be chosen');
+  await page.done();
+  await mapped.stop();
+});
+
+test('the ground of a dataset follows what is moved where no area is given, and the camera stays', async () => {
+  const directory = fileURLToPath(new URL('../../scenarios', import.meta.url));
+  const mapped = await service('--terrain-dir', join(directory, 'terrain'));
+  const page = await open(chrome, mapped.url);
+  await drawn(page, FIRST);
+  const near = JSON.parse(readFileSync(join(directory, 'jacksboro-wgs84.json'), 'utf8'));
+  Object.assign(near, { area: undefined, threats: [], target: { lat: 36.585, lon: -84.31, alt: 800 } });
+  await page.setInputFiles('#file', { name: 'near.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(near)) });
+  await page.waitForFunction(() => globalThis.noctule.document().terrain.kind === 'dataset' && globalThis.noctule.scene().ground.columns === 201);
+  await settled(page);
+  const seen = () => page.evaluate((p) => globalThis.noctule.onScreen(globalThis.noctule.toMetres(p)), near.start);
+  const [whole, before_] = [await seen(), await page.evaluate(() => globalThis.noctule.groundAt(9000, 3000))];
+  await fill(page, '/target/lon', '-84.1845');
+  await page.waitForFunction((before) => globalThis.noctule.groundAt(9000, 3000) !== before, before_);
+  await settled(page);
+  const far = await document_(page);
+  const { area, elevations } = await ask(mapped.url, '/scenarios:ground?columns=101&rows=101', { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify(far) });
+  assert.ok(area.max.lon > far.target.lon);
+  const node = { lat: area.min.lat + (area.max.lat - area.min.lat) / 2, lon: area.min.lon + ((area.max.lon - area.min.lon) * 9) / 10 };
+  const ground = await page.evaluate((p) => {
+    const { x, y } = globalThis.noctule.toMetres(p);
+    return globalThis.noctule.groundAt(x, y);
+  }, node);
+  assert.ok(Math.abs(ground - elevations[50 * 101 + 90]) < 1, `${ground} m, the service has ${elevations[50 * 101 + 90]} m`);
+  const now = await seen();
+  assert.ok(Math.hypot(now.x - whole.x, now.y - whole.y) < 1, 'the camera has not turned');
   await page.done();
   await mapped.stop();
 });

@@ -207,9 +207,7 @@ impl Obstacles {
         }
         let count = ring.len();
         let first_body = self.bodies.len();
-        let twice_area: f64 = (0..count)
-            .map(|i| ring[i].coords.perp(&ring[(i + 1) % count].coords))
-            .sum();
+        let twice_area = ring::twice_area(&ring);
         for i in 0..count {
             let (a, b) = (ring[i], ring[(i + 1) % count]);
             self.bodies.push(Body {

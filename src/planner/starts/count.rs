@@ -90,7 +90,8 @@ fn with_one_raised(model: &Model, mut route: Vec<Point3>, waypoints: usize) -> V
     });
     let cheapest = ways.min_by(|(_, (one, _)), (_, (other, _))| one.rank(other));
     if let Some((leg, (_, points))) = cheapest {
-        route.splice(leg + 1..leg + 1, points);
+        let onward = route.split_off(leg + 1);
+        route.extend(points.into_iter().chain(onward));
     }
     filled(model, route, waypoints).0
 }

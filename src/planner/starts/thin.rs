@@ -131,7 +131,7 @@ impl<'c> Legs<'c> {
             if is_better {
                 legs = count;
             }
-            if count >= MOST_COARSE + 1 && is_near(&ways[legs][last].0) {
+            if count > MOST_COARSE && is_near(&ways[legs][last].0) {
                 break;
             }
         }
@@ -326,7 +326,7 @@ mod tests {
         scenario.start = Point3::new(200.0, 500.0, 100.0);
         scenario.target = Point3::new(800.0, 500.0, 100.0);
         scenario.threats = vec![radar(500.0, 500.0, 290.0)];
-        let places = 120;
+        let places: u32 = 120;
         let chain: Vec<Point3> = (0..=places)
             .map(|place| {
                 let angle = std::f64::consts::PI * (1.0 - f64::from(place) / f64::from(places));
@@ -337,7 +337,7 @@ mod tests {
                 )
             })
             .collect();
-        let all = (places * (places + 1) / 2) as u64;
+        let all = u64::from(places * (places + 1) / 2);
         for (waypoints, most) in [(20, 2 * all / 3), (1, 2 * all)] {
             scenario.planner.waypoints = waypoints;
             let model = Model::new(&scenario);

@@ -142,9 +142,7 @@ fn round(wall: &Wall, tolerance: f64, tell: &mut dyn FnMut(Line, f64)) {
 
 /// The ring whose corners are moved inwards so that its edges are by so many metres within the given ones.
 fn inset(ring: &[Point2], by: f64) -> Vec<Point2> {
-    let twice_area: f64 = ring::edges(ring)
-        .map(|(a, b)| (a - ring[0]).perp(&(b - ring[0])))
-        .sum();
+    let turning = ring::twice_area(ring).signum();
     let count = ring.len();
     (0..count)
         .map(|i| {
@@ -153,7 +151,7 @@ fn inset(ring: &[Point2], by: f64) -> Vec<Point2> {
                 ring[i],
                 ring[(i + 1) % count],
             ];
-            let left = |way: Vector2| Vector2::new(-way.y, way.x) * twice_area.signum();
+            let left = |way: Vector2| Vector2::new(-way.y, way.x) * turning;
             let [one, other] = [at - before, after - at].map(|way| left(way.normalize()));
             let sum = one + other;
             // A spike has no inside to speak of.

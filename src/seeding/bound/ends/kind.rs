@@ -329,6 +329,23 @@ mod tests {
     use super::super::super::around;
     use super::*;
 
+    /// The start, 100 m below the middle of the band, at 1 a metre off it, for climbs of 45 degrees.
+    fn end<'a>(prices: &'a Prices, walls: &'a [Wall], radii: &'a [Option<f64>]) -> End<'a> {
+        End {
+            which: 0,
+            from: prices.ends[0].xy(),
+            to: prices.ends[1].xy(),
+            height: 100.0,
+            weight: 1.0,
+            steepest: 1.0,
+            prices,
+            walls,
+            radii,
+            slack: 0.0,
+            stop: &|| false,
+        }
+    }
+
     /// From (200, 100), 100 m below the middle of the band, at 0.5 a metre and 1 a metre off the middle.
     fn check(examine: impl Fn(&End)) {
         let scenario = scenario(
@@ -337,19 +354,7 @@ mod tests {
         let prices = Prices::of(&scenario);
         let walls = around::walls(&scenario, &prices);
         let radii: Vec<_> = walls.iter().map(|wall| Some(wall.wide)).collect();
-        examine(&End {
-            which: 0,
-            from: prices.ends[0].xy(),
-            to: prices.ends[1].xy(),
-            height: 100.0,
-            weight: 1.0,
-            steepest: 1.0,
-            prices: &prices,
-            walls: &walls,
-            radii: &radii,
-            slack: 0.0,
-            stop: &|| false,
-        });
+        examine(&end(&prices, &walls, &radii));
     }
 
     #[test]
@@ -373,19 +378,7 @@ mod tests {
         );
         let prices = Prices::of(&scenario);
         let walls = around::walls(&scenario, &prices);
-        let end = End {
-            which: 0,
-            from: prices.ends[0].xy(),
-            to: prices.ends[1].xy(),
-            height: 100.0,
-            weight: 1.0,
-            steepest: 1.0,
-            prices: &prices,
-            walls: &walls,
-            radii: &[None],
-            slack: 0.0,
-            stop: &|| false,
-        };
+        let end = end(&prices, &walls, &[None]);
         let to = |length: f64| end.from - Vector2::new(0.0, length);
         let exposed = |length: f64| end.exposed(to(length), 0.0)[0];
         assert!(exposed(30.0) < exposed(60.0) && exposed(60.0) > 0.0);

@@ -1,14 +1,14 @@
 //! The edges of the plan view: ticks, what they count, the scale bar and north.
 
-use super::Drawing;
 use super::canvas::{Canvas, Font, Spot, polyline, ring};
 use super::palette::{INK, MUTED};
 use super::scale::{MapScale, Steps};
+use crate::export::Delivery;
 use crate::geometry::Point2;
 use crate::scenario::Frame;
 
 /// Ticks, their labels, the scale bar and north.
-pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale) {
+pub(super) fn draw(canvas: &mut Canvas, delivery: &Delivery, map: &MapScale) {
     let (frame, view) = (&map.frame, &map.view);
     let steps = Steps::of((view.max.x - view.min.x).max(view.max.y - view.min.y), 9.0);
     let line = format!("stroke=\"{INK}\"");
@@ -26,7 +26,7 @@ pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale) {
         canvas.text(place, &font.anchor("end"), &steps.label(y));
     }
     let title = Font::new(11.0, MUTED).anchor("middle");
-    let (east_title, north_title) = titles(&drawing.delivery.scenario.frame);
+    let (east_title, north_title) = titles(&delivery.scenario.frame);
     canvas.turned_text(
         (16.0, frame.top + frame.height / 2.0),
         -90.0,

@@ -2,28 +2,29 @@
 
 use super::canvas::{Area, Canvas, Font};
 use super::palette::{BROKEN, INK, MUTED};
-use super::{Drawing, LEFT, RIGHT, WIDTH, figure, metres};
+use super::{LEFT, RIGHT, WIDTH, figure, metres, name};
+use crate::export::Delivery;
 
 /// Pixels from the top of the sheet to the plan's frame.
-pub(super) fn height(drawing: &Drawing) -> f64 {
-    if drawing.delivery.result.feasible {
+pub(super) fn height(delivery: &Delivery) -> f64 {
+    if delivery.result.feasible {
         78.0
     } else {
         114.0
     }
 }
 
-pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing) {
+pub(super) fn draw(canvas: &mut Canvas, delivery: &Delivery) {
     let width = WIDTH - LEFT - RIGHT;
     let title = Font::new(20.0, INK).bold();
-    canvas.text((LEFT, 36.0), &title, &title.fit(drawing.name(), width));
+    canvas.text((LEFT, 36.0), &title, &title.fit(name(delivery), width));
     let facts = Font::new(13.0, MUTED);
     canvas.text(
         (LEFT, 58.0),
         &facts,
-        &facts.fit(&facts_line(drawing), width),
+        &facts.fit(&facts_line(delivery), width),
     );
-    if !drawing.delivery.result.feasible {
+    if !delivery.result.feasible {
         let banner = Area {
             left: LEFT,
             top: 72.0,
@@ -32,14 +33,14 @@ pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing) {
         };
         canvas.rect(&banner, &format!("rx=\"3\" fill=\"{BROKEN}\""));
         let font = Font::new(13.0, "#fff").bold();
-        let words = font.fit(&verdict(drawing), width - 24.0);
+        let words = font.fit(&verdict(delivery), width - 24.0);
         canvas.text((LEFT + 12.0, 90.5), &font, &words);
     }
 }
 
 /// Such as `tms-sba, seed 4 · cost 471.2 · length 921 m · least clearance 3.1 m (threat 2)`.
-fn facts_line(drawing: &Drawing) -> String {
-    let result = &drawing.delivery.result;
+fn facts_line(delivery: &Delivery) -> String {
+    let result = &delivery.result;
     let length = match &result.path {
         Some(path) => path.length,
         None => result.legs.iter().map(|leg| leg.length).sum(),
@@ -48,13 +49,13 @@ fn facts_line(drawing: &Drawing) -> String {
         format!("{}, seed {}", result.algorithm, result.seed),
         format!("cost {}", figure(result.cost.total)),
         format!("length {}", metres(length)),
-        clearance(drawing),
+        clearance(delivery),
     ]
     .join(" \u{b7} ")
 }
 
-fn clearance(drawing: &Drawing) -> String {
-    let checks = &drawing.delivery.result.checks;
+fn clearance(delivery: &Delivery) -> String {
+    let checks = &delivery.result.checks;
     let measures = checks.path.as_ref().unwrap_or(&checks.waypoints);
     if measures.clearance.is_empty() {
         return "no threats".to_owned();
@@ -76,8 +77,8 @@ fn clearance(drawing: &Drawing) -> String {
 }
 
 /// What is wrong with an infeasible route.
-fn verdict(drawing: &Drawing) -> String {
-    let violations = &drawing.delivery.result.checks.violations;
+fn verdict(delivery: &Delivery) -> String {
+    let violations = &delivery.result.checks.violations;
     let Some(first) = violations.first() else {
         return "NOT FEASIBLE".to_owned();
     };

@@ -40,15 +40,9 @@ const PROFILE_FOOT: f64 = 44.0;
 /// beside it.
 const ASPECT: (f64, f64) = (0.66, 1.05);
 
-/// What is drawn.
-struct Drawing<'d> {
-    delivery: &'d Delivery,
-}
-
 /// Draw a plan.
 pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
-    let drawing = Drawing { delivery };
-    let map = drawing.map(header::height(&drawing));
+    let map = map(delivery, header::height(delivery));
     let profile_frame = Area {
         left: LEFT,
         top: map.frame.bottom() + PLAN_FOOT,
@@ -62,66 +56,63 @@ pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
         width: WIDTH,
         height: profile_frame.bottom() + PROFILE_FOOT,
     };
-    canvas.title(drawing.name());
+    canvas.title(name(delivery));
     canvas.rect(&everything, "fill=\"#fff\"");
-    header::draw(&mut canvas, &drawing);
-    let relief = Relief::of(&drawing.delivery.scenario.terrain, &map);
-    plan_view::draw(&mut canvas, &drawing, &relief, &map);
-    sidebar::draw(&mut canvas, &drawing, &relief, &map.frame);
-    profile::draw(&mut canvas, &drawing, profile_frame);
+    header::draw(&mut canvas, delivery);
+    let relief = Relief::of(&delivery.scenario.terrain, &map);
+    plan_view::draw(&mut canvas, delivery, &relief, &map);
+    sidebar::draw(&mut canvas, delivery, &relief, &map.frame);
+    profile::draw(&mut canvas, delivery, profile_frame);
     canvas.finish()
 }
 
-impl Drawing<'_> {
-    fn name(&self) -> &str {
-        let name = self.delivery.scenario.name.as_deref();
-        name.unwrap_or("unnamed scenario")
-    }
+/// What the sheet is titled.
+fn name(delivery: &Delivery) -> &str {
+    let name = delivery.scenario.name.as_deref();
+    name.unwrap_or("unnamed scenario")
+}
 
-    fn route_color(&self) -> &'static str {
-        if self.delivery.result.feasible {
-            palette::ROUTE
-        } else {
-            palette::BROKEN
-        }
+/// Of legs that can be flown, or of a route that breaks something.
+fn route_color(delivery: &Delivery) -> &'static str {
+    if delivery.result.feasible {
+        palette::ROUTE
+    } else {
+        palette::BROKEN
     }
+}
 
-    /// Indices of what breaks a constraint: of each `leg` or of each `waypoint`.
-    fn broken(&self, place: &str) -> Vec<usize> {
-        let places = self.delivery.result.checks.violations.iter();
-        let mut indices: Vec<usize> = places
-            .filter_map(|violation| violation.place.strip_prefix(place)?.trim().parse().ok())
-            .collect();
-        indices.dedup();
-        indices
-    }
+/// Indices of what breaks a constraint: of each `leg` or of each `waypoint`.
+fn broken(delivery: &Delivery, place: &str) -> Vec<usize> {
+    let places = delivery.result.checks.violations.iter();
+    let mut indices: Vec<usize> = places
+        .filter_map(|violation| violation.place.strip_prefix(place)?.trim().parse().ok())
+        .collect();
+    indices.dedup();
+    indices
+}
 
-    /// The area and the route with a little room, in a frame of a pleasant shape.
-    fn map(&self, top: f64) -> MapScale {
-        let ends = [
-            self.delivery.scenario.area.min,
-            self.delivery.scenario.area.max,
-        ];
-        let route = self.delivery.waypoints.iter().map(Point3::xy);
-        let shown = Rect::around(ends.into_iter().chain(route)).expect("an area has corners");
-        let (width, height) = (shown.max.x - shown.min.x, shown.max.y - shown.min.y);
-        let shown = shown.grown((0.02 * width.max(height)).max(0.5));
-        let (width, height) = (shown.max.x - shown.min.x, shown.max.y - shown.min.y);
-        let aspect = (height / width).clamp(ASPECT.0, ASPECT.1);
-        let (wider, taller) = ((height / aspect).max(width), (width * aspect).max(height));
-        let margin = nalgebra::Vector2::new(wider - width, taller - height) / 2.0;
-        MapScale {
-            view: Rect {
-                min: shown.min - margin,
-                max: shown.max + margin,
-            },
-            frame: Area {
-                left: LEFT,
-                top,
-                width: PLAN_WIDTH,
-                height: PLAN_WIDTH * taller / wider,
-            },
-        }
+/// The area and the route with a little room, in a frame of a pleasant shape.
+fn map(delivery: &Delivery, top: f64) -> MapScale {
+    let ends = [delivery.scenario.area.min, delivery.scenario.area.max];
+    let route = delivery.waypoints.iter().map(Point3::xy);
+    let shown = Rect::around(ends.into_iter().chain(route)).expect("an area has corners");
+    let (width, height) = (shown.max.x - shown.min.x, shown.max.y - shown.min.y);
+    let shown = shown.grown((0.02 * width.max(height)).max(0.5));
+    let (width, height) = (shown.max.x - shown.min.x, shown.max.y - shown.min.y);
+    let aspect = (height / width).clamp(ASPECT.0, ASPECT.1);
+    let (wider, taller) = ((height / aspect).max(width), (width * aspect).max(height));
+    let margin = nalgebra::Vector2::new(wider - width, taller - height) / 2.0;
+    MapScale {
+        view: Rect {
+            min: shown.min - margin,
+            max: shown.max + margin,
+        },
+        frame: Area {
+            left: LEFT,
+            top,
+            width: PLAN_WIDTH,
+            height: PLAN_WIDTH * taller / wider,
+        },
     }
 }
 

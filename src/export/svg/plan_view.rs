@@ -1,12 +1,13 @@
 //! The route seen from above, north up, among ground and threats.
 
-use super::Drawing;
 use super::axes;
 use super::canvas::{Area, Canvas, Font, Spot, polyline, ring};
 use super::labels::Labels;
 use super::palette::{BROKEN, INK, RULE, THREAT};
 use super::relief::Relief;
 use super::scale::MapScale;
+use super::{broken, route_color};
+use crate::export::Delivery;
 use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};
 
@@ -16,33 +17,30 @@ const CASING: &str =
 /// Style of every line of the route.
 const LINE: &str = "fill=\"none\" stroke-linejoin=\"round\" stroke-linecap=\"round\"";
 
-pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, relief: &Relief, map: &MapScale) {
+pub(super) fn draw(canvas: &mut Canvas, delivery: &Delivery, relief: &Relief, map: &MapScale) {
     let frame = &map.frame;
     canvas.group("clipPath", "id=\"plan\"", |canvas| canvas.rect(frame, ""));
     canvas.group("g", "clip-path=\"url(#plan)\"", |canvas| {
         relief.draw(canvas, frame);
-        outside(canvas, drawing, map);
-        threats(canvas, &drawing.delivery.scenario.threats, map);
-        route(canvas, drawing, map);
+        outside(canvas, delivery, map);
+        threats(canvas, &delivery.scenario.threats, map);
+        route(canvas, delivery, map);
     });
     canvas.rect(frame, &format!("fill=\"none\" stroke=\"{INK}\""));
-    axes::draw(canvas, drawing, map);
+    axes::draw(canvas, delivery, map);
 
     let mut labels = Labels::within(*frame);
-    for line in [
-        Some(&drawing.delivery.waypoints),
-        drawing.delivery.path.as_ref(),
-    ]
-    .into_iter()
-    .flatten()
+    for line in [Some(&delivery.waypoints), delivery.path.as_ref()]
+        .into_iter()
+        .flatten()
     {
         labels.reserve_line(&spots(line, map));
     }
-    let [nw, ne, se, sw] = area_corners(drawing, map);
+    let [nw, ne, se, sw] = area_corners(delivery, map);
     labels.reserve_line(&[nw, ne, se, sw, nw]);
-    end_names(canvas, drawing, map, &mut labels);
-    threat_names(canvas, &drawing.delivery.scenario.threats, map, &mut labels);
-    waypoint_numbers(canvas, drawing, map, &mut labels);
+    end_names(canvas, delivery, map, &mut labels);
+    threat_names(canvas, &delivery.scenario.threats, map, &mut labels);
+    waypoint_numbers(canvas, delivery, map, &mut labels);
     relief.label(canvas, &mut labels);
 }
 
@@ -51,7 +49,7 @@ fn spots(points: &[Point3], map: &MapScale) -> Vec<Spot> {
 }
 
 /// The area's edge, and a veil over what waypoints may not reach.
-fn outside(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale) {
+fn outside(canvas: &mut Canvas, delivery: &Delivery, map: &MapScale) {
     let frame = &map.frame;
     let sheet = [
         (frame.left, frame.top),
@@ -59,7 +57,7 @@ fn outside(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale) {
         (frame.right(), frame.bottom()),
         (frame.left, frame.bottom()),
     ];
-    let inner = ring(&area_corners(drawing, map));
+    let inner = ring(&area_corners(delivery, map));
     canvas.path(
         &format!("{}{inner}", ring(&sheet)),
         "fill=\"#fff\" fill-opacity=\"0.6\" fill-rule=\"evenodd\"",
@@ -67,8 +65,8 @@ fn outside(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale) {
     canvas.path(&inner, AREA_EDGE);
 }
 
-fn area_corners(drawing: &Drawing, map: &MapScale) -> [Spot; 4] {
-    let area = &drawing.delivery.scenario.area;
+fn area_corners(delivery: &Delivery, map: &MapScale) -> [Spot; 4] {
+    let area = &delivery.scenario.area;
     let (west, north) = map.spot(Point2::new(area.min.x, area.max.y));
     let (east, south) = map.spot(Point2::new(area.max.x, area.min.y));
     [(west, north), (east, north), (east, south), (west, south)]
@@ -156,35 +154,35 @@ fn outline(vertices: &[Point2], map: &MapScale) -> String {
     ring(&spots)
 }
 
-fn route(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale) {
-    let waypoints = spots(&drawing.delivery.waypoints, map);
-    if let Some(path) = &drawing.delivery.path {
+fn route(canvas: &mut Canvas, delivery: &Delivery, map: &MapScale) {
+    let waypoints = spots(&delivery.waypoints, map);
+    if let Some(path) = &delivery.path {
         let data = polyline(&thinned(&spots(path, map)));
         canvas.path(&data, &format!("{CASING} stroke-width=\"6\""));
         canvas.path(
             &data,
             &format!(
                 "{LINE} stroke=\"{}\" stroke-width=\"3\"",
-                drawing.route_color()
+                route_color(delivery)
             ),
         );
         let straight = polyline(&waypoints);
         canvas.path(&straight, STRAIGHT);
     } else {
         let straight = polyline(&waypoints);
-        let color = drawing.route_color();
+        let color = route_color(delivery);
         canvas.path(&straight, &format!("{CASING} stroke-width=\"5\""));
         canvas.path(
             &straight,
             &format!("{LINE} stroke=\"{color}\" stroke-width=\"2\""),
         );
-        for leg in drawing.broken("leg") {
+        for leg in broken(delivery, "leg") {
             if let Some(ends) = waypoints.get(leg..leg + 2) {
                 canvas.path(&polyline(ends), BROKEN_LEG);
             }
         }
     }
-    let broken = drawing.broken("waypoint");
+    let broken = broken(delivery, "waypoint");
     for (idx, spot) in waypoints.iter().enumerate() {
         if broken.contains(&idx) {
             canvas.circle(
@@ -249,11 +247,11 @@ pub(super) fn thinned(line: &[Spot]) -> Vec<Spot> {
     kept
 }
 
-fn end_names(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale, labels: &mut Labels) {
+fn end_names(canvas: &mut Canvas, delivery: &Delivery, map: &MapScale, labels: &mut Labels) {
     let font = Font::new(12.0, INK).bold().halo();
     let ends = [
-        (drawing.delivery.scenario.start, "start"),
-        (drawing.delivery.scenario.target, "target"),
+        (delivery.scenario.start, "start"),
+        (delivery.scenario.target, "target"),
     ];
     for (point, _) in ends {
         labels.reserve(Area::about(map.spot(point.xy()), (16.0, 16.0)));
@@ -264,11 +262,11 @@ fn end_names(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale, labels: &mu
     }
 }
 
-fn waypoint_numbers(canvas: &mut Canvas, drawing: &Drawing, map: &MapScale, labels: &mut Labels) {
+fn waypoint_numbers(canvas: &mut Canvas, delivery: &Delivery, map: &MapScale, labels: &mut Labels) {
     let calm = Font::new(10.0, INK).halo();
     let alarmed = Font::new(11.0, BROKEN).bold().halo();
-    let broken = drawing.broken("leg");
-    let waypoints = &drawing.delivery.waypoints;
+    let broken = broken(delivery, "leg");
+    let waypoints = &delivery.waypoints;
     let inner = waypoints.len() - 1;
     for (idx, point) in waypoints.iter().enumerate().take(inner).skip(1) {
         let font = if broken.contains(&idx) {

@@ -1,10 +1,11 @@
 //! Heights along the route: ground, allowed band, threats on the way, and what is flown.
 
-use super::Drawing;
 use super::canvas::{Area, Canvas, Font, Spot, num, polyline, ring};
 use super::palette::{INK, MUTED, SOIL};
 use super::plan_view::{BROKEN_LEG, grid_line, start, target, thinned, waypoint};
 use super::scale::Steps;
+use super::{broken, route_color};
+use crate::export::Delivery;
 use crate::geometry::{Point2, Point3};
 use crate::threat::Threat;
 
@@ -44,24 +45,24 @@ impl Scale {
     }
 }
 
-pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, frame: Area) {
-    let course = drawing.delivery.course();
+pub(super) fn draw(canvas: &mut Canvas, delivery: &Delivery, frame: Area) {
+    let course = delivery.course();
     let ways = ways(course);
-    let stations = stations(drawing, course, &ways);
+    let stations = stations(delivery, course, &ways);
     let scale = Scale {
         frame,
         way: ways.last().copied().unwrap_or_default().max(1e-3),
-        heights: heights(drawing, &stations),
+        heights: heights(delivery, &stations),
     };
     canvas.rect(&frame, "fill=\"#fafbfc\"");
-    axes(canvas, &scale, drawing);
+    axes(canvas, &scale, delivery);
     canvas.group("clipPath", "id=\"profile\"", |canvas| {
         canvas.rect(&frame, "");
     });
     canvas.group("g", "clip-path=\"url(#profile)\"", |canvas| {
-        band(canvas, drawing, &stations, &scale);
+        band(canvas, delivery, &stations, &scale);
         canvas.group("g", CROSSED, |canvas| {
-            for threat in &drawing.delivery.scenario.threats {
+            for threat in &delivery.scenario.threats {
                 crossings(canvas, threat, &stations, &scale);
             }
         });
@@ -72,7 +73,7 @@ pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, frame: Area) {
         .zip(&ways)
         .map(|(point, way)| scale.spot(*way, point.z))
         .collect();
-    flown(canvas, drawing, &spots, &stations, &scale);
+    flown(canvas, delivery, &spots, &stations, &scale);
     canvas.rect(&frame, &format!("fill=\"none\" stroke=\"{INK}\""));
 }
 
@@ -87,7 +88,7 @@ fn ways(course: &[Point3]) -> Vec<f64> {
     ways
 }
 
-fn stations(drawing: &Drawing, course: &[Point3], ways: &[f64]) -> Vec<Station> {
+fn stations(delivery: &Delivery, course: &[Point3], ways: &[f64]) -> Vec<Station> {
     let all = ways.last().copied().unwrap_or_default();
     let mut leg = 0;
     let station = |idx: usize| {
@@ -105,21 +106,20 @@ fn stations(drawing: &Drawing, course: &[Point3], ways: &[f64]) -> Vec<Station> 
         Station {
             way,
             at,
-            ground: drawing.delivery.scenario.terrain.elevation(at),
+            ground: delivery.scenario.terrain.elevation(at),
         }
     };
     (0..STATIONS).map(station).collect()
 }
 
 /// Room for ground and route, and for the band unless it would flatten both.
-fn heights(drawing: &Drawing, stations: &[Station]) -> (f64, f64) {
-    let band = drawing.delivery.scenario.altitude;
+fn heights(delivery: &Delivery, stations: &[Station]) -> (f64, f64) {
+    let band = delivery.scenario.altitude;
     let ground = stations.iter().map(|station| station.ground);
-    let route = drawing
-        .delivery
+    let route = delivery
         .course()
         .iter()
-        .chain(&drawing.delivery.waypoints)
+        .chain(&delivery.waypoints)
         .map(|point| point.z);
     let (min, max) = ground
         .chain(route)
@@ -136,7 +136,7 @@ fn heights(drawing: &Drawing, stations: &[Station]) -> (f64, f64) {
     (min - 0.10 * span, top + 0.06 * span)
 }
 
-fn axes(canvas: &mut Canvas, scale: &Scale, drawing: &Drawing) {
+fn axes(canvas: &mut Canvas, scale: &Scale, delivery: &Delivery) {
     let frame = &scale.frame;
     let font = Font::new(11.0, MUTED);
     let steps = Steps::of(scale.heights.1 - scale.heights.0, 6.0);
@@ -157,7 +157,7 @@ fn axes(canvas: &mut Canvas, scale: &Scale, drawing: &Drawing) {
     let title = font.anchor("middle");
     let middle = frame.top + frame.height / 2.0;
     canvas.turned_text((16.0, middle), -90.0, &title, "height, m");
-    let along = if drawing.delivery.path.is_some() {
+    let along = if delivery.path.is_some() {
         "path"
     } else {
         "waypoints"
@@ -177,8 +177,8 @@ pub(super) const ALLOWED: &str = "fill=\"#8fb8d8\" fill-opacity=\"0.28\"";
 /// Style of their edges.
 pub(super) const ALLOWED_EDGE: &str = "fill=\"none\" stroke=\"#8fb8d8\" stroke-dasharray=\"5 3\"";
 
-fn band(canvas: &mut Canvas, drawing: &Drawing, stations: &[Station], scale: &Scale) {
-    let band = drawing.delivery.scenario.altitude;
+fn band(canvas: &mut Canvas, delivery: &Delivery, stations: &[Station], scale: &Scale) {
+    let band = delivery.scenario.altitude;
     let [floor, ceiling] = [band.min, band.max].map(|above| over_ground(stations, above, scale));
     let allowed: Vec<Spot> = floor.iter().chain(ceiling.iter().rev()).copied().collect();
     canvas.path(&ring(&allowed), ALLOWED);
@@ -241,25 +241,25 @@ fn crossings(canvas: &mut Canvas, threat: &Threat, stations: &[Station], scale: 
 
 fn flown(
     canvas: &mut Canvas,
-    drawing: &Drawing,
+    delivery: &Delivery,
     course: &[Spot],
     stations: &[Station],
     scale: &Scale,
 ) {
-    let color = drawing.route_color();
+    let color = route_color(delivery);
     let line = "fill=\"none\" stroke-linejoin=\"round\" stroke-linecap=\"round\"";
     canvas.path(
         &polyline(&thinned(course)),
         &format!("{line} stroke=\"{color}\" stroke-width=\"2.5\""),
     );
-    let marks: Vec<Spot> = if drawing.delivery.path.is_some() {
-        let ways = abreast(&drawing.delivery.waypoints, stations);
-        let points = drawing.delivery.waypoints.iter().zip(ways);
+    let marks: Vec<Spot> = if delivery.path.is_some() {
+        let ways = abreast(&delivery.waypoints, stations);
+        let points = delivery.waypoints.iter().zip(ways);
         points
             .map(|(point, way)| scale.spot(way, point.z))
             .collect()
     } else {
-        for leg in drawing.broken("leg") {
+        for leg in broken(delivery, "leg") {
             if let Some(ends) = course.get(leg..leg + 2) {
                 canvas.path(&polyline(ends), BROKEN_LEG);
             }

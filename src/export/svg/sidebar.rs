@@ -7,7 +7,8 @@ use super::plan_view::{
 };
 use super::profile::{ALLOWED, ALLOWED_EDGE};
 use super::relief::Relief;
-use super::{Drawing, RIGHT, WIDTH, figure, metres};
+use super::{RIGHT, WIDTH, figure, metres};
+use crate::export::Delivery;
 
 /// Between the plan's frame and this.
 const GAP: f64 = 22.0;
@@ -15,43 +16,39 @@ const GAP: f64 = 22.0;
 const LEGEND_LINE: f64 = 19.0;
 const FIGURE_LINE: f64 = 17.0;
 
-pub(super) fn draw(canvas: &mut Canvas, drawing: &Drawing, relief: &Relief, plan: &Area) {
+pub(super) fn draw(canvas: &mut Canvas, delivery: &Delivery, relief: &Relief, plan: &Area) {
     let column = Area {
         left: plan.right() + GAP,
         width: WIDTH - RIGHT - plan.right() - GAP,
         ..*plan
     };
     let mut y = column.top + 8.0;
-    for (words, mark) in legend(drawing) {
+    for (words, mark) in legend(delivery) {
         mark(canvas, (column.left + 13.0, y));
         let place = (column.left + 34.0, y + 4.0);
         canvas.text(place, &Font::new(12.0, INK), words);
         y += LEGEND_LINE;
     }
     y = heights(canvas, relief, &column, y + 6.0);
-    figures(canvas, drawing, &column, y + 22.0);
+    figures(canvas, delivery, &column, y + 22.0);
 }
 
 type Mark = fn(&mut Canvas, Spot);
 
 /// What occurs in the drawing.
-fn legend(drawing: &Drawing) -> Vec<(&'static str, Mark)> {
-    let threats = &drawing.delivery.scenario.threats;
-    let feasible = drawing.delivery.result.feasible;
+fn legend(delivery: &Delivery) -> Vec<(&'static str, Mark)> {
+    let threats = &delivery.scenario.threats;
+    let feasible = delivery.result.feasible;
     let rows: [(bool, &'static str, Mark); 11] = [
         (true, "start", start),
         (true, "target", target),
-        (
-            drawing.delivery.path.is_some(),
-            "path flown",
-            |canvas, at| {
-                across(
-                    canvas,
-                    at,
-                    &format!("stroke=\"{ROUTE}\" stroke-width=\"3\""),
-                );
-            },
-        ),
+        (delivery.path.is_some(), "path flown", |canvas, at| {
+            across(
+                canvas,
+                at,
+                &format!("stroke=\"{ROUTE}\" stroke-width=\"3\""),
+            );
+        }),
         (feasible, "waypoints and legs", |canvas, at| {
             across(canvas, at, STRAIGHT);
             waypoint(canvas, at);
@@ -163,8 +160,8 @@ fn heights(canvas: &mut Canvas, relief: &Relief, column: &Area, y: f64) -> f64 {
     foot + 15.0
 }
 
-fn figures(canvas: &mut Canvas, drawing: &Drawing, column: &Area, top: f64) {
-    let result = &drawing.delivery.result;
+fn figures(canvas: &mut Canvas, delivery: &Delivery, column: &Area, top: f64) {
+    let result = &delivery.result;
     let legs = &result.checks.waypoints;
     let measures = result.checks.path.as_ref().unwrap_or(legs);
     let gap = result.bound.gap.map(|gap| format!("{:.1} %", 100.0 * gap));

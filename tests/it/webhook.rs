@@ -153,23 +153,22 @@ async fn submit(api: &Api, url: &str) -> Answer {
     api.send(Method::POST, "/plans", &headers, body).await
 }
 
+/// The address of a plan whose end is told to `url`.
+async fn accepted(api: &Api, url: &str) -> String {
+    submit(api, url).await.header("location").to_owned()
+}
+
 #[tokio::test]
 async fn an_end_is_told_once_and_signed() {
     let api = Api::with_webhooks(settings(true));
     let mut receiver = Receiver::new(&[]).await;
-    let plan = submit(&api, &receiver.url)
-        .await
-        .header("location")
-        .to_owned();
+    let plan = accepted(&api, &receiver.url).await;
     let _sender = sender(&api, true);
     run::complete(&*api.store, Vec::new()).await;
     let told = check(&receiver.next().await, &plan);
     assert_eq!(told, api.get(&plan).await.json());
     // Another one's end comes after it, and nothing between.
-    let other = submit(&api, &receiver.url)
-        .await
-        .header("location")
-        .to_owned();
+    let other = accepted(&api, &receiver.url).await;
     api.send(Method::POST, &format!("{other}/cancel"), &[], "")
         .await;
     let told = check(&receiver.next().await, &other);
@@ -197,10 +196,7 @@ async fn an_address_of_a_host_and_a_query_is_called() {
 async fn what_is_not_heard_is_told_again_and_redirects_lead_nowhere() {
     let api = Api::with_webhooks(settings(true));
     let mut receiver = Receiver::new(&[307]).await;
-    let plan = submit(&api, &receiver.url)
-        .await
-        .header("location")
-        .to_owned();
+    let plan = accepted(&api, &receiver.url).await;
     run::complete(&*api.store, Vec::new()).await;
     let _sender = sender(&api, true);
     let first = receiver.next().await;
@@ -253,10 +249,7 @@ async fn what_cannot_be_written_down_at_once_is_told_no_more_often() {
 async fn an_end_whose_telling_broke_is_told_again() {
     let api = Api::with_webhooks(settings(true));
     let mut receiver = Receiver::new(&[]).await;
-    let plan = submit(&api, &receiver.url)
-        .await
-        .header("location")
-        .to_owned();
+    let plan = accepted(&api, &receiver.url).await;
     run::complete(&*api.store, Vec::new()).await;
     let broken = Arc::new(FaultyStore::that_panics(api.store.clone()));
     let _sender = Sender::start(broken, settings(true), wall_clock());

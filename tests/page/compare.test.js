@@ -166,13 +166,19 @@ test('the list has states, a filter and pages, and lets go', async () => {
   await other.stop();
 });
 
-test('a running plan that is removed is not shown any longer', async () => {
+/** A page whose plan runs for long, its first route drawn. */
+async function running() {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);
   await fill(page, '/planner/iterations', '100000');
   await page.click('#plan');
   await page.waitForSelector('#cancel:not([hidden])');
   await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 1);
+  return page;
+}
+
+test('a running plan that is removed is not shown any longer', async () => {
+  const page = await running();
   await fill(page, '/planner/iterations', '50');
   await page.waitForSelector('#stale:not([hidden])');
   await page.click('#tab-plans');
@@ -187,12 +193,7 @@ test('a running plan that is removed is not shown any longer', async () => {
 });
 
 test('a running plan that is removed elsewhere is told to have ended', async () => {
-  const page = await open(chrome, site.url);
-  await drawn(page, FIRST);
-  await fill(page, '/planner/iterations', '100000');
-  await page.click('#plan');
-  await page.waitForSelector('#cancel:not([hidden])');
-  await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 1);
+  const page = await running();
   const id = await page.evaluate(() => new URLSearchParams(location.hash.slice(1)).get('plan'));
   await fetch(`${site.url}/plans/${id}`, { method: 'DELETE' });
   await page.waitForSelector('.verdict.bad');

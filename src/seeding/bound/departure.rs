@@ -50,7 +50,7 @@ impl Departure {
                 // It may be passed, but not at once.
                 let stay = place.end.map_or(0.0, |end| wall.stays[end].min(between));
                 if !spent.contains(&idx) {
-                    toll += prices.exposure * ramp(wall.influence - away, 1.0, stay.max(0.0));
+                    toll += prices.exposure * leaving(wall, (place.at, place.spread), stay);
                 }
                 continue;
             }
@@ -76,9 +76,16 @@ pub(super) fn early(walls: &[Wall], prices: &Prices) -> f64 {
     let passable = walls.iter().filter(|wall| wall.toll.is_some());
     let exposed = passable.flat_map(|wall| {
         let ends = prices.ends.iter().zip(wall.stays);
-        ends.map(|(end, stay)| ramp(wall.influence - wall.distance(end.xy()), 1.0, stay))
+        ends.map(|(end, stay)| leaving(wall, (end.xy(), 0.0), stay))
     });
     prices.exposure * exposed.sum::<f64>()
+}
+
+/// Least exposure to `wall` on the first `metres` of a way from within so many metres of a place: no way leaves a zone
+/// faster than straight out of it.
+pub(super) fn leaving(wall: &Wall, (from, spread): (Point2, f64), metres: f64) -> f64 {
+    let depth = wall.influence - wall.distance(from) - spread;
+    ramp(depth, 1.0, metres.max(0.0))
 }
 
 /// Integral of the depth in the soft zone of `wall` from one distance to the next, none of which is beyond it.

@@ -2,8 +2,7 @@
 
 use nalgebra::Vector2;
 
-use super::super::departure::{Departure, Place};
-use super::super::event::ramp;
+use super::super::departure::{Departure, Place, leaving};
 use super::super::prices::Prices;
 use super::super::string::{narrowed, scene, shortest};
 use super::super::wall::Wall;
@@ -261,8 +260,8 @@ impl End<'_> {
     fn later(&self, length: f64) -> f64 {
         let passable = self.counting().filter(|(_, stay)| stay.is_finite());
         let exposed = passable.map(|(wall, stay)| {
-            let depth = wall.influence - wall.distance(self.from);
-            ramp(depth, 1.0, stay) - ramp(depth, 1.0, stay.min(length))
+            let first = |metres| leaving(wall, (self.from, 0.0), metres);
+            first(stay) - first(stay.min(length))
         });
         self.prices.exposure * exposed.sum::<f64>()
     }

@@ -1,5 +1,7 @@
 //! A chain of many short legs as a route of few waypoints.
 
+use std::cell::LazyCell;
+
 use super::{MOST_COARSE, few, may_turn, may_turn_along, net};
 use crate::cost::Model;
 use crate::cost::batch::{LANES, Price, Pricer};
@@ -75,8 +77,10 @@ impl<'c> Legs<'c> {
             if open.is_empty() {
                 break;
             }
-            let onward = |a: usize| a + first..=(a + first + at_once - 1).min(last);
-            let onward = |&a: &usize| onward(a).map(move |b| (a, b));
+            let onward = |&a: &usize| {
+                let next = a + first..(a + first + at_once).min(last + 1);
+                next.map(move |b| (a, b))
+            };
             let ends: Vec<(usize, usize)> = open.iter().flat_map(onward).collect();
             let [from, to] = net::rows(chain, &ends);
             let mut prices = vec![Price::ZERO; from.len()];
@@ -116,7 +120,7 @@ impl<'c> Legs<'c> {
     /// coarse one unless that is far from as good as any number.
     fn best(&self) -> Option<Vec<usize>> {
         let last = self.last();
-        let any = self.of_any_number();
+        let any = LazyCell::new(|| self.of_any_number());
         let is_near = |way: &Fitness| {
             way.violation <= any.violation && way.cost <= any.cost * (1.0 + FAR_FROM)
         };

@@ -44,6 +44,16 @@ pub(super) fn radar(x: f64, y: f64, radius: f64) -> Threat {
     }
 }
 
+/// Start, free waypoints, target of the three radars; those between are given.
+pub(super) fn route(free: &[[f64; 3]]) -> Vec<Point3> {
+    let scenario = scenario();
+    let free = free.iter().map(|&point| Point3::from(point));
+    std::iter::once(scenario.start)
+        .chain(free)
+        .chain([scenario.target])
+        .collect()
+}
+
 /// Three radars on flat ground, as in the first scenario of the paper.
 pub(super) fn scenario() -> Scenario {
     Scenario {

@@ -5,19 +5,23 @@ mod climbs;
 mod count;
 mod exposed;
 mod few;
+mod heap;
 mod known;
 mod levels;
 mod net;
 mod over;
 mod roadmap;
 mod rounded;
+mod spare;
+mod surplus;
 mod tangents;
 mod thin;
 mod trails;
 mod ways;
 mod worth;
 
-pub(super) use count::{spread, with_waypoints};
+pub(super) use count::with_waypoints;
+pub(super) use heap::spread;
 
 use super::polish::{Polish, Steps};
 use super::price::price;
@@ -92,7 +96,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let mut shapes: Vec<Vec<Point3>> = known.into_iter().collect();
     let (mut low, mut hopeless) = (false, HOPELESS);
     if settings.seeding == Seeding::Tangent {
-        shapes.extend(along_strings(model, stop));
+        shapes.extend(along_strings(model, &is_over));
         // Who brings a route has been over the hills already.
         if !warm {
             let (found, rough) = over_ground(model, &shapes, &is_over);
@@ -216,14 +220,13 @@ fn bends(model: &Model, shapes: &[Vec<Point3>], hopeless: f64) -> usize {
 
 /// Routes with as few waypoints as each needs, along the taut strings of several scenes: round the
 /// soft zones, round the threats alone, over those that can be overflown, round steep ground.
-fn along_strings(model: &Model, stop: &dyn Stop) -> Vec<Vec<Point3>> {
+fn along_strings(model: &Model, is_over: &dyn Fn() -> bool) -> Vec<Vec<Point3>> {
     let scenario = model.scenario;
-    let is_over = || why_stop(scenario, stop).is_some();
     let everything = |_: usize, _: &Threat| true;
     let in_the_way = |_: usize, threat: &Threat| !over::passable(scenario, threat);
     let mut shapes = Vec::new();
     let mut follow = |obstacles: &Obstacles, count: usize| {
-        for string in taut_strings_until(obstacles, count, &is_over).strings {
+        for string in taut_strings_until(obstacles, count, is_over).strings {
             shapes.push(along(model, &string));
         }
     };

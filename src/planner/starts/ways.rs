@@ -52,7 +52,6 @@ pub(super) fn routes(model: &Model, is_over: &dyn Fn() -> bool) -> Found {
 mod tests {
     use super::*;
     use crate::optimizer::{Fitness, Random};
-    use crate::planner::Nobody;
     use crate::planner::price::price;
     use crate::planner::starts::{along_strings, roadmap};
     use crate::planner::tests::{radar, scenario};
@@ -100,7 +99,7 @@ mod tests {
             };
             let ways = best(&routes(&model, &|| false).routes);
             let others = best(&roadmap::routes(&model, 8, f64::INFINITY).0.routes);
-            let others = [others, best(&along_strings(&model, &Nobody))];
+            let others = [others, best(&along_strings(&model, &|| false))];
             assert!(ways.is_feasible());
             let is_far_better =
                 |other: &Fitness| !other.is_feasible() || ways.cost < 0.95 * other.cost;

@@ -83,12 +83,13 @@ test('the keyboard alone leads from a scenario to a read result', async () => {
   await page.done();
 });
 
-test('a service with keys is asked with one, kept in memory, and followed with tickets', async () => {
+test('a service with keys is asked with one, kept in memory, and followed with tickets', async (t) => {
   const directory = mkdtempSync(join(tmpdir(), 'noctule-keys-'));
   const made_ = spawnSync(process.env.NOCTULE_BIN, ['key', 'new', '--name', 'planner', '--scopes', 'plan'], { encoding: 'utf8', cwd: directory });
   writeFileSync(join(directory, 'keys.toml'), made_.stdout);
   const key = made_.stderr.trim().split('\n').at(-1);
   const guarded = await service('--keys-file', join(directory, 'keys.toml'));
+  t.after(guarded.stop);
   const asked = [];
   const page = await open(chrome, 'about:blank');
   page.on('request', (request) => asked.push(request.url()));
@@ -113,7 +114,6 @@ test('a service with keys is asked with one, kept in memory, and followed with t
   await page.reload();
   await page.waitForSelector('#key[open]');
   await page.done();
-  await guarded.stop();
   rmSync(directory, { recursive: true, force: true });
 });
 

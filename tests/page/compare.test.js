@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
-import { SMALL, ask, browser, color, FIRST, document_, drawn, fill, made, open, pixels, plan, scene, service } from './support.js';
+import { LONG, SMALL, ask, browser, color, FIRST, document_, drawn, fill, made, open, pixels, plan, scene, service } from './support.js';
 
 let site;
 let chrome;
@@ -99,11 +99,12 @@ test('a plan that is left before it has opened is not followed', async () => {
   await page.done();
 });
 
-test('five running plans over a sixth leave the page a connection', async () => {
+test('five running plans over a sixth leave the page a connection', async (t) => {
   const other = await service('--workers', '6');
+  t.after(other.stop);
   const ids = [];
   for (let n = 0; n < 6; n += 1) {
-    const { id } = await ask(other.url, '/plans', { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify({ ...SMALL, name: `plan ${n}`, planner: { ...SMALL.planner, iterations: 100000 } }) });
+    const { id } = await ask(other.url, '/plans', { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify({ ...SMALL, name: `plan ${n}`, planner: { ...SMALL.planner, ...LONG } }) });
     ids.push(id);
   }
   const page = await open(chrome, `${other.url}#plan=${ids[0]}&with=${ids.slice(1).join('+')}`);
@@ -122,7 +123,6 @@ test('five running plans over a sixth leave the page a connection', async () => 
   await page.click('#cancel');
   await page.waitForSelector('.verdict');
   await page.done();
-  await other.stop();
 });
 
 test('a threat moves, and the plan is made anew from the route there was', async () => {
@@ -139,8 +139,9 @@ test('a threat moves, and the plan is made anew from the route there was', async
   await page.done();
 });
 
-test('the list has states, a filter and pages, and lets go', async () => {
+test('the list has states, a filter and pages, and lets go', async (t) => {
   const other = await service();
+  t.after(other.stop);
   for (let n = 0; n < 23; n += 1) await made(other.url, { ...SMALL, name: `plan ${n}`, planner: { ...SMALL.planner, iterations: 1, population: 10 } });
   const page = await open(chrome, other.url);
   await drawn(page, FIRST);
@@ -155,7 +156,7 @@ test('the list has states, a filter and pages, and lets go', async () => {
   await page.selectOption('#plans-filter', 'running');
   await page.waitForFunction(() => document.querySelectorAll('.plans tbody tr').length === 0);
   // One that begins is there without being asked for.
-  await ask(other.url, '/plans', { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify({ ...SMALL, name: 'long', planner: { iterations: 100000, population: 200, waypoints: 10 } }) });
+  await ask(other.url, '/plans', { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify({ ...SMALL, name: 'long', planner: LONG }) });
   await page.waitForFunction(() => /long.*running/s.test(document.querySelector('.plans tbody')?.textContent ?? ''));
   await page.click('.plans [aria-label="Remove long"]');
   await page.waitForFunction(() => document.querySelectorAll('.plans tbody tr').length === 0);
@@ -163,14 +164,13 @@ test('the list has states, a filter and pages, and lets go', async () => {
   await page.click('text="plan 7"').catch(() => page.click('text="plan 21"'));
   await page.waitForSelector('.verdict.good');
   await page.done();
-  await other.stop();
 });
 
 /** A page whose plan runs for long, its first route drawn. */
 async function running() {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);
-  await fill(page, '/planner/iterations', '100000');
+  for (const [name, value] of Object.entries(LONG)) await fill(page, `/planner/${name}`, value);
   await page.click('#plan');
   await page.waitForSelector('#cancel:not([hidden])');
   await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 1);

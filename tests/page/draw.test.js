@@ -169,9 +169,10 @@ test('faults stand where they are, in the words of the service', async () => {
   await page.done();
 });
 
-test('the ground of a dataset is drawn as the service has it', async () => {
+test('the ground of a dataset is drawn as the service has it', async (t) => {
   const directory = fileURLToPath(new URL('../../scenarios', import.meta.url));
   const mapped = await service('--terrain-dir', join(directory, 'terrain'));
+  t.after(mapped.stop);
   const page = await open(chrome, mapped.url);
   await drawn(page, FIRST);
   await page.setInputFiles('#file', join(directory, 'jacksboro-wgs84.json'));
@@ -188,12 +189,12 @@ test('the ground of a dataset is drawn as the service has it', async () => {
   await page.evaluate(() => { for (const part of document.querySelectorAll('details')) part.open = true; });
   assert.equal(await page.inputValue('[data-pointer="/terrain/name"]'), 'jacksboro', 'and can be chosen');
   await page.done();
-  await mapped.stop();
 });
 
-test('the ground of a dataset follows what is moved where no area is given, and the camera stays', async () => {
+test('the ground of a dataset follows what is moved where no area is given, and the camera stays', async (t) => {
   const directory = fileURLToPath(new URL('../../scenarios', import.meta.url));
   const mapped = await service('--terrain-dir', join(directory, 'terrain'));
+  t.after(mapped.stop);
   const page = await open(chrome, mapped.url);
   await drawn(page, FIRST);
   const near = JSON.parse(readFileSync(join(directory, 'jacksboro-wgs84.json'), 'utf8'));
@@ -218,5 +219,4 @@ test('the ground of a dataset follows what is moved where no area is given, and 
   const now = await seen();
   assert.ok(Math.hypot(now.x - whole.x, now.y - whole.y) < 1, 'the camera has not turned');
   await page.done();
-  await mapped.stop();
 });

@@ -236,6 +236,9 @@ export const SMALL = {
   altitude: { min: 20, max: 120 }, planner: { population: 30, iterations: 20, waypoints: 6, seed: 1 },
 };
 
+/** A search that lasts until it is told to end, however fast the program and the machine: minutes at the least. */
+export const LONG = { iterations: 100000, population: 2000 };
+
 /** No way leads past it. */
 export const WALLED = {
   ...SMALL, name: 'walled',

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { SMALL, WALLED, around, ask, browser, choose, FIRST, color, drawn, made, open, pixels, plan, scene, service, settled, wire } from './support.js';
+import { LONG, SMALL, WALLED, around, ask, browser, choose, FIRST, color, drawn, made, open, pixels, plan, scene, service, settled, wire } from './support.js';
 
 let site;
 let chrome;
@@ -12,13 +12,13 @@ after(async () => {
   await site?.stop();
 });
 
-/** A search that lasts until it is told to end. */
-const LONG = { '/planner/iterations': 100000, '/planner/population': 100, '/planner/waypoints': 8 };
+/** What makes a shipped scenario such a search. */
+const LASTING = { '/planner/iterations': LONG.iterations, '/planner/population': LONG.population, '/planner/waypoints': 8 };
 
 test('the swarm is seen converging, and cancelling keeps the best', async () => {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);
-  await choose(page, 'paper-4', LONG);
+  await choose(page, 'paper-4', LASTING);
   await page.click('#plan');
   await page.waitForFunction(() => globalThis.noctule.scene().trail >= 2);
   const live = await scene(page);
@@ -74,12 +74,13 @@ test('the route is drawn where it is, and a place in it is one place everywhere'
   await page.done();
 });
 
-test('a lost connection says so, and is taken up again without a loss', async () => {
+test('a lost connection says so, and is taken up again without a loss', async (t) => {
   const line = await wire(site.url);
+  t.after(line.stop);
   const page = await open(chrome, line.url);
   page.allowed = /ERR_|Failed to load resource/;
   await drawn(page, FIRST);
-  await choose(page, 'paper-4', LONG);
+  await choose(page, 'paper-4', LASTING);
   await page.click('#plan');
   await page.waitForFunction(() => globalThis.noctule.scene().trail >= 1);
   line.cut();
@@ -92,13 +93,12 @@ test('a lost connection says so, and is taken up again without a loss', async ()
   await page.click('#cancel');
   await page.waitForSelector('.verdict.good');
   await page.done();
-  line.stop();
 });
 
 test('a plan that is gone is not asked for again and again', async () => {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);
-  await choose(page, 'paper-4', LONG);
+  await choose(page, 'paper-4', LASTING);
   let streams = 0;
   await page.route('**/events?*', async (route) => {
     streams += 1;
@@ -198,7 +198,7 @@ test('a search of milliseconds has its whole history, also when its plan is open
 test('a search that starts over is shown from its new beginning', async () => {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);
-  await choose(page, 'paper-4', LONG);
+  await choose(page, 'paper-4', LASTING);
   const event = (kind, data) => `event: ${kind}\ndata: ${JSON.stringify(data)}\n\n`;
   const told = (iteration) => event('convergence', { iteration, best_cost: 500, mean_cost: 600, feasible_fraction: 1 })
     + event('incumbent', { iteration, cost: 500, feasible: true, waypoints: [{ x: 200, y: 200, z: 0 }, { x: 800, y: 800, z: 150 }] });
@@ -218,7 +218,7 @@ test('a search that starts over is shown from its new beginning', async () => {
 test('a search of very many iterations is drawn', async () => {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);
-  await choose(page, 'paper-4', LONG);
+  await choose(page, 'paper-4', LASTING);
   await page.route('**/events?*', async (route) => {
     const status = await ask(site.url, new URL(route.request().url()).pathname.replace('/events', ''));
     const event = (kind, data) => `event: ${kind}\ndata: ${JSON.stringify(data)}\n\n`;

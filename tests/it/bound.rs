@@ -33,6 +33,8 @@ struct Drawn {
     threat: f64,
     altitude: f64,
     heights: [f64; 2],
+    /// The lower end of the band; the other one is at 200.
+    lowest: f64,
     climb: f64,
     waypoints: usize,
     is_sampled: bool,
@@ -102,14 +104,27 @@ fn drawn() -> impl Strategy<Value = Drawn> {
         log(-3.0, 1.0),
         prop_oneof![1 => Just(0.0), 6 => log(-8.0, 2.0)],
         prop_oneof![1 => Just(0.0), 4 => log(-5.0, 1.0)],
-        [0.0..200.0f64, 0.0..200.0f64],
+        (
+            [0.0..200.0f64, 0.0..200.0f64],
+            prop_oneof![2 => Just(0.0), 1 => 0.0..150.0f64],
+        ),
         prop_oneof![1 => Just(89.0), 2 => 12.0..60.0f64],
         prop_oneof![Just(1_usize), Just(2), Just(3), Just(6), Just(12)],
         prop::bool::weighted(0.1),
         any::<u64>(),
     )
         .prop_map(
-            |(threats, fuel, threat, altitude, heights, climb, waypoints, is_sampled, seed)| {
+            |(
+                threats,
+                fuel,
+                threat,
+                altitude,
+                (heights, lowest),
+                climb,
+                waypoints,
+                is_sampled,
+                seed,
+            )| {
                 Drawn {
                     ends: [[80.0, 120.0], [920.0, 840.0]],
                     threats,
@@ -118,6 +133,7 @@ fn drawn() -> impl Strategy<Value = Drawn> {
                     threat,
                     altitude,
                     heights,
+                    lowest,
                     climb,
                     waypoints,
                     is_sampled,
@@ -282,7 +298,7 @@ fn scenario(drawn: &Drawn) -> Option<Scenario> {
         r#"{{ "frame": "local",
             "start": {{ "x": {}, "y": {}, "z": {} }}, "target": {{ "x": {}, "y": {}, "z": {} }},
             "area": {{ "min": {{ "x": 0, "y": 0 }}, "max": {{ "x": 1000, "y": 1000 }} }},
-            "altitude": {{ "min": 0, "max": 200 }},
+            "altitude": {{ "min": {}, "max": 200 }},
             "vehicle": {{ "max_turn_deg": 180, "max_climb_deg": {}, "fuel_per_km": 1000, "min_leg": 0.001 }},
             "weights": {{ "fuel": {}, "threat": {}, "altitude": {} }},
             "planner": {{ "algorithm": "tms-sba", "waypoints": {}, "population": 40, "iterations": 40, "parameters": {{ "quadrature": "{}" }} }},
@@ -293,6 +309,7 @@ fn scenario(drawn: &Drawn) -> Option<Scenario> {
         drawn.ends[1][0],
         drawn.ends[1][1],
         drawn.heights[1],
+        drawn.lowest,
         drawn.climb,
         drawn.fuel,
         drawn.threat,
@@ -453,18 +470,19 @@ fn cheapen(model: &Model<'_>, route: &mut Vec<Point3>, seed: u64) -> (f64, f64) 
 fn ways(model: &Model<'_>) -> Vec<Vec<Point3>> {
     let scenario = model.scenario;
     let scale = scale(scenario);
-    let mut ways: Vec<Vec<Point3>> = [5.0, 100.0, 195.0]
+    let band = scenario.altitude;
+    let middle = 0.5 * (band.min + band.max);
+    let inside = scale * 5.0;
+    let mut ways: Vec<Vec<Point3>> = [band.min + inside, middle, band.max - inside]
         .into_iter()
-        .filter_map(|height| over_lattice(model, scale * height))
+        .filter_map(|height| over_lattice(model, height))
         .collect();
     let hard = Obstacles::hard(scenario, |_, threat| {
         threat.top.is_none() && threat.base.is_none()
     });
     for string in taut_strings(&hard, 3).strings {
         let along = (0..=60).map(|i| string.at(f64::from(i) / 60.0));
-        let mut way: Vec<Point3> = along
-            .map(|at| Point3::new(at.x, at.y, scale * 100.0))
-            .collect();
+        let mut way: Vec<Point3> = along.map(|at| Point3::new(at.x, at.y, middle)).collect();
         way[0] = scenario.start;
         way[60] = scenario.target;
         ways.push(way);

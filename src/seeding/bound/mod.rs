@@ -189,6 +189,26 @@ mod tests {
     use crate::geometry::Point3;
 
     /// Best routes known, from long searches: upper bounds of the optimum.
+    /// From the ground to the ground, in bands above it.
+    #[test]
+    fn within_half_a_percent_where_a_route_takes_off_and_lands() {
+        let check = |document: &str, [min, max]: [u32; 2], best: f64| {
+            let band = format!(r#""min": {min}, "max": {max}"#);
+            let document = document.replace(r#""min": 0, "max": 200"#, &band);
+            let document = document.replace(r#""z": 150"#, r#""z": 0"#);
+            let bound = lower_bound(&read(&document));
+            assert!(bound <= best, "{bound} {best}");
+            assert!(best / bound - 1.0 <= 0.005, "{bound} {best}");
+        };
+        let [one, two] = [
+            include_str!("../../../scenarios/paper-1.json"),
+            include_str!("../../../scenarios/paper-2.json"),
+        ];
+        check(one, [60, 260], 517.6716);
+        check(one, [100, 300], 531.1);
+        check(two, [30, 120], 510.5145);
+    }
+
     #[test]
     fn within_two_percent_of_the_best_routes_known() {
         let check = |document: &str, best: f64, gap: f64| {

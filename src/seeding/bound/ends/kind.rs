@@ -7,6 +7,7 @@ use super::super::prices::Prices;
 use super::super::string::{narrowed, scene, shortest};
 use super::super::wall::Wall;
 use super::exposure;
+use super::ramp::{Ramp, Rates};
 use crate::geometry::{Point2, ring};
 use crate::seeding::arc::point_segment;
 use crate::seeding::outline::OutlineShape;
@@ -71,6 +72,8 @@ pub(super) struct End<'a> {
     pub(super) weight: f64,
     /// Metres of climb in a metre seen from above, at most.
     pub(super) steepest: f64,
+    /// Where it lies outside the band.
+    pub(super) ramp: Option<Ramp>,
     pub(super) prices: &'a Prices,
     pub(super) walls: &'a [Wall],
     pub(super) radii: &'a [Option<f64>],
@@ -79,9 +82,23 @@ pub(super) struct End<'a> {
 }
 
 impl End<'_> {
-    /// What a leg of `length` metres seen from above that is `exposed` costs at least on top of what it costs seen from
-    /// above, waypoint included: it climbs, or its waypoint is off the middle. Falls with `length`.
-    fn steepness(&self, length: f64, exposed: f64) -> f64 {
+    /// What a leg with one of those `lengths` seen from above, `exposed` if it is the shortest, costs at least on top of
+    /// what it costs seen from above, waypoint included: it climbs, or its waypoint is off the middle.
+    fn steepness(&self, lengths: [f64; 2], exposed: f64) -> f64 {
+        let gentle = self.gently(lengths[1], exposed);
+        let Some(ramp) = self.ramp.filter(|ramp| lengths[0] >= ramp.reach) else {
+            return gentle;
+        };
+        let rates = Rates {
+            fuel: self.prices.fuel,
+            exposed,
+            weight: self.weight,
+        };
+        gentle.max(ramp.steepness(lengths, rates, self.height, self.steepest))
+    }
+
+    /// The same of a leg that may climb as gently as it likes; falls with `length`.
+    fn gently(&self, length: f64, exposed: f64) -> f64 {
         if length.is_infinite() {
             return 0.0;
         }
@@ -102,7 +119,11 @@ impl End<'_> {
 
     /// What a level leg to `at` costs more since it cannot be level, about.
     pub(super) fn climbing_to(&self, at: Point2) -> f64 {
-        self.steepness((at - self.from).norm(), self.exposed(at, 0.0)[0])
+        let length = (at - self.from).norm();
+        let length = self
+            .ramp
+            .map_or(length, |ramp| length.min(ramp.run(self.height)));
+        self.steepness([length; 2], self.exposed(at, 0.0)[0])
     }
 
     /// What may be gained by looking at `kind` more closely.
@@ -116,7 +137,7 @@ impl End<'_> {
 
     /// What may be gained by cutting the lengths of `kind`.
     fn longer(&self, kind: &Kind) -> f64 {
-        self.steepness(kind.lengths[0], kind.exposed) - kind.steepness
+        self.steepness([kind.lengths[0]; 2], kind.exposed) - kind.steepness
     }
 
     /// `kind` in two parts, not yet priced.
@@ -131,21 +152,38 @@ impl End<'_> {
             return [part(-1.0), part(1.0)];
         }
         let [shortest, longest] = kind.lengths;
-        let steepest = self.steepness(shortest, kind.exposed);
-        let between = self.length_of(0.5 * (steepest + kind.steepness), kind.exposed);
-        let between = between.clamp(shortest, longest);
+        let between = self.between(kind).clamp(shortest, longest);
         [[shortest, between], [between, longest]].map(|lengths| Kind { lengths, ..*kind })
     }
 
-    /// The length from which on the steepness of a leg that is `exposed` is at most that one, which is not 0.
+    /// The length at which those of `kind` are cut.
+    fn between(&self, kind: &Kind) -> f64 {
+        let [shortest, longest] = kind.lengths;
+        if let Some(ramp) = self.ramp {
+            let bends = [ramp.reach, ramp.run(self.height)];
+            let mut within = bends
+                .into_iter()
+                .filter(|at| shortest < *at && *at < longest);
+            if let Some(bend) = within.next() {
+                return bend;
+            }
+            if shortest >= ramp.reach {
+                return 0.5 * (shortest + longest);
+            }
+        }
+        let steepest = self.gently(shortest, kind.exposed);
+        self.length_of(0.5 * (steepest + kind.steepness), kind.exposed)
+    }
+
+    /// The length from which on a leg that is `exposed` costs at most so much for climbing gently, which is not 0.
     fn length_of(&self, steepness: f64, exposed: f64) -> f64 {
         let (mut low, mut high) = (0.0, (self.to - self.from).norm());
-        while self.steepness(high, exposed) > steepness && high < 1e12 {
+        while self.gently(high, exposed) > steepness && high < 1e12 {
             (low, high) = (high, 2.0 * high);
         }
         for _ in 0..40 {
             let middle = 0.5 * (low + high);
-            if self.steepness(middle, exposed) > steepness {
+            if self.gently(middle, exposed) > steepness {
                 low = middle;
             } else {
                 high = middle;
@@ -158,7 +196,7 @@ impl End<'_> {
     pub(super) fn priced(&self, kind: Kind) -> Kind {
         let [length, longest] = kind.lengths;
         if length <= 0.0 {
-            let steepness = self.steepness(longest, 0.0);
+            let steepness = self.gently(longest, 0.0);
             return Kind { steepness, ..kind };
         }
         let (at, spread) = self.reached(&kind);
@@ -173,7 +211,7 @@ impl End<'_> {
         let leg = fuel * (length - spread) + exposed + self.later(length);
         Kind {
             cost: kind.cost.max(leg + fuel * (self.to - at).norm()),
-            steepness: self.steepness(longest, exposed),
+            steepness: self.steepness(kind.lengths, exposed),
             leg,
             turned: 2.0 * fuel * spread + (middle - exposed),
             is_rough: spread <= COARSEST * (self.to - self.from).norm(),
@@ -189,7 +227,7 @@ impl End<'_> {
         if length <= 0.0 {
             return Kind {
                 cost: self.later(length),
-                steepness: self.steepness(longest, 0.0),
+                steepness: self.gently(longest, 0.0),
                 ..kind
             };
         }
@@ -207,7 +245,7 @@ impl End<'_> {
             cost: kind
                 .cost
                 .max(fuel * length + exposed + self.later(length) - highest),
-            steepness: self.steepness(longest, exposed),
+            steepness: self.steepness(kind.lengths, exposed),
             // The potential is at least as steep as fuel is dear, about.
             turned: fuel * spread + (middle - exposed),
             exposed,
@@ -337,6 +375,7 @@ mod tests {
             height: 100.0,
             weight: 1.0,
             steepest: 1.0,
+            ramp: None,
             prices,
             walls,
             radii,
@@ -360,11 +399,11 @@ mod tests {
     fn a_short_leg_climbs_no_steeper_than_allowed() {
         check(|end| {
             let root = 2.0_f64.sqrt();
-            assert!((end.steepness(0.0, 0.0) - 100.0).abs() < 1e-9);
-            assert!((end.steepness(40.0, 0.0) - (20.0 * (root - 1.0) + 60.0)).abs() < 1e-9);
-            assert!((end.steepness(100.0, 0.0) - 50.0 * (root - 1.0)).abs() < 1e-9);
-            assert!(end.steepness(1000.0, 0.0) < 2.5 && end.steepness(f64::INFINITY, 0.0) == 0.0);
-            assert!((end.steepness(end.length_of(33.0, 0.0), 0.0) - 33.0).abs() < 1e-6);
+            assert!((end.gently(0.0, 0.0) - 100.0).abs() < 1e-9);
+            assert!((end.gently(40.0, 0.0) - (20.0 * (root - 1.0) + 60.0)).abs() < 1e-9);
+            assert!((end.gently(100.0, 0.0) - 50.0 * (root - 1.0)).abs() < 1e-9);
+            assert!(end.gently(1000.0, 0.0) < 2.5 && end.gently(f64::INFINITY, 0.0) == 0.0);
+            assert!((end.gently(end.length_of(33.0, 0.0), 0.0) - 33.0).abs() < 1e-6);
         });
     }
 
@@ -395,10 +434,10 @@ mod tests {
             let climbed = 100.0 / 3.0_f64.sqrt();
             let slant = (1e4 + climbed * climbed).sqrt();
             let expected = 2.0 * (slant - 100.0) + 100.0 - climbed;
-            assert!((end.steepness(100.0, 150.0) - expected).abs() < 1e-9);
-            assert!(end.steepness(100.0, 150.0) > 3.0 * end.steepness(100.0, 0.0));
+            assert!((end.gently(100.0, 150.0) - expected).abs() < 1e-9);
+            assert!(end.gently(100.0, 150.0) > 3.0 * end.gently(100.0, 0.0));
             let length = end.length_of(33.0, 150.0);
-            assert!((end.steepness(length, 150.0) - 33.0).abs() < 1e-6);
+            assert!((end.gently(length, 150.0) - 33.0).abs() < 1e-6);
         });
     }
 

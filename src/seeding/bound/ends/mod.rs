@@ -4,6 +4,7 @@
 mod excess;
 mod exposure;
 mod kind;
+mod ramp;
 
 pub(super) use excess::over;
 
@@ -15,6 +16,7 @@ use crate::geometry::Point2;
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;
 use kind::{End, Kind};
+use ramp::Ramp;
 
 /// With more corners than this, only the difference in height of the ends is made use of.
 const MOST_CORNERS: usize = 80;
@@ -127,6 +129,9 @@ fn ends<'a>(
     } else {
         0.5
     };
+    let steepest = steepest(scenario);
+    let heights = prices.ends.map(|end| end.z - ground.elevation);
+    let ramps = Ramp::round(heights, scenario);
     (scenario.weights.altitude > 0.0).then(|| {
         [0, 1].map(|end| End {
             which: end,
@@ -134,7 +139,8 @@ fn ends<'a>(
             to: prices.ends[1 - end].xy(),
             height: (prices.ends[end].z - middle).abs(),
             weight: share * scenario.weights.altitude,
-            steepest: steepest(scenario),
+            steepest,
+            ramp: ramps[end],
             prices,
             walls,
             radii,

@@ -1,0 +1,130 @@
+//! A leg that leaves the zone round an end outside the band is in the band from there on: it is as steep as that asks for,
+//! however long it is. The argument is section 7 of docs/BOUND.md.
+
+use crate::cost::Tolerance;
+use crate::scenario::{AltitudeBand, Scenario};
+
+/// The zone round an end that lies below the band or above it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Ramp {
+    /// Metres from the end within which a route may be outside the band.
+    pub(super) reach: f64,
+    /// Least climb towards the band, in a metre seen from above, of a leg that leads farther.
+    slope: f64,
+}
+
+/// What a metre of a leg costs, and one off the middle of the band.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rates {
+    pub(super) fuel: f64,
+    /// What the soft zones along the shortest leg cost.
+    pub(super) exposed: f64,
+    pub(super) weight: f64,
+}
+
+impl Ramp {
+    /// Round both ends at so much above level ground; none where they are within the band, or where leaving one zone may
+    /// be entering the other.
+    pub(super) fn round(heights: [f64; 2], scenario: &Scenario) -> [Option<Self>; 2] {
+        let outside = heights.map(|height| beyond(scenario.altitude, height));
+        // A hair wider than the zones are.
+        let allowed = libm::tan(scenario.vehicle.max_climb_deg.to_radians());
+        let reaches = outside.map(|outside| 2.0 * outside / allowed * (1.0 + 1e-9));
+        let apart = (scenario.target.xy() - scenario.start.xy()).norm();
+        if reaches[0] + reaches[1] >= apart {
+            return [None; 2];
+        }
+        // What is within tolerance counts as within the band.
+        let overlooked = 2.0 * Tolerance::of(scenario).height_m;
+        [0, 1].map(|end| {
+            let climbed = outside[end] - overlooked;
+            (climbed > 0.0).then(|| Self {
+                reach: reaches[end],
+                slope: climbed / reaches[end],
+            })
+        })
+    }
+
+    /// Metres seen from above in which a leg that leaves the zone climbs so many at least.
+    pub(super) fn run(&self, height: f64) -> f64 {
+        self.reach.max(height / self.slope)
+    }
+
+    /// What a leg that leaves the zone, with a length seen from above in `lengths`, costs at least on top of what it costs
+    /// seen from above: from `height` metres off the middle of the band, at no more than the `steepest` climb.
+    pub(super) fn steepness(
+        &self,
+        [shortest, longest]: [f64; 2],
+        rates: Rates,
+        height: f64,
+        steepest: f64,
+    ) -> f64 {
+        let whole = rates.fuel * shortest + rates.exposed;
+        // Convex in the climb: where a climb of all metres costs what it saves off the middle, unless that is reached
+        // before, or the zone asks for more.
+        let share = rates.weight * longest / whole;
+        let best = if share < 1.0 {
+            share / (1.0 - share * share).sqrt()
+        } else {
+            f64::INFINITY
+        };
+        let climb = best.min(height / longest).max(self.slope).min(steepest);
+        let off_middle = (height - climb * longest).max(climb * shortest - height);
+        whole * ((1.0 + climb * climb).sqrt() - 1.0) + rates.weight * off_middle.max(0.0)
+    }
+}
+
+/// Metres outside the band.
+fn beyond(band: AltitudeBand, height: f64) -> f64 {
+    (band.min - height).max(height - band.max).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// No leg of those lengths and no climb that leaves the zone costs less.
+        #[test]
+        fn no_leg_is_cheaper(
+            (shortest, more) in (1.0..500.0f64, prop_oneof![Just(0.0), 0.0..500.0f64, Just(f64::INFINITY)]),
+            (length, climb) in (0.0..1.0f64, 0.0..1.0f64),
+            (fuel, exposed, weight) in (0.01..2.0f64, prop_oneof![Just(0.0), 0.0..300.0f64], 0.01..3.0f64),
+            (height, slope) in (1.0..300.0f64, 0.05..0.6f64),
+        ) {
+            let longest = shortest + more;
+            let ramp = Ramp { reach: 1.0, slope };
+            let rates = Rates { fuel, exposed, weight };
+            let steepest = 2.0 * slope;
+            let least = ramp.steepness([shortest, longest], rates, height, steepest);
+            let length = shortest + length * more.min(2000.0);
+            let climb = slope + climb * (steepest - slope);
+            let slant = (1.0 + climb * climb).sqrt() - 1.0;
+            let cost = (fuel * length + exposed) * slant + weight * (height - climb * length).abs();
+            prop_assert!(least <= cost * (1.0 + 1e-12), "{least} {cost}");
+        }
+    }
+
+    /// From 60 m below the band, with climbs of 45 degrees: out of the zone it climbs half a metre a metre, so that the
+    /// middle, 160 m above, is passed after 320 m.
+    #[test]
+    fn a_long_leg_leads_past_the_middle() {
+        let ramp = Ramp {
+            reach: 120.0,
+            slope: 0.5,
+        };
+        let rates = Rates {
+            fuel: 0.5,
+            exposed: 0.0,
+            weight: 1.0,
+        };
+        let cost = |length: f64| ramp.steepness([length, length], rates, 160.0, 1.0);
+        let slant = 1.25_f64.sqrt() - 1.0;
+        assert!((cost(320.0) - 160.0 * slant).abs() < 1e-9);
+        assert!((cost(420.0) - (210.0 * slant + 50.0)).abs() < 1e-9);
+        assert!(cost(240.0) > cost(320.0));
+        assert!(ramp.steepness([320.0, f64::INFINITY], rates, 160.0, 1.0) <= cost(320.0));
+    }
+}

@@ -17,7 +17,7 @@ pub mod sqlite;
 pub use clock::{Clock, SteadyClock, wall_clock};
 pub use end::{End, Ending};
 pub use error::{StoreError, Trouble};
-pub use options::{Options, Retention};
+pub use options::{Options, Retention, Tell};
 
 use std::sync::Arc;
 

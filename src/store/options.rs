@@ -1,7 +1,12 @@
 //! What a store is opened with.
 
+use std::sync::Arc;
+
 use super::clock::{Clock, wall_clock};
 use crate::job::Plan;
+
+/// Told of a plan, as it now stands.
+pub type Tell = Arc<dyn Fn(&Plan) + Send + Sync>;
 
 /// What a store is opened with.
 #[derive(Clone)]
@@ -14,6 +19,9 @@ pub struct Options {
     pub retention: Retention,
     /// Events kept of each plan; of a longer history the oldest are forgotten.
     pub events_kept: u64,
+    /// Told of each plan that the store itself ends because its workers were lost, once that is durable: there is no
+    /// run that could tell of it.
+    pub lost: Tell,
 }
 
 impl Options {
@@ -25,6 +33,7 @@ impl Options {
             clock: wall_clock(),
             retention: Retention::default(),
             events_kept: u64::MAX,
+            lost: Arc::new(|_| {}),
         }
     }
 }

@@ -4,11 +4,12 @@ use axum::http::Method;
 use serde_json::{Value, json};
 
 use crate::support::api::Api;
-use crate::support::lives::{a_run_of, running};
+use crate::support::lives::{a_run_of, await_run, running};
 use crate::support::openmetrics::Reading;
 use crate::support::patience::eventually;
 use crate::support::process::Service;
 use crate::support::scenario;
+use crate::support::stores::{Place, for_every_backend};
 
 async fn read(api: &Api) -> Reading {
     let answer = api.get("/metrics").await;
@@ -136,6 +137,34 @@ async fn a_run_that_loses_its_plan_is_counted() {
     let deleted = service.request(Method::DELETE, &address).send().await;
     assert_eq!(deleted.expect("an answer").status(), 204);
     eventually(async || lost().await > 0.5).await;
+}
+
+/// No run of it is left that could count it.
+#[tokio::test]
+async fn a_plan_that_loses_its_workers_is_counted() {
+    for_every_backend(async |backend| {
+        let place = Place::new(backend);
+        let serve = || place.serve(&["--workers", "1"]);
+        let mut service = serve();
+        let address = service.submit(&a_run_of(3_600_000)).await;
+        for n_lost in 0..5 {
+            let mut stream = running(&service, &address).await;
+            for _ in 0..n_lost {
+                await_run(&mut stream).await;
+            }
+            service.kill();
+            service = serve();
+        }
+        let status = service.ended(&address).await;
+        assert_eq!(status["error"]["type"], "/problems/worker-lost", "{status}");
+        let ended = "noctule_plans_ended_total{status=\"failed\"}";
+        eventually(async || read_from(&service).await.value(ended) > 0.5).await;
+        let runs = "noctule_plan_run_seconds_count{status=\"failed\"}";
+        let reading = read_from(&service).await;
+        assert!(reading.value(ended) < 1.5);
+        assert!(reading.value(runs) < 0.5, "nobody knows how long it ran");
+    })
+    .await;
 }
 
 /// What is shown and what alerts are raised on is there.

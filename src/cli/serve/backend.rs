@@ -11,14 +11,20 @@ use crate::config::{self, Address, Config, Place};
 use crate::store::jetstream::{JetStreamShelf, JetStreamStore, Settings};
 use crate::store::reopening::{Open, Reopening};
 use crate::store::sqlite::SqliteStore;
-use crate::store::{Clock, Options, Retention, Store};
+use crate::store::{Clock, Options, Retention, Store, Tell};
+use crate::telemetry::Instruments;
+use crate::telemetry::metrics::Ended;
 
 /// The store, as soon as it can be opened.
 ///
 /// # Errors
 /// When the configuration names none.
-pub(super) async fn open(config: &Config, clock: Clock) -> anyhow::Result<Arc<dyn Store>> {
-    let options = options(config, clock);
+pub(super) async fn open(
+    config: &Config,
+    clock: Clock,
+    instruments: &Arc<Instruments>,
+) -> anyhow::Result<Arc<dyn Store>> {
+    let options = options(config, clock, instruments);
     let open = match &config.store {
         Place::Sqlite => sqlite(data_dir(config)?, options),
         Place::Nats(address) => jetstream(settings(config, address), options),
@@ -69,13 +75,25 @@ fn settings(config: &Config, address: &Address) -> Settings {
     }
 }
 
-fn options(config: &Config, clock: Clock) -> Options {
+fn options(config: &Config, clock: Clock, instruments: &Arc<Instruments>) -> Options {
     Options {
         clock,
+        lost: counted(instruments),
         retention: retention(config.retention),
         events_kept: config.retention.events,
         ..Options::new(config.queue as u64)
     }
+}
+
+/// Counts a plan among those that ended; for how long its last run went on, nobody knows.
+fn counted(instruments: &Arc<Instruments>) -> Tell {
+    let instruments = Arc::clone(instruments);
+    Arc::new(move |plan| {
+        instruments.metrics.ended(Ended {
+            status: plan.status.name(),
+            run_ms: None,
+        });
+    })
 }
 
 /// Of a setting, 0 is no limit.

@@ -46,7 +46,7 @@ pub(super) async fn open(
 ) -> anyhow::Result<Parts> {
     let instruments = Arc::new(Instruments::default());
     let clock = SteadyClock::following(store::wall_clock());
-    let store = backend::open(config, clock.clock()).await?;
+    let store = backend::open(config, clock.clock(), &instruments).await?;
     let catalogue = datasets::open(config, &instruments).await?;
     let rules = planner::rules(config.limits).with_datasets(catalogue.clone());
     let Callers {

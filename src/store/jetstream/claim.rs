@@ -17,7 +17,7 @@ use super::record::{Record, State};
 use super::steps::Change;
 use super::view::Standing;
 use super::{JetStream, closed};
-use crate::job::{PlanId, Status};
+use crate::job::{Plan, PlanId, Status};
 use crate::store::{Lease, StoreError, lost};
 
 /// A job may be seen before its record; for so long a claim waits.
@@ -194,6 +194,10 @@ impl JetStream {
         let (found, scenario) = tokio::join!(self.start(id, &job), self.servers.read(&document));
         match found? {
             Found::Over => answer(id, &job, AckKind::Ack).await,
+            Found::Lost(plan) => {
+                (self.options.lost)(&plan);
+                answer(id, &job, AckKind::Ack).await;
+            }
             Found::Ours => {}
             Found::Run(record) => return self.lease(*record, scenario, job).await.map(Some),
         }
@@ -240,6 +244,7 @@ impl JetStream {
                         record.lost += 1;
                         if lost::end(&mut record.plan, record.lost.into(), now_ms)? {
                             record.ended(self.options.retention);
+                            found = Found::Lost(Box::new(record.plan.clone()));
                             return Ok(Some(Change::told(record)));
                         }
                         record.plan.requeue()?;
@@ -313,6 +318,8 @@ enum Found {
     Ours,
     /// Done, or removed.
     Over,
+    /// At its end, as this node has written down, for its workers were lost.
+    Lost(Box<Plan>),
 }
 
 /// Answer a delivery. A lost answer is made good by the next delivery, so nobody waits for one to be

@@ -157,19 +157,21 @@ pub(super) fn release_all(tx: &mut Transaction<'_>) -> Result<(), StoreError> {
 }
 
 /// What an earlier process was running when it died is queued again, or is at its end; nobody holds those leases any
-/// more.
-pub(super) fn recover(tx: &mut Transaction<'_>) -> Result<(), StoreError> {
+/// more. Returns what has ended.
+pub(super) fn recover(tx: &mut Transaction<'_>) -> Result<Vec<Plan>, StoreError> {
+    let mut ended = Vec::new();
     for mut row in running(tx)? {
         row.lost += 1;
         if lost::end(&mut row.plan, row.lost, tx.now_ms())? {
             forget_incumbent(tx, &row)?;
             tell_end(tx, &mut row)?;
             row.update(tx.connection)?;
+            ended.push(row.plan);
         } else {
             requeue(tx, row)?;
         }
     }
-    Ok(())
+    Ok(ended)
 }
 
 /// In the order in which they were accepted.

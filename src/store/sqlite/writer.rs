@@ -210,12 +210,16 @@ impl Desk {
             )?
             .cast_unsigned();
         let now_ms = (self.options.clock)();
-        self.commit(|tx, _| {
+        let ended = self.commit(|tx, _| {
             tx.step(|tx| {
                 removal::bury_for_good(tx, now_ms)?;
                 operations::recover(tx)
             })
-        })?
+        })??;
+        for plan in &ended {
+            (self.options.lost)(plan);
+        }
+        Ok(())
     }
 
     /// Serve until somebody closes the store or drops it; returns whom to tell.

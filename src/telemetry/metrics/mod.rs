@@ -153,7 +153,7 @@ impl Metrics {
         self.wait_times.observe(seconds(waited_ms));
     }
 
-    /// A plan's run ended.
+    /// A plan that had been run ended.
     pub fn ended(&self, ended: Ended) {
         let status = Status {
             status: ended.status,

@@ -40,7 +40,7 @@ impl Default for Metrics {
             queue_limit: new.add("queue_limit", "Plans that may wait"),
             workers: new.add("workers", "Plans that may run at the same time"),
             accepted: new.add("plans_accepted", "Plans accepted"),
-            ended: new.add("plans_ended", "Runs that ended, by the status of the plan"),
+            ended: new.add("plans_ended", "Plans that ended once they had been run, by status"),
             lost: new.add(
                 "plan_runs_lost",
                 "Runs whose plan was taken away: it was deleted, or another node runs it",

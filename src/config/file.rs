@@ -121,7 +121,7 @@ fn given(value: &Spanned<DeValue>) -> Given {
         DeValue::String(text) => Given::Text(text.to_string()),
         DeValue::Boolean(truth) => Given::Bool(*truth),
         value @ DeValue::Integer(number) => {
-            let number = i64::from_str_radix(number.as_str(), number.radix());
+            let number = i128::from_str_radix(number.as_str(), number.radix());
             number.map_or_else(|_| other(value), Given::Integer)
         }
         value @ DeValue::Float(number) => {

@@ -13,8 +13,8 @@ pub(super) enum Given {
     Word(String),
     /// A string of the file.
     Text(String),
-    /// A number of the file without a fraction.
-    Integer(i64),
+    /// A number of the file without a fraction; a count may be greater than those of TOML's own must be.
+    Integer(i128),
     /// Another number of the file.
     Float(f64),
     /// Of the file.

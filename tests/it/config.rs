@@ -53,6 +53,20 @@ fn what_is_printed_says_where_it_comes_from_and_reads_back_the_same() {
     assert!(!again.contains("# default"), "{again}");
 }
 
+/// Also beyond the 64 bits with a sign that every reader of TOML has.
+#[test]
+fn the_greatest_count_that_a_flag_may_have_is_read_from_a_file_too() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let file = directory.path().join("printed.toml");
+    let file = file.to_str().expect("UTF-8");
+    let greatest = u64::MAX.to_string();
+    let text = printed(&[], &["--retention-bytes", &greatest]);
+    fs::write(file, &text).expect("written");
+    let again = printed(&[], &["--config", file]);
+    let line = format!("\nbytes = {greatest} #");
+    assert!(again.contains(&line), "{again}");
+}
+
 #[test]
 fn what_is_wrong_is_refused_before_anything_is_opened() {
     let directory = tempfile::tempdir().expect("a temporary directory");

@@ -15,7 +15,8 @@ mod terrain;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::builder::Resettable;
+use clap::{Arg, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 /// Plans 3-D routes for unmanned aircraft.
 #[derive(Parser)]
@@ -66,7 +67,9 @@ mod exit {
 /// Do what the command line says.
 #[must_use]
 pub fn run() -> ExitCode {
-    let command = match Cli::try_parse() {
+    let parsed = heeding_variables(Cli::command()).try_get_matches();
+    let parsed = parsed.and_then(|matches| Cli::from_arg_matches(&matches));
+    let command = match parsed {
         Ok(cli) => cli.command,
         Err(usage) => {
             // Nothing can be done about a closed terminal.
@@ -95,4 +98,21 @@ pub fn run() -> ExitCode {
         exit::FAILED
     })
     .into()
+}
+
+/// An empty variable is as none, whichever command looks at it.
+fn heeding_variables(command: clap::Command) -> clap::Command {
+    let is_empty = |argument: &Arg| {
+        let value = argument.get_env().and_then(std::env::var_os);
+        value.is_some_and(|value| value.is_empty())
+    };
+    command
+        .mut_args(|argument| {
+            if is_empty(&argument) {
+                argument.env(Resettable::Reset)
+            } else {
+                argument
+            }
+        })
+        .mut_subcommands(heeding_variables)
 }

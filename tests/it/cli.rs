@@ -5,7 +5,7 @@ use std::fs;
 use serde_json::{Value, json};
 
 use crate::support::description::check_schema;
-use crate::support::process::{Service, noctule, run};
+use crate::support::process::{Service, noctule, run, run_with};
 use crate::support::scenario;
 
 #[test]
@@ -222,4 +222,31 @@ fn a_reader_who_has_read_enough_is_no_failure() {
             "{arguments:?}"
         );
     }
+}
+
+/// As deployments leave those that they have no value for.
+#[test]
+fn an_empty_variable_is_as_none() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &[]);
+    let data_dir = directory.path().to_str().expect("UTF-8");
+    let url = service.url("/readyz");
+    let document = scenario().to_string();
+    for (variable, arguments) in [
+        ("NOCTULE_CONFIG", &["serve", "--print-config"][..]),
+        ("NOCTULE_TERRAIN_DIR", &["plan", "-"]),
+        ("NOCTULE_STORE", &["store", "check", "--data-dir", data_dir]),
+        ("NOCTULE_HEALTHCHECK_URL", &["healthcheck", "--url", &url]),
+    ] {
+        let ended = run_with(&[(variable, "")], arguments, &document);
+        let told = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!((ended.status.code(), &*told), (Some(0), ""), "{variable}");
+    }
+    let elsewhere = run_with(
+        &[("NOCTULE_DATA_DIR", ""), ("XDG_DATA_HOME", data_dir)],
+        &["store", "check"],
+        "",
+    );
+    let told = String::from_utf8_lossy(&elsewhere.stderr);
+    assert!(told.contains("there is no store at"), "{told}");
 }

@@ -167,6 +167,26 @@ async fn a_plan_that_loses_its_workers_is_counted() {
     .await;
 }
 
+/// Whoever restarts without end accepts nothing meanwhile, so no other figure would have to change.
+#[tokio::test]
+async fn a_restart_is_seen_though_nothing_was_accepted() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let start = async || {
+        let service = Service::start(directory.path(), &[]);
+        let reading = read_from(&service).await;
+        reading.value("noctule_start_time_seconds")
+    };
+    let now_s = || {
+        let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+        since.expect("after 1970").as_secs_f64()
+    };
+    // To the millisecond.
+    let before = now_s() - 0.001;
+    let first = start().await;
+    let second = start().await;
+    assert!(before <= first && first < second && second <= now_s());
+}
+
 /// What is shown and what alerts are raised on is there.
 #[tokio::test]
 async fn dashboard_and_alerts_name_metrics_that_there_are() {

@@ -46,6 +46,7 @@ pub(super) async fn open(
 ) -> anyhow::Result<Parts> {
     let instruments = Arc::new(Instruments::default());
     let clock = SteadyClock::following(store::wall_clock());
+    instruments.metrics.began(clock.now_ms());
     let store = backend::open(config, clock.clock(), &instruments).await?;
     let catalogue = datasets::open(config, &instruments).await?;
     let rules = planner::rules(config.limits).with_datasets(catalogue.clone());

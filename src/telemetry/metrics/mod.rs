@@ -29,6 +29,7 @@ const FETCHES: [&str; 2] = ["fetched", "failed"];
 #[derive(Debug)]
 pub struct Metrics {
     registry: Registry,
+    start: Level,
     requests: Family<Request, Counter>,
     request_times: Family<Answered, Histogram, fn() -> Histogram>,
     connections: Gauge,
@@ -110,6 +111,11 @@ pub struct Ended {
 }
 
 impl Metrics {
+    /// The process began, milliseconds since 1970.
+    pub fn began(&self, at_ms: i64) {
+        self.start.set(seconds(at_ms));
+    }
+
     /// A request was answered, or something that is none. `route` is the template, `None` when no route has the path.
     pub fn answered(&self, method: &str, route: Option<&str>, status: u16, took: Duration) {
         const METHODS: [&str; 5] = ["GET", "POST", "DELETE", "PUT", "HEAD"];

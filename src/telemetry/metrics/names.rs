@@ -20,6 +20,11 @@ impl Default for Metrics {
         registry.register("build", "The program", Info::new(Build { version }));
         let mut new = Registrar(&mut registry);
         Self {
+            start: new.add_with_unit(
+                "start_time",
+                "When the process began, since 1970",
+                Unit::Seconds,
+            ),
             requests: new.add(
                 "http_requests",
                 "Requests answered, by method, route template and status",

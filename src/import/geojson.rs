@@ -4,6 +4,7 @@
 use geojson::{Feature, GeometryValue, JsonValue, Position};
 use serde_json::Value;
 
+use super::antimeridian;
 use super::draft::{Draft, Place};
 use super::facts::Facts;
 use super::{Conversion, ImportError};
@@ -83,13 +84,12 @@ fn geometry(draft: &mut Draft, at: &str, facts: &Facts, value: &GeometryValue) {
     }
     match value {
         GeometryValue::Point { coordinates } => point(draft, at, facts, coordinates),
-        GeometryValue::Polygon { coordinates } => polygon(draft, at, facts, coordinates),
-        GeometryValue::MultiPolygon { coordinates } => {
-            for (index, rings) in coordinates.iter().enumerate() {
-                let at = format!("{at}/geometry/coordinates/{index}");
-                polygon(draft, &at, facts, rings);
+        GeometryValue::Polygon { coordinates } => {
+            if let Some(ring) = outer(draft, at, coordinates) {
+                draft.polygon(at, facts, &ring);
             }
         }
+        GeometryValue::MultiPolygon { coordinates } => polygons(draft, at, facts, coordinates),
         GeometryValue::GeometryCollection { geometries } => {
             for (index, inner) in geometries.iter().enumerate() {
                 let at = format!("{at}/geometry/geometries/{index}");
@@ -115,18 +115,35 @@ fn point(draft: &mut Draft, at: &str, facts: &Facts, position: &Position) {
     }
 }
 
-fn polygon(draft: &mut Draft, at: &str, facts: &Facts, rings: &[Vec<Position>]) {
+fn polygons(draft: &mut Draft, at: &str, facts: &Facts, polygons: &[Vec<Vec<Position>>]) {
+    let (mut places, mut outer_rings) = (Vec::new(), Vec::new());
+    for (index, rings) in polygons.iter().enumerate() {
+        let at = format!("{at}/geometry/coordinates/{index}");
+        if let Some(ring) = outer(draft, &at, rings) {
+            places.push(at);
+            outer_rings.push(ring);
+        }
+    }
+    for (first, ring) in antimeridian::joined(&outer_rings) {
+        draft.polygon(&places[first], facts, &ring);
+    }
+}
+
+/// The ring that bounds a polygon.
+fn outer(draft: &mut Draft, at: &str, rings: &[Vec<Position>]) -> Option<Vec<[f64; 2]>> {
     let Some((outer, holes)) = rings.split_first() else {
-        return draft.leave(at, "a polygon without a ring");
+        draft.leave(at, "a polygon without a ring");
+        return None;
     };
     for index in 0..holes.len() {
         let hole = format!("{at}: hole {index}");
         draft.leave(hole, "the hole of a polygon: all of it is kept clear of");
     }
-    match outer.iter().map(degrees).collect::<Option<Vec<_>>>() {
-        Some(ring) => draft.polygon(at, facts, &ring),
-        None => draft.leave(at, "a corner that is not longitude and latitude"),
+    let ring: Option<_> = outer.iter().map(degrees).collect();
+    if ring.is_none() {
+        draft.leave(at, "a corner that is not longitude and latitude");
     }
+    ring
 }
 
 /// East and north; of what lies in a ring, the library does not ask that it has both.

@@ -5,6 +5,7 @@
 //! told what is wrong with it. Deliberately absent: the size of the file, which is checked before
 //! its text is here, and anything that a file refers to.
 
+mod antimeridian;
 mod draft;
 mod facts;
 mod geojson;

@@ -248,13 +248,42 @@ async fn exports_become_scenarios_again() {
     }
 }
 
+/// Cut at the 180th meridian, as GeoJSON asks; a route along the cut would go through.
+#[tokio::test]
+async fn a_polygon_across_the_antimeridian_comes_back_whole() {
+    let api = Api::new();
+    let mut scenario = scenario();
+    scenario["start"] = json!({"lat": -17.0, "lon": 179.99, "alt": 500});
+    scenario["target"] = json!({"lat": -17.0, "lon": -179.99, "alt": 520});
+    let corner = |lat: f64, lon: f64| json!({"lat": lat, "lon": lon});
+    scenario["threats"] = json!([{"kind": "polygon", "name": "atoll", "margin": 20, "vertices": [
+        corner(-17.004, 179.998), corner(-17.004, -179.997), corner(-17.002, -179.997), corner(-17.002, 179.998)]}]);
+    let address = ended(&api, &scenario, -17.0, 180.0).await;
+    let exported = api.get(&format!("{address}/result?format=geojson")).await;
+    let headers = [("content-type", "application/geo+json")];
+    let text = String::from_utf8(exported.body.to_vec()).expect("UTF-8");
+    assert!(text.contains("MultiPolygon"), "it is cut");
+    let text = without_path("geojson", &text);
+    let back = api
+        .send(Method::POST, "/scenarios:convert", &headers, text)
+        .await;
+    let threats = &back.json()["scenario"]["threats"];
+    assert_eq!(threats.as_array().map(Vec::len), Some(1), "{threats}");
+    let lons = threats[0]["vertices"].as_array().expect("corners").iter();
+    let mut lons: Vec<f64> = lons.filter_map(|corner| corner["lon"].as_f64()).collect();
+    lons.sort_by(f64::total_cmp);
+    let expected = [-180.0, -179.997, -179.997, 179.998, 179.998, 180.0];
+    assert_eq!(lons, expected);
+}
+
 /// The file with the long lines of its path and rings cut short.
 fn without_path(format: &str, text: &str) -> String {
     match format {
         "geojson" => {
             let mut read: Value = serde_json::from_str(text).expect("JSON");
             let features = read["features"].as_array_mut().expect("features");
-            features.retain(|feature| feature["geometry"]["type"] != "LineString");
+            let is_line = |kind: &Value| kind == "LineString" || kind == "MultiLineString";
+            features.retain(|feature| !is_line(&feature["geometry"]["type"]));
             for feature in features {
                 if feature["geometry"]["type"] == "Polygon" {
                     let ring = feature["geometry"]["coordinates"][0].as_array_mut();

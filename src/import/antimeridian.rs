@@ -1,0 +1,240 @@
+//! Polygons that a file has cut along the 180th meridian, as RFC 7946 section 3.1.9 asks, made whole: halves that
+//! meet there would leave a gap without width between them, wide enough for a route.
+
+use std::collections::HashMap;
+use std::iter::successors;
+
+/// Degrees east and north.
+type Corner = [f64; 2];
+
+/// A part of a ring off the meridian, from one place on it to another.
+struct Chain {
+    /// Which ring it is of.
+    ring: usize,
+    corners: Vec<Corner>,
+}
+
+/// Outer rings of one geometry, each with the number of the first that it is of. Those that go on with each other
+/// beyond the meridian are one; all others are as they were.
+pub(super) fn joined(rings: &[Vec<Corner>]) -> Vec<(usize, Vec<Corner>)> {
+    let chains: Vec<Chain> = rings
+        .iter()
+        .enumerate()
+        .flat_map(|(index, ring)| chains(index, &counterclockwise(ring)))
+        .collect();
+    let follower = followers(&chains);
+    let whole = whole(rings.len(), &chains, &follower);
+    let mut made: Vec<(usize, Vec<Corner>)> = Vec::new();
+    let mut told = vec![false; chains.len()];
+    for first in 0..chains.len() {
+        if told[first] || !whole[chains[first].ring] {
+            continue;
+        }
+        let mut ring: Vec<Corner> = Vec::new();
+        let mut next = Some(first);
+        while let Some(index) = next.filter(|index| !told[*index]) {
+            told[index] = true;
+            // Where it begins the one before has ended.
+            ring.extend(&chains[index].corners[1..]);
+            next = follower[index];
+        }
+        made.push((chains[first].ring, ring));
+    }
+    let others = rings.iter().cloned().enumerate();
+    made.extend(others.filter(|(index, _)| !whole[*index]));
+    made.sort_by_key(|(index, _)| *index);
+    made
+}
+
+/// A ring that goes round to the left, its first corner not repeated.
+fn counterclockwise(ring: &[Corner]) -> Vec<Corner> {
+    let mut ring = ring.to_vec();
+    if ring.len() > 1 && ring.first() == ring.last() {
+        ring.pop();
+    }
+    let next = ring.iter().cycle().skip(1);
+    let twice_area: f64 = ring
+        .iter()
+        .zip(next)
+        .map(|(a, b)| (a[0] - b[0]) * (a[1] + b[1]))
+        .sum();
+    if twice_area < 0.0 {
+        ring.reverse();
+    }
+    ring
+}
+
+/// What is left of a ring without its edges along the meridian; nothing when there are none.
+fn chains(ring: usize, corners: &[Corner]) -> Vec<Chain> {
+    let n = corners.len();
+    let is_cut = |index: usize| {
+        let (here, next) = (corners[index % n], corners[(index + 1) % n]);
+        here[0].abs() >= 180.0 && here[0].total_cmp(&next[0]).is_eq()
+    };
+    let Some(cut) = (0..n).find(|index| is_cut(*index)) else {
+        return Vec::new();
+    };
+    let mut chains = Vec::new();
+    let mut corners_so_far = Vec::new();
+    // Once round, from the end of one cut to the beginning of the last.
+    for index in cut + 1..=cut + n {
+        corners_so_far.push(corners[index % n]);
+        if is_cut(index) {
+            let corners = std::mem::take(&mut corners_so_far);
+            // Between two cuts in a row is nothing.
+            if corners.len() > 1 {
+                chains.push(Chain { ring, corners });
+            }
+        }
+    }
+    chains
+}
+
+/// For each chain the one that begins where it ends, on the other side.
+fn followers(chains: &[Chain]) -> Vec<Option<usize>> {
+    let place = |[lon, lat]: Corner, beyond: bool| {
+        let is_east = lon < 0.0;
+        // Both zeros are one place.
+        (is_east != beyond, (lat + 0.0).to_bits())
+    };
+    let mut begins = HashMap::new();
+    for (index, chain) in chains.iter().enumerate() {
+        begins.insert(place(chain.corners[0], false), index);
+    }
+    let mut taken = vec![false; chains.len()];
+    let follower = |chain: &Chain| {
+        let end = chain.corners[chain.corners.len() - 1];
+        let next = *begins.get(&place(end, true))?;
+        (!std::mem::replace(&mut taken[next], true)).then_some(next)
+    };
+    chains.iter().map(follower).collect()
+}
+
+/// Of which rings every chain goes on in another, and so on in those.
+fn whole(n_rings: usize, chains: &[Chain], follower: &[Option<usize>]) -> Vec<bool> {
+    let mut group: Vec<usize> = (0..n_rings).collect();
+    for (chain, next) in chains.iter().zip(follower) {
+        if let Some(next) = next {
+            let (one, other) = (
+                head(&mut group, chain.ring),
+                head(&mut group, chains[*next].ring),
+            );
+            group[one] = other;
+        }
+    }
+    let mut whole = vec![false; n_rings];
+    for chain in chains {
+        whole[chain.ring] = true;
+    }
+    let mut broken = vec![false; n_rings];
+    for (chain, next) in chains.iter().zip(follower) {
+        broken[head(&mut group, chain.ring)] |= next.is_none();
+    }
+    for ring in 0..n_rings {
+        whole[ring] &= !broken[head(&mut group, ring)];
+    }
+    whole
+}
+
+/// The ring by which a group is known.
+fn head(group: &mut [usize], ring: usize) -> usize {
+    let path: Vec<usize> =
+        successors(Some(ring), |at| Some(group[*at]).filter(|next| next != at)).collect();
+    let head = path[path.len() - 1];
+    for at in path {
+        group[at] = head;
+    }
+    head
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn check(rings: &[&[Corner]], expected: &[(usize, &[Corner])]) {
+        let rings: Vec<Vec<Corner>> = rings.iter().map(|ring| ring.to_vec()).collect();
+        let expected: Vec<(usize, Vec<Corner>)> = expected
+            .iter()
+            .map(|(index, ring)| (*index, ring.to_vec()))
+            .collect();
+        assert_eq!(joined(&rings), expected);
+    }
+
+    const WEST: [Corner; 5] = [
+        [179.0, 0.0],
+        [180.0, 0.0],
+        [180.0, 2.0],
+        [179.0, 2.0],
+        [179.0, 0.0],
+    ];
+    const EAST: [Corner; 4] = [[-180.0, 0.0], [-179.0, 0.0], [-179.0, 2.0], [-180.0, 2.0]];
+    const BOTH: [Corner; 6] = [
+        [179.0, 2.0],
+        [179.0, 0.0],
+        [180.0, 0.0],
+        [-179.0, 0.0],
+        [-179.0, 2.0],
+        [-180.0, 2.0],
+    ];
+
+    #[test]
+    fn halves_are_one_however_they_turn() {
+        check(&[&WEST, &EAST], &[(0, &BOTH)]);
+        let mut clockwise = EAST;
+        clockwise.reverse();
+        check(&[&WEST, &clockwise], &[(0, &BOTH)]);
+    }
+
+    #[test]
+    fn what_ends_at_the_meridian_is_as_it_was() {
+        let far = [[170.0, 0.0], [171.0, 0.0], [171.0, 1.0]];
+        check(&[&far, &WEST], &[(0, &far), (1, &WEST)]);
+        let lower = [[-180.0, 0.0], [-179.0, 0.0], [-180.0, 1.0]];
+        check(&[&WEST, &lower], &[(0, &WEST), (1, &lower)]);
+        let touching = [[180.0, 5.0], [179.0, 6.0], [179.0, 4.0]];
+        check(&[&WEST, &touching, &EAST], &[(0, &BOTH), (1, &touching)]);
+    }
+
+    /// Two arms reach across; what they are cut to, our own exports give as one ring that turns back on itself.
+    #[test]
+    fn two_arms_across_are_arms_of_one() {
+        let body = [
+            [178.0, 0.0],
+            [180.0, 0.0],
+            [180.0, 1.0],
+            [179.0, 1.0],
+            [179.0, 2.0],
+            [180.0, 2.0],
+            [180.0, 3.0],
+            [178.0, 3.0],
+        ];
+        let arms = [
+            [-180.0, 0.0],
+            [-179.0, 0.0],
+            [-179.0, 1.0],
+            [-180.0, 1.0],
+            [-180.0, 2.0],
+            [-179.0, 2.0],
+            [-179.0, 3.0],
+            [-180.0, 3.0],
+        ];
+        let expected = [
+            [179.0, 1.0],
+            [179.0, 2.0],
+            [180.0, 2.0],
+            [-179.0, 2.0],
+            [-179.0, 3.0],
+            [-180.0, 3.0],
+            [178.0, 3.0],
+            [178.0, 0.0],
+            [180.0, 0.0],
+            [-179.0, 0.0],
+            [-179.0, 1.0],
+            [-180.0, 1.0],
+        ];
+        check(&[&body, &arms], &[(0, &expected)]);
+        let apart: [&[Corner]; 3] = [&arms[..4], &body, &arms[4..]];
+        assert_eq!(joined(&apart.map(<[Corner]>::to_vec)).len(), 1);
+    }
+}

@@ -265,7 +265,7 @@ fn over_ground(
     let strings = priced(model, strings);
     let cheapest = strings.iter().min_by(|one, other| one.0.rank(&other.0));
     let known = cheapest.map_or(f64::INFINITY, |(fitness, _)| fitness.cost);
-    let (mut found, few) = roadmap::routes(model, OVERLAND, known);
+    let (mut found, few) = roadmap::routes(model, OVERLAND, known, is_over);
     let is_crowd = ways::are_worth_a_look(model);
     if is_crowd && !is_over() {
         let ways = ways::routes(model, is_over);

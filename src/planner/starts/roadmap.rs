@@ -12,6 +12,9 @@ use crate::cost::batch::{LANES, Price, Pricer};
 use crate::cost::{Model, metre};
 use crate::geometry::Point3;
 use crate::planner::price::PRICED_FROM;
+use crate::scenario::Scenario;
+use crate::terrain::Terrain;
+use crate::threat::{Shape, Threat};
 
 /// Places of the net, besides both ends, on level ground.
 const PLACES: usize = 160;
@@ -37,11 +40,28 @@ const MOST_LEGS: usize = 12;
 /// Chains of few legs looked at, at most.
 const EFFORT: usize = 4_000;
 
+/// So many threats, corners of rings and peaks, each time that a leg is priced, are met between two questions whether to
+/// stop: the net of an ordinary scene takes so little time that it is worth its while even where that is over.
+const MET_UNWATCHED: usize = 4_000_000;
+
 /// Up to `count` routes that differ, where one that costs `known` is to be had without, about; and where not even
-/// the first of them can be flown as it is, some of so few legs and so soft turns that they can.
-pub(super) fn routes(model: &Model, count: usize, known: f64) -> (Found, Vec<Vec<Point3>>) {
+/// the first of them can be flown as it is, some of so few legs and so soft turns that they can. None where it takes
+/// long, once `is_over`.
+pub(super) fn routes(
+    model: &Model,
+    count: usize,
+    known: f64,
+    is_over: &dyn Fn() -> bool,
+) -> (Found, Vec<Vec<Point3>>) {
     let places = places(model);
-    let mut legs = Legs::new(model, &places, known);
+    let mut legs = Legs::new(model, &places, known, is_over);
+    if legs.is_broken_off {
+        let found = Found {
+            routes: Vec::new(),
+            legs_priced: legs.priced,
+        };
+        return (found, Vec::new());
+    }
     let trees = [0, places.len() - 1].map(|end| legs.cheapest(end));
     let routes = net::chains(model, &places, &trees, count);
     let most = model.scenario.planner.waypoints + 1;
@@ -78,6 +98,20 @@ fn places(model: &Model) -> Vec<Point3> {
         .collect()
 }
 
+/// Legs between two questions whether to stop.
+fn legs_unwatched(scenario: &Scenario) -> usize {
+    let met = |threat: &Threat| match &threat.shape {
+        Shape::Cylinder(_) => 1,
+        Shape::Polygon(polygon) => polygon.vertices().len(),
+    };
+    let peaks = match &scenario.terrain {
+        Terrain::Peaks(peaks) => peaks.peaks.len(),
+        _ => 0,
+    };
+    let met = peaks + scenario.threats.iter().map(met).sum::<usize>();
+    (MET_UNWATCHED / met.max(1)).next_multiple_of(LANES)
+}
+
 /// The legs between places.
 struct Legs<'p, 's> {
     places: &'p [Point3],
@@ -87,12 +121,20 @@ struct Legs<'p, 's> {
     /// Whether it is known to keep its heights; where those take long to measure, few legs are asked.
     measured: Vec<Vec<bool>>,
     priced: u64,
+    /// Whether there was no time to price all of them.
+    is_broken_off: bool,
     /// Cosine of the sharpest turn.
     sharpest: f64,
 }
 
 impl<'p, 's> Legs<'p, 's> {
-    fn new(model: &Model<'s>, places: &'p [Point3], known: f64) -> Self {
+    /// All legs, or, where they take long, those that have been priced once `is_over`.
+    fn new(
+        model: &Model<'s>,
+        places: &'p [Point3],
+        known: f64,
+        is_over: &dyn Fn() -> bool,
+    ) -> Self {
         let scenario = model.scenario;
         let tolerance = model.tolerance.scaled(PRICED_FROM);
         let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).verdicts();
@@ -114,29 +156,40 @@ impl<'p, 's> Legs<'p, 's> {
         let farthest = ways.fold(worthwhile.max(DETOUR * direct), f64::max);
         // One by one of them, as all at once would fill megabytes.
         let mut costs = vec![vec![f64::INFINITY; count]; count];
-        let mut priced = 0;
-        for a in 0..count {
+        let (mut priced, mut unwatched, mut is_broken_off) = (0, 0, false);
+        let most_unwatched = legs_unwatched(scenario);
+        'rows: for a in 0..count {
             let is_near = |b: &usize| {
                 let about = (away[0][a] + away[1][*b]).min(away[0][*b] + away[1][a]);
                 about + (places[*b] - places[a]).norm() <= farthest
             };
             let ends: Vec<(usize, usize)> =
                 (a + 1..count).filter(is_near).map(|b| (a, b)).collect();
-            let [from, to] = net::rows(places, &ends);
-            let mut prices = vec![Price::ZERO; from.len()];
-            if hilly {
-                pricer.legs_at_best(&from, &to, &mut prices);
-            } else {
-                pricer.legs(&from, &to, &mut prices);
-            }
-            for (idx, &(_, b)) in ends.iter().enumerate() {
-                let (price, lane) = (&prices[idx / LANES], idx % LANES);
-                if price.violation[lane] <= 0.0 {
-                    let cost = price.cost[lane] + own[a] + own[b];
-                    (costs[a][b], costs[b][a]) = (cost, cost);
+            for ends in ends.chunks(most_unwatched) {
+                unwatched += ends.len();
+                if unwatched > most_unwatched {
+                    if is_over() {
+                        is_broken_off = true;
+                        break 'rows;
+                    }
+                    unwatched = ends.len();
                 }
+                let [from, to] = net::rows(places, ends);
+                let mut prices = vec![Price::ZERO; from.len()];
+                if hilly {
+                    pricer.legs_at_best(&from, &to, &mut prices);
+                } else {
+                    pricer.legs(&from, &to, &mut prices);
+                }
+                for (idx, &(_, b)) in ends.iter().enumerate() {
+                    let (price, lane) = (&prices[idx / LANES], idx % LANES);
+                    if price.violation[lane] <= 0.0 {
+                        let cost = price.cost[lane] + own[a] + own[b];
+                        (costs[a][b], costs[b][a]) = (cost, cost);
+                    }
+                }
+                priced += ends.len() as u64;
             }
-            priced += ends.len() as u64;
         }
         Self {
             places,
@@ -144,6 +197,7 @@ impl<'p, 's> Legs<'p, 's> {
             costs,
             measured: vec![vec![!hilly; count]; count],
             priced,
+            is_broken_off,
             sharpest: libm::cos(scenario.vehicle.max_turn_deg.to_radians()),
         }
     }
@@ -269,7 +323,40 @@ impl few::Legs for Legs<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::planner::tests::hilly_scenario;
+    use crate::geometry::Point2;
+    use crate::planner::tests::{hilly_scenario, scenario};
+    use crate::threat::Polygon;
+
+    /// Legs take long to price round a coast of thousands of corners, and none of the time that there is otherwise.
+    #[test]
+    fn a_stop_is_heard_where_legs_take_long() {
+        let mut scenario = scenario();
+        let priced = |scenario: &Scenario, looks: u32| {
+            let looked = std::cell::Cell::new(0);
+            let is_over = || {
+                looked.set(looked.get() + 1);
+                looked.get() > looks
+            };
+            let found = routes(&Model::new(scenario), 8, f64::INFINITY, &is_over).0;
+            (found.legs_priced, found.routes.is_empty())
+        };
+        let (all, is_empty) = priced(&scenario, 0);
+        assert!(!is_empty);
+        let coast = (0..8_000).map(|corner| {
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU / 8e3 * f64::from(corner));
+            Point2::new(850.0 + 50.0 * cos, 150.0 + 50.0 * sin)
+        });
+        scenario.threats.push(Threat {
+            name: None,
+            shape: Shape::Polygon(Polygon::new(coast.collect(), 0.0)),
+            base: None,
+            top: None,
+        });
+        let most = legs_unwatched(&scenario) as u64;
+        let (few, is_empty) = priced(&scenario, 2);
+        assert!(is_empty);
+        assert!(0 < few && few <= 3 * most && 3 * most < all, "{few} {all}");
+    }
 
     /// Chains are the same whether legs are measured when their turn comes or all of them before.
     #[test]
@@ -278,8 +365,8 @@ mod tests {
         let model = Model::new(&scenario);
         let places = places(&model);
         let (mut late, mut early) = (
-            Legs::new(&model, &places, 0.0),
-            Legs::new(&model, &places, 0.0),
+            Legs::new(&model, &places, 0.0, &|| false),
+            Legs::new(&model, &places, 0.0, &|| false),
         );
         let all: Vec<usize> = (0..places.len()).collect();
         for place in 0..places.len() {

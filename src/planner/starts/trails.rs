@@ -329,7 +329,9 @@ mod tests {
         let scenario = mountains();
         let model = Model::new(&scenario);
         let can_be_flown = |route: &&Vec<Point3>| price(&model, route).is_feasible();
-        let coarse = roadmap::routes(&model, 8, f64::INFINITY).0.routes;
+        let coarse = roadmap::routes(&model, 8, f64::INFINITY, &|| false)
+            .0
+            .routes;
         assert_eq!(coarse.iter().filter(can_be_flown).count(), 0);
         let fine = routes(&model, None, 8, &|| false).routes;
         assert!(fine.iter().filter(can_be_flown).count() > 0);
@@ -370,7 +372,7 @@ mod tests {
             priced.min_by(Fitness::rank).expect("a route")
         };
         let [coarse, fine] = [
-            roadmap::routes(&model, 8, f64::INFINITY).0,
+            roadmap::routes(&model, 8, f64::INFINITY, &|| false).0,
             routes(&model, None, 8, &|| false),
         ]
         .map(best);

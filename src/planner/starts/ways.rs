@@ -98,7 +98,11 @@ mod tests {
                 prices.min_by(Fitness::rank).unwrap_or(Fitness::WORST)
             };
             let ways = best(&routes(&model, &|| false).routes);
-            let others = best(&roadmap::routes(&model, 8, f64::INFINITY).0.routes);
+            let others = best(
+                &roadmap::routes(&model, 8, f64::INFINITY, &|| false)
+                    .0
+                    .routes,
+            );
             let others = [others, best(&along_strings(&model, &|| false))];
             assert!(ways.is_feasible());
             let is_far_better =

@@ -11,6 +11,9 @@ use crate::seeding::outline::OutlineShape;
 /// Pairs of cores looked at before the search for gaps gives up.
 const MOST_PAIRS: usize = 300_000;
 
+/// So many pairs are looked at between two questions whether to stop: of a ring of thousands of corners, each takes a while.
+const PAIRS_UNWATCHED: usize = 64;
+
 /// A way to beat the string.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Event {
@@ -55,9 +58,13 @@ struct Core {
     edge: usize,
 }
 
-/// All events, cheapest first; `None` when there are too many to tell.
-pub(super) fn events(walls: &[Wall], prices: &Prices) -> Option<Vec<Event>> {
-    let mut events = gaps(walls, prices)?;
+/// All events, cheapest first; `None` when there are too many to tell, or once `stop` asks for it.
+pub(super) fn events(
+    walls: &[Wall],
+    prices: &Prices,
+    stop: &dyn Fn() -> bool,
+) -> Option<Vec<Event>> {
+    let mut events = gaps(walls, prices, stop)?;
     let early = early(walls, prices);
     for (idx, wall) in walls.iter().enumerate() {
         if let Some(toll) = wall.toll {
@@ -107,7 +114,7 @@ pub(super) fn ramp(depth: f64, slope: f64, way: f64) -> f64 {
 }
 
 /// The gaps between walls that overlap when widened.
-fn gaps(walls: &[Wall], prices: &Prices) -> Option<Vec<Event>> {
+fn gaps(walls: &[Wall], prices: &Prices, stop: &dyn Fn() -> bool) -> Option<Vec<Event>> {
     let mut cores = cores(walls);
     let low = |core: &Core| core.a.x.min(core.b.x) - walls[core.wall].wide;
     let high = |core: &Core| core.a.x.max(core.b.x) + walls[core.wall].wide;
@@ -119,7 +126,7 @@ fn gaps(walls: &[Wall], prices: &Prices) -> Option<Vec<Event>> {
             .take_while(|other| low(other) <= high(one));
         for other in near {
             pairs += 1;
-            if pairs > MOST_PAIRS {
+            if pairs > MOST_PAIRS || (pairs % PAIRS_UNWATCHED == 0 && stop()) {
                 return None;
             }
             events.extend(gap(one, other, walls, prices));

@@ -67,7 +67,7 @@ pub fn lower_bound_until(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
 /// The largest cost that can be proven: by strings round walls, by a potential, and by the legs that leave the ends.
 fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) -> f64 {
     let walls = around::walls(scenario, prices);
-    let Some(events) = event::events(&walls, prices) else {
+    let Some(events) = event::events(&walls, prices, stop) else {
         let radii = string::cores(&walls);
         let proven = string::plain(&walls, &radii, prices, stop);
         let promised = || promise(&walls, &radii, prices, &scenario.area, stop);
@@ -323,6 +323,36 @@ mod tests {
             0.5,
             0.0,
         );
+    }
+
+    /// A comb whose teeth are near to each other: nearly as many pairs as teeth squared, each of which asks all teeth.
+    #[test]
+    fn a_stop_is_heard_among_gaps() {
+        let teeth = 20;
+        let corners: Vec<String> = (0..=2 * teeth)
+            .map(|corner| {
+                format!(
+                    r#"{{"x": {}, "y": {}}}"#,
+                    500 + corner,
+                    600 - 50 * (corner % 2)
+                )
+            })
+            .chain([format!(r#"{{"x": {}, "y": 650}}"#, 500 + teeth)])
+            .collect();
+        let scenario = scenario(&format!(
+            r#""threats": [{{"kind": "polygon", "margin": 60, "vertices": [{}]}}]"#,
+            corners.join(", ")
+        ));
+        let prices = Prices::of(&scenario);
+        let walls = around::walls(&scenario, &prices);
+        assert!(event::events(&walls, &prices, &|| false).is_some());
+        let looks = Cell::new(0);
+        let stop = || {
+            looks.set(looks.get() + 1);
+            looks.get() > 2
+        };
+        assert!(event::events(&walls, &prices, &stop).is_none());
+        assert_eq!(looks.get(), 3);
     }
 
     #[test]

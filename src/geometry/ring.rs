@@ -37,26 +37,34 @@ pub fn is_convex(ring: &[Point2]) -> bool {
 /// Whether `point` lies inside `ring`, by the even-odd rule; on the ring itself, either.
 #[must_use]
 pub fn contains(ring: &[Point2], point: Point2) -> bool {
-    let crossed = edges(ring).filter(|(a, b)| {
-        (a.y > point.y) != (b.y > point.y)
-            && point.x < a.x + (b.x - a.x) * (point.y - a.y) / (b.y - a.y)
-    });
+    let crossed = edges(ring).filter(|edge| is_crossed(*edge, point));
     crossed.count() % 2 == 1
+}
+
+/// Whether the way from `point` straight to the right crosses an edge.
+#[must_use]
+pub fn is_crossed((a, b): (Point2, Point2), point: Point2) -> bool {
+    (a.y > point.y) != (b.y > point.y)
+        && point.x < a.x + (b.x - a.x) * (point.y - a.y) / (b.y - a.y)
 }
 
 /// Distance of `point` to the edges of `ring`, metres; infinite without edges.
 #[must_use]
 pub fn distance(ring: &[Point2], point: Point2) -> f64 {
     edges(ring)
-        .map(|(a, b)| {
-            let along = b - a;
-            let t = (point - a).dot(&along) / along.norm_squared();
-            // An edge without extent is its point.
-            let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) };
-            (point - (a + along * t)).norm_squared()
-        })
+        .map(|edge| squared_distance(edge, point))
         .fold(f64::INFINITY, f64::min)
         .sqrt()
+}
+
+/// Squared distance of `point` to an edge, square metres.
+#[must_use]
+pub fn squared_distance((a, b): (Point2, Point2), point: Point2) -> f64 {
+    let along = b - a;
+    let t = (point - a).dot(&along) / along.norm_squared();
+    // An edge without extent is its point.
+    let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) };
+    (point - (a + along * t)).norm_squared()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! How deep a leg goes into a ring.
 
 use super::Polygon;
-use super::nearest::{Edge, cut, features_near};
+use super::nearest::{Edge, cut};
 use crate::geometry::Segment;
 
 impl Polygon {
@@ -14,7 +14,7 @@ impl Polygon {
         // The ring is nowhere farther than it would be were the leg to lead straight away from it.
         let length = leg.horizontal_length();
         let reach = middle + 0.5 * (to - from) * length;
-        let features = features_near(&self.edges, leg, (from, to), reach);
+        let features = self.features_near(leg, (from, to), reach);
         let mut depth = middle;
         if !features.is_empty() {
             // Distance grows convexly on each piece, so that its ends hold the greatest depth.

@@ -3,6 +3,7 @@
 //! Deliberately absent: which feature of the ring is nearest along a leg, see [`nearest`].
 
 mod depth;
+mod index;
 mod nearest;
 mod zones;
 
@@ -10,6 +11,7 @@ use super::{Cylinder, hover_exposure, intensity};
 use crate::geometry::{LEVEL, Point2, Rect, Segment, ring};
 pub(crate) use zones::Zone;
 
+use index::Index;
 use nearest::{Edge, Feature, Kind, Piece, clearance_of, cut};
 
 /// A simple ring that is never entered, and a soft zone outside it.
@@ -17,6 +19,8 @@ use nearest::{Edge, Feature, Kind, Piece, clearance_of, cut};
 pub struct Polygon {
     vertices: Vec<Point2>,
     edges: Vec<Edge>,
+    /// Where they are; `None` where they are few.
+    index: Option<Index>,
     is_convex: bool,
     /// `None` where no part of the soft zone is known to belong to one edge or corner.
     zones: Option<Vec<Zone>>,
@@ -42,6 +46,7 @@ impl Polygon {
             is_convex,
             zones: zones::zones(&vertices, is_convex, margin),
             extent: bounds.grown(margin),
+            index: Index::of(&vertices),
             bounds,
             vertices,
             edges,
@@ -80,7 +85,10 @@ impl Polygon {
         let bounds = &self.bounds;
         (bounds.min.x <= point.x && point.x <= bounds.max.x)
             && (bounds.min.y <= point.y && point.y <= bounds.max.y)
-            && ring::contains(&self.vertices, point)
+            && match &self.index {
+                Some(index) => index.contains(&self.vertices, point),
+                None => ring::contains(&self.vertices, point),
+            }
             && self.ring_distance(point) > 0.0
     }
 
@@ -122,7 +130,9 @@ impl Polygon {
     /// Least distance of the part `window` of `leg` to the ring, metres; where the leg enters, the
     /// greatest depth that it reaches, negative.
     pub(super) fn clearance(&self, leg: &Segment, window: (f64, f64)) -> f64 {
-        clearance_of(&self.pieces(leg, window), leg, &self.vertices)
+        clearance_of(&self.pieces(leg, window), leg, |point| {
+            self.ring_distance(point)
+        })
     }
 
     /// Integral of `T` over the part `window` of `leg`: `margin - distance` outside the ring up to
@@ -140,7 +150,7 @@ impl Polygon {
             let depth = -self.distance(leg.at(window.0).xy());
             return (depth.max(0.0), 0.0);
         }
-        let near = nearest::features_near(&self.edges, leg, window, self.margin);
+        let near = self.features_near(leg, window, self.margin);
         // Sides are not told by the nearest features: where edges are nearly in line, rounding may
         // take one for another beside a vertex, and with it the crossing.
         let crossings = nearest::crossings(&near, window);
@@ -154,7 +164,7 @@ impl Polygon {
             } else if is_exposed && to > from {
                 exposure += self
                     .exposure_outside(leg, (from, to))
-                    .unwrap_or_else(|| self.exposure_among(&near, leg, (from, to)));
+                    .unwrap_or_else(|| self.exposure_among(&near, leg, (from, to), window));
             }
             from = to;
         }
@@ -164,13 +174,51 @@ impl Polygon {
         (depth, exposure)
     }
 
-    /// Exposure of the part `window` of `leg`, outside of the ring, wherever one of `features` is the nearest.
-    fn exposure_among(&self, features: &[Feature], leg: &Segment, window: (f64, f64)) -> f64 {
+    /// Exposure of the part `part` of `leg`, outside of the ring, wherever one of `features`, those near to `window`,
+    /// is the nearest.
+    fn exposure_among(
+        &self,
+        features: &[Feature],
+        leg: &Segment,
+        part: (f64, f64),
+        window: (f64, f64),
+    ) -> f64 {
+        let near;
+        let features = if self.index.is_some() && part != window {
+            near = self.features_near(leg, part, self.margin);
+            &near[..]
+        } else {
+            features
+        };
         let mut exposure = 0.0;
-        cut(features, window, leg.horizontal_length(), &mut |piece| {
-            exposure += self.piece_exposure(leg, &piece);
-        });
+        if !features.is_empty() {
+            cut(features, part, leg.horizontal_length(), &mut |piece| {
+                exposure += self.piece_exposure(leg, &piece);
+            });
+        }
         exposure
+    }
+
+    /// The vertices and edges that come within `reach` metres of the part `window` of `leg`, and maybe some more.
+    fn features_near(&self, leg: &Segment, window: (f64, f64), reach: f64) -> Vec<Feature> {
+        let Some(index) = &self.index else {
+            return nearest::features_near(&self.edges, leg, window, reach);
+        };
+        let (from, to) = (leg.at(window.0).xy(), leg.at(window.1).xy());
+        let edges = index.near(from, to, nearest::reach(reach, (to - from).norm()));
+        let edges = edges.into_iter().map(|edge| &self.edges[edge]);
+        nearest::features_near(edges, leg, window, reach)
+    }
+
+    /// Those that may be the nearest somewhere on the part `window` of `leg`.
+    fn features(&self, leg: &Segment, window: (f64, f64)) -> Vec<Feature> {
+        if self.index.is_none() {
+            return nearest::features(&self.edges, leg);
+        }
+        // The ring is nowhere farther than it would be were the leg to lead straight away from it.
+        let (from, to) = (leg.at(window.0).xy(), leg.at(window.1).xy());
+        let middle = self.ring_distance(nalgebra::center(&from, &to));
+        self.features_near(leg, window, middle + 0.5 * (to - from).norm())
     }
 
     /// Of a piece outside of the ring.
@@ -204,13 +252,16 @@ impl Polygon {
     }
 
     fn ring_distance(&self, point: Point2) -> f64 {
-        ring::distance(&self.vertices, point)
+        match &self.index {
+            Some(index) => index.distance(&self.vertices, point),
+            None => ring::distance(&self.vertices, point),
+        }
     }
 
     /// The part `window` of `leg` in order, cut where the nearest feature of the ring changes and
     /// where the leg crosses the ring.
     fn pieces(&self, leg: &Segment, window: (f64, f64)) -> Vec<Piece> {
-        let features = nearest::features(&self.edges, leg);
+        let features = self.features(leg, window);
         let mut pieces = Vec::new();
         cut(&features, window, leg.horizontal_length(), &mut |piece| {
             pieces.push(piece);

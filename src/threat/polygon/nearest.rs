@@ -94,8 +94,8 @@ pub(super) fn reach(reach: f64, length: f64) -> f64 {
 }
 
 /// Those that come within `reach` metres of the part `window` of `leg`, and maybe some more.
-pub(super) fn features_near(
-    edges: &[Edge],
+pub(super) fn features_near<'e>(
+    edges: impl IntoIterator<Item = &'e Edge>,
     leg: &Segment,
     window: (f64, f64),
     reach: f64,
@@ -238,8 +238,12 @@ pub(super) fn mark_inside(pieces: &mut Vec<Piece>, (from, to): (f64, f64)) {
     }
 }
 
-/// The clearance of `pieces` of `leg` from the ring through `vertices`.
-pub(super) fn clearance_of(pieces: &[Piece], leg: &Segment, vertices: &[Point2]) -> f64 {
+/// The clearance of `pieces` of `leg` from a ring that is `ring_distance` away from a point.
+pub(super) fn clearance_of(
+    pieces: &[Piece],
+    leg: &Segment,
+    ring_distance: impl Fn(Point2) -> f64,
+) -> f64 {
     // Inside, distance grows convexly on each piece, so that its ends hold the greatest depth.
     let within = || pieces.iter().filter(|piece| piece.inside);
     let depth = within()
@@ -250,7 +254,7 @@ pub(super) fn clearance_of(pieces: &[Piece], leg: &Segment, vertices: &[Point2])
         depth
     } else {
         within()
-            .map(|piece| ring::distance(vertices, leg.at(0.5 * (piece.t0 + piece.t1)).xy()))
+            .map(|piece| ring_distance(leg.at(0.5 * (piece.t0 + piece.t1)).xy()))
             .fold(0.0, f64::max)
     };
     if depth > 0.0 {

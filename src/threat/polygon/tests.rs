@@ -223,6 +223,31 @@ fn a_ring_of_many_vertices_agrees_with_sums() {
     }
 }
 
+/// Each of its teeth is entered and left; none of that asks all of them.
+#[test]
+fn a_leg_through_five_thousand_teeth_is_quick() {
+    let teeth = 5_000;
+    let mut corners = Vec::new();
+    for tooth in 0..teeth {
+        let y = 2.0 * f64::from(tooth);
+        corners.extend([[0.0, y], [10.0, y], [10.0, y + 1.0], [0.0, y + 1.0]]);
+    }
+    let last = 2.0 * f64::from(teeth) - 1.0;
+    corners.extend([[-5.0, last], [-5.0, 0.0]]);
+    let comb = ring(&corners, 1.0);
+    let leg = leg([5.0, -2.0, 0.0], [5.0, last + 2.0, 0.0]);
+    let (depth, exposure) = comb.encounter(&leg, (0.0, 1.0));
+    let clearance = comb.clearance(&leg, (0.0, 1.0));
+    assert!((depth - 0.5).abs() < 1e-6, "{depth}");
+    assert!((clearance + 0.5).abs() < 1e-6, "{clearance}");
+    // A metre within each tooth, three quarters in each gap, a half at either end.
+    let expected = f64::from(teeth) + 0.75 * f64::from(teeth - 1) + 1.0;
+    assert!(
+        (exposure - expected).abs() < 1e-6 * expected,
+        "{exposure} {expected}"
+    );
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases / 4, ..ProptestConfig::default() })]
 

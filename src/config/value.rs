@@ -13,7 +13,7 @@ pub(super) enum Given {
     Word(String),
     /// A string of the file.
     Text(String),
-    /// A number of the file without a fraction; a count may be greater than those of TOML's own must be.
+    /// A number of the file without a fraction. A count may go beyond 2^63, where TOML's own end.
     Integer(i128),
     /// Another number of the file.
     Float(f64),

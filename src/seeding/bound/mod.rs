@@ -163,10 +163,9 @@ fn crossing(field: &Field, events: &[Event], used: &[Event], known: f64) -> f64 
         return level.max(legs(field, events, dense));
     }
     let known = known.max(legs(field, events, 0.0));
-    // Not for its own sake, but for what the legs that leave the ends cost beyond it: by bending later, a route may climb
-    // for half as much as a string.
+    // Not for its own sake, but for what the legs that leave the ends cost beyond it.
     let climbing = ends::climbing(scenario, prices, walls, promise.bends, stop);
-    if climbing <= 0.0 || promise.cost + 0.5 * climbing <= WORTHWHILE * known {
+    if climbing <= 0.0 || promise.cost + climbing <= WORTHWHILE * known {
         return known;
     }
     prove(0.0).map_or(known, |proof| known.max(over(proof)))

@@ -13,7 +13,7 @@ pub(super) struct Family {
 }
 
 /// All kinds.
-pub(super) const FAMILIES: [Family; 9] = [
+pub(super) const FAMILIES: [Family; 10] = [
     Family {
         name: "discs",
         about: "3 to 12 discs with soft zones, weights and vehicle of the paper",
@@ -38,6 +38,11 @@ pub(super) const FAMILIES: [Family; 9] = [
         name: "polygons",
         about: "1 to 8 polygons of 3 to 9 corners, and discs",
         draw: polygons,
+    },
+    Family {
+        name: "takeoff",
+        about: "discs and polygons, from the ground to the ground, below a band that begins at 20 to 120 m",
+        draw: takeoff,
     },
     Family {
         name: "agility",
@@ -185,6 +190,17 @@ fn polygons(scene: &mut Scene) {
         let radius = scene.random.between(20.0, 60.0);
         scene.disc(radius, 20.0);
     }
+}
+
+fn takeoff(scene: &mut Scene) {
+    polygons(scene);
+    let (lowest, height) = (
+        scene.random.between(20.0, 120.0),
+        scene.random.between(60.0, 200.0),
+    );
+    scene.band = [lowest, lowest + height];
+    scene.heights = [0.0; 2];
+    scene.climb_deg = scene.random.between(25.0, 50.0);
 }
 
 fn agility(scene: &mut Scene) {

@@ -117,13 +117,14 @@ impl End<'_> {
         (w * (slant - length) + weight * (self.height - climbed)).max(0.0)
     }
 
-    /// What a level leg to `at` costs more since it cannot be level, about.
+    /// What a level leg to `at` costs more since it cannot be level, about: by bending later, one that may climb gently
+    /// climbs for half as much.
     pub(super) fn climbing_to(&self, at: Point2) -> f64 {
-        let length = (at - self.from).norm();
-        let length = self
-            .ramp
-            .map_or(length, |ramp| length.min(ramp.run(self.height)));
-        self.steepness([length; 2], self.exposed(at, 0.0)[0])
+        let (length, exposed) = ((at - self.from).norm(), self.exposed(at, 0.0)[0]);
+        self.ramp.map_or_else(
+            || 0.5 * self.gently(length, exposed),
+            |ramp| self.steepness([length.min(ramp.run(self.height)); 2], exposed),
+        )
     }
 
     /// What may be gained by looking at `kind` more closely.

@@ -1,5 +1,6 @@
 //! `noctule bench random`: the planner's default settings on scenarios that nobody has tuned it to.
 
+mod family;
 mod scene;
 
 use std::fs;
@@ -16,7 +17,7 @@ use super::summary::{mean, median};
 use super::table::{Cell, Table};
 use super::trial::{self, Trial};
 use super::{Output, progress};
-use scene::{FAMILIES, Family};
+use family::{FAMILIES, Family};
 
 /// A run that is farther from its reference than this is a miss.
 const MISS: f64 = 0.01;

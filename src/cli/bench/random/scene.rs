@@ -1,102 +1,31 @@
-//! Scenarios drawn at random, by families: each family asks another thing of the planner.
+//! A scenario in the making: where its ends, threats and peaks are drawn, and the document that it becomes.
 
 use serde_json::{Value, json};
 
 use crate::optimizer::Random;
 
-/// A kind of scenario.
-pub(super) struct Family {
-    pub(super) name: &'static str,
-    /// What its scenarios have.
-    pub(super) about: &'static str,
-    draw: fn(&mut Scene),
-}
-
-/// All kinds.
-pub(super) const FAMILIES: [Family; 10] = [
-    Family {
-        name: "discs",
-        about: "3 to 12 discs with soft zones, weights and vehicle of the paper",
-        draw: discs,
-    },
-    Family {
-        name: "crowd",
-        about: "20 to 60 discs, soft zones of 5 to 100 m, any weights",
-        draw: crowd,
-    },
-    Family {
-        name: "minefield",
-        about: "40 to 80 discs that let something through between any two, in gaps of 3 m and more",
-        draw: minefield,
-    },
-    Family {
-        name: "passable",
-        about: "1 to 20 discs, most with a base or a top within the band",
-        draw: passable,
-    },
-    Family {
-        name: "polygons",
-        about: "1 to 8 polygons of 3 to 9 corners, and discs",
-        draw: polygons,
-    },
-    Family {
-        name: "takeoff",
-        about: "discs and polygons, from the ground to the ground, below a band that begins at 20 to 120 m",
-        draw: takeoff,
-    },
-    Family {
-        name: "agility",
-        about: "discs for a vehicle that turns by 12 to 45 degrees and climbs by 8 to 30, in legs no shorter than it likes",
-        draw: agility,
-    },
-    Family {
-        name: "zones",
-        about: "wide soft zones, often over start and target, that may be worth crossing",
-        draw: zones,
-    },
-    Family {
-        name: "peaks",
-        about: "3 to 12 peaks, and up to 6 discs",
-        draw: peaks,
-    },
-    Family {
-        name: "mixed",
-        about: "all of these at once, on 50 m to 20 km, with 1 to 60 waypoints",
-        draw: mixed,
-    },
-];
-
-impl Family {
-    /// The scenario document of `seed`, its planner as it is by default but for waypoints and seed.
-    pub(super) fn scenario(&self, seed: u64) -> Value {
-        let mut scene = Scene::new(Random::new(seed));
-        (self.draw)(&mut scene);
-        scene.document(&format!("{}-{seed}", self.name))
-    }
-}
-
 /// A scenario in the making; lengths as in one whose area is a square kilometre, until it is scaled.
-struct Scene {
-    random: Random,
-    start: [f64; 2],
-    target: [f64; 2],
+pub(super) struct Scene {
+    pub(super) random: Random,
+    pub(super) start: [f64; 2],
+    pub(super) target: [f64; 2],
     /// Heights above the ground of start and target.
-    heights: [f64; 2],
-    threats: Vec<Threat>,
-    peaks: Vec<Peak>,
-    band: [f64; 2],
-    turn_deg: f64,
-    climb_deg: f64,
-    min_leg: Option<f64>,
-    weights: [f64; 3],
-    waypoints: usize,
-    scale: f64,
+    pub(super) heights: [f64; 2],
+    pub(super) threats: Vec<Threat>,
+    pub(super) peaks: Vec<Peak>,
+    pub(super) band: [f64; 2],
+    pub(super) turn_deg: f64,
+    pub(super) climb_deg: f64,
+    pub(super) min_leg: Option<f64>,
+    pub(super) weights: [f64; 3],
+    pub(super) waypoints: usize,
+    pub(super) scale: f64,
 }
 
-struct Threat {
-    center: [f64; 2],
+pub(super) struct Threat {
+    pub(super) center: [f64; 2],
     /// Of the circle about it.
-    radius: f64,
+    pub(super) radius: f64,
     margin: f64,
     /// Bearings and distances of a polygon's corners; none of a disc.
     corners: Vec<[f64; 2]>,
@@ -104,7 +33,7 @@ struct Threat {
     top: Option<f64>,
 }
 
-struct Peak {
+pub(super) struct Peak {
     center: [f64; 2],
     height: f64,
     spread: [f64; 2],
@@ -123,142 +52,8 @@ const WEIGHTS: [[f64; 3]; 6] = [
 /// Hard parts of threats are so far from start and target.
 const CLEAR: f64 = 6.0;
 
-fn discs(scene: &mut Scene) {
-    for _ in 0..scene.between(3, 12) {
-        let radius = scene.random.between(30.0, 90.0);
-        scene.disc(radius, 30.0);
-    }
-}
-
-fn crowd(scene: &mut Scene) {
-    scene.any_weights();
-    scene.waypoints = scene.between(3, 60);
-    let margin = scene.random.between(5.0, 100.0);
-    for _ in 0..scene.between(20, 60) {
-        let radius = scene.random.between(15.0, 55.0);
-        scene.disc(radius, margin);
-    }
-}
-
-fn minefield(scene: &mut Scene) {
-    scene.waypoints = scene.between(6, 40);
-    let (gap, margin) = (
-        scene.random.between(3.0, 20.0),
-        scene.random.between(10.0, 45.0),
-    );
-    let count = scene.between(40, 80);
-    // So many fit in by far; where one does not, another is drawn.
-    for _ in 0..100 * count {
-        if scene.threats.len() == count {
-            break;
-        }
-        let radius = scene.random.between(15.0, 45.0);
-        let before = scene.threats.len();
-        scene.disc(radius, margin);
-        let is_free = |one: &Threat, other: &Threat| {
-            let [x, y] = [0, 1].map(|axis| one.center[axis] - other.center[axis]);
-            libm::hypot(x, y) >= one.radius + other.radius + gap
-        };
-        let (others, last) = scene.threats.split_at(before);
-        if last
-            .iter()
-            .any(|last| !others.iter().all(|other| is_free(last, other)))
-        {
-            scene.threats.pop();
-        }
-    }
-}
-
-fn passable(scene: &mut Scene) {
-    scene.any_weights();
-    scene.waypoints = scene.between(5, 30);
-    for _ in 0..scene.between(1, 20) {
-        let radius = scene.random.between(30.0, 120.0);
-        let margin = scene.random.between(0.0, 40.0);
-        scene.disc(radius, margin);
-        scene.open_above_or_below();
-    }
-}
-
-fn polygons(scene: &mut Scene) {
-    scene.any_weights();
-    scene.waypoints = scene.between(3, 30);
-    for _ in 0..scene.between(1, 8) {
-        scene.polygon();
-    }
-    for _ in 0..scene.between(0, 6) {
-        let radius = scene.random.between(20.0, 60.0);
-        scene.disc(radius, 20.0);
-    }
-}
-
-fn takeoff(scene: &mut Scene) {
-    polygons(scene);
-    let (lowest, height) = (
-        scene.random.between(20.0, 120.0),
-        scene.random.between(60.0, 200.0),
-    );
-    scene.band = [lowest, lowest + height];
-    scene.heights = [0.0; 2];
-    scene.climb_deg = scene.random.between(25.0, 50.0);
-}
-
-fn agility(scene: &mut Scene) {
-    discs(scene);
-    scene.waypoints = scene.between(3, 20);
-    scene.turn_deg = scene.random.between(12.0, 45.0);
-    scene.climb_deg = scene.random.between(8.0, 30.0);
-    scene.min_leg = Some(scene.random.between(5.0, 40.0));
-}
-
-fn zones(scene: &mut Scene) {
-    scene.any_weights();
-    scene.waypoints = scene.between(4, 30);
-    for _ in 0..scene.between(3, 14) {
-        let (radius, margin) = (
-            scene.random.between(10.0, 60.0),
-            scene.random.between(60.0, 250.0),
-        );
-        scene.disc(radius, margin);
-    }
-}
-
-fn peaks(scene: &mut Scene) {
-    scene.waypoints = scene.between(3, 30);
-    scene.raise_peaks();
-    for _ in 0..scene.between(0, 6) {
-        let radius = scene.random.between(25.0, 60.0);
-        scene.disc(radius, 30.0);
-    }
-}
-
-fn mixed(scene: &mut Scene) {
-    scene.any_weights();
-    scene.waypoints = scene.between(1, 60);
-    scene.scale = libm::pow(10.0, scene.random.between(-1.3, 1.3));
-    scene.turn_deg = scene.random.between(25.0, 120.0);
-    scene.climb_deg = scene.random.between(12.0, 60.0);
-    if scene.chance(0.4) {
-        scene.raise_peaks();
-    }
-    for _ in 0..scene.between(0, 25) {
-        if scene.chance(0.25) {
-            scene.polygon();
-        } else {
-            let (radius, margin) = (
-                scene.random.between(15.0, 80.0),
-                scene.random.between(0.0, 90.0),
-            );
-            scene.disc(radius, margin);
-        }
-        if scene.chance(0.3) {
-            scene.open_above_or_below();
-        }
-    }
-}
-
 impl Scene {
-    fn new(mut random: Random) -> Self {
+    pub(super) fn new(mut random: Random) -> Self {
         let mut corner = |low, high| [random.between(low, high), random.between(low, high)];
         let (start, target) = (corner(50.0, 280.0), corner(720.0, 950.0));
         let heights = [random.between(0.0, 150.0), random.between(0.0, 150.0)];
@@ -280,15 +75,15 @@ impl Scene {
     }
 
     /// A whole number, both ends included.
-    fn between(&mut self, low: usize, high: usize) -> usize {
+    pub(super) fn between(&mut self, low: usize, high: usize) -> usize {
         low + self.random.below(high - low + 1)
     }
 
-    fn chance(&mut self, share: f64) -> bool {
+    pub(super) fn chance(&mut self, share: f64) -> bool {
         self.random.unit() < share
     }
 
-    fn any_weights(&mut self) {
+    pub(super) fn any_weights(&mut self) {
         self.weights = WEIGHTS[self.random.below(WEIGHTS.len())];
     }
 
@@ -300,7 +95,7 @@ impl Scene {
     }
 
     /// Clear of start and target: smaller than asked for where they are near, or nowhere at all.
-    fn disc(&mut self, radius: f64, margin: f64) {
+    pub(super) fn disc(&mut self, radius: f64, margin: f64) {
         let center = self.place();
         let room = [self.start, self.target]
             .map(|end| libm::hypot(end[0] - center[0], end[1] - center[1]) - CLEAR);
@@ -318,7 +113,7 @@ impl Scene {
     }
 
     /// A star, its corners at growing bearings; as a disc clear of start and target.
-    fn polygon(&mut self) {
+    pub(super) fn polygon(&mut self) {
         let (radius, margin) = (
             self.random.between(40.0, 140.0),
             self.random.between(0.0, 40.0),
@@ -337,7 +132,7 @@ impl Scene {
     }
 
     /// Most threats that were placed last can be passed above or below, most of these above.
-    fn open_above_or_below(&mut self) {
+    pub(super) fn open_above_or_below(&mut self) {
         let (top, base) = (
             self.random.between(0.2, 0.9) * self.band[1],
             self.random.between(0.3, 0.9) * self.band[1],
@@ -352,7 +147,7 @@ impl Scene {
         }
     }
 
-    fn raise_peaks(&mut self) {
+    pub(super) fn raise_peaks(&mut self) {
         self.band = [60.0, 260.0];
         for _ in 0..self.between(3, 12) {
             let peak = Peak {
@@ -375,7 +170,7 @@ impl Scene {
         self.peaks.iter().map(height).sum()
     }
 
-    fn document(&self, name: &str) -> Value {
+    pub(super) fn document(&self, name: &str) -> Value {
         let scale = self.scale;
         let point = |at: [f64; 2]| json!({"x": at[0] * scale, "y": at[1] * scale});
         let end = |at: [f64; 2], height: f64| {
@@ -442,25 +237,5 @@ impl Threat {
         document["base"] = height(self.base).into();
         document["top"] = height(self.top).into();
         document
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::cli::bench::case::Case;
-
-    /// Whatever the seed, a document that the reader takes; and the same one each time.
-    #[test]
-    fn every_scenario_is_valid_and_its_seeds_own() {
-        for family in &FAMILIES {
-            let documents: Vec<Value> = (1..=60).map(|seed| family.scenario(seed)).collect();
-            for (document, seed) in documents.iter().zip(1..) {
-                let case = Case::drawn(document.clone());
-                case.as_it_is().unwrap_or_else(|error| panic!("{error:#}"));
-                assert_eq!(document, &family.scenario(seed));
-            }
-            assert_ne!(documents[0]["start"], documents[1]["start"]);
-        }
     }
 }

@@ -7,7 +7,7 @@ use super::super::prices::Prices;
 use super::super::string::{narrowed, scene, shortest};
 use super::super::wall::Wall;
 use super::exposure;
-use super::ramp::{Ramp, Rates};
+use super::ramp::Ramp;
 use crate::geometry::{Point2, ring};
 use crate::seeding::arc::point_segment;
 use crate::seeding::outline::OutlineShape;
@@ -82,51 +82,6 @@ pub(super) struct End<'a> {
 }
 
 impl End<'_> {
-    /// What a leg with one of those `lengths` seen from above, `exposed` if it is the shortest, costs at least on top of
-    /// what it costs seen from above, waypoint included: it climbs, or its waypoint is off the middle.
-    fn steepness(&self, lengths: [f64; 2], exposed: f64) -> f64 {
-        let gentle = self.gently(lengths[1], exposed);
-        let Some(ramp) = self.ramp.filter(|ramp| lengths[0] >= ramp.reach) else {
-            return gentle;
-        };
-        let rates = Rates {
-            fuel: self.prices.fuel,
-            exposed,
-            weight: self.weight,
-        };
-        gentle.max(ramp.steepness(lengths, rates, self.height, self.steepest))
-    }
-
-    /// The same of a leg that may climb as gently as it likes; falls with `length`.
-    fn gently(&self, length: f64, exposed: f64) -> f64 {
-        if length.is_infinite() {
-            return 0.0;
-        }
-        // Climbing lengthens a leg in soft zones as it does elsewhere.
-        let dearer = if length > 0.0 { exposed / length } else { 0.0 };
-        let (w, weight) = (self.prices.fuel + dearer, self.weight);
-        // Flown with the slope at which a metre of climb costs as much as one off the middle.
-        let climbed = if weight < w {
-            let share = weight / w;
-            (length * share / (1.0 - share * share).sqrt()).min(self.height)
-        } else {
-            self.height
-        };
-        let climbed = climbed.min(length * self.steepest);
-        let slant = (length * length + climbed * climbed).sqrt();
-        (w * (slant - length) + weight * (self.height - climbed)).max(0.0)
-    }
-
-    /// What a level leg to `at` costs more since it cannot be level, about: by bending later, one that may climb gently
-    /// climbs for half as much.
-    pub(super) fn climbing_to(&self, at: Point2) -> f64 {
-        let (length, exposed) = ((at - self.from).norm(), self.exposed(at, 0.0)[0]);
-        self.ramp.map_or_else(
-            || 0.5 * self.gently(length, exposed),
-            |ramp| self.steepness([length.min(ramp.run(self.height)); 2], exposed),
-        )
-    }
-
     /// What may be gained by looking at `kind` more closely.
     pub(super) fn gain(&self, kind: &Kind) -> f64 {
         if kind.is_rough {
@@ -174,23 +129,6 @@ impl End<'_> {
         }
         let steepest = self.gently(shortest, kind.exposed);
         self.length_of(0.5 * (steepest + kind.steepness), kind.exposed)
-    }
-
-    /// The length from which on a leg that is `exposed` costs at most so much for climbing gently, which is not 0.
-    fn length_of(&self, steepness: f64, exposed: f64) -> f64 {
-        let (mut low, mut high) = (0.0, (self.to - self.from).norm());
-        while self.gently(high, exposed) > steepness && high < 1e12 {
-            (low, high) = (high, 2.0 * high);
-        }
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            if self.gently(middle, exposed) > steepness {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        high
     }
 
     /// `kind`, with what its legs cost at least at the price of the straight line from there.
@@ -324,7 +262,7 @@ impl End<'_> {
 
     /// What the soft zones cost of all legs to as far as `at` and within `half` radians of it: no less than the first, and
     /// of the one to `at` about the second.
-    fn exposed(&self, at: Point2, half: f64) -> [f64; 2] {
+    pub(super) fn exposed(&self, at: Point2, half: f64) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for (wall, stay) in self.counting() {
             let at = self.at_most(at, stay);

@@ -1,6 +1,7 @@
 //! What start and target at another height than the middle of the band cost on top of the string: a first leg is
 //! straight, so that where the way bends soon, it is short and steep. The argument is section 7 of docs/BOUND.md.
 
+mod climb;
 mod excess;
 mod exposure;
 mod kind;

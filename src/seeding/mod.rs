@@ -10,7 +10,7 @@ mod outline;
 mod steep;
 mod taut;
 
-pub use bound::{cheap_ways, lower_bound, lower_bound_until};
+pub use bound::{WaysSought, cheap_ways, cheapest_slip, lower_bound, lower_bound_until};
 pub use obstacles::Obstacles;
 pub use outline::{Outline, OutlineShape};
 pub use steep::steep_ground;

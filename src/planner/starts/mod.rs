@@ -58,8 +58,12 @@ const OVERLAND: usize = 8;
 /// And from each of the nets that reach far about.
 const FAR_ABOUT: usize = 16;
 
-/// A start this much dearer than the best one refined, as a share, is not worth refining.
-const HOPELESS: f64 = 0.08;
+/// A start this much dearer than the best one refined, as a share, is not worth refining. Corners drawn round a string may
+/// reach into the next soft zone.
+const HOPELESS: f64 = 0.12;
+
+/// Over hills, where starts follow the ground as they are.
+const HOPELESS_OVER_HILLS: f64 = 0.08;
 
 /// Where soft zones are dear or many, a small shift changes more of what it costs.
 const HOPELESS_IN_ZONES: f64 = 0.3;
@@ -94,7 +98,12 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let warm = known.is_some();
     let (mut legs_priced, mut evaluations) = (0, 0);
     let mut shapes: Vec<Vec<Point3>> = known.into_iter().collect();
-    let (mut low, mut hopeless) = (false, HOPELESS);
+    let mut low = false;
+    let mut hopeless = if model.scenario.terrain.is_flat() {
+        HOPELESS
+    } else {
+        HOPELESS_OVER_HILLS
+    };
     if settings.seeding == Seeding::Tangent {
         shapes.extend(along_strings(model, &is_over));
         // Who brings a route has been over the hills already.
@@ -255,8 +264,8 @@ fn along_strings(model: &Model, is_over: &dyn Fn() -> bool) -> Vec<Vec<Point3>> 
 }
 
 /// Routes over the ground: through a fine net only where the coarse one has none that can be flown as it is, and
-/// far about where the best so far pays much for soft zones, and in crowds along the ways between the threats; and
-/// whether there are such zones or crowds. What has been found once `is_over`.
+/// far about where the best so far pays much for soft zones, and along the ways between threats where these are many or
+/// near to each other; and whether there are such zones or ways. What has been found once `is_over`.
 fn over_ground(
     model: &Model,
     strings: &[Vec<Point3>],
@@ -266,9 +275,10 @@ fn over_ground(
     let cheapest = strings.iter().min_by(|one, other| one.0.rank(&other.0));
     let known = cheapest.map_or(f64::INFINITY, |(fitness, _)| fitness.cost);
     let (mut found, few) = roadmap::routes(model, OVERLAND, known, is_over);
-    let is_crowd = ways::are_worth_a_look(model);
-    if is_crowd && !is_over() {
-        let ways = ways::routes(model, is_over);
+    let flown = cheapest.filter(|(fitness, _)| fitness.is_feasible());
+    let ways_sought = ways::sought(model, flown.map_or(f64::INFINITY, |_| known), is_over);
+    if let Some(sought) = ways_sought.filter(|_| !is_over()) {
+        let ways = ways::routes(model, sought, is_over);
         found.routes.extend(ways.routes);
         found.legs_priced += ways.legs_priced;
     }
@@ -293,7 +303,7 @@ fn over_ground(
     let rounded = |route: &Vec<Point3>| rounded::rounded(model.scenario, route);
     let turned: Vec<_> = found.routes.iter().filter_map(rounded).collect();
     found.routes.extend(turned);
-    (found, detour.is_some() || is_crowd)
+    (found, detour.is_some() || ways_sought.is_some())
 }
 
 /// A route and its price.

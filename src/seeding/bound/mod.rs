@@ -24,8 +24,9 @@ use std::cell::Cell;
 
 use crate::scenario::Scenario;
 use event::Event;
+pub use event::cheapest_slip;
 use field::{Field, cost_of};
-pub use potential::cheap_ways;
+pub use potential::{WaysSought, cheap_ways};
 use prices::Prices;
 use promise::promise;
 

@@ -24,7 +24,7 @@ use mesh::Mesh;
 use priced::Priced;
 pub(super) use proof::Proof;
 use spacing::Spacing;
-pub use ways::cheap_ways;
+pub use ways::{WaysSought, cheap_ways};
 use zones::Zones;
 
 /// Vertices of a mesh that tells where the cheapest routes are, about.

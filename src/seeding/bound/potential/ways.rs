@@ -7,7 +7,7 @@ use super::priced::Priced;
 use super::spacing::Spacing;
 use super::vertices;
 use super::zones::Zones;
-use super::{FIRST, Plane, region};
+use super::{Plane, region};
 use crate::geometry::{Point2, Vector2};
 use crate::scenario::Scenario;
 use crate::seeding::bound::prices::Prices;
@@ -20,11 +20,20 @@ const DEAREST: f64 = 1.25;
 /// Ways that are traced, at most.
 const MOST_TRACED: usize = 1000;
 
-/// Up to `most` ways for a route that flies at `height`, the cheapest first, at the prices of fuel and soft zones; each
-/// passes some threat on another side than all before it. None where fuel costs nothing, start and target are not apart, or
-/// nothing leads from one to the other.
+/// How closely ways are looked for.
+#[derive(Debug, Clone, Copy)]
+pub struct WaysSought {
+    /// Vertices of the mesh that they lead over, about; where zones are many and fine, there are more.
+    pub vertices: usize,
+    /// Ways, at most.
+    pub most: usize,
+}
+
+/// Ways for a route that flies at `height`, the cheapest first, at the prices of fuel and soft zones; each passes some
+/// threat on another side than all before it. None where fuel costs nothing, start and target are not apart, or nothing
+/// leads from one to the other.
 #[must_use]
-pub fn cheap_ways(scenario: &Scenario, height: f64, most: usize) -> Vec<Vec<Point2>> {
+pub fn cheap_ways(scenario: &Scenario, height: f64, sought: WaysSought) -> Vec<Vec<Point2>> {
     let prices = Prices::of(scenario);
     if prices.fuel <= 0.0 {
         return Vec::new();
@@ -37,7 +46,7 @@ pub fn cheap_ways(scenario: &Scenario, height: f64, most: usize) -> Vec<Vec<Poin
     let plane = Plane::new(walls, &prices, &scenario.area);
     let (rect, _) = region(plane.ends, &plane.area, &prices, 0.0);
     let zones = Zones::new(&plane.walls, &prices, rect);
-    let spacing = Spacing::even(rect, &zones, FIRST);
+    let spacing = Spacing::even(rect, &zones, sought.vertices);
     let vertices = vertices::lay(plane.ends, &zones, &spacing);
     let Some(priced) = Priced::over(&vertices, &zones, &spacing) else {
         return Vec::new();
@@ -48,7 +57,7 @@ pub fn cheap_ways(scenario: &Scenario, height: f64, most: usize) -> Vec<Vec<Poin
         priced,
     };
     let to_scenario = |at: Point2| at + plane.origin;
-    ways.differing(&told_apart, most)
+    ways.differing(&told_apart, sought.most)
         .into_iter()
         .map(|way| way.into_iter().map(to_scenario).collect())
         .collect()
@@ -166,6 +175,13 @@ mod tests {
     use super::*;
     use crate::seeding::tests::scenario;
 
+    fn sought(most: usize) -> WaysSought {
+        WaysSought {
+            vertices: 1000,
+            most,
+        }
+    }
+
     /// Two discs in the way, one after the other, whose soft zones overlap in gaps of ten metres beside a third and a fourth.
     #[test]
     fn each_way_passes_some_threat_on_another_side() {
@@ -181,7 +197,7 @@ mod tests {
             )
         });
         let scenario = scenario(&format!(r#""threats": [{}]"#, discs.join(", ")));
-        let ways = cheap_ways(&scenario, 100.0, 12);
+        let ways = cheap_ways(&scenario, 100.0, sought(12));
         assert!((4..=12).contains(&ways.len()), "{}", ways.len());
         let (start, target) = (scenario.start.xy(), scenario.target.xy());
         let mut lengths = Vec::new();
@@ -216,7 +232,7 @@ mod tests {
             })
             .collect();
         let scenario = scenario(&format!(r#""threats": [{}]"#, discs.join(", ")));
-        let ways = cheap_ways(&scenario, 100.0, 3);
+        let ways = cheap_ways(&scenario, 100.0, sought(3));
         let first = ways.first().expect("there are gaps");
         let length: f64 = first
             .windows(2)

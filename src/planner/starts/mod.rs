@@ -273,10 +273,10 @@ fn over_ground(
 ) -> (Found, bool) {
     let strings = priced(model, strings);
     let cheapest = strings.iter().min_by(|one, other| one.0.rank(&other.0));
-    let known = cheapest.map_or(f64::INFINITY, |(fitness, _)| fitness.cost);
-    let (mut found, few) = roadmap::routes(model, OVERLAND, known, is_over);
+    let cost = |route: Option<&Priced>| route.map_or(f64::INFINITY, |(fitness, _)| fitness.cost);
+    let (mut found, few) = roadmap::routes(model, OVERLAND, cost(cheapest), is_over);
     let flown = cheapest.filter(|(fitness, _)| fitness.is_feasible());
-    let ways_sought = ways::sought(model, flown.map_or(f64::INFINITY, |_| known), is_over);
+    let ways_sought = ways::sought(model, cost(flown), is_over);
     if let Some(sought) = ways_sought.filter(|_| !is_over()) {
         let ways = ways::routes(model, sought, is_over);
         found.routes.extend(ways.routes);

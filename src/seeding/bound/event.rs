@@ -1,12 +1,10 @@
 //! What a route would have to do to beat the string round the widened walls, and what that costs
 //! at least: slip between two walls, cut a corner, fly over or under.
 
-use super::around;
 use super::departure::early;
 use super::prices::Prices;
 use super::wall::Wall;
 use crate::geometry::{Point2, ring};
-use crate::scenario::Scenario;
 use crate::seeding::arc::{crossing, nearest_points, point_segment};
 use crate::seeding::outline::OutlineShape;
 
@@ -115,21 +113,8 @@ pub(super) fn ramp(depth: f64, slope: f64, way: f64) -> f64 {
     way * (depth - 0.5 * slope * way)
 }
 
-/// What no route undercuts that slips through a gap between threats, where their soft zones would have it go round;
-/// infinite where there is no such gap, or there are too many to tell.
-#[must_use]
-pub fn cheapest_slip(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
-    let prices = Prices::of(scenario);
-    let walls = around::walls(scenario, &prices);
-    let slips = gaps(&walls, &prices, stop).unwrap_or_default();
-    slips
-        .iter()
-        .map(|slip| slip.cost)
-        .fold(f64::INFINITY, f64::min)
-}
-
 /// The gaps between walls that overlap when widened.
-fn gaps(walls: &[Wall], prices: &Prices, stop: &dyn Fn() -> bool) -> Option<Vec<Event>> {
+pub(super) fn gaps(walls: &[Wall], prices: &Prices, stop: &dyn Fn() -> bool) -> Option<Vec<Event>> {
     let mut cores = cores(walls);
     let low = |core: &Core| core.a.x.min(core.b.x) - walls[core.wall].wide;
     let high = |core: &Core| core.a.x.max(core.b.x) + walls[core.wall].wide;

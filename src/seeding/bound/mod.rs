@@ -24,7 +24,6 @@ use std::cell::Cell;
 
 use crate::scenario::Scenario;
 use event::Event;
-pub use event::cheapest_slip;
 use field::{Field, cost_of};
 pub use potential::{WaysSought, cheap_ways};
 use prices::Prices;
@@ -63,6 +62,23 @@ pub fn lower_bound_until(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
     let bound = round_walls(scenario, &prices, stop).max(straight);
     let bound = if bound.is_finite() { bound } else { straight };
     bound * (1.0 - ROUNDING)
+}
+
+/// What no route undercuts that slips through a gap between threats, where their soft zones would have it go round;
+/// infinite where there is no such gap, fuel costs nothing, or the threats have too many corners to tell soon.
+#[must_use]
+pub fn cheapest_slip(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
+    let prices = Prices::of(scenario);
+    if prices.fuel <= 0.0 {
+        return f64::INFINITY;
+    }
+    let walls = around::walls(scenario, &prices);
+    if ends::are_too_many(&walls) {
+        return f64::INFINITY;
+    }
+    let slips = event::gaps(&walls, &prices, stop).unwrap_or_default();
+    let costs = slips.iter().map(|slip| slip.cost);
+    costs.fold(f64::INFINITY, f64::min)
 }
 
 /// The largest cost that can be proven: by strings round walls, by a potential, and by the legs that leave the ends.

@@ -68,3 +68,34 @@ impl End<'_> {
         high
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::kind::tests::check;
+
+    #[test]
+    fn a_short_leg_climbs_no_steeper_than_allowed() {
+        check(|end| {
+            let root = 2.0_f64.sqrt();
+            assert!((end.gently(0.0, 0.0) - 100.0).abs() < 1e-9);
+            assert!((end.gently(40.0, 0.0) - (20.0 * (root - 1.0) + 60.0)).abs() < 1e-9);
+            assert!((end.gently(100.0, 0.0) - 50.0 * (root - 1.0)).abs() < 1e-9);
+            assert!(end.gently(1000.0, 0.0) < 2.5 && end.gently(f64::INFINITY, 0.0) == 0.0);
+            assert!((end.gently(end.length_of(33.0, 0.0), 0.0) - 33.0).abs() < 1e-6);
+        });
+    }
+
+    #[test]
+    fn climbing_costs_more_in_soft_zones() {
+        check(|end| {
+            // A metre costs 2 in place of 0.5: as much is climbed as a metre of climb costs one off the middle.
+            let climbed = 100.0 / 3.0_f64.sqrt();
+            let slant = (1e4 + climbed * climbed).sqrt();
+            let expected = 2.0 * (slant - 100.0) + 100.0 - climbed;
+            assert!((end.gently(100.0, 150.0) - expected).abs() < 1e-9);
+            assert!(end.gently(100.0, 150.0) > 3.0 * end.gently(100.0, 0.0));
+            let length = end.length_of(33.0, 150.0);
+            assert!((end.gently(length, 150.0) - 33.0).abs() < 1e-6);
+        });
+    }
+}

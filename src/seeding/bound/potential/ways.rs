@@ -21,7 +21,7 @@ const DEAREST: f64 = 1.25;
 const MOST_TRACED: usize = 1000;
 
 /// How closely ways are looked for.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WaysSought {
     /// Vertices of the mesh that they lead over, about; where zones are many and fine, there are more.
     pub vertices: usize,

@@ -1,6 +1,6 @@
 //! Circles that a string bends round: common tangents, angles in a sense of rotation, distances.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use nalgebra::Vector2;
 
@@ -106,9 +106,20 @@ impl Arc {
         self.on.center + self.to * self.on.radius
     }
 
-    /// Whether the arc passes the direction `way` from the centre.
+    /// Whether the arc passes the direction `way` from the centre: whether [`turn`] from its beginning to there is no more
+    /// than its own, told without an angle.
     pub(super) fn passes(&self, way: Vector2<f64>) -> bool {
-        turn(self.from, way, self.on.sense) <= self.turn
+        let sign = self.on.sense.sign();
+        let (aside, ahead) = (sign * self.from.perp(&way), self.from.dot(&way));
+        if ahead >= 0.0 && aside <= 0.0 && -aside <= NO_TURN * ahead {
+            return true;
+        }
+        // Within the first half of a circle from the beginning.
+        let [is_early, ends_early] = [aside > 0.0, self.turn < PI];
+        if is_early != ends_early {
+            return is_early;
+        }
+        self.turn > 0.0 && sign * way.perp(&self.to) >= 0.0
     }
 
     /// Distance of `point` to the arc.
@@ -229,13 +240,48 @@ pub(super) fn crossing((a, b): (Point2, Point2), (c, d): (Point2, Point2)) -> Op
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use std::f64::consts::{FRAC_PI_2, PI};
+    use std::f64::consts::FRAC_PI_2;
 
     fn rounding(x: f64, y: f64, radius: f64, sense: Sense) -> Rounding {
         Rounding {
             center: Point2::new(x, y),
             radius,
             sense,
+        }
+    }
+
+    /// Also where an arc is none, all but a circle, or half of one, and begins or ends in the direction that is asked for.
+    #[test]
+    fn an_arc_passes_what_it_turns_by() {
+        let unit = |degrees: i32| {
+            let (sin, cos) = libm::sincos(f64::from(degrees).to_radians());
+            Vector2::new(cos, sin)
+        };
+        for (sense, sign) in [(Sense::Left, 1), (Sense::Right, -1)] {
+            for (start, turned) in (0..360)
+                .step_by(24)
+                .zip([0, 1, 60, 179, 180, 181, 270, 359].into_iter().cycle())
+            {
+                let to = unit(start + sign * turned);
+                let arc = Arc::new(rounding(3.0, 4.0, 5.0, sense), unit(start), to);
+                for degrees in 0..360 {
+                    let passes = arc.passes(unit(start + sign * degrees) * 7.0);
+                    // Where it ends is a matter of rounding.
+                    assert!(
+                        passes == (degrees <= turned) || degrees == turned,
+                        "{arc:?} {degrees}"
+                    );
+                }
+                assert!(arc.passes(arc.from) && arc.passes(Vector2::zeros()));
+            }
+            let hair = Vector2::new(1.0, -1e-12 * f64::from(sign));
+            let none = Arc::new(rounding(0.0, 0.0, 1.0, sense), Vector2::new(1.0, 0.0), hair);
+            assert!(
+                none.turn <= 0.0
+                    && none.passes(hair)
+                    && !none.passes(unit(sign * 5))
+                    && !none.passes(unit(-sign * 5))
+            );
         }
     }
 

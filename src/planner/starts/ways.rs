@@ -20,13 +20,19 @@ const CROWD: usize = 16;
 const IN_CROWDS: WaysSought = WaysSought {
     vertices: 1000,
     most: 24,
+    dearest: f64::INFINITY,
 };
 
 /// Elsewhere: strings and nets bring most of the ways.
 const AMONG_FEW: WaysSought = WaysSought {
     vertices: 800,
     most: 8,
+    dearest: f64::INFINITY,
 };
+
+/// There, a way so many times as dear as what is known is not worth a look. In steps over a mesh it may be a little dearer
+/// than the route that comes of it.
+const DEAREST: f64 = 1.1;
 
 /// How closely such ways are looked for over level ground, if they are worth a look: in a crowd, and where one through a
 /// gap may cost less than what is `known`.
@@ -37,7 +43,10 @@ pub(super) fn sought(model: &Model, known: f64, is_over: &dyn Fn() -> bool) -> O
     } else if scenario.threats.len() >= CROWD {
         Some(IN_CROWDS)
     } else {
-        (cheapest_slip(scenario, is_over) < known).then_some(AMONG_FEW)
+        (cheapest_slip(scenario, is_over) < known).then_some(WaysSought {
+            dearest: DEAREST * known,
+            ..AMONG_FEW
+        })
     }
 }
 
@@ -151,7 +160,9 @@ mod tests {
         assert_eq!(of(&scenario, 1e6), None);
         scenario.threats = vec![radar(415.0, 500.0, 60.0), radar(585.0, 500.0, 60.0)];
         let direct = 0.5 * (scenario.target - scenario.start).norm();
-        assert_eq!(of(&scenario, 2.0 * direct), Some(AMONG_FEW));
+        let sought = of(&scenario, 2.0 * direct).expect("through the gap is not dearer");
+        assert_eq!(sought.most, AMONG_FEW.most);
+        assert!(sought.dearest < 2.3 * direct);
         assert_eq!(of(&scenario, direct), None);
         scenario.weights.fuel = 0.0;
         assert_eq!(of(&scenario, 1e6), None);

@@ -21,12 +21,14 @@ const DEAREST: f64 = 1.25;
 const MOST_TRACED: usize = 1000;
 
 /// How closely ways are looked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WaysSought {
     /// Vertices of the mesh that they lead over, about; where zones are many and fine, there are more.
     pub vertices: usize,
     /// Ways, at most.
     pub most: usize,
+    /// What a way may cost at most.
+    pub dearest: f64,
 }
 
 /// Ways for a route that flies at `height`, the cheapest first, at the prices of fuel and soft zones; each passes some
@@ -57,7 +59,7 @@ pub fn cheap_ways(scenario: &Scenario, height: f64, sought: WaysSought) -> Vec<V
         priced,
     };
     let to_scenario = |at: Point2| at + plane.origin;
-    ways.differing(&told_apart, sought.most)
+    ways.differing(&told_apart, &sought)
         .into_iter()
         .map(|way| way.into_iter().map(to_scenario).collect())
         .collect()
@@ -71,28 +73,29 @@ struct Ways {
 
 impl Ways {
     /// The cheapest way over each node that no way before comes near to, unless one of these passes all walls on the same sides.
-    fn differing(&self, walls: &[&Wall], most: usize) -> Vec<Vec<Point2>> {
+    fn differing(&self, walls: &[&Wall], sought: &WaysSought) -> Vec<Vec<Point2>> {
         let mesh = &self.priced.mesh;
         let nodes = &mesh.nodes;
         let cost = |node: usize| self.costs[0][node] + self.costs[1][node];
-        let dearest = DEAREST * cost(0);
+        let dearest = sought.dearest.min(DEAREST * cost(0));
         let mut over: Vec<usize> = (0..nodes.len())
             .filter(|node| cost(*node) <= dearest && cost(*node).is_finite())
             .collect();
         over.sort_by(|&one, &other| cost(one).total_cmp(&cost(other)).then(one.cmp(&other)));
         let mut is_passed = vec![false; nodes.len()];
+        let mut nexts = [vec![None; nodes.len()], vec![None; nodes.len()]];
         let mut traced = 0;
         let mut known = HashSet::new();
         let mut ways = Vec::new();
         for node in over {
-            if ways.len() == most || traced == MOST_TRACED {
+            if ways.len() == sought.most || traced == MOST_TRACED {
                 break;
             }
             if is_passed[node] {
                 continue;
             }
             traced += 1;
-            let Some(chain) = self.over(node) else {
+            let Some(chain) = self.over(&mut nexts, node) else {
                 continue;
             };
             for at in &chain {
@@ -111,39 +114,46 @@ impl Ways {
     }
 
     /// From start to target over `node`.
-    fn over(&self, node: usize) -> Option<Vec<usize>> {
-        let mut chain = self.trace(0, node)?;
+    fn over(&self, nexts: &mut [Vec<Option<usize>>; 2], node: usize) -> Option<Vec<usize>> {
+        let mut chain = self.trace(0, &mut nexts[0], node)?;
         chain.reverse();
-        chain.extend(self.trace(1, node)?.into_iter().skip(1));
+        chain.extend(self.trace(1, &mut nexts[1], node)?.into_iter().skip(1));
         Some(chain)
     }
 
-    /// From `node` to an end, from node to node of triangles that share them.
-    fn trace(&self, end: usize, node: usize) -> Option<Vec<usize>> {
-        let (mesh, costs) = (&self.priced.mesh, &self.costs[end]);
+    /// From `node` to an end, from node to node of triangles that share them. `nexts` are those that are known.
+    fn trace(&self, end: usize, nexts: &mut [Option<usize>], node: usize) -> Option<Vec<usize>> {
         let mut chain = vec![node];
         let mut at = node;
         while at != end {
-            let mut cheapest = (f64::INFINITY, at);
-            for &(triangle, which) in mesh.round(at) {
-                let limits = &self.priced.limits[triangle];
-                let others = mesh.triangles[triangle].nodes.into_iter().enumerate();
-                for (other, next) in others.filter(|(_, next)| costs[*next] < costs[at]) {
-                    let metre = 0.5 * (limits[which] + limits[other]);
-                    let way = (mesh.nodes[next] - mesh.nodes[at]).norm();
-                    let cost = costs[next] + metre * way;
-                    if cost < cheapest.0 {
-                        cheapest = (cost, next);
-                    }
-                }
-            }
-            if cheapest.1 == at {
-                return None;
-            }
-            at = cheapest.1;
+            let next = match nexts[at] {
+                Some(next) => next,
+                None => self.next(end, at)?,
+            };
+            nexts[at] = Some(next);
+            at = next;
             chain.push(at);
         }
         Some(chain)
+    }
+
+    /// Over which node it is cheapest from `at` to an end.
+    fn next(&self, end: usize, at: usize) -> Option<usize> {
+        let (mesh, costs) = (&self.priced.mesh, &self.costs[end]);
+        let mut cheapest = (f64::INFINITY, None);
+        for &(triangle, which) in mesh.round(at) {
+            let limits = &self.priced.limits[triangle];
+            let others = mesh.triangles[triangle].nodes.into_iter().enumerate();
+            for (other, next) in others.filter(|(_, next)| costs[*next] < costs[at]) {
+                let metre = 0.5 * (limits[which] + limits[other]);
+                let way = (mesh.nodes[next] - mesh.nodes[at]).norm();
+                let cost = costs[next] + metre * way;
+                if cost < cheapest.0 {
+                    cheapest = (cost, Some(next));
+                }
+            }
+        }
+        cheapest.1
     }
 }
 
@@ -179,6 +189,7 @@ mod tests {
         WaysSought {
             vertices: 1000,
             most,
+            dearest: f64::INFINITY,
         }
     }
 

@@ -271,23 +271,20 @@ fn over_ground(
     strings: &[Vec<Point3>],
     is_over: &dyn Fn() -> bool,
 ) -> (Found, bool) {
-    let strings = priced(model, strings);
-    let cheapest = strings.iter().min_by(|one, other| one.0.rank(&other.0));
-    let cost = |route: Option<&Priced>| route.map_or(f64::INFINITY, |(fitness, _)| fitness.cost);
-    let (mut found, few) = roadmap::routes(model, OVERLAND, cost(cheapest), is_over);
-    let flown = cheapest.filter(|(fitness, _)| fitness.is_feasible());
-    let ways_sought = ways::sought(model, cost(flown), is_over);
+    let cheapest = priced(model, strings).min_by(by_rank);
+    let dearest = cheapest.map_or(f64::INFINITY, |(fitness, _)| fitness.cost);
+    let (mut found, few) = roadmap::routes(model, OVERLAND, dearest, is_over);
+    let flown = [best_of(model, strings), best_of(model, &few)];
+    let known = flown.into_iter().chain([best_of(model, &found.routes)]);
+    let known = known.flatten().min_by(by_rank);
+    let ways_sought = ways::sought(model, known.map(|(fitness, _)| fitness.cost), is_over);
     if let Some(sought) = ways_sought.filter(|_| !is_over()) {
         let ways = ways::routes(model, sought, is_over);
         found.routes.extend(ways.routes);
         found.legs_priced += ways.legs_priced;
     }
-    let over = best_of(model, priced(model, &found.routes));
-    let best = over
-        .into_iter()
-        .chain(best_of(model, priced(model, &few)))
-        .chain(best_of(model, strings))
-        .min_by(|one, other| one.0.rank(&other.0));
+    let over = best_of(model, &found.routes);
+    let best = flown.into_iter().chain([over]).flatten().min_by(by_rank);
     let detour = best.and_then(|(_, route)| exposed::detour(model, route));
     if over.is_none() || detour.is_some() {
         let count = if detour.is_some() {
@@ -309,19 +306,21 @@ fn over_ground(
 /// A route and its price.
 type Priced<'r> = (Fitness, &'r [Point3]);
 
-fn priced<'r>(model: &Model, routes: &'r [Vec<Point3>]) -> Vec<Priced<'r>> {
+fn by_rank(one: &Priced, other: &Priced) -> std::cmp::Ordering {
+    one.0.rank(&other.0)
+}
+
+fn priced<'r>(model: &Model, routes: &'r [Vec<Point3>]) -> impl Iterator<Item = Priced<'r>> {
     let priced = |route: &'r Vec<Point3>| (price(model, route), route.as_slice());
-    routes.iter().map(priced).collect()
+    routes.iter().map(priced)
 }
 
 /// The best of `routes` that can be flown as it is.
-fn best_of<'r>(model: &Model, routes: Vec<Priced<'r>>) -> Option<Priced<'r>> {
-    routes
-        .into_iter()
-        .filter(|(fitness, route)| {
-            fitness.is_feasible() && route.len() - 2 <= model.scenario.planner.waypoints
-        })
-        .min_by(|one, other| one.0.rank(&other.0))
+fn best_of<'r>(model: &Model, routes: &'r [Vec<Point3>]) -> Option<Priced<'r>> {
+    let most = model.scenario.planner.waypoints + 2;
+    let flown = priced(model, routes)
+        .filter(|(fitness, route)| fitness.is_feasible() && route.len() <= most);
+    flown.min_by(by_rank)
 }
 
 /// The route along `string`, in the middle of the band where it can be reached.

@@ -34,20 +34,22 @@ const AMONG_FEW: WaysSought = WaysSought {
 /// than the route that comes of it.
 const DEAREST: f64 = 1.1;
 
-/// How closely such ways are looked for over level ground, if they are worth a look: in a crowd, and where one through a
-/// gap may cost less than what is `known`.
-pub(super) fn sought(model: &Model, known: f64, is_over: &dyn Fn() -> bool) -> Option<WaysSought> {
+/// How closely such ways are looked for, if they are worth a look: in a crowd, and where one through a gap may cost less
+/// than what is `known`.
+pub(super) fn sought(
+    model: &Model,
+    known: Option<f64>,
+    is_over: &dyn Fn() -> bool,
+) -> Option<WaysSought> {
     let scenario = model.scenario;
-    if !scenario.terrain.is_flat() {
-        None
-    } else if scenario.threats.len() >= CROWD {
-        Some(IN_CROWDS)
-    } else {
-        (cheapest_slip(scenario, is_over) < known).then_some(WaysSought {
-            dearest: DEAREST * known,
-            ..AMONG_FEW
-        })
+    if scenario.threats.len() >= CROWD {
+        return Some(IN_CROWDS);
     }
+    let known = known.unwrap_or(f64::INFINITY);
+    (cheapest_slip(scenario, is_over) < known).then_some(WaysSought {
+        dearest: DEAREST * known,
+        ..AMONG_FEW
+    })
 }
 
 /// Routes of at most as many free waypoints as `model` asks for, each along another way; fewer once `is_over`.
@@ -77,12 +79,14 @@ pub(super) fn routes(model: &Model, sought: WaysSought, is_over: &dyn Fn() -> bo
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Point2;
     use crate::optimizer::{Fitness, Random};
     use crate::planner::price::price;
     use crate::planner::starts::{along_strings, roadmap};
     use crate::planner::tests::{radar, scenario};
     use crate::planner::{Nobody, plan};
     use crate::scenario::{Scenario, Seeding};
+    use crate::terrain::{Peak, Peaks, Terrain};
     use crate::threat::Shape;
 
     /// Sixty discs at random, in gaps of ten metres and more.
@@ -112,7 +116,8 @@ mod tests {
         scenario
     }
 
-    /// Fourteen discs, of which the soft zones of two overlap by four metres: a route costs 588 through that gap, 699 round it.
+    /// Fourteen discs, of which the soft zones of two overlap by four metres: a route costs 588 through that gap, 699 round
+    /// it. So it is with a hill far off.
     #[test]
     fn a_gap_between_few_threats_is_passed() {
         let discs = [
@@ -146,16 +151,28 @@ mod tests {
         (scenario.target.x, scenario.target.y) = (886.0, 839.0);
         (scenario.altitude.min, scenario.altitude.max) = (60.0, 260.0);
         (scenario.planner.seeding, scenario.planner.polish) = (Seeding::Tangent, true);
-        let outcome = plan(&scenario, &mut Nobody, &Nobody);
-        assert!(outcome.feasible);
-        assert!(outcome.cost.total < 590.0, "{}", outcome.cost.total);
+        let hill = Terrain::Peaks(Peaks {
+            base: 0.0,
+            peaks: vec![Peak {
+                center: Point2::new(900.0, 100.0),
+                height: 60.0,
+                spread: Point2::new(60.0, 60.0),
+            }],
+        });
+        for terrain in [scenario.terrain.clone(), hill] {
+            scenario.terrain = terrain;
+            let outcome = plan(&scenario, &mut Nobody, &Nobody);
+            assert!(outcome.feasible);
+            assert!(outcome.cost.total < 590.0, "{}", outcome.cost.total);
+        }
     }
 
     /// Among few threats where a gap is no dearer than what is known, and only there.
     #[test]
     fn ways_among_few_threats_are_looked_for_where_a_gap_may_be_cheaper() {
         let mut scenario = scenario();
-        let of = |scenario: &Scenario, known: f64| sought(&Model::new(scenario), known, &|| false);
+        let of =
+            |scenario: &Scenario, known: f64| sought(&Model::new(scenario), Some(known), &|| false);
         scenario.threats = vec![radar(400.0, 500.0, 60.0), radar(700.0, 500.0, 60.0)];
         assert_eq!(of(&scenario, 1e6), None);
         scenario.threats = vec![radar(415.0, 500.0, 60.0), radar(585.0, 500.0, 60.0)];
@@ -175,7 +192,7 @@ mod tests {
         for seed in 1..=8 {
             let scenario = minefield(seed);
             let model = Model::new(&scenario);
-            let sought = sought(&model, 0.0, &|| false).expect("it is a crowd");
+            let sought = sought(&model, None, &|| false).expect("it is a crowd");
             let best = |routes: &[Vec<Point3>]| {
                 let flown = routes.iter().filter(|route| route.len() <= 22);
                 let prices = flown.map(|route| price(&model, route));

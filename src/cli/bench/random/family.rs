@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::scene::{Scene, Threat};
+use super::scene::Scene;
 use crate::optimizer::Random;
 
 /// A kind of scenario.
@@ -14,7 +14,7 @@ pub(super) struct Family {
 }
 
 /// All kinds.
-pub(super) const FAMILIES: [Family; 10] = [
+pub(super) const FAMILIES: [Family; 12] = [
     Family {
         name: "discs",
         about: "3 to 12 discs with soft zones, weights and vehicle of the paper",
@@ -29,6 +29,11 @@ pub(super) const FAMILIES: [Family; 10] = [
         name: "minefield",
         about: "40 to 80 discs that let something through between any two, in gaps of 3 m and more",
         draw: minefield,
+    },
+    Family {
+        name: "gaps",
+        about: "6 to 15 discs, up to 40 m apart, soft zones of 20 to 40 m that overlap in the gaps",
+        draw: gaps,
     },
     Family {
         name: "passable",
@@ -59,6 +64,11 @@ pub(super) const FAMILIES: [Family; 10] = [
         name: "peaks",
         about: "3 to 12 peaks, and up to 6 discs",
         draw: peaks,
+    },
+    Family {
+        name: "valleys",
+        about: "6 to 30 such discs among 3 to 12 peaks",
+        draw: valleys,
     },
     Family {
         name: "mixed",
@@ -100,25 +110,34 @@ fn minefield(scene: &mut Scene) {
         scene.random.between(10.0, 45.0),
     );
     let count = scene.between(40, 80);
-    // So many fit in by far; where one does not, another is drawn.
+    fill(scene, count, |scene| {
+        let radius = scene.random.between(15.0, 45.0);
+        scene.disc_apart(radius, margin, gap);
+    });
+}
+
+fn gaps(scene: &mut Scene) {
+    scene.waypoints = scene.between(5, 40);
+    let count = scene.between(6, 15);
+    near_to_each_other(scene, count);
+}
+
+/// Discs that leave gaps in which their soft zones overlap.
+fn near_to_each_other(scene: &mut Scene, count: usize) {
+    fill(scene, count, |scene| {
+        let [radius, margin, gap] = [(25.0, 80.0), (20.0, 40.0), (0.0, 40.0)]
+            .map(|(low, high)| scene.random.between(low, high));
+        scene.disc_apart(radius, margin, gap);
+    });
+}
+
+/// Draw until there are so many threats: those asked for fit in by far, but not each that is drawn does.
+fn fill(scene: &mut Scene, count: usize, draw: impl Fn(&mut Scene)) {
     for _ in 0..100 * count {
         if scene.threats.len() == count {
             break;
         }
-        let radius = scene.random.between(15.0, 45.0);
-        let before = scene.threats.len();
-        scene.disc(radius, margin);
-        let is_free = |one: &Threat, other: &Threat| {
-            let [x, y] = [0, 1].map(|axis| one.center[axis] - other.center[axis]);
-            libm::hypot(x, y) >= one.radius + other.radius + gap
-        };
-        let (others, last) = scene.threats.split_at(before);
-        if last
-            .iter()
-            .any(|last| !others.iter().all(|other| is_free(last, other)))
-        {
-            scene.threats.pop();
-        }
+        draw(scene);
     }
 }
 
@@ -183,6 +202,13 @@ fn peaks(scene: &mut Scene) {
         let radius = scene.random.between(25.0, 60.0);
         scene.disc(radius, 30.0);
     }
+}
+
+fn valleys(scene: &mut Scene) {
+    scene.waypoints = scene.between(5, 40);
+    scene.raise_peaks();
+    let count = scene.between(6, 30);
+    near_to_each_other(scene, count);
 }
 
 fn mixed(scene: &mut Scene) {

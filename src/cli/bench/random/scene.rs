@@ -23,9 +23,9 @@ pub(super) struct Scene {
 }
 
 pub(super) struct Threat {
-    pub(super) center: [f64; 2],
+    center: [f64; 2],
     /// Of the circle about it.
-    pub(super) radius: f64,
+    radius: f64,
     margin: f64,
     /// Bearings and distances of a polygon's corners; none of a disc.
     corners: Vec<[f64; 2]>,
@@ -109,6 +109,23 @@ impl Scene {
                 base: None,
                 top: None,
             });
+        }
+    }
+
+    /// As a disc, or nowhere where another threat is nearer than `gap`.
+    pub(super) fn disc_apart(&mut self, radius: f64, margin: f64, gap: f64) {
+        let before = self.threats.len();
+        self.disc(radius, margin);
+        let is_near = |one: &Threat, other: &Threat| {
+            let [x, y] = [0, 1].map(|axis| one.center[axis] - other.center[axis]);
+            libm::hypot(x, y) < one.radius + other.radius + gap
+        };
+        let (others, last) = self.threats.split_at(before);
+        if last
+            .iter()
+            .any(|last| others.iter().any(|other| is_near(last, other)))
+        {
+            self.threats.truncate(before);
         }
     }
 

@@ -47,7 +47,7 @@ pub(super) fn plain(model: &Model, log: &mut Log) -> StopReason {
     let scenario = model.scenario;
     let iterations = 0..=scenario.planner.iterations;
     let (_, reason) = run(model, &mut routes, iterations, log);
-    finish(model, reason, &[], log)
+    finish(model, reason, [&[], &[]], log)
 }
 
 /// From `starts`, best first: bats about coarse routes, then about whole ones, then polish.
@@ -84,6 +84,7 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
             }
         }
     }
+    let beyond = starts.beyond;
     let mut elites = whole(elites, log);
     // What spare waypoints cost is not seen in coarse routes: one that was left may be the best of all.
     let best_starts = whole(best_starts, log);
@@ -96,12 +97,17 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         reason = why;
     }
     elites.extend(best_starts);
-    finish(model, reason, &elites, log)
+    finish(model, reason, [&elites, &beyond], log)
 }
 
 /// Polish the best route, as the last point of the curve, unless it is good enough already; it may be after. Where the
-/// vehicle's limits decide its shape, `others` that lead elsewhere may become better.
-fn finish(model: &Model, reason: StopReason, others: &[Vec<Point3>], log: &mut Log) -> StopReason {
+/// vehicle's limits decide its shape, `others` that lead elsewhere may become better, and so may those `beyond` limits.
+fn finish(
+    model: &Model,
+    reason: StopReason,
+    [others, beyond]: [&[Vec<Point3>]; 2],
+    log: &mut Log,
+) -> StopReason {
     if model.scenario.planner.polish && reason != StopReason::Converged {
         let mut candidates = vec![log.route.clone()];
         // Where the best so far is as a search began, what its bats came to may be better when polished.
@@ -111,7 +117,7 @@ fn finish(model: &Model, reason: StopReason, others: &[Vec<Point3>], log: &mut L
                 log.offer(&route, fitness);
             }
         }
-        bring_home(model, others, log);
+        bring_home(model, [others, beyond], log);
         log.last_point();
     }
     if reason == StopReason::Iterations && log.has_converged() {
@@ -120,12 +126,14 @@ fn finish(model: &Model, reason: StopReason, others: &[Vec<Point3>], log: &mut L
     reason
 }
 
-/// The last metres of a route that turns or climbs as sharply as it may, or has many waypoints over hills.
-fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
+/// The last metres of a route that turns or climbs as sharply as it may, or has many waypoints over hills; and whole routes
+/// that are brought within limits from `beyond` them.
+fn bring_home(model: &Model, [others, beyond]: [&[Vec<Point3>]; 2], log: &mut Log) {
     let mut route = log.route.clone();
     let is_free = log.best.is_feasible() && !newton::is_felt(model, &route);
     let is_level = model.scenario.terrain.is_flat();
-    let is_done = is_free && (is_level || model.scenario.planner.waypoints < ROOMY);
+    let is_roomy = !is_level && model.scenario.planner.waypoints >= ROOMY;
+    let is_done = is_free && !is_roomy && beyond.is_empty();
     if is_done || why_stop(model.scenario, log.stop).is_some() {
         return;
     }
@@ -141,6 +149,12 @@ fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
     let fitness = newton.improve(&mut route, &elsewhere);
     log.evaluations += newton.evaluations;
     log.offer(&route, fitness);
+    for route in beyond {
+        let (mut newton, mut route) = (Newton::new(model, log.stop), route.clone());
+        let fitness = newton.improve(&mut route, &[]);
+        log.evaluations += newton.evaluations;
+        log.offer(&route, fitness);
+    }
 }
 
 /// Improve `route` by `steps`, if the scenario asks for polish.

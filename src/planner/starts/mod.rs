@@ -18,6 +18,7 @@ mod tangents;
 mod thin;
 mod trails;
 mod ways;
+mod wider;
 mod worth;
 
 pub(super) use count::with_waypoints;
@@ -83,6 +84,8 @@ const GAIN_OF_KNOWN: f64 = 1e-4;
 pub(super) struct Starts {
     /// Best first, all with as many waypoints.
     pub(super) routes: Vec<Vec<Point3>>,
+    /// Routes of as many waypoints as are asked for that break limits, but may become better than all others.
+    pub(super) beyond: Vec<Vec<Point3>>,
     /// Routes priced on the way.
     pub(super) evaluations: u64,
 }
@@ -98,7 +101,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     let warm = known.is_some();
     let (mut legs_priced, mut evaluations) = (0, 0);
     let mut shapes: Vec<Vec<Point3>> = known.into_iter().collect();
-    let mut low = false;
+    let (mut low, mut rough) = (false, false);
     let mut hopeless = if model.scenario.terrain.is_flat() {
         HOPELESS
     } else {
@@ -108,7 +111,8 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
         shapes.extend(along_strings(model, &is_over));
         // Who brings a route has been over the hills already.
         if !warm {
-            let (found, rough) = over_ground(model, &shapes, &is_over);
+            let (found, is_rough) = over_ground(model, &shapes, &is_over);
+            rough = is_rough;
             if rough {
                 hopeless = HOPELESS_IN_ZONES;
             }
@@ -133,6 +137,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     };
     let mut starts = Starts {
         routes: Vec::new(),
+        beyond: Vec::new(),
         evaluations: evaluations + legs_priced / (coarse as u64 + 1),
     };
     let mut priced: Vec<(Fitness, Vec<Point3>)> = Vec::new();
@@ -152,6 +157,11 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     if settings.polish {
         let hopeless = if warm { 0.0 } else { hopeless };
         refine(model, &mut priced, hopeless, stop, &mut starts.evaluations);
+        if rough && !model.scenario.terrain.is_flat() {
+            let (beyond, evaluations) = wider::routes(model, &priced, stop);
+            starts.beyond = beyond;
+            starts.evaluations += evaluations;
+        }
     }
     priced.truncate(STARTS);
     starts.routes = priced.into_iter().map(|(_, route)| route).collect();

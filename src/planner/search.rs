@@ -47,7 +47,7 @@ pub(super) fn plain(model: &Model, log: &mut Log) -> StopReason {
     let scenario = model.scenario;
     let iterations = 0..=scenario.planner.iterations;
     let (_, reason) = run(model, &mut routes, iterations, log);
-    finish(model, reason, [&[], &[]], log)
+    finish(model, reason, &[], &[], log)
 }
 
 /// From `starts`, best first: bats about coarse routes, then about whole ones, then polish.
@@ -84,7 +84,6 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
             }
         }
     }
-    let beyond = starts.beyond;
     let mut elites = whole(elites, log);
     // What spare waypoints cost is not seen in coarse routes: one that was left may be the best of all.
     let best_starts = whole(best_starts, log);
@@ -97,7 +96,7 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         reason = why;
     }
     elites.extend(best_starts);
-    finish(model, reason, [&elites, &beyond], log)
+    finish(model, reason, &elites, &starts.beyond, log)
 }
 
 /// Polish the best route, as the last point of the curve, unless it is good enough already; it may be after. Where the
@@ -105,7 +104,8 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
 fn finish(
     model: &Model,
     reason: StopReason,
-    [others, beyond]: [&[Vec<Point3>]; 2],
+    others: &[Vec<Point3>],
+    beyond: &[Vec<Point3>],
     log: &mut Log,
 ) -> StopReason {
     if model.scenario.planner.polish && reason != StopReason::Converged {
@@ -117,7 +117,8 @@ fn finish(
                 log.offer(&route, fitness);
             }
         }
-        bring_home(model, [others, beyond], log);
+        bring_home(model, others, log);
+        bring_within(model, beyond, log);
         log.last_point();
     }
     if reason == StopReason::Iterations && log.has_converged() {
@@ -126,14 +127,12 @@ fn finish(
     reason
 }
 
-/// The last metres of a route that turns or climbs as sharply as it may, or has many waypoints over hills; and whole routes
-/// that are brought within limits from `beyond` them.
-fn bring_home(model: &Model, [others, beyond]: [&[Vec<Point3>]; 2], log: &mut Log) {
+/// The last metres of a route that turns or climbs as sharply as it may, or has many waypoints over hills.
+fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
     let mut route = log.route.clone();
     let is_free = log.best.is_feasible() && !newton::is_felt(model, &route);
     let is_level = model.scenario.terrain.is_flat();
-    let is_roomy = !is_level && model.scenario.planner.waypoints >= ROOMY;
-    let is_done = is_free && !is_roomy && beyond.is_empty();
+    let is_done = is_free && (is_level || model.scenario.planner.waypoints < ROOMY);
     if is_done || why_stop(model.scenario, log.stop).is_some() {
         return;
     }
@@ -149,7 +148,15 @@ fn bring_home(model: &Model, [others, beyond]: [&[Vec<Point3>]; 2], log: &mut Lo
     let fitness = newton.improve(&mut route, &elsewhere);
     log.evaluations += newton.evaluations;
     log.offer(&route, fitness);
+}
+
+/// What becomes of routes that break limits when these are felt: from round to round of Newton's method, what is beyond them
+/// costs more.
+fn bring_within(model: &Model, beyond: &[Vec<Point3>], log: &mut Log) {
     for route in beyond {
+        if why_stop(model.scenario, log.stop).is_some() {
+            return;
+        }
         let (mut newton, mut route) = (Newton::new(model, log.stop), route.clone());
         let fitness = newton.improve(&mut route, &[]);
         log.evaluations += newton.evaluations;

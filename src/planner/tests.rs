@@ -6,23 +6,28 @@ use crate::scenario::{AltitudeBand, Frame, PlannerSettings, Seeding, Vehicle, Wa
 use crate::terrain::{Flat, Peak, Peaks, Terrain};
 use crate::threat::{Cylinder, Shape, Threat};
 
-/// The same among hills, over which a route must keep between 30 and 150 m.
-pub(super) fn hilly_scenario() -> Scenario {
-    let peak = |x, y, height, spread| Peak {
+/// Mountains, each by its centre, its height, and how wide and deep it is.
+pub(super) fn peaks(base: f64, peaks: &[[f64; 5]]) -> Terrain {
+    let peak = |&[x, y, height, wide, deep]: &[f64; 5]| Peak {
         center: Point2::new(x, y),
         height,
-        spread: Point2::new(spread, 0.8 * spread),
+        spread: Point2::new(wide, deep),
     };
+    let peaks = peaks.iter().map(peak).collect();
+    Terrain::Peaks(Peaks { base, peaks })
+}
+
+/// The same among hills, over which a route must keep between 30 and 150 m.
+pub(super) fn hilly_scenario() -> Scenario {
     let mut scenario = scenario();
-    scenario.terrain = Terrain::Peaks(Peaks {
-        base: -20.0,
-        peaks: vec![
-            peak(420.0, 360.0, 180.0, 90.0),
-            peak(600.0, 500.0, 240.0, 110.0),
-            peak(300.0, 600.0, 150.0, 70.0),
-            peak(520.0, 690.0, -60.0, 60.0),
-        ],
-    });
+    let round = |x, y, height, spread| [x, y, height, spread, 0.8 * spread];
+    let hills = [
+        round(420.0, 360.0, 180.0, 90.0),
+        round(600.0, 500.0, 240.0, 110.0),
+        round(300.0, 600.0, 150.0, 70.0),
+        round(520.0, 690.0, -60.0, 60.0),
+    ];
+    scenario.terrain = peaks(-20.0, &hills);
     scenario.altitude = AltitudeBand {
         min: 30.0,
         max: 150.0,
@@ -32,12 +37,17 @@ pub(super) fn hilly_scenario() -> Scenario {
 
 /// With a soft zone of 30 m.
 pub(super) fn radar(x: f64, y: f64, radius: f64) -> Threat {
+    disc([x, y, radius, radius + 30.0])
+}
+
+/// By its centre, radius and influence.
+pub(super) fn disc([x, y, radius, influence]: [f64; 4]) -> Threat {
     Threat {
         name: Some(format!("radar at {x}, {y}")),
         shape: Shape::Cylinder(Cylinder {
             center: Point2::new(x, y),
             radius,
-            influence: radius + 30.0,
+            influence,
         }),
         base: None,
         top: None,
@@ -324,19 +334,14 @@ fn many_waypoints_over_hills_are_moved_together() {
     scenario.start = Point3::new(277.9, 144.1, 32.4);
     scenario.target = Point3::new(819.0, 858.1, 86.5);
     scenario.threats.clear();
-    let peak = |x, y, height, wide, deep| Peak {
-        center: Point2::new(x, y),
-        height,
-        spread: Point2::new(wide, deep),
-    };
-    scenario.terrain = Terrain::Peaks(Peaks {
-        base: 0.0,
-        peaks: vec![
-            peak(529.0, 788.0, 293.0, 129.0, 141.0),
-            peak(536.0, 458.0, 241.0, 87.0, 97.0),
-            peak(522.0, 341.0, 289.0, 149.0, 126.0),
+    scenario.terrain = peaks(
+        0.0,
+        &[
+            [529.0, 788.0, 293.0, 129.0, 141.0],
+            [536.0, 458.0, 241.0, 87.0, 97.0],
+            [522.0, 341.0, 289.0, 149.0, 126.0],
         ],
-    });
+    );
     scenario.altitude = AltitudeBand {
         min: 60.0,
         max: 260.0,

@@ -281,36 +281,36 @@ fn over_ground(
     strings: &[Vec<Point3>],
     is_over: &dyn Fn() -> bool,
 ) -> (Found, bool) {
-    let cheapest = priced(model, strings).min_by(by_rank);
+    let strings: Vec<Priced> = priced(model, strings).collect();
+    let cheapest = strings.iter().copied().min_by(by_rank);
     let dearest = cheapest.map_or(f64::INFINITY, |(fitness, _)| fitness.cost);
     let (mut found, few) = roadmap::routes(model, OVERLAND, dearest, is_over);
-    let flown = [best_of(model, strings), best_of(model, &few)];
-    let known = flown.into_iter().chain([best_of(model, &found.routes)]);
-    let known = known.flatten().min_by(by_rank);
-    let ways_sought = ways::sought(model, known.map(|(fitness, _)| fitness.cost), is_over);
-    if let Some(sought) = ways_sought.filter(|_| !is_over()) {
-        let ways = ways::routes(model, sought, is_over);
-        found.routes.extend(ways.routes);
-        found.legs_priced += ways.legs_priced;
-    }
-    let over = best_of(model, &found.routes);
-    let best = flown.into_iter().chain([over]).flatten().min_by(by_rank);
+    let near = best_of(model, priced(model, &found.routes));
+    let others = [best_of(model, strings), best_of(model, priced(model, &few))];
+    let known = others.into_iter().chain([near]).flatten().min_by(by_rank);
+    let sought = ways::sought(model, known.map(|(fitness, _)| fitness.cost), is_over);
+    let ways = sought
+        .filter(|_| !is_over())
+        .map(|sought| ways::routes(model, sought, is_over));
+    let ways = ways.unwrap_or_default();
+    let between = best_of(model, priced(model, &ways.routes));
+    let best = known.into_iter().chain(between).min_by(by_rank);
     let detour = best.and_then(|(_, route)| exposed::detour(model, route));
-    if over.is_none() || detour.is_some() {
+    let is_open = near.or(between).is_some();
+    found.add(ways);
+    if !is_open || detour.is_some() {
         let count = if detour.is_some() {
             FAR_ABOUT
         } else {
             OVERLAND
         };
-        let trails = trails::routes(model, detour, count, is_over);
-        found.routes.extend(trails.routes);
-        found.legs_priced += trails.legs_priced;
+        found.add(trails::routes(model, detour, count, is_over));
     }
     found.routes.extend(few);
     let rounded = |route: &Vec<Point3>| rounded::rounded(model.scenario, route);
     let turned: Vec<_> = found.routes.iter().filter_map(rounded).collect();
     found.routes.extend(turned);
-    (found, detour.is_some() || ways_sought.is_some())
+    (found, detour.is_some() || sought.is_some())
 }
 
 /// A route and its price.
@@ -325,10 +325,11 @@ fn priced<'r>(model: &Model, routes: &'r [Vec<Point3>]) -> impl Iterator<Item = 
     routes.iter().map(priced)
 }
 
-/// The best of `routes` that can be flown as it is.
-fn best_of<'r>(model: &Model, routes: &'r [Vec<Point3>]) -> Option<Priced<'r>> {
+/// The best of those `priced` that can be flown as it is.
+fn best_of<'r>(model: &Model, priced: impl IntoIterator<Item = Priced<'r>>) -> Option<Priced<'r>> {
     let most = model.scenario.planner.waypoints + 2;
-    let flown = priced(model, routes)
+    let flown = priced
+        .into_iter()
         .filter(|(fitness, route)| fitness.is_feasible() && route.len() <= most);
     flown.min_by(by_rank)
 }

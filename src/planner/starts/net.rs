@@ -20,6 +20,14 @@ pub(super) struct Found {
     pub(super) legs_priced: u64,
 }
 
+impl Found {
+    /// With what another search found.
+    pub(super) fn add(&mut self, other: Self) {
+        self.routes.extend(other.routes);
+        self.legs_priced += other.legs_priced;
+    }
+}
+
 /// A hexagonal net.
 pub(super) struct Spots {
     pub(super) points: Vec<Point2>,

@@ -79,15 +79,12 @@ pub(super) fn routes(model: &Model, sought: WaysSought, is_over: &dyn Fn() -> bo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point2;
     use crate::optimizer::{Fitness, Random};
     use crate::planner::price::price;
     use crate::planner::starts::{along_strings, roadmap};
-    use crate::planner::tests::{radar, scenario};
+    use crate::planner::tests::{disc, peaks, radar, scenario};
     use crate::planner::{Nobody, plan};
     use crate::scenario::{Scenario, Seeding};
-    use crate::terrain::{Peak, Peaks, Terrain};
-    use crate::threat::Shape;
 
     /// Sixty discs at random, in gaps of ten metres and more.
     fn minefield(seed: u64) -> Scenario {
@@ -137,28 +134,12 @@ mod tests {
             [561.0, 255.0, 56.0, 76.0],
         ];
         let mut scenario = scenario();
-        scenario.threats = discs
-            .map(|[x, y, radius, influence]| {
-                let mut threat = radar(x, y, radius);
-                let Shape::Cylinder(cylinder) = &mut threat.shape else {
-                    panic!("a radar is a cylinder");
-                };
-                cylinder.influence = influence;
-                threat
-            })
-            .to_vec();
+        scenario.threats = discs.map(disc).to_vec();
         (scenario.start.x, scenario.start.y, scenario.start.z) = (132.0, 65.0, 50.0);
         (scenario.target.x, scenario.target.y) = (886.0, 839.0);
         (scenario.altitude.min, scenario.altitude.max) = (60.0, 260.0);
         (scenario.planner.seeding, scenario.planner.polish) = (Seeding::Tangent, true);
-        let hill = Terrain::Peaks(Peaks {
-            base: 0.0,
-            peaks: vec![Peak {
-                center: Point2::new(900.0, 100.0),
-                height: 60.0,
-                spread: Point2::new(60.0, 60.0),
-            }],
-        });
+        let hill = peaks(0.0, &[[900.0, 100.0, 60.0, 60.0, 60.0]]);
         for terrain in [scenario.terrain.clone(), hill] {
             scenario.terrain = terrain;
             let outcome = plan(&scenario, &mut Nobody, &Nobody);

@@ -78,12 +78,9 @@ pub(super) fn routes(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point2;
-    use crate::planner::tests::{radar, scenario};
+    use crate::planner::tests::{disc, peaks, scenario};
     use crate::planner::{Nobody, plan};
     use crate::scenario::{AltitudeBand, Scenario, Seeding};
-    use crate::terrain::{Peak, Peaks, Terrain};
-    use crate::threat::Shape;
 
     /// Two mountains and five discs: the best route begins with a leg of 700 m that touches both limits of the band.
     fn between_mountains() -> Scenario {
@@ -94,31 +91,15 @@ mod tests {
             [740.0, 891.0, 34.0, 65.0],
             [836.0, 832.0, 26.0, 58.0],
         ];
-        let peak = |x, y, height, wide, deep| Peak {
-            center: Point2::new(x, y),
-            height,
-            spread: Point2::new(wide, deep),
-        };
         let mut scenario = scenario();
         scenario.start = Point3::new(146.0, 256.0, 294.0);
         scenario.target = Point3::new(871.0, 745.0, 159.0);
-        scenario.threats = discs
-            .map(|[x, y, radius, influence]| {
-                let mut threat = radar(x, y, radius);
-                let Shape::Cylinder(cylinder) = &mut threat.shape else {
-                    panic!("a radar is a cylinder");
-                };
-                cylinder.influence = influence;
-                threat
-            })
-            .to_vec();
-        scenario.terrain = Terrain::Peaks(Peaks {
-            base: 0.0,
-            peaks: vec![
-                peak(810.0, 724.0, 207.0, 54.0, 133.0),
-                peak(490.0, 260.0, 242.0, 113.0, 131.0),
-            ],
-        });
+        scenario.threats = discs.map(disc).to_vec();
+        let mountains = [
+            [810.0, 724.0, 207.0, 54.0, 133.0],
+            [490.0, 260.0, 242.0, 113.0, 131.0],
+        ];
+        scenario.terrain = peaks(0.0, &mountains);
         scenario.altitude = AltitudeBand {
             min: 60.0,
             max: 260.0,

@@ -46,7 +46,7 @@ const MOST_VERTICES: usize = 6000;
 const MOST_ROUNDS: usize = 3;
 
 /// Share of what a potential rises by that is worth no more vertices.
-const NEARLY: f64 = 0.985;
+const NEARLY: f64 = 0.988;
 
 /// How many times what a string costs a route costs that is not looked at.
 const BEYOND: f64 = 1.05;

@@ -8,7 +8,7 @@ use super::{easing, marching};
 use crate::geometry::Point2;
 
 /// How many times as steep as its limits a triangle is that is cut up.
-const TOO_STEEP: f64 = 1.02;
+const TOO_STEEP: f64 = 1.01;
 
 /// A mesh with what its triangles may rise by.
 pub(super) struct Priced {

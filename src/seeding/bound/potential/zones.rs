@@ -3,7 +3,7 @@
 use super::super::prices::Prices;
 use super::super::wall::Wall;
 use super::cells::Cells;
-use super::mesh::PARTS;
+use super::mesh::{PARTS, SIDES};
 use crate::geometry::{Point2, Rect, ring};
 use crate::seeding::arc::{point_segment, segment_segment};
 use crate::seeding::outline::OutlineShape;
@@ -86,22 +86,27 @@ impl<'a> Zones<'a> {
     pub(super) fn limits(&self, places: &[Point2; 6]) -> [f64; 6] {
         let middle = middle(places);
         let mut sums = [[self.prices.fuel; 3]; PARTS.len()];
+        let mut cut = Vec::new();
         for wall in self.near(middle) {
             // The depth in the zone of a disc or of an edge is concave: nowhere less than what is linear between nodes.
             let (a, b) = part(wall, middle);
-            let depths = places
-                .map(|place| wall.influence - point_segment(place, a, b) - self.prices.tolerance);
-            for (sums, part) in sums.iter_mut().zip(PARTS) {
-                if part.iter().all(|node| depths[*node] >= 0.0) {
-                    for (sum, node) in sums.iter_mut().zip(part) {
-                        *sum += self.prices.exposure * depths[node];
-                    }
+            let depth = |place| wall.influence - point_segment(place, a, b) - self.prices.tolerance;
+            let prices = places.map(|place| self.prices.exposure * depth(place));
+            for (at, nodes) in PARTS.iter().enumerate() {
+                let zone = nodes.map(|node| prices[node]);
+                if zone.iter().all(|price| *price >= 0.0) {
+                    sums[at] = with_share(&sums[at], &zone, 1.0);
+                } else if zone.iter().any(|price| *price > 0.0) {
+                    cut.push((at, zone));
                 }
             }
         }
+        for (at, zone) in cut {
+            sums[at] = with_a_share(&sums[at], &zone);
+        }
         let mut limits = [f64::INFINITY; 6];
-        for (sums, part) in sums.iter().zip(PARTS) {
-            for (sum, node) in sums.iter().zip(part) {
+        for (sums, nodes) in sums.iter().zip(PARTS) {
+            for (sum, node) in sums.iter().zip(nodes) {
                 limits[node] = limits[node].min(*sum);
             }
         }
@@ -138,6 +143,30 @@ impl<'a> Zones<'a> {
     }
 }
 
+/// The limits in the nodes of a part whose edge a zone cuts, with the share of what the zone costs, less than nothing
+/// where a node lies outside, that makes the least of them the greatest: no share is more than what the zone does cost.
+fn with_a_share(limits: &[f64; 3], zone: &[f64; 3]) -> [f64; 3] {
+    let least = |limits: &[f64; 3]| limits.iter().copied().fold(f64::INFINITY, f64::min);
+    // The least is concave in the share: it is greatest with all of it, or where two nodes change places.
+    let meeting =
+        |[one, other]: [usize; 2]| (limits[other] - limits[one]) / (zone[one] - zone[other]);
+    let shares = [1.0].into_iter().chain(SIDES.map(meeting));
+    shares
+        .filter(|share| *share > 0.0 && *share <= 1.0)
+        .map(|share| with_share(limits, zone, share))
+        .fold(*limits, |best, other| {
+            if least(&other) > least(&best) {
+                other
+            } else {
+                best
+            }
+        })
+}
+
+fn with_share(limits: &[f64; 3], zone: &[f64; 3], share: f64) -> [f64; 3] {
+    std::array::from_fn(|node| limits[node] + share * zone[node])
+}
+
 /// What of `wall` is nearest to a place: a point, as both ends of an edge, or an edge.
 fn part(wall: &Wall, place: Point2) -> (Point2, Point2) {
     let edges = match &wall.shape {
@@ -153,4 +182,23 @@ fn part(wall: &Wall, place: Point2) -> (Point2, Point2) {
 /// The middle of the first three.
 fn middle(corners: &[Point2]) -> Point2 {
     Point2::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_zone_whose_edge_cuts_a_part_counts_as_far_as_it_helps() {
+        let check = |limits: [f64; 3], zone: [f64; 3], expected: [f64; 3]| {
+            let found = with_a_share(&limits, &zone);
+            let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs());
+            assert!(off.fold(0.0, f64::max) < 1e-12, "{found:?}");
+        };
+        // The third node lies outside, but deeper in another.
+        check([0.5, 0.5, 1.25], [0.5, 0.5, -0.25], [1.0, 1.0, 1.0]);
+        check([0.5, 0.5, 1.0], [0.5, 0.5, -0.5], [0.75, 0.75, 0.75]);
+        // Nothing would be left for it.
+        check([0.5, 0.5, 0.5], [0.5, 0.5, -0.25], [0.5, 0.5, 0.5]);
+    }
 }

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 
 use super::MOST_WAYS_IN_ALL;
-use super::ends::Legs;
+use super::ends::{self, Legs};
 use super::event::{Event, Kind};
 use super::prices::Prices;
 use super::string;
@@ -20,6 +20,9 @@ const MOST_ALLOWED: usize = 40;
 pub(super) fn cost_of(events: &[Event], level: usize) -> f64 {
     events.get(level).map_or(f64::INFINITY, |event| event.cost)
 }
+
+/// Times that more of them are allowed for the sake of the climb into the band.
+const MOST_RISING: usize = 4;
 
 /// A scenario as a bound sees it.
 pub(super) struct Field<'a> {
@@ -106,6 +109,24 @@ impl Field<'_> {
                 }
             }
             allowed = left;
+        }
+        proven
+    }
+
+    /// What no route undercuts by what it takes to come into the band from ends outside it, where those that use more than
+    /// the first `count` of `events` may be cheaper.
+    pub(super) fn rising(&self, events: &[Event], mut count: usize) -> f64 {
+        let mut proven = 0.0_f64;
+        for _ in 0..MOST_RISING {
+            let radii = self.radii(&events[..count]);
+            let field = (self.walls, &radii[..]);
+            let rising = ends::rising(self.scenario, self.prices, field, self.stop);
+            proven = proven.max(rising.min(cost_of(events, count)));
+            let cheaper = events.partition_point(|event| event.cost < rising);
+            if cheaper <= count {
+                break;
+            }
+            count = cheaper;
         }
         proven
     }

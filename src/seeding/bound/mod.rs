@@ -108,7 +108,8 @@ fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) ->
     if stop() {
         proven
     } else {
-        proven.max(crossing(&field, &events, &events[..used], proven))
+        let crossing = crossing(&field, &events, &events[..used], proven);
+        proven.max(crossing).max(field.rising(&events, used))
     }
 }
 
@@ -223,6 +224,25 @@ mod tests {
         check(one, [60, 260], 517.6716);
         check(one, [100, 300], 531.1);
         check(two, [30, 120], 510.5145);
+    }
+
+    /// Where only the length counts, the way out of the ground's zone and back into it may be flown in any legs.
+    #[test]
+    fn a_short_route_climbs_out_of_the_zones_round_its_ends() {
+        let mut scenario = scenario(
+            r#""threats": [{"kind": "cylinder", "center": {"x": 500, "y": 520}, "radius": 50}]"#,
+        );
+        (scenario.start.z, scenario.target.z) = (0.0, 0.0);
+        (scenario.altitude.min, scenario.altitude.max) = (60.0, 260.0);
+        scenario.weights.altitude = 0.0;
+        let climbing = lower_bound(&scenario);
+        (scenario.altitude.min, scenario.altitude.max) = (0.0, 260.0);
+        let level = lower_bound(&scenario);
+        let zone = 0.5 * (libm::hypot(120.0, 60.0) - 120.0);
+        assert!(
+            (climbing - level - 2.0 * zone).abs() < 1e-3,
+            "{climbing} {level} {zone}"
+        );
     }
 
     #[test]

@@ -2,8 +2,11 @@
 //! argument is section 7 of docs/BOUND.md.
 
 use super::kind::End;
-use super::ramp::Rates;
+use super::ramp::{Ramp, Rates};
 use crate::geometry::Point2;
+
+/// Lengths of first legs that are told apart.
+const LENGTHS: u32 = 64;
 
 impl End<'_> {
     /// What a leg with one of those `lengths` seen from above, `exposed` if it is the shortest, costs at least on top of
@@ -39,6 +42,35 @@ impl End<'_> {
         let climbed = climbed.min(length * self.steepest);
         let slant = (length * length + climbed * climbed).sqrt();
         (w * (slant - length) + weight * (self.height - climbed)).max(0.0)
+    }
+
+    /// What a route costs at least on top of what it costs seen from above to come out of the zone round the end, first
+    /// waypoint included, if a potential rises on that way by no more than its fuel and `more`; 0 where there is no zone.
+    pub(super) fn leaving(&self, more: f64) -> f64 {
+        let Some(ramp) = self.ramp else {
+            return 0.0;
+        };
+        let within = self.beginning(&ramp, ramp.reach, self.prices.fuel * ramp.reach + more);
+        let run = ramp.run(self.height);
+        let cut = |idx: u32| ramp.reach + (run - ramp.reach) * f64::from(idx) / f64::from(LENGTHS);
+        let ranges = (0..LENGTHS).map(|idx| [cut(idx), cut(idx + 1)]);
+        // What is flown in the zone round the other end is told there.
+        let farther = ranges.chain([[run, f64::INFINITY]]);
+        farther
+            .map(|[shortest, longest]| self.steepness([shortest.min(self.apart), longest], 0.0))
+            .fold(within, f64::min)
+    }
+
+    /// What the way out of the zone costs on top of that `rise`, with a first waypoint after no more than `longest` metres,
+    /// which may be beyond the zone.
+    pub(super) fn beginning(&self, ramp: &Ramp, longest: f64, rise: f64) -> f64 {
+        let is_within = longest <= ramp.reach;
+        let rates = Rates {
+            fuel: self.prices.fuel,
+            exposed: 0.0,
+            weight: if is_within { self.weight } else { 0.0 },
+        };
+        ramp.leaving(rise, rates, self.height, longest * self.steepest)
     }
 
     /// What a level leg to `at` costs more since it cannot be level, about: by bending later, one that may climb gently

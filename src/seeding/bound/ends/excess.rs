@@ -8,12 +8,16 @@ use super::super::prices::Prices;
 use super::super::string::cores;
 use super::super::wall::Wall;
 use super::kind::{End, Kind};
+use super::ramp::Ramp;
 use super::{MOST_CORNERS, ends};
-use crate::geometry::Point2;
+use crate::geometry::{Point2, Vector2};
 use crate::scenario::Scenario;
 
 /// What a kind of leg may be off by, as a share of what is proven, before it is told apart.
 const LEAST: f64 = 3e-4;
+
+/// Sectors of the edge of a zone that are told apart.
+const SECTORS: u32 = 64;
 
 /// Kinds of legs that are looked at, for each end; fewer among more than `MOST_CORNERS`.
 const EFFORT: usize = 1500;
@@ -48,11 +52,16 @@ fn least(
     rise: &dyn Fn(Point2, f64) -> Option<f64>,
     (fine, effort): (f64, usize),
 ) -> f64 {
+    let zone = zone(end, rise);
     let mut kinds = Vec::new();
     let mut cheapest = BinaryHeap::new();
     let keep = |kind: Kind, kinds: &mut Vec<Kind>, cheapest: &mut BinaryHeap<_>| {
         // Bits of numbers that are not negative are ordered as they are.
         let total = (kind.cost + kind.steepness).max(0.0);
+        let [shortest, longest] = kind.lengths;
+        let leaving = zone.filter(|(ramp, _)| shortest < ramp.reach);
+        let leaving = leaving.map(|(ramp, rise)| end.beginning(&ramp, longest, rise));
+        let total = leaving.unwrap_or(0.0).max(total);
         cheapest.push((Reverse(total.to_bits()), kinds.len()));
         kinds.push(kind);
     };
@@ -70,4 +79,17 @@ fn least(
         }
     }
     0.0
+}
+
+/// The zone round an end outside the band, and the most that the potential rises by on the way to its edge; `None` where
+/// there is none.
+fn zone(end: &End, rise: &dyn Fn(Point2, f64) -> Option<f64>) -> Option<(Ramp, f64)> {
+    let ramp = end.ramp?;
+    let half = std::f64::consts::PI / f64::from(SECTORS);
+    let rises = (0..SECTORS).filter_map(|sector| {
+        let (sin, cos) = libm::sincos(2.0 * half * f64::from(sector));
+        let at = end.from + Vector2::new(cos, sin) * ramp.reach;
+        rise(at, ramp.reach * half)
+    });
+    Some((ramp, rises.reduce(f64::max)?))
 }

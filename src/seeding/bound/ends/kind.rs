@@ -25,7 +25,7 @@ pub(super) struct Kind {
     heading: f64,
     half: f64,
     /// Lengths seen from above, metres; the second may be infinite.
-    lengths: [f64; 2],
+    pub(super) lengths: [f64; 2],
     /// No route with such a leg costs less seen from above.
     pub(super) cost: f64,
     /// What the leg costs at least on top.
@@ -74,6 +74,8 @@ pub(super) struct End<'a> {
     pub(super) steepest: f64,
     /// Where it lies outside the band.
     pub(super) ramp: Option<Ramp>,
+    /// Metres from it to the zone round the other end.
+    pub(super) apart: f64,
     pub(super) prices: &'a Prices,
     pub(super) walls: &'a [Wall],
     pub(super) radii: &'a [Option<f64>],
@@ -93,6 +95,9 @@ impl End<'_> {
 
     /// What may be gained by cutting the lengths of `kind`.
     fn longer(&self, kind: &Kind) -> f64 {
+        if kind.lengths[0] >= self.apart {
+            return 0.0;
+        }
         self.steepness([kind.lengths[0]; 2], kind.exposed) - kind.steepness
     }
 
@@ -160,8 +165,13 @@ impl End<'_> {
     }
 
     /// `kind`, with what its legs cost at least beyond the `rise` of a potential on the way to any place within so many
-    /// metres of another.
+    /// metres of another, before they come to the zone round the other end.
     pub(super) fn beyond(&self, kind: Kind, rise: &dyn Fn(Point2, f64) -> Option<f64>) -> Kind {
+        let [shortest, longest] = kind.lengths;
+        let kind = Kind {
+            lengths: [shortest.min(self.apart), longest],
+            ..kind
+        };
         let [length, longest] = kind.lengths;
         if length <= 0.0 {
             return Kind {
@@ -315,6 +325,7 @@ pub(super) mod tests {
             weight: 1.0,
             steepest: 1.0,
             ramp: None,
+            apart: f64::INFINITY,
             prices,
             walls,
             radii,

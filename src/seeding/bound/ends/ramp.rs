@@ -45,6 +45,25 @@ impl Ramp {
         })
     }
 
+    /// What the way out of the zone costs at least on top of the `rise` on it of a potential that rises by no more than
+    /// what a way costs seen from above, with the first waypoint: on that way, no more than `highest` metres above the
+    /// end, and cheapest at `height`.
+    pub(super) fn leaving(&self, rise: f64, rates: Rates, height: f64, highest: f64) -> f64 {
+        let Rates { fuel, weight, .. } = rates;
+        let across = rise.max(fuel * self.reach);
+        // Convex in the climb to the waypoint: as high as a metre of climb costs less than one off the middle.
+        let share = weight / fuel;
+        let best = if share < 1.0 {
+            across / fuel * share / (1.0 - share * share).sqrt()
+        } else {
+            f64::INFINITY
+        };
+        let out = self.reach * self.slope;
+        let waypoint = best.max(out).min(height).min(highest);
+        let climbed = waypoint.max(out);
+        libm::hypot(across, fuel * climbed) - rise + weight * (height - waypoint).max(0.0)
+    }
+
     /// Metres seen from above in which a leg that leaves the zone climbs so many at least.
     pub(super) fn run(&self, height: f64) -> f64 {
         self.reach.max(height / self.slope)
@@ -104,6 +123,28 @@ mod tests {
             let slant = (1.0 + climb * climb).sqrt() - 1.0;
             let cost = (fuel * length + exposed) * slant + weight * (height - climb * length).abs();
             prop_assert!(least <= cost * (1.0 + 1e-12), "{least} {cost}");
+        }
+    }
+
+    proptest! {
+        /// No way out of the zone with a waypoint on it costs less, whatever a potential rises by on it.
+        #[test]
+        fn no_way_out_is_cheaper(
+            (reach, slope, off) in (1.0..500.0f64, 0.05..0.6f64, 0.0..200.0f64),
+            (at, climb, detour, higher) in (0.0..1.0f64, 0.0..1.0f64, 0.0..200.0f64, 0.0..100.0f64),
+            (fuel, weight) in (0.01..2.0f64, prop_oneof![Just(0.0), 0.01..3.0f64]),
+            (most, share) in (0.0..3.0f64, 0.0..1.0f64),
+        ) {
+            let (ramp, rates) = (Ramp { reach, slope }, Rates { fuel, exposed: 0.0, weight });
+            let (out, across) = (reach * slope, reach + detour);
+            let (height, rise) = (out + off, most * fuel * reach);
+            let (before, highest) = (at * across, at * across * 2.0 * slope);
+            let (climbed, left) = (climb * highest, out + higher);
+            let least = ramp.leaving(rise, rates, height, highest);
+            let flown = libm::hypot(before, climbed) + libm::hypot(across - before, left - climbed);
+            let rise = share * rise.min(fuel * across);
+            let cost = fuel * flown - rise + weight * (height - climbed).abs();
+            prop_assert!(least <= cost + 1e-9 * (1.0 + cost.abs() + rise), "{least} {cost}");
         }
     }
 

@@ -12,16 +12,30 @@ impl End<'_> {
     /// What a leg with one of those `lengths` seen from above, `exposed` if it is the shortest, costs at least on top of
     /// what it costs seen from above, waypoint included: it climbs, or its waypoint is off the middle.
     pub(super) fn steepness(&self, lengths: [f64; 2], exposed: f64) -> f64 {
-        let gentle = self.gently(lengths[1], exposed);
-        let Some(ramp) = self.ramp.filter(|ramp| lengths[0] >= ramp.reach) else {
-            return gentle;
-        };
+        self.gently(lengths[1], exposed)
+            .max(self.out_of_zone(lengths, exposed))
+    }
+
+    /// The same, of what is flown before the zone round the other end: what is flown in there is told there.
+    pub(super) fn before_other_zone(&self, [shortest, longest]: [f64; 2], exposed: f64) -> f64 {
+        if longest <= self.apart {
+            self.steepness([shortest, longest], exposed)
+        } else {
+            self.out_of_zone([shortest.min(self.apart), longest], exposed)
+        }
+    }
+
+    /// The same of a leg that leads out of the zone round the end; 0 where it does not, or there is none.
+    fn out_of_zone(&self, lengths: [f64; 2], exposed: f64) -> f64 {
+        let ramp = self.ramp.filter(|ramp| lengths[0] >= ramp.reach);
         let rates = Rates {
             fuel: self.prices.fuel,
             exposed,
             weight: self.weight,
         };
-        gentle.max(ramp.steepness(lengths, rates, self.height, self.steepest))
+        ramp.map_or(0.0, |ramp| {
+            ramp.steepness(lengths, rates, self.height, self.steepest)
+        })
     }
 
     /// The same of a leg that may climb as gently as it likes; falls with `length`.
@@ -54,10 +68,9 @@ impl End<'_> {
         let run = ramp.run(self.height);
         let cut = |idx: u32| ramp.reach + (run - ramp.reach) * f64::from(idx) / f64::from(LENGTHS);
         let ranges = (0..LENGTHS).map(|idx| [cut(idx), cut(idx + 1)]);
-        // What is flown in the zone round the other end is told there.
         let farther = ranges.chain([[run, f64::INFINITY]]);
         farther
-            .map(|[shortest, longest]| self.steepness([shortest.min(self.apart), longest], 0.0))
+            .map(|lengths| self.before_other_zone(lengths, 0.0))
             .fold(within, f64::min)
     }
 

@@ -172,11 +172,11 @@ impl End<'_> {
             lengths: [shortest.min(self.apart), longest],
             ..kind
         };
-        let [length, longest] = kind.lengths;
+        let length = kind.lengths[0];
         if length <= 0.0 {
             return Kind {
                 cost: self.later(length),
-                steepness: self.gently(longest, 0.0),
+                steepness: self.before_other_zone(kind.lengths, 0.0),
                 ..kind
             };
         }
@@ -194,7 +194,7 @@ impl End<'_> {
             cost: kind
                 .cost
                 .max(fuel * length + exposed + self.later(length) - highest),
-            steepness: self.steepness(kind.lengths, exposed),
+            steepness: self.before_other_zone(kind.lengths, exposed),
             // The potential is at least as steep as fuel is dear, about.
             turned: fuel * spread + (middle - exposed),
             exposed,

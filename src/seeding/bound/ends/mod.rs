@@ -6,11 +6,13 @@ mod excess;
 mod exposure;
 mod kind;
 mod ramp;
+mod rising;
 
 pub(super) use excess::over;
+pub(super) use rising::rising;
 
 use super::prices::Prices;
-use super::string::{cores, cost, departures, narrowed, slack};
+use super::string::{cores, slack};
 use super::toll::steepest;
 use super::wall::Wall;
 use crate::geometry::Point2;
@@ -153,31 +155,6 @@ fn ends<'a>(
             stop,
         })
     })
-}
-
-/// What no route undercuts that goes round `walls` widened to `radii`, by what it takes to climb out of the zones round
-/// ends below the band, or to descend from above it; 0 where there are none.
-pub(super) fn rising(
-    scenario: &Scenario,
-    prices: &Prices,
-    (walls, radii): (&[Wall], &[Option<f64>]),
-    stop: &dyn Fn() -> bool,
-) -> f64 {
-    let Some(ends) = ends(scenario, prices, (walls, radii), stop) else {
-        return 0.0;
-    };
-    if ends.iter().all(|end| end.ramp.is_none()) {
-        return 0.0;
-    }
-    // Where no wall is in a zone, a string has no way through it that is longer than straight ahead.
-    let zones = ends.iter().filter_map(|end| Some((end.from, end.ramp?)));
-    let radii = zones.fold(radii.to_vec(), |radii, (at, ramp)| {
-        narrowed((walls, &radii), at, ramp.reach)
-    });
-    let [first, last] = departures((walls, &radii), prices, &[]);
-    let (across, _) = cost((walls, &radii), prices, &[], (f64::INFINITY, stop));
-    let on_top = ends.map(|end| end.leaving(first.toll + last.toll));
-    across + on_top[0] + on_top[1]
 }
 
 /// What a string that bends first and last there costs more since its ends are off the middle of the band, about.

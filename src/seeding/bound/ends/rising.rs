@@ -1,0 +1,33 @@
+//! What it costs on top of a string to come out of the zones round ends outside the band, however that is flown. The
+//! argument is section 7 of docs/BOUND.md.
+
+use super::super::prices::Prices;
+use super::super::string::{cost, departures, narrowed};
+use super::super::wall::Wall;
+use super::ends;
+use crate::scenario::Scenario;
+
+/// What no route undercuts that goes round `walls` widened to `radii`, by what it takes to climb out of the zones round
+/// ends below the band, or to descend from above it; 0 where there are none.
+pub(in super::super) fn rising(
+    scenario: &Scenario,
+    prices: &Prices,
+    (walls, radii): (&[Wall], &[Option<f64>]),
+    stop: &dyn Fn() -> bool,
+) -> f64 {
+    let Some(ends) = ends(scenario, prices, (walls, radii), stop) else {
+        return 0.0;
+    };
+    if ends.iter().all(|end| end.ramp.is_none()) {
+        return 0.0;
+    }
+    // Where no wall is in a zone, a string has no way through it that is longer than straight ahead.
+    let zones = ends.iter().filter_map(|end| Some((end.from, end.ramp?)));
+    let radii = zones.fold(radii.to_vec(), |radii, (at, ramp)| {
+        narrowed((walls, &radii), at, ramp.reach)
+    });
+    let [first, last] = departures((walls, &radii), prices, &[]);
+    let (across, _) = cost((walls, &radii), prices, &[], (f64::INFINITY, stop));
+    let on_top = ends.map(|end| end.leaving(first.toll + last.toll));
+    across + on_top[0] + on_top[1]
+}

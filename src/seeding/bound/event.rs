@@ -94,7 +94,7 @@ fn dip(idx: usize, wall: &Wall, prices: &Prices) -> Event {
         let depth = (wall.influence - wall.dip).max(0.0);
         let more = prices.exposure * (ramp(depth, 1.0, ways[0]) + ramp(depth, 1.0, ways[1]));
         let length = (ways[0] + ways[1]).max(prices.direct());
-        cost = cost.min(prices.climbing(length, prices.rise()) + more);
+        cost = cost.min(prices.reaching(length, more));
         extra = extra.min(more);
     }
     Event {
@@ -194,7 +194,7 @@ fn gap(one: &Core, other: &Core, walls: &[Wall], prices: &Prices) -> Option<Even
             walls: [one.wall, other.wall],
             between: [p, q],
         },
-        cost: prices.climbing(length, prices.rise()) + extra,
+        cost: prices.reaching(length, extra),
         extra,
     })
 }

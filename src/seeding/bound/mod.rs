@@ -13,6 +13,7 @@ mod departure;
 mod ends;
 mod event;
 mod field;
+mod peak;
 mod potential;
 mod prices;
 mod promise;
@@ -55,10 +56,10 @@ pub fn lower_bound(scenario: &Scenario) -> f64 {
 #[must_use]
 pub fn lower_bound_until(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
     let prices = Prices::of(scenario);
-    let straight = prices.climbing(prices.direct(), prices.rise());
     if prices.fuel <= 0.0 {
         return 0.0;
     }
+    let straight = prices.climbing_at(prices.fuel * prices.direct());
     let bound = round_walls(scenario, &prices, stop).max(straight);
     let bound = if bound.is_finite() { bound } else { straight };
     bound * (1.0 - ROUNDING)

@@ -1,5 +1,6 @@
 //! What a bound pays for a metre.
 
+use super::peak::Peak;
 use crate::cost::{THREAT_SHARE, Tolerance, metre};
 use crate::geometry::Point3;
 use crate::scenario::{Quadrature, Scenario};
@@ -14,6 +15,8 @@ pub(super) struct Prices {
     /// Metres by which a feasible route may miss a limit.
     pub(super) tolerance: f64,
     pub(super) ends: [Point3; 2],
+    /// Towards the middle of the band.
+    peak: Option<Peak>,
 }
 
 impl Prices {
@@ -28,6 +31,7 @@ impl Prices {
             exposure,
             tolerance: Tolerance::of(scenario).length_m,
             ends: [scenario.start, scenario.target],
+            peak: Peak::of(scenario),
         }
     }
 
@@ -47,13 +51,21 @@ impl Prices {
         self.fuel * (length * length + vertical * vertical).sqrt()
     }
 
-    /// Least cost of a way with the rise of the ends that costs so much seen from above.
+    /// Least cost of a way between the ends that costs so much or more seen from above, waypoints included.
     pub(super) fn climbing_at(&self, cost: f64) -> f64 {
         let rise = self.fuel * self.rise();
-        (cost * cost + rise * rise).sqrt()
+        let level = (cost * cost + rise * rise).sqrt();
+        let peak = self.peak.filter(|_| level.is_finite());
+        peak.map_or(level, |peak| peak.least(self.fuel, cost).max(level))
     }
 
-    /// What a way costs seen from above that costs `cost` with the rise of the ends, or a hair more.
+    /// Least cost of a way between the ends of that `length` seen from above or more, with `extra` for soft zones.
+    pub(super) fn reaching(&self, length: f64, extra: f64) -> f64 {
+        let level = self.climbing(length, self.rise()) + extra;
+        level.max(self.climbing_at(self.fuel * length + extra))
+    }
+
+    /// What a way costs seen from above at most that costs `cost` with the rise of the ends, and a hair more.
     pub(super) fn across(&self, cost: f64) -> f64 {
         let rise = self.fuel * self.rise();
         (cost * cost - rise * rise).max(0.0).sqrt() * (1.0 + 1e-9)

@@ -52,7 +52,7 @@ pub(super) fn promise(
             + out(0)
             + out(1)
             + early(walls, prices);
-        promise.cost = prices.climbing_at(across);
+        promise.cost = prices.climbing(across / prices.fuel, prices.rise());
         if let [Piece::Straight { to, .. }, .., Piece::Straight { from, .. }] = &string.pieces[..] {
             promise.bends = [*to, *from];
         }

@@ -1,0 +1,119 @@
+//! What it costs that waypoints are to be at the middle of the band, where both ends are below it or above it: the
+//! route climbs towards it, or all waypoints stay off it. The argument is section 7 of docs/BOUND.md.
+
+use super::toll::steepest;
+use crate::scenario::Scenario;
+use crate::terrain::Terrain;
+
+/// Steps in which the cheapest height is looked for.
+const STEPS: usize = 60;
+
+/// Both ends on one side of the middle of a band above level ground.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Peak {
+    /// Metres of each between it and the middle.
+    off_middle: [f64; 2],
+    /// Of a metre that all waypoints are off the middle.
+    weight: f64,
+    /// Metres of climb in a metre seen from above, at most.
+    steepest: f64,
+}
+
+impl Peak {
+    /// `None` where nothing is told: over hills, from one side of the middle to the other, or where heights cost nothing.
+    pub(super) fn of(scenario: &Scenario) -> Option<Self> {
+        let Terrain::Flat(ground) = &scenario.terrain else {
+            return None;
+        };
+        let middle = ground.elevation + 0.5 * (scenario.altitude.min + scenario.altitude.max);
+        let below = [scenario.start, scenario.target].map(|end| middle - end.z);
+        let weight = scenario.weights.altitude * scenario.planner.waypoints as f64;
+        let is_told = below[0] * below[1] > 0.0 && weight > 0.0;
+        is_told.then(|| Self {
+            off_middle: below.map(f64::abs),
+            weight,
+            steepest: steepest(scenario),
+        })
+    }
+
+    /// Least cost of a way that costs `across` or more seen from above, waypoints included, where a metre costs `fuel`: of
+    /// all distances off the middle that the waypoint nearest to it may keep.
+    pub(super) fn least(&self, fuel: f64, across: f64) -> f64 {
+        let [one, other] = self.off_middle;
+        let cost = |off: f64| {
+            let climbed = fuel * (one + other - 2.0 * off);
+            libm::hypot(across.max(climbed / self.steepest), climbed) + self.weight * off
+        };
+        // Convex in that distance.
+        let (mut low, mut high) = (0.0, one.min(other));
+        for _ in 0..STEPS {
+            let third = (high - low) / 3.0;
+            if cost(low + third) < cost(high - third) {
+                high -= third;
+            } else {
+                low += third;
+            }
+        }
+        cost(low).min(cost(high)).min(cost(0.5 * (low + high)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::super::tests::scenario;
+    use super::*;
+
+    /// From 100 m below the middle and back to there, by climbs of 45 degrees.
+    fn peak(weight: f64) -> Peak {
+        Peak {
+            off_middle: [100.0, 100.0],
+            weight,
+            steepest: 1.0,
+        }
+    }
+
+    #[test]
+    fn what_is_dear_is_climbed_to_and_what_is_cheap_is_not() {
+        let check = |weight: f64, across: f64, expected: f64| {
+            let found = peak(weight).least(0.5, across);
+            assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+        };
+        check(50.0, 1000.0, libm::hypot(1000.0, 100.0));
+        // Ten metres are worth it.
+        check(0.01, 1000.0, libm::hypot(1000.0, 10.0) + 0.9);
+        // No room to climb so high without a longer way.
+        check(50.0, 60.0, 100.0 * 2.0_f64.sqrt());
+    }
+
+    proptest! {
+        /// No route over level ground with its waypoints at those heights costs less.
+        #[test]
+        fn no_way_to_and_fro_is_cheaper(
+            heights in prop::collection::vec(-40.0..200.0f64, 1..6),
+            longer in prop::collection::vec(1.0..4.0f64, 6),
+            (ends, weight, climb) in ([-50.0..90.0f64, -50.0..90.0f64], 0.01..3.0f64, 10.0..70.0f64),
+        ) {
+            let mut scenario = scenario(r#""threats": []"#);
+            (scenario.start.z, scenario.target.z) = (ends[0], ends[1]);
+            (scenario.altitude.min, scenario.altitude.max) = (0.0, 200.0);
+            (scenario.weights.altitude, scenario.planner.waypoints) = (weight, heights.len());
+            scenario.vehicle.max_climb_deg = climb;
+            let peak = Peak::of(&scenario).expect("both are below the middle");
+            let all: Vec<f64> = [ends[0]].iter().chain(&heights).chain(&ends[1..]).copied().collect();
+            let tangent = libm::tan(climb.to_radians());
+            let (mut across, mut flown) = (0.0, 0.0);
+            for (leg, longer) in all.windows(2).zip(longer) {
+                let climbed = (leg[1] - leg[0]).abs();
+                let length = climbed / tangent * longer;
+                across += length;
+                flown += libm::hypot(length, climbed);
+            }
+            let off: f64 = heights.iter().map(|height| (height - 100.0).abs()).sum();
+            let cost = 0.5 * flown + weight * off;
+            let least = peak.least(0.5, 0.5 * across);
+            prop_assert!(least <= cost * (1.0 + 1e-9), "{least} {cost}");
+        }
+    }
+}

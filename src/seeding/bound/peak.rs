@@ -1,12 +1,9 @@
 //! What it costs that waypoints are to be at the middle of the band, where both ends are below it or above it: the
 //! route climbs towards it, or all waypoints stay off it. The argument is section 7 of docs/BOUND.md.
 
-use super::toll::steepest;
+use super::toll::{climb_worth, steepest};
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;
-
-/// Steps in which the cheapest height is looked for.
-const STEPS: usize = 60;
 
 /// Both ends on one side of the middle of a band above level ground.
 #[derive(Debug, Clone, Copy)]
@@ -40,21 +37,19 @@ impl Peak {
     /// all distances off the middle that the waypoint nearest to it may keep.
     pub(super) fn least(&self, fuel: f64, across: f64) -> f64 {
         let [one, other] = self.off_middle;
-        let cost = |off: f64| {
-            let climbed = fuel * (one + other - 2.0 * off);
-            libm::hypot(across.max(climbed / self.steepest), climbed) + self.weight * off
+        // Convex in what is climbed: two metres more are worth one off the middle of all waypoints up to some slope. Where
+        // the way has to be longer for them, each costs the same.
+        let share = 0.5 * self.weight / fuel;
+        let steep = libm::hypot(self.steepest.recip(), 1.0);
+        let best = if share < steep {
+            across / fuel * climb_worth(share).min(self.steepest)
+        } else {
+            f64::INFINITY
         };
-        // Convex in that distance.
-        let (mut low, mut high) = (0.0, one.min(other));
-        for _ in 0..STEPS {
-            let third = (high - low) / 3.0;
-            if cost(low + third) < cost(high - third) {
-                high -= third;
-            } else {
-                low += third;
-            }
-        }
-        cost(low).min(cost(high)).min(cost(0.5 * (low + high)))
+        let climbed = best.clamp((one - other).abs(), one + other);
+        let off = 0.5 * (one + other - climbed);
+        let climbing = fuel * climbed;
+        libm::hypot(across.max(climbing / self.steepest), climbing) + self.weight * off
     }
 }
 

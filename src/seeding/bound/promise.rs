@@ -52,6 +52,7 @@ pub(super) fn promise(
             + out(0)
             + out(1)
             + early(walls, prices);
+        // Waypoints off the middle of the band are no reason to look farther.
         promise.cost = prices.climbing(across / prices.fuel, prices.rise());
         if let [Piece::Straight { to, .. }, .., Piece::Straight { from, .. }] = &string.pieces[..] {
             promise.bends = [*to, *from];

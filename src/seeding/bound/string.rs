@@ -37,10 +37,20 @@ pub(super) fn cost(
     (walls, radii): (&[Wall], &[Option<f64>]),
     prices: &Prices,
     spent: &[usize],
+    limits: (f64, &dyn Fn() -> bool),
+) -> (f64, usize) {
+    let ends = departures((walls, radii), prices, spent);
+    between(ends, (walls, radii), prices, limits)
+}
+
+/// As `cost`, from one of these `ends` to the other.
+pub(super) fn between(
+    ends: [Departure; 2],
+    (walls, radii): (&[Wall], &[Option<f64>]),
+    prices: &Prices,
     (enough, stop): (f64, &dyn Fn() -> bool),
 ) -> (f64, usize) {
     let slack = slack(walls, radii, prices);
-    let ends = departures((walls, radii), prices, spent);
     let tolls = ends[0].toll + ends[1].toll;
     let enough = (enough - tolls).max(0.0) / prices.fuel + slack;
     let (shortest, ways) = shortest(

@@ -20,6 +20,16 @@ pub(super) fn steepest(scenario: &Scenario) -> f64 {
     libm::tan(angle.min(90.0).to_radians()) * (1.0 + 1e-12)
 }
 
+/// Metres of climb in a metre seen from above from which on one more costs this `share` of a metre flown; infinite where it
+/// never does.
+pub(super) fn climb_worth(share: f64) -> f64 {
+    if share < 1.0 {
+        share / (1.0 - share * share).sqrt()
+    } else {
+        f64::INFINITY
+    }
+}
+
 /// Metres seen from above that a route flies at the heights of `threat` at least, after the start and before the target:
 /// what climbing or descending out of them takes, but no more than half of the straight way.
 pub(super) fn stays(threat: &Threat, scenario: &Scenario) -> [f64; 2] {

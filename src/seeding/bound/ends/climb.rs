@@ -1,6 +1,7 @@
 //! What it costs on top that a first or last leg climbs to the middle of the band, or that its waypoint is off it. The
 //! argument is section 7 of docs/BOUND.md.
 
+use super::super::toll::climb_worth;
 use super::kind::End;
 use super::ramp::{Ramp, Rates};
 use crate::geometry::Point2;
@@ -47,13 +48,8 @@ impl End<'_> {
         let dearer = if length > 0.0 { exposed / length } else { 0.0 };
         let (w, weight) = (self.prices.fuel + dearer, self.weight);
         // Flown with the slope at which a metre of climb costs as much as one off the middle.
-        let climbed = if weight < w {
-            let share = weight / w;
-            (length * share / (1.0 - share * share).sqrt()).min(self.height)
-        } else {
-            self.height
-        };
-        let climbed = climbed.min(length * self.steepest);
+        let slope = climb_worth(weight / w).min(self.steepest);
+        let climbed = (length * slope).min(self.height);
         let slant = (length * length + climbed * climbed).sqrt();
         (w * (slant - length) + weight * (self.height - climbed)).max(0.0)
     }

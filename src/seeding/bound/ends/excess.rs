@@ -57,11 +57,11 @@ fn least(
     let mut cheapest = BinaryHeap::new();
     let keep = |kind: Kind, kinds: &mut Vec<Kind>, cheapest: &mut BinaryHeap<_>| {
         // Bits of numbers that are not negative are ordered as they are.
-        let total = (kind.cost + kind.steepness).max(0.0);
         let [shortest, longest] = kind.lengths;
-        let leaving = zone.filter(|(ramp, _)| shortest < ramp.reach);
-        let leaving = leaving.map(|(ramp, rise)| end.beginning(&ramp, longest, rise));
-        let total = leaving.unwrap_or(0.0).max(total);
+        let leaving = zone
+            .filter(|(ramp, _)| shortest < ramp.reach)
+            .map_or(0.0, |(ramp, rise)| end.beginning(&ramp, longest, rise));
+        let total = (kind.cost + kind.steepness).max(leaving).max(0.0);
         cheapest.push((Reverse(total.to_bits()), kinds.len()));
         kinds.push(kind);
     };

@@ -95,6 +95,7 @@ impl End<'_> {
 
     /// What may be gained by cutting the lengths of `kind`.
     fn longer(&self, kind: &Kind) -> f64 {
+        // What is flown in the zone round the other end is not told apart.
         if kind.lengths[0] >= self.apart {
             return 0.0;
         }

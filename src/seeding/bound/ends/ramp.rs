@@ -1,6 +1,7 @@
 //! A leg that leaves the zone round an end outside the band is in the band from there on: it is as steep as that asks for,
 //! however long it is. The argument is section 7 of docs/BOUND.md.
 
+use super::super::toll::climb_worth;
 use crate::cost::Tolerance;
 use crate::scenario::{AltitudeBand, Scenario};
 
@@ -52,12 +53,7 @@ impl Ramp {
         let Rates { fuel, weight, .. } = rates;
         let across = rise.max(fuel * self.reach);
         // Convex in the climb to the waypoint: as high as a metre of climb costs less than one off the middle.
-        let share = weight / fuel;
-        let best = if share < 1.0 {
-            across / fuel * share / (1.0 - share * share).sqrt()
-        } else {
-            f64::INFINITY
-        };
+        let best = across / fuel * climb_worth(weight / fuel);
         let out = self.reach * self.slope;
         let waypoint = best.max(out).min(height).min(highest);
         let climbed = waypoint.max(out);
@@ -81,12 +77,7 @@ impl Ramp {
         let whole = rates.fuel * shortest + rates.exposed;
         // Convex in the climb: where a climb of all metres costs what it saves off the middle, unless that is reached
         // before, or the zone asks for more.
-        let share = rates.weight * longest / whole;
-        let best = if share < 1.0 {
-            share / (1.0 - share * share).sqrt()
-        } else {
-            f64::INFINITY
-        };
+        let best = climb_worth(rates.weight * longest / whole);
         let climb = best.min(height / longest).max(self.slope).min(steepest);
         let off_middle = (height - climb * longest).max(climb * shortest - height);
         whole * ((1.0 + climb * climb).sqrt() - 1.0) + rates.weight * off_middle.max(0.0)

@@ -2,7 +2,7 @@
 //! argument is section 7 of docs/BOUND.md.
 
 use super::super::prices::Prices;
-use super::super::string::{cost, departures, narrowed};
+use super::super::string::{between, departures, narrowed};
 use super::super::wall::Wall;
 use super::ends;
 use crate::scenario::Scenario;
@@ -26,8 +26,10 @@ pub(in super::super) fn rising(
     let radii = zones.fold(radii.to_vec(), |radii, (at, ramp)| {
         narrowed((walls, &radii), at, ramp.reach)
     });
-    let [first, last] = departures((walls, &radii), prices, &[]);
-    let (across, _) = cost((walls, &radii), prices, &[], (f64::INFINITY, stop));
-    let on_top = ends.map(|end| end.leaving(first.toll + last.toll));
+    let field = (walls, &radii[..]);
+    let departures = departures(field, prices, &[]);
+    let tolls = departures[0].toll + departures[1].toll;
+    let (across, _) = between(departures, field, prices, (f64::INFINITY, stop));
+    let on_top = ends.map(|end| end.leaving(tolls));
     across + on_top[0] + on_top[1]
 }

@@ -95,14 +95,14 @@ impl<'a> Zones<'a> {
             for (at, nodes) in PARTS.iter().enumerate() {
                 let zone = nodes.map(|node| prices[node]);
                 if zone.iter().all(|price| *price >= 0.0) {
-                    sums[at] = with_share(&sums[at], &zone, 1.0);
+                    sums[at] = with(&sums[at], &zone, 1.0);
                 } else if zone.iter().any(|price| *price > 0.0) {
                     cut.push((at, zone));
                 }
             }
         }
         for (at, zone) in cut {
-            sums[at] = with_a_share(&sums[at], &zone);
+            sums[at] = with_best_share(&sums[at], &zone);
         }
         let mut limits = [f64::INFINITY; 6];
         for (sums, nodes) in sums.iter().zip(PARTS) {
@@ -145,7 +145,7 @@ impl<'a> Zones<'a> {
 
 /// The limits in the nodes of a part whose edge a zone cuts, with the share of what the zone costs, less than nothing
 /// where a node lies outside, that makes the least of them the greatest: no share is more than what the zone does cost.
-fn with_a_share(limits: &[f64; 3], zone: &[f64; 3]) -> [f64; 3] {
+fn with_best_share(limits: &[f64; 3], zone: &[f64; 3]) -> [f64; 3] {
     let least = |limits: &[f64; 3]| limits.iter().copied().fold(f64::INFINITY, f64::min);
     // The least is concave in the share: it is greatest with all of it, or where two nodes change places.
     let meeting =
@@ -153,17 +153,14 @@ fn with_a_share(limits: &[f64; 3], zone: &[f64; 3]) -> [f64; 3] {
     let shares = [1.0].into_iter().chain(SIDES.map(meeting));
     shares
         .filter(|share| *share > 0.0 && *share <= 1.0)
-        .map(|share| with_share(limits, zone, share))
+        .map(|share| with(limits, zone, share))
         .fold(*limits, |best, other| {
-            if least(&other) > least(&best) {
-                other
-            } else {
-                best
-            }
+            let better = least(&other) > least(&best);
+            if better { other } else { best }
         })
 }
 
-fn with_share(limits: &[f64; 3], zone: &[f64; 3], share: f64) -> [f64; 3] {
+fn with(limits: &[f64; 3], zone: &[f64; 3], share: f64) -> [f64; 3] {
     std::array::from_fn(|node| limits[node] + share * zone[node])
 }
 
@@ -191,7 +188,7 @@ mod tests {
     #[test]
     fn a_zone_whose_edge_cuts_a_part_counts_as_far_as_it_helps() {
         let check = |limits: [f64; 3], zone: [f64; 3], expected: [f64; 3]| {
-            let found = with_a_share(&limits, &zone);
+            let found = with_best_share(&limits, &zone);
             let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs());
             assert!(off.fold(0.0, f64::max) < 1e-12, "{found:?}");
         };

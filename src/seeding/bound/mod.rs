@@ -93,7 +93,14 @@ fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) ->
             return proven;
         }
         let known = (proven, promised().cost);
-        let proof = potential::prove(&walls, prices, &scenario.area, known, stop);
+        let proof = potential::prove(
+            &walls,
+            prices,
+            &scenario.area,
+            known,
+            &potential::FREE,
+            stop,
+        );
         let early = departure::early(&walls, prices);
         let dense = proof.map_or(0.0, |proof| proof.total() + early);
         return proven.max(prices.climbing_at(dense));
@@ -167,9 +174,11 @@ fn crossing(field: &Field, events: &[Event], used: &[Event], known: f64) -> f64 
         return legs(field, events, 0.0);
     }
     let promise = promise(walls, &field.radii(used), prices, &scenario.area, stop);
+    let radii = string::cores(walls);
+    let leads = ends::leads(scenario, prices, (walls, &radii), stop);
     let prove = |known: f64| {
         let known = (known, promise.cost);
-        potential::prove(walls, prices, &scenario.area, known, stop)
+        potential::prove(walls, prices, &scenario.area, known, &leads, stop)
     };
     let over = |proof| ends::over(proof, scenario, prices, walls, stop);
     if let Some(proof) = prove(known) {

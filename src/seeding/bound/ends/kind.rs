@@ -255,7 +255,7 @@ impl End<'_> {
     }
 
     /// Whether every leg to within `spread` of `at` enters a core.
-    fn is_blocked(&self, at: Point2, spread: f64) -> bool {
+    pub(super) fn is_blocked(&self, at: Point2, spread: f64) -> bool {
         self.counting().any(|(wall, stay)| {
             let at = self.at_most(at, stay);
             match &wall.shape {

@@ -5,10 +5,12 @@ mod climb;
 mod excess;
 mod exposure;
 mod kind;
+mod lead;
 mod ramp;
 mod rising;
 
 pub(super) use excess::over;
+pub(super) use lead::leads;
 pub(super) use rising::rising;
 
 use super::prices::Prices;

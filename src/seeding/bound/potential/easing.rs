@@ -8,7 +8,7 @@ use super::slopes::{gradients, response};
 const SWEEPS: usize = 20;
 
 /// How many times as steep as allowed is well enough.
-const ENOUGH: f64 = 1.005;
+const ENOUGH: f64 = 1.002;
 
 /// Share of a step of Newton's method that is taken: the nodes about it move, too.
 const TAKEN: f64 = 0.8;

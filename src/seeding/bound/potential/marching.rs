@@ -1,9 +1,21 @@
-//! What reaching each node costs, about: fast marching over the parts of triangles, after Kimmel and Sethian (1998).
+//! What reaching each node costs, about: fast marching over the parts of triangles, after Kimmel and Sethian (1998), with
+//! the slopes of what it costs carried along, so that it bends between two nodes as fronts do.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::mesh::{Mesh, PARTS, Triangle};
+use crate::geometry::{Point2, Vector2};
+
+/// Steps of Newton's method to the cheapest place of a side, at most.
+const STEPS: usize = 3;
+
+/// Share of a side that is a step to which none needs to follow.
+const SMALL: f64 = 0.01;
+
+/// How far a cubic is from its chord at most for each unit by which its slope at either end differs from that of the
+/// chord: the most of `u (1 - u)^2`.
+const BULGE: f64 = 4.0 / 27.0;
 
 /// Of each node of a triangle, the parts that have it, and which of their corners it is.
 const PARTS_ROUND: [&[(usize, usize)]; 6] = [
@@ -15,63 +27,173 @@ const PARTS_ROUND: [&[(usize, usize)]; 6] = [
     &[(0, 2), (2, 0), (3, 1)],
 ];
 
-/// What the cheapest ways from the first node and from the second to each node cost where a metre in the parts of a
-/// triangle costs `prices`; infinite where none leads.
-pub(super) fn march(mesh: &Mesh, prices: &[[f64; 4]]) -> [Vec<f64>; 2] {
+/// Where ways begin.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Seed {
+    pub(super) node: usize,
+    /// What has been paid there.
+    pub(super) cost: f64,
+    /// How that changes about it, a metre.
+    pub(super) slope: Vector2,
+}
+
+impl Seed {
+    /// Ways that begin in a node where so much has been paid, and go straight to all others of triangles that have it: there
+    /// fronts are bent too much to be a march's.
+    pub(super) fn about(mesh: &Mesh, prices: &[[f64; 6]], node: usize, cost: f64) -> Vec<Self> {
+        let slope = Vector2::zeros();
+        let mut seeds = vec![Self { node, cost, slope }];
+        for &(triangle, here) in mesh.round(node) {
+            let prices = &prices[triangle];
+            for (other, price) in mesh.triangles[triangle].nodes.into_iter().zip(prices) {
+                let way = mesh.nodes[other] - mesh.nodes[node];
+                let length = way.norm();
+                if length > 0.0 {
+                    seeds.push(Self {
+                        node: other,
+                        cost: cost + 0.5 * (prices[here] + price) * length,
+                        slope: way * (price / length),
+                    });
+                }
+            }
+        }
+        seeds
+    }
+}
+
+/// What the cheapest ways from any of the `seeds` of each end to each node cost where a metre in the nodes of a triangle
+/// costs `prices`; infinite where none leads.
+pub(super) fn march(mesh: &Mesh, prices: &[[f64; 6]], seeds: [&[Seed]; 2]) -> [Vec<f64>; 2] {
     let triangles = mesh.triangles.iter();
     let shapes: Vec<Shape> = triangles
         .map(|triangle| Shape::of(mesh, triangle))
         .collect();
-    [0, 1].map(|end| march_from(end, mesh, &shapes, prices))
+    seeds.map(|seeds| {
+        let mut front = Front {
+            mesh,
+            prices,
+            shapes: &shapes,
+            costs: vec![f64::INFINITY; mesh.nodes.len()],
+            slopes: vec![Vector2::zeros(); mesh.nodes.len()],
+            is_known: vec![false; mesh.nodes.len()],
+        };
+        front.march(seeds);
+        front.costs
+    })
 }
 
-fn march_from(from: usize, mesh: &Mesh, shapes: &[Shape], prices: &[[f64; 4]]) -> Vec<f64> {
-    let mut costs = vec![f64::INFINITY; mesh.nodes.len()];
-    let mut is_known = vec![false; mesh.nodes.len()];
-    let mut heap = BinaryHeap::new();
-    costs[from] = 0.0;
-    heap.push((Reverse(0_u64), from));
-    while let Some((_, node)) = heap.pop() {
-        if is_known[node] {
-            continue;
+/// How far a march has come.
+struct Front<'a> {
+    mesh: &'a Mesh,
+    prices: &'a [[f64; 6]],
+    shapes: &'a [Shape],
+    /// Of each node, by the cheapest way so far.
+    costs: Vec<f64>,
+    /// How these change there, a metre; nothing where ways begin and it is not known.
+    slopes: Vec<Vector2>,
+    /// Whether no way is cheaper.
+    is_known: Vec<bool>,
+}
+
+impl Front<'_> {
+    fn march(&mut self, seeds: &[Seed]) {
+        let mut heap = BinaryHeap::new();
+        for seed in seeds {
+            if seed.cost < self.costs[seed.node] {
+                self.costs[seed.node] = seed.cost;
+                self.slopes[seed.node] = seed.slope;
+                // Bits of positive numbers are ordered as they are.
+                heap.push((Reverse(seed.cost.to_bits()), seed.node));
+            }
         }
-        is_known[node] = true;
-        for &(triangle, which) in mesh.round(node) {
-            let (nodes, shape) = (&mesh.triangles[triangle].nodes, &shapes[triangle]);
-            for &(part, here) in PARTS_ROUND[which] {
-                let (part, price) = (PARTS[part], prices[triangle][part]);
-                for (next, third) in [
-                    ((here + 1) % 3, (here + 2) % 3),
-                    ((here + 2) % 3, (here + 1) % 3),
-                ] {
-                    let (reached, beside) = (nodes[part[next]], nodes[part[third]]);
-                    if is_known[reached] {
-                        continue;
-                    }
-                    // A side between two corners is named for the third.
-                    let straight = costs[node] + price * shape.sides[third];
-                    let least = costs[node].min(costs[beside]) + price * shape.feet[next][1];
-                    let cost = if is_known[beside] && least < costs[reached] {
-                        let side = if here == (next + 1) % 3 {
-                            [node, beside]
-                        } else {
-                            [beside, node]
-                        };
-                        let over = shape.over(next, price, side.map(|node| costs[node]));
-                        straight.min(over)
-                    } else {
-                        straight
-                    };
-                    if cost < costs[reached] {
-                        costs[reached] = cost;
-                        // Bits of positive numbers are ordered as they are.
-                        heap.push((Reverse(cost.to_bits()), reached));
+        let mesh = self.mesh;
+        while let Some((_, node)) = heap.pop() {
+            if std::mem::replace(&mut self.is_known[node], true) {
+                continue;
+            }
+            for &(triangle, which) in mesh.round(node) {
+                let nodes = &mesh.triangles[triangle].nodes;
+                for &(part, here) in PARTS_ROUND[which] {
+                    let [one, other] = [(here + 1) % 3, (here + 2) % 3];
+                    for corners in [[here, one, other], [here, other, one]] {
+                        let reached = nodes[PARTS[part][corners[1]]];
+                        if self.is_known[reached] {
+                            continue;
+                        }
+                        let (cost, from) = self.cheapest((triangle, part), corners);
+                        if cost < self.costs[reached] {
+                            let way = mesh.nodes[reached] - from;
+                            let price = self.prices[triangle][PARTS[part][corners[1]]];
+                            self.costs[reached] = cost;
+                            self.slopes[reached] = way * (price / way.norm());
+                            heap.push((Reverse(cost.to_bits()), reached));
+                        }
                     }
                 }
             }
         }
     }
-    costs
+
+    /// What it costs within a part of a triangle to come from the first of its corners, or from between it and the third,
+    /// to the second, and from where; not told exactly where that is no cheaper than what is known.
+    #[inline]
+    fn cheapest(
+        &self,
+        (triangle, part): (usize, usize),
+        [here, next, third]: [usize; 3],
+    ) -> (f64, Point2) {
+        let (part, shape) = (PARTS[part], &self.shapes[triangle]);
+        let nodes = part.map(|corner| self.mesh.triangles[triangle].nodes[corner]);
+        let prices = part.map(|corner| self.prices[triangle][corner]);
+        let place = |corner: usize| self.mesh.nodes[nodes[corner]];
+        // A side between two corners is named for the third.
+        let straight = 0.5 * (prices[here] + prices[next]) * shape.sides[third];
+        let along_side = (self.costs[nodes[here]] + straight, place(here));
+        if !self.is_known[nodes[third]] {
+            return along_side;
+        }
+        let ends = if here == (next + 1) % 3 {
+            [here, third]
+        } else {
+            [third, here]
+        };
+        let way = place(ends[1]) - place(ends[0]);
+        let costs = ends.map(|end| self.costs[nodes[end]]);
+        let rise = |end: usize| {
+            let slope = self.slopes[nodes[end]];
+            if slope == Vector2::zeros() {
+                costs[1] - costs[0]
+            } else {
+                slope.dot(&way)
+            }
+        };
+        let side = Side {
+            costs,
+            rises: ends.map(rise),
+            prices: ends.map(|end| prices[end]),
+        };
+        let enough = along_side.0.min(self.costs[nodes[next]]);
+        if shape.least(next, prices[next], &side) >= enough {
+            return along_side;
+        }
+        let (cost, at) = shape.over(next, prices[next], &side);
+        if cost < along_side.0 {
+            (cost, place(ends[0]) + way * at)
+        } else {
+            along_side
+        }
+    }
+}
+
+/// A side of a part of which both ends are reached.
+#[derive(Debug)]
+struct Side {
+    /// What reaching its ends costs.
+    costs: [f64; 2],
+    /// By how much that would rise along the whole side as it does at each end.
+    rises: [f64; 2],
+    /// Of a metre at its ends.
+    prices: [f64; 2],
 }
 
 /// Of the parts of a triangle.
@@ -102,30 +224,79 @@ impl Shape {
         }
     }
 
-    /// What a corner costs that is reached over the side opposite to it, which begins in the next corner, where
-    /// reaching its ends costs `costs` and what lies between them is linear; infinite where the way would miss it.
+    /// No more than what `over` finds, told at once: at the least price, from a side that bulges as far down as it may.
     #[inline]
-    fn over(&self, corner: usize, price: f64, costs: [f64; 2]) -> f64 {
-        let side = self.sides[corner];
+    fn least(&self, corner: usize, price: f64, side: &Side) -> f64 {
         let [along, above] = self.feet[corner];
-        // The cheapest way crosses the side at an angle of which this is the cosine.
-        let rise = (costs[1] - costs[0]) / (price * side);
-        if rise.abs() >= 1.0 {
-            return f64::INFINITY;
+        let [first, last] = side.costs;
+        let price = price.min(side.prices[0]).min(side.prices[1]);
+        let rise = (last - first) / self.sides[corner];
+        let slant = price * price - rise * rise;
+        let straight = if slant > 0.0 {
+            first + rise * along + above * slant.sqrt()
+        } else {
+            first.min(last)
+        };
+        let bulge = side.rises.map(|rise| (rise - (last - first)).abs());
+        straight - BULGE * (bulge[0] + bulge[1])
+    }
+
+    /// What a corner costs where a metre costs `price` that is reached over the side opposite to it, which begins in the
+    /// next corner, and at which share of the side that crosses it. What reaching the side costs is a cubic along it, and
+    /// the price is linear.
+    #[inline]
+    fn over(&self, corner: usize, price: f64, side: &Side) -> (f64, f64) {
+        let length = self.sides[corner];
+        let [along, above] = self.feet[corner];
+        let change = side.costs[1] - side.costs[0];
+        let [first, last] = side.rises;
+        let (square, cube) = (
+            3.0 * change - 2.0 * first - last,
+            first + last - 2.0 * change,
+        );
+        // The mean price of the way from the beginning of the side, and how it changes along it.
+        let begin = 0.5 * (price + side.prices[0]);
+        let dearer = 0.5 * (side.prices[1] - side.prices[0]);
+        let way = |at: f64| {
+            let aside = along - at * length;
+            (aside, (aside * aside + above * above).sqrt())
+        };
+        // Were all of it linear, the way would cross the side at an angle of which this is the cosine.
+        let rise = change / ((begin + 0.5 * dearer) * length);
+        let mut at = if rise.abs() < 1.0 {
+            (along - above * rise / (1.0 - rise * rise).sqrt()) / length
+        } else {
+            -rise
+        };
+        at = at.clamp(0.0, 1.0);
+        for _ in 0..STEPS {
+            let (aside, flown) = way(at);
+            let (price, nearer) = (begin + dearer * at, -aside * length / flown);
+            let turned = length * above / flown;
+            let turning = turned * turned / flown;
+            let slope =
+                first + at * (2.0 * square + 3.0 * cube * at) + nearer * price + flown * dearer;
+            let curvature =
+                2.0 * square + 6.0 * cube * at + turning * price + 2.0 * nearer * dearer;
+            if curvature <= 0.0 {
+                break;
+            }
+            let before = at;
+            at = (at - slope / curvature).clamp(0.0, 1.0);
+            if (at - before).abs() < SMALL {
+                break;
+            }
         }
-        let slant = (1.0 - rise * rise).sqrt();
-        let aside = above * rise;
-        if along * slant < aside || (along - side) * slant > aside {
-            return f64::INFINITY;
-        }
-        costs[0] + price * (rise * along + above * slant)
+        let paid = side.costs[0] + at * (first + at * (square + at * cube));
+        (paid + way(at).1 * (begin + dearer * at), at)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
-    use crate::geometry::Point2;
 
     /// A square of `n` by `n` steps of a metre, cut along its diagonals, without the squares that are `left_out`.
     fn square(n: u32, left_out: impl Fn(Point2) -> bool) -> Mesh {
@@ -135,6 +306,12 @@ mod tests {
             .collect();
         let middle = |[a, b, c]: &[Point2; 3]| Point2::from((a.coords + b.coords + c.coords) / 3.0);
         Mesh::new(&vertices, |corners| left_out(middle(corners))).expect("they are apart")
+    }
+
+    /// What all nodes cost from the first one on.
+    fn from_first(mesh: &Mesh, prices: &[[f64; 6]]) -> Vec<f64> {
+        let [costs, _] = march(mesh, prices, [&Seed::about(mesh, prices, 0, 0.0), &[]]);
+        costs
     }
 
     #[test]
@@ -150,13 +327,83 @@ mod tests {
     #[test]
     fn as_far_as_the_straight_line() {
         let mesh = square(20, |_| false);
-        let [costs, _] = march(&mesh, &vec![[3.0; 4]; mesh.triangles.len()]);
+        let costs = from_first(&mesh, &vec![[3.0; 6]; mesh.triangles.len()]);
         for (node, cost) in mesh.nodes.iter().zip(&costs) {
             let straight = 3.0 * node.coords.norm();
             assert!(
-                (straight - 1e-9..1.05 * straight + 1.0).contains(cost),
+                (0.999 * straight..=1.002 * straight).contains(cost),
                 "{cost} to {node}"
             );
+        }
+    }
+
+    /// Where a metre costs the more the farther from the first node, the ways are straight, and what they cost bends.
+    #[test]
+    fn as_dear_as_the_way_is() {
+        let mesh = square(20, |_| false);
+        let price = |at: Point2| 1.0 + 0.2 * at.coords.norm();
+        let triangles = mesh.triangles.iter();
+        let prices: Vec<_> = triangles
+            .map(|triangle| mesh.places(triangle).map(price))
+            .collect();
+        let costs = from_first(&mesh, &prices);
+        for (node, cost) in mesh.nodes.iter().zip(&costs) {
+            let away = node.coords.norm();
+            let expected = away + 0.1 * away * away;
+            assert!(
+                (cost - expected).abs() <= 0.004 * expected,
+                "{cost} {expected} to {node}"
+            );
+        }
+    }
+
+    /// A front that is a straight line, ahead of which a node has been paid less for.
+    #[test]
+    fn from_the_cheapest_of_all_seeds() {
+        let mesh = square(20, |_| false);
+        let mut seeds: Vec<Seed> = (0..mesh.nodes.len())
+            .filter(|node| mesh.nodes[*node].x < 1e-9)
+            .map(|node| Seed {
+                node,
+                cost: 7.0,
+                slope: Vector2::new(1.0, 0.0),
+            })
+            .collect();
+        let ahead = Point2::new(12.0, 10.0);
+        let node = mesh.nodes.iter().position(|node| *node == ahead);
+        let prices = vec![[1.0; 6]; mesh.triangles.len()];
+        let node = node.expect("it is a corner");
+        seeds.extend(Seed::about(&mesh, &prices, node, 9.0));
+        let [costs, none] = march(&mesh, &prices, [&seeds, &[]]);
+        for (node, cost) in mesh.nodes.iter().zip(&costs) {
+            let expected = (7.0 + node.x).min(9.0 + (node - ahead).norm());
+            assert!(
+                (cost - expected).abs() <= 0.05,
+                "{cost} {expected} to {node}"
+            );
+        }
+        assert!(none.iter().all(|cost| cost.is_infinite()));
+    }
+
+    proptest! {
+        /// However the side bulges and whatever metres cost.
+        #[test]
+        fn nothing_is_over_a_side_for_less_than_told_at_once(
+            (x, y) in (-2.0..3.0f64, 0.05..3.0f64),
+            (first, last) in (0.0..5.0f64, 0.0..5.0f64),
+            rises in prop::array::uniform2(-6.0..6.0f64),
+            prices in prop::array::uniform3(0.1..4.0f64),
+        ) {
+            let places = [[0.0, 0.0], [2.0, 0.0], [2.0 * x, 2.0 * y]].map(Point2::from);
+            let mesh = Mesh::new(&places, |_| false).expect("they are apart");
+            let triangle = &mesh.triangles[0];
+            let corner = (0..3).find(|corner| triangle.nodes[*corner] == 2).expect("it is one");
+            let shape = Shape::of(&mesh, triangle);
+            let side = Side { costs: [first, last], rises, prices: [prices[0], prices[1]] };
+            let least = shape.least(corner, prices[2], &side);
+            let (cost, at) = shape.over(corner, prices[2], &side);
+            prop_assert!(least <= cost + 1e-9, "{least} {cost}");
+            prop_assert!((0.0..=1.0).contains(&at));
         }
     }
 
@@ -164,7 +411,7 @@ mod tests {
     fn round_what_is_left_out() {
         // A wall with a way round its upper end.
         let mesh = square(20, |at| (10.0..11.0).contains(&at.x) && at.y < 15.0);
-        let [costs, _] = march(&mesh, &vec![[1.0; 4]; mesh.triangles.len()]);
+        let costs = from_first(&mesh, &vec![[1.0; 6]; mesh.triangles.len()]);
         let to = mesh
             .nodes
             .iter()
@@ -174,7 +421,7 @@ mod tests {
         assert!((round..1.06 * round).contains(&cost), "{cost} {round}");
         // Nothing leads into what is walled in.
         let mesh = square(20, |at| (10.0..11.0).contains(&at.x));
-        let [costs, _] = march(&mesh, &vec![[1.0; 4]; mesh.triangles.len()]);
+        let costs = from_first(&mesh, &vec![[1.0; 6]; mesh.triangles.len()]);
         assert!(costs.iter().any(|cost| cost.is_infinite()));
     }
 }

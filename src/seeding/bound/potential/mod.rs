@@ -4,6 +4,7 @@
 mod cells;
 mod easing;
 mod edges;
+mod lead;
 mod levels;
 mod marching;
 mod mesh;
@@ -19,6 +20,7 @@ use super::WORTHWHILE;
 use super::prices::Prices;
 use super::wall::Wall;
 use crate::geometry::{Point2, Rect, Vector2};
+pub(super) use lead::{FREE, Lead, Leads};
 use levels::Levels;
 use mesh::Mesh;
 use priced::Priced;
@@ -46,7 +48,7 @@ const MOST_VERTICES: usize = 6000;
 const MOST_ROUNDS: usize = 3;
 
 /// Share of what a potential rises by that is worth no more vertices.
-const NEARLY: f64 = 0.988;
+const NEARLY: f64 = 0.993;
 
 /// How many times what a string costs a route costs that is not looked at.
 const BEYOND: f64 = 1.05;
@@ -67,12 +69,14 @@ pub(super) fn whole(walls: &[Wall]) -> impl Iterator<Item = &Wall> {
 }
 
 /// What proves what no route undercuts at the prices of fuel and soft zones, seen from above, where it `applies`; `None`
-/// where that is not expected to exceed `known`, which no route undercuts either. A string costs what is `promised`.
+/// where that is not expected to exceed `known`, which no route undercuts either. A string costs what is `promised`, and
+/// routes begin and end with legs that cost what `leads` tell.
 pub(super) fn prove(
     walls: &[Wall],
     prices: &Prices,
     area: &Rect,
     (known, promised): (f64, f64),
+    leads: &Leads,
     stop: &dyn Fn() -> bool,
 ) -> Option<Proof> {
     if promised <= WORTHWHILE * known {
@@ -83,11 +87,13 @@ pub(super) fn prove(
     let (rect, cap) = region(ends, &area, prices, promised);
     let zones = Zones::new(&plane.walls, prices, rect);
     let mut spacing = Spacing::even(rect, &zones, FIRST);
+    let mut extras = [0.0; 2];
     for level in 1..=MOST_MESHES {
         let vertices = vertices::lay(ends, &zones, &spacing);
-        let priced = Priced::over(&vertices, &zones, &spacing)?;
-        let costs = priced.costs();
-        let estimate = costs[0][1];
+        let priced = Priced::over(&vertices, &zones, &spacing, leads)?;
+        extras = priced.extras();
+        let costs = priced.costs(extras);
+        let estimate = costs[0][1] - extras[0];
         // The first mesh is too coarse for narrow gaps, through which an estimate leaks.
         let is_near = prices.climbing_at(estimate) < WORTHWHILE * known && promised < FAR * known;
         // Nothing leads to the target, or nothing is to be gained.
@@ -102,7 +108,7 @@ pub(super) fn prove(
         }
     }
     let vertices = vertices::lay(ends, &zones, &spacing);
-    let steep = steepest(vertices, &zones, &spacing, stop)?;
+    let steep = steepest(vertices, (&zones, &spacing), (leads, extras), stop)?;
     Some(Proof::new(steep, cap, (plane.origin, rect)))
 }
 
@@ -134,16 +140,16 @@ impl Plane {
 /// large for what they must rise by.
 fn steepest(
     mut vertices: Vec<Point2>,
-    zones: &Zones,
-    spacing: &Spacing,
+    (zones, spacing): (&Zones, &Spacing),
+    (leads, extras): (&Leads, [f64; 2]),
     stop: &dyn Fn() -> bool,
 ) -> Option<(Mesh, Vec<f64>, Levels)> {
     let mut best: Option<(Mesh, Vec<f64>, Levels)> = None;
     for round in 0..=MOST_ROUNDS {
-        let Some(priced) = Priced::over(&vertices, zones, spacing) else {
+        let Some(priced) = Priced::over(&vertices, zones, spacing, leads) else {
             break;
         };
-        let potential = priced.potential();
+        let potential = priced.potential(extras);
         let rise = potential[1] - potential[0];
         // Nothing leads to the target.
         if !(rise > 0.0 && rise.is_finite()) {

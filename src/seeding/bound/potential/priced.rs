@@ -1,6 +1,8 @@
 //! A mesh with what its triangles may rise by, and potentials over it.
 
-use super::mesh::{Mesh, PARTS};
+use super::lead::Leads;
+use super::marching::Seed;
+use super::mesh::Mesh;
 use super::slopes::steepness;
 use super::spacing::Spacing;
 use super::zones::Zones;
@@ -8,48 +10,93 @@ use super::{easing, marching};
 use crate::geometry::Point2;
 
 /// How many times as steep as its limits a triangle is that is cut up.
-const TOO_STEEP: f64 = 1.01;
+const TOO_STEEP: f64 = 1.005;
 
 /// A mesh with what its triangles may rise by.
 pub(super) struct Priced {
     pub(super) mesh: Mesh,
     /// In the nodes of each triangle, a metre.
     pub(super) limits: Vec<[f64; 6]>,
-    /// In the parts of each triangle, a metre: what is made use of.
-    prices: Vec<[f64; 4]>,
+    /// The same, a metre: what is made use of.
+    prices: Vec<[f64; 6]>,
+    /// Where routes may be after first legs, and before last ones; nowhere where these cost nothing beyond their way.
+    led: [Vec<Seed>; 2],
 }
 
 impl Priced {
-    pub(super) fn over(vertices: &[Point2], zones: &Zones, spacing: &Spacing) -> Option<Self> {
+    pub(super) fn over(
+        vertices: &[Point2],
+        zones: &Zones,
+        spacing: &Spacing,
+        leads: &Leads,
+    ) -> Option<Self> {
         let mesh = Mesh::new(vertices, |corners| zones.leave_out(corners))?;
         let triangles = mesh.triangles.iter();
         let limits: Vec<[f64; 6]> = triangles
             .map(|triangle| zones.limits(&mesh.places(triangle)))
             .collect();
         let shares: Vec<f64> = mesh.nodes.iter().map(|at| spacing.share(*at)).collect();
-        let of_part = |nodes: &[usize; 6], limits: &[f64; 6], part: [usize; 3]| {
-            let prices = part.map(|node| limits[node] * shares[nodes[node]]);
-            prices.iter().sum::<f64>() / 3.0
-        };
         let triangles = mesh.triangles.iter().zip(&limits);
-        let prices = triangles
-            .map(|(triangle, limits)| PARTS.map(|part| of_part(&triangle.nodes, limits, part)))
+        let prices: Vec<[f64; 6]> = triangles
+            .map(|(triangle, limits)| {
+                let shares = triangle.of(&shares);
+                std::array::from_fn(|node| limits[node] * shares[node])
+            })
             .collect();
+        let led = [0, 1].map(|end| {
+            let over = (&mesh, vertices.len());
+            let lead = leads[end].as_ref();
+            lead.map_or_else(Vec::new, |lead| lead.seeds(end, over, &prices, spacing))
+        });
         Some(Self {
             mesh,
             limits,
             prices,
+            led,
         })
     }
 
-    /// What the cheapest ways to each node cost from either end, about.
-    pub(super) fn costs(&self) -> [Vec<f64>; 2] {
-        marching::march(&self.mesh, &self.prices)
+    /// What the cheapest ways to each node cost from either end, about: of those that begin with first legs, and of all
+    /// others as if they had paid the `extra` of the end for theirs.
+    pub(super) fn costs(&self, extras: [f64; 2]) -> [Vec<f64>; 2] {
+        let seeds = [0, 1].map(|end| {
+            let mut seeds = self.led[end].clone();
+            seeds.extend(self.about(end, extras[end]));
+            seeds
+        });
+        marching::march(
+            &self.mesh,
+            &self.prices,
+            seeds.each_ref().map(Vec::as_slice),
+        )
     }
 
-    /// A potential that is hardly anywhere steeper than the limits.
-    pub(super) fn potential(&self) -> Vec<f64> {
-        let [from, to] = self.costs();
+    /// What first legs and last ones make a way dearer by that leads to the other end, about.
+    pub(super) fn extras(&self) -> [f64; 2] {
+        if self.led.iter().all(Vec::is_empty) {
+            return [0.0; 2];
+        }
+        let led = self.led.each_ref().map(Vec::as_slice);
+        let led = marching::march(&self.mesh, &self.prices, led);
+        let free = [0, 1].map(|end| self.about(end, 0.0));
+        let free = marching::march(&self.mesh, &self.prices, free.each_ref().map(Vec::as_slice));
+        [0, 1].map(|end| {
+            let extra = led[end][1 - end] - free[end][1 - end];
+            if extra.is_finite() {
+                extra.max(0.0)
+            } else {
+                0.0
+            }
+        })
+    }
+
+    fn about(&self, end: usize, cost: f64) -> Vec<Seed> {
+        Seed::about(&self.mesh, &self.prices, end, cost)
+    }
+
+    /// A potential that is hardly anywhere steeper than the limits, for the `extras` of first and last legs.
+    pub(super) fn potential(&self, extras: [f64; 2]) -> Vec<f64> {
+        let [from, to] = self.costs(extras);
         // Away from the cheapest way the two do not rise in the same direction: their mean is less steep there.
         let mean = |(from, to): (&f64, &f64)| 0.5 * (from - to);
         let mut potential: Vec<f64> = from.iter().zip(&to).map(mean).collect();

@@ -51,7 +51,8 @@ impl Spacing {
         zones: &Zones,
         vertices: usize,
     ) -> Self {
-        let cheapest = costs[0][1].min(costs[1][0]);
+        let [first, last] = [0, 1].map(|end| costs[0][end] + costs[1][end]);
+        let cheapest = first.min(last);
         let rect = self.cells.rect;
         let cells = Cells::new(rect, self.side.max(Cells::about(rect, MOST_CELLS).side));
         let mut dearness = vec![f64::INFINITY; cells.count()];

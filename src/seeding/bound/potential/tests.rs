@@ -30,7 +30,7 @@ fn disc(x: f64, y: f64, radius: f64, influence: f64) -> String {
 fn proof(scenario: &Scenario, known: (f64, f64), stop: bool) -> Option<Proof> {
     let prices = Prices::of(scenario);
     let walls = around::walls(scenario, &prices);
-    prove(&walls, &prices, &scenario.area, known, &|| stop)
+    prove(&walls, &prices, &scenario.area, known, &FREE, &|| stop)
 }
 
 fn proven(scenario: &Scenario) -> f64 {
@@ -130,9 +130,9 @@ fn what_a_march_finds_is_proven_but_for_little() {
     let zones = Zones::new(&walls, &prices, scenario.area);
     let spacing = Spacing::even(scenario.area, &zones, 4000);
     let vertices = vertices::lay(ends, &zones, &spacing);
-    let priced = Priced::over(&vertices, &zones, &spacing).expect("they are apart");
-    let costs = priced.costs();
-    let steepest = steepest(vertices, &zones, &spacing, &|| false);
+    let priced = Priced::over(&vertices, &zones, &spacing, &FREE).expect("they are apart");
+    let costs = priced.costs([0.0; 2]);
+    let steepest = steepest(vertices, (&zones, &spacing), (&FREE, [0.0; 2]), &|| false);
     let proven = steepest.expect("there is a way").2.total();
     for cost in [costs[0][1], costs[1][0]] {
         assert!(

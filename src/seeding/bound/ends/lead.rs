@@ -50,3 +50,44 @@ impl End<'_> {
         self.prices.fuel * length + exposed + self.steepness([length; 2], exposed)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::super::tests::scenario;
+    use super::super::super::{around, potential, string};
+    use super::super::over;
+    use super::*;
+
+    /// From 85 m below the middle of the band to 44 above it, among 36 discs whose soft zones overlap: legs lead where none
+    /// of the cheapest ways seen from above does.
+    #[test]
+    fn a_potential_that_knows_of_legs_proves_more_with_them() {
+        let discs: Vec<String> = (0..36)
+            .map(|idx| {
+                let (column, row) = (f64::from(idx % 6), f64::from(idx / 6));
+                let (x, y) = (100.0 + 150.0 * column + 40.0 * (row % 2.0), 120.0 + 140.0 * row);
+                format!(
+                    r#"{{"kind": "cylinder", "center": {{"x": {x}, "y": {y}}}, "radius": 35, "influence": 90}}"#
+                )
+            })
+            .collect();
+        let mut scenario = scenario(&format!(r#""threats": [{}]"#, discs.join(", ")));
+        (scenario.start.z, scenario.target.z) = (15.0, 144.0);
+        let prices = Prices::of(&scenario);
+        let walls = around::walls(&scenario, &prices);
+        let radii = string::cores(&walls);
+        let proven = |leads: &Leads| {
+            let known = (0.0, 4000.0);
+            let proof = potential::prove(&walls, &prices, &scenario.area, known, leads, &|| false);
+            let proof = proof.expect("soft zones must be crossed");
+            let across = proof.total();
+            [across, over(proof, &scenario, &prices, &walls, &|| false)]
+        };
+        let [across, free] = proven(&FREE);
+        let [across_with, with] = proven(&leads(&scenario, &prices, (&walls, &radii), &|| false));
+        // The best route known has 30 waypoints.
+        assert!(with > 1.005 * free && with <= 1492.740, "{free} {with}");
+        // What is proven of the way seen from above hardly suffers.
+        assert!(across_with > 0.985 * across, "{across} {across_with}");
+    }
+}

@@ -288,7 +288,9 @@ impl Shape {
             }
         }
         let paid = side.costs[0] + at * (first + at * (square + at * cube));
-        (paid + way(at).1 * (begin + dearer * at), at)
+        let cost = paid + way(at).1 * (begin + dearer * at);
+        // A cubic with slopes that do not fit each other may dip, a front never comes back.
+        (cost.max(side.costs[0].min(side.costs[1])), at)
     }
 }
 

@@ -10,6 +10,7 @@ mod marching;
 mod mesh;
 mod priced;
 mod proof;
+mod sides;
 mod slopes;
 mod spacing;
 mod vertices;

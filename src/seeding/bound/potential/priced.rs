@@ -2,7 +2,7 @@
 
 use super::lead::Leads;
 use super::marching::Seed;
-use super::mesh::Mesh;
+use super::mesh::{Mesh, PARTS};
 use super::slopes::steepness;
 use super::spacing::Spacing;
 use super::zones::Zones;
@@ -87,6 +87,30 @@ impl Priced {
             } else {
                 0.0
             }
+        })
+    }
+
+    /// What the straight way from one node of a triangle to another costs, about.
+    pub(super) fn straight(&self, triangle: usize, [one, other]: [usize; 2]) -> f64 {
+        let (nodes, limits) = (&self.mesh.triangles[triangle].nodes, &self.limits[triangle]);
+        let [from, to] = [one, other].map(|node| self.mesh.nodes[nodes[node]]);
+        0.5 * (limits[one] + limits[other]) * (to - from).norm()
+    }
+
+    /// The nodes at both ends of each side of the parts of triangles, and what the way from one to the other costs, about.
+    pub(super) fn sides(&self) -> impl Iterator<Item = ([usize; 2], f64)> {
+        let sides = PARTS
+            .iter()
+            .flat_map(|[a, b, c]| [[*a, *b], [*b, *c], [*c, *a]]);
+        let triangles = self.mesh.triangles.iter().enumerate();
+        triangles.flat_map(move |(idx, triangle)| {
+            let side = move |side: [usize; 2]| {
+                (
+                    side.map(|node| triangle.nodes[node]),
+                    self.straight(idx, side),
+                )
+            };
+            sides.clone().map(side)
         })
     }
 

@@ -92,8 +92,8 @@ pub(super) fn prove(
     for level in 1..=MOST_MESHES {
         let vertices = vertices::lay(ends, &zones, &spacing);
         let priced = Priced::over(&vertices, &zones, &spacing, leads)?;
-        extras = priced.extras();
-        let costs = priced.costs(extras);
+        let costs;
+        (costs, extras) = priced.costs();
         let estimate = costs[0][1] - extras[0];
         // The first mesh is too coarse for narrow gaps, through which an estimate leaks.
         let is_near = prices.climbing_at(estimate) < WORTHWHILE * known && promised < FAR * known;

@@ -56,38 +56,33 @@ impl Priced {
         })
     }
 
-    /// What the cheapest ways to each node cost from either end, about: of those that begin with first legs, and of all
-    /// others as if they had paid the `extra` of the end for theirs.
-    pub(super) fn costs(&self, extras: [f64; 2]) -> [Vec<f64>; 2] {
-        let seeds = [0, 1].map(|end| {
-            let mut seeds = self.led[end].clone();
-            seeds.extend(self.about(end, extras[end]));
-            seeds
-        });
-        marching::march(
-            &self.mesh,
-            &self.prices,
-            seeds.each_ref().map(Vec::as_slice),
-        )
-    }
-
-    /// What first legs and last ones make a way dearer by that leads to the other end, about.
-    pub(super) fn extras(&self) -> [f64; 2] {
+    /// What the cheapest ways to each node cost from either end, about, and what first legs and last ones make a way dearer
+    /// by that leads to the other end. Ways begin with such legs, or as if they had paid what these make them dearer by.
+    pub(super) fn costs(&self) -> ([Vec<f64>; 2], [f64; 2]) {
+        let free = self.march([0, 1].map(|end| self.about(end, 0.0)));
         if self.led.iter().all(Vec::is_empty) {
-            return [0.0; 2];
+            return (free, [0.0; 2]);
         }
-        let led = self.led.each_ref().map(Vec::as_slice);
-        let led = marching::march(&self.mesh, &self.prices, led);
-        let free = [0, 1].map(|end| self.about(end, 0.0));
-        let free = marching::march(&self.mesh, &self.prices, free.each_ref().map(Vec::as_slice));
-        [0, 1].map(|end| {
+        let led = self.march(self.led.clone());
+        let extras = [0, 1].map(|end| {
             let extra = led[end][1 - end] - free[end][1 - end];
             if extra.is_finite() {
                 extra.max(0.0)
             } else {
                 0.0
             }
-        })
+        });
+        let costs = [0, 1].map(|end| {
+            let both = free[end].iter().zip(&led[end]);
+            both.map(|(free, led)| led.min(free + extras[end]))
+                .collect()
+        });
+        (costs, extras)
+    }
+
+    fn march(&self, seeds: [Vec<Seed>; 2]) -> [Vec<f64>; 2] {
+        let seeds = seeds.each_ref().map(Vec::as_slice);
+        marching::march(&self.mesh, &self.prices, seeds)
     }
 
     /// What the straight way from one node of a triangle to another costs, about.
@@ -120,7 +115,11 @@ impl Priced {
 
     /// A potential that is hardly anywhere steeper than the limits, for the `extras` of first and last legs.
     pub(super) fn potential(&self, extras: [f64; 2]) -> Vec<f64> {
-        let [from, to] = self.costs(extras);
+        let [from, to] = self.march([0, 1].map(|end| {
+            let mut seeds = self.led[end].clone();
+            seeds.extend(self.about(end, extras[end]));
+            seeds
+        }));
         // Away from the cheapest way the two do not rise in the same direction: their mean is less steep there.
         let mean = |(from, to): (&f64, &f64)| 0.5 * (from - to);
         let mut potential: Vec<f64> = from.iter().zip(&to).map(mean).collect();

@@ -131,7 +131,7 @@ fn what_a_march_finds_is_proven_but_for_little() {
     let spacing = Spacing::even(scenario.area, &zones, 4000);
     let vertices = vertices::lay(ends, &zones, &spacing);
     let priced = Priced::over(&vertices, &zones, &spacing, &FREE).expect("they are apart");
-    let costs = priced.costs([0.0; 2]);
+    let (costs, _) = priced.costs();
     let steepest = steepest(vertices, (&zones, &spacing), (&FREE, [0.0; 2]), &|| false);
     let proven = steepest.expect("there is a way").2.total();
     for cost in [costs[0][1], costs[1][0]] {

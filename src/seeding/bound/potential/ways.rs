@@ -53,7 +53,7 @@ pub fn cheap_ways(scenario: &Scenario, height: f64, sought: WaysSought) -> Vec<V
     };
     let told_apart: Vec<&Wall> = zones.counted().collect();
     let ways = Ways {
-        costs: priced.costs([0.0; 2]),
+        costs: priced.costs().0,
         priced,
     };
     let to_scenario = |at: Point2| at + plane.origin;

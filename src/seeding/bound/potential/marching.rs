@@ -5,7 +5,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::mesh::{Mesh, PARTS, Triangle};
-use crate::geometry::{Point2, Vector2};
+use crate::geometry::Vector2;
 
 /// Steps of Newton's method to the cheapest place of a side, at most.
 const STEPS: usize = 3;
@@ -76,8 +76,12 @@ pub(super) fn march(mesh: &Mesh, prices: &[[f64; 6]], seeds: [&[Seed]; 2]) -> [V
             costs: vec![f64::INFINITY; mesh.nodes.len()],
             slopes: vec![Vector2::zeros(); mesh.nodes.len()],
             is_known: vec![false; mesh.nodes.len()],
+            heap: BinaryHeap::new(),
         };
-        front.march(seeds);
+        for seed in seeds {
+            front.offer(*seed);
+        }
+        front.march();
         front.costs
     })
 }
@@ -93,40 +97,33 @@ struct Front<'a> {
     slopes: Vec<Vector2>,
     /// Whether no way is cheaper.
     is_known: Vec<bool>,
+    /// The nodes that are reached, the cheapest first, by the bits of what they cost: those of positive numbers are ordered
+    /// as they are.
+    heap: BinaryHeap<(Reverse<u64>, usize)>,
 }
 
 impl Front<'_> {
-    fn march(&mut self, seeds: &[Seed]) {
-        let mut heap = BinaryHeap::new();
-        for seed in seeds {
-            if seed.cost < self.costs[seed.node] {
-                self.costs[seed.node] = seed.cost;
-                self.slopes[seed.node] = seed.slope;
-                // Bits of positive numbers are ordered as they are.
-                heap.push((Reverse(seed.cost.to_bits()), seed.node));
-            }
+    /// Takes a way that is cheaper than those so far.
+    fn offer(&mut self, seed: Seed) {
+        if seed.cost < self.costs[seed.node] {
+            self.costs[seed.node] = seed.cost;
+            self.slopes[seed.node] = seed.slope;
+            self.heap.push((Reverse(seed.cost.to_bits()), seed.node));
         }
+    }
+
+    fn march(&mut self) {
         let mesh = self.mesh;
-        while let Some((_, node)) = heap.pop() {
+        while let Some((_, node)) = self.heap.pop() {
             if std::mem::replace(&mut self.is_known[node], true) {
                 continue;
             }
             for &(triangle, which) in mesh.round(node) {
-                let nodes = &mesh.triangles[triangle].nodes;
                 for &(part, here) in PARTS_ROUND[which] {
                     let [one, other] = [(here + 1) % 3, (here + 2) % 3];
                     for corners in [[here, one, other], [here, other, one]] {
-                        let reached = nodes[PARTS[part][corners[1]]];
-                        if self.is_known[reached] {
-                            continue;
-                        }
-                        let (cost, from) = self.cheapest((triangle, part), corners);
-                        if cost < self.costs[reached] {
-                            let way = mesh.nodes[reached] - from;
-                            let price = self.prices[triangle][PARTS[part][corners[1]]];
-                            self.costs[reached] = cost;
-                            self.slopes[reached] = way * (price / way.norm());
-                            heap.push((Reverse(cost.to_bits()), reached));
+                        if let Some(seed) = self.onward((triangle, part), corners) {
+                            self.offer(seed);
                         }
                     }
                 }
@@ -134,53 +131,67 @@ impl Front<'_> {
         }
     }
 
-    /// What it costs within a part of a triangle to come from the first of its corners, or from between it and the third,
-    /// to the second, and from where; not told exactly where that is no cheaper than what is known.
+    /// The cheapest way within a part of a triangle from the first of its corners, or from between it and the third, to the
+    /// second; `None` where that is no cheaper than what is known.
     #[inline]
-    fn cheapest(
+    fn onward(
         &self,
         (triangle, part): (usize, usize),
         [here, next, third]: [usize; 3],
-    ) -> (f64, Point2) {
-        let (part, shape) = (PARTS[part], &self.shapes[triangle]);
-        let nodes = part.map(|corner| self.mesh.triangles[triangle].nodes[corner]);
-        let prices = part.map(|corner| self.prices[triangle][corner]);
+    ) -> Option<Seed> {
+        let nodes = PARTS[part].map(|corner| self.mesh.triangles[triangle].nodes[corner]);
+        if self.is_known[nodes[next]] {
+            return None;
+        }
+        let shape = &self.shapes[triangle];
+        let prices = PARTS[part].map(|corner| self.prices[triangle][corner]);
         let place = |corner: usize| self.mesh.nodes[nodes[corner]];
         // A side between two corners is named for the third.
         let straight = 0.5 * (prices[here] + prices[next]) * shape.sides[third];
-        let along_side = (self.costs[nodes[here]] + straight, place(here));
-        if !self.is_known[nodes[third]] {
-            return along_side;
+        let mut cheapest = (self.costs[nodes[here]] + straight, place(here));
+        let known = self.costs[nodes[next]];
+        if self.is_known[nodes[third]] {
+            let ends = if here == (next + 1) % 3 {
+                [here, third]
+            } else {
+                [third, here]
+            };
+            let way = place(ends[1]) - place(ends[0]);
+            let side = self.side(nodes, prices, ends);
+            if shape.least(next, prices[next], &side) < cheapest.0.min(known) {
+                let (cost, at) = shape.over(next, prices[next], &side);
+                if cost < cheapest.0 {
+                    cheapest = (cost, place(ends[0]) + way * at);
+                }
+            }
         }
-        let ends = if here == (next + 1) % 3 {
-            [here, third]
-        } else {
-            [third, here]
-        };
-        let way = place(ends[1]) - place(ends[0]);
-        let costs = ends.map(|end| self.costs[nodes[end]]);
-        let rise = |end: usize| {
-            let slope = self.slopes[nodes[end]];
+        let (cost, from) = cheapest;
+        (cost < known).then(|| {
+            let way = place(next) - from;
+            Seed {
+                node: nodes[next],
+                cost,
+                slope: way * (prices[next] / way.norm()),
+            }
+        })
+    }
+
+    fn side(&self, nodes: [usize; 3], prices: [f64; 3], ends: [usize; 2]) -> Side {
+        let [from, to] = ends.map(|end| nodes[end]);
+        let way = self.mesh.nodes[to] - self.mesh.nodes[from];
+        let costs = [from, to].map(|node| self.costs[node]);
+        let rise = |node: usize| {
+            let slope = self.slopes[node];
             if slope == Vector2::zeros() {
                 costs[1] - costs[0]
             } else {
                 slope.dot(&way)
             }
         };
-        let side = Side {
+        Side {
             costs,
-            rises: ends.map(rise),
+            rises: [from, to].map(rise),
             prices: ends.map(|end| prices[end]),
-        };
-        let enough = along_side.0.min(self.costs[nodes[next]]);
-        if shape.least(next, prices[next], &side) >= enough {
-            return along_side;
-        }
-        let (cost, at) = shape.over(next, prices[next], &side);
-        if cost < along_side.0 {
-            (cost, place(ends[0]) + way * at)
-        } else {
-            along_side
         }
     }
 }
@@ -299,6 +310,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::geometry::Point2;
 
     /// A square of `n` by `n` steps of a metre, cut along its diagonals, without the squares that are `left_out`.
     fn square(n: u32, left_out: impl Fn(Point2) -> bool) -> Mesh {

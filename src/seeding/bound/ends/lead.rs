@@ -39,13 +39,10 @@ pub(in super::super) fn leads<'a>(
 impl End<'_> {
     /// What a leg to `at` costs, waypoint included; infinite where it enters a core.
     fn leg_to(&self, at: Point2) -> f64 {
-        let length = (at - self.from).norm();
-        if length <= 0.0 {
-            return self.steepness([0.0; 2], 0.0);
-        }
         if self.is_blocked(at, 0.0) {
             return f64::INFINITY;
         }
+        let length = (at - self.from).norm();
         let exposed = self.exposed(at, 0.0)[0];
         self.prices.fuel * length + exposed + self.steepness([length; 2], exposed)
     }

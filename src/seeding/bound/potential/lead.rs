@@ -33,14 +33,12 @@ impl Lead<'_> {
         let from = mesh.nodes[end];
         let seed = |node: usize| {
             let (way, (triangle, which)) = (mesh.nodes[node] - from, *mesh.round(node).first()?);
-            let length = way.norm();
-            if length > self.reach || spacing.share(mesh.nodes[node]) < 1.0 {
+            if way.norm() > self.reach || spacing.share(mesh.nodes[node]) < 1.0 {
                 return None;
             }
             let cost = (self.cost)(mesh.nodes[node]);
             // Straight away from the end; what a steep leg saves by being longer is left out.
-            let away = if length > 0.0 { length.recip() } else { 0.0 };
-            let slope = way * (prices[triangle][which] * away);
+            let slope = way.try_normalize(0.0).unwrap_or_default() * prices[triangle][which];
             cost.is_finite().then_some(Seed { node, cost, slope })
         };
         (0..vertices).filter_map(seed).collect()

@@ -63,12 +63,12 @@ impl Seed {
 
 /// What the cheapest ways from any of the `seeds` of each end to each node cost where a metre in the nodes of a triangle
 /// costs `prices`; infinite where none leads.
-pub(super) fn march(mesh: &Mesh, prices: &[[f64; 6]], seeds: [&[Seed]; 2]) -> [Vec<f64>; 2] {
+pub(super) fn march(mesh: &Mesh, prices: &[[f64; 6]], seeds: &[Vec<Seed>; 2]) -> [Vec<f64>; 2] {
     let triangles = mesh.triangles.iter();
     let shapes: Vec<Shape> = triangles
         .map(|triangle| Shape::of(mesh, triangle))
         .collect();
-    seeds.map(|seeds| {
+    seeds.each_ref().map(|seeds| {
         let mut front = Front {
             mesh,
             prices,
@@ -324,7 +324,7 @@ mod tests {
 
     /// What all nodes cost from the first one on.
     fn from_first(mesh: &Mesh, prices: &[[f64; 6]]) -> Vec<f64> {
-        let [costs, _] = march(mesh, prices, [&Seed::about(mesh, prices, 0, 0.0), &[]]);
+        let [costs, _] = march(mesh, prices, &[Seed::about(mesh, prices, 0, 0.0), vec![]]);
         costs
     }
 
@@ -388,7 +388,7 @@ mod tests {
         let prices = vec![[1.0; 6]; mesh.triangles.len()];
         let node = node.expect("it is a corner");
         seeds.extend(Seed::about(&mesh, &prices, node, 9.0));
-        let [costs, none] = march(&mesh, &prices, [&seeds, &[]]);
+        let [costs, none] = march(&mesh, &prices, &[seeds, vec![]]);
         for (node, cost) in mesh.nodes.iter().zip(&costs) {
             let expected = (7.0 + node.x).min(9.0 + (node - ahead).norm());
             assert!(

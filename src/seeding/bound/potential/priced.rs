@@ -59,11 +59,11 @@ impl Priced {
     /// What the cheapest ways to each node cost from either end, about, and what first legs and last ones make a way dearer
     /// by that leads to the other end. Ways begin with such legs, or as if they had paid what these make them dearer by.
     pub(super) fn costs(&self) -> ([Vec<f64>; 2], [f64; 2]) {
-        let free = self.march([0, 1].map(|end| self.about(end, 0.0)));
+        let free = self.march(&[0, 1].map(|end| self.about(end, 0.0)));
         if self.led.iter().all(Vec::is_empty) {
             return (free, [0.0; 2]);
         }
-        let led = self.march(self.led.clone());
+        let led = self.march(&self.led);
         let extras = [0, 1].map(|end| {
             let extra = led[end][1 - end] - free[end][1 - end];
             if extra.is_finite() {
@@ -80,8 +80,7 @@ impl Priced {
         (costs, extras)
     }
 
-    fn march(&self, seeds: [Vec<Seed>; 2]) -> [Vec<f64>; 2] {
-        let seeds = seeds.each_ref().map(Vec::as_slice);
+    fn march(&self, seeds: &[Vec<Seed>; 2]) -> [Vec<f64>; 2] {
         marching::march(&self.mesh, &self.prices, seeds)
     }
 
@@ -115,7 +114,7 @@ impl Priced {
 
     /// A potential that is hardly anywhere steeper than the limits, for the `extras` of first and last legs.
     pub(super) fn potential(&self, extras: [f64; 2]) -> Vec<f64> {
-        let [from, to] = self.march([0, 1].map(|end| {
+        let [from, to] = self.march(&[0, 1].map(|end| {
             let mut seeds = self.led[end].clone();
             seeds.extend(self.about(end, extras[end]));
             seeds

@@ -4,8 +4,11 @@
 use super::mesh::Mesh;
 use super::slopes::{gradients, response};
 
-/// Times that the places are gone over, at most.
-const SWEEPS: usize = 20;
+/// Times that the places are gone over, at most, where it is to be seen whether a mesh is fine enough,
+pub(super) const FEW: usize = 10;
+
+/// and where no finer one follows.
+pub(super) const MANY: usize = 60;
 
 /// How many times as steep as allowed is well enough.
 const ENOUGH: f64 = 1.002;
@@ -17,8 +20,13 @@ const TAKEN: f64 = 0.8;
 const BEYOND: f64 = 0.999;
 
 /// Change `values` but for those of the first `fixed` nodes so that triangles are no steeper than their `limits`, as
-/// far as it goes: by Newton's method for each node alone, on the squares of what is too much.
-pub(super) fn ease(mesh: &Mesh, limits: &[[f64; 6]], values: &mut [f64], fixed: usize) {
+/// far as it goes in so many sweeps: by Newton's method for each node alone, on the squares of what is too much.
+pub(super) fn ease(
+    mesh: &Mesh,
+    limits: &[[f64; 6]],
+    values: &mut [f64],
+    (fixed, sweeps): (usize, usize),
+) {
     // Of slopes that are allowed.
     let squares: Vec<[f64; 6]> = limits
         .iter()
@@ -33,7 +41,7 @@ pub(super) fn ease(mesh: &Mesh, limits: &[[f64; 6]], values: &mut [f64], fixed: 
     let mut asked: Vec<usize> = (0..mesh.triangles.len()).collect();
     // In which sweep each was met last.
     let mut met = (vec![0; values.len()], vec![0; mesh.triangles.len()]);
-    for sweep in 1..=SWEEPS {
+    for sweep in 1..=sweeps {
         asked.retain(|triangle| is_steep(*triangle, values));
         if asked.is_empty() {
             return;
@@ -106,7 +114,7 @@ mod tests {
                 .fold(0.0, f64::max)
         };
         let (before, first) = (steepest(&values), values[0]);
-        ease(&mesh, &limits, &mut values, 2);
+        ease(&mesh, &limits, &mut values, (2, MANY));
         let after = steepest(&values);
         assert!(before > 1.5 && after < 1.01, "{before} {after}");
         assert!((values[0] - first).abs() < f64::EPSILON);

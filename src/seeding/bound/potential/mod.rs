@@ -109,7 +109,7 @@ pub(super) fn prove(
         }
     }
     let vertices = vertices::lay(ends, &zones, &spacing);
-    let steep = steepest(vertices, (&zones, &spacing), (leads, extras), stop)?;
+    let steep = steepest(vertices, (&zones, &mut spacing), (leads, extras), stop)?;
     Some(Proof::new(steep, cap, (plane.origin, rect)))
 }
 
@@ -141,11 +141,11 @@ impl Plane {
 /// large for what they must rise by.
 fn steepest(
     mut vertices: Vec<Point2>,
-    (zones, spacing): (&Zones, &Spacing),
+    (zones, spacing): (&Zones, &mut Spacing),
     (leads, extras): (&Leads, [f64; 2]),
     stop: &dyn Fn() -> bool,
 ) -> Option<(Mesh, Vec<f64>, Levels)> {
-    let mut best: Option<(Mesh, Vec<f64>, Levels)> = None;
+    let mut best: Option<(Priced, Vec<f64>, Levels)> = None;
     for round in 0..=MOST_ROUNDS {
         let Some(priced) = Priced::over(&vertices, zones, spacing, leads) else {
             break;
@@ -156,10 +156,13 @@ fn steepest(
         if !(rise > 0.0 && rise.is_finite()) {
             break;
         }
-        let levels = Levels::new(&priced.mesh, &priced.limits, &potential);
+        let levels = priced.levels(&potential);
         let proven = levels.total();
+        // The first of these meshes tells whether those before it were too coarse for gaps.
+        let is_held_down = round == 0 && spacing.raise(rise + extras[0] + extras[1]);
         let room = MOST_VERTICES.saturating_sub(vertices.len());
-        let is_last = round == MOST_ROUNDS || room == 0 || proven >= NEARLY * rise || stop();
+        let is_enough = room == 0 || proven >= NEARLY * rise;
+        let is_last = round == MOST_ROUNDS || (is_enough && !is_held_down) || stop();
         if !is_last {
             vertices.extend(priced.between(&potential).into_iter().take(room));
         }
@@ -167,13 +170,21 @@ fn steepest(
             .as_ref()
             .is_none_or(|(_, _, other)| proven > other.total())
         {
-            best = Some((priced.mesh, potential, levels));
+            best = Some((priced, potential, levels));
         }
         if is_last {
             break;
         }
     }
-    best
+    let (priced, mut potential, levels) = best?;
+    let before = potential.clone();
+    priced.ease(&mut potential, easing::MANY);
+    let eased = priced.levels(&potential);
+    Some(if eased.total() > levels.total() {
+        (priced.mesh, potential, eased)
+    } else {
+        (priced.mesh, before, levels)
+    })
 }
 
 /// Where routes are looked at, and what one costs at least that leaves it: all of the area, or the part of it with

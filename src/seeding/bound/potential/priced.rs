@@ -1,6 +1,7 @@
 //! A mesh with what its triangles may rise by, and potentials over it.
 
 use super::lead::Leads;
+use super::levels::Levels;
 use super::marching::Seed;
 use super::mesh::{Mesh, PARTS};
 use super::slopes::steepness;
@@ -112,7 +113,7 @@ impl Priced {
         Seed::about(&self.mesh, &self.prices, end, cost)
     }
 
-    /// A potential that is hardly anywhere steeper than the limits, for the `extras` of first and last legs.
+    /// A potential that is in few places steeper than the limits, for the `extras` of first and last legs.
     pub(super) fn potential(&self, extras: [f64; 2]) -> Vec<f64> {
         let [from, to] = self.march(&[0, 1].map(|end| {
             let mut seeds = self.led[end].clone();
@@ -122,8 +123,18 @@ impl Priced {
         // Away from the cheapest way the two do not rise in the same direction: their mean is less steep there.
         let mean = |(from, to): (&f64, &f64)| 0.5 * (from - to);
         let mut potential: Vec<f64> = from.iter().zip(&to).map(mean).collect();
-        easing::ease(&self.mesh, &self.limits, &mut potential, 2);
+        self.ease(&mut potential, easing::FEW);
         potential
+    }
+
+    /// Makes a potential less steep where it is too steep.
+    pub(super) fn ease(&self, potential: &mut [f64], sweeps: usize) {
+        easing::ease(&self.mesh, &self.limits, potential, (2, sweeps));
+    }
+
+    /// What a potential over it proves.
+    pub(super) fn levels(&self, potential: &[f64]) -> Levels {
+        Levels::new(&self.mesh, &self.limits, potential)
     }
 
     /// The middles of the sides of all triangles that are too steep nevertheless.

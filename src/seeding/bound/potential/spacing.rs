@@ -12,6 +12,9 @@ const WIDER: [(f64, f64); 3] = [(1.1, 1.0), (2.0, 2.0), (4.0, 4.0)];
 /// How many times as dear as the cheapest a route is expected to be taken for at least where prices are lowered.
 const SPARE: f64 = 1.05;
 
+/// The same once it has been told from a mesh that is finer.
+const SPARE_TOLD: f64 = 1.03;
+
 /// Share of a price that is always left.
 const LEAST_SHARE: f64 = 0.4;
 
@@ -28,6 +31,10 @@ pub(super) struct Spacing {
     dearness: Vec<f64>,
     /// Distance between vertices where they are closest.
     pub(super) side: f64,
+    /// What the cheapest route costs, as far as known.
+    cheapest: f64,
+    /// How many times as dear as that routes are taken for at least where prices are lowered.
+    spare: f64,
 }
 
 impl Spacing {
@@ -38,6 +45,8 @@ impl Spacing {
             cells,
             dearness: vec![1.0; cells.count()],
             side: 0.0,
+            cheapest: f64::INFINITY,
+            spare: SPARE,
         };
         even.side = even.fitting(zones, vertices);
         even
@@ -67,6 +76,8 @@ impl Spacing {
             cells,
             dearness,
             side: 0.0,
+            cheapest,
+            spare: SPARE,
         };
         finer.side = finer.fitting(zones, vertices).min(self.side);
         finer
@@ -97,9 +108,20 @@ impl Spacing {
         self.side * self.wider(self.cells.of(place))
     }
 
+    /// Ask for more where the cheapest route turned out to cost so much that what is left of prices holds it down; whether
+    /// that is so.
+    pub(super) fn raise(&mut self, cost: f64) -> bool {
+        let times = cost / self.cheapest;
+        let is_held_down = times > self.spare;
+        if is_held_down {
+            self.spare = SPARE_TOLD * times;
+        }
+        is_held_down
+    }
+
     /// Share of its price that is enough at a place to make all routes that pass it dearer than the cheapest: what is
     /// not asked for there need not be proven by triangles that are few and large.
     pub(super) fn share(&self, place: Point2) -> f64 {
-        (SPARE / self.dearness[self.cells.of(place)]).clamp(LEAST_SHARE, 1.0)
+        (self.spare / self.dearness[self.cells.of(place)]).clamp(LEAST_SHARE, 1.0)
     }
 }

@@ -128,11 +128,13 @@ fn what_a_march_finds_is_proven_but_for_little() {
     let walls = around::walls(&scenario, &prices);
     let ends = prices.ends.map(|end| end.xy());
     let zones = Zones::new(&walls, &prices, scenario.area);
-    let spacing = Spacing::even(scenario.area, &zones, 4000);
+    let mut spacing = Spacing::even(scenario.area, &zones, 4000);
     let vertices = vertices::lay(ends, &zones, &spacing);
     let priced = Priced::over(&vertices, &zones, &spacing, &FREE).expect("they are apart");
     let (costs, _) = priced.costs();
-    let steepest = steepest(vertices, (&zones, &spacing), (&FREE, [0.0; 2]), &|| false);
+    let steepest = steepest(vertices, (&zones, &mut spacing), (&FREE, [0.0; 2]), &|| {
+        false
+    });
     let proven = steepest.expect("there is a way").2.total();
     for cost in [costs[0][1], costs[1][0]] {
         assert!(
@@ -196,6 +198,48 @@ fn limits_are_nowhere_more_than_a_metre_costs() {
         (covered / 1e6 - 1.0).abs() < 1e-9 && left_out > 30,
         "{covered} {left_out}"
     );
+}
+
+/// Where edges cross the border of the area, touch it or run close to it, vertices are on it or well within it.
+#[test]
+fn no_triangle_along_the_border_is_slim() {
+    let threats = [
+        disc(300.0, 60.5, 20.0, 60.0),
+        disc(600.0, 59.0, 59.5, 90.0),
+        disc(941.0, 700.0, 40.0, 60.0),
+        disc(995.0, 300.0, 30.0, 80.0),
+        disc(200.0, 1049.0, 10.0, 50.0),
+    ];
+    let scenario = scenario(0.2, &threats.join(", "));
+    let prices = Prices::of(&scenario);
+    let walls = around::walls(&scenario, &prices);
+    let rect = scenario.area;
+    let zones = Zones::new(&walls, &prices, rect);
+    let ends = prices.ends.map(|end| end.xy());
+    for vertices in [500, 1000, 2500, 4000] {
+        let spacing = Spacing::even(rect, &zones, vertices);
+        let vertices = vertices::lay(ends, &zones, &spacing);
+        let mesh = Mesh::new(&vertices, |corners| zones.leave_out(corners));
+        let mesh = mesh.expect("they are apart");
+        let is_on = |at: &Point2| {
+            [at.x, at.y]
+                .iter()
+                .any(|at| at.abs() < 1e-6 || (at - 1000.0).abs() < 1e-6)
+        };
+        let mut along = 0;
+        for triangle in &mesh.triangles {
+            let [a, b, c, ..] = mesh.places(triangle);
+            let corners = [a, b, c];
+            if corners.iter().filter(|at| is_on(at)).count() == 2 {
+                let longest = ring::edges(&corners).map(|(from, to)| (to - from).norm());
+                let longest = longest.fold(0.0, f64::max);
+                let height = (b - a).perp(&(c - a)) / longest;
+                assert!(height > 0.1 * longest, "{corners:?}");
+                along += 1;
+            }
+        }
+        assert!(along > 50, "{along}");
+    }
 }
 
 #[test]

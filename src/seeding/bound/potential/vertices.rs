@@ -6,7 +6,7 @@ use super::cells::Cells;
 use super::edges::{self, Edge};
 use super::spacing::Spacing;
 use super::zones::Zones;
-use crate::geometry::{Point2, Vector2};
+use crate::geometry::{Point2, Rect, Vector2};
 use crate::seeding::outline::OutlineShape;
 
 /// Share of the radius of a circle by which vertices on it are apart at most,
@@ -26,6 +26,10 @@ const BETWEEN: f64 = 0.62;
 
 /// How near vertices in between may come to edges.
 const BESIDE: f64 = 0.45;
+
+/// How near any may come to the border of the rectangle, but for those on it, as a share of how near they may come to each
+/// other: triangles between them and the border would be slim, and too steep.
+const INNER: f64 = 0.5;
 
 /// Edges of which all crossings are looked for, at most.
 const MOST_EDGES: usize = 1500;
@@ -104,10 +108,6 @@ fn follow(laid: &mut Laid, edges: &[Edge], spacing: &Spacing) {
 /// Between the edges, in equilateral triangles.
 fn fill(laid: &mut Laid, spacing: &Spacing) {
     let (rect, tolerance) = (laid.zones.rect(), laid.zones.tolerance());
-    let inner = |place: Point2| {
-        let [low, high] = [place - rect.min, rect.max - place];
-        low.x.min(low.y).min(high.x).min(high.y)
-    };
     for cell in 0..spacing.cells.count() {
         let side = spacing.side * spacing.wider(cell);
         let row = side * (0.75_f64).sqrt();
@@ -119,7 +119,7 @@ fn fill(laid: &mut Laid, spacing: &Spacing) {
             let mut i = (low.x / side - shift).ceil();
             while (i + shift) * side < high.x {
                 let place = rect.min + Vector2::new((i + shift) * side, j * row);
-                let is_beside = inner(place) < BESIDE * side
+                let is_beside = inner(&rect, place) < BESIDE * side
                     || laid
                         .zones
                         .near(place)
@@ -132,6 +132,24 @@ fn fill(laid: &mut Laid, spacing: &Spacing) {
             j += 1.0;
         }
     }
+}
+
+/// How far a place is within a rectangle.
+fn inner(rect: &Rect, place: Point2) -> f64 {
+    let [low, high] = [place - rect.min, rect.max - place];
+    low.x.min(low.y).min(high.x).min(high.y)
+}
+
+/// The place on the border of a rectangle that is within `near` of another in each direction; that one if there is none.
+fn onto(rect: &Rect, place: Point2, near: f64) -> Point2 {
+    let onto = |at: f64, borders: [f64; 2]| {
+        let border = borders.into_iter().find(|to| (at - to).abs() <= near);
+        border.unwrap_or(at)
+    };
+    Point2::new(
+        onto(place.x, [rect.min.x, rect.max.x]),
+        onto(place.y, [rect.min.y, rect.max.y]),
+    )
 }
 
 /// Whether a place is near the edge of a zone or a core.
@@ -158,10 +176,15 @@ struct Laid<'a> {
 }
 
 impl Laid<'_> {
-    /// One more, unless it is outside, in a core, or nearer than `least` to another.
+    /// One more, unless it is outside, in a core, or nearer than `least` to another, or to the border while not on it.
     fn add(&mut self, place: Point2, least: f64) {
-        let is_inside =
-            place.x.is_finite() && place.y.is_finite() && self.zones.rect().contains(place);
+        let rect = self.zones.rect();
+        let place = onto(&rect, place, self.zones.tolerance());
+        let inner = inner(&rect, place);
+        if inner > 0.0 && inner < INNER * least {
+            return;
+        }
+        let is_inside = place.x.is_finite() && place.y.is_finite() && rect.contains(place);
         if !is_inside || (least > 0.0 && self.zones.is_deep(place)) {
             return;
         }

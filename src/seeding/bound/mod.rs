@@ -13,6 +13,7 @@ mod departure;
 mod ends;
 mod event;
 mod field;
+mod least_legs;
 mod peak;
 mod potential;
 mod prices;
@@ -26,6 +27,7 @@ use std::cell::Cell;
 use crate::scenario::Scenario;
 use event::Event;
 use field::{Field, cost_of};
+use least_legs::least_legs;
 pub use potential::{WaysSought, cheap_ways};
 use prices::Prices;
 use promise::promise;
@@ -60,6 +62,7 @@ pub fn lower_bound_until(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
         return 0.0;
     }
     let straight = prices.climbing_at(prices.fuel * prices.direct());
+    let straight = straight.max(least_legs(scenario, &prices));
     let bound = round_walls(scenario, &prices, stop).max(straight);
     let bound = if bound.is_finite() { bound } else { straight };
     bound * (1.0 - ROUNDING)

@@ -41,8 +41,11 @@ const MOST_WAYS_IN_ALL: usize = 120_000;
 /// Bisections on the number of events that a cheaper route may make use of.
 const MOST_LEVELS: usize = 24;
 
-/// Where the string itself, with its climbs, is not this many times as dear as what is known, a potential promises nothing.
+/// Where the string itself is not this many times as dear as what is known, a potential promises nothing;
 const WORTHWHILE: f64 = 1.02;
+
+/// nor where it is not with its climbs, of which a route that leaves the string pays less.
+const WORTHWHILE_CLIMBING: f64 = 1.03;
 
 /// A potential that proves so many times what strings do leaves nothing to the legs of these.
 const BEYOND_STRINGS: f64 = 1.04;
@@ -195,8 +198,8 @@ fn crossing(field: &Field, events: &[Event], used: &[Event], known: f64) -> f64 
     }
     let known = known.max(legs(field, events, 0.0));
     // Not for its own sake, but for what the legs that leave the ends cost beyond it.
-    let climbing = ends::climbing(scenario, prices, walls, promise.bends, stop);
-    if climbing <= 0.0 || promise.cost + climbing <= WORTHWHILE * known {
+    let climbing = ends::climbing(scenario, prices, walls, &promise.places, stop);
+    if climbing <= 0.0 || promise.cost + climbing <= WORTHWHILE_CLIMBING * known {
         return known;
     }
     prove(0.0).map_or(known, |proof| known.max(over(proof)))
@@ -256,6 +259,48 @@ mod tests {
             (climbing - level - 2.0 * zone).abs() < 1e-3,
             "{climbing} {level} {zone}"
         );
+    }
+
+    /// Strings tell of neither: the last leg climbs through the soft zone that the target lies in, and the best route leaves
+    /// the string for where it may do so straight ahead.
+    #[test]
+    fn within_a_percent_where_the_last_leg_climbs_out_of_a_gap() {
+        let discs = [
+            [916, 787, 66, 105],
+            [406, 734, 75, 112],
+            [88, 76, 25, 54],
+            [91, 829, 30, 61],
+            [447, 462, 57, 97],
+            [990, 272, 45, 71],
+            [613, 65, 66, 96],
+            [187, 830, 50, 74],
+        ];
+        let discs = discs.map(|[x, y, radius, influence]| {
+            format!(
+                r#"{{"kind": "cylinder", "center": {{"x": {x}, "y": {y}}}, "radius": {radius}, "influence": {influence}}}"#
+            )
+        });
+        let mut scenario = scenario(&format!(r#""threats": [{}]"#, discs.join(", ")));
+        scenario.start = Point3::new(63.6, 94.9, 75.4);
+        scenario.target = Point3::new(847.9, 817.0, 145.5);
+        (scenario.altitude.min, scenario.altitude.max) = (0.0, 200.0);
+        scenario.planner.waypoints = 18;
+        let (bound, best) = (lower_bound(&scenario), 746.7366);
+        assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
+    }
+
+    /// The least legs leave a vehicle that climbs so slowly no other way than the route that is known.
+    #[test]
+    fn tight_where_legs_are_long_and_climbs_slow() {
+        let mut scenario = scenario(r#""threats": []"#);
+        scenario.start = Point3::new(78.0, 83.6, 20.5);
+        scenario.target = Point3::new(799.6, 804.0, 138.7);
+        (scenario.altitude.min, scenario.altitude.max) = (0.0, 200.0);
+        scenario.vehicle.max_climb_deg = 15.1;
+        scenario.vehicle.min_leg = 38.4;
+        scenario.planner.waypoints = 19;
+        let (bound, best) = (lower_bound(&scenario), 554.0766);
+        assert!(bound <= best && bound > 0.999 * best, "{bound} {best}");
     }
 
     #[test]

@@ -6,20 +6,22 @@ use super::prices::Prices;
 use super::string::{departures, pulled, scene};
 use super::wall::Wall;
 use crate::geometry::{Point2, Rect};
-use crate::seeding::taut::Piece;
 
 /// Share of the direct way by which a string may leave the area: a way within it is about as long.
 const OUTSIDE: f64 = 0.01;
 
-/// Points on a way at which soft zones are looked up.
-const SAMPLES: u32 = 256;
+/// Pieces of a string in which soft zones are looked up,
+const PIECES: u32 = 256;
+
+/// and of a way straight out of one.
+const PIECES_OUT: u32 = 32;
 
 /// What is hoped for: more than that cannot be proven.
 pub(super) struct Promise {
     /// What the string costs with all its soft zones, about; infinite where it leaves the area.
     pub(super) cost: f64,
-    /// Where it bends first after the start and last before the target.
-    pub(super) bends: [Point2; 2],
+    /// Places along it from the start to the target, and what it costs up to each seen from above.
+    pub(super) places: Vec<(Point2, f64)>,
 }
 
 /// What the string round `walls` widened to `radii` promises.
@@ -35,50 +37,53 @@ pub(super) fn promise(
         &scene((walls, radii), ends.map(|end| end.at)),
         (f64::INFINITY, stop),
     );
-    let [start, target] = prices.ends.map(|end| end.xy());
     let mut promise = Promise {
         cost: f64::INFINITY,
-        bends: [target, start],
+        places: Vec::new(),
     };
     if let Some(string) = found.strings.first() {
-        let price = |length, at: &dyn Fn(f64) -> Point2| price(walls, prices, area, (length, at));
+        let share = |part: u32, pieces: u32| f64::from(part) / f64::from(pieces);
         // Straight out of the soft zone that an end lies in.
-        let out = |end: usize| {
+        let out = |end: usize, part: u32| {
             let from = prices.ends[end].xy();
-            let way = ends[end].at - from;
-            price(way.norm(), &|share| from + way * share)
+            from + (ends[end].at - from) * share(part, PIECES_OUT)
         };
-        let across = price(string.length, &|share| string.at(share))
-            + out(0)
-            + out(1)
-            + early(walls, prices);
-        // Waypoints off the middle of the band are no reason to look farther.
-        promise.cost = prices.climbing(across / prices.fuel, prices.rise());
-        if let [Piece::Straight { to, .. }, .., Piece::Straight { from, .. }] = &string.pieces[..] {
-            promise.bends = [*to, *from];
+        let places = (0..=PIECES_OUT)
+            .map(|part| out(0, part))
+            .chain((1..PIECES).map(|part| string.at(share(part, PIECES))))
+            .chain((0..=PIECES_OUT).rev().map(|part| out(1, part)));
+        promise.places = paid(walls, prices, places);
+        let outside = OUTSIDE * prices.direct();
+        let leaves = |(at, _): &(Point2, f64)| area.excess(*at) > outside;
+        if let (Some((_, across)), false) =
+            (promise.places.last(), promise.places.iter().any(leaves))
+        {
+            // Waypoints off the middle of the band are no reason to look farther.
+            let length = (across + early(walls, prices)) / prices.fuel;
+            promise.cost = prices.climbing(length, prices.rise());
         }
     }
     promise
 }
 
-/// What a way costs seen from above, about, that is at places told by their shares of its length; infinite where it
-/// leaves the area, of which strings know nothing.
-fn price(
+/// What a way over `places` costs up to each of them seen from above, about.
+fn paid(
     walls: &[Wall],
     prices: &Prices,
-    area: &Rect,
-    (length, at): (f64, &dyn Fn(f64) -> Point2),
-) -> f64 {
+    places: impl Iterator<Item = Point2>,
+) -> Vec<(Point2, f64)> {
     let depth = |at: Point2| -> f64 {
         whole(walls)
             .map(|wall| (wall.influence - wall.distance(at)).max(0.0))
             .sum()
     };
-    let middle = |part| at((f64::from(part) + 0.5) / f64::from(SAMPLES));
-    let outside = OUTSIDE * prices.direct();
-    if (0..SAMPLES).any(|part| area.excess(middle(part)) > outside) {
-        return f64::INFINITY;
+    let mut paid: Vec<(Point2, f64)> = Vec::new();
+    for place in places {
+        let so_far = paid.last().map_or(0.0, |(before, so_far)| {
+            let metre = prices.fuel + prices.exposure * depth(nalgebra::center(before, &place));
+            so_far + metre * (place - before).norm()
+        });
+        paid.push((place, so_far));
     }
-    let depths: f64 = (0..SAMPLES).map(|part| depth(middle(part))).sum();
-    length * (prices.fuel + prices.exposure * depths / f64::from(SAMPLES))
+    paid
 }

@@ -82,14 +82,12 @@ impl End<'_> {
         ramp.leaving(rise, rates, self.height, longest * self.steepest)
     }
 
-    /// What a level leg to `at` costs more since it cannot be level, about: by bending later, one that may climb gently
-    /// climbs for half as much.
-    pub(super) fn climbing_to(&self, at: Point2) -> f64 {
-        let (length, exposed) = ((at - self.from).norm(), self.exposed(at, 0.0)[0]);
-        self.ramp.map_or_else(
-            || 0.5 * self.gently(length, exposed),
-            |ramp| self.steepness([length.min(ramp.run(self.height)); 2], exposed),
-        )
+    /// What a leg to any of the places along a string costs more at least than that does so far, about.
+    pub(super) fn climbing_along(&self, string: impl Iterator<Item = (Point2, f64)>) -> f64 {
+        let reach = self.reach();
+        let near = string.filter(|(at, _)| (at - self.from).norm() <= reach);
+        let more = near.map(|(at, paid)| self.leg_to(at) - paid);
+        more.fold(f64::INFINITY, f64::min).max(0.0)
     }
 
     /// The length from which on a leg that is `exposed` costs at most so much for climbing gently, which is not 0.

@@ -25,11 +25,11 @@ pub(in super::super) fn leads<'a>(
     let ends = ends(scenario, prices, (walls, radii), stop);
     ends.map_or(FREE, |ends| {
         ends.map(|end| {
-            let run = RUNS * end.height / end.steepest;
+            let reach = end.reach();
             // Out of a zone in which it need not be in the band, a route may climb in many legs.
-            let matters = end.ramp.is_none() && run > 0.0;
+            let matters = end.ramp.is_none() && reach > 0.0;
             matters.then(|| Lead {
-                reach: run.min(FARTHEST * prices.direct()),
+                reach,
                 cost: Box::new(move |at| end.leg_to(at + origin)),
             })
         })
@@ -37,8 +37,13 @@ pub(in super::super) fn leads<'a>(
 }
 
 impl End<'_> {
+    /// How far legs matter, metres seen from above.
+    pub(super) fn reach(&self) -> f64 {
+        (RUNS * self.height / self.steepest).min(FARTHEST * self.prices.direct())
+    }
+
     /// What a leg to `at` costs, waypoint included; infinite where it enters a core.
-    fn leg_to(&self, at: Point2) -> f64 {
+    pub(super) fn leg_to(&self, at: Point2) -> f64 {
         if self.is_blocked(at, 0.0) {
             return f64::INFINITY;
         }

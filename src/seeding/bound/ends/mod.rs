@@ -159,19 +159,28 @@ fn ends<'a>(
     })
 }
 
-/// What a string that bends first and last there costs more since its ends are off the middle of the band, about.
+/// What a string, told by places and what it costs up to each, costs more since its ends are off the middle of the band,
+/// about.
 pub(super) fn climbing(
     scenario: &Scenario,
     prices: &Prices,
     walls: &[Wall],
-    bends: [Point2; 2],
+    string: &[(Point2, f64)],
     stop: &dyn Fn() -> bool,
 ) -> f64 {
     let radii = cores(walls);
     let ends = ends(scenario, prices, (walls, &radii), stop);
-    ends.map_or(0.0, |[start, target]| {
-        start.climbing_to(bends[0]) + target.climbing_to(bends[1])
-    })
+    let Some((ends, (_, whole))) = ends.zip(string.last()) else {
+        return 0.0;
+    };
+    let more = |end: &End| {
+        let beginning = string.iter().map(|(at, paid)| {
+            let paid = if end.which == 0 { *paid } else { whole - paid };
+            (*at, paid)
+        });
+        end.climbing_along(beginning)
+    };
+    ends.iter().map(more).sum()
 }
 
 /// The least that a route can cost whose first leg is one of the first `kinds` and whose last leg is one of the others,

@@ -5,10 +5,10 @@ use super::mesh::Mesh;
 use super::slopes::{gradients, response};
 
 /// Times that the places are gone over, at most, where it is to be seen whether a mesh is fine enough,
-pub(super) const FEW: usize = 10;
+pub(super) const FEW: usize = 20;
 
 /// and where no finer one follows.
-pub(super) const MANY: usize = 60;
+pub(super) const MANY: usize = 40;
 
 /// How many times as steep as allowed is well enough.
 const ENOUGH: f64 = 1.002;

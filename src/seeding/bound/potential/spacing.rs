@@ -125,3 +125,43 @@ impl Spacing {
         (self.spare / self.dearness[self.cells.of(place)]).clamp(LEAST_SHARE, 1.0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seeding::bound::around;
+    use crate::seeding::bound::potential::vertices;
+    use crate::seeding::bound::prices::Prices;
+    use crate::seeding::tests::scenario;
+
+    /// A coarse mesh takes the way past the middle for twice as dear as the cheapest; a finer one shows that the cheapest costs
+    /// a tenth more.
+    #[test]
+    fn prices_are_lowered_less_where_the_cheapest_route_turns_out_dearer() {
+        let scenario = scenario(r#""threats": []"#);
+        let prices = Prices::of(&scenario);
+        let walls = around::walls(&scenario, &prices);
+        let (rect, ends) = (scenario.area, prices.ends.map(|end| end.xy()));
+        let zones = Zones::new(&walls, &prices, rect);
+        let even = Spacing::even(rect, &zones, 500);
+        let mesh = Mesh::new(&vertices::lay(ends, &zones, &even), |_| false);
+        let mesh = mesh.expect("they are apart");
+        let middle = Point2::new(500.0, 500.0);
+        let sum = |at: &Point2| {
+            if (at - middle).norm() < 200.0 {
+                200.0
+            } else {
+                100.0
+            }
+        };
+        let costs = [
+            mesh.nodes.iter().map(sum).collect(),
+            vec![0.0; mesh.nodes.len()],
+        ];
+        let mut finer = even.finer(&mesh, &costs, &zones, 1000);
+        assert!((finer.share(middle) - 0.5 * SPARE).abs() < 1e-12);
+        assert!(!finer.raise(104.0) && finer.raise(110.0));
+        assert!((finer.share(middle) - 0.5 * 1.1 * SPARE_TOLD).abs() < 1e-12);
+        assert!((finer.share(ends[0]) - 1.0).abs() < 1e-12);
+    }
+}

@@ -176,14 +176,16 @@ fn steepest(
             break;
         }
     }
-    let (priced, mut potential, levels) = best?;
-    let before = potential.clone();
-    priced.ease(&mut potential, easing::MANY);
-    let eased = priced.levels(&potential);
-    Some(if eased.total() > levels.total() {
-        (priced.mesh, potential, eased)
+    let (priced, potential, levels) = best?;
+    let mut eased = potential.clone();
+    if !stop() {
+        priced.ease(&mut eased, easing::MANY);
+    }
+    let levels_eased = priced.levels(&eased);
+    Some(if levels_eased.total() > levels.total() {
+        (priced.mesh, eased, levels_eased)
     } else {
-        (priced.mesh, before, levels)
+        (priced.mesh, potential, levels)
     })
 }
 

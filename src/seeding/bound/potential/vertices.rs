@@ -179,7 +179,12 @@ impl Laid<'_> {
     /// One more, unless it is outside, in a core, or nearer than `least` to another, or to the border while not on it.
     fn add(&mut self, place: Point2, least: f64) {
         let rect = self.zones.rect();
-        let place = onto(&rect, place, self.zones.tolerance());
+        // Start, target and corners are where they are.
+        let place = if least > 0.0 {
+            onto(&rect, place, self.zones.tolerance())
+        } else {
+            place
+        };
         let inner = inner(&rect, place);
         if inner > 0.0 && inner < INNER * least {
             return;

@@ -1,9 +1,8 @@
 //! What legs cost at least that must be so long, wherever they lead. The argument is section 7 of docs/BOUND.md.
 
 use super::prices::Prices;
-use super::toll::steepest;
+use super::toll::{below_middle, steepest};
 use crate::scenario::Scenario;
-use crate::terrain::Terrain;
 
 /// What no route undercuts since each of its legs has a least length, and waypoints before the middle of the band cost
 /// something: one half of them counts on the way up from the start, the other on the way down to the target.
@@ -14,15 +13,8 @@ pub(super) fn least_legs(scenario: &Scenario, prices: &Prices) -> f64 {
         climb: libm::hypot(steepest(scenario).recip(), 1.0).recip(),
         weight: scenario.weights.altitude,
     };
-    let off_middle = |z: f64| match &scenario.terrain {
-        Terrain::Flat(ground) => {
-            let band = scenario.altitude;
-            (z - ground.elevation - 0.5 * (band.min + band.max)).abs()
-        }
-        _ => 0.0,
-    };
     let waypoints = scenario.planner.waypoints;
-    let [start, target] = prices.ends.map(|end| off_middle(end.z));
+    let [start, target] = below_middle(scenario).map_or([0.0; 2], |below| below.map(f64::abs));
     let between = prices.fuel * legs.shortest * waypoints.saturating_sub(1) as f64;
     legs.from(start, waypoints.div_ceil(2)) + between + legs.from(target, waypoints / 2)
 }

@@ -1,9 +1,8 @@
 //! What it costs that waypoints are to be at the middle of the band, where both ends are below it or above it: the
 //! route climbs towards it, or all waypoints stay off it. The argument is section 7 of docs/BOUND.md.
 
-use super::toll::{climb_worth, steepest};
+use super::toll::{below_middle, climb_worth, steepest};
 use crate::scenario::Scenario;
-use crate::terrain::Terrain;
 
 /// Both ends on one side of the middle of a band above level ground.
 #[derive(Debug, Clone, Copy)]
@@ -19,11 +18,7 @@ pub(super) struct Peak {
 impl Peak {
     /// `None` where nothing is told: over hills, from one side of the middle to the other, or where heights cost nothing.
     pub(super) fn of(scenario: &Scenario) -> Option<Self> {
-        let Terrain::Flat(ground) = &scenario.terrain else {
-            return None;
-        };
-        let middle = ground.elevation + 0.5 * (scenario.altitude.min + scenario.altitude.max);
-        let below = [scenario.start, scenario.target].map(|end| middle - end.z);
+        let below = below_middle(scenario)?;
         let weight = scenario.weights.altitude * scenario.planner.waypoints as f64;
         let is_told = below[0] * below[1] > 0.0 && weight > 0.0;
         is_told.then(|| Self {

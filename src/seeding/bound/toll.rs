@@ -20,6 +20,15 @@ pub(super) fn steepest(scenario: &Scenario) -> f64 {
     libm::tan(angle.min(90.0).to_radians()) * (1.0 + 1e-12)
 }
 
+/// Metres from start and target up to the middle of the band, less than nothing from above it; `None` over hills.
+pub(super) fn below_middle(scenario: &Scenario) -> Option<[f64; 2]> {
+    let Terrain::Flat(ground) = &scenario.terrain else {
+        return None;
+    };
+    let middle = ground.elevation + 0.5 * (scenario.altitude.min + scenario.altitude.max);
+    Some([scenario.start, scenario.target].map(|end| middle - end.z))
+}
+
 /// Metres of climb in a metre seen from above from which on one more costs this `share` of a metre flown; infinite where it
 /// never does.
 pub(super) fn climb_worth(share: f64) -> f64 {

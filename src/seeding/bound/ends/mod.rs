@@ -15,7 +15,7 @@ pub(super) use rising::rising;
 
 use super::prices::Prices;
 use super::string::{cores, slack};
-use super::toll::steepest;
+use super::toll::{below_middle, steepest};
 use super::wall::Wall;
 use crate::geometry::Point2;
 use crate::scenario::Scenario;
@@ -125,10 +125,9 @@ fn ends<'a>(
     (walls, radii): (&'a [Wall], &'a [Option<f64>]),
     stop: &'a dyn Fn() -> bool,
 ) -> Option<[End<'a>; 2]> {
-    let Terrain::Flat(ground) = &scenario.terrain else {
+    let (Terrain::Flat(ground), Some(below)) = (&scenario.terrain, below_middle(scenario)) else {
         return None;
     };
-    let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max) + ground.elevation;
     // A single waypoint ends both legs.
     let share = if scenario.planner.waypoints > 1 {
         1.0
@@ -145,7 +144,7 @@ fn ends<'a>(
             which: end,
             from: prices.ends[end].xy(),
             to: prices.ends[1 - end].xy(),
-            height: (prices.ends[end].z - middle).abs(),
+            height: below[end].abs(),
             weight: share * scenario.weights.altitude,
             steepest,
             ramp: ramps[end],

@@ -43,4 +43,10 @@ mod tests {
                 "planner": {{ "algorithm": "tms-sba" }}, {members} }}"#
         ))
     }
+    /// A cylinder of all heights, as a member of `threats`.
+    pub(super) fn disc(x: f64, y: f64, radius: f64, influence: f64) -> String {
+        format!(
+            r#"{{"kind": "cylinder", "center": {{"x": {x}, "y": {y}}}, "radius": {radius}, "influence": {influence}}}"#
+        )
+    }
 }

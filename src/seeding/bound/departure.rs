@@ -168,7 +168,7 @@ fn apart(one: &Wall, other: &Wall) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::tests::scenario;
+    use super::super::super::tests::{disc, scenario};
     use super::super::around::walls;
     use super::super::string::departures as ends_of;
     use super::*;
@@ -188,11 +188,8 @@ mod tests {
         // The target is (600, 700) away from the start.
         let along = crate::geometry::Vector2::new(600.0, 700.0).normalize();
         let center = Point2::new(200.0, 100.0) - along * 50.0;
-        let (x, y) = (center.x, center.y);
         departures(
-            &format!(
-                r#"{{"kind": "cylinder", "center": {{"x": {x}, "y": {y}}}, "radius": 40, "influence": 80}}"#
-            ),
+            &disc(center.x, center.y, 40.0, 80.0),
             |prices, [start, target]| {
                 let out = 30.0;
                 assert!((start.at - (prices.ends[0].xy() + along * out)).norm() < 1e-6);

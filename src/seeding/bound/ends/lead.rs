@@ -55,7 +55,7 @@ impl End<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::super::tests::scenario;
+    use super::super::super::super::tests::{disc, scenario};
     use super::super::super::{around, potential, string};
     use super::super::over;
     use super::*;
@@ -67,10 +67,11 @@ mod tests {
         let discs: Vec<String> = (0..36)
             .map(|idx| {
                 let (column, row) = (f64::from(idx % 6), f64::from(idx / 6));
-                let (x, y) = (100.0 + 150.0 * column + 40.0 * (row % 2.0), 120.0 + 140.0 * row);
-                format!(
-                    r#"{{"kind": "cylinder", "center": {{"x": {x}, "y": {y}}}, "radius": 35, "influence": 90}}"#
-                )
+                let (x, y) = (
+                    100.0 + 150.0 * column + 40.0 * (row % 2.0),
+                    120.0 + 140.0 * row,
+                );
+                disc(x, y, 35.0, 90.0)
             })
             .collect();
         let mut scenario = scenario(&format!(r#""threats": [{}]"#, discs.join(", ")));

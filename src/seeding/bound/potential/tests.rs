@@ -1,6 +1,6 @@
 //! Potentials against lattices of legs, and what they are made of against prices at many places.
 
-use super::super::super::tests::read;
+use super::super::super::tests::{disc, read};
 use super::super::around;
 use super::mesh::PARTS;
 use super::*;
@@ -19,12 +19,6 @@ fn scenario(fuel: f64, threats: &str) -> Scenario {
             "weights": {{ "fuel": {fuel}, "threat": 1, "altitude": 1 }},
             "planner": {{ "algorithm": "tms-sba" }}, "threats": [{threats}] }}"#
     ))
-}
-
-fn disc(x: f64, y: f64, radius: f64, influence: f64) -> String {
-    format!(
-        r#"{{"kind": "cylinder", "center": {{"x": {x}, "y": {y}}}, "radius": {radius}, "influence": {influence}}}"#
-    )
 }
 
 fn proof(scenario: &Scenario, known: (f64, f64), stop: bool) -> Option<Proof> {
@@ -240,6 +234,19 @@ fn no_triangle_along_the_border_is_slim() {
         }
         assert!(along > 50, "{along}");
     }
+}
+
+/// However close to the border start and target are.
+#[test]
+fn a_mesh_begins_and_ends_where_routes_do() {
+    let mut scenario = scenario(0.2, &disc(500.0, 60.0, 20.0, 60.0));
+    (scenario.start.y, scenario.target.y) = (1e-9, 1000.0 - 0.3);
+    let prices = Prices::of(&scenario);
+    let walls = around::walls(&scenario, &prices);
+    let zones = Zones::new(&walls, &prices, scenario.area);
+    let ends = prices.ends.map(|end| end.xy());
+    let vertices = vertices::lay(ends, &zones, &Spacing::even(scenario.area, &zones, 500));
+    assert_eq!(vertices[..2], ends);
 }
 
 #[test]

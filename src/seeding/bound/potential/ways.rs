@@ -186,7 +186,7 @@ impl<'a> Tree<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::seeding::tests::scenario;
+    use crate::seeding::tests::{disc, scenario};
 
     fn sought(most: usize) -> WaysSought {
         WaysSought {
@@ -205,11 +205,7 @@ mod tests {
             (600.0, 566.0),
             (530.0, 650.0),
         ];
-        let discs = discs.map(|(x, y)| {
-            format!(
-                r#"{{"kind": "cylinder", "center": {{"x": {x}, "y": {y}}}, "radius": 50, "influence": 80}}"#
-            )
-        });
+        let discs = discs.map(|(x, y)| disc(x, y, 50.0, 80.0));
         let scenario = scenario(&format!(r#""threats": [{}]"#, discs.join(", ")));
         let ways = cheap_ways(&scenario, 100.0, sought(12));
         // Either pair on either side.
@@ -239,12 +235,7 @@ mod tests {
     #[test]
     fn a_way_through_a_gap_of_ten_metres_is_found() {
         let discs: Vec<String> = (0..9)
-            .map(|idx| {
-                let y = 60.0 + 110.0 * f64::from(idx);
-                format!(
-                    r#"{{"kind": "cylinder", "center": {{"x": 500, "y": {y}}}, "radius": 50, "influence": 58}}"#
-                )
-            })
+            .map(|idx| disc(500.0, 60.0 + 110.0 * f64::from(idx), 50.0, 58.0))
             .collect();
         let scenario = scenario(&format!(r#""threats": [{}]"#, discs.join(", ")));
         let ways = cheap_ways(&scenario, 100.0, sought(3));

@@ -1,0 +1,238 @@
+//! What is proven of whole scenarios, against the best routes known.
+
+use super::super::tests::{disc, read, scenario};
+use super::*;
+use crate::geometry::Point3;
+
+/// Best routes known, from long searches: upper bounds of the optimum.
+/// From the ground to the ground, in bands above it.
+#[test]
+fn within_half_a_percent_where_a_route_takes_off_and_lands() {
+    let check = |document: &str, [min, max]: [u32; 2], best: f64| {
+        let band = format!(r#""min": {min}, "max": {max}"#);
+        let document = document.replace(r#""min": 0, "max": 200"#, &band);
+        let document = document.replace(r#""z": 150"#, r#""z": 0"#);
+        let bound = lower_bound(&read(&document));
+        assert!(bound <= best, "{bound} {best}");
+        assert!(best / bound - 1.0 <= 0.005, "{bound} {best}");
+    };
+    let [one, two] = [
+        include_str!("../../../scenarios/paper-1.json"),
+        include_str!("../../../scenarios/paper-2.json"),
+    ];
+    check(one, [60, 260], 517.6716);
+    check(one, [100, 300], 531.1);
+    check(two, [30, 120], 510.5145);
+}
+
+/// Where only the length counts, the way out of the ground's zone and back into it may be flown in any legs.
+#[test]
+fn a_short_route_climbs_out_of_the_zones_round_its_ends() {
+    let mut scenario = scenario(
+        r#""threats": [{"kind": "cylinder", "center": {"x": 500, "y": 520}, "radius": 50}]"#,
+    );
+    (scenario.start.z, scenario.target.z) = (0.0, 0.0);
+    (scenario.altitude.min, scenario.altitude.max) = (60.0, 260.0);
+    scenario.weights.altitude = 0.0;
+    let climbing = lower_bound(&scenario);
+    (scenario.altitude.min, scenario.altitude.max) = (0.0, 260.0);
+    let level = lower_bound(&scenario);
+    let zone = 0.5 * (libm::hypot(120.0, 60.0) - 120.0);
+    assert!(
+        (climbing - level - 2.0 * zone).abs() < 1e-3,
+        "{climbing} {level} {zone}"
+    );
+}
+
+/// Strings tell of neither: the last leg climbs through the soft zone that the target lies in, and the best route leaves
+/// the string for where it may do so straight ahead.
+#[test]
+fn within_a_percent_where_the_last_leg_climbs_out_of_a_gap() {
+    let discs = [
+        [916, 787, 66, 105],
+        [406, 734, 75, 112],
+        [88, 76, 25, 54],
+        [91, 829, 30, 61],
+        [447, 462, 57, 97],
+        [990, 272, 45, 71],
+        [613, 65, 66, 96],
+        [187, 830, 50, 74],
+    ];
+    let discs = discs
+        .map(|numbers: [i32; 4]| numbers.map(f64::from))
+        .map(|[x, y, radius, influence]| disc(x, y, radius, influence));
+    let mut scenario = scenario(&format!(r#""threats": [{}]"#, discs.join(", ")));
+    scenario.start = Point3::new(63.6, 94.9, 75.4);
+    scenario.target = Point3::new(847.9, 817.0, 145.5);
+    (scenario.altitude.min, scenario.altitude.max) = (0.0, 200.0);
+    scenario.planner.waypoints = 18;
+    let (bound, best) = (lower_bound(&scenario), 746.7366);
+    assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
+}
+
+/// The least legs leave a vehicle that climbs so slowly no other way than the route that is known.
+#[test]
+fn tight_where_legs_are_long_and_climbs_slow() {
+    let mut scenario = scenario(r#""threats": []"#);
+    scenario.start = Point3::new(78.0, 83.6, 20.5);
+    scenario.target = Point3::new(799.6, 804.0, 138.7);
+    (scenario.altitude.min, scenario.altitude.max) = (0.0, 200.0);
+    scenario.vehicle.max_climb_deg = 15.1;
+    scenario.vehicle.min_leg = 38.4;
+    scenario.planner.waypoints = 19;
+    let (bound, best) = (lower_bound(&scenario), 554.0766);
+    assert!(bound <= best && bound > 0.999 * best, "{bound} {best}");
+}
+
+#[test]
+fn within_two_percent_of_the_best_routes_known() {
+    let check = |document: &str, best: f64, gap: f64| {
+        let bound = lower_bound(&read(document));
+        assert!(bound <= best, "{bound} {best}");
+        assert!(best / bound - 1.0 <= gap, "{bound} {best}");
+    };
+    check(
+        include_str!("../../../scenarios/paper-1.json"),
+        489.4413,
+        0.02,
+    );
+    check(
+        include_str!("../../../scenarios/paper-2.json"),
+        505.1495,
+        0.02,
+    );
+    check(
+        include_str!("../../../scenarios/paper-3.json"),
+        519.4687,
+        0.02,
+    );
+    check(
+        include_str!("../../../scenarios/paper-4.json"),
+        525.6264,
+        0.20,
+    );
+}
+
+/// A start and a target in soft zones, in the way of each, and three gaps between: the best known has 30 waypoints.
+#[test]
+fn within_a_percent_where_soft_zones_are_left_and_gaps_are_passed() {
+    let mut scenario = scenario(
+        r#""threats": [
+            {"kind": "cylinder", "center": {"x": 240, "y": 150}, "radius": 45, "influence": 75},
+            {"kind": "cylinder", "center": {"x": 440, "y": 470}, "radius": 60, "influence": 90},
+            {"kind": "cylinder", "center": {"x": 560, "y": 370}, "radius": 65, "influence": 95},
+            {"kind": "cylinder", "center": {"x": 330, "y": 580}, "radius": 60, "influence": 90},
+            {"kind": "cylinder", "center": {"x": 690, "y": 290}, "radius": 60, "influence": 90},
+            {"kind": "polygon", "margin": 30, "vertices": [{"x": 760, "y": 740}, {"x": 800, "y": 740},
+                {"x": 800, "y": 780}, {"x": 760, "y": 780}]}
+        ]"#,
+    );
+    (scenario.start.z, scenario.target.z) = (100.0, 100.0);
+    let (bound, best) = (lower_bound(&scenario), 598.893);
+    assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
+}
+
+/// A start low in two wide soft zones, out of which every leg climbs: the best known has 20 waypoints.
+#[test]
+fn within_two_percent_where_a_leg_climbs_in_soft_zones() {
+    let mut scenario = scenario(
+        r#""threats": [
+            {"kind": "cylinder", "center": {"x": 344, "y": 72}, "radius": 17, "influence": 252},
+            {"kind": "cylinder", "center": {"x": 156, "y": 557}, "radius": 30, "influence": 107},
+            {"kind": "cylinder", "center": {"x": 642, "y": 264}, "radius": 34, "influence": 276},
+            {"kind": "cylinder", "center": {"x": 413, "y": 238}, "radius": 50, "influence": 140}
+        ]"#,
+    );
+    scenario.start = Point3::new(237.0, 222.0, 28.0);
+    scenario.target = Point3::new(743.0, 892.0, 89.0);
+    let (bound, best) = (lower_bound(&scenario), 976.19);
+    assert!(bound <= best && bound > 0.98 * best, "{bound} {best}");
+}
+
+/// Ends low in soft zones that could be flown over if there were room to climb: the best known has 30 waypoints.
+#[test]
+fn within_a_percent_where_what_may_be_passed_cannot_be_at_once() {
+    let mut scenario = scenario(
+        r#""threats": [
+            {"kind": "cylinder", "center": {"x": 166, "y": 232}, "radius": 58, "influence": 85, "top": 106},
+            {"kind": "cylinder", "center": {"x": 270, "y": 483}, "radius": 54, "influence": 93, "top": 154}
+        ]"#,
+    );
+    scenario.start = Point3::new(162.0, 168.0, 19.0);
+    scenario.target = Point3::new(820.0, 844.0, 139.0);
+    (scenario.weights.fuel, scenario.weights.altitude) = (0.3, 3.0);
+    let (bound, best) = (lower_bound(&scenario), 395.560);
+    assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
+}
+
+/// What a route may cut off corners can be worth more than the way; and it may go through what
+/// is thinner than its tolerance.
+#[test]
+fn never_above_a_way_through_what_is_no_obstacle() {
+    let check = |ring: &str, fuel: f64, threat: f64| {
+        let mut scenario = scenario(&format!(
+            r#""threats": [{{"kind": "polygon", "margin": 60, "vertices": [{ring}]}}]"#
+        ));
+        scenario.weights.fuel = fuel;
+        scenario.weights.threat = threat;
+        scenario.weights.altitude = 0.0;
+        let straight = fuel * (scenario.target - scenario.start).norm();
+        let bound = lower_bound(&scenario);
+        assert!(bound <= straight, "{bound} {straight}");
+    };
+    // Both keep out of the way, with their soft zones.
+    let triangle = r#"{"x": 900, "y": 0}, {"x": 990, "y": 0}, {"x": 950, "y": 90}"#;
+    check(triangle, 1e-6, 1000.0);
+    let needle = r#"{"x": 900, "y": 0}, {"x": 900.001, "y": 0}, {"x": 900, "y": 100}"#;
+    check(needle, 0.5, 1000.0);
+    // Half a micrometre wide where the way crosses it.
+    check(
+        r#"{"x": 0, "y": 500}, {"x": 0, "y": 500.000003}, {"x": 640, "y": 500}"#,
+        0.5,
+        0.0,
+    );
+    // A block with an arm of a micrometre.
+    check(
+        r#"{"x": 0, "y": 900}, {"x": 0, "y": 500}, {"x": 900, "y": 500},
+           {"x": 900, "y": 500.000001}, {"x": 50, "y": 500.000001}, {"x": 50, "y": 900}"#,
+        0.5,
+        0.0,
+    );
+}
+
+/// A comb whose teeth are near to each other: nearly as many pairs as teeth squared, each of which asks all teeth.
+#[test]
+fn a_stop_is_heard_among_gaps() {
+    let teeth = 20;
+    let corners: Vec<String> = (0..=2 * teeth)
+        .map(|corner| {
+            format!(
+                r#"{{"x": {}, "y": {}}}"#,
+                500 + corner,
+                600 - 50 * (corner % 2)
+            )
+        })
+        .chain([format!(r#"{{"x": {}, "y": 650}}"#, 500 + teeth)])
+        .collect();
+    let scenario = scenario(&format!(
+        r#""threats": [{{"kind": "polygon", "margin": 60, "vertices": [{}]}}]"#,
+        corners.join(", ")
+    ));
+    let prices = Prices::of(&scenario);
+    let walls = around::walls(&scenario, &prices);
+    assert!(event::events(&walls, &prices, &|| false).is_some());
+    let looks = Cell::new(0);
+    let stop = || {
+        looks.set(looks.get() + 1);
+        looks.get() > 2
+    };
+    assert!(event::events(&walls, &prices, &stop).is_none());
+    assert_eq!(looks.get(), 3);
+}
+
+#[test]
+fn never_below_the_straight_line() {
+    let scenario = scenario(r#""threats": []"#);
+    let straight = 0.5 * (scenario.target - scenario.start).norm();
+    assert!(lower_bound(&scenario) >= straight * (1.0 - 1e-8));
+}

@@ -254,6 +254,7 @@ pub(super) fn exposure_within<S: Simd>(
         .splat(LEVEL)
         .le(across.abs())
         .keep(across_square * logarithm);
-    let integral = chord * influence - (s1 * d1 - s0 * d0 + logarithm) * 0.5;
+    // Of a leg that grazes the zone less is left than what rounding takes; no zone pays.
+    let integral = (chord * influence - (s1 * d1 - s0 * d0 + logarithm) * 0.5).max(zero);
     (zero.lt(half_square) & s0.lt(s1)).keep(integral * (leg.length * leg.inverse))
 }

@@ -199,12 +199,17 @@ impl Earth {
         }
         let rect = self.rect();
         let (width, height) = (rect.max.x - rect.min.x, rect.max.y - rect.min.y);
-        let widest = width.max(height);
-        if !(width > 0.0 && height > 0.0) || widest > sketch::MAX_WIDTH_M {
+        let has_inside = width > 0.0 && height > 0.0;
+        if !has_inside || width.max(height) > sketch::MAX_WIDTH_M {
             faults.add(&path, "area-too-wide", || {
+                let size = if has_inside {
+                    format!("the area is {width:.0} m by {height:.0} m")
+                } else {
+                    // Parallels over much of a hemisphere bend past each other.
+                    format!("the area reaches over {:.6} degrees of longitude", area.width())
+                };
                 format!(
-                    "the area is {width:.0} m by {height:.0} m, must be at most {} m either way: \
-                     a plane fits the earth no farther",
+                    "{size}, must be at most {} m either way: a plane fits the earth no farther",
                     sketch::MAX_WIDTH_M
                 )
             });

@@ -12,6 +12,8 @@ use super::{faults, read};
 pub(super) fn cases() -> Vec<(String, &'static str, &'static str, &'static str)> {
     let mut wide = document();
     wide["area"] = json!({"min": {"lat": 35.5, "lon": -85.5}, "max": {"lat": 37.5, "lon": -83.0}});
+    let mut bent = document();
+    bent["area"] = json!({"min": {"lat": 86.6, "lon": -42.4}, "max": {"lat": 87.5, "lon": 143.4}});
     let mut cold = document();
     cold["area"] = json!({"min": {"lat": 36, "lon": -85}, "max": {"lat": 89.4, "lon": -84}});
     let mut far = document();
@@ -23,6 +25,13 @@ pub(super) fn cases() -> Vec<(String, &'static str, &'static str, &'static str)>
             "/area",
             "area-too-wide",
             "the area is 221061 m by 221204 m, must be at most 200000 m either way: a plane fits the earth no farther",
+        ),
+        (
+            bent.to_string(),
+            "/area",
+            "area-too-wide",
+            "the area reaches over 185.800000 degrees of longitude, must be at most 200000 m either way: a plane fits \
+             the earth no farther",
         ),
         (
             cold.to_string(),

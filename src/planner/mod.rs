@@ -6,6 +6,7 @@ mod beside;
 mod blocks;
 mod certificate;
 mod coding;
+mod finish;
 mod guide;
 mod kept;
 mod log;

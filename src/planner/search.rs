@@ -1,9 +1,9 @@
 //! How a run searches: the algorithm alone, or guided by routes to start from.
 
+use super::finish::{finish, polish};
 use super::log::Log;
-use super::newton::{self, Newton};
 use super::objective::Routes;
-use super::polish::{Polish, Steps};
+use super::polish::Steps;
 use super::starts::Starts;
 use super::{StopReason, same, starts, why_stop};
 use crate::cost::Model;
@@ -22,22 +22,11 @@ const PROMISING: f64 = 0.05;
 /// Starts that compete in the end where the vehicle's limits decide, at most.
 const RIVALS: usize = 8;
 
-/// Over hills, so many waypoints are more than there are bends: where the spare ones lie costs something.
-const ROOMY: usize = 16;
-
 /// Of the polish between the stages.
-const COARSE_STEPS: Steps = Steps {
+pub(super) const COARSE_STEPS: Steps = Steps {
     from: 0.02,
     to: 1e-3,
     gain: 1e-4,
-    violation_m: f64::INFINITY,
-};
-
-/// Of the polish at the end.
-const LAST_STEPS: Steps = Steps {
-    from: 0.01,
-    to: 5e-5,
-    gain: 5e-6,
     violation_m: f64::INFINITY,
 };
 
@@ -97,81 +86,6 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
     }
     elites.extend(best_starts);
     finish(model, reason, &elites, &starts.beyond, log)
-}
-
-/// Polish the best route, as the last point of the curve, unless it is good enough already; it may be after. Where the
-/// vehicle's limits decide its shape, `others` that lead elsewhere may become better, and so may those `beyond` limits.
-fn finish(
-    model: &Model,
-    reason: StopReason,
-    others: &[Vec<Point3>],
-    beyond: &[Vec<Point3>],
-    log: &mut Log,
-) -> StopReason {
-    if model.scenario.planner.polish && reason != StopReason::Converged {
-        let mut candidates = vec![log.route.clone()];
-        // Where the best so far is as a search began, what its bats came to may be better when polished.
-        candidates.extend(others.first().filter(|other| **other != log.route).cloned());
-        for mut route in candidates {
-            if let Some(fitness) = polish(model, &mut route, LAST_STEPS, log) {
-                log.offer(&route, fitness);
-            }
-        }
-        bring_home(model, others, log);
-        bring_within(model, beyond, log);
-        log.last_point();
-    }
-    if reason == StopReason::Iterations && log.has_converged() {
-        return StopReason::Converged;
-    }
-    reason
-}
-
-/// The last metres of a route that turns or climbs as sharply as it may, or has many waypoints over hills.
-fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
-    let mut route = log.route.clone();
-    let is_free = log.best.is_feasible() && !newton::is_felt(model, &route);
-    let is_level = model.scenario.terrain.is_flat();
-    let is_done = is_free && (is_level || model.scenario.planner.waypoints < ROOMY);
-    if is_done || why_stop(model.scenario, log.stop).is_some() {
-        return;
-    }
-    let others = if is_free { &[] } else { others };
-    let mut elsewhere: Vec<Vec<Point3>> = Vec::new();
-    for other in others {
-        let is_near = |known: &Vec<Point3>| same(model.scenario, known, other);
-        if !is_near(&route) && !elsewhere.iter().any(is_near) {
-            elsewhere.push(other.clone());
-        }
-    }
-    let mut newton = Newton::new(model, log.stop);
-    let fitness = newton.improve(&mut route, &elsewhere);
-    log.evaluations += newton.evaluations;
-    log.offer(&route, fitness);
-}
-
-/// What becomes of routes that break limits when these are felt: from round to round of Newton's method, what is beyond them
-/// costs more.
-fn bring_within(model: &Model, beyond: &[Vec<Point3>], log: &mut Log) {
-    for route in beyond {
-        if why_stop(model.scenario, log.stop).is_some() {
-            return;
-        }
-        let (mut newton, mut route) = (Newton::new(model, log.stop), route.clone());
-        let fitness = newton.improve(&mut route, &[]);
-        log.evaluations += newton.evaluations;
-        log.offer(&route, fitness);
-    }
-}
-
-/// Improve `route` by `steps`, if the scenario asks for polish.
-fn polish(model: &Model, route: &mut Vec<Point3>, steps: Steps, log: &mut Log) -> Option<Fitness> {
-    model.scenario.planner.polish.then(|| {
-        let mut polish = Polish::new(model, log.stop);
-        let fitness = polish.descend(route, steps);
-        log.evaluations += polish.evaluations(route.len() - 2);
-        fitness
-    })
 }
 
 #[expect(

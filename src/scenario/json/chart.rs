@@ -206,7 +206,10 @@ impl Earth {
                     format!("the area is {width:.0} m by {height:.0} m")
                 } else {
                     // Parallels over much of a hemisphere bend past each other.
-                    format!("the area reaches over {:.6} degrees of longitude", area.width())
+                    format!(
+                        "the area reaches over {:.6} degrees of longitude",
+                        area.width()
+                    )
                 };
                 format!(
                     "{size}, must be at most {} m either way: a plane fits the earth no farther",

@@ -1,0 +1,233 @@
+//! What becomes of the routes that a search ends with: the best is polished and brought home, and so are some that lead
+//! elsewhere.
+
+use super::log::Log;
+use super::newton::{self, Newton};
+use super::polish::{Polish, Steps};
+use super::search::COARSE_STEPS;
+use super::{StopReason, same, why_stop};
+use crate::cost::Model;
+use crate::geometry::Point3;
+use crate::optimizer::Fitness;
+
+/// Routes that lead elsewhere than the best and are polished in the end, too, at most,
+const CHALLENGERS: usize = 5;
+
+/// but all where there are no more waypoints than this: so few cannot follow a coarse route, and what that costs is not made
+/// up for before the polish.
+const FEW: usize = 8;
+
+/// It prices one in so many of the routes that the bats were asked for, about, at most.
+const CHALLENGE_PART: usize = 2;
+
+/// A challenger that costs this share more than the best once it is roughly polished is left.
+const CLOSE: f64 = 0.002;
+
+/// Over hills, so many waypoints are more than there are bends: where the spare ones lie costs something.
+const ROOMY: usize = 16;
+
+/// Of the polish at the end.
+const LAST_STEPS: Steps = Steps {
+    from: 0.01,
+    to: 5e-5,
+    gain: 5e-6,
+    violation_m: f64::INFINITY,
+};
+
+/// Of the rough polish of a challenger,
+const ROUGH_STEPS: Steps = Steps {
+    from: 0.01,
+    ..COARSE_STEPS
+};
+
+/// and of what follows.
+const FINE_STEPS: Steps = Steps {
+    from: 1e-3,
+    ..LAST_STEPS
+};
+
+/// Polish the best route, as the last point of the curve, unless it is good enough already; it may be after. Where the
+/// vehicle's limits decide its shape, `others` that lead elsewhere may become better, and so may those `beyond` limits.
+pub(super) fn finish(
+    model: &Model,
+    reason: StopReason,
+    others: &[Vec<Point3>],
+    beyond: &[Vec<Point3>],
+    log: &mut Log,
+) -> StopReason {
+    if model.scenario.planner.polish && reason != StopReason::Converged {
+        let mut candidates = vec![log.route.clone()];
+        // Where the best so far is as a search began, what its bats came to may be better when polished.
+        candidates.extend(others.first().filter(|other| **other != log.route).cloned());
+        let before = log.evaluations;
+        for mut route in candidates {
+            if let Some(fitness) = polish(model, &mut route, LAST_STEPS, log) {
+                log.offer(&route, fitness);
+            }
+        }
+        challenge(model, others, log.evaluations - before, log);
+        bring_home(model, others, log);
+        bring_within(model, beyond, log);
+        log.last_point();
+    }
+    if reason == StopReason::Iterations && log.has_converged() {
+        return StopReason::Converged;
+    }
+    reason
+}
+
+/// Which of two ways is the cheaper one is told by their last metres: some of the `others`, which were no better than the
+/// best before the polish, may be after. The first of them has been polished, too; one polish prices `each` routes, about.
+fn challenge(model: &Model, others: &[Vec<Point3>], each: u64, log: &mut Log) {
+    let settings = &model.scenario.planner;
+    let asked_for = settings.population * settings.iterations;
+    let most = log.evaluations + (asked_for / CHALLENGE_PART) as u64;
+    let challengers = if settings.waypoints <= FEW {
+        others.len()
+    } else {
+        CHALLENGERS
+    };
+    let mut met = vec![log.route.clone()];
+    for other in others.iter().skip(1) {
+        let is_over = met.len() > challengers || log.evaluations + each > most;
+        if is_over || why_stop(model.scenario, log.stop).is_some() {
+            return;
+        }
+        if met.iter().any(|known| same(model.scenario, known, other)) {
+            continue;
+        }
+        met.push(other.clone());
+        let mut route = other.clone();
+        if let Some(fitness) = challenger(model, &mut route, log) {
+            log.offer(&route, fitness);
+        }
+    }
+}
+
+/// Polish `route` as long as it may become better than the best; `None` where it does not.
+fn challenger(model: &Model, route: &mut Vec<Point3>, log: &mut Log) -> Option<Fitness> {
+    let best = log.best;
+    let known = [(best, log.route.clone())];
+    let mut polish = Polish::new(model, log.stop);
+    let rough = polish.descend_unless_known(route, ROUGH_STEPS, &known);
+    let is_close = |rough: &Fitness| {
+        rough.violation <= best.violation && rough.cost < best.cost * (1.0 + CLOSE)
+    };
+    let fine = rough
+        .filter(is_close)
+        .and_then(|_| polish.descend_unless_known(route, FINE_STEPS, &known));
+    log.evaluations += polish.evaluations(route.len() - 2);
+    fine
+}
+
+/// The last metres of a route that turns or climbs as sharply as it may, or has many waypoints over hills.
+fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
+    let mut route = log.route.clone();
+    let is_free = log.best.is_feasible() && !newton::is_felt(model, &route);
+    let is_level = model.scenario.terrain.is_flat();
+    let is_done = is_free && (is_level || model.scenario.planner.waypoints < ROOMY);
+    if is_done || why_stop(model.scenario, log.stop).is_some() {
+        return;
+    }
+    let others = if is_free { &[] } else { others };
+    let mut elsewhere: Vec<Vec<Point3>> = Vec::new();
+    for other in others {
+        let is_near = |known: &Vec<Point3>| same(model.scenario, known, other);
+        if !is_near(&route) && !elsewhere.iter().any(is_near) {
+            elsewhere.push(other.clone());
+        }
+    }
+    let mut newton = Newton::new(model, log.stop);
+    let fitness = newton.improve(&mut route, &elsewhere);
+    log.evaluations += newton.evaluations;
+    log.offer(&route, fitness);
+}
+
+/// What becomes of routes that break limits when these are felt: from round to round of Newton's method, what is beyond them
+/// costs more.
+fn bring_within(model: &Model, beyond: &[Vec<Point3>], log: &mut Log) {
+    for route in beyond {
+        if why_stop(model.scenario, log.stop).is_some() {
+            return;
+        }
+        let (mut newton, mut route) = (Newton::new(model, log.stop), route.clone());
+        let fitness = newton.improve(&mut route, &[]);
+        log.evaluations += newton.evaluations;
+        log.offer(&route, fitness);
+    }
+}
+
+/// Improve `route` by `steps`, if the scenario asks for polish.
+pub(super) fn polish(
+    model: &Model,
+    route: &mut Vec<Point3>,
+    steps: Steps,
+    log: &mut Log,
+) -> Option<Fitness> {
+    model.scenario.planner.polish.then(|| {
+        let mut polish = Polish::new(model, log.stop);
+        let fitness = polish.descend(route, steps);
+        log.evaluations += polish.evaluations(route.len() - 2);
+        fitness
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::Nobody;
+    use crate::planner::price::price;
+    use crate::planner::tests::{radar, scenario};
+    use crate::scenario::Scenario;
+
+    /// Start and target on a level, and what lies in the way off to one side: round the other is shorter.
+    fn one_in_the_way() -> Scenario {
+        let mut scenario = scenario();
+        scenario.planner.waypoints = 3;
+        (scenario.planner.population, scenario.planner.iterations) = (200, 200);
+        (scenario.start, scenario.target) = (
+            Point3::new(100.0, 500.0, 100.0),
+            Point3::new(900.0, 500.0, 100.0),
+        );
+        scenario.threats = vec![radar(500.0, 540.0, 150.0)];
+        scenario
+    }
+
+    fn round(scenario: &Scenario, free: [[f64; 2]; 3]) -> Vec<Point3> {
+        let mut route = vec![scenario.start];
+        route.extend(free.map(|[x, y]| Point3::new(x, y, 100.0)));
+        route.push(scenario.target);
+        route
+    }
+
+    #[test]
+    fn a_way_that_is_cheaper_once_it_is_polished_wins() {
+        let scenario = one_in_the_way();
+        let model = Model::new(&scenario);
+        let dear = round(&scenario, [[400.0, 740.0], [500.0, 750.0], [600.0, 740.0]]);
+        let rough = round(&scenario, [[250.0, 150.0], [500.0, 250.0], [750.0, 150.0]]);
+        assert!(price(&model, &dear).cost < price(&model, &rough).cost);
+        let mut nobody = Nobody;
+        let mut log = Log::new(&model, &mut nobody, &Nobody);
+        log.offer_unpriced(&dear);
+        let others = [dear.clone(), rough.clone()];
+        finish(&model, StopReason::Iterations, &[], &[], &mut log);
+        assert!(log.route[2].y > 700.0, "polished, it leads as it did");
+        challenge(&model, &others, 1_000, &mut log);
+        assert!(log.best.is_feasible() && log.route[2].y < 400.0);
+    }
+
+    #[test]
+    fn a_search_of_few_routes_polishes_no_others() {
+        let mut scenario = one_in_the_way();
+        (scenario.planner.population, scenario.planner.iterations) = (10, 20);
+        let model = Model::new(&scenario);
+        let dear = round(&scenario, [[400.0, 740.0], [500.0, 750.0], [600.0, 740.0]]);
+        let rough = round(&scenario, [[250.0, 150.0], [500.0, 250.0], [750.0, 150.0]]);
+        let mut nobody = Nobody;
+        let mut log = Log::new(&model, &mut nobody, &Nobody);
+        log.offer_unpriced(&dear);
+        challenge(&model, &[dear, rough], 1_000, &mut log);
+        assert_eq!(log.evaluations, 1);
+    }
+}

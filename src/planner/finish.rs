@@ -17,7 +17,7 @@ const CHALLENGERS: usize = 5;
 /// up for before the polish.
 const FEW: usize = 8;
 
-/// It prices one in so many of the routes that the bats were asked for, about, at most.
+/// So many times fewer routes are priced for that than the bats were asked for, at least.
 const CHALLENGE_PART: usize = 2;
 
 /// A challenger that costs this share more than the best once it is roughly polished is left.

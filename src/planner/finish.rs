@@ -65,8 +65,11 @@ pub(super) fn finish(
                 log.offer(&route, fitness);
             }
         }
-        challenge(model, others, log.evaluations - before, log);
+        let each = log.evaluations - before;
         bring_home(model, others, log);
+        if challenge(model, others, each, log) {
+            bring_home(model, &[], log);
+        }
         bring_within(model, beyond, log);
         log.last_point();
     }
@@ -77,8 +80,9 @@ pub(super) fn finish(
 }
 
 /// Which of two ways is the cheaper one is told by their last metres: some of the `others`, which were no better than the
-/// best before the polish, may be after. The first of them has been polished, too; one polish prices `each` routes, about.
-fn challenge(model: &Model, others: &[Vec<Point3>], each: u64, log: &mut Log) {
+/// best before the polish, may be after; whether one is. The first of them has been polished, too; one polish prices `each`
+/// routes, about.
+fn challenge(model: &Model, others: &[Vec<Point3>], each: u64, log: &mut Log) -> bool {
     let settings = &model.scenario.planner;
     let asked_for = settings.population * settings.iterations;
     let most = log.evaluations + (asked_for / CHALLENGE_PART) as u64;
@@ -88,10 +92,11 @@ fn challenge(model: &Model, others: &[Vec<Point3>], each: u64, log: &mut Log) {
         CHALLENGERS
     };
     let mut met = vec![log.route.clone()];
+    let mut has_won = false;
     for other in others.iter().skip(1) {
         let is_over = met.len() > challengers || log.evaluations + each > most;
         if is_over || why_stop(model.scenario, log.stop).is_some() {
-            return;
+            break;
         }
         if met.iter().any(|known| same(model.scenario, known, other)) {
             continue;
@@ -99,9 +104,10 @@ fn challenge(model: &Model, others: &[Vec<Point3>], each: u64, log: &mut Log) {
         met.push(other.clone());
         let mut route = other.clone();
         if let Some(fitness) = challenger(model, &mut route, log) {
-            log.offer(&route, fitness);
+            has_won |= log.offer(&route, fitness);
         }
     }
+    has_won
 }
 
 /// Polish `route` as long as it may become better than the best; `None` where it does not.

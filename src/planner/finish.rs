@@ -46,8 +46,8 @@ const FINE_STEPS: Steps = Steps {
     ..LAST_STEPS
 };
 
-/// Polish the best route, as the last point of the curve, unless it is good enough already; it may be after. Where the
-/// vehicle's limits decide its shape, `others` that lead elsewhere may become better, and so may those `beyond` limits.
+/// Polish the best route, as the last point of the curve, unless it is good enough already; it may be after. Of the `others`
+/// that lead elsewhere one may become better, and so may one of those `beyond` limits.
 pub(super) fn finish(
     model: &Model,
     reason: StopReason,
@@ -61,13 +61,12 @@ pub(super) fn finish(
         candidates.extend(others.first().filter(|other| **other != log.route).cloned());
         let before = log.evaluations;
         for mut route in candidates {
-            if let Some(fitness) = polish(model, &mut route, LAST_STEPS, log) {
-                log.offer(&route, fitness);
-            }
+            let fitness = polish(model, &mut route, LAST_STEPS, log);
+            log.offer(&route, fitness);
         }
-        let each = log.evaluations - before;
+        let spent = log.evaluations - before;
         bring_home(model, others, log);
-        if challenge(model, others, each, log) {
+        if challenge(model, others, spent, log) {
             bring_home(model, &[], log);
         }
         bring_within(model, beyond, log);
@@ -80,9 +79,9 @@ pub(super) fn finish(
 }
 
 /// Which of two ways is the cheaper one is told by their last metres: some of the `others`, which were no better than the
-/// best before the polish, may be after; whether one is. The first of them has been polished, too; one polish prices `each`
-/// routes, about.
-fn challenge(model: &Model, others: &[Vec<Point3>], each: u64, log: &mut Log) -> bool {
+/// best before the polish, may be after; whether one is. The first of them has been polished with the best. None is begun
+/// where fewer routes are left to price than the `spent` ones of that.
+fn challenge(model: &Model, others: &[Vec<Point3>], spent: u64, log: &mut Log) -> bool {
     let settings = &model.scenario.planner;
     let asked_for = settings.population * settings.iterations;
     let most = log.evaluations + (asked_for / CHALLENGE_PART) as u64;
@@ -91,23 +90,34 @@ fn challenge(model: &Model, others: &[Vec<Point3>], each: u64, log: &mut Log) ->
     } else {
         CHALLENGERS
     };
-    let mut met = vec![log.route.clone()];
+    let others = elsewhere(model, &log.route, others.iter().skip(1));
     let mut has_won = false;
-    for other in others.iter().skip(1) {
-        let is_over = met.len() > challengers || log.evaluations + each > most;
+    for mut route in others.into_iter().take(challengers) {
+        let is_over = log.evaluations + spent > most;
         if is_over || why_stop(model.scenario, log.stop).is_some() {
             break;
         }
-        if met.iter().any(|known| same(model.scenario, known, other)) {
-            continue;
-        }
-        met.push(other.clone());
-        let mut route = other.clone();
         if let Some(fitness) = challenger(model, &mut route, log) {
             has_won |= log.offer(&route, fitness);
         }
     }
     has_won
+}
+
+/// Those of the `others` that lead elsewhere than `route` and than each other.
+fn elsewhere<'r>(
+    model: &Model,
+    route: &[Point3],
+    others: impl IntoIterator<Item = &'r Vec<Point3>>,
+) -> Vec<Vec<Point3>> {
+    let mut met: Vec<Vec<Point3>> = Vec::new();
+    for other in others {
+        let is_near = |known: &[Point3]| same(model.scenario, known, other);
+        if !is_near(route) && !met.iter().any(|known| is_near(known)) {
+            met.push(other.clone());
+        }
+    }
+    met
 }
 
 /// Polish `route` as long as it may become better than the best; `None` where it does not.
@@ -136,15 +146,9 @@ fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
         return;
     }
     let others = if is_free { &[] } else { others };
-    let mut elsewhere: Vec<Vec<Point3>> = Vec::new();
-    for other in others {
-        let is_near = |known: &Vec<Point3>| same(model.scenario, known, other);
-        if !is_near(&route) && !elsewhere.iter().any(is_near) {
-            elsewhere.push(other.clone());
-        }
-    }
+    let others = elsewhere(model, &route, others);
     let mut newton = Newton::new(model, log.stop);
-    let fitness = newton.improve(&mut route, &elsewhere);
+    let fitness = newton.improve(&mut route, &others);
     log.evaluations += newton.evaluations;
     log.offer(&route, fitness);
 }
@@ -163,19 +167,17 @@ fn bring_within(model: &Model, beyond: &[Vec<Point3>], log: &mut Log) {
     }
 }
 
-/// Improve `route` by `steps`, if the scenario asks for polish.
+/// Improve `route` by `steps`.
 pub(super) fn polish(
     model: &Model,
     route: &mut Vec<Point3>,
     steps: Steps,
     log: &mut Log,
-) -> Option<Fitness> {
-    model.scenario.planner.polish.then(|| {
-        let mut polish = Polish::new(model, log.stop);
-        let fitness = polish.descend(route, steps);
-        log.evaluations += polish.evaluations(route.len() - 2);
-        fitness
-    })
+) -> Fitness {
+    let mut polish = Polish::new(model, log.stop);
+    let fitness = polish.descend(route, steps);
+    log.evaluations += polish.evaluations(route.len() - 2);
+    fitness
 }
 
 #[cfg(test)]
@@ -186,54 +188,48 @@ mod tests {
     use crate::planner::tests::{radar, scenario};
     use crate::scenario::Scenario;
 
-    /// Start and target on a level, and what lies in the way off to one side: round the other is shorter.
-    fn one_in_the_way() -> Scenario {
+    /// Start and target on a level, what lies in the way off to one side, and a route round it on either side: a smooth one
+    /// on the long side, and one that is dearer as long as nothing is done about it.
+    fn one_in_the_way() -> (Scenario, [Vec<Point3>; 2]) {
         let mut scenario = scenario();
         scenario.planner.waypoints = 3;
         (scenario.planner.population, scenario.planner.iterations) = (200, 200);
-        (scenario.start, scenario.target) = (
-            Point3::new(100.0, 500.0, 100.0),
-            Point3::new(900.0, 500.0, 100.0),
-        );
+        let at = |[x, y]: [f64; 2]| Point3::new(x, y, 100.0);
+        (scenario.start, scenario.target) = (at([100.0, 500.0]), at([900.0, 500.0]));
         scenario.threats = vec![radar(500.0, 540.0, 150.0)];
-        scenario
-    }
-
-    fn round(scenario: &Scenario, free: [[f64; 2]; 3]) -> Vec<Point3> {
-        let mut route = vec![scenario.start];
-        route.extend(free.map(|[x, y]| Point3::new(x, y, 100.0)));
-        route.push(scenario.target);
-        route
+        let routes = [
+            [[400.0, 740.0], [500.0, 750.0], [600.0, 740.0]],
+            [[250.0, 150.0], [500.0, 250.0], [750.0, 150.0]],
+        ];
+        let [start, target] = [scenario.start, scenario.target];
+        let routes = routes.map(|[a, b, c]| vec![start, at(a), at(b), at(c), target]);
+        (scenario, routes)
     }
 
     #[test]
     fn a_way_that_is_cheaper_once_it_is_polished_wins() {
-        let scenario = one_in_the_way();
+        let (scenario, others) = one_in_the_way();
         let model = Model::new(&scenario);
-        let dear = round(&scenario, [[400.0, 740.0], [500.0, 750.0], [600.0, 740.0]]);
-        let rough = round(&scenario, [[250.0, 150.0], [500.0, 250.0], [750.0, 150.0]]);
-        assert!(price(&model, &dear).cost < price(&model, &rough).cost);
+        let [long, short] = others.each_ref().map(|route| price(&model, route).cost);
+        assert!(long < short);
         let mut nobody = Nobody;
         let mut log = Log::new(&model, &mut nobody, &Nobody);
-        log.offer_unpriced(&dear);
-        let others = [dear.clone(), rough.clone()];
+        log.offer_unpriced(&others[0]);
         finish(&model, StopReason::Iterations, &[], &[], &mut log);
         assert!(log.route[2].y > 700.0, "polished, it leads as it did");
-        challenge(&model, &others, 1_000, &mut log);
+        assert!(challenge(&model, &others, 1_000, &mut log));
         assert!(log.best.is_feasible() && log.route[2].y < 400.0);
     }
 
     #[test]
     fn a_search_of_few_routes_polishes_no_others() {
-        let mut scenario = one_in_the_way();
+        let (mut scenario, others) = one_in_the_way();
         (scenario.planner.population, scenario.planner.iterations) = (10, 20);
         let model = Model::new(&scenario);
-        let dear = round(&scenario, [[400.0, 740.0], [500.0, 750.0], [600.0, 740.0]]);
-        let rough = round(&scenario, [[250.0, 150.0], [500.0, 250.0], [750.0, 150.0]]);
         let mut nobody = Nobody;
         let mut log = Log::new(&model, &mut nobody, &Nobody);
-        log.offer_unpriced(&dear);
-        challenge(&model, &[dear, rough], 1_000, &mut log);
+        log.offer_unpriced(&others[0]);
+        assert!(!challenge(&model, &others, 1_000, &mut log));
         assert_eq!(log.evaluations, 1);
     }
 }

@@ -19,7 +19,7 @@ const ELITES: usize = 4;
 /// A route that goes on costs at most this share more than the best.
 const PROMISING: f64 = 0.05;
 
-/// Starts that compete in the end where the vehicle's limits decide, at most.
+/// Starts that compete in the end, at most.
 const RIVALS: usize = 8;
 
 /// Of the polish between the stages.
@@ -67,7 +67,7 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         best_starts.truncate(RIVALS);
         elites = distinct(model, &routes, search.as_ref());
         reason = why;
-        if reason == StopReason::Iterations {
+        if settings.polish && reason == StopReason::Iterations {
             for route in &mut elites {
                 polish(model, route, COARSE_STEPS, log);
             }

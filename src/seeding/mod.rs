@@ -43,6 +43,14 @@ mod tests {
                 "planner": {{ "algorithm": "tms-sba" }}, {members} }}"#
         ))
     }
+
+    /// The same among cylinders of all heights, each by its centre, radius and influence.
+    pub(super) fn among(discs: impl IntoIterator<Item = [f64; 4]>) -> Scenario {
+        let discs = discs.into_iter();
+        let threats: Vec<String> = discs.map(|[x, y, r, i]| disc(x, y, r, i)).collect();
+        scenario(&format!(r#""threats": [{}]"#, threats.join(", ")))
+    }
+
     /// A cylinder of all heights, as a member of `threats`.
     pub(super) fn disc(x: f64, y: f64, radius: f64, influence: f64) -> String {
         format!(

@@ -1,10 +1,9 @@
 //! What is proven of whole scenarios, against the best routes known.
 
-use super::super::tests::{disc, read, scenario};
+use super::super::tests::{among, read, scenario};
 use super::*;
 use crate::geometry::Point3;
 
-/// Best routes known, from long searches: upper bounds of the optimum.
 /// From the ground to the ground, in bands above it.
 #[test]
 fn within_half_a_percent_where_a_route_takes_off_and_lands() {
@@ -58,10 +57,7 @@ fn within_a_percent_where_the_last_leg_climbs_out_of_a_gap() {
         [613, 65, 66, 96],
         [187, 830, 50, 74],
     ];
-    let discs = discs
-        .map(|numbers: [i32; 4]| numbers.map(f64::from))
-        .map(|[x, y, radius, influence]| disc(x, y, radius, influence));
-    let mut scenario = scenario(&format!(r#""threats": [{}]"#, discs.join(", ")));
+    let mut scenario = among(discs.map(|numbers: [i32; 4]| numbers.map(f64::from)));
     scenario.start = Point3::new(63.6, 94.9, 75.4);
     scenario.target = Point3::new(847.9, 817.0, 145.5);
     (scenario.altitude.min, scenario.altitude.max) = (0.0, 200.0);
@@ -84,6 +80,7 @@ fn tight_where_legs_are_long_and_climbs_slow() {
     assert!(bound <= best && bound > 0.999 * best, "{bound} {best}");
 }
 
+/// Best routes known, from long searches: upper bounds of the optimum.
 #[test]
 fn within_two_percent_of_the_best_routes_known() {
     let check = |document: &str, best: f64, gap: f64| {
@@ -135,14 +132,12 @@ fn within_a_percent_where_soft_zones_are_left_and_gaps_are_passed() {
 /// A start low in two wide soft zones, out of which every leg climbs: the best known has 20 waypoints.
 #[test]
 fn within_two_percent_where_a_leg_climbs_in_soft_zones() {
-    let mut scenario = scenario(
-        r#""threats": [
-            {"kind": "cylinder", "center": {"x": 344, "y": 72}, "radius": 17, "influence": 252},
-            {"kind": "cylinder", "center": {"x": 156, "y": 557}, "radius": 30, "influence": 107},
-            {"kind": "cylinder", "center": {"x": 642, "y": 264}, "radius": 34, "influence": 276},
-            {"kind": "cylinder", "center": {"x": 413, "y": 238}, "radius": 50, "influence": 140}
-        ]"#,
-    );
+    let mut scenario = among([
+        [344.0, 72.0, 17.0, 252.0],
+        [156.0, 557.0, 30.0, 107.0],
+        [642.0, 264.0, 34.0, 276.0],
+        [413.0, 238.0, 50.0, 140.0],
+    ]);
     scenario.start = Point3::new(237.0, 222.0, 28.0);
     scenario.target = Point3::new(743.0, 892.0, 89.0);
     let (bound, best) = (lower_bound(&scenario), 976.19);

@@ -55,7 +55,7 @@ impl End<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::super::tests::{disc, scenario};
+    use super::super::super::super::tests::among;
     use super::super::super::{around, potential, string};
     use super::super::over;
     use super::*;
@@ -64,17 +64,16 @@ mod tests {
     /// of the cheapest ways seen from above does.
     #[test]
     fn a_potential_that_knows_of_legs_proves_more_with_them() {
-        let discs: Vec<String> = (0..36)
-            .map(|idx| {
-                let (column, row) = (f64::from(idx % 6), f64::from(idx / 6));
-                let (x, y) = (
-                    100.0 + 150.0 * column + 40.0 * (row % 2.0),
-                    120.0 + 140.0 * row,
-                );
-                disc(x, y, 35.0, 90.0)
-            })
-            .collect();
-        let mut scenario = scenario(&format!(r#""threats": [{}]"#, discs.join(", ")));
+        let mut scenario = among((0..36).map(|idx| {
+            let (column, row) = (f64::from(idx % 6), f64::from(idx / 6));
+            let aside = 40.0 * (row % 2.0);
+            [
+                100.0 + 150.0 * column + aside,
+                120.0 + 140.0 * row,
+                35.0,
+                90.0,
+            ]
+        }));
         (scenario.start.z, scenario.target.z) = (15.0, 144.0);
         let prices = Prices::of(&scenario);
         let walls = around::walls(&scenario, &prices);

@@ -177,10 +177,11 @@ fn steepest(
         }
     }
     let (priced, potential, levels) = best?;
-    let mut eased = potential.clone();
-    if !stop() {
-        priced.ease(&mut eased, easing::MANY);
+    if stop() {
+        return Some((priced.mesh, potential, levels));
     }
+    let mut eased = potential.clone();
+    priced.ease(&mut eased, easing::MANY);
     let levels_eased = priced.levels(&eased);
     Some(if levels_eased.total() > levels.total() {
         (priced.mesh, eased, levels_eased)

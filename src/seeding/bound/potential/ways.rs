@@ -186,7 +186,7 @@ impl<'a> Tree<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::seeding::tests::{disc, scenario};
+    use crate::seeding::tests::among;
 
     fn sought(most: usize) -> WaysSought {
         WaysSought {
@@ -205,8 +205,7 @@ mod tests {
             (600.0, 566.0),
             (530.0, 650.0),
         ];
-        let discs = discs.map(|(x, y)| disc(x, y, 50.0, 80.0));
-        let scenario = scenario(&format!(r#""threats": [{}]"#, discs.join(", ")));
+        let scenario = among(discs.map(|(x, y)| [x, y, 50.0, 80.0]));
         let ways = cheap_ways(&scenario, 100.0, sought(12));
         // Either pair on either side.
         assert_eq!(ways.len(), 4);
@@ -234,10 +233,8 @@ mod tests {
 
     #[test]
     fn a_way_through_a_gap_of_ten_metres_is_found() {
-        let discs: Vec<String> = (0..9)
-            .map(|idx| disc(500.0, 60.0 + 110.0 * f64::from(idx), 50.0, 58.0))
-            .collect();
-        let scenario = scenario(&format!(r#""threats": [{}]"#, discs.join(", ")));
+        let wall = |idx| [500.0, 60.0 + 110.0 * f64::from(idx), 50.0, 58.0];
+        let scenario = among((0..9).map(wall));
         let ways = cheap_ways(&scenario, 100.0, sought(3));
         let first = ways.first().expect("there are gaps");
         let length: f64 = first

@@ -7,6 +7,7 @@
 mod address;
 mod collector;
 mod file;
+mod filter;
 mod flags;
 mod layers;
 mod place;
@@ -21,10 +22,11 @@ use std::time::Duration;
 
 pub use address::Address;
 pub use collector::{Endpoint, Headers};
+pub use filter::Filter;
 pub use flags::Flags;
 pub use layers::{Loaded, load};
 pub use place::{Place, Replicas, Role};
-pub use value::{Filter, LogFormat};
+pub use value::LogFormat;
 
 use crate::scenario::limits::Limits;
 

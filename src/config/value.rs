@@ -4,8 +4,6 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use tracing_subscriber::EnvFilter;
-
 /// A value as the operator gave it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Given {
@@ -70,24 +68,6 @@ pub(super) trait Value: Clone + PartialOrd + 'static {
     fn to_toml(&self) -> Option<String>;
 }
 
-/// What is logged, in the syntax of tracing's `EnvFilter`.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd)]
-pub struct Filter(String);
-
-impl Filter {
-    /// For the log's lines.
-    #[must_use]
-    pub fn to_env_filter(&self) -> EnvFilter {
-        EnvFilter::new(&self.0)
-    }
-}
-
-impl Default for Filter {
-    fn default() -> Self {
-        Self("info".to_owned())
-    }
-}
-
 /// How log lines are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd)]
 pub enum LogFormat {
@@ -114,20 +94,6 @@ impl Value for LogFormat {
             Self::Json => "json",
         };
         Some(quoted(name))
-    }
-}
-
-impl Value for Filter {
-    const ALLOWED: &'static str = "directives such as info or warn,noctule=debug";
-
-    fn read(given: &Given) -> Option<Self> {
-        let text = given.text()?;
-        EnvFilter::try_new(text).ok()?;
-        Some(Self(text.to_owned()))
-    }
-
-    fn to_toml(&self) -> Option<String> {
-        Some(quoted(&self.0))
     }
 }
 
@@ -321,6 +287,5 @@ mod tests {
         check(&vec!["a\"b".to_owned(), "c".to_owned()], "['a\"b', \"c\"]");
         check(&Some(PathBuf::from("/data\\x")), r"'/data\x'");
         check(&true, "true");
-        check(&Filter::default(), "\"info\"");
     }
 }

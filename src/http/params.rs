@@ -3,6 +3,7 @@
 
 use std::str::FromStr;
 
+use axum::extract::rejection::QueryRejection;
 use axum::extract::{FromRequestParts, Path, Query};
 use axum::http::Uri;
 use axum::http::request::Parts;
@@ -19,8 +20,7 @@ pub(super) struct Params(Vec<(String, String)>);
 impl Params {
     /// Of `uri`, which may have those that `known` names.
     pub(super) fn read(uri: &Uri, known: &[&str]) -> Result<Self, Problem> {
-        let Query(pairs) = Query::<Vec<(String, String)>>::try_from_uri(uri)
-            .map_err(|error| invalid("query", &error.to_string()))?;
+        let pairs = pairs_of(uri).map_err(|error| invalid("query", &error.to_string()))?;
         for (position, (name, _)) in pairs.iter().enumerate() {
             if !known.contains(&name.as_str()) {
                 return Err(invalid(name, &unknown(name, known)));
@@ -57,6 +57,15 @@ impl Params {
     }
 }
 
+/// What the query says.
+fn pairs_of(uri: &Uri) -> Result<Vec<(String, String)>, QueryRejection> {
+    // Most addresses have none, and each is looked at more than once.
+    if uri.query().is_none() {
+        return Ok(Vec::new());
+    }
+    Query::try_from_uri(uri).map(|Query(pairs)| pairs)
+}
+
 /// `value` is not what `name` may be.
 pub(super) fn refused(name: &str, value: &str, allowed: &str) -> Problem {
     invalid(name, &format!("{name} is {value:?}, must be {allowed}"))
@@ -90,8 +99,7 @@ const CREDENTIALS: [&str; 7] = [
 
 /// Whether a key stands in the address, or what is meant to be one.
 pub(super) fn brings_a_key(uri: &Uri) -> bool {
-    let pairs = Query::<Vec<(String, String)>>::try_from_uri(uri);
-    let in_query = pairs.is_ok_and(|Query(pairs)| {
+    let in_query = pairs_of(uri).is_ok_and(|pairs| {
         pairs.iter().any(|(name, value)| {
             CREDENTIALS.contains(&name.to_ascii_lowercase().as_str())
                 || holds_a_key(name)
@@ -103,8 +111,8 @@ pub(super) fn brings_a_key(uri: &Uri) -> bool {
 
 /// The ticket of the query, and the plan of the path, which is that of `/plans/{id}/events`.
 pub(super) fn ticket_of(uri: &Uri) -> Option<(String, Option<PlanId>)> {
-    let Query(pairs) = Query::<Vec<(String, String)>>::try_from_uri(uri).ok()?;
-    let (_, ticket) = pairs.into_iter().find(|(name, _)| name == "ticket")?;
+    let mut pairs = pairs_of(uri).ok()?.into_iter();
+    let (_, ticket) = pairs.find(|(name, _)| name == "ticket")?;
     let id = uri.path().split('/').nth(2)?;
     Some((ticket, Uuid::try_parse(id).ok()))
 }

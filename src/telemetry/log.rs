@@ -53,7 +53,7 @@ pub fn init(config: &Config) -> Log {
             .with_filter(filter_fn(is_exported))
     });
     tracing_subscriber::registry()
-        .with(lines.with_filter(config.log.to_env_filter()))
+        .with(lines.with_filter(config.log.of_lines()))
         .with(traces)
         .init();
     std::panic::set_hook(Box::new(log_panic));

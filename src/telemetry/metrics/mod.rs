@@ -60,8 +60,8 @@ type Level = Gauge<f64, AtomicU64>;
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 struct Request {
-    method: &'static str,
-    route: String,
+    #[prometheus(flatten)]
+    answered: Answered,
     status: u16,
 }
 
@@ -122,18 +122,11 @@ impl Metrics {
         let known = METHODS.into_iter().find(|known| *known == method);
         let method = known.unwrap_or(OTHER);
         let route = route.unwrap_or("unmatched").to_owned();
-        let answered = Answered {
-            method,
-            route: route.clone(),
-        };
+        let answered = Answered { method, route };
         self.request_times
             .get_or_create(&answered)
             .observe(took.as_secs_f64());
-        let request = Request {
-            method,
-            route,
-            status,
-        };
+        let request = Request { answered, status };
         self.requests.get_or_create(&request).inc();
     }
 

@@ -7,7 +7,8 @@
 # Who may use it is decided by where its port is published, as above on this machine alone; for others,
 # give it keys: docker run -v ./keys.toml:/keys.toml:ro -e NOCTULE_KEYS_FILE=/keys.toml -p 8080:8080 ...
 
-FROM rust:1-slim-bookworm AS builder
+# Not the slim one, which has a C compiler and no make.
+FROM rust:1-bookworm AS builder
 WORKDIR /build
 
 # The libraries alone, so that this layer is built again only when they change.

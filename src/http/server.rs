@@ -1,7 +1,7 @@
 //! Accept connections, answer them, and let them end.
 //!
-//! An accept loop of our own because `axum::serve` sets no timer, without which hyper's header
-//! timeout never fires.
+//! An accept loop of our own because `axum::serve` lets whoever holds a connection and asks for nothing
+//! hold it for ever.
 
 mod complaints;
 mod socket;
@@ -26,7 +26,7 @@ use hyper_util::server::graceful::GracefulConnection;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use tokio::time::Instant;
-use tower::ServiceExt as _;
+use tower::Service as _;
 
 use self::complaints::Complaints;
 use self::socket::Socket;
@@ -144,32 +144,26 @@ async fn answer(socket: Socket, router: Router, mut phase: watch::Receiver<Phase
     let watched = traffic.clone();
     let service = service_fn(move |request: Request<Incoming>| {
         let busy = watched.clone().begin();
-        let answer = router.clone().oneshot(request);
+        // It is ready at all times.
+        let answer = router.clone().call(request);
         async move { Ok::<_, Infallible>(busy.answered(answer.await?)) }
     });
     if http1 {
         let mut builder = http1::Builder::new();
-        builder
-            .timer(TokioTimer::new())
-            .max_buf_size(HEAD_BYTES)
-            .header_read_timeout(times.idle);
+        builder.max_buf_size(HEAD_BYTES);
         // Without what the other version needs: whatever is held here, every open stream holds.
         let connection = builder.serve_connection(socket, service);
-        keep(connection, phase, &traffic, times).await;
+        keep(connection, phase, &traffic, times, true).await;
     } else {
         let mut builder = auto::Builder::new(TokioExecutor::new());
-        builder
-            .http1()
-            .timer(TokioTimer::new())
-            .max_buf_size(HEAD_BYTES)
-            .header_read_timeout(times.idle);
+        builder.http1().max_buf_size(HEAD_BYTES);
         builder
             .http2()
             .timer(TokioTimer::new())
             .keep_alive_interval(times.idle)
             .max_concurrent_streams(256);
         let connection = builder.serve_connection(socket, service);
-        Box::pin(keep(connection, phase, &traffic, times)).await;
+        Box::pin(keep(connection, phase, &traffic, times, false)).await;
     }
 }
 
@@ -179,12 +173,20 @@ async fn keep<C: GracefulConnection<Error: Display>>(
     mut phase: watch::Receiver<Phase>,
     traffic: &Traffic,
     times: Times,
+    http1: bool,
 ) {
     let mut connection = pin!(connection);
     tokio::select! {
+        biased;
         ended = &mut connection => return note(ended),
         () = stopping(&mut phase) => {}
-        () = traffic.still_for(times.idle) => {}
+        () = traffic.still_for(times.idle) => {
+            // Nothing is left to be said; of a request there is no more than a part of its head.
+            if http1 && !traffic.is_held_up() {
+                tracing::debug!("a connection asked for nothing");
+                return;
+            }
+        }
     }
     connection.as_mut().graceful_shutdown();
     tokio::select! {

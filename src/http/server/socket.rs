@@ -52,11 +52,13 @@ impl Socket {
         Poll::Ready(Ok(()))
     }
 
-    fn counted(&self, written: io::Result<usize>) -> Poll<io::Result<usize>> {
-        if let Ok(bytes) = &written {
-            self.traffic.sent(*bytes);
+    fn counted(&self, written: Poll<io::Result<usize>>) -> Poll<io::Result<usize>> {
+        match &written {
+            Poll::Ready(Ok(bytes)) => self.traffic.sent(*bytes),
+            Poll::Ready(Err(_)) => {}
+            Poll::Pending => self.traffic.hold_up(),
         }
-        Poll::Ready(written)
+        written
     }
 }
 
@@ -78,9 +80,9 @@ impl AsyncWrite for Socket {
     ) -> Poll<io::Result<usize>> {
         ready!(self.poll_instead(context))?;
         if self.is_told_better(bytes) {
-            return self.counted(Ok(bytes.len()));
+            return self.counted(Poll::Ready(Ok(bytes.len())));
         }
-        let written = ready!(Pin::new(&mut self.stream).poll_write(context, bytes));
+        let written = Pin::new(&mut self.stream).poll_write(context, bytes);
         self.counted(written)
     }
 
@@ -93,9 +95,9 @@ impl AsyncWrite for Socket {
         if let [bytes] = slices
             && self.is_told_better(bytes)
         {
-            return self.counted(Ok(bytes.len()));
+            return self.counted(Poll::Ready(Ok(bytes.len())));
         }
-        let written = ready!(Pin::new(&mut self.stream).poll_write_vectored(context, slices));
+        let written = Pin::new(&mut self.stream).poll_write_vectored(context, slices);
         self.counted(written)
     }
 

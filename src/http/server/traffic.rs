@@ -1,8 +1,8 @@
 //! Whether anything still moves on a connection.
 //!
-//! A caller who asks for nothing, or takes nothing of what it asked for, holds a connection and
-//! whatever waits to be sent on it. Of the two only the first is known to hyper, and only where
-//! it speaks HTTP/1.
+//! A caller who asks for nothing, whose request never has its whole head, or who takes nothing of what it asked
+//! for, holds a connection and whatever waits to be sent on it. Of these hyper knows the first two alone, only where
+//! it speaks HTTP/1, and winds up a clock for each request.
 
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -34,6 +34,8 @@ struct State {
     moved: Instant,
     /// Sent since, in bytes.
     unnoted: usize,
+    /// Whether something waits to be sent and is not taken.
+    held_up: bool,
 }
 
 impl Traffic {
@@ -42,6 +44,7 @@ impl Traffic {
             busy: 0,
             moved: Instant::now(),
             unnoted: 0,
+            held_up: false,
         }))
     }
 
@@ -54,10 +57,21 @@ impl Traffic {
     /// So many bytes have been taken from the service.
     pub(super) fn sent(&self, bytes: usize) {
         let mut state = self.state();
+        state.held_up = false;
         state.unnoted += bytes;
         if state.unnoted >= WORTH_NOTING {
             state.note();
         }
+    }
+
+    /// What is to be sent next is not taken for now.
+    pub(super) fn hold_up(&self) {
+        self.state().held_up = true;
+    }
+
+    /// Whether there is something to be sent that is not taken.
+    pub(super) fn is_held_up(&self) -> bool {
+        self.state().held_up
     }
 
     /// Until nothing has moved for `time`, from now on.

@@ -1,7 +1,7 @@
 //! Layers of our own round a handler.
 //!
 //! What axum makes of a function puts the next service and the whole request into a box of its own, and all of that
-//! for each layer into a future of a kilobyte or two: more than the allocator keeps at hand. Here a layer looks at the
+//! for each layer into a future of a kilobyte or two, to be filled and moved. Here a layer looks at the
 //! request, hands it on at once, and holds no more than what it wants of the answer.
 
 use std::convert::Infallible;

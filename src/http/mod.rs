@@ -67,7 +67,7 @@ use crate::scenario::json::Rules;
 use crate::store::{Stats, SteadyClock, Store};
 use crate::telemetry::Instruments;
 use around::Layered;
-use auth::{Access, Needs};
+use auth::{Access, Gate, Needs};
 use problem::Problem;
 
 /// What every handler can reach; cheap to clone, for each request does.
@@ -138,7 +138,7 @@ pub struct Route {
     pub path: &'static str,
     /// Of its caller.
     pub needs: Needs,
-    handler: MethodRouter<AppState>,
+    guarded: Box<dyn FnOnce(Layered<Gate>) -> MethodRouter<AppState>>,
 }
 
 /// Every route there is.
@@ -206,8 +206,8 @@ fn assemble<T: 'static>(
     let router = routes
         .into_iter()
         .fold(Router::new(), |router, route| {
-            let gate = Layered(auth::Gate::new(access.clone(), route.needs));
-            router.route(route.path, route.handler.route_layer(gate))
+            let gate = Gate::new(access.clone(), route.needs);
+            router.route(route.path, (route.guarded)(Layered(gate)))
         })
         .method_not_allowed_fallback(async || Problem::MethodNotAllowed)
         .fallback(nowhere)
@@ -262,27 +262,32 @@ fn wrap(router: Router, cors: &Origins, hosts: Hosts, instruments: Arc<Instrumen
 }
 
 fn get<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
-    row("GET", path, routing::get(handler))
+    row("GET", path, |gate| routing::get(handler.layer(gate)))
 }
 
 fn post<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
-    row("POST", path, routing::post(handler))
+    row("POST", path, |gate| routing::post(handler.layer(gate)))
 }
 
 fn put<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
-    row("PUT", path, routing::put(handler))
+    row("PUT", path, |gate| routing::put(handler.layer(gate)))
 }
 
 fn delete<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
-    row("DELETE", path, routing::delete(handler))
+    row("DELETE", path, |gate| routing::delete(handler.layer(gate)))
 }
 
-fn row(method: &'static str, path: &'static str, handler: MethodRouter<AppState>) -> Route {
+/// The gate belongs to the handler: as a layer of the route it would be one more box that is made anew for each request.
+fn row(
+    method: &'static str,
+    path: &'static str,
+    guarded: impl FnOnce(Layered<Gate>) -> MethodRouter<AppState> + 'static,
+) -> Route {
     Route {
         method,
         path,
         needs: Needs::of(method, path),
-        handler,
+        guarded: Box::new(guarded),
     }
 }
 

@@ -8,6 +8,7 @@ mod socket;
 pub(super) mod traffic;
 mod unread;
 
+use std::cell::RefCell;
 use std::convert::Infallible;
 use std::fmt::Display;
 use std::io;
@@ -142,10 +143,11 @@ async fn answer(socket: Socket, router: Router, mut phase: watch::Receiver<Phase
     let traffic = socket.traffic.clone();
     let socket = TokioIo::new(socket);
     let watched = traffic.clone();
+    // One for all requests of the connection; it is ready at all times.
+    let router = RefCell::new(router);
     let service = service_fn(move |request: Request<Incoming>| {
         let busy = watched.clone().begin();
-        // It is ready at all times.
-        let answer = router.clone().call(request);
+        let answer = router.borrow_mut().call(request);
         async move { Ok::<_, Infallible>(busy.answered(answer.await?)) }
     });
     if http1 {

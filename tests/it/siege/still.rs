@@ -7,7 +7,7 @@ use http_body_util::{BodyExt as _, Empty};
 use hyper::client::conn::http2::{self, SendRequest};
 use hyper::{Request, Response, body::Incoming};
 use hyper_util::rt::{TokioExecutor, TokioIo};
-use tokio::io::AsyncWriteExt as _;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 use tokio::task::JoinHandle;
 
@@ -134,4 +134,25 @@ async fn who_does_not_take_what_it_asked_for_is_let_go() {
     assert_eq!(answer.status(), 200);
     unread.closed().await;
     drop(answer);
+}
+
+/// Who has asked for nothing does not get the time of those who have yet to take an answer.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_head_that_never_ends_is_waited_for_no_longer_than_it_may_take() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let limits = ["--http-head-timeout", "1", "--http-body-timeout", "3600"];
+    let service = Service::start(directory.path(), &limits);
+    let asked = "GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\n";
+    for n_asked in 0..3 {
+        let mut half = TcpStream::connect(service.address())
+            .await
+            .expect("connected");
+        let said = asked.repeat(n_asked) + "GET /livez HT";
+        half.write_all(said.as_bytes()).await.expect("sent");
+        let mut told = String::new();
+        in_time(half.read_to_string(&mut told))
+            .await
+            .expect("an end");
+        assert_eq!(told.matches("HTTP/1.1 200 OK").count(), n_asked, "{told}");
+    }
 }

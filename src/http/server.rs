@@ -158,7 +158,12 @@ async fn answer(socket: Socket, router: Router, mut phase: watch::Receiver<Phase
         keep(connection, phase, &traffic, times, true).await;
     } else {
         let mut builder = auto::Builder::new(TokioExecutor::new());
-        builder.http1().max_buf_size(HEAD_BYTES);
+        // Who begins like the other version and goes on in this one: few, and `keep` does not tell them apart.
+        builder
+            .http1()
+            .timer(TokioTimer::new())
+            .max_buf_size(HEAD_BYTES)
+            .header_read_timeout(times.idle);
         builder
             .http2()
             .timer(TokioTimer::new())

@@ -9,7 +9,7 @@ use async_nats::jetstream::stream::{Config, DiscardPolicy, RetentionPolicy, Stor
 use async_nats::jetstream::{self, Context, kv, object_store};
 use async_nats::{Client, ConnectOptions, Event};
 
-use super::election::outlast;
+use super::election::{Election, outlast};
 use super::lane::Version;
 use super::settings::Settings;
 use super::trouble::{failed, passes};
@@ -148,6 +148,24 @@ impl Servers {
 
     pub(super) fn is_connected(&self) -> bool {
         self.client.connection_state() == Connection::Connected
+    }
+
+    /// Do again what may be done twice, while a server is there and refuses what passes with an election.
+    ///
+    /// # Errors
+    /// The last one of `work`.
+    pub(super) async fn outlast<T, F>(&self, work: impl Fn() -> F) -> Result<T, StoreError>
+    where
+        F: Future<Output = Result<T, StoreError>>,
+    {
+        let mut election = Election::perhaps();
+        loop {
+            let done = work().await;
+            let passes = matches!(&done, Err(error) if self.is_connected() && passes(error));
+            if !passes || !election.goes_on().await {
+                return done;
+            }
+        }
     }
 }
 

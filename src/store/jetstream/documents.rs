@@ -33,6 +33,10 @@ impl Document {
 
 impl Servers {
     pub(super) async fn write(&self, document: &Document, text: &str) -> Result<(), StoreError> {
+        self.outlast(|| self.try_to_write(document, text)).await
+    }
+
+    async fn try_to_write(&self, document: &Document, text: &str) -> Result<(), StoreError> {
         let what = || format!("document {}", document.key);
         if document.large {
             let put = self
@@ -49,6 +53,10 @@ impl Servers {
     }
 
     pub(super) async fn read(&self, document: &Document) -> Result<String, StoreError> {
+        self.outlast(|| self.try_to_read(document)).await
+    }
+
+    async fn try_to_read(&self, document: &Document) -> Result<String, StoreError> {
         let what = || format!("document {}", document.key);
         let bytes = if document.large {
             let mut object = self

@@ -13,24 +13,25 @@ const SHORTEST: Duration = Duration::from_millis(20);
 /// Between two times of asking, at most.
 const LONGEST: Duration = Duration::from_secs(1);
 
-/// An election that may be under way.
+/// An election that may be under way, since it was first asked about.
 pub(super) struct Election {
-    until: Instant,
+    until: Option<Instant>,
     pause: Duration,
 }
 
 impl Election {
-    /// One that began just now, if it did.
+    /// One that nothing has yet been heard of.
     pub(super) fn perhaps() -> Self {
         Self {
-            until: Instant::now() + PATIENCE,
+            until: None,
             pause: SHORTEST,
         }
     }
 
     /// Wait before asking again; false when it is no election that they do not answer for.
     pub(super) async fn goes_on(&mut self) -> bool {
-        if Instant::now() > self.until {
+        let now = Instant::now();
+        if now > *self.until.get_or_insert(now + PATIENCE) {
             return false;
         }
         sleep(self.pause).await;
@@ -47,18 +48,12 @@ pub(super) async fn outlast<T, E>(
     passes: impl Fn(&E) -> bool,
     mut work: impl AsyncFnMut() -> Result<T, E>,
 ) -> Result<T, E> {
-    let mut election = None;
+    let mut election = Election::perhaps();
     loop {
-        let error = match work().await {
-            Err(error) if passes(&error) => error,
-            done => return done,
-        };
-        if !election
-            .get_or_insert_with(Election::perhaps)
-            .goes_on()
-            .await
-        {
-            return Err(error);
+        let done = work().await;
+        let passes = matches!(&done, Err(error) if passes(error));
+        if !passes || !election.goes_on().await {
+            return done;
         }
     }
 }

@@ -78,6 +78,10 @@ impl Plans<'_> {
     }
 
     async fn newest(&self, id: PlanId) -> Result<Option<Placed>, StoreError> {
+        self.servers.outlast(|| self.ask_for_newest(id)).await
+    }
+
+    async fn ask_for_newest(&self, id: PlanId) -> Result<Option<Placed>, StoreError> {
         let subject = self.servers.subject_of(id);
         match self
             .servers

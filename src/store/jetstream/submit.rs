@@ -3,6 +3,7 @@
 //! Its document and its job are written first, its record last: what broke off before that was never
 //! accepted, and its job, which no record stands behind, is thrown away by whoever finds it.
 
+use std::error::Error;
 use std::time::Duration;
 
 use async_nats::jetstream::context::PublishErrorKind;
@@ -50,8 +51,8 @@ impl First {
     }
 }
 
-fn unread(error: &(dyn std::error::Error + 'static)) -> StoreError {
-    StoreError::unavailable(format!("idempotency key: {error}"))
+fn unread(error: &(impl Error + 'static)) -> StoreError {
+    failed("idempotency key", error)
 }
 
 impl JetStream {
@@ -62,8 +63,11 @@ impl JetStream {
         idempotency: &Idempotency,
     ) -> Result<Option<Plan>, StoreError> {
         let key = key_of(owner, idempotency);
-        let entry = self.servers.keys.entry(key).await;
-        let entry = entry.map_err(|error| unread(&error))?;
+        let asked = self.servers.outlast(async || {
+            let entry = self.servers.keys.entry(key.as_str()).await;
+            entry.map_err(|error| unread(&error))
+        });
+        let entry = asked.await?;
         let Some(entry) = entry.filter(|entry| entry.operation == Operation::Put) else {
             return Ok(None);
         };
@@ -153,8 +157,13 @@ impl JetStream {
         Ok(plan)
     }
 
-    /// Its place in the queue's stream.
+    /// Its place in the queue's stream. A job that is written twice, since no answer came, is there once: the
+    /// servers know it by its plan.
     async fn enqueue(&self, id: PlanId, lane: &Lane) -> Result<u64, StoreError> {
+        self.servers.outlast(|| self.try_to_enqueue(id, lane)).await
+    }
+
+    async fn try_to_enqueue(&self, id: PlanId, lane: &Lane) -> Result<u64, StoreError> {
         let what = || format!("job of plan {id}");
         let job = PublishMessage::build().message_id(id.to_string());
         let subject = self.job_subject(id, lane);
@@ -191,7 +200,17 @@ impl JetStream {
         submission: &Submission,
         idempotency: &Idempotency,
     ) -> Result<Turn, StoreError> {
-        let what = unread;
+        self.servers
+            .outlast(|| self.try_to_be_first(key, submission, idempotency))
+            .await
+    }
+
+    async fn try_to_be_first(
+        &self,
+        key: &str,
+        submission: &Submission,
+        idempotency: &Idempotency,
+    ) -> Result<Turn, StoreError> {
         let keys = &self.servers.keys;
         let until = Instant::now() + PATIENCE;
         loop {
@@ -202,19 +221,24 @@ impl JetStream {
                 seen_ms: now_ms,
             };
             let own: Bytes = serde_json::to_vec(&own)
-                .map_err(|error| what(&error))?
+                .map_err(|error| unread(&error))?
                 .into();
             match keys.create(key, own.clone()).await {
                 Ok(revision) => return Ok(Turn::First { revision }),
                 Err(error) if error.kind() == CreateErrorKind::AlreadyExists => {}
                 Err(error) if is_outrun(&error) => {}
-                Err(error) => return Err(what(&error)),
+                Err(error) => return Err(unread(&error)),
             }
-            let entry = keys.entry(key).await.map_err(|error| what(&error))?;
+            let entry = keys.entry(key).await.map_err(|error| unread(&error))?;
             let Some(entry) = entry.filter(|entry| entry.operation == Operation::Put) else {
                 continue;
             };
             if let Some(first) = First::read(&entry, idempotency, now_ms)? {
+                if first == submission.id {
+                    // Taken before, when no answer came.
+                    let revision = entry.revision;
+                    return Ok(Turn::First { revision });
+                }
                 match self.get(first).await {
                     Ok(plan) => return Ok(Turn::Later(Box::new(plan))),
                     Err(StoreError::NotFound(_)) if Instant::now() < until => {
@@ -228,7 +252,7 @@ impl JetStream {
             match keys.update(key, own, entry.revision).await {
                 Ok(revision) => return Ok(Turn::First { revision }),
                 Err(error) if is_outrun(&error) => {}
-                Err(error) => return Err(what(&error)),
+                Err(error) => return Err(unread(&error)),
             }
         }
     }

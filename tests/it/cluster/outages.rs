@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use futures_util::TryStreamExt as _;
 use noctule::config::Address;
-use noctule::job::{Event, Status, Submission};
+use noctule::job::{Event, Idempotency, Status, Submission};
 use noctule::store::jetstream::Settings;
 use noctule::store::{Store, StoreError};
 
@@ -137,6 +137,48 @@ async fn a_run_goes_on_over_the_loss_of_the_leader() {
     let told = history(&*follower, id).await;
     assert_eq!(told.len(), 2 + 5 + 2);
     assert_eq!(told, history(&*store, id).await);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_submitted_in_an_election_is_accepted_after_it() {
+    let _turn = turn().await;
+    let mut cluster = Cluster::start();
+    let all = Address::read(&cluster.address()).unwrap();
+    for stream in ["jobs", "keys", "documents"] {
+        let name = match stream {
+            "jobs" => format!("{}-jobs", all.namespace),
+            bucket => format!("KV_{}-{bucket}", all.namespace),
+        };
+        let settings = |address: &Address| Settings {
+            replicas: 3,
+            ..node(&address.to_string())
+        };
+        drop(open_as(settings(&all)).await);
+        let leader = cluster.leader_of(&name).await;
+        // By way of a server that stays.
+        let other = &cluster.servers[(leader + 1) % 3];
+        let store = open_as(settings(&Address {
+            servers: vec![format!("nats://{}", other.host())],
+            ..all.clone()
+        }))
+        .await;
+        cluster.servers[leader].kill();
+        let submitted = store
+            .submit(Submission {
+                idempotency: Some(Idempotency {
+                    key: stream.to_owned(),
+                    body_sha256: String::new(),
+                }),
+                ..submission()
+            })
+            .await
+            .unwrap();
+        assert!(!submitted.replayed, "{stream}");
+        cluster.servers[leader].restart();
+    }
+    let store = open_as(node(&all.to_string())).await;
+    // The server that it reads from may be the one that came back last.
+    eventually(async || store.stats().await.unwrap().queued == 3).await;
 }
 
 /// Copies that the servers keep of each stream of a namespace, by its name.

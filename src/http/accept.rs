@@ -54,7 +54,10 @@ impl Range {
         let quality = parts
             .filter_map(|parameter| parameter.split_once('='))
             .find(|(name, _)| name.eq_ignore_ascii_case("q"))
-            .map_or(Some(1.0), |(_, value)| value.parse().ok())?;
+            .map_or(Ok(1.0), |(_, value)| value.parse());
+        let quality = quality
+            .ok()
+            .filter(|quality| (0.0..=1.0).contains(quality))?;
         Some(Self {
             kind: kind.to_ascii_lowercase(),
             subtype: subtype.to_ascii_lowercase(),
@@ -95,6 +98,12 @@ mod tests {
                 Some("application/x-ndjson"),
             ),
             ("text/html", None),
+            // What is no quality makes no entry.
+            (
+                "text/event-stream;q=nan, application/x-ndjson;q=0.1",
+                Some("application/x-ndjson"),
+            ),
+            ("application/x-ndjson;q=2", Some("text/event-stream")),
         ] {
             let mut headers = HeaderMap::new();
             headers.insert(header::ACCEPT, HeaderValue::from_static(accept));

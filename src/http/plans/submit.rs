@@ -221,10 +221,9 @@ fn dataset(terrain: &Terrain) -> Option<String> {
     }
 }
 
-/// Whether reading a document may read files: a name can be hidden in escapes.
+/// Whether reading a document may read files: a name can be hidden in escapes. What is no text is refused before.
 fn may_name_a_dataset(document: &[u8]) -> bool {
-    let word = b"dataset";
-    document.contains(&b'\\') || document.windows(word.len()).any(|part| part == word)
+    str::from_utf8(document).is_ok_and(|text| text.contains('\\') || text.contains("dataset"))
 }
 
 /// Read a document into a submission. Most are short and name nothing that has to be looked up.

@@ -246,7 +246,8 @@ fn refuse(
 /// Which names there are.
 fn known(name: &str, names: &[String]) -> String {
     if names.is_empty() {
-        return "there are no datasets; PUT /terrains/{name} makes one".to_owned();
+        return "there are no datasets; PUT /terrains/{name} makes one, --terrain-dir names a directory of them"
+            .to_owned();
     }
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let hint = nearest(name, &names)

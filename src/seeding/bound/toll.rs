@@ -1,5 +1,6 @@
 //! What it costs to pass a threat above or below, and how soon that can be.
 
+use super::prices::Prices;
 use crate::cost::Tolerance;
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;
@@ -52,6 +53,20 @@ pub(super) fn stays(threat: &Threat, scenario: &Scenario) -> [f64; 2] {
         let hair = 1e-9 * (1.0 + z.abs());
         let vertical = (down.min(up) - hair).max(0.0);
         (vertical / steepest(scenario)).min(half)
+    })
+}
+
+/// From start and target, metres up to the top of `threat` and down to its base, a hair less than there are; infinite where
+/// there is none.
+pub(super) fn climbs(threat: &Threat, prices: &Prices) -> [[f64; 2]; 2] {
+    prices.ends.map(|end| {
+        let hair = prices.tolerance + 1e-9 * (1.0 + end.z.abs());
+        [
+            threat.top.map_or(f64::INFINITY, |top| top - end.z - hair),
+            threat
+                .base
+                .map_or(f64::INFINITY, |base| end.z - base - hair),
+        ]
     })
 }
 

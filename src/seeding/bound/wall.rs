@@ -2,7 +2,7 @@
 //! flying over or under them.
 
 use super::prices::Prices;
-use super::toll::{Heights, Toll, stays};
+use super::toll::{Heights, Toll, climbs, stays};
 use crate::geometry::{Point2, Vector2, ring};
 use crate::scenario::Scenario;
 use crate::seeding::arc::{nearest_points, point_segment, segment_segment};
@@ -30,6 +30,9 @@ pub(super) struct Wall {
     /// Metres seen from above that a route flies at its heights at least, after the start and before the target; what
     /// matters of a wall that may be passed.
     pub(super) stays: [f64; 2],
+    /// From the start and from the target, metres up to its top and down to its base; less than nothing where these have
+    /// been passed, infinite where there is none.
+    pub(super) climbs: [[f64; 2]; 2],
 }
 
 impl Wall {
@@ -62,6 +65,7 @@ impl Wall {
             safe: 0.0,
             toll,
             stays: stays(threat, scenario),
+            climbs: climbs(threat, prices),
         };
         if let OutlineShape::Ring(ring) = &wall.shape
             && (wall.slack(slack) >= perimeter(ring) || is_thin(ring, 2.0 * slack))

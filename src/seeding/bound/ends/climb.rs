@@ -4,6 +4,7 @@
 use super::super::toll::climb_worth;
 use super::kind::End;
 use super::ramp::{Ramp, Rates};
+use super::slopes::Slopes;
 use crate::geometry::Point2;
 
 /// Lengths of first legs that are told apart.
@@ -12,15 +13,23 @@ const LENGTHS: u32 = 64;
 impl End<'_> {
     /// What a leg with one of those `lengths` seen from above, `exposed` if it is the shortest, costs at least on top of
     /// what it costs seen from above, waypoint included: it climbs, or its waypoint is off the middle.
-    pub(super) fn steepness(&self, lengths: [f64; 2], exposed: f64) -> f64 {
-        self.gently(lengths[1], exposed)
+    pub(super) fn steepness(&self, lengths: [f64; 2], exposed: f64, slopes: Option<Slopes>) -> f64 {
+        let told = slopes.map_or(0.0, |slopes| {
+            slopes.steepness(lengths, self.rates(exposed), self.height)
+        });
+        told.max(self.gently(lengths[1], exposed))
             .max(self.out_of_zone(lengths, exposed))
     }
 
     /// The same, of what is flown before the zone round the other end: what is flown in there is told there.
-    pub(super) fn before_other_zone(&self, [shortest, longest]: [f64; 2], exposed: f64) -> f64 {
+    pub(super) fn before_other_zone(
+        &self,
+        [shortest, longest]: [f64; 2],
+        exposed: f64,
+        slopes: Option<Slopes>,
+    ) -> f64 {
         if longest <= self.apart {
-            self.steepness([shortest, longest], exposed)
+            self.steepness([shortest, longest], exposed, slopes)
         } else {
             self.out_of_zone([shortest.min(self.apart), longest], exposed)
         }
@@ -29,14 +38,17 @@ impl End<'_> {
     /// The same of a leg that leads out of the zone round the end; 0 where it does not, or there is none.
     fn out_of_zone(&self, lengths: [f64; 2], exposed: f64) -> f64 {
         let ramp = self.ramp.filter(|ramp| lengths[0] >= ramp.reach);
-        let rates = Rates {
+        ramp.map_or(0.0, |ramp| {
+            ramp.steepness(lengths, self.rates(exposed), self.height, self.steepest)
+        })
+    }
+
+    fn rates(&self, exposed: f64) -> Rates {
+        Rates {
             fuel: self.prices.fuel,
             exposed,
             weight: self.weight,
-        };
-        ramp.map_or(0.0, |ramp| {
-            ramp.steepness(lengths, rates, self.height, self.steepest)
-        })
+        }
     }
 
     /// The same of a leg that may climb as gently as it likes; falls with `length`.
@@ -66,7 +78,7 @@ impl End<'_> {
         let ranges = (0..LENGTHS).map(|idx| [cut(idx), cut(idx + 1)]);
         let farther = ranges.chain([[run, f64::INFINITY]]);
         farther
-            .map(|lengths| self.before_other_zone(lengths, 0.0))
+            .map(|lengths| self.before_other_zone(lengths, 0.0, None))
             .fold(within, f64::min)
     }
 

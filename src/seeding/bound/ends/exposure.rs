@@ -28,6 +28,20 @@ pub(super) fn least(wall: &Wall, (from, at): (Point2, Point2), half: f64) -> f64
     }
 }
 
+/// Exposure to `wall` between two places on the way of every leg that begins in `from` and leads within `half` radians of
+/// theirs.
+pub(super) fn between(wall: &Wall, from: Point2, [near, far]: [Point2; 2], half: f64) -> f64 {
+    let to = |at: Point2| least(wall, (from, at), half);
+    if near == from {
+        return to(far);
+    }
+    match wall.shape {
+        // It is that of one leg, point by point.
+        OutlineShape::Disc(_) => (to(far) - to(near)).max(0.0),
+        OutlineShape::Ring(_) => 0.0,
+    }
+}
+
 /// Exposure to a disc of a leg of `length` that begins `away` from its centre and leads `off` radians past it.
 fn past(influence: f64, length: f64, (away, off): (f64, f64)) -> f64 {
     let leg = Segment {

@@ -2,15 +2,14 @@
 
 use nalgebra::Vector2;
 
-use super::super::departure::{Departure, Place, leaving};
+use super::super::departure::{Departure, Place};
 use super::super::prices::Prices;
 use super::super::string::{narrowed, scene, shortest};
 use super::super::wall::Wall;
-use super::exposure;
 use super::ramp::Ramp;
-use crate::geometry::{Point2, ring};
-use crate::seeding::arc::point_segment;
-use crate::seeding::outline::OutlineShape;
+use super::slopes::Slopes;
+use super::threats::Climb;
+use crate::geometry::Point2;
 
 /// No string is pulled for sectors that are wider than this share of the way.
 const COARSEST: f64 = 0.04;
@@ -39,6 +38,10 @@ pub(super) struct Kind {
     pub(super) is_rough: bool,
     /// What the soft zones along the shortest of them cost at least.
     exposed: f64,
+    /// How they climb; `None` for all.
+    slopes: Option<Slopes>,
+    /// What may be gained by telling apart how they climb.
+    sloped: f64,
 }
 
 impl Kind {
@@ -55,8 +58,14 @@ impl Kind {
             turned: 0.0,
             is_rough: false,
             exposed: 0.0,
+            slopes: None,
+            sloped: 0.0,
         };
         (0..SECTORS).map(sector).collect()
+    }
+
+    fn climb(&self) -> Climb {
+        self.slopes.map_or(Climb::Any, Climb::As)
     }
 }
 
@@ -68,6 +77,8 @@ pub(super) struct End<'a> {
     pub(super) to: Point2,
     /// Metres between it and the middle of the band.
     pub(super) height: f64,
+    /// Whether it lies below that.
+    pub(super) is_below: bool,
     /// Of a metre between the waypoint and the middle of the band.
     pub(super) weight: f64,
     /// Metres of climb in a metre seen from above, at most.
@@ -89,7 +100,7 @@ impl End<'_> {
         if kind.is_rough {
             f64::INFINITY
         } else {
-            kind.turned.max(self.longer(kind))
+            kind.turned.max(self.longer(kind)).max(kind.sloped)
         }
     }
 
@@ -99,28 +110,48 @@ impl End<'_> {
         if kind.lengths[0] >= self.apart {
             return 0.0;
         }
-        self.steepness([kind.lengths[0]; 2], kind.exposed) - kind.steepness
+        self.steepness([kind.lengths[0]; 2], kind.exposed, kind.slopes) - kind.steepness
     }
 
-    /// `kind` in two parts, not yet priced.
-    pub(super) fn parts(&self, kind: &Kind) -> [Kind; 2] {
-        if kind.turned >= self.longer(kind) {
+    /// `kind` in parts, not yet priced.
+    pub(super) fn parts(&self, kind: &Kind) -> Vec<Kind> {
+        let longer = self.longer(kind);
+        if kind.sloped > kind.turned.max(longer) {
+            let all = Slopes::parts(self.steepest).into_iter();
+            let part = |slopes| Kind {
+                slopes: Some(slopes),
+                sloped: 0.0,
+                ..*kind
+            };
+            return all.map(part).collect();
+        }
+        if kind.turned >= longer {
             let half = 0.5 * kind.half;
             let part = |side: f64| Kind {
                 heading: kind.heading + side * half,
                 half,
                 ..*kind
             };
-            return [part(-1.0), part(1.0)];
+            return vec![part(-1.0), part(1.0)];
         }
         let [shortest, longest] = kind.lengths;
         let between = self.between(kind).clamp(shortest, longest);
-        [[shortest, between], [between, longest]].map(|lengths| Kind { lengths, ..*kind })
+        let cut = [[shortest, between], [between, longest]];
+        cut.map(|lengths| Kind { lengths, ..*kind }).to_vec()
     }
 
     /// The length at which those of `kind` are cut.
     fn between(&self, kind: &Kind) -> f64 {
         let [shortest, longest] = kind.lengths;
+        if kind.slopes.is_some() {
+            return if longest.is_finite() {
+                0.5 * (shortest + longest)
+            } else {
+                (2.0 * shortest)
+                    .max(self.height / self.steepest.min(1.0))
+                    .max(1.0)
+            };
+        }
         if let Some(ramp) = self.ramp {
             let bends = [ramp.reach, ramp.run(self.height)];
             let mut within = bends
@@ -141,26 +172,27 @@ impl End<'_> {
     pub(super) fn priced(&self, kind: Kind) -> Kind {
         let [length, longest] = kind.lengths;
         if length <= 0.0 {
-            let steepness = self.gently(longest, 0.0);
+            let steepness = self.steepness([0.0, longest], 0.0, kind.slopes);
             return Kind { steepness, ..kind };
         }
         let (at, spread) = self.reached(&kind);
-        if self.is_blocked(at, spread) {
+        if self.is_blocked(at, spread, kind.climb()) {
             return Kind {
                 cost: f64::INFINITY,
                 ..kind
             };
         }
         let fuel = self.prices.fuel;
-        let [exposed, middle] = self.exposed(at, kind.half);
+        let [exposed, middle] = self.exposed(at, kind.half, kind.climb());
         let leg = fuel * (length - spread) + exposed + self.later(length);
         Kind {
             cost: kind.cost.max(leg + fuel * (self.to - at).norm()),
-            steepness: self.steepness(kind.lengths, exposed),
+            steepness: self.steepness(kind.lengths, exposed, kind.slopes),
             leg,
             turned: 2.0 * fuel * spread + (middle - exposed),
             is_rough: spread <= COARSEST * (self.to - self.from).norm(),
             exposed,
+            sloped: self.sloped(&kind, (at, spread), exposed),
             ..kind
         }
     }
@@ -177,12 +209,12 @@ impl End<'_> {
         if length <= 0.0 {
             return Kind {
                 cost: self.later(length),
-                steepness: self.before_other_zone(kind.lengths, 0.0),
+                steepness: self.before_other_zone(kind.lengths, 0.0, kind.slopes),
                 ..kind
             };
         }
         let (at, spread) = self.reached(&kind);
-        let highest = rise(at, spread).filter(|_| !self.is_blocked(at, spread));
+        let highest = rise(at, spread).filter(|_| !self.is_blocked(at, spread, kind.climb()));
         let Some(highest) = highest else {
             return Kind {
                 cost: f64::INFINITY,
@@ -190,15 +222,16 @@ impl End<'_> {
             };
         };
         let fuel = self.prices.fuel;
-        let [exposed, middle] = self.exposed(at, kind.half);
+        let [exposed, middle] = self.exposed(at, kind.half, kind.climb());
         Kind {
             cost: kind
                 .cost
                 .max(fuel * length + exposed + self.later(length) - highest),
-            steepness: self.before_other_zone(kind.lengths, exposed),
+            steepness: self.before_other_zone(kind.lengths, exposed, kind.slopes),
             // The potential is at least as steep as fuel is dear, about.
             turned: fuel * spread + (middle - exposed),
             exposed,
+            sloped: self.sloped(&kind, (at, spread), exposed),
             ..kind
         }
     }
@@ -223,65 +256,16 @@ impl End<'_> {
         (self.from + way, length * kind.half)
     }
 
-    /// The walls that count, each with the metres from here on for which it does.
-    fn counting(&self) -> impl Iterator<Item = (&Wall, f64)> {
-        let both = self.walls.iter().zip(self.radii);
-        let counts = both.map(|(wall, radius)| {
-            let stay = radius.map_or(wall.stays[self.which], |_| f64::INFINITY);
-            (wall, stay)
-        });
-        counts.filter(|(_, stay)| *stay > 0.0)
-    }
-
-    /// How far a leg to `at` leads in so many metres.
-    fn at_most(&self, at: Point2, metres: f64) -> Point2 {
-        let way = at - self.from;
-        let length = way.norm();
-        if metres < length {
-            self.from + way * (metres / length)
-        } else {
-            at
+    /// What may be gained by telling apart how legs of `kind` climb that are `exposed`: as much as threats that may be passed
+    /// cost at most.
+    fn sloped(&self, kind: &Kind, (at, spread): (Point2, f64), exposed: f64) -> f64 {
+        if kind.slopes.is_some() || self.radii.iter().all(Option::is_some) {
+            return 0.0;
         }
-    }
-
-    /// What is paid at least, after a leg of `length`, in the zones of walls that cannot be passed yet.
-    fn later(&self, length: f64) -> f64 {
-        let passable = self.counting().filter(|(_, stay)| stay.is_finite());
-        let exposed = passable.map(|(wall, stay)| {
-            let first = |metres| leaving(wall, (self.from, 0.0), metres);
-            first(stay) - first(stay.min(length))
-        });
-        self.prices.exposure * exposed.sum::<f64>()
-    }
-
-    /// Whether every leg to within `spread` of `at` enters a core.
-    pub(super) fn is_blocked(&self, at: Point2, spread: f64) -> bool {
-        self.counting().any(|(wall, stay)| {
-            let at = self.at_most(at, stay);
-            match &wall.shape {
-                OutlineShape::Disc(center) => {
-                    wall.core > spread && point_segment(*center, self.from, at) < wall.core - spread
-                }
-                OutlineShape::Ring(ring) => (1..=16).rev().any(|i| {
-                    let point = self.from + (at - self.from) * (f64::from(i) / 16.0);
-                    ring::contains(ring, point)
-                        && ring::distance(ring, point) > spread + 2.0 * self.prices.tolerance
-                }),
-            }
-        })
-    }
-
-    /// What the soft zones cost of all legs to as far as `at` and within `half` radians of it: no less than the first, and
-    /// of the one to `at` about the second.
-    pub(super) fn exposed(&self, at: Point2, half: f64) -> [f64; 2] {
-        let mut sums = [0.0; 2];
-        for (wall, stay) in self.counting() {
-            let at = self.at_most(at, stay);
-            for (sum, half) in sums.iter_mut().zip([half, 0.0]) {
-                *sum += self.prices.exposure * exposure::least(wall, (self.from, at), half);
-            }
+        if self.is_blocked(at, spread, Climb::Along) {
+            return f64::INFINITY;
         }
-        sums
+        self.exposed(at, kind.half, Climb::Along)[0] - exposed
     }
 
     /// What no route from within `spread` of `at` to the other end undercuts, but for the fuel of `spread`, or `enough` of
@@ -315,14 +299,20 @@ pub(super) mod tests {
     use super::super::super::super::tests::scenario;
     use super::super::super::around;
     use super::*;
+    use crate::seeding::arc::point_segment;
 
     /// The start, 100 m below the middle of the band, at 1 a metre off it, for climbs of 45 degrees.
-    fn end<'a>(prices: &'a Prices, walls: &'a [Wall], radii: &'a [Option<f64>]) -> End<'a> {
+    pub(in super::super) fn end<'a>(
+        prices: &'a Prices,
+        walls: &'a [Wall],
+        radii: &'a [Option<f64>],
+    ) -> End<'a> {
         End {
             which: 0,
             from: prices.ends[0].xy(),
             to: prices.ends[1].xy(),
             height: 100.0,
+            is_below: true,
             weight: 1.0,
             steepest: 1.0,
             ramp: None,
@@ -346,26 +336,6 @@ pub(super) mod tests {
         examine(&end(&prices, &walls, &radii));
     }
 
-    /// Beneath the top for 60 m, a leg is as exposed, and as blocked, as one so long; a shorter one leaves something to
-    /// those after it.
-    #[test]
-    fn a_leg_is_under_a_top_for_as_long_as_it_climbs() {
-        let scenario = scenario(
-            r#""threats": [{"kind": "cylinder", "center": {"x": 260, "y": 100}, "radius": 30, "influence": 100, "top": 60}]"#,
-        );
-        let prices = Prices::of(&scenario);
-        let walls = around::walls(&scenario, &prices);
-        let end = end(&prices, &walls, &[None]);
-        let to = |length: f64| end.from - Vector2::new(0.0, length);
-        let exposed = |length: f64| end.exposed(to(length), 0.0)[0];
-        assert!(exposed(30.0) < exposed(60.0) && exposed(60.0) > 0.0);
-        assert!((exposed(90.0) - exposed(60.0)).abs() < 1e-3);
-        assert!(end.later(0.0) > end.later(30.0) && end.later(30.0) > 0.0);
-        assert!(end.later(60.0) < 1e-4 * end.later(0.0));
-        let over = end.from + Vector2::new(90.0, 0.0);
-        assert!(end.is_blocked(over, 0.0) && !end.is_blocked(to(90.0), 0.0));
-    }
-
     /// However often kinds are cut: all legs are of one, and none is told to cost more than it does.
     #[test]
     fn every_leg_is_of_a_kind_that_costs_no_more() {
@@ -373,7 +343,7 @@ pub(super) mod tests {
             let mut kinds = Kind::all(0.0);
             for round in 0..200 {
                 let kind = kinds.swap_remove(round * 7 % kinds.len());
-                let parts = end.parts(&kind).map(|part| end.priced(part));
+                let parts = end.parts(&kind).into_iter().map(|part| end.priced(part));
                 kinds.extend(parts.map(|part| end.pulled(part, f64::INFINITY).0));
             }
             for idx in 0..400 {
@@ -398,5 +368,80 @@ pub(super) mod tests {
                 assert!(!is_free || own.all(|kind| kind.cost <= least + 1e-6));
             }
         });
+    }
+
+    /// Among threats to be passed, some of whose heights hold the start and some not: no leg that keeps out of cores costs
+    /// less than it is told to, however it climbs.
+    #[test]
+    fn no_leg_costs_less_than_its_kind_by_threats_it_climbs_over() {
+        let discs = [
+            (260.0, 100.0, 30.0, 100.0, [f64::NEG_INFINITY, 60.0]),
+            (170.0, 210.0, 50.0, 90.0, [30.0, f64::INFINITY]),
+            (120.0, 60.0, 20.0, 110.0, [-20.0, 12.0]),
+            (300.0, 220.0, 25.0, 70.0, [20.0, 70.0]),
+        ];
+        let limit = |name: &str, limit: f64| {
+            if limit.is_finite() {
+                format!(r#", "{name}": {limit}"#)
+            } else {
+                String::new()
+            }
+        };
+        let threats = discs.map(|(x, y, radius, influence, [base, top])| {
+            let limits = limit("base", base) + &limit("top", top);
+            format!(
+                r#"{{"kind": "cylinder", "center": {{"x": {x}, "y": {y}}}, "radius": {radius}, "influence": {influence}{limits}}}"#
+            )
+        });
+        let scenario = scenario(&format!(r#""threats": [{}]"#, threats.join(", ")));
+        let prices = Prices::of(&scenario);
+        let walls = around::walls(&scenario, &prices);
+        let end = end(&prices, &walls, &[None; 4]);
+        let mut kinds = Kind::all(0.0);
+        for round in 0..600 {
+            let kind = kinds.swap_remove(round * 7 % kinds.len());
+            let parts = end.parts(&kind).into_iter();
+            kinds.extend(parts.map(|part| end.beyond(part, &|_, _| Some(0.0))));
+        }
+        let (mut told, mut blocked) = (0, 0);
+        for idx in 0..2000 {
+            let share = f64::from(idx) / 2000.0;
+            let (heading, slope) = (
+                share * std::f64::consts::TAU,
+                2.0 * (share * 613.0).fract() - 1.0,
+            );
+            let length = 300.0 * (share * 37.0).fract();
+            let way = Vector2::new(libm::cos(heading), libm::sin(heading));
+            let (mut depths, mut enters) = (0.0, false);
+            for part in 0..800 {
+                let flown = length * (f64::from(part) + 0.5) / 800.0;
+                let at = end.from + way * flown;
+                for (x, y, radius, influence, [base, top]) in discs {
+                    if base <= slope * flown && slope * flown < top {
+                        let away = (at - Point2::new(x, y)).norm();
+                        enters |= away < radius;
+                        depths += (influence - away).max(0.0) * length / 800.0;
+                    }
+                }
+            }
+            let slant = (1.0 + slope * slope).sqrt();
+            let flown = (prices.fuel * length + prices.exposure * depths) * slant;
+            let cost = flown + (100.0 - slope * length).abs() + end.later(length);
+            let of = |kind: &&Kind| {
+                let off = crate::geometry::wrap_angle(heading - kind.heading).abs();
+                off <= kind.half + 1e-9
+                    && (kind.lengths[0]..=kind.lengths[1]).contains(&length)
+                    && kind.slopes.is_none_or(|slopes| slopes.hold(slope))
+            };
+            let mut own = kinds.iter().filter(of).peekable();
+            assert!(own.peek().is_some());
+            for kind in own {
+                blocked += i32::from(kind.cost.is_infinite());
+                told += i32::from(kind.slopes.is_some());
+                let least = kind.cost + kind.steepness;
+                assert!(enters || least <= cost + 0.05, "{least} {cost}");
+            }
+        }
+        assert!(told > 1000 && blocked > 100, "{told} {blocked}");
     }
 }

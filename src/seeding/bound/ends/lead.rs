@@ -5,6 +5,7 @@ use super::super::prices::Prices;
 use super::super::wall::Wall;
 use super::ends;
 use super::kind::End;
+use super::threats::Climb;
 use crate::geometry::Point2;
 use crate::scenario::Scenario;
 
@@ -44,12 +45,12 @@ impl End<'_> {
 
     /// What a leg to `at` costs, waypoint included; infinite where it enters a core.
     pub(super) fn leg_to(&self, at: Point2) -> f64 {
-        if self.is_blocked(at, 0.0) {
+        if self.is_blocked(at, 0.0, Climb::Any) {
             return f64::INFINITY;
         }
         let length = (at - self.from).norm();
-        let exposed = self.exposed(at, 0.0)[0];
-        self.prices.fuel * length + exposed + self.steepness([length; 2], exposed)
+        let exposed = self.exposed(at, 0.0, Climb::Any)[0];
+        self.prices.fuel * length + exposed + self.steepness([length; 2], exposed, None)
     }
 }
 

@@ -8,6 +8,8 @@ mod kind;
 mod lead;
 mod ramp;
 mod rising;
+mod slopes;
+mod threats;
 
 pub(super) use excess::over;
 pub(super) use lead::leads;
@@ -145,6 +147,7 @@ fn ends<'a>(
             from: prices.ends[end].xy(),
             to: prices.ends[1 - end].xy(),
             height: below[end].abs(),
+            is_below: below[end] > 0.0,
             weight: share * scenario.weights.altitude,
             steepest,
             ramp: ramps[end],

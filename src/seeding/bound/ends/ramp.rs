@@ -69,19 +69,35 @@ impl Ramp {
     /// seen from above: from `height` metres off the middle of the band, at no more than the `steepest` climb.
     pub(super) fn steepness(
         &self,
-        [shortest, longest]: [f64; 2],
+        lengths: [f64; 2],
         rates: Rates,
         height: f64,
         steepest: f64,
     ) -> f64 {
-        let whole = rates.fuel * shortest + rates.exposed;
-        // Convex in the climb: where a climb of all metres costs what it saves off the middle, unless that is reached
-        // before, or the zone asks for more.
-        let best = climb_worth(rates.weight * longest / whole);
-        let climb = best.min(height / longest).max(self.slope).min(steepest);
-        let off_middle = (height - climb * longest).max(climb * shortest - height);
-        whole * ((1.0 + climb * climb).sqrt() - 1.0) + rates.weight * off_middle.max(0.0)
+        climbing([self.slope, steepest], lengths, rates, height)
     }
+}
+
+/// What a leg with a length seen from above in `lengths`, and a slope in `slopes` towards the middle of the band, costs at
+/// least on top of what it costs seen from above: from `height` metres off the middle.
+pub(super) fn climbing(
+    [gentlest, steepest]: [f64; 2],
+    [shortest, longest]: [f64; 2],
+    rates: Rates,
+    height: f64,
+) -> f64 {
+    let whole = rates.fuel * shortest + rates.exposed;
+    // Convex in the climb: where a climb of all metres costs what it saves off the middle, unless that is reached
+    // before, or it must be more.
+    let best = climb_worth(rates.weight * longest / whole);
+    let climb = best.min(height / longest).max(gentlest).min(steepest);
+    let below = if longest.is_finite() {
+        height - climb * longest
+    } else {
+        0.0
+    };
+    let off_middle = below.max(climb * shortest - height);
+    whole * ((1.0 + climb * climb).sqrt() - 1.0) + rates.weight * off_middle.max(0.0)
 }
 
 /// Metres outside the band.

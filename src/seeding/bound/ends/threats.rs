@@ -1,0 +1,141 @@
+//! Which threats first and last legs meet: those to be passed only while they are at their heights. The argument is section
+//! 7 of docs/BOUND.md.
+
+use super::super::departure::leaving;
+use super::super::wall::Wall;
+use super::exposure;
+use super::kind::End;
+use super::slopes::Slopes;
+use crate::geometry::{Point2, ring};
+use crate::seeding::arc::point_segment;
+use crate::seeding::outline::OutlineShape;
+
+/// How legs climb.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Climb {
+    /// As they like.
+    Any,
+    As(Slopes),
+    /// So that no threat is ever passed.
+    Along,
+}
+
+impl End<'_> {
+    /// The walls that count for legs that climb so, each with the metres seen from above from which and up to which it
+    /// does.
+    fn counting(&self, climb: Climb) -> impl Iterator<Item = (&Wall, [f64; 2])> {
+        // As much of the way belongs to the other end.
+        let half = 0.5 * self.prices.direct();
+        let both = self.walls.iter().zip(self.radii);
+        let counts = both.map(move |(wall, radius)| {
+            let range = match (radius, climb) {
+                (Some(_), _) => [0.0, f64::INFINITY],
+                (None, Climb::Along) => [0.0, half],
+                (None, Climb::Any) => [0.0, wall.stays[self.which]],
+                (None, Climb::As(slopes)) => {
+                    let [up, down] = wall.climbs[self.which];
+                    let [towards, away] = if self.is_below {
+                        [up, down]
+                    } else {
+                        [down, up]
+                    };
+                    let [from, to] = slopes.at_heights([towards, away]);
+                    [from, to.min(half)]
+                }
+            };
+            (wall, range)
+        });
+        counts.filter(|(_, [from, to])| from < to)
+    }
+
+    /// How far a leg to `at` leads in so many metres.
+    fn at_most(&self, at: Point2, metres: f64) -> Point2 {
+        let way = at - self.from;
+        let length = way.norm();
+        if metres < length {
+            self.from + way * (metres / length)
+        } else {
+            at
+        }
+    }
+
+    /// What is paid at least, after a leg of `length`, in the zones of walls that cannot be passed yet.
+    pub(super) fn later(&self, length: f64) -> f64 {
+        let passable = self
+            .counting(Climb::Any)
+            .filter(|(_, [_, stay])| stay.is_finite());
+        let exposed = passable.map(|(wall, [_, stay])| {
+            let first = |metres| leaving(wall, (self.from, 0.0), metres);
+            first(stay) - first(stay.min(length))
+        });
+        self.prices.exposure * exposed.sum::<f64>()
+    }
+
+    /// Whether every leg that climbs so to within `spread` of `at` enters a core.
+    pub(super) fn is_blocked(&self, at: Point2, spread: f64, climb: Climb) -> bool {
+        let length = (at - self.from).norm();
+        let counting = self.counting(climb);
+        counting
+            .filter(|(_, [from, _])| *from < length)
+            .any(|(wall, range)| {
+                let [from, to] = range.map(|metres| self.at_most(at, metres));
+                match &wall.shape {
+                    OutlineShape::Disc(center) => {
+                        wall.core > spread && point_segment(*center, from, to) < wall.core - spread
+                    }
+                    OutlineShape::Ring(ring) => (1..=16).rev().any(|i| {
+                        let point = from + (to - from) * (f64::from(i) / 16.0);
+                        ring::contains(ring, point)
+                            && ring::distance(ring, point) > spread + 2.0 * self.prices.tolerance
+                    }),
+                }
+            })
+    }
+
+    /// What the soft zones cost of all legs that climb so to as far as `at` and within `half` radians of it: no less
+    /// than the first, and of the one to `at` about the second.
+    pub(super) fn exposed(&self, at: Point2, half: f64, climb: Climb) -> [f64; 2] {
+        let mut sums = [0.0; 2];
+        for (wall, range) in self.counting(climb) {
+            let reached = range.map(|metres| self.at_most(at, metres));
+            for (sum, half) in sums.iter_mut().zip([half, 0.0]) {
+                let within = exposure::between(wall, self.from, reached, half);
+                *sum += self.prices.exposure * within;
+            }
+        }
+        sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector2;
+
+    use super::super::super::super::tests::scenario;
+    use super::super::super::around;
+    use super::super::super::prices::Prices;
+    use super::super::kind::tests::end;
+    use super::*;
+
+    /// Beneath the top for 60 m, a leg is as exposed, and as blocked, as one so long; a shorter one leaves something to
+    /// those after it.
+    #[test]
+    fn a_leg_is_under_a_top_for_as_long_as_it_climbs() {
+        let scenario = scenario(
+            r#""threats": [{"kind": "cylinder", "center": {"x": 260, "y": 100}, "radius": 30, "influence": 100, "top": 60}]"#,
+        );
+        let prices = Prices::of(&scenario);
+        let walls = around::walls(&scenario, &prices);
+        let end = end(&prices, &walls, &[None]);
+        let to = |length: f64| end.from - Vector2::new(0.0, length);
+        let exposed = |length: f64| end.exposed(to(length), 0.0, Climb::Any)[0];
+        assert!(exposed(30.0) < exposed(60.0) && exposed(60.0) > 0.0);
+        assert!((exposed(90.0) - exposed(60.0)).abs() < 1e-3);
+        assert!(end.later(0.0) > end.later(30.0) && end.later(30.0) > 0.0);
+        assert!(end.later(60.0) < 1e-4 * end.later(0.0));
+        let over = end.from + Vector2::new(90.0, 0.0);
+        assert!(
+            end.is_blocked(over, 0.0, Climb::Any) && !end.is_blocked(to(90.0), 0.0, Climb::Any)
+        );
+    }
+}

@@ -160,6 +160,24 @@ fn within_a_percent_where_what_may_be_passed_cannot_be_at_once() {
     assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
 }
 
+/// The target is 9 m above the top of a disc on the way: a last leg over it comes from nowhere near the middle of the band.
+#[test]
+fn within_a_percent_where_the_last_leg_leads_over_a_top() {
+    let mut scenario = scenario(
+        r#""threats": [
+            {"kind": "cylinder", "center": {"x": 819, "y": 715}, "radius": 79, "influence": 116, "top": 139},
+            {"kind": "cylinder", "center": {"x": 727, "y": 479}, "radius": 99, "influence": 119, "base": 70},
+            {"kind": "cylinder", "center": {"x": 414, "y": 117}, "radius": 94, "influence": 131}
+        ]"#,
+    );
+    scenario.start = Point3::new(215.0, 56.0, 145.0);
+    scenario.target = Point3::new(932.0, 777.0, 148.0);
+    scenario.weights.fuel = 1.0;
+    scenario.planner.waypoints = 20;
+    let (bound, best) = (lower_bound(&scenario), 1066.6164);
+    assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
+}
+
 /// What a route may cut off corners can be worth more than the way; and it may go through what
 /// is thinner than its tolerance.
 #[test]

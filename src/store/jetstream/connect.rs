@@ -150,7 +150,8 @@ impl Servers {
         self.client.connection_state() == Connection::Connected
     }
 
-    /// Do again what may be done twice, while a server is there and refuses what passes with an election.
+    /// Do again what may be done twice, while a server is there and refuses what passes with an election. As [`outlast`] does,
+    /// whose work cannot be sent between threads.
     ///
     /// # Errors
     /// The last one of `work`.

@@ -126,7 +126,9 @@ impl JetStream {
             .info()
             .await
             .map_err(|error| failed(what, &error))?;
-        let is_empty = info.num_pending == 0 && info.delivered.stream_sequence == 0;
+        // Nothing is delivered before somebody listens. (What is told as delivered is no measure: of a
+        // consumer that begins at a place it is the place before.)
+        let is_empty = info.num_pending == 0;
         let messages = consumer.messages().await;
         Ok((is_empty, messages.map_err(|error| failed(what, &error))?))
     }

@@ -84,6 +84,21 @@ async fn a_server_that_stops_answering_is_told_and_waited_for() {
     assert_eq!(store.claim().await.unwrap().plan.id, id);
 }
 
+/// As long as it takes until nothing heard from a server means that it is gone.
+const SILENCE: Duration = Duration::from_secs(13);
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_that_was_silent_for_long_is_taken_up_again_without_news() {
+    let server = NatsServer::start();
+    let store = open(&server.address()).await;
+    let id = store.submit(submission()).await.unwrap().plan.id;
+    server.pause();
+    tokio::time::sleep(SILENCE).await;
+    server.resume();
+    until_sound(&*store).await;
+    assert_eq!(store.claim().await.unwrap().plan.id, id);
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_webhook_is_its_tellers_until_the_try_is_written_down() {
     let mut server = NatsServer::start();

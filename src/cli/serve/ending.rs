@@ -44,7 +44,14 @@ impl Running {
             ended.context("the server broke")?;
         }
         drop((self.sweeper, self.sender));
-        self.store.close().await;
+        if timeout_at(signalled + grace, self.store.close())
+            .await
+            .is_err()
+        {
+            tracing::warn!(
+                "the store did not close in time; what it had yet to give back is found as after a crash"
+            );
+        }
         tracing::info!(
             duration_ms = signalled.elapsed().as_secs_f64() * 1e3,
             "shut down"

@@ -2,19 +2,25 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use futures_util::TryStreamExt as _;
 use noctule::config::Address;
 use noctule::job::{Event, Idempotency, Status, Submission};
 use noctule::store::jetstream::Settings;
 use noctule::store::{Store, StoreError};
+use tempfile::TempDir;
 
 use super::{open, open_as, turn};
+use crate::support::lives::{a_run_of, running};
 use crate::support::nats::{Cluster, NatsServer};
 use crate::support::patience::eventually;
 use crate::support::plans::{ending, history, kind, point, submission, until};
+use crate::support::process::Service;
 use crate::support::stores::node;
+
+/// As long as it takes until nothing heard from a server means that it is gone.
+const SILENCE: Duration = Duration::from_secs(13);
 
 /// Ask again until the store is sound.
 async fn until_sound(store: &dyn Store) {
@@ -84,8 +90,22 @@ async fn a_server_that_stops_answering_is_told_and_waited_for() {
     assert_eq!(store.claim().await.unwrap().plan.id, id);
 }
 
-/// As long as it takes until nothing heard from a server means that it is gone.
-const SILENCE: Duration = Duration::from_secs(13);
+#[tokio::test(flavor = "multi_thread")]
+async fn a_node_leaves_within_its_grace_though_no_server_answers() {
+    let server = NatsServer::start();
+    let directory = TempDir::new().unwrap();
+    let arguments = ["--store", &server.address(), "--grace", "4"];
+    let node = Service::start(directory.path(), &arguments);
+    let address = node.submit(&a_run_of(3_600_000)).await;
+    running(&node, &address).await;
+    server.pause();
+    let begun = Instant::now();
+    node.signal("TERM");
+    assert!(node.exit().await.success());
+    // One that asks the servers until they answer is still here then.
+    assert!(begun.elapsed() < 2 * SILENCE, "{:?}", begun.elapsed());
+    server.resume();
+}
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_server_that_was_silent_for_long_is_taken_up_again_without_news() {

@@ -30,6 +30,9 @@ pub enum StoreError {
     /// The idempotency key came with another body before.
     #[error("the idempotency key was used with another body")]
     KeyReused,
+    /// Another request with the idempotency key is being accepted, or broke off a moment ago.
+    #[error("another request with the idempotency key has not been answered")]
+    KeyInFlight,
     /// The plan ended, was deleted or was claimed by another worker.
     #[error("plan {0} is no longer this worker's to run")]
     LeaseLost(PlanId),

@@ -40,6 +40,7 @@ pub trait Store: Send + Sync + 'static {
     /// [`StoreError::QueueFull`] when as many plans are queued as the store was opened for,
     /// [`StoreError::QuotaReached`] when its owner has as many active plans as the submission allows,
     /// [`StoreError::KeyReused`] when its idempotency key came with another body,
+    /// [`StoreError::KeyInFlight`] when a request with the key has not been answered,
     /// [`StoreError::Gone`] when the plan of the first one was deleted.
     async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError>;
 

@@ -16,6 +16,7 @@ impl From<StoreError> for Problem {
             StoreError::NotFound(id) => Self::NoSuchPlan(id.to_string()),
             StoreError::Gone(tombstone) => Self::Gone(tombstone),
             StoreError::KeyReused => Self::IdempotencyKeyReused,
+            StoreError::KeyInFlight => Self::IdempotencyInFlight,
             StoreError::QuotaReached { active, quota } => Self::QuotaReached {
                 active,
                 quota,

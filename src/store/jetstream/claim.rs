@@ -13,7 +13,7 @@ use super::connect::plan_of;
 use super::lane::Version;
 use super::leases::Job;
 use super::orphans::Orphan;
-use super::record::{Record, State};
+use super::record::{Document, Record, State};
 use super::steps::Change;
 use super::view::Standing;
 use super::{JetStream, closed};
@@ -180,7 +180,8 @@ impl JetStream {
                     Orphan::Waits(pause) => answer(id, &job, AckKind::Nak(Some(pause))).await,
                     Orphan::Nobodys => {
                         tracing::info!(plan_id = %id, "a job that was never accepted is thrown away");
-                        self.servers.remove_documents(id, &[]).await?;
+                        let scenario = Document::scenario_key(id);
+                        self.servers.remove_documents(id, &[scenario]).await?;
                         answer(id, &job, AckKind::Ack).await;
                     }
                 }

@@ -14,10 +14,18 @@ use crate::store::StoreError;
 const LONGEST: usize = 512 << 10;
 
 impl Document {
+    pub(super) fn scenario_key(id: PlanId) -> String {
+        format!("{id}.scenario")
+    }
+
+    pub(super) fn result_key(id: PlanId, attempt: u64) -> String {
+        format!("{id}.result.{attempt}")
+    }
+
     /// Where the accepted scenario of a plan goes.
     pub(super) fn scenario(id: PlanId, text: &str) -> Self {
         Self {
-            key: format!("{id}.scenario"),
+            key: Self::scenario_key(id),
             large: text.len() > LONGEST,
         }
     }
@@ -25,7 +33,7 @@ impl Document {
     /// Where the result of a run goes; that of a late worker lies beside it, and nobody reads it.
     pub(super) fn result(id: PlanId, attempt: u64, text: &str) -> Self {
         Self {
-            key: format!("{id}.result.{attempt}"),
+            key: Self::result_key(id, attempt),
             large: text.len() > LONGEST,
         }
     }
@@ -81,11 +89,11 @@ impl Servers {
         String::from_utf8(bytes).map_err(|error| failed(&what(), &error))
     }
 
-    /// Remove all documents of a plan. `large` are those among the objects that may be there.
+    /// Remove all documents of a plan. `objects` are the keys of those that may be among the objects.
     pub(super) async fn remove_documents(
         &self,
         id: PlanId,
-        large: &[&Document],
+        objects: &[String],
     ) -> Result<(), StoreError> {
         let what = || format!("documents of plan {id}");
         let subjects = format!("{}{id}.>", self.documents.prefix);
@@ -95,8 +103,8 @@ impl Servers {
             .filter(subjects)
             .await
             .map_err(|error| failed(&what(), &error))?;
-        for document in large.iter().filter(|document| document.large) {
-            match self.objects.delete(&document.key).await {
+        for key in objects {
+            match self.objects.delete(key).await {
                 Err(error) if error.kind() != DeleteErrorKind::NotFound => {
                     return Err(failed(&what(), &error));
                 }

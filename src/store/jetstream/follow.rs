@@ -137,7 +137,6 @@ impl JetStream {
     pub(super) async fn read_history(&self, id: PlanId) -> Result<History, StoreError> {
         let what = format!("events of plan {id}");
         let subject = self.servers.subject_of(id);
-        let steps_kept = self.view.known().histories.steps_kept();
         let mut history = History::whole();
         let (is_empty, mut messages) = self.read_steps(&what, subject, DeliverPolicy::All).await?;
         if is_empty {
@@ -151,7 +150,7 @@ impl JetStream {
                 .pending;
             let step = Step::read(&message.payload)?;
             if matches!(*step.state, State::Kept(_)) {
-                history.push(&step, steps_kept);
+                history.push(&step, self.options.events_kept);
             }
             if pending == 0 {
                 break;

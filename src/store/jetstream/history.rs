@@ -51,7 +51,7 @@ impl History {
     }
 
     /// Add a step; false when there is a hole before it.
-    pub(super) fn push(&mut self, step: &Step, steps_kept: usize) -> bool {
+    pub(super) fn push(&mut self, step: &Step, events_kept: u64) -> bool {
         let State::Kept(record) = &*step.state else {
             return true;
         };
@@ -80,7 +80,9 @@ impl History {
             events: events.into(),
             bytes,
         });
-        while self.batches.len() > steps_kept {
+        let last = self.last();
+        let is_spare = |oldest: &Batch| last - oldest.last >= events_kept;
+        while self.batches.front().is_some_and(is_spare) {
             self.forget_one();
         }
         true
@@ -137,23 +139,19 @@ pub(super) struct Histories {
     by_touch: BTreeMap<u64, PlanId>,
     touches: u64,
     bytes: usize,
-    steps_kept: usize,
+    events_kept: u64,
 }
 
 impl Histories {
-    /// Of each plan the stream keeps `steps_kept` steps.
-    pub(super) fn new(steps_kept: usize) -> Self {
+    /// Of each plan that has them the newest `events_kept` are kept, in whole steps.
+    pub(super) fn new(events_kept: u64) -> Self {
         Self {
             plans: HashMap::new(),
             by_touch: BTreeMap::new(),
             touches: 0,
             bytes: 0,
-            steps_kept,
+            events_kept,
         }
-    }
-
-    pub(super) fn steps_kept(&self) -> usize {
-        self.steps_kept
     }
 
     /// A step has come. Of plans whose beginning was not seen nothing is kept.
@@ -163,7 +161,7 @@ impl Histories {
         let Some(mut history) = known.or_else(|| begins.then(History::whole)) else {
             return;
         };
-        if history.push(step, self.steps_kept) {
+        if history.push(step, self.events_kept) {
             self.put(id, history);
         }
     }
@@ -247,11 +245,11 @@ mod tests {
 
     #[test]
     fn pages_are_whole_from_any_place_and_say_what_is_forgotten() {
-        let mut histories = Histories::new(4);
+        let mut histories = Histories::new(6);
         for step in steps(10) {
             histories.push(Uuid::nil(), &step);
         }
-        // Fifteen events; the last four steps have six.
+        // Fifteen events; the last four steps have six of them.
         let page = histories.page(Uuid::nil(), 0, 100).expect("it began here");
         assert_eq!(page.forgotten, 9);
         let ids: Vec<_> = page.events.iter().map(|event| event.id).collect();
@@ -269,7 +267,7 @@ mod tests {
     #[test]
     fn a_history_with_a_hole_is_not_kept_and_one_without_a_beginning_not_begun() {
         let steps = steps(6);
-        let mut histories = Histories::new(usize::MAX);
+        let mut histories = Histories::new(u64::MAX);
         histories.push(Uuid::nil(), &steps[2]);
         assert_eq!(histories.page(Uuid::nil(), 0, 100), None);
         for nth in [0, 1, 1, 0, 2] {
@@ -284,17 +282,17 @@ mod tests {
     #[test]
     fn a_history_that_was_read_before_the_last_step_came_is_not_kept() {
         let (id, steps) = (Uuid::nil(), steps(3));
-        let mut known = Known::new(usize::MAX);
+        let mut known = Known::new(u64::MAX);
         for (sequence, step) in (1..).zip(steps.clone()) {
             known.stand(id, &Placed { sequence, step });
         }
         let mut read = History::whole();
         for step in &steps[..2] {
-            read.push(step, usize::MAX);
+            read.push(step, u64::MAX);
         }
         known.keep_history(id, read.clone());
         assert_eq!(known.histories.page(id, 0, 100), None);
-        read.push(&steps[2], usize::MAX);
+        read.push(&steps[2], u64::MAX);
         known.keep_history(id, read);
         let page = known.histories.page(id, 0, 100).expect("it is whole");
         assert_eq!(page.events.len(), 4);
@@ -302,7 +300,7 @@ mod tests {
 
     #[test]
     fn what_nobody_reads_makes_room() {
-        let mut histories = Histories::new(usize::MAX);
+        let mut histories = Histories::new(u64::MAX);
         let step = &steps(1)[0];
         let count = ROOM / (2 * SMALL_EVENT) + 10;
         for nth in 0..count as u128 {

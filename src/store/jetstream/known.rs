@@ -37,10 +37,10 @@ pub(super) struct Known {
 }
 
 impl Known {
-    pub(super) fn new(steps_kept: usize) -> Self {
+    pub(super) fn new(events_kept: u64) -> Self {
         Self {
             plans: BTreeMap::new(),
-            histories: Histories::new(steps_kept),
+            histories: Histories::new(events_kept),
             queue: BTreeSet::new(),
             lanes: HashMap::new(),
             running: HashMap::new(),
@@ -124,7 +124,7 @@ impl Known {
         let (id, plan) = (record.id(), &record.plan);
         let ended_ms = plan.finished_ms.unwrap_or_default();
         self.ended.insert((ended_ms, id));
-        self.ended_bytes += record.bytes;
+        self.ended_bytes += record.size();
         self.expiring.extend(plan.expires_ms.map(|at| (at, id)));
         let hook = record.webhook.as_ref();
         self.due
@@ -161,7 +161,7 @@ impl Known {
         if plan.status.is_final() {
             self.ended
                 .remove(&(plan.finished_ms.unwrap_or_default(), id));
-            self.ended_bytes -= record.bytes;
+            self.ended_bytes -= record.size();
             if let Some(at) = plan.expires_ms {
                 self.expiring.remove(&(at, id));
             }
@@ -207,14 +207,37 @@ impl Known {
             query.status.is_none_or(|status| plan.status == status)
                 && (query.owner.is_none() || plan.owner == query.owner)
         };
-        let older = self.plans.iter().rev();
-        let older = older.skip_while(|(id, _)| query.before.is_some_and(|before| **id >= before));
-        older
+        let older = match query.before {
+            Some(before) => self.plans.range(..before),
+            None => self.plans.range(..),
+        };
+        let mut plans: Vec<Plan> = older
+            .rev()
             .filter_map(|(id, _)| self.kept(*id))
             .filter(|record| wanted(&record.plan))
             .take(query.limit)
-            .map(|record| self.shown(record))
-            .collect()
+            .map(|record| record.plan.clone())
+            .collect();
+        self.place_in_queue(&mut plans);
+        plans
+    }
+
+    /// Tell each its place in the queue; the queue is walked once for all of them.
+    fn place_in_queue(&self, plans: &mut [Plan]) {
+        let queued = |plan: &&mut Plan| plan.status == Status::Queued;
+        let mut waiting: HashMap<PlanId, &mut Option<u64>> = plans
+            .iter_mut()
+            .filter(queued)
+            .map(|plan| (plan.id, &mut plan.queue_position))
+            .collect();
+        for ((_, id), position) in self.queue.iter().zip(1..) {
+            if waiting.is_empty() {
+                return;
+            }
+            if let Some(place) = waiting.remove(id) {
+                *place = Some(position);
+            }
+        }
     }
 
     pub(super) fn stats(&self) -> Stats {
@@ -333,7 +356,7 @@ impl Known {
         let expired = self.expiring.range(..=(now_ms, PlanId::max()));
         let mut going: Vec<_> = expired.map(|(_, id)| *id).take(at_most).collect();
         let known: BTreeSet<_> = going.iter().copied().collect();
-        let bytes_of = |id| self.kept(id).map_or(0, |record| record.bytes);
+        let bytes_of = |id| self.kept(id).map_or(0, Record::size);
         let mut left = (self.ended.len() - known.len()) as u64;
         let mut left_bytes = self.ended_bytes - known.iter().copied().map(bytes_of).sum::<u64>();
         for (_, id) in self.ended.iter().filter(|(_, id)| !known.contains(id)) {
@@ -349,7 +372,7 @@ impl Known {
     }
 
     /// Tombstones whose time is over.
-    pub(super) fn mouldered(&self, now_ms: i64, at_most: usize) -> Vec<PlanId> {
+    pub(super) fn expired_tombstones(&self, now_ms: i64, at_most: usize) -> Vec<PlanId> {
         let until = (now_ms.saturating_sub(TOMBSTONE_MS), PlanId::max());
         let graves = self.graves.range(..=until).take(at_most);
         graves.map(|(_, id)| *id).collect()

@@ -10,6 +10,7 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
 use super::record::State;
+use super::told::Told;
 use crate::job::PlanId;
 
 /// Says so as many times within the time after which the job would be given to another.
@@ -27,6 +28,7 @@ struct Held {
     renewing: JoinHandle<()>,
     /// Steps that have been appended, as far as the worker knows.
     appended: u64,
+    told: Told,
 }
 
 /// The delivery by which the job is held.
@@ -53,6 +55,7 @@ impl Leases {
             job,
             renewing: tokio::spawn(renew(id, jobs, ack_wait / RENEWALS)),
             appended: 0,
+            told: Told::default(),
         };
         if let Some(before) = self.held().insert(id, held) {
             before.renewing.abort();
@@ -99,6 +102,18 @@ impl Leases {
         {
             held.appended = number;
         }
+    }
+
+    /// Look at, or write down, what a run has told; `None` when it is not held here.
+    pub(super) fn told<T>(
+        &self,
+        id: PlanId,
+        attempt: u64,
+        look: impl FnOnce(&mut Told) -> T,
+    ) -> Option<T> {
+        let mut all = self.held();
+        let held = all.get_mut(&id).filter(|held| held.attempt == attempt)?;
+        Some(look(&mut held.told))
     }
 
     /// Let go of a run; its job, if it was held.

@@ -25,6 +25,7 @@ mod settings;
 mod shelf;
 mod steps;
 mod submit;
+mod told;
 mod trouble;
 mod turns;
 mod view;
@@ -116,10 +117,9 @@ impl JetStreamStore {
     /// or when it cannot keep as many replicas as asked.
     pub async fn open(settings: Settings, options: Options) -> Result<Self, StoreError> {
         let servers = Box::pin(Servers::open(&settings, &options)).await?;
-        let steps_kept = usize::try_from(options.events_kept).unwrap_or(usize::MAX);
         let store = Arc::new(JetStream {
             servers,
-            view: View::new(steps_kept),
+            view: View::new(options.events_kept),
             leases: Leases::default(),
             all_slots: AtomicUsize::new(settings.slots),
             settings,

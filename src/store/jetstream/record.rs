@@ -54,8 +54,11 @@ pub(super) struct Record {
     pub(super) appended: u64,
     /// Id of the newest event.
     pub(super) last_event: u64,
-    /// Of its documents and events.
+    /// Of its documents.
     pub(super) bytes: u64,
+    /// Of its events that are kept.
+    #[serde(default)]
+    pub(super) event_bytes: u64,
     pub(super) scenario: Document,
     pub(super) result: Option<Document>,
     pub(super) dataset: Option<String>,
@@ -94,6 +97,9 @@ pub(super) struct Grave {
     pub(super) owner: Option<Owner>,
     pub(super) expired: bool,
     pub(super) deleted_ms: i64,
+    /// See [`Record::objects`].
+    #[serde(default)]
+    pub(super) objects: Vec<String>,
 }
 
 impl Record {
@@ -108,6 +114,7 @@ impl Record {
             appended: 0,
             last_event: 0,
             bytes: submission.scenario.len() as u64,
+            event_bytes: 0,
             scenario,
             result: None,
             dataset: submission.dataset.clone(),
@@ -121,6 +128,28 @@ impl Record {
 
     pub(super) fn id(&self) -> PlanId {
         self.plan.id
+    }
+
+    /// Keys of its documents that are among the objects, or may be: what a run that was superseded, or ended
+    /// without a result, wrote is told of nowhere.
+    pub(super) fn objects(&self) -> Vec<String> {
+        let known = [Some(&self.scenario), self.result.as_ref()];
+        let known = known.into_iter().flatten();
+        let (large, small): (Vec<_>, Vec<_>) = known.partition(|document| document.large);
+        let results = (1..=self.attempt).map(|attempt| Document::result_key(self.id(), attempt));
+        let mut objects: Vec<_> = large
+            .into_iter()
+            .map(|document| document.key.clone())
+            .collect();
+        let is_known = |key: &String| small.iter().any(|document| document.key == *key);
+        objects.extend(results.filter(|key| !is_known(key)));
+        objects.dedup();
+        objects
+    }
+
+    /// What it takes up on the servers, about: documents and events.
+    pub(super) fn size(&self) -> u64 {
+        self.bytes + self.event_bytes
     }
 
     /// The event of its status.
@@ -161,6 +190,7 @@ impl Step {
         } = change;
         if let State::Kept(record) = &mut state {
             record.last_event += count(events.len(), told, &record.plan);
+            record.event_bytes += length(&events);
         }
         Self {
             mark: Uuid::new_v4(),
@@ -207,6 +237,25 @@ impl Step {
 /// Events of a step that tells so many before the plan as it leaves it, and perhaps this.
 fn count(before: usize, told: bool, plan: &Plan) -> u64 {
     before as u64 + u64::from(told) + u64::from(told && plan.status.is_final())
+}
+
+/// Bytes of events, as a step holds them.
+pub(super) fn length(events: &[Event]) -> u64 {
+    struct Count(u64);
+    impl std::io::Write for Count {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.0 += bytes.len() as u64;
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+    let mut count = Count(0);
+    // What cannot be written makes no step either, and is told there.
+    let _ = serde_json::to_writer(&mut count, events);
+    count.0
 }
 
 /// A state is read and written as if it were not shared.

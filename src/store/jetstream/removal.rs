@@ -1,7 +1,7 @@
 //! Plans that are removed, and what remains of them.
 
 use super::JetStream;
-use super::record::{Document, Grave, State};
+use super::record::{Grave, State};
 use super::steps::Change;
 use super::trouble::failed;
 use crate::job::PlanId;
@@ -17,37 +17,46 @@ impl JetStream {
 
     /// Remove a plan and all that belongs to it, except its tombstone.
     async fn bury(&self, id: PlanId, now_ms: i64, expired: bool) -> Result<(), StoreError> {
-        let mut remains: Option<(u64, Vec<Document>)> = None;
+        let mut remains: Option<(u64, Vec<String>)> = None;
         let standing = self
             .plans()
             .change(id, |standing| {
                 let record = standing.record(id, now_ms)?;
-                let documents = [Some(&record.scenario), record.result.as_ref()];
-                remains = Some((
-                    record.place,
-                    documents.into_iter().flatten().cloned().collect(),
-                ));
+                let objects = record.objects();
+                remains = Some((record.place, objects.clone()));
                 let grave = Grave {
                     owner: record.plan.owner.clone(),
                     expired,
                     deleted_ms: now_ms,
+                    objects,
                 };
                 Ok(Some(Change::silent(State::Buried(grave))))
             })
             .await?;
-        if let Some((place, documents)) = remains {
+        if let Some((place, objects)) = remains {
             self.withdraw(id, place).await;
-            self.servers
-                .remove_documents(id, &documents.iter().collect::<Vec<_>>())
-                .await?;
+            self.servers.remove_documents(id, &objects).await?;
         }
-        let earlier = self
-            .servers
-            .plans
-            .purge()
-            .filter(self.servers.subject_of(id));
-        let purged = earlier.sequence(standing.sequence).await;
+        // Last: where steps are still there, documents may be, too.
+        let steps = self.servers.plans.purge();
+        let steps = steps.filter(self.servers.subject_of(id));
+        let purged = steps.sequence(standing.sequence).await;
         purged.map_err(|error| failed(&format!("steps of plan {id}"), &error))?;
+        Ok(())
+    }
+
+    /// Remove a tombstone, and what a removal that broke off has left.
+    async fn forget_tombstone(&self, id: PlanId) -> Result<(), StoreError> {
+        let steps = self.servers.plans.purge();
+        let purged = steps.filter(self.servers.subject_of(id)).await;
+        let purged = purged.map_err(|error| failed(&format!("tombstone of plan {id}"), &error))?;
+        if let Some(standing) = self.view.standing(id)
+            && let State::Buried(grave) = &*standing.state
+            && purged.purged > 1
+        {
+            self.servers.remove_documents(id, &grave.objects).await?;
+        }
+        self.view.forget(id);
         Ok(())
     }
 
@@ -62,25 +71,17 @@ impl JetStream {
 
     pub(super) async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError> {
         let retention = self.options.retention;
-        let (mouldered, going) = {
+        let (expired_tombstones, going) = {
             let known = self.view.known();
             let plans = retention.plans.unwrap_or(u64::MAX);
             let bytes = retention.bytes.unwrap_or(u64::MAX);
             (
-                known.mouldered(now_ms, SWEEP),
+                known.expired_tombstones(now_ms, SWEEP),
                 known.removable(now_ms, plans, bytes, SWEEP),
             )
         };
-        for id in mouldered {
-            let steps = self
-                .servers
-                .plans
-                .purge()
-                .filter(self.servers.subject_of(id));
-            steps
-                .await
-                .map_err(|error| failed(&format!("tombstone of plan {id}"), &error))?;
-            self.view.forget(id);
+        for id in expired_tombstones {
+            self.forget_tombstone(id).await?;
         }
         let mut removed = 0;
         for id in going {

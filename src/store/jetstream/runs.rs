@@ -5,8 +5,9 @@ use async_nats::jetstream::AckKind;
 use super::JetStream;
 use super::claim::answer;
 use super::history::bytes_of;
-use super::record::{Document, Record, State};
+use super::record::{Document, Record, State, length};
 use super::steps::Change;
+use super::told::{Appended, Told};
 use super::view::Standing;
 use crate::job::{Event, Plan, PlanId, Status};
 use crate::store::{End, Ending, StoreError};
@@ -54,8 +55,27 @@ impl JetStream {
         for part in parts {
             number += 1;
             self.append_part(id, attempt, number, part).await?;
+            self.forget_old_events(id, attempt).await;
         }
         Ok(number)
+    }
+
+    /// Of a run that tells much, the servers keep the newest. Tried again at the next step when it fails.
+    async fn forget_old_events(&self, id: PlanId, attempt: u64) {
+        let kept = self.options.events_kept;
+        let excess = |told: &mut Told| told.excess(kept);
+        let Some(Some(first)) = self.leases.told(id, attempt, excess) else {
+            return;
+        };
+        let purge = self.servers.plans.purge();
+        let older = purge.filter(self.servers.subject_of(id)).sequence(first);
+        match older.await {
+            Ok(_) => {
+                let forget = |told: &mut Told| told.forget_before(first);
+                self.leases.told(id, attempt, forget);
+            }
+            Err(error) => tracing::debug!(%error, plan_id = %id, "old events are kept for now"),
+        }
     }
 
     async fn append_part(
@@ -65,6 +85,8 @@ impl JetStream {
         number: u64,
         events: &[Event],
     ) -> Result<(), StoreError> {
+        let left = self.leases.told(id, attempt, |told| told.bytes_left());
+        let left = left.flatten();
         let appended = self
             .plans()
             .change(id, |standing| {
@@ -75,6 +97,9 @@ impl JetStream {
                 }
                 let mut record = Box::new(record.clone());
                 record.appended = number;
+                if let Some(left) = left {
+                    record.event_bytes = left;
+                }
                 record.plan.advance(events);
                 Ok(Some(Change {
                     events: events.to_vec(),
@@ -82,7 +107,14 @@ impl JetStream {
                 }))
             })
             .await;
-        appended.map(drop).map_err(|error| lost(error, id))
+        let standing = appended.map_err(|error| lost(error, id))?;
+        let step = Appended {
+            sequence: standing.sequence,
+            events: events.len() as u64,
+            bytes: length(events),
+        };
+        self.leases.told(id, attempt, |told| told.push(step));
+        Ok(())
     }
 
     pub(super) async fn finish(

@@ -11,7 +11,7 @@ use async_nats::jetstream::kv::{CreateErrorKind, Entry, Operation};
 use async_nats::jetstream::message::PublishMessage;
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};
-use tokio::time::Instant;
+use tokio::time::{Instant, timeout};
 
 use super::JetStream;
 use super::lane::Lane;
@@ -22,8 +22,15 @@ use crate::export::sha256_hex;
 use crate::job::{Idempotency, Owner, Plan, PlanId, Submission};
 use crate::store::{IDEMPOTENCY_MS, StoreError, Submitted};
 
-/// A first submission that has not ended after so long is taken to be broken off.
+/// How long a request waits for an earlier one with the same idempotency key.
 const PATIENCE: Duration = Duration::from_secs(10);
+
+/// How long a submission with an idempotency key may last; nothing of it is written later.
+const LONGEST: Duration = Duration::from_secs(30);
+
+/// An earlier request that is older, and whose plan is not there, broke off. The clocks of two nodes may differ by as
+/// much as this is longer than [`LONGEST`].
+const BROKEN_OFF_MS: i64 = 60_000;
 
 /// Which submission came first with a key.
 #[derive(Debug, Serialize, Deserialize)]
@@ -34,12 +41,12 @@ struct First {
 }
 
 impl First {
-    /// The plan of the first submission, unless that was too long ago.
+    /// The first submission, unless that was too long ago.
     fn read(
         entry: &Entry,
         idempotency: &Idempotency,
         now_ms: i64,
-    ) -> Result<Option<PlanId>, StoreError> {
+    ) -> Result<Option<Self>, StoreError> {
         let first: Self = serde_json::from_slice(&entry.value).map_err(|error| unread(&error))?;
         if first.seen_ms <= now_ms.saturating_sub(IDEMPOTENCY_MS) {
             return Ok(None);
@@ -47,7 +54,7 @@ impl First {
         if first.body_sha256 != idempotency.body_sha256 {
             return Err(StoreError::KeyReused);
         }
-        Ok(Some(first.plan))
+        Ok(Some(first))
     }
 }
 
@@ -75,7 +82,7 @@ impl JetStream {
         let Some(first) = First::read(&entry, idempotency, now_ms)? else {
             return Ok(None);
         };
-        match self.get(first).await {
+        match self.get(first.plan).await {
             // It was never accepted, or not yet.
             Err(StoreError::NotFound(_)) => Ok(None),
             found => found.map(Some),
@@ -84,11 +91,22 @@ impl JetStream {
 
     pub(super) async fn submit(&self, submission: &Submission) -> Result<Submitted, StoreError> {
         let Some(idempotency) = &submission.idempotency else {
-            return self.accept(submission).await.map(|plan| Submitted {
-                plan,
-                replayed: false,
-            });
+            let accepted = self.accept(submission).await;
+            return accepted.map(newly).map_err(|not| not.error);
         };
+        let submitted = self.submit_once(submission, idempotency);
+        timeout(LONGEST, submitted).await.unwrap_or_else(|_| {
+            Err(StoreError::unavailable(
+                "the servers were too slow to accept a plan",
+            ))
+        })
+    }
+
+    async fn submit_once(
+        &self,
+        submission: &Submission,
+        idempotency: &Idempotency,
+    ) -> Result<Submitted, StoreError> {
         let key = key_of(submission.owner.as_ref(), idempotency);
         let revision = match self.be_first(&key, submission, idempotency).await? {
             Turn::First { revision } => revision,
@@ -100,13 +118,10 @@ impl JetStream {
             }
         };
         match self.accept(submission).await {
-            Ok(plan) => Ok(Submitted {
-                plan,
-                replayed: false,
-            }),
-            Err(error) => {
-                // Whether it was accepted may be open; then the key must stand for it.
-                if !matches!(error, StoreError::Unavailable { .. }) {
+            Ok(plan) => Ok(newly(plan)),
+            Err(NotAccepted { error, is_certain }) => {
+                // Where that is open the key must stand for it.
+                if is_certain {
                     let undone = self
                         .servers
                         .keys
@@ -121,10 +136,11 @@ impl JetStream {
         }
     }
 
-    async fn accept(&self, submission: &Submission) -> Result<Plan, StoreError> {
+    async fn accept(&self, submission: &Submission) -> Result<Plan, NotAccepted> {
         let lane = Lane::of(submission);
         let limit = self.options.queue_limit;
-        let position = self.view.known().expect(limit, submission.quota, &lane)?;
+        let room = self.view.known().expect(limit, submission.quota, &lane);
+        let position = room.map_err(NotAccepted::certainly)?;
         let accepted = self.write_all(submission, &lane, position).await;
         self.view.known().arrived(&lane);
         accepted
@@ -135,7 +151,7 @@ impl JetStream {
         submission: &Submission,
         lane: &Lane,
         position: u64,
-    ) -> Result<Plan, StoreError> {
+    ) -> Result<Plan, NotAccepted> {
         let id = submission.id;
         let scenario = Document::scenario(id, &submission.scenario);
         let (document, job) = tokio::join!(
@@ -146,15 +162,18 @@ impl JetStream {
             Ok(place) => place,
             Err(error) => {
                 // What remains of it is thrown away with its job.
-                let _ = self.servers.remove_documents(id, &[&scenario]).await;
-                return Err(error);
+                let _ = self.servers.remove_documents(id, &[scenario.key]).await;
+                return Err(NotAccepted::certainly(error));
             }
         };
         let record = Record::accepted(submission, Queued { place, position }, scenario);
         let plan = record.plan.clone();
         let change = Change::told(Box::new(record));
-        self.plans().begin(id, change).await?;
-        Ok(plan)
+        let begun = self.plans().begin(id, change).await;
+        begun.map(|()| plan).map_err(|error| NotAccepted {
+            is_certain: !matches!(error, StoreError::Unavailable { .. }),
+            error,
+        })
     }
 
     /// Its place in the queue's stream. A job that is written twice, since no answer came, is there once: the
@@ -234,16 +253,19 @@ impl JetStream {
                 continue;
             };
             if let Some(first) = First::read(&entry, idempotency, now_ms)? {
-                if first == submission.id {
+                if first.plan == submission.id {
                     // Taken before, when no answer came.
                     let revision = entry.revision;
                     return Ok(Turn::First { revision });
                 }
-                match self.get(first).await {
+                match self.get(first.plan).await {
                     Ok(plan) => return Ok(Turn::Later(Box::new(plan))),
                     Err(StoreError::NotFound(_)) if Instant::now() < until => {
                         tokio::time::sleep(Duration::from_millis(10)).await;
                         continue;
+                    }
+                    Err(StoreError::NotFound(_)) if now_ms - first.seen_ms < BROKEN_OFF_MS => {
+                        return Err(StoreError::KeyInFlight);
                     }
                     Err(StoreError::NotFound(_)) => {}
                     Err(error) => return Err(error),
@@ -258,12 +280,35 @@ impl JetStream {
     }
 }
 
+/// Why a plan was not accepted, as far as is known.
+struct NotAccepted {
+    error: StoreError,
+    /// False when it may have been, and only the answer was lost.
+    is_certain: bool,
+}
+
+impl NotAccepted {
+    fn certainly(error: StoreError) -> Self {
+        Self {
+            error,
+            is_certain: true,
+        }
+    }
+}
+
 enum Turn {
     First {
         /// Of the key.
         revision: u64,
     },
     Later(Box<Plan>),
+}
+
+fn newly(plan: Plan) -> Submitted {
+    Submitted {
+        plan,
+        replayed: false,
+    }
 }
 
 /// Callers choose keys freely; a bucket does not take all of them.

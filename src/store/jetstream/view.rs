@@ -27,9 +27,9 @@ pub(super) struct Standing {
 }
 
 impl View {
-    pub(super) fn new(steps_kept: usize) -> Self {
+    pub(super) fn new(events_kept: u64) -> Self {
         Self {
-            known: Mutex::new(Known::new(steps_kept)),
+            known: Mutex::new(Known::new(events_kept)),
             waiting: watch::Sender::new(0),
             changes: Changes::default(),
         }

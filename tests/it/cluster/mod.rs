@@ -5,6 +5,7 @@ mod nodes;
 mod outages;
 mod partition;
 mod processes;
+mod remains;
 mod servers;
 
 use std::ops::Deref;

@@ -127,6 +127,47 @@ async fn of_too_many_bytes_the_longest_ended_go() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn events_are_bytes_too_as_long_as_they_are_kept() {
+    const LIMIT: u64 = 20_000;
+    on_every_backend(10, async |store| {
+        store.retention.bytes = Some(LIMIT);
+        for (events_kept, is_kept) in [(u64::MAX, false), (50, true)] {
+            store.events_kept = events_kept;
+            store.reopen().await;
+            let id = store.submit(submission()).await.unwrap().plan.id;
+            let lease = store.claim().await.unwrap();
+            for iteration in 0..1_000 {
+                let told = vec![incumbent(iteration, 0.5)];
+                store.append(&lease, told).await.unwrap();
+            }
+            let now_ms = store.now_ms();
+            store.finish(&lease, failure().at(now_ms)).await.unwrap();
+            store.sweep(now_ms).await.unwrap();
+            assert_eq!(kept(&**store, &[id]).await, [is_kept], "{events_kept}");
+        }
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn of_steps_that_tell_much_the_newest_events_are_kept() {
+    on_every_backend(10, async |store| {
+        store.events_kept = 100;
+        store.reopen().await;
+        let id = store.submit(submission()).await.unwrap().plan.id;
+        let lease = store.claim().await.unwrap();
+        for step in 0..20 {
+            let told = (0..40).map(|nth| point(40 * step + nth, None)).collect();
+            store.append(&lease, told).await.unwrap();
+        }
+        store.lose().await;
+        let told = history(&**store, id).await.len();
+        assert!((100..=200).contains(&told), "{told}");
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_sweep_is_short_and_goes_on_at_the_next() {
     on_every_backend(10, async |store| {
         store.retention = Retention {

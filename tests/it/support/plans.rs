@@ -97,6 +97,7 @@ pub(crate) fn kind<T>(result: Result<T, StoreError>) -> Result<(), &'static str>
         StoreError::QueueFull { .. } => "queue full",
         StoreError::QuotaReached { .. } => "quota reached",
         StoreError::KeyReused => "key reused",
+        StoreError::KeyInFlight => "key in flight",
         StoreError::LeaseLost(_) => "lease lost",
         StoreError::InUse(_) => "in use",
         StoreError::Unavailable { .. } => "unavailable",

@@ -1,0 +1,99 @@
+//! What a run has told so far, step by step, so that the oldest can be forgotten when there is too much of it.
+
+use std::collections::VecDeque;
+
+/// A step that a run appended.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Appended {
+    /// Its place in the plans' stream.
+    pub(super) sequence: u64,
+    pub(super) events: u64,
+    pub(super) bytes: u64,
+}
+
+/// The steps of a run that are still kept.
+#[derive(Debug, Default)]
+pub(super) struct Told {
+    steps: VecDeque<Appended>,
+    events: u64,
+    bytes: u64,
+    /// Whether some have been forgotten: with them goes all that earlier runs of the plan told.
+    has_forgotten: bool,
+}
+
+impl Told {
+    pub(super) fn push(&mut self, step: Appended) {
+        self.events += step.events;
+        self.bytes += step.bytes;
+        self.steps.push_back(step);
+    }
+
+    /// Where what is to be kept begins, when there is half as much again as `events_kept`: so that most steps make
+    /// the servers forget nothing.
+    pub(super) fn excess(&self, events_kept: u64) -> Option<u64> {
+        if self.events <= events_kept.saturating_add(events_kept / 2) {
+            return None;
+        }
+        let mut left = self.events;
+        let spare = self.steps.iter().take_while(|step| {
+            left -= step.events;
+            left >= events_kept
+        });
+        let first = spare.count();
+        let first = self.steps.get(first).filter(|_| first > 0)?;
+        Some(first.sequence)
+    }
+
+    /// What stood before that place is kept no longer.
+    pub(super) fn forget_before(&mut self, sequence: u64) {
+        self.has_forgotten = true;
+        let spare = self.steps.partition_point(|step| step.sequence < sequence);
+        for step in self.steps.drain(..spare) {
+            self.events -= step.events;
+            self.bytes -= step.bytes;
+        }
+    }
+
+    /// Bytes of all events that are kept of the plan, where they are no longer the sum of what was written.
+    pub(super) fn bytes_left(&self) -> Option<u64> {
+        self.has_forgotten.then_some(self.bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_newest_events_are_kept_in_whole_steps() {
+        let mut told = Told::default();
+        for sequence in 1..=7 {
+            assert_eq!(told.excess(20), None);
+            told.push(Appended {
+                sequence: 10 * sequence,
+                events: 4,
+                bytes: 100,
+            });
+        }
+        assert_eq!((told.excess(20), told.bytes_left()), (None, None));
+        told.push(Appended {
+            sequence: 80,
+            events: 4,
+            bytes: 100,
+        });
+        assert_eq!(told.excess(20), Some(40));
+        told.forget_before(40);
+        assert_eq!((told.events, told.bytes_left()), (20, Some(500)));
+        assert_eq!(told.excess(20), None);
+        // One that is too long by itself is kept whole.
+        told.push(Appended {
+            sequence: 90,
+            events: 256,
+            bytes: 6_400,
+        });
+        assert_eq!(told.excess(20), Some(90));
+        told.forget_before(90);
+        assert_eq!((told.events, told.bytes_left()), (256, Some(6_400)));
+        assert_eq!(told.excess(20), None);
+    }
+}

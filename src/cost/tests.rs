@@ -154,6 +154,32 @@ fn five_samples_a_leg() {
     );
 }
 
+/// A leg that ends at a base is in the threat there, one that ends at a top is not, whatever rounding makes of its middle.
+#[test]
+fn a_sample_at_the_end_of_a_leg_is_where_it_ends() {
+    let mut scenario = scenario();
+    let heights = (0..200).map(|nth| 20.0 + 0.37 * f64::from(nth));
+    for (from, to) in heights.clone().zip(heights.rev()) {
+        for (base, top, share) in [(Some(to), None, 0.2), (None, Some(to), 0.0)] {
+            let threat = &mut scenario.threats[0];
+            (threat.base, threat.top) = (base, top);
+            // Nearer than the soft zone at the end alone.
+            let leg = route(&[[0.0, 0.0, from], [35.0, 0.0, to]]);
+            let climbs_to_base = base.is_some() && from < to;
+            let descends_to_top = top.is_some() && from > to;
+            if climbs_to_base || descends_to_top {
+                let figures = Model::new(&scenario).figures(&leg, Quadrature::Paper);
+                let length = (leg[1] - leg[0]).norm();
+                let exposure = share * 5.0 * length * 3.0 / 5.0;
+                assert!(
+                    (figures.threat - exposure).abs() < 1e-9 * length,
+                    "{from} {to}"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn each_constraint_is_measured() {
     use Constraint::{Altitude, Area, Climb, Leg, Terrain, Threat, Turn};

@@ -87,6 +87,8 @@ impl Model<'_> {
 
 /// The integral of Eq. 4 as printed: the mean of five samples times the leg's length.
 pub(super) fn sampled_exposure(threat: &Threat, leg: &Segment) -> f64 {
-    let sum: f64 = SAMPLES.iter().map(|&t| threat.intensity(leg.at(t))).sum();
+    // The last is where the leg ends, to the last digit: at a base or top as a rule.
+    let sample = |&t: &f64| if t < 1.0 { leg.at(t) } else { leg.b };
+    let sum: f64 = SAMPLES.iter().map(|t| threat.intensity(sample(t))).sum();
     sum / SAMPLES.len() as f64 * leg.length()
 }

@@ -181,10 +181,10 @@ fn measured(
     let cost = model.figures(&route, quadrature);
     let violations = certificate::violations(model, &route);
     let feasible = violations.is_empty();
-    if let Some(last) = convergence.last_mut().filter(|_| feasible) {
+    if let Some(last) = convergence.last_mut() {
         // The search aims at half the tolerance; what is delivered counts by the whole.
-        last.best_cost = Some(cost.total);
-        last.best_violation = 0.0;
+        last.best_cost = feasible.then_some(cost.total);
+        last.best_violation = violations.iter().map(|violation| violation.amount).sum();
     }
     let path = feasible.then(|| smoothing::smooth(model, &route)).flatten();
     Outcome {

@@ -380,6 +380,11 @@ fn an_impossible_scenario_ends_with_its_violations() {
             .any(|violation| violation.kind == "threat")
     );
     assert_eq!(outcome.bound.gap, None);
+    let last = outcome.convergence.last().expect("there is a curve");
+    let amounts = outcome.violations.iter().map(|violation| violation.amount);
+    assert_eq!(last.best_cost, None);
+    let sum: f64 = amounts.sum();
+    assert_eq!(last.best_violation.to_bits(), sum.to_bits());
 }
 
 #[test]

@@ -213,7 +213,11 @@ impl Disc {
     fn sampled_exposure<S: Simd>(&self, leg: &Leg<S>, sight: &Sight<S>) -> Lane<S> {
         let mut sum = leg.splat(0.0);
         for t in SAMPLES {
-            let z = leg.a.z + leg.dz * t;
+            let z = if t < 1.0 {
+                leg.a.z + leg.dz * t
+            } else {
+                leg.b.z
+            };
             let reached = leg.splat(self.span.base).le(z) & z.lt(leg.splat(self.span.top));
             sum = sum + reached.keep(self.intensity(sight, leg.splat(t)));
         }

@@ -12,7 +12,7 @@ use crate::geometry::{LEVEL, Point2, Rect, Segment, ring};
 pub(crate) use zones::Zone;
 
 use index::Index;
-use nearest::{Edge, Feature, Kind, Piece, clearance_of, cut};
+use nearest::{Edge, Feature, Kind, Piece, cut};
 
 /// A simple ring that is never entered, and a soft zone outside it.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,9 +130,14 @@ impl Polygon {
     /// Least distance of the part `window` of `leg` to the ring, metres; where the leg enters, the
     /// greatest depth that it reaches, negative.
     pub(super) fn clearance(&self, leg: &Segment, window: (f64, f64)) -> f64 {
-        clearance_of(&self.pieces(leg, window), leg, |point| {
-            self.ring_distance(point)
-        })
+        let (depth, _) = self.encounter(leg, window);
+        if depth > 0.0 {
+            return -depth;
+        }
+        self.pieces(leg, window)
+            .iter()
+            .map(|piece| piece.least_distance(leg))
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// Integral of `T` over the part `window` of `leg`: `margin - distance` outside the ring up to

@@ -181,7 +181,7 @@ impl Piece {
         )
     }
 
-    fn least_distance(&self, leg: &Segment) -> f64 {
+    pub(super) fn least_distance(&self, leg: &Segment) -> f64 {
         match self.nearest.kind {
             Kind::Vertex(center) => {
                 let corner = Cylinder {
@@ -236,34 +236,6 @@ pub(super) fn mark_inside(pieces: &mut Vec<Piece>, (from, to): (f64, f64)) {
         let middle = 0.5 * (piece.t0 + piece.t1);
         piece.inside |= from < middle && middle < to;
     }
-}
-
-/// The clearance of `pieces` of `leg` from a ring that is `ring_distance` away from a point.
-pub(super) fn clearance_of(
-    pieces: &[Piece],
-    leg: &Segment,
-    ring_distance: impl Fn(Point2) -> f64,
-) -> f64 {
-    // Inside, distance grows convexly on each piece, so that its ends hold the greatest depth.
-    let within = || pieces.iter().filter(|piece| piece.inside);
-    let depth = within()
-        .map(|piece| piece.end_distances(leg))
-        .fold(0.0, |depth: f64, (d0, d1)| depth.max(d0).max(d1));
-    // From edge to edge of a ring so sharp or so small that no piece ends between.
-    let depth = if depth > 0.0 {
-        depth
-    } else {
-        within()
-            .map(|piece| ring_distance(leg.at(0.5 * (piece.t0 + piece.t1)).xy()))
-            .fold(0.0, f64::max)
-    };
-    if depth > 0.0 {
-        return -depth;
-    }
-    pieces
-        .iter()
-        .map(|piece| piece.least_distance(leg))
-        .fold(f64::INFINITY, f64::min)
 }
 
 /// The pieces of `window` of a leg of horizontal `length`, in order: the nearest feature at its middle

@@ -16,6 +16,7 @@ mod objective;
 mod outcome;
 mod polish;
 mod price;
+mod roomier;
 mod rules;
 mod search;
 mod smoothing;
@@ -104,7 +105,14 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
 fn search(model: &Model, log: &mut Log) -> StopReason {
     match starts::routes(model, log.stop) {
         None => search::plain(model, log),
-        Some(starts) => search::guided(model, starts, log),
+        Some(starts) => {
+            let reason = search::guided(model, starts, log);
+            let is_lost = reason == StopReason::Iterations && !log.best.is_feasible();
+            if is_lost && model.scenario.planner.polish {
+                return roomier::search(model, log);
+            }
+            reason
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 //! that is known.
 
 mod climbs;
+mod contours;
 mod count;
 mod exposed;
 mod few;
@@ -123,6 +124,13 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
                 shapes.extend(climbs.routes);
                 evaluations += shapes.len() as u64;
                 (shapes, low) = worth::promising(model, shapes);
+            }
+            let is_hilly = !model.scenario.terrain.is_flat();
+            if is_hilly && best_of(model, priced(model, &shapes)).is_none() {
+                let round = contours::routes(model, &is_over);
+                evaluations += shapes.len() as u64;
+                legs_priced += round.legs_priced;
+                shapes.extend(round.routes);
             }
         }
     }

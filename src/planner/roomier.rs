@@ -1,0 +1,192 @@
+//! What is done where no route is found that keeps every limit: one of more waypoints is sought, which is easier, and
+//! waypoints of it are left out again until there are as many as were asked for.
+
+use super::finish::{finish, polish};
+use super::log::Log;
+use super::newton::Newton;
+use super::polish::Steps;
+use super::price::price;
+use super::search::{self, COARSE_STEPS};
+use super::{Nobody, StopReason, starts, why_stop};
+use crate::cost::Model;
+use crate::geometry::Point3;
+use crate::optimizer::Fitness;
+
+/// So many times as many waypoints,
+const TIMES: [f64; 2] = [1.4, 2.0];
+
+/// but at least so many more.
+const MORE: usize = 3;
+
+/// A roomier search is no larger than this, however large a search was asked for: what it is to find is any route.
+const POPULATION: usize = 200;
+
+/// The same of its iterations.
+const ITERATIONS: usize = 200;
+
+/// Waypoints that are tried to be left out, at each step.
+const TRIES: usize = 3;
+
+/// Of what is left of a route when a waypoint has been left out.
+const STEPS: Steps = Steps {
+    from: 0.05,
+    ..COARSE_STEPS
+};
+
+/// Look for a route that keeps every limit by way of routes with more waypoints.
+pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
+    for times in TIMES {
+        if let Some(reason) = why_stop(model.scenario, log.stop) {
+            return reason;
+        }
+        if let Some(mut route) = roomy(model, times, log) {
+            let fitness = leave_out(model, &mut route, log);
+            log.offer(&route, fitness);
+        }
+        if log.best.is_feasible() {
+            return finish(model, StopReason::Iterations, &[], &[], log);
+        }
+        log.last_point();
+    }
+    StopReason::Iterations
+}
+
+/// A route of more waypoints that keeps every limit, if one is found.
+fn roomy(model: &Model, times: f64, log: &mut Log) -> Option<Vec<Point3>> {
+    let mut scenario = model.scenario.clone();
+    let settings = &mut scenario.planner;
+    settings.waypoints = more(settings.waypoints, times);
+    settings.population = settings.population.min(POPULATION);
+    settings.iterations = settings.iterations.min(ITERATIONS);
+    let model = Model::new(&scenario);
+    let mut nobody = Nobody;
+    let mut own = Log::new(&model, &mut nobody, log.stop);
+    if let Some(starts) = starts::routes(&model, log.stop) {
+        search::guided(&model, starts, &mut own);
+    }
+    log.evaluations += own.evaluations;
+    own.best.is_feasible().then_some(own.route)
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a few times a count"
+)]
+fn more(waypoints: usize, times: f64) -> usize {
+    let many = (waypoints as f64 * times).ceil() as usize;
+    many.max(waypoints + MORE)
+}
+
+/// Leave out one waypoint after the other, always that without which the rest is best once it is pulled into place.
+fn leave_out(model: &Model, route: &mut Vec<Point3>, log: &mut Log) -> Fitness {
+    let mut best = price(model, route);
+    while route.len() - 2 > model.scenario.planner.waypoints {
+        let mut rests: Vec<_> = (1..route.len() - 1)
+            .map(|idx| {
+                let mut rest = route.clone();
+                rest.remove(idx);
+                (price(model, &rest), rest)
+            })
+            .collect();
+        log.evaluations += rests.len() as u64;
+        rests.sort_by(|one, other| one.0.rank(&other.0));
+        rests.truncate(TRIES);
+        for (fitness, rest) in &mut rests {
+            *fitness = into_place(model, rest, log);
+        }
+        let rests = rests.into_iter();
+        if let Some(placed) = rests.min_by(|one, other| one.0.rank(&other.0)) {
+            (best, *route) = placed;
+        }
+    }
+    best
+}
+
+fn into_place(model: &Model, route: &mut Vec<Point3>, log: &mut Log) -> Fitness {
+    let fitness = polish(model, route, STEPS, log);
+    if fitness.is_feasible() {
+        return fitness;
+    }
+    let mut newton = Newton::new(model, log.stop);
+    let fitness = newton.improve(route, &[]);
+    log.evaluations += newton.evaluations;
+    fitness
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point2;
+    use crate::planner::tests::scenario;
+    use crate::scenario::{Scenario, Seeding};
+    use crate::threat::{Polygon, Shape, Threat};
+
+    /// Walls across the area with gates at alternate sides, and few waypoints to get through.
+    fn slalom() -> Scenario {
+        let mut scenario = scenario();
+        let at = |x| Point3::new(x, 500.0, 100.0);
+        (scenario.start, scenario.target) = (at(50.0), at(950.0));
+        let wall = |x: f64, [from, to]: [f64; 2]| {
+            let corners = [(x, from), (x + 10.0, from), (x + 10.0, to), (x, to)];
+            Threat {
+                name: None,
+                shape: Shape::Polygon(Polygon::new(
+                    corners.map(|(x, y)| Point2::new(x, y)).to_vec(),
+                    0.0,
+                )),
+                base: None,
+                top: None,
+            }
+        };
+        scenario.threats = vec![
+            wall(300.0, [-100.0, 850.0]),
+            wall(500.0, [150.0, 1100.0]),
+            wall(700.0, [-100.0, 850.0]),
+        ];
+        scenario.vehicle.max_turn_deg = 70.0;
+        scenario.planner.waypoints = 9;
+        scenario.planner.seeding = Seeding::Tangent;
+        scenario.planner.polish = true;
+        scenario
+    }
+
+    #[test]
+    fn a_route_is_found_by_way_of_more_waypoints_and_has_as_many_as_were_asked_for() {
+        let scenario = slalom();
+        let model = Model::new(&scenario);
+        let mut nobody = Nobody;
+        let mut log = Log::new(&model, &mut nobody, &Nobody);
+        let step = (scenario.target - scenario.start) / 10.0;
+        let straight: Vec<_> = (0..=10)
+            .map(|idx| scenario.start + step * f64::from(idx))
+            .collect();
+        log.offer_unpriced(&straight);
+        assert!(!log.best.is_feasible());
+        search(&model, &mut log);
+        assert!(log.best.is_feasible(), "{:?}", log.best);
+        assert_eq!(log.route.len(), straight.len());
+    }
+
+    #[test]
+    fn what_is_left_out_is_what_is_least_missed() {
+        let mut scenario = slalom();
+        scenario.threats.truncate(1);
+        scenario.planner.waypoints = 3;
+        let model = Model::new(&scenario);
+        let corners = [
+            (250.0, 860.0),
+            (290.0, 870.0),
+            (320.0, 870.0),
+            (500.0, 740.0),
+            (800.0, 560.0),
+        ];
+        let free = corners.map(|(x, y)| Point3::new(x, y, 100.0));
+        let mut route = [&[scenario.start], &free[..], &[scenario.target]].concat();
+        let mut nobody = Nobody;
+        let mut log = Log::new(&model, &mut nobody, &Nobody);
+        let fitness = leave_out(&model, &mut route, &mut log);
+        assert!(fitness.is_feasible() && route.len() == 5, "{fitness:?}");
+        assert!(log.evaluations > 0);
+    }
+}

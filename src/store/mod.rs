@@ -56,7 +56,8 @@ pub trait Store: Send + Sync + 'static {
 
     /// Wait for the plan at the head of the queue and take it: queued -> running, at the time that
     /// the store's clock shows then. A plan whose run was cut off by the end of its process, and not given back, is
-    /// handed out again; after the fifth time it fails, `worker-lost`. Dropping the future before it is done takes nothing; what was on its way
+    /// handed out again; after the fifth time it fails, `worker-lost`. One whose document the store has lost fails,
+    /// `scenario-lost`, and the next is taken. Dropping the future before it is done takes nothing; what was on its way
     /// goes back, and meanwhile others are given what stands behind it.
     ///
     /// # Errors

@@ -4,6 +4,7 @@
 //! process died is queued again when the next one opens the file.
 
 mod claims;
+mod head;
 mod idempotency;
 mod opening;
 mod operations;

@@ -8,7 +8,7 @@ use tokio::sync::watch;
 use super::read::missing;
 use super::row::{COLUMNS, PlanRow};
 use super::transaction::{Effect, Transaction};
-use super::{idempotency, removal, webhooks};
+use super::{head, idempotency, removal, webhooks};
 use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Status, Submission};
 use crate::store::{End, Ending, Lease, StoreError, Submitted, Tombstone, lost};
@@ -74,7 +74,7 @@ fn within_quota(tx: &Transaction<'_>, submission: &Submission) -> Result<(), Sto
 
 /// `None` when nothing is queued.
 pub(super) fn claim(tx: &mut Transaction<'_>) -> Result<Option<Lease>, StoreError> {
-    let Some(mut row) = PlanRow::head(tx.connection)? else {
+    let Some((mut row, scenario)) = head::take(tx)? else {
         return Ok(None);
     };
     row.plan.start(tx.now_ms())?;
@@ -83,10 +83,6 @@ pub(super) fn claim(tx: &mut Transaction<'_>) -> Result<Option<Lease>, StoreErro
     tx.queued -= 1;
     tell_status(tx, &mut row)?;
     row.update(tx.connection)?;
-    let scenario: String = tx
-        .connection
-        .prepare_cached("SELECT document FROM scenarios WHERE plan_seq = ?1")?
-        .query_row([row.seq], |scenario| scenario.get(0))?;
     let (cancel, cancelled) = watch::channel(false);
     tx.effects.push(Effect::Leased(row.plan.id, cancel));
     Ok(Some(Lease {
@@ -287,13 +283,13 @@ fn forget_incumbent(tx: &Transaction<'_>, row: &PlanRow) -> Result<(), StoreErro
     Ok(())
 }
 
-fn tell_status(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
+pub(super) fn tell_status(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
     let status = Event::Status(Box::new(row.plan.clone()));
     tx.tell(row, &[status])
 }
 
 /// The caller has just ended the plan. From now on its time runs.
-fn tell_end(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
+pub(super) fn tell_end(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
     row.plan.expires_ms = tx.options.retention.expires_ms(&row.plan);
     let status = Event::Status(Box::new(row.plan.clone()));
     let end = Event::End(row.plan.status);

@@ -3,7 +3,9 @@
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode};
 use http_body_util::BodyExt as _;
-use noctule::http::auth::{Keys, Needs, Scope, Settings};
+use noctule::export::sha256_hex;
+use noctule::http;
+use noctule::http::auth::{Access, Keys, Needs, Scope, Settings};
 use serde_json::Value;
 use tower::ServiceExt as _;
 
@@ -316,6 +318,23 @@ async fn a_ticket_follows_one_plan_and_nothing_else() {
         .replace(Keys::read(&without_rita.join("[[key]]")).expect("keys"));
     let dead = api.get(&format!("{plan}/events{query}")).await;
     dead.expect_problem(401, "unauthorized");
+}
+
+/// A page's stream is opened at whichever node it is sent to; one that was restarted is another.
+#[tokio::test]
+async fn a_ticket_of_one_node_is_one_on_all() {
+    let mut api = Api::with_keys(&house());
+    let plan = submit(&api, "of alice").await;
+    let issued = send(&api, "of rita", &format!("POST {plan}/tickets")).await;
+    let events = issued.json()["events"].as_str().expect("text").to_owned();
+    run::complete(&*api.store, Vec::new()).await;
+    let other_key = house().replace(&sha256_hex(b"of rita"), &sha256_hex(b"of rita too"));
+    for (keys, status) in [(house(), 200), (other_key, 401)] {
+        let keys = Keys::read(&keys).expect("keys");
+        api.state.access = Access::new(Some(keys), Settings::default());
+        api.router = http::router(api.state.clone());
+        assert_eq!(api.get(&events).await.status, status);
+    }
 }
 
 #[tokio::test]

@@ -117,6 +117,10 @@ impl Keys {
         bool::from(found).then(|| &self.0[place as usize])
     }
 
+    pub(super) fn named(&self, name: &str) -> Option<&Key> {
+        self.0.iter().find(|key| key.name == name)
+    }
+
     pub(super) fn names(&self) -> HashSet<&str> {
         self.0.iter().map(|key| key.name.as_str()).collect()
     }

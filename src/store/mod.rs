@@ -88,11 +88,11 @@ pub trait Store: Send + Sync + 'static {
 
     /// Give a plan back, to its old place in the queue, which is the head: running -> queued. Its
     /// next run begins again from its seed. When its end has been asked for, it is cancelled
-    /// instead, without a result.
+    /// instead, without a result. Returns it as it now stands.
     ///
     /// # Errors
     /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.
-    async fn release(&self, lease: &Lease) -> Result<(), StoreError>;
+    async fn release(&self, lease: &Lease) -> Result<Plan, StoreError>;
 
     /// Ask for the end of a plan. A queued one ends at once, without a result; a running one's lease
     /// is told; at the end of its life nothing changes.

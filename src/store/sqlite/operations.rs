@@ -139,7 +139,7 @@ pub(super) fn release(
     tx: &mut Transaction<'_>,
     id: PlanId,
     attempt: u64,
-) -> Result<(), StoreError> {
+) -> Result<Plan, StoreError> {
     let row = leased(tx, id, attempt)?;
     give_back(tx, row)
 }
@@ -243,18 +243,18 @@ fn leased(tx: &Transaction<'_>, id: PlanId, attempt: u64) -> Result<PlanRow, Sto
 }
 
 /// Back to the queue, or to its end when that was asked for.
-fn give_back(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<(), StoreError> {
+fn give_back(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<Plan, StoreError> {
     tx.effects.push(Effect::Unleased(row.plan.id));
     if row.plan.cancel_requested {
         row.plan.cancel(tx.now_ms())?;
         tell_end(tx, &mut row)?;
         row.update(tx.connection)?;
-        return Ok(());
+        return Ok(row.plan);
     }
     requeue(tx, row)
 }
 
-fn requeue(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<(), StoreError> {
+fn requeue(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<Plan, StoreError> {
     row.plan.requeue()?;
     forget_incumbent(tx, &row)?;
     tx.queued += 1;
@@ -263,7 +263,7 @@ fn requeue(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<(), StoreError>
     row = row.placed(tx.connection)?;
     tell_status(tx, &mut row)?;
     row.update(tx.connection)?;
-    Ok(())
+    Ok(row.plan)
 }
 
 fn keep_incumbent(tx: &Transaction<'_>, row: &PlanRow, best: &Incumbent) -> Result<(), StoreError> {

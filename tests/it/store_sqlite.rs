@@ -2,11 +2,12 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
+use std::ffi::OsStr;
 use std::path::Path;
 use std::sync::Arc;
 
 use noctule::job::{Event, Status};
-use noctule::store::sqlite::SqliteStore;
+use noctule::store::sqlite::{SqliteStore, upkeep};
 use noctule::store::{Options, Store, StoreError};
 use tempfile::TempDir;
 
@@ -279,6 +280,23 @@ async fn one_that_fails_half_done_leaves_nothing_and_spoils_nobody() {
         )
         .unwrap();
     assert_eq!(orphans, 0);
+}
+
+#[tokio::test]
+async fn a_backup_may_be_called_what_a_file_may() {
+    use std::os::unix::ffi::OsStrExt as _;
+
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let id = store.submit(submission()).await.unwrap().plan.id;
+    let copies = TempDir::new().unwrap();
+    let copy = copies.path().join(OsStr::from_bytes(b"no text: \xff"));
+    upkeep::backup(directory.path(), &copy).unwrap();
+    let made: Vec<_> = copies.path().read_dir().unwrap().collect();
+    assert_eq!(made.len(), 1, "{made:?}");
+    std::fs::rename(copy, copies.path().join("noctule.db")).unwrap();
+    let restored = SqliteStore::open(copies.path(), options()).unwrap();
+    assert_eq!(restored.get(id).await.unwrap().status, Status::Queued);
 }
 
 /// Whatever is wrong with the plan at the head of the queue, those behind it have their turn.

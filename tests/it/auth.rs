@@ -382,7 +382,9 @@ async fn a_key_has_so_many_active_plans_and_no_more() {
     submit(&api, "of alice too").await;
     for secret in ["of alice", "of alice too"] {
         let refused = post(&api, secret).await;
-        refused.expect_problem(429, "quota-reached");
+        let problem = refused.expect_problem(429, "quota-reached");
+        let detail = problem["detail"].as_str().expect("text");
+        assert!(detail.starts_with("2 plans of the key's owner"), "{detail}");
         assert!(refused.headers.contains_key("retry-after"));
         assert_eq!(refused.header("ratelimit-policy"), "\"plans\";q=2");
         assert_eq!(refused.header("ratelimit"), "\"plans\";r=0");
@@ -478,8 +480,12 @@ async fn a_stream_counts_until_its_body_is_dropped() {
     let refused = async |secret: &str| {
         let answer = send(&api, secret, &format!("GET {plan}/events")).await;
         assert!(answer.headers.contains_key("retry-after"));
-        let limit = answer.expect_problem(429, "too-many-streams")["limit"].clone();
+        let problem = answer.expect_problem(429, "too-many-streams");
+        let limit = problem["limit"].clone();
         let name = limit.as_str().expect("text");
+        let detail = problem["detail"].as_str().expect("text");
+        let of_owner = detail.contains("of the key's owner");
+        assert_eq!(of_owner, name == "streams_per_key", "{detail}");
         let policy = format!("\"{name}\";q={}", limits[name]);
         assert_eq!(answer.header("ratelimit-policy"), policy);
         assert_eq!(answer.header("ratelimit"), format!("\"{name}\";r=0"));

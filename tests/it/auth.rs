@@ -3,7 +3,7 @@
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode};
 use http_body_util::BodyExt as _;
-use noctule::export::sha256_hex;
+use noctule::digest::sha256_hex;
 use noctule::http;
 use noctule::http::auth::{Access, Keys, Needs, Scope, Settings};
 use serde_json::Value;

@@ -1,7 +1,8 @@
 //! Keys that nobody can guess.
 
+use data_encoding::HEXLOWER;
+
 use super::keys::PREFIX;
-use crate::export::hex;
 
 /// A new key: 256 random bits.
 ///
@@ -10,7 +11,7 @@ use crate::export::hex;
 pub fn key() -> Result<String, getrandom::Error> {
     let mut bytes = [0_u8; 32];
     getrandom::fill(&mut bytes)?;
-    Ok(format!("{PREFIX}{}", hex(&bytes)))
+    Ok(format!("{PREFIX}{}", HEXLOWER.encode(&bytes)))
 }
 
 #[cfg(test)]

@@ -160,7 +160,7 @@ fn looks_like_a_key(text: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::sha256_hex;
+    use crate::digest::sha256_hex;
 
     #[test]
     fn finds_each_key_and_no_other() {

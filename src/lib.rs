@@ -8,6 +8,9 @@ pub mod geometry;
 pub mod terrain;
 pub mod threat;
 
+// What every room may tell of bytes.
+pub mod digest;
+
 // What is asked for, and what a route costs.
 pub mod scenario;
 

@@ -4,11 +4,11 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
+use data_encoding::HEXLOWER;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::Staged;
-use crate::export::hex;
 use crate::terrain::dem::{self, Dataset, Declared, DemError, Format, Metadata, Survey};
 
 /// What a file does not say of itself and somebody else did.
@@ -100,7 +100,7 @@ impl Identity {
                 self.add(format!("\n{name}={value}").as_bytes());
             }
         }
-        hex(&self.0.finalize())
+        HEXLOWER.encode(&self.0.finalize())
     }
 }
 

@@ -8,7 +8,8 @@ use serde::Deserialize;
 use super::exit;
 use super::files::{self, Choice};
 use super::ground::Ground;
-use crate::export::{ExportError, ResultInput, sha256_hex};
+use crate::digest::sha256_hex;
+use crate::export::{ExportError, ResultInput};
 use crate::scenario::json::{self, Rules};
 use crate::scenario::limits::Limits;
 

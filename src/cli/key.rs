@@ -6,7 +6,7 @@ use anyhow::anyhow;
 use clap::{Args, Subcommand};
 use jiff::Timestamp;
 
-use crate::export::sha256_hex;
+use crate::digest::sha256_hex;
 use crate::http::auth::{Keys, Scope, fresh_key};
 
 #[derive(Subcommand)]

@@ -54,11 +54,11 @@ pub(super) fn start(config: &Config) -> anyhow::Result<()> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
         .build()?;
-    runtime.block_on(serve(config))?;
-    // Whatever still runs has been given back to the queue; the process does not wait for it.
+    let served = runtime.block_on(serve(config));
+    // Whatever still runs has been given back to the queue, or has hardly begun; the process does not wait for it.
     runtime.shutdown_background();
     log.close();
-    Ok(())
+    served
 }
 
 async fn serve(config: &Config) -> anyhow::Result<()> {

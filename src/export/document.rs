@@ -221,7 +221,7 @@ pub struct Origin {
     pub algorithm: String,
     /// Of the run.
     pub seed: u64,
-    /// Of the accepted scenario document, by [`sha256_hex`](super::sha256_hex).
+    /// Of the accepted scenario document, by [`sha256_hex`](crate::digest::sha256_hex).
     pub scenario_sha256: String,
     /// Wall times.
     pub timing: Timing,

@@ -12,7 +12,6 @@ mod error;
 mod file_name;
 mod geojson;
 mod gpx;
-mod hex;
 mod kml;
 mod mission;
 mod options;
@@ -23,9 +22,10 @@ mod words;
 pub use delivery::Delivery;
 pub use error::{ExportError, OptionFault};
 pub use file_name::file_name;
-pub use hex::{hex, sha256_hex};
 pub use options::{Altitude, Firmware, OPTIONS, OptionRule, Options};
 
+/// What a result names its scenario by.
+pub use crate::digest::sha256_hex;
 use crate::scenario::json::Rules;
 
 /// A format of a result.

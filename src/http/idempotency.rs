@@ -11,7 +11,7 @@ use axum::http::{HeaderMap, HeaderName};
 use super::caller::Caller;
 use super::params;
 use super::problem::Problem;
-use crate::export::sha256_hex;
+use crate::digest::sha256_hex;
 use crate::job::{Idempotency, Owner};
 
 const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");

@@ -26,6 +26,7 @@ mod phase;
 mod plans;
 mod prefer;
 mod problem;
+mod readiness;
 mod request_id;
 mod retry;
 mod scenarios;
@@ -61,6 +62,7 @@ pub use browser::Origins;
 pub use hosts::Hosts;
 pub use idempotency::InFlight;
 pub use phase::Phase;
+pub use readiness::Readiness;
 pub use terrains::Terrains;
 
 use crate::scenario::json::Rules;
@@ -95,6 +97,8 @@ pub struct Parts {
     pub capacity: Capacity,
     /// Idempotency keys that are being worked on.
     pub in_flight: InFlight,
+    /// What the store last said of itself.
+    pub readiness: Readiness,
     /// A request's body must be complete after this.
     pub body_timeout: Duration,
     /// By which plans are stamped and expire.

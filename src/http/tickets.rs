@@ -27,7 +27,8 @@ pub(super) async fn issue(
     _: NoParams,
 ) -> Result<(StatusCode, Json<TicketDocument>), Problem> {
     caller.plan(&*state.store, id).await?;
-    let (ticket, until) = state.access.ticket(id, &caller)?;
+    let ticket = state.access.ticket(id, &caller);
+    let (ticket, until) = ticket.map_err(Problem::Unauthorized)?;
     let document = TicketDocument {
         events: format!("{}/events?ticket={ticket}", location(id)),
         expires_at: format!("{until:.3}"),

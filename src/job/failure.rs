@@ -23,15 +23,18 @@ pub enum FailureKind {
     NoGround,
     /// This version does not read the document that was accepted.
     InvalidScenario,
+    /// The store does not have the document any more that was accepted.
+    ScenarioLost,
 }
 
 impl FailureKind {
     /// Every one, once.
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 5] = [
         Self::PlannerPanic,
         Self::WorkerLost,
         Self::NoGround,
         Self::InvalidScenario,
+        Self::ScenarioLost,
     ];
 
     /// As it is kept and told.
@@ -42,6 +45,7 @@ impl FailureKind {
             Self::WorkerLost => "worker-lost",
             Self::NoGround => "no-ground",
             Self::InvalidScenario => "invalid-scenario",
+            Self::ScenarioLost => "scenario-lost",
         }
     }
 

@@ -2,8 +2,8 @@
 
 use super::state::{Refused, Status};
 use super::{Event, Failure, Plan, Submission};
+use crate::digest::sha256_hex;
 use crate::export::document::{Convergence, Origin, Timing};
-use crate::export::sha256_hex;
 
 impl Plan {
     /// The record of a plan that has just been accepted as number `queue_position` in the queue.

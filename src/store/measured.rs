@@ -84,7 +84,7 @@ impl Store for MeasuredStore {
         self.measured("finish", self.store.finish(lease, end)).await
     }
 
-    async fn release(&self, lease: &Lease) -> Result<(), StoreError> {
+    async fn release(&self, lease: &Lease) -> Result<Plan, StoreError> {
         self.measured("release", self.store.release(lease)).await
     }
 

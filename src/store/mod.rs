@@ -57,7 +57,8 @@ pub trait Store: Send + Sync + 'static {
 
     /// Wait for the plan at the head of the queue and take it: queued -> running, at the time that
     /// the store's clock shows then. A plan whose run was cut off by the end of its process, and not given back, is
-    /// handed out again; after the fifth time it fails, `worker-lost`. Dropping the future before it is done takes nothing; what was on its way
+    /// handed out again; after the fifth time it fails, `worker-lost`. One whose document the store has lost fails,
+    /// `scenario-lost`, and the next is taken. Dropping the future before it is done takes nothing; what was on its way
     /// goes back, and meanwhile others are given what stands behind it.
     ///
     /// # Errors
@@ -88,11 +89,11 @@ pub trait Store: Send + Sync + 'static {
 
     /// Give a plan back, to its old place in the queue, which is the head: running -> queued. Its
     /// next run begins again from its seed. When its end has been asked for, it is cancelled
-    /// instead, without a result.
+    /// instead, without a result. Returns it as it now stands.
     ///
     /// # Errors
     /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.
-    async fn release(&self, lease: &Lease) -> Result<(), StoreError>;
+    async fn release(&self, lease: &Lease) -> Result<Plan, StoreError>;
 
     /// Ask for the end of a plan. A queued one ends at once, without a result; a running one's lease
     /// is told; at the end of its life nothing changes.

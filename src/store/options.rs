@@ -19,8 +19,8 @@ pub struct Options {
     pub retention: Retention,
     /// Events kept of each plan; of a longer history the oldest are forgotten.
     pub events_kept: u64,
-    /// Told of each plan that the store itself ends because its workers were lost, once that is durable: there is no
-    /// run that could tell of it.
+    /// Told of each plan that the store itself ends because its workers, or its document, were lost, once that is
+    /// durable: there is no run that could tell of it.
     pub lost: Tell,
 }
 

@@ -172,7 +172,7 @@ impl Store for Reopening {
         self.heed(&store, store.finish(lease, end).await)
     }
 
-    async fn release(&self, lease: &Lease) -> Result<(), StoreError> {
+    async fn release(&self, lease: &Lease) -> Result<Plan, StoreError> {
         let store = self.store()?;
         self.heed(&store, store.release(lease).await)
     }

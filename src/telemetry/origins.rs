@@ -19,8 +19,8 @@ pub struct Origin {
     pub traceparent: Option<TraceParent>,
 }
 
-/// Of the plans that this process accepted and that have not ended. It is lost at a restart: plans
-/// that were accepted earlier have none.
+/// Of the plans that this process accepted, until they end here. Those that end elsewhere, as all do that another node
+/// runs, are forgotten when they are among the oldest. It is lost at a restart: plans that were accepted earlier have none.
 #[derive(Debug, Default)]
 pub struct Origins(Mutex<BTreeMap<Uuid, Origin>>);
 
@@ -42,7 +42,7 @@ impl Origins {
         known.get(&plan).cloned()
     }
 
-    /// It has ended.
+    /// It has ended, or is gone.
     pub fn forget(&self, plan: Uuid) {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         known.remove(&plan);

@@ -9,7 +9,7 @@ use tracing::{Instrument as _, Span};
 
 use super::planning::{Reason, Reports, StopFlag, Thread};
 use super::{Pause, Phase, Slot, reached};
-use crate::job::Event;
+use crate::job::{Event, Plan};
 use crate::store::{Ending, Lease, StoreError};
 use crate::telemetry::metrics::Ended;
 
@@ -146,24 +146,31 @@ impl Slot {
         let end = ending.after(told, (self.clock)());
         let finish = || self.store.finish(lease, Arc::clone(&end));
         if let Some(plan) = self.persist("ending", finish).await {
-            let run_ms = plan
-                .finished_ms
-                .zip(plan.started_ms)
-                .map(|(end, start)| end - start);
-            tracing::info!(status = plan.status.name(), run_ms, "plan ended");
-            self.instruments.origins.forget(plan.id);
-            self.instruments.metrics.ended(Ended {
-                status: plan.status.name(),
-                run_ms,
-            });
+            self.tell_end(&plan);
         }
     }
 
     async fn give_back(&self, lease: &Lease) {
         let release = || self.store.release(lease);
-        if self.persist("release", release).await.is_some() {
-            tracing::info!("plan given back to the queue");
+        match self.persist("release", release).await {
+            // Somebody had asked for its end, and it has none of its own to wait for.
+            Some(plan) if plan.status.is_final() => self.tell_end(&plan),
+            Some(_) => tracing::info!("plan given back to the queue"),
+            None => {}
         }
+    }
+
+    fn tell_end(&self, plan: &Plan) {
+        let run_ms = plan
+            .finished_ms
+            .zip(plan.started_ms)
+            .map(|(end, start)| end - start);
+        tracing::info!(status = plan.status.name(), run_ms, "plan ended");
+        self.instruments.origins.forget(plan.id);
+        self.instruments.metrics.ended(Ended {
+            status: plan.status.name(),
+            run_ms,
+        });
     }
 
     /// Do a step of the store, again and again while the store fails; `None` when the plan is no

@@ -107,7 +107,7 @@ fn a_new_key_is_told_once_and_its_entry_can_be_appended() {
     assert_eq!(entries[0]["name"].as_str(), Some("a \"b\""));
     assert_eq!(
         entries[0]["sha256"].as_str(),
-        Some(noctule::export::sha256_hex(key.as_bytes()).as_str())
+        Some(noctule::digest::sha256_hex(key.as_bytes()).as_str())
     );
     assert_eq!(entries[1]["expires"].as_str(), Some("2027-01-31T00:00:00Z"));
 
@@ -306,7 +306,7 @@ async fn neither_keys_nor_tickets_are_logged() {
     let log = guarded.log_with("a key came in a URL").await;
     assert!(log.contains("alice"), "the key's name is there: {log}");
     let ticket = ticket["ticket"].as_str().expect("text");
-    let sum = noctule::export::sha256_hex(key.as_bytes());
+    let sum = noctule::digest::sha256_hex(key.as_bytes());
     for secret in [&key["noctule_".len()..], ticket, &sum] {
         assert!(!log.contains(secret), "{log}");
     }

@@ -369,6 +369,20 @@ async fn a_draining_service_answers_but_takes_no_plans() {
 }
 
 #[tokio::test]
+async fn where_a_plan_came_from_is_forgotten_with_it() {
+    let api = Api::new();
+    for (method, step) in [(Method::POST, "/cancel"), (Method::DELETE, "")] {
+        let address = api.submit().await;
+        let id = address.rsplit('/').next().expect("an id");
+        let id = id.parse().expect("an id");
+        let origins = &api.state.instruments.origins;
+        assert!(origins.of(id).is_some());
+        api.send(method, &format!("{address}{step}"), &[], "").await;
+        assert_eq!(origins.of(id), None);
+    }
+}
+
+#[tokio::test]
 async fn a_closed_store_is_unavailable_not_broken() {
     let api = Api::new();
     let address = api.submit().await;

@@ -3,7 +3,9 @@
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode};
 use http_body_util::BodyExt as _;
-use noctule::http::auth::{Keys, Needs, Scope, Settings};
+use noctule::digest::sha256_hex;
+use noctule::http;
+use noctule::http::auth::{Access, Keys, Needs, Scope, Settings};
 use serde_json::Value;
 use tower::ServiceExt as _;
 
@@ -318,6 +320,23 @@ async fn a_ticket_follows_one_plan_and_nothing_else() {
     dead.expect_problem(401, "unauthorized");
 }
 
+/// A page's stream is opened at whichever node it is sent to; one that was restarted is another.
+#[tokio::test]
+async fn a_ticket_of_one_node_is_one_on_all() {
+    let mut api = Api::with_keys(&house());
+    let plan = submit(&api, "of alice").await;
+    let issued = send(&api, "of rita", &format!("POST {plan}/tickets")).await;
+    let events = issued.json()["events"].as_str().expect("text").to_owned();
+    run::complete(&*api.store, Vec::new()).await;
+    let other_key = house().replace(&sha256_hex(b"of rita"), &sha256_hex(b"of rita too"));
+    for (keys, status) in [(house(), 200), (other_key, 401)] {
+        let keys = Keys::read(&keys).expect("keys");
+        api.state.access = Access::new(Some(keys), Settings::default());
+        api.router = http::router(api.state.clone());
+        assert_eq!(api.get(&events).await.status, status);
+    }
+}
+
 #[tokio::test]
 async fn a_ticket_runs_out() {
     let settings = Settings {
@@ -363,7 +382,9 @@ async fn a_key_has_so_many_active_plans_and_no_more() {
     submit(&api, "of alice too").await;
     for secret in ["of alice", "of alice too"] {
         let refused = post(&api, secret).await;
-        refused.expect_problem(429, "quota-reached");
+        let problem = refused.expect_problem(429, "quota-reached");
+        let detail = problem["detail"].as_str().expect("text");
+        assert!(detail.starts_with("2 plans of the key's owner"), "{detail}");
         assert!(refused.headers.contains_key("retry-after"));
         assert_eq!(refused.header("ratelimit-policy"), "\"plans\";q=2");
         assert_eq!(refused.header("ratelimit"), "\"plans\";r=0");
@@ -459,8 +480,12 @@ async fn a_stream_counts_until_its_body_is_dropped() {
     let refused = async |secret: &str| {
         let answer = send(&api, secret, &format!("GET {plan}/events")).await;
         assert!(answer.headers.contains_key("retry-after"));
-        let limit = answer.expect_problem(429, "too-many-streams")["limit"].clone();
+        let problem = answer.expect_problem(429, "too-many-streams");
+        let limit = problem["limit"].clone();
         let name = limit.as_str().expect("text");
+        let detail = problem["detail"].as_str().expect("text");
+        let of_owner = detail.contains("of the key's owner");
+        assert_eq!(of_owner, name == "streams_per_key", "{detail}");
         let policy = format!("\"{name}\";q={}", limits[name]);
         assert_eq!(answer.header("ratelimit-policy"), policy);
         assert_eq!(answer.header("ratelimit"), format!("\"{name}\";r=0"));

@@ -3,8 +3,9 @@
 use std::fs;
 
 use axum::http::Method;
+use noctule::digest::sha256_hex;
+use noctule::export::ALL;
 use noctule::export::document::{Convergence, Origin, Position, ResultDocument, Timing};
-use noctule::export::{ALL, sha256_hex};
 use noctule::planner;
 use noctule::scenario::json;
 use noctule::scenario::limits::Limits;

@@ -15,7 +15,8 @@ use Imports::{Above, Only};
 /// From the ground up: geometry knows nothing of flying, the optimizers nothing of routes, the engine
 /// nothing of plans on disk, and nobody anything of the command line. Flags and logs stand below the
 /// engine: what may change a result is in the request.
-const ROOMS: [(&str, Imports); 18] = [
+const ROOMS: [(&str, Imports); 19] = [
+    ("digest", Only(&[])),
     ("geometry", Only(&[])),
     ("terrain", Above),
     ("threat", Above),

@@ -2,14 +2,16 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
+use std::ffi::OsStr;
 use std::path::Path;
+use std::sync::Arc;
 
 use noctule::job::{Event, Status};
-use noctule::store::sqlite::SqliteStore;
+use noctule::store::sqlite::{SqliteStore, upkeep};
 use noctule::store::{Options, Store, StoreError};
 use tempfile::TempDir;
 
-use crate::support::plans::{ending, point, submission};
+use crate::support::plans::{ending, history, point, submission};
 
 fn options() -> Options {
     Options::new(1_000)
@@ -278,4 +280,92 @@ async fn one_that_fails_half_done_leaves_nothing_and_spoils_nobody() {
         )
         .unwrap();
     assert_eq!(orphans, 0);
+}
+
+#[tokio::test]
+async fn a_backup_may_be_called_what_a_file_may() {
+    use std::os::unix::ffi::OsStrExt as _;
+
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let id = store.submit(submission()).await.unwrap().plan.id;
+    let copies = TempDir::new().unwrap();
+    let copy = copies.path().join(OsStr::from_bytes(b"no text: \xff"));
+    upkeep::backup(directory.path(), &copy).unwrap();
+    let made: Vec<_> = copies.path().read_dir().unwrap().collect();
+    assert_eq!(made.len(), 1, "{made:?}");
+    std::fs::rename(copy, copies.path().join("noctule.db")).unwrap();
+    let restored = SqliteStore::open(copies.path(), options()).unwrap();
+    assert_eq!(restored.get(id).await.unwrap().status, Status::Queued);
+}
+
+/// Whatever is wrong with the plan at the head of the queue, those behind it have their turn.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plan_that_cannot_be_read_holds_up_nobody() {
+    let directory = TempDir::new().unwrap();
+    let (tell, ended) = std::sync::mpsc::channel();
+    let options = Options {
+        lost: Arc::new(move |plan| tell.send(plan.clone()).unwrap()),
+        ..options()
+    };
+    let store = SqliteStore::open(directory.path(), options).unwrap();
+    let mut ids = Vec::new();
+    for _ in 0..4 {
+        ids.push(store.submit(submission()).await.unwrap().plan.id);
+    }
+    let database = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
+    for damage in [
+        "DELETE FROM scenarios WHERE plan_seq = 1",
+        "UPDATE scenarios SET document = CAST(x'ff' AS TEXT) WHERE plan_seq = 2",
+        "UPDATE plans SET id = 'x' WHERE seq = 3",
+    ] {
+        assert_eq!(database.execute(damage, []).unwrap(), 1, "{damage}");
+    }
+
+    assert_eq!(store.claim().await.unwrap().plan.id, ids[3]);
+    for id in &ids[..2] {
+        let plan = store.get(*id).await.unwrap();
+        assert_eq!(plan.status, Status::Failed);
+        assert_eq!(plan.error.as_ref().unwrap().kind, "scenario-lost");
+        let told = history(&store, *id).await;
+        assert_eq!(told.last(), Some(&Event::End(Status::Failed)));
+        assert_eq!(ended.try_recv().unwrap(), plan);
+    }
+    assert!(ended.try_recv().is_err());
+    let stats = store.stats().await.unwrap();
+    assert_eq!((stats.queued, stats.running), (0, 1));
+    let status: String = database
+        .query_row("SELECT status FROM plans WHERE seq = 3", [], |row| {
+            row.get(0)
+        })
+        .unwrap();
+    assert_eq!(status, "failed");
+}
+
+/// However often claims fail after they have written, nobody who shares their transactions does.
+#[tokio::test(flavor = "multi_thread")]
+async fn claims_that_fail_spoil_nobody_s_write() {
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let id = store.submit(submission()).await.unwrap().plan.id;
+    let database = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
+    database
+        .execute_batch(
+            "CREATE TRIGGER break AFTER UPDATE OF attempt ON plans \
+             BEGIN SELECT raise(ABORT, 'not taken'); END; BEGIN IMMEDIATE",
+        )
+        .unwrap();
+    // While the file is held, they all come together; more claims than could be answered before the last write.
+    let mut claims = futures_util::future::join_all((0..20).map(|_| store.claim()));
+    assert!(futures_util::FutureExt::now_or_never(&mut claims).is_none());
+    let mut writes = futures_util::future::join_all((0..10).map(|_| store.submit(submission())));
+    assert!(futures_util::FutureExt::now_or_never(&mut writes).is_none());
+    database.execute_batch("COMMIT").unwrap();
+    let writes = writes.await;
+    assert!(writes.iter().all(Result::is_ok), "{writes:?}");
+    drop(claims);
+    assert_eq!(store.stats().await.unwrap().queued, 11);
+
+    database.execute_batch("DROP TRIGGER break").unwrap();
+    assert_eq!(store.claim().await.unwrap().plan.id, id);
 }

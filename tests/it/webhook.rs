@@ -9,7 +9,7 @@ use axum::Router;
 use axum::body::Bytes;
 use axum::extract::State;
 use axum::http::{HeaderMap, Method, StatusCode, Uri};
-use noctule::export::sha256_hex;
+use noctule::digest::sha256_hex;
 use noctule::http::webhook::{Secret, Sender, Settings};
 use noctule::store::wall_clock;
 use serde_json::{Value, json};

@@ -11,10 +11,12 @@ use noctule::export::document::ResultDocument;
 use noctule::job::{Event, Failure, PlanId, Status, Submission};
 use noctule::planner::StopReason;
 use noctule::store::{Clock, Store};
+use noctule::telemetry::metrics::Queue;
 use noctule::worker::{Engine, Pool, Settings, Unplanned};
 
 use crate::support::engines::{deterministic, endless, engine, incumbent, outcome, point};
 use crate::support::faulty_store::FaultyStore;
+use crate::support::openmetrics::Reading;
 use crate::support::plans::{history, kind, statuses, submission, until};
 use crate::support::stores::{Fixture, on_every_backend};
 
@@ -207,7 +209,9 @@ async fn what_cannot_be_planned_now_is_planned_a_little_later() {
 async fn who_waits_to_plan_heeds_a_stop() {
     on_every_backend(10, async |store| {
         let never: Engine = Arc::new(|_, _, _| Err(Unplanned::NotNow("away".to_owned())));
-        let pool = pool(store, 2, never);
+        let settings = settings(2, store.clock());
+        let instruments = Arc::clone(&settings.instruments);
+        let pool = Pool::start(store.share(), settings, never);
         let [first, second] = [submit(&**store, "{}").await, submit(&**store, "{}").await];
         for id in [first, second] {
             until(&**store, id, |plan| plan.status == Status::Running).await;
@@ -218,6 +222,19 @@ async fn who_waits_to_plan_heeds_a_stop() {
         pool.drain(Duration::ZERO).await;
         let plan = store.get(second).await.unwrap();
         assert_eq!(plan.status, Status::Queued, "for another worker");
+        let queue = Queue {
+            queued: Some(1),
+            running: Some(0),
+            oldest_queued_ms: None,
+            limit: 10,
+            workers: 2,
+        };
+        let reading = Reading::read(&instruments.metrics.text(queue));
+        let cancelled = reading.value("noctule_plans_ended_total{status=\"cancelled\"}");
+        assert!(
+            (cancelled - 1.0).abs() < 0.5,
+            "what was given back to its end"
+        );
     })
     .await;
 }

@@ -89,6 +89,7 @@ fn options(config: &Config, clock: Clock, instruments: &Arc<Instruments>) -> Opt
 fn counted(instruments: &Arc<Instruments>) -> Tell {
     let instruments = Arc::clone(instruments);
     Arc::new(move |plan| {
+        instruments.origins.forget(plan.id);
         instruments.metrics.ended(Ended {
             status: plan.status.name(),
             run_ms: None,

@@ -10,7 +10,7 @@ use crate::cli::access;
 use crate::config::{self, Config};
 use crate::http::auth::Access;
 use crate::http::webhook::{self, Secret};
-use crate::http::{Capacity, Hosts, InFlight, Origins, Parts, Phase, Terrains};
+use crate::http::{Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains};
 use crate::planner;
 use crate::store::measured::MeasuredStore;
 use crate::store::{self, SteadyClock};
@@ -65,6 +65,7 @@ pub(super) async fn open(
             queue: config.queue,
         },
         in_flight: InFlight::default(),
+        readiness: Readiness::default(),
         clock,
         body_timeout: config.http.body_timeout,
         access,

@@ -1,21 +1,17 @@
-//! Secrets that nobody can guess.
+//! Keys that nobody can guess.
+
+use data_encoding::HEXLOWER;
 
 use super::keys::PREFIX;
-use crate::export::hex;
 
-/// A new key.
+/// A new key: 256 random bits.
 ///
 /// # Errors
 /// When the operating system has no randomness.
 pub fn key() -> Result<String, getrandom::Error> {
-    Ok(format!("{PREFIX}{}", random_hex()?))
-}
-
-/// 256 random bits.
-pub(super) fn random_hex() -> Result<String, getrandom::Error> {
     let mut bytes = [0_u8; 32];
     getrandom::fill(&mut bytes)?;
-    Ok(hex(&bytes))
+    Ok(format!("{PREFIX}{}", HEXLOWER.encode(&bytes)))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 //! Refusals name the entry but never repeat its sum: whoever put the key itself there by mistake
 //! would find it in the log.
 
+use data_encoding::HEXLOWER_PERMISSIVE;
 use jiff::Timestamp;
 use serde::Deserialize;
 
@@ -104,15 +105,7 @@ fn sum(text: &str) -> Result<Digest, String> {
     if text.starts_with(PREFIX) {
         return Err("sha256 is the key itself, must be its SHA-256; make a new key, this one has been written down".to_owned());
     }
-    let digit = |byte: u8| char::from(byte).to_digit(16);
-    let bytes: Option<Vec<u8>> = text
-        .as_bytes()
-        .chunks(2)
-        .map(|pair| match pair {
-            [high, low] => u8::try_from(digit(*high)? * 16 + digit(*low)?).ok(),
-            _ => None,
-        })
-        .collect();
+    let bytes = HEXLOWER_PERMISSIVE.decode(text.as_bytes()).ok();
     bytes
         .and_then(|bytes| bytes.try_into().ok())
         .ok_or_else(|| "sha256 must be 64 hexadecimal digits".to_owned())

@@ -117,6 +117,10 @@ impl Keys {
         bool::from(found).then(|| &self.0[place as usize])
     }
 
+    pub(super) fn named(&self, name: &str) -> Option<&Key> {
+        self.0.iter().find(|key| key.name == name)
+    }
+
     pub(super) fn names(&self) -> HashSet<&str> {
         self.0.iter().map(|key| key.name.as_str()).collect()
     }
@@ -156,7 +160,7 @@ fn looks_like_a_key(text: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::sha256_hex;
+    use crate::digest::sha256_hex;
 
     #[test]
     fn finds_each_key_and_no_other() {

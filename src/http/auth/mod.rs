@@ -44,7 +44,6 @@ use crate::job::{Owner, PlanId};
 use crate::telemetry::spans;
 use rate::{Buckets, Taken};
 use streams::Streams;
-use ticket::{Holder, Tickets};
 
 /// How often a stream looks whether its key has expired.
 const EXPIRY_LOOK: Duration = Duration::from_secs(60);
@@ -57,7 +56,6 @@ pub struct Access(Arc<Inner>);
 struct Inner {
     keys: watch::Sender<Option<Arc<Keys>>>,
     buckets: Buckets,
-    tickets: Tickets,
     streams: Arc<Streams>,
     settings: Settings,
 }
@@ -107,7 +105,6 @@ impl Access {
         Self(Arc::new(Inner {
             keys: watch::Sender::new(keys.map(Arc::new)),
             buckets: Buckets::default(),
-            tickets: Tickets::default(),
             streams: Streams::new(settings.streams, settings.streams_per_key),
             settings,
         }))
@@ -136,15 +133,16 @@ impl Access {
         &self,
         plan: PlanId,
         caller: &Caller,
-    ) -> Result<(String, Timestamp), Problem> {
+    ) -> Result<(String, Timestamp), Unauthorized> {
+        let keys = self.0.keys.borrow().clone();
+        let key = match (caller.key, &keys) {
+            // It may have been withdrawn since the caller was let in.
+            (Some(key), Some(keys)) => Some(keys.with_digest(&key).ok_or(Unauthorized::NoKey)?),
+            _ => None,
+        };
         let life = self.0.settings.ticket_life;
-        let ticket = self.0.tickets.issue(plan, caller.key, Instant::now(), life);
-        let ticket = ticket.map_err(|error| {
-            tracing::error!(%error, "no randomness for a ticket");
-            Problem::Internal
-        })?;
         let until = Timestamp::now().checked_add(life).unwrap_or(Timestamp::MAX);
-        Ok((ticket, until))
+        Ok((ticket::issue(plan, key, until.as_millisecond()), until))
     }
 
     /// Leave to have one more stream open.
@@ -191,25 +189,19 @@ impl Access {
             Needs::Ticket if !headers.contains_key(header::AUTHORIZATION) => ticket_of(uri),
             _ => None,
         };
-        let holder = match ticket {
-            Some((ticket, plan)) => {
-                let holder =
-                    plan.and_then(|plan| self.0.tickets.holder(&ticket, plan, Instant::now()));
-                Some(holder.ok_or(Unauthorized::NoTicket)?)
+        let now = Timestamp::now();
+        let key = match (ticket, keys.as_deref()) {
+            (Some((ticket, plan)), keys) => {
+                let plan = plan.ok_or(Unauthorized::NoTicket)?;
+                ticket::holder(&ticket, plan, keys, now.as_millisecond())?
             }
-            None => None,
+            (None, Some(keys)) => Some(keys.find(secret(headers)?).ok_or(Unauthorized::NoKey)?),
+            (None, None) => None,
         };
-        let Some(keys) = keys else {
+        let Some(key) = key else {
             return Ok(Admitted::default());
         };
-        let key = match holder {
-            None => keys.find(secret(headers)?).ok_or(Unauthorized::NoKey)?,
-            // Of a key that has been withdrawn since.
-            Some(Holder(holder)) => holder
-                .and_then(|holder| keys.with_digest(&holder))
-                .ok_or(Unauthorized::NoTicket)?,
-        };
-        if key.has_expired(Timestamp::now()) {
+        if key.has_expired(now) {
             return Err(Unauthorized::Expired.into());
         }
         spans::name_key(&key.name);

@@ -1,69 +1,71 @@
 //! Tickets: what a browser's `EventSource`, which can send no header, follows one plan with.
 //!
-//! Kept in memory only: they live for minutes, and a reader whose ticket is gone takes a new one.
+//! Nothing is kept of them. Each says in whose name it was issued and until when, signed with the sum of that key, which
+//! every node has read from the same file: so a ticket of one node is one on all of them, and ends with its key.
 
-use std::collections::HashMap;
-use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use base64::Engine as _;
+use base64::engine::general_purpose::URL_SAFE_NO_PAD as BASE64;
+use hmac::{Hmac, KeyInit as _, Mac as _};
+use sha2::Sha256;
 
-use tokio::time::Instant;
-
-use super::fresh;
-use super::keys::{Digest, digest};
+use super::Unauthorized;
+use super::keys::{Key, Keys};
 use crate::job::PlanId;
 
-/// Tickets of one key, or of all who have none; a further one takes the place of the oldest.
-const MOST: usize = 10_000;
+/// What is signed begins so, lest anything else that is signed with a key's sum be taken for a ticket.
+const LABEL: &[u8] = b"noctule ticket ";
 
-/// The tickets in force, by their sums.
-#[derive(Debug, Default)]
-pub(super) struct Tickets(Mutex<HashMap<Digest, Ticket>>);
+/// Signs where nobody has a key: there everybody may follow every plan, and there is nothing to forge.
+const NOBODY_S: [u8; 32] = [0; 32];
 
-#[derive(Debug, Clone, Copy)]
-struct Ticket {
-    plan: PlanId,
-    holder: Option<Digest>,
-    until: Instant,
+/// A ticket for the plan's events until then, in the name of that key; `None` where there are none.
+pub(super) fn issue(plan: PlanId, key: Option<&Key>, until_ms: i64) -> String {
+    let until = until_ms.to_be_bytes();
+    let tag = signing(plan, key, until).finalize().into_bytes();
+    let name = key.map_or("", |key| &key.name);
+    BASE64.encode([until.as_slice(), tag.as_slice(), name.as_bytes()].concat())
 }
 
-/// The sum of the key that a ticket was issued for; `None` where nobody had one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Holder(pub(super) Option<Digest>);
-
-impl Tickets {
-    /// A ticket for the plan's events, in the place of the key `holder`.
-    pub(super) fn issue(
-        &self,
-        plan: PlanId,
-        holder: Option<Digest>,
-        now: Instant,
-        life: Duration,
-    ) -> Result<String, getrandom::Error> {
-        let text = fresh::random_hex()?;
-        let ticket = Ticket {
-            plan,
-            holder,
-            until: now + life,
-        };
-        let mut tickets = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        tickets.retain(|_, ticket| ticket.until > now);
-        let own = tickets.iter().filter(|(_, other)| other.holder == holder);
-        if own.clone().count() >= MOST {
-            let oldest = own.min_by_key(|(_, other)| other.until);
-            if let Some(oldest) = oldest.map(|(sum, _)| *sum) {
-                tickets.remove(&oldest);
-            }
-        }
-        tickets.insert(digest(text.as_bytes()), ticket);
-        Ok(text)
+/// In whose name `text` is a ticket for the plan; `None` where nobody has a key.
+///
+/// # Errors
+/// [`Unauthorized::NoTicket`] when it is none, or none any more.
+pub(super) fn holder<'k>(
+    text: &str,
+    plan: PlanId,
+    keys: Option<&'k Keys>,
+    now_ms: i64,
+) -> Result<Option<&'k Key>, Unauthorized> {
+    let bytes = BASE64.decode(text).ok();
+    let parts = bytes.as_deref().and_then(parts);
+    let (until, tag, name) = parts.ok_or(Unauthorized::NoTicket)?;
+    let key = match keys {
+        Some(keys) => Some(keys.named(name).ok_or(Unauthorized::NoTicket)?),
+        None => None,
+    };
+    // In a time that tells nothing of how much of it is right.
+    let signed = signing(plan, key, until).verify_slice(tag).is_ok();
+    if signed && i64::from_be_bytes(until) > now_ms {
+        Ok(key)
+    } else {
+        Err(Unauthorized::NoTicket)
     }
+}
 
-    /// Whose ticket for the plan `text` is, if it is one.
-    pub(super) fn holder(&self, text: &str, plan: PlanId, now: Instant) -> Option<Holder> {
-        let tickets = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let ticket = tickets.get(&digest(text.as_bytes()))?;
-        (ticket.plan == plan && ticket.until > now).then_some(Holder(ticket.holder))
-    }
+/// Until when, the tag, and the name of the key.
+fn parts(bytes: &[u8]) -> Option<([u8; 8], &[u8; 32], &str)> {
+    let (until, rest) = bytes.split_first_chunk()?;
+    let (tag, name) = rest.split_first_chunk()?;
+    Some((*until, tag, std::str::from_utf8(name).ok()?))
+}
+
+fn signing(plan: PlanId, key: Option<&Key>, until: [u8; 8]) -> Hmac<Sha256> {
+    let secret = key.map_or(NOBODY_S, Key::digest);
+    let mut mac = Hmac::new_from_slice(&secret).expect("a key of HMAC has any length");
+    mac.update(LABEL);
+    mac.update(plan.as_bytes());
+    mac.update(&until);
+    mac
 }
 
 #[cfg(test)]
@@ -71,42 +73,62 @@ mod tests {
     use super::*;
     use crate::job::new_id;
 
-    const LIFE: Duration = Duration::from_secs(600);
-
-    #[test]
-    fn a_ticket_is_for_one_plan_and_some_time() {
-        let tickets = Tickets::default();
-        let (plan, now, key) = (new_id(0), Instant::now(), Some([1; 32]));
-        let ticket = tickets.issue(plan, key, now, LIFE).expect("random");
-        assert_eq!(tickets.holder(&ticket, plan, now), Some(Holder(key)));
-        let later = now + LIFE - Duration::from_millis(1);
-        assert_eq!(
-            tickets.holder(&ticket, plan, later),
-            Some(Holder(key)),
-            "again"
-        );
-        assert_eq!(tickets.holder(&ticket, new_id(0), now), None);
-        assert_eq!(tickets.holder(&ticket, plan, now + LIFE), None);
-        assert_eq!(tickets.holder("", plan, now), None);
+    /// A file of one key.
+    fn keys(name: &str, digit: char) -> Keys {
+        let sum = digit.to_string().repeat(64);
+        let text = format!("[[key]]\nname = {name:?}\nsha256 = \"{sum}\"\nscopes = [\"read\"]\n");
+        Keys::read(&text).expect("a key")
     }
 
     #[test]
-    fn a_key_has_so_many_and_no_more() {
-        let tickets = Tickets::default();
-        let (plan, begin) = (new_id(0), Instant::now());
-        let issue = |key: u8, n: usize| {
-            let now = begin + Duration::from_micros(n as u64);
-            tickets
-                .issue(plan, Some([key; 32]), now, LIFE)
-                .expect("random")
+    fn a_ticket_is_for_one_plan_and_some_time_in_one_key_s_name() {
+        let (ours, plan) = (keys("ä", '1'), new_id(0));
+        let key = ours.named("ä");
+        let ticket = issue(plan, key, 600_000);
+        let holds = |text: &str, plan, keys: &Keys, now_ms| {
+            let holder = holder(text, plan, Some(keys), now_ms);
+            holder.is_ok_and(|holder| holder.is_some())
         };
-        let other = issue(2, 0);
-        let first = issue(1, 1);
-        let second = issue(1, 2);
-        for n in 2..=MOST {
-            issue(1, n + 1);
+        assert!(holds(&ticket, plan, &ours, 0));
+        assert!(holds(&ticket, plan, &ours, 599_999), "again");
+        assert!(holds(&ticket, plan, &keys("ä", '1'), 0), "on any node");
+        assert!(!holds(&ticket, plan, &ours, 600_000));
+        assert!(!holds(&ticket, new_id(0), &ours, 0));
+        assert!(!holds(&ticket, plan, &keys("ä", '2'), 0), "a changed key");
+        assert!(!holds(&ticket, plan, &keys("o", '1'), 0), "no such key");
+        assert!(holder(&ticket, plan, None, 0).is_err());
+        assert!(!holds(&issue(plan, None, 600_000), plan, &ours, 0));
+    }
+
+    #[test]
+    fn no_bit_of_it_can_be_changed_and_nothing_be_left_out() {
+        let (keys, plan) = (keys("a", '1'), new_id(0));
+        let ticket = issue(plan, keys.named("a"), 600_000);
+        let bytes = BASE64.decode(&ticket).expect("of this alphabet");
+        for bit in 0..bytes.len() * 8 {
+            let mut forged = bytes.clone();
+            forged[bit / 8] ^= 1 << (bit % 8);
+            let forged = BASE64.encode(forged);
+            assert!(holder(&forged, plan, Some(&keys), 0).is_err(), "{bit}");
         }
-        let holds = |text: &str| tickets.holder(text, plan, begin).is_some();
-        assert!(holds(&other) && holds(&second) && !holds(&first));
+        for length in 0..ticket.len() {
+            let part = &ticket[..length];
+            assert!(holder(part, plan, Some(&keys), 0).is_err(), "{part}");
+        }
+    }
+
+    #[test]
+    fn where_nobody_has_a_key_it_is_a_ticket_all_the_same() {
+        let plan = new_id(0);
+        let ticket = issue(plan, None, 600_000);
+        assert_eq!(holder(&ticket, plan, None, 599_999), Ok(None));
+        for (text, plan, now_ms) in [
+            (&*ticket, plan, 600_000),
+            (&*ticket, new_id(0), 0),
+            ("x", plan, 0),
+        ] {
+            let refused = holder(text, plan, None, now_ms);
+            assert_eq!(refused, Err(Unauthorized::NoTicket), "{text}");
+        }
     }
 }

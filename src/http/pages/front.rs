@@ -12,7 +12,7 @@ use axum::response::{IntoResponse, Response};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-use crate::export::sha256_hex;
+use crate::digest::sha256_hex;
 use crate::http::known_tags::KnownTags;
 use crate::http::params::NoParams;
 use crate::http::problem::Problem;

@@ -82,6 +82,7 @@ pub(super) async fn cancel(
     caller.plan(&*state.store, id).await?;
     let plan = state.store.request_cancel(id, state.clock.now_ms()).await?;
     let status = if plan.status.is_final() {
+        state.instruments.origins.forget(id);
         StatusCode::OK
     } else {
         StatusCode::ACCEPTED
@@ -97,7 +98,10 @@ pub(super) async fn delete(
     _: NoParams,
 ) -> Result<StatusCode, Problem> {
     match caller.plan(&*state.store, id).await {
-        Ok(_) => state.store.delete(id, state.clock.now_ms()).await?,
+        Ok(_) => {
+            state.store.delete(id, state.clock.now_ms()).await?;
+            state.instruments.origins.forget(id);
+        }
         // Whoever asks again had no answer the first time.
         Err(Problem::Gone(_)) => {}
         Err(problem) => return Err(problem),

@@ -52,7 +52,11 @@ impl Problem {
                 format!("the key has asked more often than it may; try again in {retry_after_s} s")
             }
             Self::TooManyStreams(TooMany { limit, most }) => {
-                format!("{most} event streams are open, the limit {limit} of GET /limits; close one, or wait")
+                let whose = match *limit {
+                    "streams_per_key" => " of the key's owner",
+                    _ => "",
+                };
+                format!("{most} event streams{whose} are open, the limit {limit} of GET /limits; close one, or wait")
             }
             Self::NoSuchResource(path) => {
                 format!("nothing is at {path}; GET /docs lists what is")
@@ -116,7 +120,7 @@ impl Problem {
                 "a request with this Idempotency-Key had another body; take a new key for a new request".to_owned()
             }
             Self::QuotaReached { active, quota, retry_after_s } => {
-                format!("{active} plans of this key are queued or running, its quota is {quota}; try again in {retry_after_s} s")
+                format!("{active} plans of the key's owner are queued or running, the key's quota is {quota}; try again in {retry_after_s} s")
             }
             Self::BodyTooLarge(limit) => {
                 format!(

@@ -25,7 +25,8 @@ pub(super) fn of_failure(name: &str) -> (StatusCode, &'static str) {
     let (status, _, title) = match FailureKind::named(name) {
         Some(FailureKind::NoGround) => NO_GROUND,
         Some(FailureKind::InvalidScenario) => INVALID_SCENARIO,
-        Some(FailureKind::PlannerPanic | FailureKind::WorkerLost) | None => {
+        Some(FailureKind::PlannerPanic | FailureKind::WorkerLost | FailureKind::ScenarioLost)
+        | None => {
             return (StatusCode::INTERNAL_SERVER_ERROR, "The plan failed");
         }
     };

@@ -29,7 +29,7 @@ use super::params::{self, NoParams};
 use super::problem::Problem;
 use super::{AppState, off_thread};
 use crate::catalogue::{Catalogue, CatalogueError, Claim, Entry, Expected, Naming, Tally};
-use crate::export::sha256_hex;
+use crate::digest::sha256_hex;
 use crate::terrain::is_dataset_name;
 
 /// Uploads at the same time; more wait, as long as a body may pause.

@@ -128,12 +128,89 @@ async fn send(
         .map_err(io::Error::other)?;
     let answer = sender.send_request(request);
     tokio::pin!(connection, answer);
-    tokio::select! {
-        answer = &mut answer => answer.map(|answer| answer.status()).map_err(io::Error::other),
-        ended = &mut connection => match ended {
-            // The answer is there when the connection has ended well.
-            Ok(()) => answer.await.map(|answer| answer.status()).map_err(io::Error::other),
-            Err(error) => Err(io::Error::other(error)),
-        },
+    let answer = tokio::select! {
+        biased;
+        answer = &mut answer => answer,
+        // However it ended: an answer that came before is there now, and what was heard is not to be sent again. Where
+        // there is none, its error says why.
+        _ = &mut connection => answer.await,
+    };
+    answer
+        .map(|answer| answer.status())
+        .map_err(io::Error::other)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::pin::Pin;
+    use std::task::{Context, Poll, Waker};
+
+    use tokio::io::ReadBuf;
+
+    use super::*;
+
+    /// Breaks as soon as it has answered what was written to it, or in place of the answer.
+    struct Breaking {
+        answer: &'static [u8],
+        heard: bool,
+        reader: Option<Waker>,
+    }
+
+    impl AsyncRead for Breaking {
+        fn poll_read(
+            mut self: Pin<&mut Self>,
+            context: &mut Context<'_>,
+            buffer: &mut ReadBuf<'_>,
+        ) -> Poll<io::Result<()>> {
+            if !self.heard {
+                self.reader = Some(context.waker().clone());
+                return Poll::Pending;
+            }
+            match std::mem::take(&mut self.answer) {
+                [] => Poll::Ready(Err(io::ErrorKind::ConnectionReset.into())),
+                answer => {
+                    buffer.put_slice(answer);
+                    Poll::Ready(Ok(()))
+                }
+            }
+        }
+    }
+
+    impl AsyncWrite for Breaking {
+        fn poll_write(
+            mut self: Pin<&mut Self>,
+            _: &mut Context<'_>,
+            bytes: &[u8],
+        ) -> Poll<io::Result<usize>> {
+            self.heard = true;
+            self.reader.take().into_iter().for_each(Waker::wake);
+            Poll::Ready(Ok(bytes.len()))
+        }
+
+        fn poll_flush(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<io::Result<()>> {
+            Poll::Ready(Ok(()))
+        }
+
+        fn poll_shutdown(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<io::Result<()>> {
+            Poll::Ready(Ok(()))
+        }
+    }
+
+    async fn sent(answer: &'static [u8]) -> io::Result<StatusCode> {
+        let stream = Breaking {
+            answer,
+            heard: false,
+            reader: None,
+        };
+        send(stream, Request::new(Full::default())).await
+    }
+
+    #[tokio::test]
+    async fn an_answer_counts_though_the_connection_breaks_behind_it() {
+        let answer = sent(b"HTTP/1.1 200 OK\r\ncontent-length: 0\r\n\r\n").await;
+        assert_eq!(answer.expect("it came"), StatusCode::OK);
+        for cut_off in ["", "HTTP/1.1 200 OK\r\ncontent-le"] {
+            assert!(sent(cut_off.as_bytes()).await.is_err(), "{cut_off}");
+        }
     }
 }

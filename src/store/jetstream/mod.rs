@@ -202,7 +202,7 @@ impl Store for JetStreamStore {
             .await
     }
 
-    async fn release(&self, lease: &Lease) -> Result<(), StoreError> {
+    async fn release(&self, lease: &Lease) -> Result<Plan, StoreError> {
         self.open_store()?
             .release(lease.plan.id, lease.attempt)
             .await

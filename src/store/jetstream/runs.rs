@@ -159,7 +159,7 @@ impl JetStream {
         Ok(record.plan.clone())
     }
 
-    pub(super) async fn release(&self, id: PlanId, attempt: u64) -> Result<(), StoreError> {
+    pub(super) async fn release(&self, id: PlanId, attempt: u64) -> Result<Plan, StoreError> {
         let now_ms = (self.options.clock)();
         let mut back = AckKind::Nak(None);
         let released = self
@@ -177,11 +177,12 @@ impl JetStream {
                 Ok(Some(Change::told(record)))
             })
             .await;
-        released.map_err(|error| lost(error, id))?;
+        let standing = released.map_err(|error| lost(error, id))?;
         if let Some(job) = self.leases.let_go(id, attempt) {
             answer(id, &job, back).await;
         }
-        Ok(())
+        let record = standing.record(id, now_ms)?;
+        Ok(record.plan.clone())
     }
 
     pub(super) async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {

@@ -31,6 +31,8 @@ pub(super) struct Claims {
     messages: Sender<Message>,
     /// To be answered after the commit.
     held: Vec<(Claimer, Result<Lease, StoreError>)>,
+    /// Whether the transaction may hold what a claim did.
+    pub(super) any: bool,
     /// The greatest attempt whose lease was given out before it.
     pub(super) early_attempt: u64,
 }
@@ -40,6 +42,7 @@ impl Claims {
         Self {
             messages,
             held: Vec::new(),
+            any: false,
             early_attempt: 0,
         }
     }
@@ -50,6 +53,7 @@ impl Claims {
             && tx.sound().is_ok()
             && let Some(claimer) = waiting.pop_front()
         {
+            self.any = true;
             match tx.step(operations::claim) {
                 Ok(None) => {
                     waiting.push_front(claimer);

@@ -4,6 +4,7 @@
 //! process died is queued again when the next one opens the file.
 
 mod claims;
+mod head;
 mod idempotency;
 mod opening;
 mod operations;
@@ -175,7 +176,7 @@ impl Store for SqliteStore {
             .await
     }
 
-    async fn release(&self, lease: &Lease) -> Result<(), StoreError> {
+    async fn release(&self, lease: &Lease) -> Result<Plan, StoreError> {
         let (id, attempt) = (lease.plan.id, lease.attempt);
         self.writer
             .change(move |tx| operations::release(tx, id, attempt))

@@ -8,7 +8,7 @@ use tokio::sync::watch;
 use super::read::missing;
 use super::row::{COLUMNS, PlanRow};
 use super::transaction::{Effect, Transaction};
-use super::{idempotency, removal, webhooks};
+use super::{head, idempotency, removal, webhooks};
 use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Status, Submission};
 use crate::store::{End, Ending, Lease, StoreError, Submitted, Tombstone, lost};
@@ -74,7 +74,7 @@ fn within_quota(tx: &Transaction<'_>, submission: &Submission) -> Result<(), Sto
 
 /// `None` when nothing is queued.
 pub(super) fn claim(tx: &mut Transaction<'_>) -> Result<Option<Lease>, StoreError> {
-    let Some(mut row) = PlanRow::head(tx.connection)? else {
+    let Some((mut row, scenario)) = head::take(tx)? else {
         return Ok(None);
     };
     row.plan.start(tx.now_ms())?;
@@ -83,10 +83,6 @@ pub(super) fn claim(tx: &mut Transaction<'_>) -> Result<Option<Lease>, StoreErro
     tx.queued -= 1;
     tell_status(tx, &mut row)?;
     row.update(tx.connection)?;
-    let scenario: String = tx
-        .connection
-        .prepare_cached("SELECT document FROM scenarios WHERE plan_seq = ?1")?
-        .query_row([row.seq], |scenario| scenario.get(0))?;
     let (cancel, cancelled) = watch::channel(false);
     tx.effects.push(Effect::Leased(row.plan.id, cancel));
     Ok(Some(Lease {
@@ -143,7 +139,7 @@ pub(super) fn release(
     tx: &mut Transaction<'_>,
     id: PlanId,
     attempt: u64,
-) -> Result<(), StoreError> {
+) -> Result<Plan, StoreError> {
     let row = leased(tx, id, attempt)?;
     give_back(tx, row)
 }
@@ -247,18 +243,18 @@ fn leased(tx: &Transaction<'_>, id: PlanId, attempt: u64) -> Result<PlanRow, Sto
 }
 
 /// Back to the queue, or to its end when that was asked for.
-fn give_back(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<(), StoreError> {
+fn give_back(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<Plan, StoreError> {
     tx.effects.push(Effect::Unleased(row.plan.id));
     if row.plan.cancel_requested {
         row.plan.cancel(tx.now_ms())?;
         tell_end(tx, &mut row)?;
         row.update(tx.connection)?;
-        return Ok(());
+        return Ok(row.plan);
     }
     requeue(tx, row)
 }
 
-fn requeue(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<(), StoreError> {
+fn requeue(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<Plan, StoreError> {
     row.plan.requeue()?;
     forget_incumbent(tx, &row)?;
     tx.queued += 1;
@@ -267,7 +263,7 @@ fn requeue(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<(), StoreError>
     row = row.placed(tx.connection)?;
     tell_status(tx, &mut row)?;
     row.update(tx.connection)?;
-    Ok(())
+    Ok(row.plan)
 }
 
 fn keep_incumbent(tx: &Transaction<'_>, row: &PlanRow, best: &Incumbent) -> Result<(), StoreError> {
@@ -287,13 +283,13 @@ fn forget_incumbent(tx: &Transaction<'_>, row: &PlanRow) -> Result<(), StoreErro
     Ok(())
 }
 
-fn tell_status(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
+pub(super) fn tell_status(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
     let status = Event::Status(Box::new(row.plan.clone()));
     tx.tell(row, &[status])
 }
 
 /// The caller has just ended the plan. From now on its time runs.
-fn tell_end(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
+pub(super) fn tell_end(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
     row.plan.expires_ms = tx.options.retention.expires_ms(&row.plan);
     let status = Event::Status(Box::new(row.plan.clone()));
     let end = Event::End(row.plan.status);

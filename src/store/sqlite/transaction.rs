@@ -5,7 +5,7 @@ use tokio::sync::watch;
 
 use super::packed;
 use super::row::PlanRow;
-use crate::job::{Event, PlanId};
+use crate::job::{Event, Plan, PlanId};
 use crate::store::{Options, StoreError};
 
 /// Events in a row of the table, at most.
@@ -35,6 +35,8 @@ pub(super) enum Effect {
     Stop(PlanId),
     /// Nobody runs the plan any more.
     Unleased(PlanId),
+    /// The store itself has ended the plan.
+    Ended(Box<Plan>),
 }
 
 impl Transaction<'_> {

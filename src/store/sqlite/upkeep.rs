@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::path::Path;
 
+use rusqlite::types::{ToSqlOutput, ValueRef};
 use rusqlite::{Connection, OpenFlags};
 
 use super::{BUSY_TIMEOUT, DATABASE, StoreError};
@@ -134,8 +135,10 @@ pub fn backup(data_dir: &Path, to: &Path) -> Result<(), StoreError> {
     name.push(".part");
     let part = to.with_file_name(name);
     let _ = std::fs::remove_file(&part);
+    // SQLite passes it on to the system as it is, whatever text that makes.
+    let path = ToSqlOutput::Borrowed(ValueRef::Text(part.as_os_str().as_encoded_bytes()));
     let written = connection
-        .execute("VACUUM INTO ?1", [part.to_string_lossy()])
+        .execute("VACUUM INTO ?1", [path])
         .map_err(StoreError::from)
         .and_then(|_| put_in_place(&part, to).map_err(unusable));
     if written.is_err() {

@@ -259,26 +259,42 @@ impl Desk {
         }
     }
 
-    fn serve_batch(&mut self, mut batch: Vec<Box<dyn Operation>>) {
+    fn serve_batch(&mut self, batch: Vec<Box<dyn Operation>>) {
         self.waiting.retain(|claimer| !claimer.reply.is_closed());
-        if batch.is_empty() && (self.queued == 0 || self.waiting.is_empty()) {
-            return;
+        if !batch.is_empty() || (self.queued > 0 && !self.waiting.is_empty()) {
+            self.write(batch, true);
         }
+    }
+
+    /// Do a batch in one transaction, and what claims there are, if `claiming`.
+    fn write(&mut self, mut batch: Vec<Box<dyn Operation>>, claiming: bool) {
         let mut claims = Claims::new(self.messages.clone());
         let mut spoiled = false;
         let durable = self.commit(|tx, waiting| {
             // Whoever can be given a plan need not wait until all else is written.
-            claims.serve(tx, waiting);
+            if claiming {
+                claims.serve(tx, waiting);
+            }
             for operation in &mut batch {
                 operation.run(tx);
             }
-            claims.serve(tx, waiting);
+            if claiming {
+                claims.serve(tx, waiting);
+            }
             spoiled = tx.sound().is_err();
         });
         if durable.is_err() {
             self.void_attempt = self.void_attempt.max(claims.early_attempt);
         }
+        let any_claimed = claims.any;
         claims.answer(durable.as_ref().copied());
+        if durable.is_err() && any_claimed && !batch.is_empty() {
+            // Nor must what a claim did be the failure of whoever shared its transaction.
+            self.write(batch, false);
+            // Those who have not been served go on waiting for a plan, not for the next message.
+            self.serve_batch(Vec::new());
+            return;
+        }
         if spoiled && batch.len() > 1 {
             // What one of them did must not be the others' failure.
             for operation in batch {
@@ -360,6 +376,7 @@ impl Desk {
                 Effect::Unleased(id) => {
                     self.leases.remove(&id);
                 }
+                Effect::Ended(plan) => (self.options.lost)(&plan),
             }
         }
     }

@@ -246,7 +246,8 @@ async fn a_cancelled_run_that_comes_back_is_not_run_again() {
         let released = store.submit(submission()).await.unwrap().plan.id;
         let lease = store.claim().await.unwrap();
         store.request_cancel(released, 11_000).await.unwrap();
-        store.release(&lease).await.unwrap();
+        let plan = store.release(&lease).await.unwrap();
+        assert_eq!(plan, store.get(released).await.unwrap());
 
         let recovered = store.submit(submission()).await.unwrap().plan.id;
         let _lease = store.claim().await.unwrap();

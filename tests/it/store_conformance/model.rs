@@ -160,7 +160,7 @@ impl Model {
                 store.finish(lease, failure().at(0)).await.map(|_| ())
             }
             Step::Finish(_, status) => store.finish(lease, ending(*status).at(0)).await.map(|_| ()),
-            _ => store.release(lease).await,
+            _ => store.release(lease).await.map(|_| ()),
         };
         let (plan, holds) = (*plan, self.holds(which));
         assert_eq!(kind(answer), if holds { Ok(()) } else { Err("lease lost") });

@@ -198,8 +198,9 @@ async fn a_released_plan_is_next_and_begins_anew() {
             .await
             .unwrap();
         store.release(&second).await.unwrap();
-        store.release(&first).await.unwrap();
+        let released = store.release(&first).await.unwrap();
         let plan = store.get(ids[0]).await.unwrap();
+        assert_eq!(released, plan);
         assert_eq!(
             (plan.status, plan.queue_position),
             (Status::Queued, Some(1))

@@ -12,7 +12,7 @@ use http_body_util::BodyExt as _;
 use noctule::catalogue::Directories;
 use noctule::http::auth::{Access, Keys, Settings};
 use noctule::http::webhook;
-use noctule::http::{self, Capacity, Hosts, InFlight, Origins, Parts, Phase, Terrains};
+use noctule::http::{self, Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains};
 use noctule::planner;
 use noctule::scenario::limits::Limits;
 use noctule::store::measured::MeasuredStore;
@@ -159,6 +159,7 @@ impl Api {
             terrains: Terrains::new(catalogue),
             capacity: Capacity { workers: 2, queue },
             in_flight: InFlight::default(),
+            readiness: Readiness::default(),
             clock: SteadyClock::following(wall_clock()),
             body_timeout: Duration::from_secs(30),
             access,

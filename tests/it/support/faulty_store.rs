@@ -78,7 +78,7 @@ impl Store for FaultyStore {
         self.sound.finish(lease, end).await
     }
 
-    async fn release(&self, lease: &Lease) -> Result<(), StoreError> {
+    async fn release(&self, lease: &Lease) -> Result<Plan, StoreError> {
         self.stumble()?;
         self.sound.release(lease).await
     }

@@ -1,7 +1,7 @@
 //! Keys, and requests that carry them.
 
 use axum::http::Method;
-use noctule::export::sha256_hex;
+use noctule::digest::sha256_hex;
 
 use super::api::{Answer, Api};
 

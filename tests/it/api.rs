@@ -260,6 +260,49 @@ async fn a_cancelled_plan_keeps_its_best_route() {
 }
 
 #[tokio::test]
+async fn a_plan_is_cancelled_or_deleted_only_as_its_caller_expects_it() {
+    let api = Api::new();
+    let address = api.submit().await;
+    let queued = api.get(&address).await.header("etag").to_owned();
+    api.store.claim().await.expect("a queued plan");
+    let running = api.get(&address).await.header("etag").to_owned();
+
+    let cancel = format!("{address}/cancel");
+    for (method, uri) in [(Method::POST, &cancel), (Method::DELETE, &address)] {
+        for (header, value) in [
+            ("if-match", &*queued),
+            ("if-match", "\"x, *\""),
+            ("if-match", "\"caf\u{e9}\""),
+            ("if-none-match", &running),
+            ("if-none-match", "*"),
+        ] {
+            let headers = [(header, value)];
+            let answer = api.send(method.clone(), uri, &headers, "");
+            let problem = answer.await.expect_problem(412, "precondition-failed");
+            let detail = problem["detail"].as_str().expect("text");
+            assert!(detail.contains(&running), "{detail}");
+        }
+    }
+    let after = api.get(&address).await;
+    assert_eq!(after.header("etag"), running, "nothing has happened");
+
+    let as_it_is = [("if-match", &*format!("\"x\", {running}"))];
+    let cancelled = api.send(Method::POST, &cancel, &as_it_is, "").await;
+    assert_eq!(cancelled.status, StatusCode::ACCEPTED);
+    for (header, value, status) in [
+        ("if-match", &*running, 412),
+        ("if-match", "*", 204),
+        // Nothing of what was removed is as it was.
+        ("if-match", "*", 412),
+        ("if-none-match", "*", 204),
+    ] {
+        let headers = [(header, value)];
+        let answer = api.send(Method::DELETE, &address, &headers, "");
+        assert_eq!(answer.await.status, status, "{header}: {value}");
+    }
+}
+
+#[tokio::test]
 async fn a_deleted_plan_is_gone() {
     let api = Api::new();
     let address = api.submit().await;

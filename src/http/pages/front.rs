@@ -13,7 +13,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 
 use crate::export::sha256_hex;
-use crate::http::known_tags::KnownTags;
+use crate::http::entity_tags::EntityTags;
 use crate::http::params::NoParams;
 use crate::http::problem::Problem;
 
@@ -168,7 +168,7 @@ fn serve(name: &str, uri: &Uri, headers: &HeaderMap) -> Result<Response, Problem
         (header::CONTENT_SECURITY_POLICY, POLICY),
         (header::VARY, HeaderValue::from_static("accept-encoding")),
     ];
-    if KnownTags::of(headers).is_some_and(|known| known.contain(&tag)) {
+    if EntityTags::known(headers).is_some_and(|known| known.contain(&tag)) {
         return Ok((StatusCode::NOT_MODIFIED, common).into_response());
     }
     let mut response = (common, bytes).into_response();

@@ -138,7 +138,7 @@ impl Problem {
             Self::PreconditionFailed(_) => (
                 StatusCode::PRECONDITION_FAILED,
                 "precondition-failed",
-                "The dataset is not as expected",
+                "The resource is not as expected",
             ),
             Self::InvalidTerrain(_) => (
                 StatusCode::UNPROCESSABLE_ENTITY,

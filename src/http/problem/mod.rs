@@ -52,7 +52,7 @@ pub(super) enum Problem {
     TerrainMounted(String),
     /// The dataset that a plan was made over is not there any more; why.
     NoGround(String),
-    /// A dataset is not what the request expects; which.
+    /// A plan or a dataset is not what the request expects; which.
     PreconditionFailed(String),
     /// A dataset is too long; the limit in bytes.
     TerrainTooLarge(u64),

@@ -10,7 +10,7 @@ use super::document::{Corners, Place};
 use super::{Name, etag, tagged};
 use crate::geometry::geodesy::{LatLon, wrapped};
 use crate::http::AppState;
-use crate::http::known_tags::KnownTags;
+use crate::http::entity_tags::EntityTags;
 use crate::http::params::{self, Params};
 use crate::http::problem::Problem;
 use crate::terrain::dem::Degrees;
@@ -46,7 +46,7 @@ pub(in crate::http) async fn elevations(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let asked = Asked::read(name.clone(), &uri)?;
-    let (datasets, known) = (state.rules.datasets.clone(), KnownTags::of(&headers));
+    let (datasets, known) = (state.rules.datasets.clone(), EntityTags::known(&headers));
     let sampled = state
         .terrains
         .read(move || asked.sample(&*datasets, known.as_ref()))
@@ -90,7 +90,7 @@ impl Asked {
     fn sample(
         self,
         datasets: &dyn Datasets,
-        known: Option<&KnownTags>,
+        known: Option<&EntityTags>,
     ) -> Result<(HeaderValue, Option<ElevationsDocument>), DatasetError> {
         let found = datasets.find(&self.name, self.sha256.as_deref())?;
         let tag = etag(&found.sha256);

@@ -336,6 +336,7 @@ async fn results_that_are_not_there_say_why() {
     run::fail(&*api.store, &lease).await;
     problems.push(api.get(&result).await.expect_problem(409, "no-result"));
     let failed = api.get(&address).await.json();
+    assert_eq!(failed["progress"], 1.0);
     assert_eq!(failed["error"]["type"], "/problems/planner-panic");
     assert_eq!(failed["error"]["detail"], "the planner broke");
 
@@ -348,6 +349,7 @@ async fn results_that_are_not_there_say_why() {
         StatusCode::OK,
         "a queued plan ends at once"
     );
+    assert_eq!(cancelled.json()["progress"], 1.0);
     problems.push(
         api.get(&format!("{address}/result"))
             .await

@@ -2,9 +2,14 @@
 
 use axum::http::{HeaderMap, header};
 
-/// The media type out of `offers` that the caller likes best, the earlier one between equals;
-/// `None` when the caller takes none of them. No `Accept` takes all.
+/// The media type out of `offers` that the caller likes best; `None` when the caller takes none of them.
 pub(super) fn choose(headers: &HeaderMap, offers: &[&'static str]) -> Option<&'static str> {
+    ranked(headers, offers).first().copied()
+}
+
+/// The media types out of `offers` that the caller takes, the best liked first, the earlier one between
+/// equals. No `Accept` takes all.
+pub(super) fn ranked(headers: &HeaderMap, offers: &[&'static str]) -> Vec<&'static str> {
     let ranges: Vec<Range> = headers
         .get_all(header::ACCEPT)
         .iter()
@@ -13,7 +18,7 @@ pub(super) fn choose(headers: &HeaderMap, offers: &[&'static str]) -> Option<&'s
         .filter_map(Range::read)
         .collect();
     if ranges.is_empty() {
-        return offers.first().copied();
+        return offers.to_vec();
     }
     let quality = |offer: &str| {
         ranges
@@ -22,13 +27,10 @@ pub(super) fn choose(headers: &HeaderMap, offers: &[&'static str]) -> Option<&'s
             .max_by_key(|range| range.precision())
             .map_or(0.0, |range| range.quality)
     };
-    offers
-        .iter()
-        .copied()
-        .fold(None, |best: Option<&'static str>, offer| {
-            let better = quality(offer) > best.map_or(0.0, quality);
-            if better { Some(offer) } else { best }
-        })
+    let mut taken = offers.to_vec();
+    taken.retain(|offer| quality(offer) > 0.0);
+    taken.sort_by(|a, b| quality(b).total_cmp(&quality(a)));
+    taken
 }
 
 /// What the caller sent, for people.

@@ -142,6 +142,7 @@ fn streamed(stream: Stream, wire: Wire) -> Response {
             HeaderValue::from_static("no-cache, no-transform"),
         ),
         (X_ACCEL_BUFFERING, HeaderValue::from_static("no")),
+        (header::VARY, HeaderValue::from_static("accept")),
     ];
     let body = Body::from_stream(futures_util::StreamExt::chain(prologue, told));
     // A slow reader costs a place in a plan's events, no memory, and may be as slow as it likes.

@@ -285,6 +285,7 @@ async fn lines_tell_the_same_as_events() {
     let request = plan.events("").header("accept", "application/x-ndjson");
     let answer = request.send().await.expect("an answer");
     assert_eq!(answer.headers()["content-type"], "application/x-ndjson");
+    assert_eq!(answer.headers()["vary"], "accept");
     let lines: Vec<Block> = answer
         .text()
         .await

@@ -503,7 +503,9 @@ async fn a_body_that_never_ends_is_cut_off() {
     let answer = api
         .send(Method::POST, "/plans", &headers, Body::from_stream(broken))
         .await;
-    answer.expect_problem(400, "incomplete-body");
+    let broken_off = answer.expect_problem(400, "incomplete-body");
+    let detail = "the connection ended before the body did";
+    assert_eq!(broken_off["detail"], detail);
 }
 
 #[tokio::test]

@@ -30,6 +30,7 @@ impl Problem {
                 format!("address and headers may have {limit} bytes together, and headers be 100")
             }
             Self::BodyIncomplete => "the connection ended before the body did".to_owned(),
+            Self::BodyUnreadable => "the chunks that the body comes in cannot be read, see RFC 9112 section 7.1".to_owned(),
             Self::BodyNotGzip(detail) => format!("content-encoding is gzip, but: {detail}"),
             Self::InvalidParameter { detail, .. }
             | Self::NoGeodeticFrame(detail)

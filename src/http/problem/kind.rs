@@ -52,7 +52,7 @@ impl Problem {
                 "invalid-json",
                 "The body is not JSON",
             ),
-            Self::BodyIncomplete => (
+            Self::BodyIncomplete | Self::BodyUnreadable => (
                 StatusCode::BAD_REQUEST,
                 "incomplete-body",
                 "The body broke off",

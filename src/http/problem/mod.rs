@@ -86,6 +86,8 @@ pub(super) enum Problem {
     BodyTooSlow(Duration),
     /// The body broke off.
     BodyIncomplete,
+    /// The chunks that the body comes in cannot be read.
+    BodyUnreadable,
     /// The body is said to be gzip and is not; what the reader met.
     BodyNotGzip(String),
     /// The body is not JSON.

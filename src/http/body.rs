@@ -138,6 +138,7 @@ pub(super) enum Coding {
 
 impl Coding {
     pub(super) fn of(headers: &HeaderMap) -> Result<Self, Problem> {
+        check_transfer(headers)?;
         let codings: Vec<String> = headers
             .get_all(header::CONTENT_ENCODING)
             .iter()
@@ -152,6 +153,19 @@ impl Coding {
             _ => Err(Problem::UnsupportedCoding(codings.join(", "))),
         }
     }
+}
+
+/// Chunks are put together below; no other transfer coding is understood, RFC 9112 section 6.1.
+fn check_transfer(headers: &HeaderMap) -> Result<(), Problem> {
+    let values = headers.get_all(header::TRANSFER_ENCODING).iter();
+    let codings: Vec<_> = values
+        .map(|value| String::from_utf8_lossy(value.as_bytes()))
+        .collect();
+    let codings = codings.join(", ");
+    if codings.is_empty() || codings.trim().eq_ignore_ascii_case("chunked") {
+        return Ok(());
+    }
+    Err(Problem::UnsupportedTransferCoding(codings))
 }
 
 pub(super) fn announced_length(headers: &HeaderMap) -> Option<u64> {

@@ -85,6 +85,7 @@ async fn what_is_wrong_with_the_way_that_a_body_comes_is_told() {
             400,
             "the chunks that the body comes in cannot be",
         ),
+        ("gzip, chunked", 501, "transfer-encoding is gzip, chunked;"),
     ] {
         for line in ["POST /plans", "PUT /terrains/hill"] {
             let request = format!(

@@ -31,6 +31,9 @@ impl Problem {
             }
             Self::BodyIncomplete => "the connection ended before the body did".to_owned(),
             Self::BodyUnreadable => "the chunks that the body comes in cannot be read, see RFC 9112 section 7.1".to_owned(),
+            Self::UnsupportedTransferCoding(found) => {
+                format!("transfer-encoding is {found}; send the body plain or chunked, and name gzip in content-encoding")
+            }
             Self::BodyNotGzip(detail) => format!("content-encoding is gzip, but: {detail}"),
             Self::InvalidParameter { detail, .. }
             | Self::NoGeodeticFrame(detail)

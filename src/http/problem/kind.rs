@@ -193,6 +193,11 @@ impl Problem {
                 "internal",
                 "Internal error",
             ),
+            Self::UnsupportedTransferCoding(_) => (
+                StatusCode::NOT_IMPLEMENTED,
+                "unsupported-transfer-coding",
+                "Unsupported transfer coding",
+            ),
             Self::Draining { .. } => (
                 StatusCode::SERVICE_UNAVAILABLE,
                 "draining",

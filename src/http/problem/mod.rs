@@ -88,6 +88,8 @@ pub(super) enum Problem {
     BodyIncomplete,
     /// The chunks that the body comes in cannot be read.
     BodyUnreadable,
+    /// The body's transfer is coded in a way that is not read here; how.
+    UnsupportedTransferCoding(String),
     /// The body is said to be gzip and is not; what the reader met.
     BodyNotGzip(String),
     /// The body is not JSON.

@@ -189,7 +189,7 @@ impl Earth {
             None => over_grid(fields, &sketch.ends, earth).unwrap_or_else(|| sketch.area()),
         });
         let earth = earth(area);
-        earth.check(faults).then_some(earth)
+        earth.check(fields, faults).then_some(earth)
     }
 
     /// The plane in the middle of `area`.
@@ -210,39 +210,47 @@ impl Earth {
     }
 
     /// That the plane fits the earth all over the area; whether it does.
-    fn check(&self, faults: &mut Faults) -> bool {
+    fn check(&self, fields: &Fields<'_>, faults: &mut Faults) -> bool {
         let area = self.area;
-        let path = Path::Key(&Path::Root, "area");
+        let what = if fields.has("area") {
+            "the area"
+        } else {
+            "the area, by default the box round everything,"
+        };
         let farthest = area.min.lat.abs().max(area.max.lat.abs());
         if farthest > sketch::MAX_LATITUDE {
-            faults.add(&path, "near-pole", || {
-                format!(
-                    "the area reaches latitude {farthest:.6}, must stay within {} degrees of the equator: \
-                     beyond, degrees of longitude tell too little",
-                    sketch::MAX_LATITUDE
-                )
-            });
+            let detail = format!(
+                "{what} reaches latitude {farthest:.6}, must stay within {} degrees of the equator: \
+                 beyond, degrees of longitude tell too little",
+                sketch::MAX_LATITUDE
+            );
+            blame(
+                fields,
+                sketch::nearest_to_a_pole,
+                "near-pole",
+                detail,
+                faults,
+            );
             return false;
         }
         let rect = self.rect();
         let (width, height) = (rect.max.x - rect.min.x, rect.max.y - rect.min.y);
         let has_inside = width > 0.0 && height > 0.0;
         if !has_inside || width.max(height) > sketch::MAX_WIDTH_M {
-            faults.add(&path, "area-too-wide", || {
-                let size = if has_inside {
-                    format!("the area is {width:.0} m by {height:.0} m")
-                } else {
-                    // Parallels over much of a hemisphere bend past each other.
-                    format!(
-                        "the area reaches over {:.6} degrees of longitude",
-                        area.width()
-                    )
-                };
+            let size = if has_inside {
+                format!("{what} is {width:.0} m by {height:.0} m")
+            } else {
+                // Parallels over much of a hemisphere bend past each other.
                 format!(
-                    "{size}, must be at most {} m either way: a plane fits the earth no farther",
-                    sketch::MAX_WIDTH_M
+                    "{what} reaches over {:.6} degrees of longitude",
+                    area.width()
                 )
-            });
+            };
+            let detail = format!(
+                "{size}, must be at most {} m either way: a plane fits the earth no farther",
+                sketch::MAX_WIDTH_M
+            );
+            blame(fields, sketch::farthest, "area-too-wide", detail, faults);
             return false;
         }
         true
@@ -312,6 +320,27 @@ impl Earth {
         }
         self.written.borrow_mut().insert(frame::key(point), place);
         Some(point)
+    }
+}
+
+/// An area that no plane fits is at fault itself; for a default one, the `part` of the document that it had to reach is.
+fn blame(
+    fields: &Fields<'_>,
+    part: impl FnOnce(&Fields<'_>) -> Option<sketch::Part>,
+    code: &'static str,
+    detail: String,
+    faults: &mut Faults,
+) {
+    let part = if fields.has("area") {
+        None
+    } else {
+        part(fields)
+    };
+    let (name, item) = part.unwrap_or(("area", None));
+    let path = Path::Key(fields.path, name);
+    match item {
+        Some(index) => faults.add(&Path::Index(&path, index), code, || detail),
+        None => faults.add(&path, code, || detail),
     }
 }
 

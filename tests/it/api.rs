@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 
 use crate::support::api::Api;
 use crate::support::patience::eventually;
+use crate::support::stores::for_every_backend;
 use crate::support::{run, scenario};
 
 #[tokio::test]
@@ -617,4 +618,30 @@ async fn the_best_route_so_far_is_measured_like_a_result() {
     let ended = api.get(&partial).await;
     let stored = api.get(&format!("{address}/result")).await;
     assert_eq!(ended.body, stored.body);
+}
+
+#[tokio::test]
+async fn the_curve_of_the_best_so_far_has_its_newest_points() {
+    for_every_backend(async |backend| {
+        let options = Options {
+            events_kept: 20_000,
+            ..Options::new(10)
+        };
+        let api = Api::on(backend, options).await;
+        let address = api.submit().await;
+        let lease = api.store.claim().await.expect("a queued plan");
+        let route = vec![run::incumbent(0, 0.0)];
+        api.store.append(&lease, route).await.expect("held");
+        for begin in [0, 2_500, 5_000, 7_500, 10_000] {
+            let points = (begin..begin + 2_500).map(|nth| run::convergence(nth, nth as f64));
+            let points = api.store.append(&lease, points.collect());
+            points.await.expect("held");
+        }
+        let partial = format!("{address}/result?partial=true");
+        let so_far = api.get(&partial).await.json();
+        let curve = so_far["convergence"].as_array().expect("a curve");
+        let iterations = curve.iter().map(|point| &point["iteration"]);
+        assert!(iterations.eq((2_500..12_500).collect::<Vec<_>>().iter()));
+    })
+    .await;
 }

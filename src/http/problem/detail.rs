@@ -114,7 +114,7 @@ impl Problem {
             }
             Self::Gone(Tombstone { id, .. }) => format!("plan {id} was deleted"),
             Self::IdempotencyInFlight => {
-                "a request with this Idempotency-Key has not been answered yet; try again for its answer".to_owned()
+                "a request with this Idempotency-Key has not been accepted yet; try again for its plan".to_owned()
             }
             Self::IdempotencyKeyReused => {
                 "a request with this Idempotency-Key had another body; take a new key for a new request".to_owned()

@@ -154,7 +154,7 @@ impl Problem {
             Self::IdempotencyInFlight => (
                 StatusCode::CONFLICT,
                 "idempotency-in-flight",
-                "The same request is being answered",
+                "The same request is being accepted",
             ),
             Self::Gone(_) => (StatusCode::GONE, "gone", "The plan was removed"),
             Self::BodyTooLarge(_) | Self::TerrainTooLarge(_) => (

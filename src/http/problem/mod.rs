@@ -178,7 +178,7 @@ pub(super) enum Problem {
     TooManyStreams(TooMany),
     /// The idempotency key came with another body before.
     IdempotencyKeyReused,
-    /// Another request with the same idempotency key is being answered.
+    /// Another request with the same idempotency key has not been accepted yet.
     IdempotencyInFlight,
     /// The service is about to end.
     Draining {

@@ -13,6 +13,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 
 use crate::export::sha256_hex;
+use crate::http::accept::takes;
 use crate::http::entity_tags::EntityTags;
 use crate::http::params::NoParams;
 use crate::http::problem::Problem;
@@ -226,24 +227,6 @@ impl Coding {
     }
 }
 
-/// Whether `Accept-Encoding` names the coding, and not to refuse it.
-fn takes(headers: &HeaderMap, coding: &str) -> bool {
-    let lists = headers.get_all(header::ACCEPT_ENCODING).iter();
-    lists
-        .filter_map(|list| list.to_str().ok())
-        .flat_map(|list| list.split(','))
-        .any(|offer| {
-            let mut parts = offer.split(';').map(str::trim);
-            let named = parts
-                .next()
-                .is_some_and(|name| name.eq_ignore_ascii_case(coding));
-            let refused = parts
-                .filter_map(|part| part.strip_prefix("q="))
-                .any(|weight| weight.parse().is_ok_and(|weight: f64| weight <= 0.0));
-            named && !refused
-        })
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::{BTreeMap, BTreeSet};
@@ -322,22 +305,6 @@ mod tests {
                 let name = imported.1.trim_end_matches(['\'', ';']);
                 assert!(FILES.iter().any(|file| file.name == name), "{name}");
             }
-        }
-    }
-
-    #[test]
-    fn a_coding_is_taken_when_it_is_offered() {
-        for (offer, br, gz) in [
-            ("gzip, deflate, br, zstd", true, true),
-            ("gzip;q=0.5, br;q=0", false, true),
-            ("BR;q=1.0", true, false),
-            ("identity", false, false),
-            ("", false, false),
-        ] {
-            let mut headers = HeaderMap::new();
-            headers.insert(header::ACCEPT_ENCODING, HeaderValue::from_static(offer));
-            assert_eq!(takes(&headers, "br"), br, "{offer}");
-            assert_eq!(takes(&headers, "gzip"), gz, "{offer}");
         }
     }
 }

@@ -27,6 +27,12 @@ pub enum CatalogueError {
         /// The name.
         name: String,
     },
+    /// The name was to stand for something.
+    #[error("no dataset is called {name:?}, and one was expected")]
+    Absent {
+        /// The name.
+        name: String,
+    },
     /// The name stands for another content than was expected.
     #[error("{name} stands for another content than expected")]
     Changed {

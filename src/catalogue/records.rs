@@ -28,7 +28,7 @@ impl Name {
         let name = naming.name.clone();
         match (&naming.expected, before) {
             (Expected::Nothing, Some(_)) => return Err(CatalogueError::Exists { name }),
-            (Expected::OneOf(_), None) => return Err(CatalogueError::Changed { name }),
+            (Expected::OneOf(_), None) => return Err(CatalogueError::Absent { name }),
             (Expected::OneOf(sums), Some(before))
                 if !sums.iter().any(|sum| *sum == before.sha256 || sum == "*") =>
             {

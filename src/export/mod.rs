@@ -25,7 +25,6 @@ pub use file_name::file_name;
 pub use options::{Altitude, Firmware, OPTIONS, OptionRule, Options};
 
 /// What a result names its scenario by.
-pub use crate::digest::sha256_hex;
 use crate::scenario::json::Rules;
 
 /// A format of a result.

@@ -5,6 +5,7 @@ use uuid::Uuid;
 
 use super::document::{Origin, Position, ResultDocument, Timing};
 use super::*;
+use crate::digest::sha256_hex;
 use crate::planner;
 use crate::scenario::limits::Limits;
 use crate::scenario::{Frame, Scenario, json};

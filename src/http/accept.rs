@@ -1,34 +1,48 @@
-//! Which of several formats the `Accept` header asks for, RFC 9110 section 12.5.1.
+//! What a caller takes, and what it likes best: `Accept` and `Accept-Encoding`, RFC 9110 section 12.5.
 
-use axum::http::{HeaderMap, header};
+use axum::http::{HeaderMap, HeaderName, header};
 
-/// The media type out of `offers` that the caller likes best, the earlier one between equals;
-/// `None` when the caller takes none of them. No `Accept` takes all.
+use super::list;
+
+/// The media type out of `offers` that the caller likes best; `None` when the caller takes none of them.
 pub(super) fn choose(headers: &HeaderMap, offers: &[&'static str]) -> Option<&'static str> {
-    let ranges: Vec<Range> = headers
-        .get_all(header::ACCEPT)
-        .iter()
-        .filter_map(|value| value.to_str().ok())
-        .flat_map(|value| value.split(','))
-        .filter_map(Range::read)
-        .collect();
+    ranked(headers, offers).first().copied()
+}
+
+/// The media types out of `offers` that the caller takes, the best liked first, the earlier one between
+/// equals. No `Accept` takes all.
+pub(super) fn ranked(headers: &HeaderMap, offers: &[&'static str]) -> Vec<&'static str> {
+    let mut ranges = liked(headers, header::ACCEPT);
+    ranges.retain(|(range, _)| range.contains('/'));
+    let mut taken = offers.to_vec();
     if ranges.is_empty() {
-        return offers.first().copied();
+        return taken;
     }
+    // The most exact range decides.
     let quality = |offer: &str| {
-        ranges
-            .iter()
-            .filter(|range| range.covers(offer))
-            .max_by_key(|range| range.precision())
-            .map_or(0.0, |range| range.quality)
+        let of_offer = ranges.iter().filter_map(|(range, quality)| {
+            let exactness = exactness(range, offer)?;
+            Some((exactness, *quality))
+        });
+        of_offer
+            .max_by_key(|(exactness, _)| *exactness)
+            .map_or(0.0, |(_, quality)| quality)
     };
-    offers
-        .iter()
-        .copied()
-        .fold(None, |best: Option<&'static str>, offer| {
-            let better = quality(offer) > best.map_or(0.0, quality);
-            if better { Some(offer) } else { best }
-        })
+    taken.retain(|offer| quality(offer) > 0.0);
+    taken.sort_by(|a, b| quality(b).total_cmp(&quality(a)));
+    taken
+}
+
+/// Whether the caller takes answers in this coding. No `Accept-Encoding` takes none.
+pub(super) fn takes(headers: &HeaderMap, coding: &str) -> bool {
+    let codings = liked(headers, header::ACCEPT_ENCODING);
+    let quality = |name: &str| {
+        let found = codings.iter().find(|(listed, _)| listed == name);
+        found.map(|(_, quality)| *quality)
+    };
+    quality(coding)
+        .or_else(|| quality("*"))
+        .is_some_and(|quality| quality > 0.0)
 }
 
 /// What the caller sent, for people.
@@ -40,39 +54,39 @@ pub(super) fn asked(headers: &HeaderMap) -> String {
         .join(", ")
 }
 
-/// One entry of an `Accept` header.
-struct Range {
-    kind: String,
-    subtype: String,
-    quality: f64,
+/// What a header lists, in lower case, and how much each is liked, 0 to 1.
+fn liked(headers: &HeaderMap, name: HeaderName) -> Vec<(String, f64)> {
+    headers
+        .get_all(name)
+        .iter()
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| list::split(value, ','))
+        .filter_map(weighed)
+        .collect()
 }
 
-impl Range {
-    fn read(entry: &str) -> Option<Self> {
-        let mut parts = entry.split(';').map(str::trim);
-        let (kind, subtype) = parts.next()?.split_once('/')?;
-        let quality = parts
-            .filter_map(|parameter| parameter.split_once('='))
-            .find(|(name, _)| name.eq_ignore_ascii_case("q"))
-            .map_or(Ok(1.0), |(_, value)| value.parse());
-        let quality = quality
-            .ok()
-            .filter(|quality| (0.0..=1.0).contains(quality))?;
-        Some(Self {
-            kind: kind.to_ascii_lowercase(),
-            subtype: subtype.to_ascii_lowercase(),
-            quality,
-        })
-    }
+/// `name;q=0.5`; `None` where `q` is no number from 0 to 1.
+fn weighed(entry: &str) -> Option<(String, f64)> {
+    let mut parts = list::split(entry, ';');
+    let name = parts.next()?.to_ascii_lowercase();
+    let quality = parts
+        .filter_map(|parameter| parameter.split_once('='))
+        .find(|(name, _)| name.trim().eq_ignore_ascii_case("q"))
+        .map_or(Ok(1.0), |(_, value)| value.trim().parse());
+    let quality = quality.ok();
+    let quality = quality.filter(|quality| (0.0..=1.0).contains(quality))?;
+    Some((name, quality))
+}
 
-    fn covers(&self, offer: &str) -> bool {
-        let (kind, subtype) = offer.split_once('/').expect("an offer is a media type");
-        (self.kind == "*" || self.kind == kind) && (self.subtype == "*" || self.subtype == subtype)
-    }
-
-    /// The more exact range decides.
-    fn precision(&self) -> usize {
-        usize::from(self.kind != "*") + usize::from(self.subtype != "*")
+/// How exactly `range` names the media type `offer`; `None` when it does not.
+fn exactness(range: &str, offer: &str) -> Option<usize> {
+    let (kind, _) = offer.split_once('/')?;
+    if range == offer {
+        Some(2)
+    } else if range.strip_suffix("/*") == Some(kind) {
+        Some(1)
+    } else {
+        (range == "*/*").then_some(0)
     }
 }
 
@@ -98,6 +112,8 @@ mod tests {
                 Some("application/x-ndjson"),
             ),
             ("text/html", None),
+            ("text/html, */*; Q = 0.1", Some("text/event-stream")),
+            ("text/html;level=\"1, text/event-stream\"", None),
             // What is no quality makes no entry.
             (
                 "text/event-stream;q=nan, application/x-ndjson;q=0.1",
@@ -113,5 +129,25 @@ mod tests {
             choose(&HeaderMap::new(), &OFFERS),
             Some("text/event-stream")
         );
+    }
+
+    #[test]
+    fn a_coding_is_taken_when_it_is_offered() {
+        for (offer, br, gz) in [
+            ("gzip, deflate, br, zstd", true, true),
+            ("gzip;q=0.5, br;q=0", false, true),
+            ("BR;q=1.0", true, false),
+            ("gzip;Q=0, br; q = 0", false, false),
+            ("gzip;q=0, *", true, false),
+            ("*;q=0, gzip", false, true),
+            ("gzip;q=many", false, false),
+            ("identity", false, false),
+            ("", false, false),
+        ] {
+            let mut headers = HeaderMap::new();
+            headers.insert(header::ACCEPT_ENCODING, HeaderValue::from_static(offer));
+            assert_eq!(takes(&headers, "br"), br, "{offer}");
+            assert_eq!(takes(&headers, "gzip"), gz, "{offer}");
+        }
     }
 }

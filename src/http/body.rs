@@ -1,6 +1,8 @@
 //! A body: the right media type, plain or gzip, not too long either way, not too slow.
 
-use std::io::Read as _;
+use std::error::Error;
+use std::io::{self, ErrorKind, Read as _};
+use std::iter;
 use std::time::Duration;
 
 use axum::body::Body;
@@ -86,16 +88,31 @@ impl Announced {
             Ok(Err(error)) if error.is::<LengthLimitError>() => {
                 return Err(Problem::BodyTooLarge(limit));
             }
-            Ok(Err(error)) => {
-                tracing::debug!(%error, "a body broke off");
-                return Err(Problem::BodyIncomplete);
-            }
+            Ok(Err(error)) => return Err(broken_off(&*error)),
             Err(_) => return Err(Problem::BodyTooSlow(timeout)),
         };
         match self.coding {
             Coding::Plain => Ok(sent),
             Coding::Gzip => off_thread::run(move || unpack(&sent, limit)).await?,
         }
+    }
+}
+
+/// Why a body did not come whole.
+pub(super) fn broken_off(error: &(dyn Error + 'static)) -> Problem {
+    tracing::debug!(%error, "a body broke off");
+    // Malformed chunks are told as invalid input or data, a connection that ends early as an unexpected end.
+    let bad_input = |cause: &(dyn Error + 'static)| {
+        let cause = cause.downcast_ref::<io::Error>().map(io::Error::kind);
+        matches!(
+            cause,
+            Some(ErrorKind::InvalidInput | ErrorKind::InvalidData)
+        )
+    };
+    if iter::successors(Some(error), |error| (**error).source()).any(bad_input) {
+        Problem::BodyUnreadable
+    } else {
+        Problem::BodyIncomplete
     }
 }
 
@@ -121,6 +138,7 @@ pub(super) enum Coding {
 
 impl Coding {
     pub(super) fn of(headers: &HeaderMap) -> Result<Self, Problem> {
+        check_transfer(headers)?;
         let codings: Vec<String> = headers
             .get_all(header::CONTENT_ENCODING)
             .iter()
@@ -135,6 +153,19 @@ impl Coding {
             _ => Err(Problem::UnsupportedCoding(codings.join(", "))),
         }
     }
+}
+
+/// Chunks are put together below; no other transfer coding is understood, RFC 9112 section 6.1.
+fn check_transfer(headers: &HeaderMap) -> Result<(), Problem> {
+    let values = headers.get_all(header::TRANSFER_ENCODING).iter();
+    let codings: Vec<_> = values
+        .map(|value| String::from_utf8_lossy(value.as_bytes()))
+        .collect();
+    let codings = codings.join(", ");
+    if codings.is_empty() || codings.trim().eq_ignore_ascii_case("chunked") {
+        return Ok(());
+    }
+    Err(Problem::UnsupportedTransferCoding(codings))
 }
 
 pub(super) fn announced_length(headers: &HeaderMap) -> Option<u64> {

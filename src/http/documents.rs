@@ -8,7 +8,7 @@ use super::caller::Caller;
 use super::params::{self, Id, NoParams, Params};
 use super::problem::Problem;
 use super::{AppState, accept, off_thread, partial, retry};
-use crate::export::{self, Format, OPTIONS, Options, ResultInput, file_name};
+use crate::export::{self, ExportError, Format, OPTIONS, Options, ResultInput, file_name};
 use crate::job::Plan;
 
 /// Parameters of a result beside the options of its format.
@@ -39,15 +39,12 @@ pub(super) async fn result(
     let params = Params::read(&uri, &known)?;
     let partial = params.parse("partial", "true or false")?.unwrap_or(false);
     let plan = caller.plan(&*state.store, id).await?;
-    let format = choose_format(&params, &headers)?;
-    let given = params.pairs();
-    let options = given.filter(|(name, _)| !PARAMETERS.contains(name));
-    let options = Options::read(format, options).map_err(export::ExportError::from)?;
+    let choices = choices(&params, &headers)?;
     if partial
         && !plan.status.is_final()
         && let Some(so_far) = partial::result(&state, &plan).await?
     {
-        return written(&state, &plan, format, options, so_far).await;
+        return written(&state, &plan, choices, so_far).await;
     }
     if !plan.status.is_final() {
         let retry_after_s = retry::for_end(&plan, &state.store.stats().await?, state.capacity);
@@ -64,19 +61,21 @@ pub(super) async fn result(
             failure: plan.error,
         });
     };
-    written(&state, &plan, format, options, stored).await
+    written(&state, &plan, choices, stored).await
 }
 
-/// A result in the format that was asked for.
+/// A format to write a result in, and what is asked of it.
+type Choice = (&'static Format, Options);
+
+/// A result in the first of `choices` that it can be written in.
 async fn written(
     state: &AppState,
     plan: &Plan,
-    format: &'static Format,
-    options: Options,
+    choices: Vec<Choice>,
     result: String,
 ) -> Result<Response, Problem> {
-    let document = if format.is_stored() {
-        result
+    let (format, document) = if choices[0].0.is_stored() {
+        (choices[0].0, result)
     } else {
         let scenario = state.store.scenario(plan.id).await?;
         let rules = state.rules.clone();
@@ -86,7 +85,7 @@ async fn written(
                 scenario: &scenario,
                 rules: &rules,
             };
-            format.write(&input, &options)
+            write_first(&choices, &input)
         };
         off_thread::run(write).await??
     };
@@ -101,6 +100,24 @@ async fn written(
     Ok((headers, document).into_response())
 }
 
+/// A plan without degrees, or without a feasible route, cannot be written in every format; when none of `choices`
+/// will do, it is refused for what keeps it from the first.
+fn write_first(
+    choices: &[Choice],
+    input: &ResultInput,
+) -> Result<(&'static Format, String), ExportError> {
+    let mut refusal = None;
+    for (format, options) in choices {
+        match format.write(input, options) {
+            Err(error @ (ExportError::NoGeodeticFrame { .. } | ExportError::Infeasible { .. })) => {
+                refusal.get_or_insert(error);
+            }
+            written => return written.map(|document| (*format, document)),
+        }
+    }
+    Err(refusal.expect("there is at least one choice"))
+}
+
 /// What a browser makes of it: it shows what it can show, and keeps the rest under a name.
 fn disposition(plan: &Plan, format: &Format) -> HeaderValue {
     let name = file_name(plan.name.as_deref(), Some(&plan.id.to_string()), format);
@@ -113,25 +130,43 @@ fn disposition(plan: &Plan, format: &Format) -> HeaderValue {
         .expect("a file's name is ASCII letters, digits and hyphens")
 }
 
-/// `?format=` decides, else `Accept`.
-fn choose_format(params: &Params, headers: &HeaderMap) -> Result<&'static Format, Problem> {
+/// At least one, the best first. Options that the best one does not know are refused; others that do not know them
+/// are left out.
+fn choices(params: &Params, headers: &HeaderMap) -> Result<Vec<Choice>, Problem> {
+    let read = |format: &'static Format| {
+        let given = params.pairs();
+        let options = given.filter(|(name, _)| !PARAMETERS.contains(name));
+        Options::read(format, options).map(|options| (format, options))
+    };
+    let mut formats = formats(params, headers)?.into_iter();
+    let best = formats.next().map(read).transpose();
+    let best = best.map_err(ExportError::from)?;
+    Ok(best.into_iter().chain(formats.flat_map(read)).collect())
+}
+
+/// `?format=` decides, else `Accept`; at least one.
+fn formats(params: &Params, headers: &HeaderMap) -> Result<Vec<&'static Format>, Problem> {
     if let Some(name) = params.text("format") {
         let found = Format::named(name);
         let names = || {
             let names: Vec<_> = export::ALL.iter().map(|format| format.name).collect();
             format!("one of {}", names.join(", "))
         };
-        return found.ok_or_else(|| params::refused("format", name, &names()));
+        let format = found.ok_or_else(|| params::refused("format", name, &names()))?;
+        return Ok(vec![format]);
     }
     let offers: Vec<_> = export::ALL.iter().map(|format| format.media_type).collect();
-    accept::choose(headers, &offers)
-        .and_then(|media_type| {
-            export::ALL
-                .iter()
-                .find(|format| format.media_type == media_type)
-        })
-        .ok_or_else(|| Problem::NotAcceptable {
+    let taken = accept::ranked(headers, &offers);
+    if taken.is_empty() {
+        return Err(Problem::NotAcceptable {
             asked: accept::asked(headers),
             available: offers,
-        })
+        });
+    }
+    let named = |media_type| {
+        export::ALL
+            .iter()
+            .find(move |format| format.media_type == media_type)
+    };
+    Ok(taken.into_iter().filter_map(named).collect())
 }

@@ -58,15 +58,13 @@ pub(super) struct Feed {
     told: Instant,
     /// Whether the reader has been given all that there was when the store was last looked at.
     caught_up: bool,
-    /// Whether anything has come after the event that the reader named; who names one that the plan
-    /// never had would wait for ever.
-    heard: bool,
     /// Pages that may still be read once the service stops.
     last_pages: usize,
     over: bool,
 }
 
 impl Feed {
+    /// Of a plan that has come at least as far as the event `after`.
     pub(super) fn new(
         store: Arc<dyn Store>,
         phase: watch::Receiver<Phase>,
@@ -85,7 +83,6 @@ impl Feed {
             held_since: None,
             told: Instant::now(),
             caught_up: false,
-            heard: after == 0,
             last_pages: LAST_PAGES,
             over: false,
         }
@@ -108,7 +105,6 @@ impl Feed {
             // Looked at before the store: what was told until then will still be read.
             let stopping = *self.phase.borrow() == Phase::Stopping;
             self.changes.mark_unchanged();
-            let ended = !self.heard && self.has_ended().await;
             let page = match self.store.events(self.id, self.after, PAGE).await {
                 Ok(page) => page,
                 Err(StoreError::Gone(_) | StoreError::NotFound(_)) => return self.removed(),
@@ -121,11 +117,7 @@ impl Feed {
                 return self.skip(page.forgotten).await;
             }
             let quiet = page.events.is_empty();
-            self.heard |= !quiet;
             self.caught_up = quiet;
-            if quiet && ended {
-                break;
-            }
             self.take(page.events, &mut out);
             if stopping && !self.over {
                 if quiet || self.last_pages == 0 {
@@ -192,11 +184,6 @@ impl Feed {
             });
         }
         (!out.is_empty()).then_some(Told::Events(out))
-    }
-
-    async fn has_ended(&self) -> bool {
-        let plan = self.store.get(self.id).await;
-        plan.is_ok_and(|plan| plan.status.is_final())
     }
 
     fn take(&mut self, page: Vec<NumberedEvent>, out: &mut Vec<NumberedEvent>) {

@@ -1,6 +1,8 @@
 //! `GET /plans/{id}/result?partial=true` before the end: the best route so far, measured as a
 //! result is, as if the plan were cancelled now.
 
+use std::collections::VecDeque;
+
 use super::problem::Problem;
 use super::{AppState, off_thread};
 use crate::export::document::{Convergence, Incumbent, Origin, ResultDocument};
@@ -10,6 +12,9 @@ use crate::scenario::json::{self, Rules};
 
 /// Points of the curve in it, the newest.
 const CURVE: usize = 10_000;
+
+/// Events read at once.
+const PAGE: usize = 1_000;
 
 /// The document, or `None` when the run has not told of a route yet.
 pub(super) async fn result(state: &AppState, plan: &Plan) -> Result<Option<String>, Problem> {
@@ -28,18 +33,24 @@ pub(super) async fn result(state: &AppState, plan: &Plan) -> Result<Option<Strin
 
 /// The curve of the present run; an earlier one that was broken off is not part of it.
 async fn curve(state: &AppState, plan: &Plan) -> Result<Vec<Convergence>, Problem> {
-    let page = state.store.events(plan.id, 0, usize::MAX).await?;
-    let mut curve: Vec<Convergence> = Vec::new();
-    for told in page.events {
-        match told.event {
-            Event::Convergence(point) => curve.push(point),
-            Event::Status(plan) if plan.started_ms.is_none() => curve.clear(),
-            _ => {}
+    let mut curve = VecDeque::new();
+    let mut after = 0;
+    loop {
+        let page = state.store.events(plan.id, after, PAGE).await?;
+        let Some(last) = page.events.last() else {
+            return Ok(curve.into());
+        };
+        after = last.id;
+        for told in page.events {
+            match told.event {
+                Event::Convergence(point) => curve.push_back(point),
+                Event::Status(plan) if plan.started_ms.is_none() => curve.clear(),
+                _ => {}
+            }
         }
+        let excess = curve.len().saturating_sub(CURVE);
+        curve.drain(..excess);
     }
-    let excess = curve.len().saturating_sub(CURVE);
-    curve.drain(..excess);
-    Ok(curve)
 }
 
 fn measure(

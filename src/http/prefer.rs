@@ -7,6 +7,8 @@ use axum::extract::OptionalFromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 
+use super::list;
+
 const PREFER: HeaderName = HeaderName::from_static("prefer");
 pub(super) const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
 
@@ -18,14 +20,14 @@ pub(super) const MAX_WAIT_S: u8 = 30;
 pub(super) struct Wait(u8);
 
 impl Wait {
-    /// The first readable `wait` of the headers; a malformed preference counts as none.
+    /// The first `wait` of the headers; one that cannot be read counts as none, RFC 7240 section 2.
     pub(super) fn of(headers: &HeaderMap) -> Option<Self> {
         headers
             .get_all(PREFER)
             .iter()
             .filter_map(|value| value.to_str().ok())
-            .flat_map(|value| value.split(','))
-            .filter_map(|preference| preference.split(';').next()?.split_once('='))
+            .flat_map(|value| list::split(value, ','))
+            .filter_map(|preference| list::split(preference, ';').next()?.split_once('='))
             .find(|(name, _)| name.trim().eq_ignore_ascii_case("wait"))
             .and_then(|(_, value)| value.trim().trim_matches('"').parse().ok())
             .map(|seconds: u64| {
@@ -68,6 +70,11 @@ mod tests {
             ("wait=soon", None),
             ("wait", None),
             ("return=minimal", None),
+            ("wait=soon, wait=10", None),
+            ("wait=3, wait=10", Some(3)),
+            ("foo=\"x, wait=3\"", None),
+            ("foo=\"a, wait=0\", wait=5", Some(5)),
+            ("wait=5; foo=\"a;b, wait=1\"", Some(5)),
         ] {
             let mut headers = HeaderMap::new();
             headers.insert(PREFER, HeaderValue::from_static(value));

@@ -43,11 +43,11 @@ impl Wire {
         }
     }
 
-    /// Says nothing, and keeps the connection. Lines have no way to say nothing.
+    /// Says nothing, and keeps the connection; readers of JSON lines skip empty ones.
     pub(super) fn silence(self) -> &'static str {
         match self {
             Self::Sse => ":\n\n",
-            Self::Lines => "",
+            Self::Lines => "\n",
         }
     }
 
@@ -127,4 +127,19 @@ impl End {
 
 fn json(data: impl Serialize) -> String {
     serde_json::to_string(&data).expect("every map key is a string")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Else a reader that is gone is never noticed, and a proxy cuts who is still there.
+    #[test]
+    fn silence_is_written_and_tells_nothing() {
+        for wire in [Wire::Sse, Wire::Lines] {
+            let mut lines = wire.silence().lines().peekable();
+            assert!(lines.peek().is_some(), "{wire:?}");
+            assert!(lines.all(|line| line.is_empty() || line == ":"), "{wire:?}");
+        }
+    }
 }

@@ -53,7 +53,11 @@ impl From<Plan> for StatusDocument {
             stop_reason: plan.stop_reason,
             feasible: plan.feasible,
             best_cost: plan.best_cost,
-            progress: plan.progress,
+            progress: if plan.status.is_final() {
+                1.0
+            } else {
+                plan.progress
+            },
             iteration: plan.iteration,
             iterations: plan.iterations,
             evaluations: plan.evaluations,

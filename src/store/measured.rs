@@ -118,6 +118,11 @@ impl Store for MeasuredStore {
         self.measured("events", step).await
     }
 
+    async fn has_told(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
+        self.measured("has_told", self.store.has_told(id, event))
+            .await
+    }
+
     async fn incumbent(&self, id: PlanId) -> Result<Option<Incumbent>, StoreError> {
         self.measured("incumbent", self.store.incumbent(id)).await
     }

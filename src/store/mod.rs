@@ -144,6 +144,13 @@ pub trait Store: Send + Sync + 'static {
     /// As [`Store::get`].
     async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<EventPage, StoreError>;
 
+    /// Whether the plan has an event of this number by now, on whichever node: another one may have told events
+    /// that are not known here yet.
+    ///
+    /// # Errors
+    /// As [`Store::get`].
+    async fn has_told(&self, id: PlanId, event: u64) -> Result<bool, StoreError>;
+
     /// Ticks after each change of the plan or its events has become readable, and once more when it is deleted.
     /// Subscribe before reading, and no change is missed.
     fn changes(&self, id: PlanId) -> watch::Receiver<u64>;

@@ -217,6 +217,11 @@ impl Store for Reopening {
         self.heed(&store, store.events(id, after, limit).await)
     }
 
+    async fn has_told(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.has_told(id, event).await)
+    }
+
     /// While it is not open, the sender is gone: whoever waits reads again, and learns why.
     fn changes(&self, id: PlanId) -> watch::Receiver<u64> {
         self.store()

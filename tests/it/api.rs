@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 
 use crate::support::api::Api;
 use crate::support::patience::eventually;
+use crate::support::stores::for_every_backend;
 use crate::support::{run, scenario};
 
 #[tokio::test]
@@ -260,6 +261,49 @@ async fn a_cancelled_plan_keeps_its_best_route() {
 }
 
 #[tokio::test]
+async fn a_plan_is_cancelled_or_deleted_only_as_its_caller_expects_it() {
+    let api = Api::new();
+    let address = api.submit().await;
+    let queued = api.get(&address).await.header("etag").to_owned();
+    api.store.claim().await.expect("a queued plan");
+    let running = api.get(&address).await.header("etag").to_owned();
+
+    let cancel = format!("{address}/cancel");
+    for (method, uri) in [(Method::POST, &cancel), (Method::DELETE, &address)] {
+        for (header, value) in [
+            ("if-match", &*queued),
+            ("if-match", "\"x, *\""),
+            ("if-match", "\"caf\u{e9}\""),
+            ("if-none-match", &running),
+            ("if-none-match", "*"),
+        ] {
+            let headers = [(header, value)];
+            let answer = api.send(method.clone(), uri, &headers, "");
+            let problem = answer.await.expect_problem(412, "precondition-failed");
+            let detail = problem["detail"].as_str().expect("text");
+            assert!(detail.contains(&running), "{detail}");
+        }
+    }
+    let after = api.get(&address).await;
+    assert_eq!(after.header("etag"), running, "nothing has happened");
+
+    let as_it_is = [("if-match", &*format!("\"x\", {running}"))];
+    let cancelled = api.send(Method::POST, &cancel, &as_it_is, "").await;
+    assert_eq!(cancelled.status, StatusCode::ACCEPTED);
+    for (header, value, status) in [
+        ("if-match", &*running, 412),
+        ("if-match", "*", 204),
+        // Nothing of what was removed is as it was.
+        ("if-match", "*", 412),
+        ("if-none-match", "*", 204),
+    ] {
+        let headers = [(header, value)];
+        let answer = api.send(Method::DELETE, &address, &headers, "");
+        assert_eq!(answer.await.status, status, "{header}: {value}");
+    }
+}
+
+#[tokio::test]
 async fn a_deleted_plan_is_gone() {
     let api = Api::new();
     let address = api.submit().await;
@@ -293,6 +337,7 @@ async fn results_that_are_not_there_say_why() {
     run::fail(&*api.store, &lease).await;
     problems.push(api.get(&result).await.expect_problem(409, "no-result"));
     let failed = api.get(&address).await.json();
+    assert_eq!(failed["progress"], 1.0);
     assert_eq!(failed["error"]["type"], "/problems/planner-panic");
     assert_eq!(failed["error"]["detail"], "the planner broke");
 
@@ -305,6 +350,7 @@ async fn results_that_are_not_there_say_why() {
         StatusCode::OK,
         "a queued plan ends at once"
     );
+    assert_eq!(cancelled.json()["progress"], 1.0);
     problems.push(
         api.get(&format!("{address}/result"))
             .await
@@ -472,7 +518,9 @@ async fn a_body_that_never_ends_is_cut_off() {
     let answer = api
         .send(Method::POST, "/plans", &headers, Body::from_stream(broken))
         .await;
-    answer.expect_problem(400, "incomplete-body");
+    let broken_off = answer.expect_problem(400, "incomplete-body");
+    let detail = "the connection ended before the body did";
+    assert_eq!(broken_off["detail"], detail);
 }
 
 #[tokio::test]
@@ -584,4 +632,30 @@ async fn the_best_route_so_far_is_measured_like_a_result() {
     let ended = api.get(&partial).await;
     let stored = api.get(&format!("{address}/result")).await;
     assert_eq!(ended.body, stored.body);
+}
+
+#[tokio::test]
+async fn the_curve_of_the_best_so_far_has_its_newest_points() {
+    for_every_backend(async |backend| {
+        let options = Options {
+            events_kept: 20_000,
+            ..Options::new(10)
+        };
+        let api = Api::on(backend, options).await;
+        let address = api.submit().await;
+        let lease = api.store.claim().await.expect("a queued plan");
+        let route = vec![run::incumbent(0, 0.0)];
+        api.store.append(&lease, route).await.expect("held");
+        for begin in [0, 2_500, 5_000, 7_500, 10_000] {
+            let points = (begin..begin + 2_500).map(|nth| run::convergence(nth, nth as f64));
+            let points = api.store.append(&lease, points.collect());
+            points.await.expect("held");
+        }
+        let partial = format!("{address}/result?partial=true");
+        let so_far = api.get(&partial).await.json();
+        let curve = so_far["convergence"].as_array().expect("a curve");
+        let iterations = curve.iter().map(|point| &point["iteration"]);
+        assert!(iterations.eq((2_500..12_500).collect::<Vec<_>>().iter()));
+    })
+    .await;
 }

@@ -200,14 +200,28 @@ async fn a_live_stream_that_is_cut_resumes() {
 
 /// As after a restore from an older copy: nobody waits for what will never come.
 #[tokio::test]
-async fn a_reader_who_names_an_event_that_never_was_is_let_go_at_the_end() {
+async fn a_reader_who_names_an_event_that_never_was_comes_fresh() {
     for_every_backend(async |backend| {
         let plan = Followed::on(backend).await;
         let store = &plan.api.store;
         let lease = store.claim().await.expect("a queued plan");
-        let ahead = Stream::open(plan.events("?last_event_id=1000")).await;
+        let first_never_told = 3;
+        let mut streams = Vec::new();
+        for id in [first_never_told, 1_000] {
+            let request = plan.events(&format!("?last_event_id={id}"));
+            let mut ahead = Stream::open(request).await;
+            let first = in_time(ahead.next()).await.expect("a status");
+            assert_eq!(events(&[first]), [(1, "status".to_owned())], "after {id}");
+            streams.push(ahead);
+        }
+        // The newest that was told is none of these: nothing of it comes again.
+        let newest = Stream::open(plan.events("?last_event_id=2")).await;
         run::finish(&**store, &lease, Status::Succeeded).await;
-        assert_eq!(events(&in_time(ahead.rest()).await), []);
+        let whole = plan.read("").await;
+        for ahead in streams {
+            assert_eq!(in_time(ahead.rest()).await, whole[1..]);
+        }
+        assert_eq!(in_time(newest.rest()).await, whole[2..]);
     })
     .await;
 }
@@ -271,6 +285,7 @@ async fn lines_tell_the_same_as_events() {
     let request = plan.events("").header("accept", "application/x-ndjson");
     let answer = request.send().await.expect("an answer");
     assert_eq!(answer.headers()["content-type"], "application/x-ndjson");
+    assert_eq!(answer.headers()["vary"], "accept");
     let lines: Vec<Block> = answer
         .text()
         .await
@@ -346,6 +361,21 @@ async fn a_stream_of_a_deleted_plan_ends_as_cancelled() {
             .get(&format!("{}/events", plan.address))
             .await
             .expect_problem(410, "gone");
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn the_end_of_a_deleted_plan_has_the_next_id_whatever_a_reader_named() {
+    for_every_backend(async |backend| {
+        let plan = Followed::on(backend).await;
+        let mut ahead = Stream::open(plan.events("?last_event_id=1000")).await;
+        ahead.next().await.expect("the first status");
+        plan.api.delete(&plan.address).await;
+        let rest = events(&in_time(ahead.rest()).await);
+        let (last, name) = rest.last().expect("an end");
+        assert_eq!(name, "end");
+        assert!(*last <= 3, "{rest:?}");
     })
     .await;
 }

@@ -180,6 +180,60 @@ async fn a_route_that_breaks_constraints_is_not_for_flying() {
     }
 }
 
+/// `Accept` names what would do: what the plan cannot be written in is no answer to it.
+#[tokio::test]
+async fn who_takes_several_formats_gets_one_that_the_plan_has() {
+    let api = Api::new();
+    api.submit().await;
+    let lease = crate::support::run::complete(&*api.store, Vec::new()).await;
+    let local = format!("/plans/{}/result", lease.plan.id);
+    // Straight through the mast.
+    let infeasible = ended(&api, &scenario(), 47.4010, 8.5500).await + "/result";
+    for (uri, accept, expected) in [
+        (
+            &local,
+            "application/geo+json, application/json;q=0.5",
+            "application/json",
+        ),
+        (
+            &local,
+            "application/geo+json, text/csv;q=0.5, */*;q=0.1",
+            "text/csv",
+        ),
+        (
+            &infeasible,
+            "application/gpx+xml, application/geo+json;q=0.9",
+            "application/geo+json",
+        ),
+    ] {
+        let answer = api.get_with(uri, &[("accept", accept)]).await;
+        assert_eq!(answer.status, 200, "{accept}: {answer:?}");
+        assert_eq!(answer.header("content-type"), expected, "{accept}");
+    }
+    for (uri, accept, slug) in [
+        (local.clone(), "application/geo+json", "no-geodetic-frame"),
+        (
+            local.clone() + "?format=geojson",
+            "*/*",
+            "no-geodetic-frame",
+        ),
+        // What is asked of the mission is nothing that another format could do.
+        (
+            local + "?landing=true",
+            "text/plain, application/json;q=0.5",
+            "no-geodetic-frame",
+        ),
+        (
+            infeasible,
+            "application/gpx+xml, text/plain;q=0.5",
+            "infeasible",
+        ),
+    ] {
+        let answer = api.get_with(&uri, &[("accept", accept)]).await;
+        answer.expect_problem(409, slug);
+    }
+}
+
 #[tokio::test]
 async fn metres_lie_nowhere_on_the_earth() {
     let api = Api::new();

@@ -76,6 +76,30 @@ async fn what_is_no_request_gets_a_problem() {
 }
 
 #[tokio::test]
+async fn what_is_wrong_with_the_way_that_a_body_comes_is_told() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &[]);
+    for (coding, status, detail) in [
+        (
+            "chunked",
+            400,
+            "the chunks that the body comes in cannot be",
+        ),
+        ("gzip, chunked", 501, "transfer-encoding is gzip, chunked;"),
+    ] {
+        for line in ["POST /plans", "PUT /terrains/hill"] {
+            let request = format!(
+                "{line} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\ncontent-type: application/json\r\n\
+                 transfer-encoding: {coding}\r\n\r\nmany\r\n{{}}\r\n0\r\n\r\n"
+            );
+            let answer = answers(&service, request.as_bytes()).await;
+            let begins = answer.starts_with(&format!("HTTP/1.1 {status} "));
+            assert!(begins && answer.contains(detail), "{line}: {answer}");
+        }
+    }
+}
+
+#[tokio::test]
 async fn a_head_too_large_gets_a_problem() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &[]);

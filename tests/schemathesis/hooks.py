@@ -12,7 +12,7 @@ END = {"id": 1, "event": "end", "data": {"status": "succeeded", "result": None}}
 @schemathesis.deserializer("application/x-ndjson")
 def lines(_, response):
     """The description says what a line is. Every one must be JSON; one of them is held to it, another for another answer."""
-    events = [json.loads(line) for line in response.content.splitlines()] or [END]
+    events = [json.loads(line) for line in response.content.splitlines() if line] or [END]
     return events[len(response.content) % len(events)]
 
 

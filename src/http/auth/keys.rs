@@ -7,6 +7,7 @@ use std::collections::HashSet;
 use std::fmt;
 
 use jiff::Timestamp;
+use percent_encoding::percent_decode_str;
 use sha2::{Digest as _, Sha256};
 use subtle::{Choice, ConditionallySelectable as _, ConstantTimeEq as _};
 
@@ -132,20 +133,8 @@ pub(super) fn digest(secret: &[u8]) -> Digest {
 
 /// Whether `text` holds what looks like a key, percent-encoded or not.
 pub(in crate::http) fn holds_a_key(text: &str) -> bool {
-    looks_like_a_key(text) || (text.contains('%') && looks_like_a_key(&decoded(text)))
-}
-
-fn decoded(text: &str) -> String {
-    let digit = |at: usize| char::from(*text.as_bytes().get(at)?).to_digit(16);
-    let mut bytes = Vec::with_capacity(text.len());
-    let mut at = 0;
-    while let Some(&byte) = text.as_bytes().get(at) {
-        let coded = (byte == b'%').then(|| Some(digit(at + 1)? * 16 + digit(at + 2)?));
-        let coded = coded.flatten().and_then(|code| u8::try_from(code).ok());
-        bytes.push(coded.unwrap_or(byte));
-        at += if coded.is_some() { 3 } else { 1 };
-    }
-    String::from_utf8_lossy(&bytes).into_owned()
+    let decoded = percent_decode_str(text).decode_utf8_lossy();
+    looks_like_a_key(text) || looks_like_a_key(&decoded)
 }
 
 fn looks_like_a_key(text: &str) -> bool {

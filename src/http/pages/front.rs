@@ -13,7 +13,8 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 
 use crate::digest::sha256_hex;
-use crate::http::known_tags::KnownTags;
+use crate::http::accept::takes;
+use crate::http::entity_tags::EntityTags;
 use crate::http::params::NoParams;
 use crate::http::problem::Problem;
 
@@ -168,7 +169,7 @@ fn serve(name: &str, uri: &Uri, headers: &HeaderMap) -> Result<Response, Problem
         (header::CONTENT_SECURITY_POLICY, POLICY),
         (header::VARY, HeaderValue::from_static("accept-encoding")),
     ];
-    if KnownTags::of(headers).is_some_and(|known| known.contain(&tag)) {
+    if EntityTags::known(headers).is_some_and(|known| known.contain(&tag)) {
         return Ok((StatusCode::NOT_MODIFIED, common).into_response());
     }
     let mut response = (common, bytes).into_response();
@@ -224,24 +225,6 @@ impl Coding {
         };
         HeaderValue::from_str(&tag).expect("visible ASCII")
     }
-}
-
-/// Whether `Accept-Encoding` names the coding, and not to refuse it.
-fn takes(headers: &HeaderMap, coding: &str) -> bool {
-    let lists = headers.get_all(header::ACCEPT_ENCODING).iter();
-    lists
-        .filter_map(|list| list.to_str().ok())
-        .flat_map(|list| list.split(','))
-        .any(|offer| {
-            let mut parts = offer.split(';').map(str::trim);
-            let named = parts
-                .next()
-                .is_some_and(|name| name.eq_ignore_ascii_case(coding));
-            let refused = parts
-                .filter_map(|part| part.strip_prefix("q="))
-                .any(|weight| weight.parse().is_ok_and(|weight: f64| weight <= 0.0));
-            named && !refused
-        })
 }
 
 #[cfg(test)]
@@ -322,22 +305,6 @@ mod tests {
                 let name = imported.1.trim_end_matches(['\'', ';']);
                 assert!(FILES.iter().any(|file| file.name == name), "{name}");
             }
-        }
-    }
-
-    #[test]
-    fn a_coding_is_taken_when_it_is_offered() {
-        for (offer, br, gz) in [
-            ("gzip, deflate, br, zstd", true, true),
-            ("gzip;q=0.5, br;q=0", false, true),
-            ("BR;q=1.0", true, false),
-            ("identity", false, false),
-            ("", false, false),
-        ] {
-            let mut headers = HeaderMap::new();
-            headers.insert(header::ACCEPT_ENCODING, HeaderValue::from_static(offer));
-            assert_eq!(takes(&headers, "br"), br, "{offer}");
-            assert_eq!(takes(&headers, "gzip"), gz, "{offer}");
         }
     }
 }

@@ -14,9 +14,10 @@ pub(super) use list::{MAX_PAGE, list};
 pub(super) use submit::submit;
 
 use super::caller::Caller;
-use super::known_tags::KnownTags;
+use super::entity_tags::EntityTags;
 use super::params::{Id, NoParams};
 use super::phase::stopping;
+use super::precondition::Precondition;
 use super::prefer::{PREFERENCE_APPLIED, Wait};
 use super::problem::Problem;
 use super::status::{StatusDocument, etag};
@@ -33,7 +34,7 @@ pub(super) async fn show(
     Id(id): Id,
     _: NoParams,
     wait: Option<Wait>,
-    known: Option<KnownTags>,
+    known: Option<EntityTags>,
 ) -> Result<Response, Problem> {
     let mut plan = caller.plan(&*state.store, id).await?;
     if let Some(wait) = wait {
@@ -78,8 +79,10 @@ pub(super) async fn cancel(
     caller: Caller,
     Id(id): Id,
     _: NoParams,
+    precondition: Precondition,
 ) -> Result<Response, Problem> {
-    caller.plan(&*state.store, id).await?;
+    let plan = caller.plan(&*state.store, id).await?;
+    precondition.check(&plan)?;
     let plan = state.store.request_cancel(id, state.clock.now_ms()).await?;
     let status = if plan.status.is_final() {
         state.instruments.origins.forget(id);
@@ -96,14 +99,16 @@ pub(super) async fn delete(
     caller: Caller,
     Id(id): Id,
     _: NoParams,
+    precondition: Precondition,
 ) -> Result<StatusCode, Problem> {
     match caller.plan(&*state.store, id).await {
-        Ok(_) => {
+        Ok(plan) => {
+            precondition.check(&plan)?;
             state.store.delete(id, state.clock.now_ms()).await?;
             state.instruments.origins.forget(id);
         }
         // Whoever asks again had no answer the first time.
-        Err(Problem::Gone(_)) => {}
+        Err(Problem::Gone(_)) => precondition.check_removed(id)?,
         Err(problem) => return Err(problem),
     }
     Ok(StatusCode::NO_CONTENT)

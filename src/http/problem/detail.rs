@@ -30,6 +30,10 @@ impl Problem {
                 format!("address and headers may have {limit} bytes together, and headers be 100")
             }
             Self::BodyIncomplete => "the connection ended before the body did".to_owned(),
+            Self::BodyUnreadable => "the chunks that the body comes in cannot be read, see RFC 9112 section 7.1".to_owned(),
+            Self::UnsupportedTransferCoding(found) => {
+                format!("transfer-encoding is {found}; send the body plain or chunked, and name gzip in content-encoding")
+            }
             Self::BodyNotGzip(detail) => format!("content-encoding is gzip, but: {detail}"),
             Self::InvalidParameter { detail, .. }
             | Self::NoGeodeticFrame(detail)
@@ -114,7 +118,7 @@ impl Problem {
             }
             Self::Gone(Tombstone { id, .. }) => format!("plan {id} was deleted"),
             Self::IdempotencyInFlight => {
-                "a request with this Idempotency-Key has not been answered yet; try again for its answer".to_owned()
+                "a request with this Idempotency-Key has not been accepted yet; try again for its plan".to_owned()
             }
             Self::IdempotencyKeyReused => {
                 "a request with this Idempotency-Key had another body; take a new key for a new request".to_owned()

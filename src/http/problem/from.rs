@@ -98,9 +98,9 @@ impl From<CatalogueError> for Problem {
         match error {
             CatalogueError::Unknown { name } => Self::NoSuchTerrain(name),
             CatalogueError::Mounted { name } => Self::TerrainMounted(name),
-            CatalogueError::Exists { .. } | CatalogueError::Changed { .. } => {
-                Self::PreconditionFailed(detail)
-            }
+            CatalogueError::Exists { .. }
+            | CatalogueError::Absent { .. }
+            | CatalogueError::Changed { .. } => Self::PreconditionFailed(detail),
             CatalogueError::Owned { .. } => Self::Forbidden(Scope::Admin),
             CatalogueError::Unreadable(_) => Self::InvalidTerrain(detail),
             CatalogueError::TooLarge { limit } => Self::TerrainTooLarge(limit),

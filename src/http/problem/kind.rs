@@ -53,7 +53,7 @@ impl Problem {
                 "invalid-json",
                 "The body is not JSON",
             ),
-            Self::BodyIncomplete => (
+            Self::BodyIncomplete | Self::BodyUnreadable => (
                 StatusCode::BAD_REQUEST,
                 "incomplete-body",
                 "The body broke off",
@@ -139,7 +139,7 @@ impl Problem {
             Self::PreconditionFailed(_) => (
                 StatusCode::PRECONDITION_FAILED,
                 "precondition-failed",
-                "The dataset is not as expected",
+                "The resource is not as expected",
             ),
             Self::InvalidTerrain(_) => (
                 StatusCode::UNPROCESSABLE_ENTITY,
@@ -155,7 +155,7 @@ impl Problem {
             Self::IdempotencyInFlight => (
                 StatusCode::CONFLICT,
                 "idempotency-in-flight",
-                "The same request is being answered",
+                "The same request is being accepted",
             ),
             Self::Gone(_) => (StatusCode::GONE, "gone", "The plan was removed"),
             Self::BodyTooLarge(_) | Self::TerrainTooLarge(_) => (
@@ -193,6 +193,11 @@ impl Problem {
                 StatusCode::INTERNAL_SERVER_ERROR,
                 "internal",
                 "Internal error",
+            ),
+            Self::UnsupportedTransferCoding(_) => (
+                StatusCode::NOT_IMPLEMENTED,
+                "unsupported-transfer-coding",
+                "Unsupported transfer coding",
             ),
             Self::Draining { .. } => (
                 StatusCode::SERVICE_UNAVAILABLE,

@@ -52,7 +52,7 @@ pub(super) enum Problem {
     TerrainMounted(String),
     /// The dataset that a plan was made over is not there any more; why.
     NoGround(String),
-    /// A dataset is not what the request expects; which.
+    /// A plan or a dataset is not what the request expects; which.
     PreconditionFailed(String),
     /// A dataset is too long; the limit in bytes.
     TerrainTooLarge(u64),
@@ -86,6 +86,10 @@ pub(super) enum Problem {
     BodyTooSlow(Duration),
     /// The body broke off.
     BodyIncomplete,
+    /// The chunks that the body comes in cannot be read.
+    BodyUnreadable,
+    /// The body's transfer is coded in a way that is not read here; how.
+    UnsupportedTransferCoding(String),
     /// The body is said to be gzip and is not; what the reader met.
     BodyNotGzip(String),
     /// The body is not JSON.
@@ -174,7 +178,7 @@ pub(super) enum Problem {
     TooManyStreams(TooMany),
     /// The idempotency key came with another body before.
     IdempotencyKeyReused,
-    /// Another request with the same idempotency key is being answered.
+    /// Another request with the same idempotency key has not been accepted yet.
     IdempotencyInFlight,
     /// The service is about to end.
     Draining {

@@ -2,15 +2,15 @@
 
 use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 
 use super::document::{Corners, Place};
-use super::{Name, etag, tagged};
+use super::{Name, tagged};
 use crate::geometry::geodesy::{LatLon, wrapped};
 use crate::http::AppState;
-use crate::http::known_tags::KnownTags;
+use crate::http::entity_tags::EntityTags;
 use crate::http::params::{self, Params};
 use crate::http::problem::Problem;
 use crate::terrain::dem::Degrees;
@@ -46,7 +46,7 @@ pub(in crate::http) async fn elevations(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let asked = Asked::read(name.clone(), &uri)?;
-    let (datasets, known) = (state.rules.datasets.clone(), KnownTags::of(&headers));
+    let (datasets, known) = (state.rules.datasets.clone(), EntityTags::known(&headers));
     let sampled = state
         .terrains
         .read(move || asked.sample(&*datasets, known.as_ref()))
@@ -54,7 +54,12 @@ pub(in crate::http) async fn elevations(
     let (tag, document) = sampled.map_err(|error| refusal(error, &name))?;
     let answer = match document {
         Some(document) => Json(document).into_response(),
-        None => StatusCode::NOT_MODIFIED.into_response(),
+        // As compression says of the answer itself.
+        None => (
+            StatusCode::NOT_MODIFIED,
+            [(header::VARY, "accept-encoding")],
+        )
+            .into_response(),
     };
     Ok(tagged(answer, Some(tag)))
 }
@@ -90,10 +95,10 @@ impl Asked {
     fn sample(
         self,
         datasets: &dyn Datasets,
-        known: Option<&KnownTags>,
+        known: Option<&EntityTags>,
     ) -> Result<(HeaderValue, Option<ElevationsDocument>), DatasetError> {
         let found = datasets.find(&self.name, self.sha256.as_deref())?;
-        let tag = etag(&found.sha256);
+        let tag = weak_etag(&found.sha256);
         if known.is_some_and(|known| known.contain(&tag)) {
             return Ok((tag, None));
         }
@@ -112,6 +117,11 @@ impl Asked {
         };
         Ok((tag, Some(document)))
     }
+}
+
+/// The entity tag of samples of a content. Weak, for compressed they are other bytes.
+fn weak_etag(sha256: &str) -> HeaderValue {
+    HeaderValue::from_str(&format!("W/\"{sha256}\"")).expect("digits and quotes are visible ASCII")
 }
 
 fn refusal(error: DatasetError, name: &str) -> Problem {

@@ -24,7 +24,7 @@ pub(super) use upload::put;
 use document::TerrainDocument;
 
 use super::caller::Caller;
-use super::known_tags::KnownTags;
+use super::entity_tags::{EntityTags, opaque};
 use super::params::{self, NoParams};
 use super::problem::Problem;
 use super::{AppState, off_thread};
@@ -140,30 +140,21 @@ fn check_name(name: &str) -> Result<(), Problem> {
 
 /// What `If-Match` and `If-None-Match` say.
 fn expected(headers: &HeaderMap) -> Expected {
-    let tags = |name| -> Vec<String> {
-        let values = headers.get_all(name).iter();
-        // What cannot be read is a tag, too: one that nothing has.
-        let values = values.map(|value| String::from_utf8_lossy(value.as_bytes()));
-        let tags = values.flat_map(|value| value.split(',').map(str::to_owned).collect::<Vec<_>>());
-        tags.map(|tag| content_of(tag.trim().trim_matches('"')).to_owned())
-            .collect()
-    };
-    let (matching, other) = (tags(header::IF_MATCH), tags(header::IF_NONE_MATCH));
-    if other.iter().any(|tag| tag == "*") {
-        Expected::Nothing
-    } else if !matching.is_empty() {
-        Expected::OneOf(matching)
-    } else if !other.is_empty() {
-        let weak = other.iter().map(|tag| tag.trim_start_matches("W/\""));
-        Expected::NoneOf(weak.map(str::to_owned).collect())
-    } else {
-        Expected::Anything
+    let matching = EntityTags::of(headers, header::IF_MATCH);
+    let known = EntityTags::known(headers);
+    match (matching, known) {
+        (_, Some(known)) if known.iter().any(|tag| tag == "*") => Expected::Nothing,
+        (Some(matching), _) => Expected::OneOf(matching.iter().map(content_of).collect()),
+        (None, Some(known)) => Expected::NoneOf(known.iter().map(opaque).map(content_of).collect()),
+        (None, None) => Expected::Anything,
     }
 }
 
 /// Of the entity tag of a content or of a document; names change with the first alone.
-fn content_of(tag: &str) -> &str {
-    tag.split_once(OF).map_or(tag, |(content, _)| content)
+fn content_of(tag: &str) -> String {
+    let tag = tag.trim_matches('"');
+    let content = tag.split_once(OF).map_or(tag, |(content, _)| content);
+    content.to_owned()
 }
 
 /// The list.
@@ -205,7 +196,7 @@ pub(super) async fn show(
     let tag = content.map(|content| document_etag(&content, &document));
     let known = tag
         .as_ref()
-        .zip(KnownTags::of(&headers))
+        .zip(EntityTags::known(&headers))
         .is_some_and(|(tag, known)| known.contain(tag));
     Ok(if known {
         tagged(StatusCode::NOT_MODIFIED.into_response(), tag)

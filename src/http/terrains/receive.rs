@@ -14,7 +14,7 @@ use tokio::time::Instant;
 
 use crate::catalogue::Staged;
 use crate::http::AppState;
-use crate::http::body::{Coding, announced_length};
+use crate::http::body::{Coding, announced_length, broken_off};
 use crate::http::problem::Problem;
 
 /// Bytes a second that must come on the whole: who sends less holds a place for nothing.
@@ -74,10 +74,7 @@ async fn send(body: Body, pieces: &mpsc::Sender<Piece>, timeout: Duration) -> Re
                 received += bytes.len();
                 Piece::Bytes(bytes)
             }
-            Ok(Some(Err(error))) => {
-                tracing::debug!(%error, "an upload broke off");
-                return Err(Problem::BodyIncomplete);
-            }
+            Ok(Some(Err(error))) => return Err(broken_off(&error)),
         };
         let is_end = matches!(piece, Piece::End);
         let handed = Instant::now();

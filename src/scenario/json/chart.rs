@@ -21,6 +21,10 @@ use super::value::{At, figure};
 pub(super) enum Chart {
     Local,
     Wgs84(Box<Earth>),
+    /// Degrees that no plane was found for: the area or the datum is at fault.
+    Degrees,
+    /// The frame is unknown, so places cannot be read; everything else still can.
+    Unknown,
 }
 
 /// The plane of a document in degrees, and the degrees that its places were given in.
@@ -34,62 +38,52 @@ pub(super) struct Earth {
 }
 
 impl Chart {
-    /// The chart that a document asks for; `None` where it cannot be told which.
+    /// The chart that a document asks for.
     pub(super) fn of(
         fields: &Fields<'_>,
         dataset: Option<&Named<'_>>,
         faults: &mut Faults,
-    ) -> Option<Self> {
+    ) -> Self {
         let frame = fields.or("frame", "local", faults, |at, faults| {
             let choice = at.choice(&["local", "wgs84"], faults)?;
             Some(if choice == "wgs84" { "wgs84" } else { "local" })
-        })?;
-        if frame == "local" {
-            if fields.has("altitude_datum") {
-                faults.add(
-                    &Path::Key(fields.path, "altitude_datum"),
-                    "not-applicable",
-                    || "altitude_datum is given, must be left out where frame is local",
-                );
-            }
-            return Some(Self::Local);
-        }
-        let datum = fields.or("altitude_datum", Datum::Msl, faults, |at, faults| {
-            let choice = at.choice(&["msl", "ellipsoid"], faults)?;
-            Some(if choice == "msl" {
-                Datum::Msl
-            } else {
-                Datum::Ellipsoid
-            })
-        })?;
-        let given = fields.or("area", None, faults, |at, faults| {
-            area(at, faults).map(Some)
-        })?;
-        let sketch = sketch::Sketch::of(fields);
-        let earth = |area| Earth::over(area, datum, sketch.mean_alt);
-        let area = given.unwrap_or_else(|| match dataset {
-            Some(dataset) => dataset.within(sketch.area(), &sketch.ends, earth),
-            None => over_grid(fields, &sketch.ends, earth).unwrap_or_else(|| sketch.area()),
         });
-        let earth = earth(area);
-        earth.check(faults).then(|| Self::Wgs84(Box::new(earth)))
+        match frame {
+            None => {
+                datum(fields, faults);
+                Self::Unknown
+            }
+            Some("wgs84") => Earth::of(fields, dataset, faults)
+                .map_or(Self::Degrees, |earth| Self::Wgs84(Box::new(earth))),
+            Some(_) => {
+                if fields.has("altitude_datum") {
+                    faults.add(
+                        &Path::Key(fields.path, "altitude_datum"),
+                        "not-applicable",
+                        || "altitude_datum is given, must be left out where frame is local",
+                    );
+                }
+                Self::Local
+            }
+        }
     }
 
-    /// The frame, with all that was written in it.
-    pub(super) fn finish(self) -> Frame {
+    /// The frame, with all that was written in it; `None` where none could be told.
+    pub(super) fn finish(self) -> Option<Frame> {
         match self {
-            Self::Local => Frame::Local,
-            Self::Wgs84(earth) => Frame::Wgs84(Arc::new(Wgs84::new(
+            Self::Local => Some(Frame::Local),
+            Self::Wgs84(earth) => Some(Frame::Wgs84(Arc::new(Wgs84::new(
                 earth.datum,
                 earth.plane,
                 earth.undulation_m,
                 earth.area,
                 earth.written.into_inner(),
-            ))),
+            )))),
+            Self::Degrees | Self::Unknown => None,
         }
     }
 
-    /// `{"x", "y", "z"}` or `{"lat", "lon", "alt"}`.
+    /// `{"x", "y", "z"}` or `{"lat", "lon", "alt"}`; passed over where the frame is unknown.
     pub(super) fn point3(&self, at: At<'_>, faults: &mut Faults) -> Option<Point3> {
         match self {
             Self::Local => {
@@ -99,14 +93,15 @@ impl Chart {
                 let z = fields.number("z", COORDINATE, faults);
                 Some(Point3::new(x?, y?, z?))
             }
-            Self::Wgs84(earth) => {
+            Self::Wgs84(_) | Self::Degrees => {
                 let fields = at.fields(&["lat", "lon", "alt"], faults)?;
                 let place = lat_lon(&fields, faults);
                 let alt = fields.number("alt", COORDINATE, faults);
-                let point = earth.laid(place?, at.path, faults);
+                let point = self.laid(place?, at.path, faults);
                 let (point, alt) = (point?, alt?);
                 Some(Point3::new(point.x, point.y, alt))
             }
+            Self::Unknown => None,
         }
     }
 
@@ -114,43 +109,58 @@ impl Chart {
     pub(super) fn point2(&self, at: At<'_>, faults: &mut Faults) -> Option<Point2> {
         match self {
             Self::Local => super::point::pair(at, COORDINATE, faults),
-            Self::Wgs84(earth) => {
+            Self::Wgs84(_) | Self::Degrees => {
                 let fields = at.fields(&["lat", "lon"], faults)?;
                 let place = lat_lon(&fields, faults)?;
-                earth.laid(place, at.path, faults)
+                self.laid(place, at.path, faults)
             }
+            Self::Unknown => None,
         }
     }
 
-    /// Where free waypoints of a document in degrees are kept: the greatest rectangle of the plane in its
-    /// area, and its ends, which may lie where the area bends beyond that. A document of the local
-    /// frame names its area itself.
-    pub(super) fn area(&self, start: Option<Point3>, target: Option<Point3>) -> Option<Rect> {
-        let Self::Wgs84(earth) = self else {
-            return None;
-        };
-        let rect = earth.rect();
-        let ends = [start, target].into_iter().flatten().map(|end| end.xy());
-        let ends = ends.filter(|end| earth.area.contains(earth.place(*end)));
-        Rect::around(ends.chain([rect.min, rect.max]))
+    fn laid(&self, place: LatLon, path: &Path<'_>, faults: &mut Faults) -> Option<Point2> {
+        match self {
+            Self::Wgs84(earth) => earth.laid(place, path, faults),
+            _ => None,
+        }
+    }
+
+    /// Where free waypoints are kept, if the document or its frame says so: the outer `None` has left a fault.
+    #[expect(
+        clippy::option_option,
+        reason = "the outer one tells whether it could be read"
+    )]
+    pub(super) fn area(
+        &self,
+        fields: &Fields<'_>,
+        ends: [Option<Point3>; 2],
+        faults: &mut Faults,
+    ) -> Option<Option<Rect>> {
+        match self {
+            Self::Local => fields.or("area", None, faults, |at, faults| {
+                super::point::area(at, faults).map(Some)
+            }),
+            Self::Wgs84(earth) => Some(earth.area_with(ends)),
+            Self::Degrees | Self::Unknown => None,
+        }
     }
 
     /// The name of a height in this frame.
     pub(super) fn height(&self) -> &'static str {
         match self {
-            Self::Local => "z",
-            Self::Wgs84(_) => "alt",
+            Self::Local | Self::Unknown => "z",
+            Self::Wgs84(_) | Self::Degrees => "alt",
         }
     }
 
     /// `point` for people, as the document would write it.
     pub(super) fn say(&self, point: Point2) -> String {
         match self {
-            Self::Local => format!("({}, {})", figure(point.x), figure(point.y)),
             Self::Wgs84(earth) => {
                 let place = earth.plane.geodetic(point);
                 format!("lat {:.6}, lon {:.6}", place.lat, place.lon)
             }
+            _ => format!("({}, {})", figure(point.x), figure(point.y)),
         }
     }
 
@@ -158,13 +168,30 @@ impl Chart {
     /// rectangle is only the greatest part of.
     pub(super) fn is_in_area(&self, end: Point2, area: Rect) -> bool {
         match self {
-            Self::Local => area.contains(end),
             Self::Wgs84(earth) => earth.area.contains(earth.place(end)),
+            _ => area.contains(end),
         }
     }
 }
 
 impl Earth {
+    /// The earth of a document in degrees; `None` has left a fault.
+    fn of(fields: &Fields<'_>, dataset: Option<&Named<'_>>, faults: &mut Faults) -> Option<Self> {
+        let datum = datum(fields, faults);
+        let given = fields.or("area", None, faults, |at, faults| {
+            area(at, faults).map(Some)
+        });
+        let (datum, given) = (datum?, given?);
+        let sketch = sketch::Sketch::of(fields);
+        let earth = |area| Self::over(area, datum, sketch.mean_alt);
+        let area = given.unwrap_or_else(|| match dataset {
+            Some(dataset) => dataset.within(sketch.area(), &sketch.ends, earth),
+            None => over_grid(fields, &sketch.ends, earth).unwrap_or_else(|| sketch.area()),
+        });
+        let earth = earth(area);
+        earth.check(fields, faults).then_some(earth)
+    }
+
     /// The plane in the middle of `area`.
     fn over(area: LatLonBox, datum: Datum, mean_alt: f64) -> Self {
         let middle = area.middle();
@@ -183,39 +210,47 @@ impl Earth {
     }
 
     /// That the plane fits the earth all over the area; whether it does.
-    fn check(&self, faults: &mut Faults) -> bool {
+    fn check(&self, fields: &Fields<'_>, faults: &mut Faults) -> bool {
         let area = self.area;
-        let path = Path::Key(&Path::Root, "area");
+        let what = if fields.has("area") {
+            "the area"
+        } else {
+            "the area, by default the box round everything,"
+        };
         let farthest = area.min.lat.abs().max(area.max.lat.abs());
         if farthest > sketch::MAX_LATITUDE {
-            faults.add(&path, "near-pole", || {
-                format!(
-                    "the area reaches latitude {farthest:.6}, must stay within {} degrees of the equator: \
-                     beyond, degrees of longitude tell too little",
-                    sketch::MAX_LATITUDE
-                )
-            });
+            let detail = format!(
+                "{what} reaches latitude {farthest:.6}, must stay within {} degrees of the equator: \
+                 beyond, degrees of longitude tell too little",
+                sketch::MAX_LATITUDE
+            );
+            blame(
+                fields,
+                sketch::nearest_to_a_pole,
+                "near-pole",
+                detail,
+                faults,
+            );
             return false;
         }
         let rect = self.rect();
         let (width, height) = (rect.max.x - rect.min.x, rect.max.y - rect.min.y);
         let has_inside = width > 0.0 && height > 0.0;
         if !has_inside || width.max(height) > sketch::MAX_WIDTH_M {
-            faults.add(&path, "area-too-wide", || {
-                let size = if has_inside {
-                    format!("the area is {width:.0} m by {height:.0} m")
-                } else {
-                    // Parallels over much of a hemisphere bend past each other.
-                    format!(
-                        "the area reaches over {:.6} degrees of longitude",
-                        area.width()
-                    )
-                };
+            let size = if has_inside {
+                format!("{what} is {width:.0} m by {height:.0} m")
+            } else {
+                // Parallels over much of a hemisphere bend past each other.
                 format!(
-                    "{size}, must be at most {} m either way: a plane fits the earth no farther",
-                    sketch::MAX_WIDTH_M
+                    "{what} reaches over {:.6} degrees of longitude",
+                    area.width()
                 )
-            });
+            };
+            let detail = format!(
+                "{size}, must be at most {} m either way: a plane fits the earth no farther",
+                sketch::MAX_WIDTH_M
+            );
+            blame(fields, sketch::farthest, "area-too-wide", detail, faults);
             return false;
         }
         true
@@ -253,6 +288,15 @@ impl Earth {
         }
     }
 
+    /// Where free waypoints are kept: the greatest rectangle of the plane in the area, and the `ends`, which
+    /// may lie where the area bends beyond that.
+    fn area_with(&self, ends: [Option<Point3>; 2]) -> Option<Rect> {
+        let rect = self.rect();
+        let ends = ends.into_iter().flatten().map(|end| end.xy());
+        let ends = ends.filter(|end| self.area.contains(self.place(*end)));
+        Rect::around(ends.chain([rect.min, rect.max]))
+    }
+
     /// The place that was written for `point`.
     pub(super) fn place(&self, point: Point2) -> LatLon {
         let written = self.written.borrow().get(&frame::key(point)).copied();
@@ -277,6 +321,39 @@ impl Earth {
         self.written.borrow_mut().insert(frame::key(point), place);
         Some(point)
     }
+}
+
+/// An area that no plane fits is at fault itself; for a default one, the `part` of the document that it had to reach is.
+fn blame(
+    fields: &Fields<'_>,
+    part: impl FnOnce(&Fields<'_>) -> Option<sketch::Part>,
+    code: &'static str,
+    detail: String,
+    faults: &mut Faults,
+) {
+    let part = if fields.has("area") {
+        None
+    } else {
+        part(fields)
+    };
+    let (name, item) = part.unwrap_or(("area", None));
+    let path = Path::Key(fields.path, name);
+    match item {
+        Some(index) => faults.add(&Path::Index(&path, index), code, || detail),
+        None => faults.add(&path, code, || detail),
+    }
+}
+
+/// What altitudes are above.
+fn datum(fields: &Fields<'_>, faults: &mut Faults) -> Option<Datum> {
+    fields.or("altitude_datum", Datum::Msl, faults, |at, faults| {
+        let choice = at.choice(&["msl", "ellipsoid"], faults)?;
+        Some(if choice == "msl" {
+            Datum::Msl
+        } else {
+            Datum::Ellipsoid
+        })
+    })
 }
 
 fn lat_lon(fields: &Fields<'_>, faults: &mut Faults) -> Option<LatLon> {

@@ -151,12 +151,12 @@ pub(super) fn ground(fields: &Fields<'_>, site: &Site<'_>, faults: &mut Faults) 
     let sha256 = fields.or("sha256", None, faults, |at, faults| {
         sum(at, faults).map(Some)
     });
-    let Chart::Wgs84(earth) = site.chart else {
+    if let Chart::Local = site.chart {
         faults.add(&Path::Key(fields.path, "kind"), "not-applicable", || {
             "kind is dataset, must be flat, peaks or grid where frame is local: a dataset lies on the earth"
         });
         return None;
-    };
+    }
     let (name, sha256) = (name?, sha256?);
     let sha256 = sha256.as_deref();
     let named = site.named.expect("a terrain with kind and name names one");
@@ -166,6 +166,9 @@ pub(super) fn ground(fields: &Fields<'_>, site: &Site<'_>, faults: &mut Faults) 
             refuse(error, fields, &name, sha256, faults);
             return None;
         }
+    };
+    let Chart::Wgs84(earth) = site.chart else {
+        return None;
     };
     let area = site.area?;
     let area = trimmed(area, &found.dataset, earth.plane());

@@ -13,7 +13,6 @@ use super::fault::Faults;
 use super::fields::Fields;
 use super::path::Path;
 use super::planner::planner;
-use super::point::area;
 use super::terrain;
 use super::threats::threats;
 use super::tree::Node;
@@ -63,8 +62,6 @@ pub(super) fn document(
         faults,
         vehicle::weights,
     );
-    // Points of a frame that cannot be told are not faults of their own.
-    let chart = chart?;
     let planner = section(&fields, "planner", &Node::Object(Box::default()), |at| {
         planner(at, &chart, rules, drawn_seed, faults)
     });
@@ -89,7 +86,7 @@ pub(super) fn document(
     }
     Some(Scenario {
         name: name?,
-        frame: chart.finish(),
+        frame: chart.finish()?,
         start: place.start,
         target: place.target,
         area: place.area,
@@ -136,12 +133,7 @@ fn place(
 ) -> Option<Place> {
     let start = fields.required("start", faults, |at, faults| chart.point3(at, faults));
     let target = fields.required("target", faults, |at, faults| chart.point3(at, faults));
-    let given_area = match chart.area(start, target) {
-        Some(area) => Some(Some(area)),
-        None => fields.or("area", None, faults, |at, faults| {
-            area(at, faults).map(Some)
-        }),
-    };
+    let given_area = chart.area(fields, [start, target], faults);
     let threats = fields.or("threats", Vec::new(), faults, |at, faults| {
         threats(at, chart, &rules.limits, faults)
     });

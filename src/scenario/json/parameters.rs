@@ -97,8 +97,8 @@ impl Default for Parameters {
     }
 }
 
-/// What every algorithm has, and the constants that `rule` allows; with the algorithm unknown, none
-/// is checked.
+/// What every algorithm has, and the constants that `rule` allows; without a rule, nobody can tell what else
+/// there may be, so it is passed over.
 pub(super) fn parameters(
     at: At<'_>,
     rule: Option<&AlgorithmRule>,
@@ -108,16 +108,18 @@ pub(super) fn parameters(
         at.fields(&[], faults);
         return None;
     };
-    let rule = rule?;
+    let constants = rule.map_or(&[][..], |rule| &rule.parameters);
     let mut allowed: Vec<&str> = COMMON.iter().map(|parameter| parameter.name).collect();
-    allowed.extend(rule.parameters.iter().map(|parameter| parameter.name));
+    allowed.extend(constants.iter().map(|parameter| parameter.name));
     let mut seen = vec![false; allowed.len()];
     let mut sound = true;
     let mut parameters = Parameters::default();
     for (key, node) in entries {
         let Some(slot) = allowed.iter().position(|name| *name == &**key) else {
-            let role = format!("parameter of {}", rule.name);
-            unknown_key(at.path, key, "unknown-parameter", &role, &allowed, faults);
+            if let Some(rule) = rule {
+                let role = format!("parameter of {}", rule.name);
+                unknown_key(at.path, key, "unknown-parameter", &role, &allowed, faults);
+            }
             sound = false;
             continue;
         };
@@ -148,7 +150,7 @@ pub(super) fn parameters(
                 .map(|threads| parameters.threads = threads)
                 .is_some(),
             _ => {
-                let constant = rule.parameters[slot - COMMON.len()];
+                let constant = constants[slot - COMMON.len()];
                 at.number(Range::closed(constant.min, constant.max), faults)
                     .map(|value| parameters.constants.insert(key.to_string(), value))
                     .is_some()

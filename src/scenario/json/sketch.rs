@@ -50,26 +50,8 @@ impl Sketch {
             .filter_map(|end| number(end.as_ref()?.get("alt")?))
             .filter(|alt| COORDINATE.contains(*alt))
             .collect();
-        let mut places: Vec<(LatLon, f64)> = ends
-            .iter()
-            .filter_map(|end| Some((place(end.as_ref()?)?, 0.0)))
-            .collect();
-        for threat in items(fields.find("threats")) {
-            let reach = ["influence", "radius", "margin"]
-                .iter()
-                .find_map(|name| number(threat.get(name)?))
-                .filter(|reach| (0.0..=MAX_WIDTH_M).contains(reach))
-                .unwrap_or(0.0);
-            let centers = threat.get("center").into_iter();
-            let vertices = items(threat.get("vertices")).iter();
-            places.extend(
-                centers
-                    .chain(vertices)
-                    .filter_map(|node| Some((place(node)?, reach))),
-            );
-        }
         let ends: Vec<LatLon> = ends.into_iter().filter_map(|end| place(end?)).collect();
-        let reference = places.first().map_or(0.0, |(place, _)| place.lon);
+        let reference = spots(fields).next().map_or(0.0, |spot| spot.place.lon);
         let mut sketch = Self {
             climb_m: climb(fields, &ends, &alts),
             ends,
@@ -80,8 +62,8 @@ impl Sketch {
             west: f64::INFINITY,
             east: f64::NEG_INFINITY,
         };
-        for (place, reach_m) in places {
-            sketch.add(place, reach_m);
+        for spot in spots(fields) {
+            sketch.add(spot.place, spot.reach_m);
         }
         if sketch.south > sketch.north {
             sketch.add(LatLon { lat: 0.0, lon: 0.0 }, 0.0);
@@ -123,6 +105,63 @@ impl Sketch {
             },
         }
     }
+}
+
+/// A place that has to be in a default area, with what is round it.
+struct Spot {
+    part: Part,
+    place: LatLon,
+    reach_m: f64,
+}
+
+/// A field of the document, and the number of the item in it.
+pub(super) type Part = (&'static str, Option<usize>);
+
+/// The start, the target, and every center and vertex of a threat.
+fn spots<'a>(fields: &'a Fields<'_>) -> impl Iterator<Item = Spot> + 'a {
+    let ends = ["start", "target"].into_iter();
+    let ends = ends.filter_map(|name| {
+        Some(Spot {
+            part: (name, None),
+            place: place(fields.find(name)?)?,
+            reach_m: 0.0,
+        })
+    });
+    let threats = items(fields.find("threats")).iter().enumerate();
+    ends.chain(threats.flat_map(|(threat_idx, threat)| {
+        let reach_m = ["influence", "radius", "margin"]
+            .iter()
+            .find_map(|name| number(threat.get(name)?))
+            .filter(|reach| (0.0..=MAX_WIDTH_M).contains(reach))
+            .unwrap_or(0.0);
+        let centers = threat.get("center").into_iter();
+        let vertices = items(threat.get("vertices")).iter();
+        let places = centers.chain(vertices).filter_map(place);
+        places.map(move |place| Spot {
+            part: ("threats", Some(threat_idx)),
+            place,
+            reach_m,
+        })
+    }))
+}
+
+/// What reaches farthest from the start.
+pub(super) fn farthest(fields: &Fields<'_>) -> Option<Part> {
+    let start = spots(fields).next()?.place;
+    outermost(fields, |spot| start.distance_m(spot.place) + spot.reach_m)
+}
+
+/// What reaches nearest to a pole.
+pub(super) fn nearest_to_a_pole(fields: &Fields<'_>) -> Option<Part> {
+    outermost(fields, |spot| {
+        spot.place.lat.abs() + spot.reach_m / DEGREE_M
+    })
+}
+
+fn outermost(fields: &Fields<'_>, how_far: impl Fn(&Spot) -> f64) -> Option<Part> {
+    spots(fields)
+        .max_by(|a, b| how_far(a).total_cmp(&how_far(b)))
+        .map(|spot| spot.part)
 }
 
 /// [`climbing_room`] between `ends` at `alts`; nothing where one of them cannot be read.

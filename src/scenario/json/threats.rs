@@ -104,7 +104,7 @@ fn cylinder(fields: &Fields<'_>, chart: &Chart, faults: &mut Faults) -> Option<C
     let influence = fields.or("influence", None, faults, |at, faults| {
         at.number(RADIUS, faults).map(Some)
     });
-    let (center, radius) = (center?, radius?);
+    let radius = radius?;
     let influence = influence?.unwrap_or(radius);
     if influence < radius {
         faults.add(
@@ -121,7 +121,7 @@ fn cylinder(fields: &Fields<'_>, chart: &Chart, faults: &mut Faults) -> Option<C
         return None;
     }
     Some(Cylinder {
-        center,
+        center: center?,
         radius,
         influence,
     })

@@ -256,8 +256,9 @@ fn explain(text: &[u8], line: usize, column: usize, error: &serde_json::Error) -
     }
 }
 
-/// The number or bare word at a place, at most 40 bytes of it.
+/// The number or bare word at a place, a long one cut.
 fn word_at(text: &[u8], line: usize, column: usize) -> String {
+    const MAX_BYTES: usize = 40;
     let part_of_word = |byte: &u8| byte.is_ascii_alphanumeric() || b"+-._".contains(byte);
     let row = text
         .split(|byte| *byte == b'\n')
@@ -268,13 +269,14 @@ fn word_at(text: &[u8], line: usize, column: usize) -> String {
         .iter()
         .rposition(|byte| !part_of_word(byte))
         .map_or(0, |before| before + 1);
-    let word: Vec<u8> = row[begin..]
-        .iter()
-        .copied()
-        .take_while(part_of_word)
-        .take(40)
-        .collect();
-    String::from_utf8_lossy(&word).into_owned()
+    let len = row[begin..].iter().take_while(|byte| part_of_word(byte));
+    let word = &row[begin..][..len.count()];
+    let shown = String::from_utf8_lossy(&word[..word.len().min(MAX_BYTES)]);
+    if word.len() > MAX_BYTES {
+        format!("{shown}...")
+    } else {
+        shown.into_owned()
+    }
 }
 
 #[cfg(test)]
@@ -313,6 +315,18 @@ mod tests {
                 15,
                 "/a/1",
                 "1e999 is out of range, must fit a 64-bit float",
+            ),
+        );
+        check(
+            format!("[1{}]", "0".repeat(400)),
+            (
+                1,
+                402,
+                "/0",
+                &format!(
+                    "1{}... is out of range, must fit a 64-bit float",
+                    "0".repeat(39)
+                ),
             ),
         );
         check(

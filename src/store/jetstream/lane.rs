@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::export::sha256_hex;
+use crate::digest::sha256_hex;
 use crate::job::Submission;
 
 /// From so much [`Submission::work`] on a plan is large: about a second of it.

@@ -52,7 +52,7 @@ use self::lane::Lane;
 use self::leases::Leases;
 use self::orphans::Orphans;
 use self::steps::Plans;
-use self::view::View;
+use self::view::{Standing, View};
 use super::{
     DatasetUse, End, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError, Submitted,
     Webhook,
@@ -268,6 +268,19 @@ impl Store for JetStreamStore {
         let page = history.page(after, limit);
         store.view.known().keep_history(id, history);
         Ok(page)
+    }
+
+    async fn has_told(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
+        let store = self.open_store()?;
+        let has_come_so_far = |standing: &Standing| -> Result<bool, StoreError> {
+            let record = standing.record(id, (store.options.clock)())?;
+            Ok(event <= record.last_event)
+        };
+        let plans = store.plans();
+        if has_come_so_far(&plans.standing(id).await?)? {
+            return Ok(true);
+        }
+        has_come_so_far(&plans.look_up(id).await?)
     }
 
     fn changes(&self, id: PlanId) -> watch::Receiver<u64> {

@@ -68,7 +68,7 @@ impl Plans<'_> {
     }
 
     /// How a plan stands for the servers.
-    async fn look_up(&self, id: PlanId) -> Result<Standing, StoreError> {
+    pub(super) async fn look_up(&self, id: PlanId) -> Result<Standing, StoreError> {
         let newest = self.newest(id).await?.ok_or(StoreError::NotFound(id))?;
         self.learn(id, &newest);
         Ok(Standing {

@@ -18,7 +18,7 @@ use super::lane::Lane;
 use super::record::{Document, Queued, Record};
 use super::steps::Change;
 use super::trouble::{failed, is_outrun};
-use crate::export::sha256_hex;
+use crate::digest::sha256_hex;
 use crate::job::{Idempotency, Owner, Plan, PlanId, Submission};
 use crate::store::{IDEMPOTENCY_MS, StoreError, Submitted};
 

@@ -245,6 +245,11 @@ impl Store for SqliteStore {
             .await
     }
 
+    async fn has_told(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
+        let page = self.events(id, event.saturating_sub(1), 1).await?;
+        Ok(event <= page.forgotten || !page.events.is_empty())
+    }
+
     fn changes(&self, id: PlanId) -> watch::Receiver<u64> {
         self.changes.subscribe(id)
     }

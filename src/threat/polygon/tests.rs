@@ -278,7 +278,7 @@ proptest! {
     /// A leg that cuts off micrometres of a corner goes as deep as that, however long it is.
     #[test]
     fn a_corner_that_is_only_just_cut_off_is_cut_as_deep_as_it_is(
-        depth in 1e-6..1e-3f64, turn in 0.0..6.28f64, reach in 1e3..1e4f64,
+        depth in 1e-6..1e-3f64, turn in 0.0..std::f64::consts::TAU, reach in 1e3..1e4f64,
     ) {
         let (sin, cos) = libm::sincos(turn);
         let turned = |[x, y]: [f64; 2]| Point2::new(5e3 + x * cos - y * sin, 5e3 + x * sin + y * cos);

@@ -313,6 +313,64 @@ fn all_faults_come_at_once_and_in_document_order() {
     insta::assert_snapshot!(Refusal::Invalid(faults).to_string());
 }
 
+/// What needs no frame is checked without one, and what every algorithm has without an algorithm.
+#[test]
+fn a_frame_or_an_algorithm_that_is_unknown_hides_no_other_faults() {
+    let unknown = r#"{
+        "start":{"x":0,"y":0},"target":{"x":"a","y":0,"z":0},"altitude":{"min":5,"max":1},"frame":"bogus",
+        "threats":[1,{"kind":"cylinder","radius":-3},{"kind":"polygon","vertices":[{"x":0}],"margin":-1},
+            {"kind":"cylinder","center":{},"radius":3,"influence":1}],
+        "terrain":{"kind":"dataset","name":"nowhere"},
+        "vehicle":{"max_turn_deg":-1},
+        "planner":{"algorithm":"zzz","waypoints":0,"parameters":{"foo":1,"gap":-1},"smoothing":{"x":1}}
+    }"#;
+    let pointers = |document: &str| -> Vec<String> {
+        let faults = faults(document).into_iter();
+        faults.map(|fault| fault.pointer).collect()
+    };
+    assert_eq!(
+        pointers(unknown),
+        [
+            "/altitude",
+            "/frame",
+            "/threats/0",
+            "/threats/1/radius",
+            "/threats/1/center",
+            "/threats/2/margin",
+            "/threats/3/influence",
+            "/terrain/name",
+            "/vehicle/max_turn_deg",
+            "/planner/algorithm",
+            "/planner/waypoints",
+            "/planner/parameters/gap",
+            "/planner/smoothing/x",
+        ]
+    );
+
+    // Places that no plane can be laid under are degrees all the same.
+    let wide = r#"{
+        "frame":"wgs84","area":{"min":{"lat":0,"lon":0},"max":{"lat":9,"lon":9}},
+        "start":{"lat":1,"lon":1},"target":{"lat":91,"lon":2,"alt":0},"altitude":{"min":0,"max":90},
+        "threats":[{"kind":"cylinder","center":{"lat":1,"x":2},"radius":-1}],
+        "terrain":{"kind":"dataset","name":"nowhere"},
+        "planner":{"waypoints":0,"warm_start":{"waypoints":[{"lat":1,"lon":1,"alt":"high"}]}}
+    }"#;
+    assert_eq!(
+        pointers(wide),
+        [
+            "/area",
+            "/start/alt",
+            "/target/lat",
+            "/threats/0/center/x",
+            "/threats/0/center/lon",
+            "/threats/0/radius",
+            "/terrain/name",
+            "/planner/waypoints",
+            "/planner/warm_start/waypoints/0/alt",
+        ]
+    );
+}
+
 #[test]
 fn ten_thousand_faults_make_a_short_answer() {
     let threat = r#"{"kind":"cylinder","center":{"x":0,"y":0},"radius":-1},"#;

@@ -222,7 +222,7 @@ fn the_default_area_has_room_for_a_climb_that_is_steeper_than_the_vehicle() {
 #[test]
 fn what_no_plane_fits_is_refused() {
     let cases = [
-        ("/target/lon", json!(-81.0), "/area", "area-too-wide"),
+        ("/target/lon", json!(-81.0), "/target", "area-too-wide"),
         (
             "/area",
             json!({"min": {"lat": 30, "lon": -90}, "max": {"lat": 40, "lon": -80}}),
@@ -283,6 +283,50 @@ fn what_no_plane_fits_is_refused() {
                 .iter()
                 .any(|fault| fault.pointer == pointer && fault.code == code),
             "{path}: {found:#?}"
+        );
+    }
+}
+
+#[test]
+fn a_default_area_that_no_plane_fits_is_the_fault_of_what_reaches_out() {
+    for (path, value, pointer, code) in [
+        ("/target/lon", json!(-81.0), "/target", "area-too-wide"),
+        ("/target/lat", json!(89.5), "/target", "near-pole"),
+        (
+            "/threats/0/center/lat",
+            json!(39.0),
+            "/threats/0",
+            "area-too-wide",
+        ),
+        (
+            "/threats/0/influence",
+            json!(150e3),
+            "/threats/0",
+            "area-too-wide",
+        ),
+        (
+            "/threats/1/vertices/0/lon",
+            json!(-90),
+            "/threats/1",
+            "area-too-wide",
+        ),
+        (
+            "/threats/1/vertices/0/lat",
+            json!(-90),
+            "/threats/1",
+            "near-pole",
+        ),
+    ] {
+        let mut document = document();
+        *document.pointer_mut(path).expect("a place") = value;
+        let faults = faults(&document.to_string());
+        let found = faults.iter().find(|fault| fault.code == code);
+        let found = found.unwrap_or_else(|| panic!("{path}: {faults:#?}"));
+        assert_eq!(found.pointer, pointer, "{path}");
+        let detail = &found.detail;
+        assert!(
+            detail.starts_with("the area, by default the box"),
+            "{detail}"
         );
     }
 }

@@ -93,6 +93,13 @@ async fn a_name_can_be_given_to_another_content() {
         let answer = api.send(Method::DELETE, "/terrains/hill", &headers, "");
         assert_eq!(answer.await.status, status, "{header}: {value}");
     }
+    let any = [("if-match", "*")];
+    let absent = put_with(&api, "/terrains/new", &any, hill(25.0)).await;
+    let absent = absent.expect_problem(412, "precondition-failed");
+    assert_eq!(
+        absent["detail"],
+        "no dataset is called \"new\", and one was expected"
+    );
     for (header, value, status) in [
         ("if-match", "*", 412),
         ("if-none-match", "*", 201),

@@ -45,6 +45,15 @@ async fn a_grid_of_degrees_is_sampled_from_south_to_north() {
     let tag = whole.header("etag").to_owned();
     let known = api.get_with(uri, &[("if-none-match", &tag)]).await;
     assert_eq!(known.status, 304);
+    // Compressed, the same samples are other bytes.
+    let gzip = [("accept-encoding", "gzip")];
+    let packed = api.get_with(uri, &gzip).await;
+    assert_eq!(packed.header("content-encoding"), "gzip");
+    for answer in [packed, known] {
+        assert_eq!(answer.header("etag"), tag);
+        assert_eq!(answer.header("vary"), "accept-encoding");
+    }
+    assert!(tag.starts_with("W/"), "{tag}");
     // What a plan was made over, when the name stands for another.
     put(&api, "/terrains/steps", hill(1.0)).await;
     let sum = sum.as_str().expect("a sum");

@@ -1,0 +1,63 @@
+//! What a plan must be for a change to be made to it: `If-Match` and `If-None-Match`, RFC 9110
+//! section 13.1.
+
+use std::convert::Infallible;
+
+use axum::extract::FromRequestParts;
+use axum::http::request::Parts;
+use axum::http::{HeaderValue, header};
+
+use super::entity_tags::EntityTags;
+use super::problem::Problem;
+use super::status::etag;
+use crate::job::{Plan, PlanId};
+
+/// What the two headers say.
+pub(super) struct Precondition {
+    one_of: Option<EntityTags>,
+    none_of: Option<EntityTags>,
+}
+
+impl Precondition {
+    /// Refused unless `plan` is as the caller expects.
+    ///
+    /// Deviation: `If-Match` compares weakly, too. Plans' tags are weak only because the bytes of a document
+    /// may differ, and a strong comparison would never match any of them.
+    pub(super) fn check(&self, plan: &Plan) -> Result<(), Problem> {
+        let tag = etag(plan);
+        if self.holds(Some(&tag)) {
+            return Ok(());
+        }
+        let tag = tag.to_str().expect("digits are visible ASCII");
+        Err(Problem::PreconditionFailed(format!(
+            "plan {} has the entity tag {tag}, which If-Match or If-None-Match rules out",
+            plan.id
+        )))
+    }
+
+    /// Refused if the caller expects something of a plan that was removed.
+    pub(super) fn check_removed(&self, id: PlanId) -> Result<(), Problem> {
+        if self.holds(None) {
+            return Ok(());
+        }
+        Err(Problem::PreconditionFailed(format!(
+            "plan {id} was removed, so it has none of the entity tags of If-Match"
+        )))
+    }
+
+    fn holds(&self, tag: Option<&HeaderValue>) -> bool {
+        let among = |tags: &EntityTags| tag.is_some_and(|tag| tags.contain(tag));
+        self.one_of.as_ref().is_none_or(among) && !self.none_of.as_ref().is_some_and(among)
+    }
+}
+
+impl<S: Sync> FromRequestParts<S> for Precondition {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {
+        Ok(Self {
+            one_of: EntityTags::of(&parts.headers, header::IF_MATCH),
+            none_of: EntityTags::known(&parts.headers),
+        })
+    }
+}

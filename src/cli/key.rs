@@ -11,7 +11,7 @@ use crate::http::auth::{Keys, Scope, fresh_key};
 
 #[derive(Subcommand)]
 pub(super) enum Command {
-    /// Print a new key on stderr, where alone it is told, and its entry for the file of keys on stdout
+    /// Print a new key to stderr, the only place it ever appears, and its entry for the file of keys to stdout
     New(Arguments),
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     owner: Option<String>,
 
-    /// From when on it is none, such as 2027-01-31T00:00:00Z [default: never]
+    /// When it expires, such as 2027-01-31T00:00:00Z [default: never]
     #[arg(long, value_name = "TIME")]
     expires: Option<Timestamp>,
 
@@ -55,7 +55,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<()> {
     let Command::New(arguments) = command;
     let key = fresh_key()?;
     let entry = entry(arguments, &key);
-    Keys::read(&entry).map_err(|error| anyhow!("no such key can be: {error}"))?;
+    Keys::read(&entry).map_err(|error| anyhow!("there can be no such key: {error}"))?;
     // Apart from each other, so that `>> keys.toml` takes what belongs there and the key stays outside.
     eprintln!(
         "the key, for its holder alone; it is kept nowhere and cannot be shown again:\n{key}"

@@ -27,7 +27,7 @@ impl Problem {
             }
             Self::Malformed => "its first line, a header or the length of its body cannot be read, see RFC 9112".to_owned(),
             Self::HeadTooLarge(limit) => {
-                format!("address and headers may have {limit} bytes together, and headers be 100")
+                format!("request line and headers together may have {limit} bytes, and there may be 100 headers")
             }
             Self::BodyIncomplete => "the connection ended before the body did".to_owned(),
             Self::BodyUnreadable => "the chunks that the body comes in cannot be read, see RFC 9112 section 7.1".to_owned(),
@@ -51,7 +51,7 @@ impl Problem {
                 format!("this service has no keys and answers as localhost or by its address alone, not as {host}; its operator can say otherwise")
             }
             Self::Unauthorized(why) => why.detail().to_owned(),
-            Self::Forbidden(scope) => format!("the key has not the scope {}", scope.name()),
+            Self::Forbidden(scope) => format!("the key lacks the scope {}", scope.name()),
             Self::RateLimited { retry_after_s } => {
                 format!("the key has asked more often than it may; try again in {retry_after_s} s")
             }

@@ -1,4 +1,4 @@
-//! Servers of many, and the namespace of one service among others on them.
+//! A shared set of servers, and the namespace of one service on them.
 
 use std::fmt;
 use std::net::Ipv6Addr;
@@ -6,7 +6,7 @@ use std::net::Ipv6Addr;
 /// The namespace when an address names none.
 const NAMESPACE: &str = "noctule";
 
-/// What an address looks like, as a literal, to be a part of others.
+/// The form of an address, as a literal, for use within other literals.
 macro_rules! allowed {
     () => {
         "nats://HOST:PORT or tls://HOST:PORT without user and password (store_credentials has those), \
@@ -17,22 +17,22 @@ pub(super) use allowed;
 
 /// Servers of a NATS system, and the namespace of this service on them: `nats://a:4222,b:4222/noctule`.
 ///
-/// Who and what servers want to know of a client stands in its credentials file, never in an address:
-/// addresses are logged and printed.
+/// Whatever servers require a client to present is in its credentials file, never in an address: addresses are logged
+/// and printed.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd)]
 pub struct Address {
     /// Each with its scheme, `nats` or `tls`.
     pub servers: Vec<String>,
-    /// First part of the name of every stream, bucket and subject; services of other namespaces on the
-    /// same servers know nothing of this one.
+    /// First part of the name of every stream, bucket and subject; services in other namespaces on the same servers are
+    /// unaware of this one.
     pub namespace: String,
 }
 
 impl Address {
-    /// What an address looks like, for a refusal.
+    /// The form of an address, for a refusal.
     pub const ALLOWED: &str = allowed!();
 
-    /// Read an address; `None` when it is not as [`Address::ALLOWED`] says.
+    /// Read an address; `None` when it does not have the form of [`Address::ALLOWED`].
     #[must_use]
     pub fn read(text: &str) -> Option<Self> {
         let (scheme, rest) = text.split_once("://")?;
@@ -50,7 +50,7 @@ impl Address {
     }
 }
 
-/// As [`Address::read`] takes it.
+/// In the form that [`Address::read`] takes.
 impl fmt::Display for Address {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (nth, server) in self.servers.iter().enumerate() {
@@ -69,7 +69,7 @@ fn is_namespace(text: &str) -> bool {
     (1..=32).contains(&text.len()) && text.bytes().all(is_part)
 }
 
-/// A name or an address, perhaps with a port. An address of version 6 stands in brackets, for it has colons.
+/// A name or an address, optionally with a port. An IPv6 address must be in brackets because of its colons.
 fn is_host(text: &str) -> bool {
     let bracketed = text.strip_prefix('[').map(|rest| rest.split_once(']'));
     let (is_name, port) = if let Some(bracketed) = bracketed {

@@ -9,7 +9,7 @@ use super::value::{Given, Value, quoted};
 pub struct Endpoint(String);
 
 impl Endpoint {
-    /// Without a slash at its end.
+    /// Without a trailing slash.
     #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
@@ -33,12 +33,12 @@ impl Value for Option<Endpoint> {
     }
 }
 
-/// Headers of what is sent to somebody else, credentials among them: never shown.
+/// Headers sent to a third party, credentials among them: never shown.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Default)]
 pub struct Headers(Vec<(String, String)>);
 
 impl Headers {
-    /// Names in lower case, with values.
+    /// Names in lower case, with their values.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &str)> {
         let headers = self.0.iter();
         headers.map(|(name, value)| (name.as_str(), value.as_str()))
@@ -82,7 +82,7 @@ impl Value for Headers {
     }
 }
 
-/// With what `%XX` stands for, all of it visible ASCII or a space.
+/// With `%XX` decoded; everything must be visible ASCII or a space.
 fn decoded(text: &str) -> Option<String> {
     let mut parts = text.split('%');
     let mut decoded = parts.next()?.to_owned();

@@ -1,4 +1,4 @@
-//! The configuration file: TOML, each value with the line it stands on.
+//! The configuration file: TOML, each value with its line number.
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -6,25 +6,25 @@ use toml::de::{DeTable, DeValue};
 use super::setting::Setting;
 use super::value::Given;
 
-/// A value of the file.
+/// A value in the file.
 pub(super) struct Entry<'a> {
-    /// Which setting it is for.
+    /// The setting it is for.
     pub(super) setting: &'a Setting,
-    /// As it stands there.
+    /// As given in the file.
     pub(super) given: Given,
     /// From 1.
     pub(super) line: usize,
 }
 
-/// What is wrong with a file, and on which line.
+/// A fault in a file, and its line.
 pub(super) struct FileFault {
     /// From 1.
     pub(super) line: usize,
-    /// With the key it is about.
+    /// Names the key concerned.
     pub(super) detail: String,
 }
 
-/// The values of a file, and everything in it that is none.
+/// The values in a file, and everything in it that is not one.
 pub(super) fn read<'a>(text: &str, settings: &'a [Setting]) -> (Vec<Entry<'a>>, Vec<FileFault>) {
     let mut reader = Reader {
         text,
@@ -39,7 +39,7 @@ pub(super) fn read<'a>(text: &str, settings: &'a [Setting]) -> (Vec<Entry<'a>>, 
             reader.fault(start, error.message().to_owned());
         }
     }
-    // In the order of the file; tables come in that of the alphabet.
+    // In file order; the parser returns tables in alphabetical order.
     reader.entries.sort_by_key(|entry| entry.line);
     reader.faults.sort_by_key(|fault| fault.line);
     (reader.entries, reader.faults)
@@ -53,7 +53,7 @@ struct Reader<'a, 'text> {
 }
 
 impl Reader<'_, '_> {
-    /// Read the table called `name`; the top of the file has no name.
+    /// Read the table called `name`; the top level of the file has an empty name.
     fn table(&mut self, name: &'static str, table: &DeTable) {
         for (key, value) in table {
             let start = key.span().start;
@@ -93,7 +93,7 @@ impl Reader<'_, '_> {
         }
     }
 
-    /// The keys of a table; at the top, with those of tables.
+    /// The keys of a table; at the top level, table names too.
     fn known(&self, table: &str) -> String {
         let mut names: Vec<&str> = Vec::new();
         for (its_table, key) in self.settings.iter().map(Setting::path) {

@@ -1,4 +1,4 @@
-//! What is logged, and how it is looked for.
+//! What is logged, and how lines are matched.
 
 use tracing::Subscriber;
 use tracing_subscriber::EnvFilter;
@@ -13,10 +13,10 @@ use super::value::{Given, Value, quoted};
 pub struct Filter(String);
 
 impl Filter {
-    /// For the log's lines.
+    /// The filter for log lines.
     ///
-    /// An `EnvFilter` looks at each span that begins, is entered and ends, of which every request has some; what asks
-    /// for targets and levels alone gets a filter that decides once for each place in the code.
+    /// An `EnvFilter` looks at each span that begins, is entered and ends, of which every request has some; a setting
+    /// with targets and levels only gets a filter that decides once for each place in the code.
     #[must_use]
     pub fn of_lines<S>(&self) -> Box<dyn layer::Filter<S> + Send + Sync>
     where
@@ -28,7 +28,7 @@ impl Filter {
         }
     }
 
-    /// `None` where a directive asks for more, or leaves out what the two kinds of filter fill in differently.
+    /// `None` where a directive asks for more, or omits what the two kinds of filter fill in differently.
     fn targets(&self) -> Option<Targets> {
         let is_plain = |directive: &str| {
             let is_whole = !directive.is_empty() && !directive.ends_with('=');
@@ -71,7 +71,7 @@ mod tests {
 
     use super::*;
 
-    /// What lines are written to.
+    /// Collects the lines written.
     #[derive(Clone, Default)]
     struct Lines(Arc<Mutex<Vec<u8>>>);
 
@@ -86,7 +86,7 @@ mod tests {
         }
     }
 
-    /// The lines that `filter` lets through of one of each level from here, from there, and in a span.
+    /// The lines that `filter` lets through, out of one of each level from this crate, from another, and in a span.
     fn lines(filter: Box<dyn layer::Filter<Registry> + Send + Sync>) -> String {
         macro_rules! of_all_levels {
             ($target:expr) => {

@@ -8,18 +8,18 @@ use super::Config;
 use super::setting::Setting;
 use super::settings;
 
-/// What the command line says.
+/// The flags on the command line.
 #[derive(Debug, Clone, Default)]
 pub struct Flags {
     /// The file to read.
     pub config: Option<PathBuf>,
-    /// Whether to print what is in effect, and nothing else.
+    /// Whether to only print the settings in effect.
     pub print_config: bool,
-    /// Keys of settings, with what was given.
+    /// Keys of settings, with their given values.
     pub(super) given: Vec<(&'static str, String)>,
 }
 
-/// Ids of the two flags that are no settings. No key has a dash.
+/// Ids of the two flags that are not settings. No setting's key has a dash.
 const CONFIG: &str = "config-file";
 const PRINT_CONFIG: &str = "print-config";
 
@@ -64,7 +64,7 @@ fn argument(setting: &Setting, defaults: &Config) -> Arg {
     let argument = Arg::new(setting.key)
         .long(setting.flag())
         .value_name(setting.placeholder)
-        // For the setting to say what it allows, and not clap that there is no flag called so.
+        // So that the setting says what it allows, instead of clap taking the number for an unknown flag.
         .allow_negative_numbers(true)
         .help(help);
     let argument = match setting.path().0 {

@@ -1,5 +1,5 @@
-//! Which value counts where several are given: the flag's, then the variable's, then the file's,
-//! then the default. All of them must be right, also those that do not count.
+//! Which value takes effect where several are given: the flag's, then the variable's, then the file's, then the
+//! default. All of them must be valid, including those without effect.
 
 use std::ffi::OsString;
 use std::fmt;
@@ -10,12 +10,12 @@ use super::settings;
 use super::value::Given;
 use super::{Config, Flags, Role, file};
 
-/// What is in effect.
+/// The settings in effect.
 #[derive(Debug)]
 pub struct Loaded {
     /// The settings.
     pub config: Config,
-    /// Where each comes from, in the order of the table.
+    /// Where each value comes from, in the order of the table.
     pub(super) sources: Vec<Source>,
 }
 
@@ -23,11 +23,11 @@ pub struct Loaded {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Source {
     Default,
-    /// With the line, from 1.
+    /// The file, and the line from 1.
     File(PathBuf, usize),
-    /// Its name.
+    /// Name of the variable.
     Variable(String),
-    /// Its name, with dashes.
+    /// Name of the flag, with dashes.
     Flag(String),
 }
 
@@ -41,10 +41,10 @@ impl fmt::Display for Source {
     }
 }
 
-/// Put the layers together. `variable` looks into the environment.
+/// Merge the layers. `variable` looks into the environment.
 ///
 /// # Errors
-/// Everything that is wrong, a line each: where it stands, what it is, and what it must be.
+/// Everything that is wrong, one line each: where it is, what it is, and what it must be.
 pub fn load(
     flags: &Flags,
     variable: impl Fn(&str) -> Option<OsString>,
@@ -99,11 +99,11 @@ impl Layers<'_> {
         }
     }
 
-    /// An empty variable is as none.
+    /// An empty variable counts as unset.
     fn environment(&mut self, variable: impl Fn(&str) -> Option<OsString>) {
         for setting in self.settings {
             let own = setting.variable();
-            // The later counts.
+            // The later one wins.
             for name in setting.shared_variable.into_iter().chain([own.as_str()]) {
                 match variable(name).map(OsString::into_string) {
                     None => {}
@@ -126,7 +126,7 @@ impl Layers<'_> {
         }
     }
 
-    /// What is right by itself may still not go together.
+    /// Values that are valid on their own may still not be valid together.
     fn together(&mut self) {
         let Config { role, store, .. } = &self.config;
         if *role != Role::All && !store.is_shared() && self.faults.is_empty() {
@@ -238,7 +238,7 @@ mod tests {
         let lines = "workers = 0\nwokers = 2\nlimits = 3\n[http]\nhead_timeout = \"soon\"\nheads = 1\n[htpp]\n";
         let variables = [("NOCTULE_QUEUE", "many")];
         let faults = loaded(lines, &variables, &[("log_format", "xml")]).expect_err("wrong");
-        // Up to where lists of names grow with the settings.
+        // Stops before the lists of names that grow with the settings.
         let expected = [
             "FILE:2: wokers is unknown, must be one of listen, data_dir, terrain_dir, workers, queue, ",
             "FILE:3: limits must be a table with body_bytes, threats, ",

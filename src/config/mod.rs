@@ -1,8 +1,8 @@
-//! What the operator sets, as plain structs that are handed down in parts.
+//! The operator's settings, as plain structs whose parts are passed down.
 //!
-//! A setting is a field here with its default, and a row in `settings`; its flag, its variable and
-//! its key in the file follow from the row. Where several give it, the flag counts, then the
-//! variable, then the file. Deliberately absent: what a setting does.
+//! A setting is a field here with its default, and a row in `settings`; its flag, its variable and its key in the file
+//! follow from the row. Where several are given, the flag wins, then the variable, then the file. Deliberately absent:
+//! what a setting does.
 
 mod address;
 mod collector;
@@ -30,14 +30,14 @@ pub use value::LogFormat;
 
 use crate::scenario::limits::Limits;
 
-/// How the service runs. The defaults stand in [`Config::default`].
+/// How the service runs. The defaults are in [`Config::default`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Config {
     /// Address and port to listen on; port 0 takes a free one.
     pub listen: SocketAddr,
     /// Directory for the plans; `None` when none is named and the user has no home.
     pub data_dir: Option<PathBuf>,
-    /// Directory of the operator's own datasets; `None` has none.
+    /// Directory of the operator's own datasets; `None` for none.
     pub terrain_dir: Option<PathBuf>,
     /// Plans run at the same time.
     pub workers: usize,
@@ -47,31 +47,31 @@ pub struct Config {
     pub grace: Duration,
     /// Where plans are kept.
     pub store: Place,
-    /// What the servers of a shared store want to know of this node; a file as `nsc` writes it.
+    /// Credentials of this node for the servers of a shared store; a file as `nsc` writes it.
     pub store_credentials: Option<PathBuf>,
-    /// How many copies they keep.
+    /// How many copies the servers of a shared store keep.
     pub store_replicas: Replicas,
-    /// How long a run is a node's after it last said so.
+    /// How long a run belongs to a node after its last renewal.
     pub store_lease: Duration,
-    /// What this node does for those that share its store.
+    /// What this node does for the others that share its store.
     pub role: Role,
-    /// The keys of those who may use the service; `None` when it is for everybody who reaches it.
+    /// The keys of those who may use the service; `None` when it is open to everybody who can reach it.
     pub keys_file: Option<PathBuf>,
-    /// Whether it may be reached from other machines without keys.
+    /// Whether it may be reachable from other machines without keys.
     pub allow_anonymous: bool,
-    /// Origins of pages from elsewhere that may use it.
+    /// Origins of pages on other sites that may use it.
     pub cors_origins: Vec<String>,
     /// What is logged.
     pub log: Filter,
     /// How log lines are written.
     pub log_format: LogFormat,
-    /// Where traces are sent; `None` is nowhere.
+    /// Where traces are sent; `None` for nowhere.
     pub otlp_endpoint: Option<Endpoint>,
-    /// What is sent with them.
+    /// Headers sent with the traces.
     pub otlp_headers: Headers,
-    /// Of connections and requests.
+    /// Settings of connections and requests.
     pub http: Http,
-    /// Of the ends of plans, told to addresses that callers name.
+    /// Settings of webhooks, which tell callers of the ends of plans.
     pub webhook: Webhook,
     /// How long plans are kept.
     pub retention: Retention,
@@ -79,7 +79,7 @@ pub struct Config {
     pub limits: Limits,
 }
 
-/// Of connections and requests.
+/// Settings of connections and requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Http {
     /// A request's head must be complete after this; also how long a connection may idle.
@@ -94,25 +94,25 @@ pub struct Http {
     pub streams_per_key: usize,
 }
 
-/// Of the ends of plans, told to addresses that callers name.
+/// Settings of webhooks, which tell callers of the ends of plans.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Webhook {
-    /// Holds the secret that is shared with receivers; `None` tells nobody.
+    /// File with the secret that is shared with receivers; `None` disables webhooks.
     pub secret_file: Option<PathBuf>,
-    /// Whether receivers may be elsewhere than on the public internet, and without TLS.
+    /// Whether receivers may be outside the public internet, and without TLS.
     pub allow_private: bool,
 }
 
-/// How long ended plans are kept: until the first of these limits; 0 is none.
+/// How long ended plans are kept: until the first of these limits is reached; 0 for no limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Retention {
-    /// From the end of a plan.
+    /// Time since the end of a plan.
     pub age: Duration,
-    /// Ended plans.
+    /// Number of ended plans.
     pub plans: u64,
     /// Bytes of their documents and events.
     pub bytes: u64,
-    /// Events of each plan.
+    /// Number of events of each plan.
     pub events: u64,
 }
 

@@ -1,4 +1,4 @@
-//! Where plans are kept, and which part a node plays there.
+//! Where plans are kept, and the node's role there.
 
 use super::address::{self, Address};
 use super::value::{Given, Value, quoted};
@@ -9,7 +9,7 @@ pub enum Place {
     /// A file in the data directory, for one process.
     #[default]
     Sqlite,
-    /// The servers of a NATS system, for many.
+    /// The servers of a NATS system, shared by many processes.
     Nats(Address),
 }
 
@@ -40,7 +40,7 @@ impl Value for Place {
         })
     }
 
-    /// One with a password would be shown by its refusal.
+    /// An address with a password would be shown by its refusal.
     fn is_secret(given: &Given) -> bool {
         given.text().is_none_or(|text| text.contains('@'))
     }
@@ -92,7 +92,7 @@ pub enum Role {
 impl Role {
     const ALL: [Self; 3] = [Self::All, Self::Api, Self::Worker];
 
-    /// As it is given.
+    /// As written in the settings.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -1,4 +1,4 @@
-//! `noctule serve --print-config`: what is in effect, as a file that says the same.
+//! `noctule serve --print-config`: the settings in effect, as an equivalent file.
 
 use std::io::Write;
 

@@ -1,4 +1,4 @@
-//! What a setting is: its names, and how a given value gets into its field.
+//! What a setting is: its names, and how a given value is put into its field.
 
 use std::fmt::Write as _;
 use std::ops::{RangeFrom, RangeFull, RangeInclusive};
@@ -8,30 +8,30 @@ use super::value::{Given, Value};
 
 /// One setting.
 pub(super) struct Setting {
-    /// In the file: `table.key`, or `key` at its top.
+    /// Key in the file: `table.key`, or `key` at the top level.
     pub(super) key: &'static str,
-    /// Of its value, in the help.
+    /// Placeholder for its value in the help.
     pub(super) placeholder: &'static str,
-    /// One sentence without its full stop.
+    /// Help text: one sentence without its full stop.
     pub(super) help: &'static str,
-    /// A variable that other programs share, which counts when its own is not set.
+    /// A variable shared with other programs, used when its own is not set.
     pub(super) shared_variable: Option<&'static str>,
     place: Box<dyn Place>,
 }
 
 impl Setting {
-    /// Let the variable `name`, which other programs share, give it too.
+    /// Let the variable `name`, which is shared with other programs, set it too.
     pub(super) fn or_variable(mut self, name: &'static str) -> Self {
         self.shared_variable = Some(name);
         self
     }
 
-    /// Its table in the file, empty at the top, and its key there.
+    /// Its table in the file, empty at the top level, and its key there.
     pub(super) fn path(&self) -> (&'static str, &'static str) {
         self.key.split_once('.').unwrap_or(("", self.key))
     }
 
-    /// Without the dashes before it.
+    /// Name of its flag, without the leading dashes.
     pub(super) fn flag(&self) -> String {
         self.key.replace(['.', '_'], "-")
     }
@@ -44,7 +44,7 @@ impl Setting {
     /// Put `given` into `config`.
     ///
     /// # Errors
-    /// What is allowed, when it is not that.
+    /// The allowed values, when it is not one of them.
     pub(super) fn set(&self, config: &mut Config, given: &Given) -> Result<(), String> {
         self.place.set(config, given)
     }
@@ -64,13 +64,13 @@ impl Setting {
         self.place.hides(given)
     }
 
-    /// Whether its flag may stand without a value.
+    /// Whether its flag may be given without a value.
     pub(super) fn is_switch(&self) -> bool {
         self.place.is_switch()
     }
 }
 
-/// The setting of a field of [`Config`], within `range`.
+/// The setting for a field of [`Config`], with values in `range`.
 pub(super) fn row<T: Value>(
     key: &'static str,
     placeholder: &'static str,
@@ -88,7 +88,7 @@ pub(super) fn row<T: Value>(
     }
 }
 
-/// Where a setting's value goes, whatever its type.
+/// Gives access to a setting's field, whatever its type.
 trait Place {
     fn set(&self, config: &mut Config, given: &Given) -> Result<(), String>;
     fn shown(&self, config: &Config) -> Option<String>;
@@ -126,7 +126,7 @@ impl<T: Value> Place for Field<T> {
     }
 }
 
-/// What a value may be beside what its type says.
+/// Limits on a value beyond those of its type.
 pub(super) struct Range<T> {
     least: Option<T>,
     most: Option<T>,

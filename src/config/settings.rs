@@ -1,4 +1,4 @@
-//! Which settings there are: one row each.
+//! All settings: one row each.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -21,7 +21,7 @@ pub(super) fn all() -> Vec<Setting> {
     .collect()
 }
 
-/// Those without a table come first: the service itself.
+/// Settings without a table come first: the service itself.
 fn service() -> Vec<Setting> {
     vec![
         row(
@@ -69,7 +69,7 @@ fn service() -> Vec<Setting> {
     ]
 }
 
-/// Where plans are kept, and with whom.
+/// Where plans are kept, and how that is shared.
 fn store() -> Vec<Setting> {
     vec![
         row(
@@ -110,7 +110,7 @@ fn store() -> Vec<Setting> {
     ]
 }
 
-/// Who may use the service, and what it tells of itself.
+/// Who may use the service, and what it reports to others.
 fn edges() -> Vec<Setting> {
     vec![
         row(

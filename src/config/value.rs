@@ -1,4 +1,4 @@
-//! What kinds of values settings have: how each is read and written.
+//! The types of settings' values: how each is read and written.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -7,24 +7,24 @@ use std::time::Duration;
 /// A value as the operator gave it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Given {
-    /// By flag or variable: text, whatever it stands for.
+    /// Text of a flag or variable, whatever its type will be.
     Word(String),
-    /// A string of the file.
+    /// A string in the file.
     Text(String),
-    /// A number of the file without a fraction. A count may go beyond 2^63, where TOML's own end.
+    /// A number in the file without a fraction. A count may exceed 2^63, the limit of TOML's own.
     Integer(i128),
-    /// Another number of the file.
+    /// Another number in the file.
     Float(f64),
-    /// Of the file.
+    /// A boolean in the file.
     Bool(bool),
     /// An array of strings in the file.
     List(Vec<String>),
-    /// Anything else in the file; what it is called.
+    /// Anything else in the file; the name of its type.
     Other(&'static str),
 }
 
 impl Given {
-    /// For a refusal.
+    /// As shown in a refusal.
     pub(super) fn shown(&self) -> String {
         match self {
             Self::Word(text) | Self::Text(text) => format!("{text:?}"),
@@ -36,7 +36,7 @@ impl Given {
         }
     }
 
-    /// What stands for a text, in quotes or not.
+    /// The value as a text, in quotes or not.
     pub(super) fn text(&self) -> Option<&str> {
         match self {
             Self::Word(text) | Self::Text(text) => Some(text),
@@ -45,26 +45,26 @@ impl Given {
     }
 }
 
-/// A kind of value.
+/// The type of a setting's value.
 pub(super) trait Value: Clone + PartialOrd + 'static {
-    /// For a refusal: "must be" and this.
+    /// For a refusal: what follows "must be".
     const ALLOWED: &'static str;
 
-    /// Whether its flag alone, without a value, says `true`.
+    /// Whether its flag alone, without a value, means `true`.
     const IS_SWITCH: bool = false;
 
     /// Whether it is never shown, neither by `--print-config` nor in a refusal.
     const IS_SECRET: bool = false;
 
-    /// `None` when it is no such value.
+    /// `None` when it is not valid.
     fn read(given: &Given) -> Option<Self>;
 
-    /// Whether a refusal of it must not show it.
+    /// Whether a refusal of this value must not show it.
     fn is_secret(_given: &Given) -> bool {
         Self::IS_SECRET
     }
 
-    /// As it stands in the file; `None` when there is none.
+    /// As written in the file; `None` when there is no value.
     fn to_toml(&self) -> Option<String>;
 }
 
@@ -139,7 +139,7 @@ impl Value for bool {
     }
 }
 
-/// In a flag or variable, between commas.
+/// Separated by commas in a flag or variable.
 impl Value for Vec<String> {
     const ALLOWED: &'static str = "a list of texts";
 
@@ -164,7 +164,7 @@ impl Value for Vec<String> {
     }
 }
 
-/// Whole numbers, counts all of them.
+/// Whole numbers, which includes all counts.
 macro_rules! whole {
     ($($number:ty),*) => {$(
         impl Value for $number {
@@ -206,7 +206,7 @@ impl Value for Duration {
     }
 }
 
-/// A number with a unit, in seconds.
+/// A number with a unit, converted to seconds.
 fn read_seconds(text: &str) -> Option<f64> {
     const UNITS: [(&str, f64); 5] = [
         ("ms", 0.001),
@@ -221,7 +221,7 @@ fn read_seconds(text: &str) -> Option<f64> {
     Some(number.trim_end().parse::<f64>().ok()? * seconds)
 }
 
-/// As a string of TOML.
+/// As a TOML string.
 pub(super) fn quoted(text: &str) -> String {
     toml::Value::from(text).to_string()
 }

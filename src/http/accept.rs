@@ -1,16 +1,16 @@
-//! What a caller takes, and what it likes best: `Accept` and `Accept-Encoding`, RFC 9110 section 12.5.
+//! What a caller accepts, and prefers: `Accept` and `Accept-Encoding`, RFC 9110 section 12.5.
 
 use axum::http::{HeaderMap, HeaderName, header};
 
 use super::list;
 
-/// The media type out of `offers` that the caller likes best; `None` when the caller takes none of them.
+/// The media type out of `offers` that the caller prefers; `None` when the caller accepts none of them.
 pub(super) fn choose(headers: &HeaderMap, offers: &[&'static str]) -> Option<&'static str> {
     ranked(headers, offers).first().copied()
 }
 
-/// The media types out of `offers` that the caller takes, the best liked first, the earlier one between
-/// equals. No `Accept` takes all.
+/// The media types out of `offers` that the caller accepts, the preferred first, and the earlier one between equals.
+/// Without `Accept`, all are accepted.
 pub(super) fn ranked(headers: &HeaderMap, offers: &[&'static str]) -> Vec<&'static str> {
     let mut ranges = liked(headers, header::ACCEPT);
     ranges.retain(|(range, _)| range.contains('/'));
@@ -18,7 +18,7 @@ pub(super) fn ranked(headers: &HeaderMap, offers: &[&'static str]) -> Vec<&'stat
     if ranges.is_empty() {
         return taken;
     }
-    // The most exact range decides.
+    // The most specific range decides.
     let quality = |offer: &str| {
         let of_offer = ranges.iter().filter_map(|(range, quality)| {
             let exactness = exactness(range, offer)?;
@@ -33,7 +33,7 @@ pub(super) fn ranked(headers: &HeaderMap, offers: &[&'static str]) -> Vec<&'stat
     taken
 }
 
-/// Whether the caller takes answers in this coding. No `Accept-Encoding` takes none.
+/// Whether the caller accepts answers in this coding. Without `Accept-Encoding`, none is accepted.
 pub(super) fn takes(headers: &HeaderMap, coding: &str) -> bool {
     let codings = liked(headers, header::ACCEPT_ENCODING);
     let quality = |name: &str| {
@@ -54,7 +54,7 @@ pub(super) fn asked(headers: &HeaderMap) -> String {
         .join(", ")
 }
 
-/// What a header lists, in lower case, and how much each is liked, 0 to 1.
+/// The entries of a header, in lower case, and the weight of each, 0 to 1.
 fn liked(headers: &HeaderMap, name: HeaderName) -> Vec<(String, f64)> {
     headers
         .get_all(name)
@@ -65,7 +65,7 @@ fn liked(headers: &HeaderMap, name: HeaderName) -> Vec<(String, f64)> {
         .collect()
 }
 
-/// `name;q=0.5`; `None` where `q` is no number from 0 to 1.
+/// Parses `name;q=0.5`; `None` where `q` is not a number from 0 to 1.
 fn weighed(entry: &str) -> Option<(String, f64)> {
     let mut parts = list::split(entry, ';');
     let name = parts.next()?.to_ascii_lowercase();
@@ -78,7 +78,7 @@ fn weighed(entry: &str) -> Option<(String, f64)> {
     Some((name, quality))
 }
 
-/// How exactly `range` names the media type `offer`; `None` when it does not.
+/// How specifically `range` names the media type `offer`; `None` when it does not.
 fn exactness(range: &str, offer: &str) -> Option<usize> {
     let (kind, _) = offer.split_once('/')?;
     if range == offer {
@@ -114,7 +114,7 @@ mod tests {
             ("text/html", None),
             ("text/html, */*; Q = 0.1", Some("text/event-stream")),
             ("text/html;level=\"1, text/event-stream\"", None),
-            // What is no quality makes no entry.
+            // An entry with an invalid weight is left out.
             (
                 "text/event-stream;q=nan, application/x-ndjson;q=0.1",
                 Some("application/x-ndjson"),

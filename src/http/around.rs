@@ -1,8 +1,8 @@
-//! Layers of our own round a handler.
+//! Our own layers around a handler.
 //!
-//! What axum makes of a function puts the next service and the whole request into a box of its own, and all of that
-//! for each layer into a future of a kilobyte or two, to be filled and moved. Here a layer looks at the
-//! request, hands it on at once, and holds no more than what it wants of the answer.
+//! axum's function layers box the next service and the whole request, and put all that for each layer into a future of
+//! a kilobyte or two, to be filled and moved. Here a layer looks at the request, passes it on at once, and holds only
+//! what it needs for the answer.
 
 use std::convert::Infallible;
 use std::task::{Context, Poll};
@@ -13,16 +13,16 @@ use futures_util::FutureExt as _;
 use futures_util::future::BoxFuture;
 use tower::{Layer, Service};
 
-/// An answer on its way.
+/// A pending answer.
 pub(super) type Answering = BoxFuture<'static, Result<Response, Infallible>>;
 
-/// What stands before a handler, and before other layers.
+/// A layer in front of a handler, or of other layers.
 pub(super) trait Around: Clone {
     /// Answer `request`, or let `next` do so.
     fn answer<S: Next>(&self, request: Request, next: &mut S) -> Answering;
 }
 
-/// What is behind a layer.
+/// What comes after a layer.
 pub(super) trait Next {
     /// Its answer.
     fn run(&mut self, request: Request) -> impl Future<Output = Response> + Send + 'static;
@@ -57,7 +57,7 @@ impl<A: Around, S> Layer<S> for Layered<A> {
     }
 }
 
-/// A service with what stands before it.
+/// A service with a layer in front of it.
 #[derive(Clone)]
 pub(super) struct Wrapped<A, S> {
     around: A,

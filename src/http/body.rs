@@ -1,4 +1,4 @@
-//! A body: the right media type, plain or gzip, not too long either way, not too slow.
+//! A request body: the right media type, plain or gzip, limits on both lengths and on slowness.
 
 use std::error::Error;
 use std::io::{self, ErrorKind, Read as _};
@@ -24,7 +24,7 @@ pub(super) async fn read_json(
     Announced::json(state, headers)?.read(body).await
 }
 
-/// The whole body, and whether it is said to be JSON or XML.
+/// The whole body, and whether it is declared as JSON or XML.
 pub(super) async fn read_json_or_xml(
     state: &AppState,
     headers: &HeaderMap,
@@ -51,7 +51,7 @@ fn unsupported(headers: &HeaderMap, allowed: &'static str) -> Problem {
     Problem::UnsupportedMediaType { found, allowed }
 }
 
-/// A body as its headers announce it, and how it will be held to that.
+/// A body as announced by its headers, and the limits it will be held to.
 pub(super) struct Announced {
     coding: Coding,
     limit: usize,
@@ -59,7 +59,7 @@ pub(super) struct Announced {
 }
 
 impl Announced {
-    /// Of a request whose body must be JSON.
+    /// For a request whose body must be JSON.
     pub(super) fn json(state: &AppState, headers: &HeaderMap) -> Result<Self, Problem> {
         if !is_json(headers) {
             return Err(unsupported(headers, "application/json"));
@@ -98,10 +98,10 @@ impl Announced {
     }
 }
 
-/// Why a body did not come whole.
+/// Why a body did not arrive whole.
 pub(super) fn broken_off(error: &(dyn Error + 'static)) -> Problem {
     tracing::debug!(%error, "a body broke off");
-    // Malformed chunks are told as invalid input or data, a connection that ends early as an unexpected end.
+    // Malformed chunks are reported as invalid input or data, a connection that ends early as an unexpected end.
     let bad_input = |cause: &(dyn Error + 'static)| {
         let cause = cause.downcast_ref::<io::Error>().map(io::Error::kind);
         matches!(
@@ -116,7 +116,7 @@ pub(super) fn broken_off(error: &(dyn Error + 'static)) -> Problem {
     }
 }
 
-/// What a gzip body unpacks to; it is given up as soon as that is longer than a body may be.
+/// Unpacks a gzip body; gives up as soon as that is longer than a body may be.
 fn unpack(packed: &[u8], limit: usize) -> Result<Bytes, Problem> {
     let mut plain = Vec::new();
     MultiGzDecoder::new(packed)
@@ -129,7 +129,7 @@ fn unpack(packed: &[u8], limit: usize) -> Result<Bytes, Problem> {
     Ok(plain.into())
 }
 
-/// How a body is coded.
+/// A body's content coding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Coding {
     Plain,
@@ -155,7 +155,7 @@ impl Coding {
     }
 }
 
-/// Chunks are put together below; no other transfer coding is understood, RFC 9112 section 6.1.
+/// Chunks are assembled below us; no other transfer coding is supported, RFC 9112 section 6.1.
 fn check_transfer(headers: &HeaderMap) -> Result<(), Problem> {
     let values = headers.get_all(header::TRANSFER_ENCODING).iter();
     let codings: Vec<_> = values
@@ -177,7 +177,7 @@ pub(super) fn announced_length(headers: &HeaderMap) -> Option<u64> {
         .ok()
 }
 
-/// `application/json` or `application/*+json`, in UTF-8 or no charset named.
+/// `application/json` or `application/*+json`, in UTF-8 or without a charset.
 fn is_json(headers: &HeaderMap) -> bool {
     essence(headers).is_some_and(|essence| {
         let subtype = essence.strip_prefix("application/").unwrap_or_default();
@@ -185,7 +185,7 @@ fn is_json(headers: &HeaderMap) -> bool {
     })
 }
 
-/// The media type, lower case; `None` when none is named, or with a charset that is not UTF-8.
+/// The media type, lower case; `None` when there is none, or with a charset other than UTF-8.
 fn essence(headers: &HeaderMap) -> Option<String> {
     let value = headers.get(header::CONTENT_TYPE)?.to_str().ok()?;
     let mut parts = value.split(';').map(str::trim);

@@ -1,4 +1,4 @@
-//! What browsers are told about an answer: which pages may read it, and what it may do.
+//! What an answer tells browsers: which pages may read it, and what it may do.
 
 use std::time::Duration;
 
@@ -10,19 +10,19 @@ use tower_http::cors::{AllowOrigin, CorsLayer};
 const CROSS_ORIGIN_RESOURCE_POLICY: HeaderName =
     HeaderName::from_static("cross-origin-resource-policy");
 
-/// What only data needs, when somebody opens it as a page.
+/// The policy for data, when somebody opens it as a page.
 const CSP_OF_DATA: HeaderValue =
     HeaderValue::from_static("default-src 'none'; frame-ancestors 'none'");
 
-/// What a drawing needs: nothing but itself, styles among it.
+/// The policy for a drawing: nothing but itself, including its styles.
 const CSP_OF_SVG: HeaderValue = HeaderValue::from_static(
     "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; sandbox",
 );
 
-/// How long a browser may remember what it was told before a request.
+/// How long a browser may cache the answer to a preflight.
 const PREFLIGHT_AGE: Duration = Duration::from_secs(600);
 
-/// Headers of answers that pages elsewhere may read, beside those that every page may.
+/// Headers of answers that other origins' pages may read, beside those that every page may.
 const EXPOSED: [HeaderName; 12] = [
     header::CONTENT_DISPOSITION,
     header::ETAG,
@@ -38,7 +38,7 @@ const EXPOSED: [HeaderName; 12] = [
     HeaderName::from_static("x-request-id"),
 ];
 
-/// Headers that pages elsewhere may send.
+/// Headers that other origins' pages may send.
 const ALLOWED: [HeaderName; 12] = [
     header::ACCEPT,
     header::AUTHORIZATION,
@@ -54,13 +54,13 @@ const ALLOWED: [HeaderName; 12] = [
     HeaderName::from_static("x-request-id"),
 ];
 
-/// Pages from elsewhere that may use this service, by their exact origins.
+/// Pages of other origins that may use this service, by their exact origins.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Origins(Vec<HeaderValue>);
 
 impl Origins {
     /// # Errors
-    /// The first that is no origin: a scheme, a host and a port that is not the scheme's own.
+    /// The first that is not an origin: a scheme, a host and a port that is not the scheme's default.
     pub fn read(origins: &[String]) -> Result<Self, String> {
         let read = |origin: &String| {
             let refused =
@@ -73,7 +73,7 @@ impl Origins {
         origins.iter().map(read).collect::<Result<_, _>>().map(Self)
     }
 
-    /// Without their ports.
+    /// The hosts without their ports.
     pub(super) fn hosts(&self) -> impl Iterator<Item = String> {
         self.0.iter().filter_map(|origin| {
             let uri: Uri = origin.to_str().ok()?.parse().ok()?;
@@ -81,7 +81,7 @@ impl Origins {
         })
     }
 
-    /// Answers preflights, and tells the pages' browsers that they may read. Nothing where nobody may.
+    /// Answers preflights, and lets these pages read answers. Adds nothing when there are no origins.
     pub(super) fn layer(&self) -> Either<CorsLayer, Identity> {
         let layer = CorsLayer::new()
             .allow_origin(AllowOrigin::list(self.0.clone()))
@@ -93,7 +93,7 @@ impl Origins {
     }
 }
 
-/// As a browser writes it: in lower case, without a path, without the scheme's own port.
+/// An origin as a browser writes it: in lower case, without a path, without the scheme's default port.
 fn is_origin(text: &str) -> bool {
     let Ok(uri) = text.parse::<Uri>() else {
         return false;

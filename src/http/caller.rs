@@ -1,4 +1,4 @@
-//! Who asks, and what is theirs to see.
+//! Who the caller is, and what they may see.
 
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
@@ -9,21 +9,21 @@ use super::problem::Problem;
 use crate::job::{Owner, Plan, PlanId};
 use crate::store::{Store, StoreError};
 
-/// Who asks.
+/// The caller of a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Caller {
-    /// The name of the key that came with the request; `None` where nobody has one.
+    /// The owner of the key that came with the request; `None` where no keys are in use.
     pub(super) owner: Option<Owner>,
-    /// Whether everybody's plans are this caller's to see.
+    /// Whether this caller may see everybody's plans.
     pub(super) sees_all: bool,
     /// Active plans that this caller may have.
     pub(super) quota: Option<u64>,
-    /// The sum of that key.
+    /// The sum of the caller's key.
     pub(super) key: Option<Digest>,
 }
 
 impl Caller {
-    /// Where nobody has a key, everybody may do everything.
+    /// Where no keys are in use, everybody may do everything.
     pub(super) const ANYBODY: Self = Self {
         owner: None,
         sees_all: true,
@@ -31,7 +31,7 @@ impl Caller {
         key: None,
     };
 
-    /// Who has this key.
+    /// The holder of this key.
     pub(super) fn of(key: &Key) -> Self {
         Self {
             owner: Some(key.owner.clone()),
@@ -41,7 +41,7 @@ impl Caller {
         }
     }
 
-    /// The record of a plan that is this caller's to see; that of another is not there.
+    /// The record of a plan that this caller may see; others' plans do not exist for them.
     pub(super) async fn plan(&self, store: &dyn Store, id: PlanId) -> Result<Plan, Problem> {
         match store.get(id).await {
             Ok(plan) if self.may_see(plan.owner.as_ref()) => Ok(plan),

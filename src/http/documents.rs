@@ -1,4 +1,4 @@
-//! A plan's documents: what was accepted, and what came out, in the format asked for.
+//! A plan's documents: the scenario, and the result in the requested format.
 
 use axum::extract::State;
 use axum::http::{HeaderMap, HeaderValue, Uri, header};
@@ -64,10 +64,10 @@ pub(super) async fn result(
     written(&state, &plan, choices, stored).await
 }
 
-/// A format to write a result in, and what is asked of it.
+/// A format for a result, and the requested options.
 type Choice = (&'static Format, Options);
 
-/// A result in the first of `choices` that it can be written in.
+/// A result in the first of `choices` in which it can be written.
 async fn written(
     state: &AppState,
     plan: &Plan,
@@ -100,8 +100,8 @@ async fn written(
     Ok((headers, document).into_response())
 }
 
-/// A plan without degrees, or without a feasible route, cannot be written in every format; when none of `choices`
-/// will do, it is refused for what keeps it from the first.
+/// A plan without degrees, or without a feasible route, cannot be written in every format; when none of `choices` is
+/// possible, the refusal is that of the first.
 fn write_first(
     choices: &[Choice],
     input: &ResultInput,
@@ -118,7 +118,7 @@ fn write_first(
     Err(refusal.expect("there is at least one choice"))
 }
 
-/// What a browser makes of it: it shows what it can show, and keeps the rest under a name.
+/// How a browser should handle it: displayable formats are shown, others saved under a name.
 fn disposition(plan: &Plan, format: &Format) -> HeaderValue {
     let name = file_name(plan.name.as_deref(), Some(&plan.id.to_string()), format);
     let kind = if ["json", "svg"].contains(&format.name) {
@@ -130,8 +130,8 @@ fn disposition(plan: &Plan, format: &Format) -> HeaderValue {
         .expect("a file's name is ASCII letters, digits and hyphens")
 }
 
-/// At least one, the best first. Options that the best one does not know are refused; others that do not know them
-/// are left out.
+/// At least one, the preferred first. Options unknown to the preferred format are refused; other formats that do not
+/// know them are left out.
 fn choices(params: &Params, headers: &HeaderMap) -> Result<Vec<Choice>, Problem> {
     let read = |format: &'static Format| {
         let given = params.pairs();
@@ -144,7 +144,7 @@ fn choices(params: &Params, headers: &HeaderMap) -> Result<Vec<Choice>, Problem>
     Ok(best.into_iter().chain(formats.flat_map(read)).collect())
 }
 
-/// `?format=` decides, else `Accept`; at least one.
+/// `?format=` decides, otherwise `Accept`; at least one.
 fn formats(params: &Params, headers: &HeaderMap) -> Result<Vec<&'static Format>, Problem> {
     if let Some(name) = params.text("format") {
         let found = Format::named(name);

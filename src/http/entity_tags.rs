@@ -12,8 +12,7 @@ use super::list;
 pub(super) struct EntityTags(Vec<String>);
 
 impl EntityTags {
-    /// Those of `name`; `None` without such a header. What cannot be read is a tag, too: one that
-    /// nothing has.
+    /// The tags in the header `name`; `None` without such a header. An unreadable one counts as a tag that nothing has.
     pub(super) fn of(headers: &HeaderMap, name: HeaderName) -> Option<Self> {
         let mut tags = Vec::new();
         for value in headers.get_all(name) {
@@ -23,12 +22,12 @@ impl EntityTags {
         (!tags.is_empty()).then_some(Self(tags))
     }
 
-    /// Those of the versions that the caller has already.
+    /// Tags of the versions that the caller already has.
     pub(super) fn known(headers: &HeaderMap) -> Option<Self> {
         Self::of(headers, header::IF_NONE_MATCH)
     }
 
-    /// As they were sent.
+    /// The tags as they were sent.
     pub(super) fn iter(&self) -> impl Iterator<Item = &str> {
         self.0.iter().map(String::as_str)
     }
@@ -41,12 +40,12 @@ impl EntityTags {
     }
 }
 
-/// A tag without its mark of being weak.
+/// A tag without its weakness prefix.
 pub(super) fn opaque(tag: &str) -> &str {
     tag.strip_prefix("W/").unwrap_or(tag)
 }
 
-/// Those of the versions that the caller has already.
+/// Tags of the versions that the caller already has.
 impl<S: Sync> OptionalFromRequestParts<S> for EntityTags {
     type Rejection = Infallible;
 

@@ -1,4 +1,4 @@
-//! `GET /plans/{id}/events`: follow a plan, or resume where a cut stream left off.
+//! `GET /plans/{id}/events`: follow a plan, or resume where a stream was cut off.
 
 use axum::Extension;
 use axum::body::Body;
@@ -26,9 +26,9 @@ use crate::telemetry::metrics::Held;
 const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
 const X_ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering");
 
-/// Points a second unless asked otherwise.
+/// Points a second by default.
 const DEFAULT_RATE_HZ: f64 = 10.0;
-/// Rates that may be asked for, beside 0.
+/// Rates that may be requested, beside 0.
 pub(super) const RATES_HZ: std::ops::RangeInclusive<f64> = 0.01..=1000.0;
 
 /// `GET /plans/{id}/events`.
@@ -49,17 +49,17 @@ pub(super) async fn follow(
         })?;
     caller.plan(&*state.store, id).await?;
     let was_told = state.store.has_told(id, after).await?;
-    // Read after that question, which may have brought news of it.
+    // Read after that query, which may have brought news of the plan.
     let plan = state.store.get(id).await?;
     if plan.status.is_final() {
         let rest = state.store.events(id, after, 1).await?;
         if rest.events.is_empty() {
-            // All has been told; EventSource stops asking at a 204.
+            // Everything has been told; EventSource stops asking at a 204.
             return Ok(StatusCode::NO_CONTENT.into_response());
         }
     }
-    // An event that has not been told yet belongs to another history, as after a restore from an older copy: a
-    // reader who names one starts afresh.
+    // An event that has not been told yet belongs to another history, as after a restore from an older copy: a reader
+    // who names one starts from the beginning.
     let after = if was_told { after } else { 0 };
     let permit = state
         .access
@@ -88,10 +88,10 @@ fn read_rate(params: &Params) -> Result<f64, Problem> {
     }
 }
 
-/// Greatest id that may be asked for; many JSON readers keep no greater whole numbers.
+/// Greatest id that may be requested; many JSON readers cannot represent greater integers.
 const MAX_EVENT_ID: u64 = (1 << 53) - 1;
 
-/// The header is a reconnecting browser's and newer than the query of the page's own address.
+/// The header comes from a reconnecting browser and is newer than the query of the page's own address.
 fn read_last_event_id(params: &Params, headers: &HeaderMap) -> Result<u64, Problem> {
     const ALLOWED: &str = "the id of an event, a whole number below 2^53";
     let read = |name: &str, value: &str| {
@@ -113,7 +113,7 @@ fn read_last_event_id(params: &Params, headers: &HeaderMap) -> Result<u64, Probl
     Ok(header.or(query).unwrap_or(0))
 }
 
-/// What one open stream holds on to, whether anybody reads it or not.
+/// Everything an open stream holds, whether anybody reads it or not.
 struct Stream {
     feed: Feed,
     store: Arc<dyn Store>,
@@ -121,7 +121,7 @@ struct Stream {
     _counted: Held,
     access: Access,
     key: Option<Digest>,
-    /// The request's: its lines are written after its answer has begun.
+    /// The request's span: log lines are written after its answer has begun.
     span: Span,
 }
 
@@ -145,16 +145,16 @@ fn streamed(stream: Stream, wire: Wire) -> Response {
         (header::VARY, HeaderValue::from_static("accept")),
     ];
     let body = Body::from_stream(futures_util::StreamExt::chain(prologue, told));
-    // A slow reader costs a place in a plan's events, no memory, and may be as slow as it likes.
+    // A slow reader costs a position in a plan's events and no memory, so it may be as slow as it likes.
     (Extension(MayStandStill), headers, body).into_response()
 }
 
 impl Stream {
-    /// What is sent next; `None` at the end.
+    /// The next data to send; `None` at the end.
     async fn next(&mut self, wire: Wire) -> Option<String> {
         let told = tokio::select! {
             told = self.feed.next() => told?,
-            // A key that is taken away takes its streams along.
+            // Withdrawing a key ends its streams.
             () = self.access.withdrawn(self.key) => return None,
         };
         Some(match told {
@@ -169,7 +169,7 @@ impl Stream {
         })
     }
 
-    /// As the record tells, which is shorter than the result.
+    /// Taken from the record, which is shorter than the result.
     async fn has_result(&self) -> bool {
         let plan = self.store.get(self.feed.plan_id()).await;
         plan.is_ok_and(|plan| plan.stop_reason.is_some())

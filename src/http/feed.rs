@@ -1,7 +1,7 @@
-//! A plan's events as they come: from the store's pages first, then as the store ticks.
+//! A plan's events as they come: first from the store's pages, then as the store ticks.
 //!
-//! Nothing is buffered beyond one page: a reader that does not read costs no memory, for the events
-//! stay where they are kept.
+//! Nothing is buffered beyond one page: a reader that does not read costs no memory, because the events stay in the
+//! store.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -18,11 +18,11 @@ use crate::store::{Store, StoreError};
 /// Events read at once.
 const PAGE: usize = 128;
 
-/// Pages read at most when the service stops: enough for what the last runs told in their last
-/// moments, their end among it, and no more, so that nobody holds up the exit.
+/// Maximum number of pages read when the service stops: enough for what the last runs told in their last moments,
+/// including their end, and no more, so that nobody holds up the exit.
 const LAST_PAGES: usize = 16;
 
-/// A comment is due when the reader has been told nothing for so long.
+/// A comment is due when nothing has been sent to the reader for this long.
 const SILENCE: Duration = Duration::from_secs(15);
 
 /// What a reader gets next.
@@ -32,14 +32,14 @@ pub(super) enum Told {
     Events(Vec<NumberedEvent>),
     /// The store no longer keeps the events `from` to `to`.
     Gap {
-        /// The first that is missing.
+        /// The first missing event.
         from: u64,
-        /// The last that is missing.
+        /// The last missing event.
         to: u64,
     },
     /// Nothing has happened for a while.
     Silence,
-    /// The service ends, after these events; the reader may resume with the next process.
+    /// The service is stopping, after these events; the reader may resume with the next process.
     Stopping(Vec<NumberedEvent>),
 }
 
@@ -52,11 +52,11 @@ pub(super) struct Feed {
     throttle: Throttle,
     changes: watch::Receiver<u64>,
     phase: watch::Receiver<Phase>,
-    /// Since when the throttle holds something back.
+    /// Since when the throttle has been holding something back.
     held_since: Option<Instant>,
-    /// When the reader was told something last.
+    /// When something was last sent to the reader.
     told: Instant,
-    /// Whether the reader has been given all that there was when the store was last looked at.
+    /// Whether the reader has been given everything that the store had when last read.
     caught_up: bool,
     /// Pages that may still be read once the service stops.
     last_pages: usize,
@@ -64,7 +64,7 @@ pub(super) struct Feed {
 }
 
 impl Feed {
-    /// Of a plan that has come at least as far as the event `after`.
+    /// The feed of a plan that has reached at least the event `after`.
     pub(super) fn new(
         store: Arc<dyn Store>,
         phase: watch::Receiver<Phase>,
@@ -102,7 +102,7 @@ impl Feed {
     async fn wait_for_next(&mut self) -> Option<Told> {
         let mut out = Vec::new();
         while !self.over {
-            // Looked at before the store: what was told until then will still be read.
+            // Read before the store: what was told until then will still be read.
             let stopping = *self.phase.borrow() == Phase::Stopping;
             self.changes.mark_unchanged();
             let page = match self.store.events(self.id, self.after, PAGE).await {
@@ -121,7 +121,7 @@ impl Feed {
             self.take(page.events, &mut out);
             if stopping && !self.over {
                 if quiet || self.last_pages == 0 {
-                    // A reader who is further behind reads the rest from the next process.
+                    // A reader who is further behind can read the rest from the next process.
                     self.over = true;
                     return Some(Told::Stopping(out));
                 }
@@ -148,8 +148,8 @@ impl Feed {
         None
     }
 
-    /// Go on behind the events that the store has forgotten. A reader who comes fresh asked for none
-    /// of them, and begins with the record as it is.
+    /// Continue after the events that the store has deleted. A new reader asked for none of them, and starts with the
+    /// current record.
     async fn skip(&mut self, forgotten: u64) -> Option<Told> {
         if self.throttle.holds() {
             let mut out = Vec::new();
@@ -172,7 +172,8 @@ impl Feed {
         }]))
     }
 
-    /// The plan has been deleted, which cancels it if it had not ended. A reader who is behind cannot be told how it did.
+    /// The plan has been deleted, which cancels it if it had not ended. A reader who is behind cannot be told how it
+    /// ended.
     fn removed(&mut self) -> Option<Told> {
         self.over = true;
         let mut out = Vec::new();
@@ -215,8 +216,8 @@ impl Feed {
     }
 }
 
-/// When the reader, last `told` something, is told what the throttle holds until a window closes, or that there is
-/// nothing to tell: events that it holds back put neither off.
+/// When to wake for a reader to whom something was last sent at `told`: to release what the throttle holds when its
+/// window closes, or to send a comment. Events that are held back postpone neither.
 fn due(told: Instant, window_closes: Option<Instant>) -> (Instant, Woken) {
     let silent = told + SILENCE;
     match window_closes {
@@ -239,7 +240,7 @@ enum Woken {
 mod tests {
     use super::*;
 
-    /// A proxy cuts what says nothing, however much the reader's own rate holds back.
+    /// A proxy cuts silent connections, however much the reader's own rate holds back.
     #[test]
     fn a_comment_is_due_however_long_the_throttle_holds() {
         let told = Instant::now();

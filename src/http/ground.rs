@@ -1,4 +1,4 @@
-//! `POST /scenarios:ground`: the ground under a scenario at the nodes of a small grid, to be drawn.
+//! `POST /scenarios:ground`: the ground under a scenario at the nodes of a small grid, for drawing.
 
 use std::ops::RangeInclusive;
 
@@ -16,10 +16,10 @@ use crate::geometry::{Point2, Rect};
 use crate::scenario::Scenario;
 use crate::scenario::json;
 
-/// Nodes from west to east, and from south to north.
+/// Allowed number of nodes from west to east, and from south to north.
 const NODES: RangeInclusive<usize> = 2..=401;
 
-/// Where nobody says how many.
+/// Default number.
 const SOME_NODES: usize = 101;
 
 /// Elevations over the area of a scenario.
@@ -72,12 +72,12 @@ fn nodes(params: &Params, name: &str) -> Result<usize, Problem> {
 
 fn sampled(scenario: &Scenario, columns: usize, rows: usize) -> GroundDocument {
     let wgs84 = scenario.frame.wgs84();
-    // Degrees are sampled in degrees: what the caller draws over knows nothing of our plane.
+    // Geodetic scenarios are sampled in degrees: the caller's map knows nothing of our plane.
     let (min, max) = match wgs84 {
         None => (scenario.area.min, scenario.area.max),
         Some(wgs84) => (
             Point2::new(wgs84.area.min.lon, wgs84.area.min.lat),
-            // East of 180 degrees where the area lies across the antimeridian.
+            // Beyond 180 degrees where the area crosses the antimeridian.
             Point2::new(wgs84.area.min.lon + wgs84.area.width(), wgs84.area.max.lat),
         ),
     };

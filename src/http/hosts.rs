@@ -1,8 +1,8 @@
 //! Which host a request is for, and whether this service is that host.
 //!
-//! A service without keys trusts its loopback address to keep strangers out. A browser on the
-//! same machine is let in there, and with it every page whose name has been made to lead there
-//! (DNS rebinding); such a page cannot hide that name, for the browser sends it.
+//! A service without keys relies on its loopback address to keep strangers out. A browser on the same machine can reach
+//! it, and so can every page whose name has been made to resolve to it (DNS rebinding); such a page cannot hide that
+//! name, because the browser sends it.
 
 use std::future::ready;
 use std::net::{Ipv4Addr, Ipv6Addr};
@@ -24,7 +24,7 @@ use super::problem::Problem;
 pub struct Hosts(Option<Arc<[String]>>);
 
 impl Hosts {
-    /// Whatever it is called.
+    /// Answers for any host.
     #[must_use]
     pub fn any() -> Self {
         Self(None)
@@ -37,8 +37,8 @@ impl Hosts {
     }
 
     /// # Errors
-    /// Where HTTP wants a host and there is none, or more than one, or one that cannot be read; and where it
-    /// is not of this service.
+    /// Where HTTP requires a host and there is none, or more than one, or an unreadable one; and where the host is not
+    /// this service's.
     fn check(&self, uri: &Uri, version: Version, headers: &HeaderMap) -> Result<(), Problem> {
         if version == Version::HTTP_11 && !headers.contains_key(header::HOST) {
             return Err(refused("is missing, must name the host that is asked"));
@@ -52,7 +52,8 @@ impl Hosts {
     }
 }
 
-/// The host, without its port, in lower case: of the address where it has one, as in HTTP/2, else of the header.
+/// The host, without its port, in lower case: from the address where it has one, as in HTTP/2, otherwise from the
+/// header.
 fn named(uri: &Uri, headers: &HeaderMap) -> Result<Option<String>, Problem> {
     let mut values = headers.get_all(header::HOST).iter();
     let value = values.next();
@@ -78,7 +79,7 @@ fn refused(detail: &str) -> Problem {
     }
 }
 
-/// `known` are hosts beside it. An address leads where it says, whoever names it.
+/// `known` are additional hosts. An IP address cannot be rebound, whoever names it.
 fn is_of_this_machine(host: &str, known: &[String]) -> bool {
     let name = host.strip_suffix('.').unwrap_or(host);
     let v6 = host
@@ -91,7 +92,8 @@ fn is_of_this_machine(host: &str, known: &[String]) -> bool {
         || known.iter().any(|known| known == name)
 }
 
-/// The layer before all routes, for what is asked of every address; one, for each costs every request.
+/// The layer before all routes, for what is checked on every address; a single one, because each layer costs every
+/// request.
 #[derive(Clone)]
 pub(super) struct Hold(pub(super) Hosts);
 
@@ -167,7 +169,7 @@ mod tests {
         check(v11, "/", &[b"me@localhost"], Some(400));
         check(v11, "/", &[b"caf\xe9"], Some(400));
         check(v11, "/", &[b"evil.example:8080"], Some(421));
-        // An address that names one goes before the header.
+        // A host in the address takes precedence over the header.
         check(v11, "http://evil.example/", &[b"localhost"], Some(421));
         check(v11, "http://localhost/", &[], Some(400));
         check(v1, "/", &[], None);

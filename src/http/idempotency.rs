@@ -1,7 +1,7 @@
 //! `Idempotency-Key`: the same request twice makes one plan.
 //!
-//! The store remembers a key together with its plan. What is kept here is only which keys are being
-//! worked on right now, so that a request and its own repetition do not run beside each other.
+//! The store remembers a key together with its plan. Here we only track which keys are being worked on right now, so
+//! that a request and its own repetition do not run side by side.
 
 use std::collections::HashSet;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -15,13 +15,13 @@ use crate::digest::sha256_hex;
 use crate::job::{Idempotency, Owner};
 
 const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
-/// Says that an answer is an earlier request's plan.
+/// Marks an answer as being an earlier request's plan.
 pub(super) const IDEMPOTENCY_REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
 
-/// Longest key.
+/// Maximum length of a key.
 const MAX_LENGTH: usize = 255;
 
-/// Whose, and which.
+/// The owner, and the key.
 type Key = (Option<Owner>, String);
 
 /// The keys whose first request has not been answered yet.
@@ -29,11 +29,11 @@ type Key = (Option<Owner>, String);
 pub struct InFlight(Arc<Mutex<HashSet<Key>>>);
 
 impl InFlight {
-    /// Begin to work on the request's key, if it has one.
+    /// Begin work under the request's key, if it has one.
     ///
     /// # Errors
-    /// An invalid parameter when the key cannot be one, and [`Problem::IdempotencyInFlight`] while
-    /// another request with it has not been answered.
+    /// An invalid parameter when the key is malformed, and [`Problem::IdempotencyInFlight`] while another request with
+    /// it has not been answered.
     pub(super) fn begin(
         &self,
         caller: &Caller,
@@ -63,7 +63,7 @@ pub(super) struct Once {
 }
 
 impl Once {
-    /// With what the request says.
+    /// Combines the key with the request's body.
     pub(super) fn with(&self, body: &[u8]) -> Idempotency {
         Idempotency {
             key: self.key.1.clone(),
@@ -78,7 +78,7 @@ impl Drop for Once {
     }
 }
 
-/// The key, bare or as a quoted string of RFC 8941; it is the text between the quotes.
+/// The key, bare or as a quoted string of RFC 8941, where it is the text between the quotes.
 fn read(headers: &HeaderMap) -> Result<Option<String>, Problem> {
     let mut values = headers.get_all(IDEMPOTENCY_KEY).iter();
     let Some(value) = values.next() else {

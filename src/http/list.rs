@@ -1,6 +1,6 @@
 //! Lists in headers, RFC 9110 section 5.6.
 
-/// What stands between the `separator`s of `text`; one within a quoted string separates nothing.
+/// The parts of `text` between `separator`s; one within a quoted string does not separate.
 pub(super) fn split(text: &str, separator: char) -> impl Iterator<Item = &str> {
     let (mut quoted, mut escaped) = (false, false);
     let separates = move |c: char| {

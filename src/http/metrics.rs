@@ -9,7 +9,7 @@ use super::params::NoParams;
 use super::problem::Problem;
 use crate::telemetry::metrics::{MEDIA_TYPE, Queue};
 
-/// Answers also when the store does not: the operator needs it then.
+/// Answers even when the store does not: that is when the operator needs it.
 pub(super) async fn show(State(state): State<AppState>, _: NoParams) -> Result<Response, Problem> {
     let stats = state.store.stats().await;
     let stats = stats

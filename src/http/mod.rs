@@ -1,8 +1,7 @@
-//! The service's face: one table of routes, handlers by resource, one table of problems.
+//! The HTTP interface: one table of routes, handlers by resource, one table of problems.
 //!
-//! Handlers extract, call one thing and convert. Deliberately absent: planning, which happens on
-//! the worker's threads (`partial` alone asks the planner what a route would be delivered as), and
-//! storage, which sits behind [`Store`].
+//! Handlers extract, call one thing and convert. Deliberately absent: planning, which happens on the worker's threads
+//! (`partial` alone asks the planner how a route would be delivered), and storage, which is behind [`Store`].
 
 mod accept;
 mod around;
@@ -74,7 +73,7 @@ use around::Layered;
 use auth::{Access, Gate, Needs};
 use problem::Problem;
 
-/// What every handler can reach; cheap to clone, for each request does.
+/// What every handler can access; cheap to clone, since each request does.
 #[derive(Clone)]
 pub struct AppState(Arc<Parts>);
 
@@ -91,29 +90,29 @@ impl Deref for AppState {
 pub struct Parts {
     /// Where plans are kept.
     pub store: Arc<dyn Store>,
-    /// What a scenario is held to.
+    /// The rules that scenarios must meet.
     pub rules: Arc<Rules>,
-    /// The datasets that scenarios may name; those of `rules`, too.
+    /// The datasets that scenarios may name, including through `rules`.
     pub terrains: Terrains,
     /// How much may be done at once.
     pub capacity: Capacity,
     /// Idempotency keys that are being worked on.
     pub in_flight: InFlight,
-    /// What the store last said of itself.
+    /// The store's last answer about itself.
     pub readiness: Readiness,
     /// A request's body must be complete after this.
     pub body_timeout: Duration,
-    /// By which plans are stamped and expire.
+    /// The clock for timestamps and expiry of plans.
     pub clock: Arc<SteadyClock>,
     /// Who may do what.
     pub access: Access,
-    /// How ends of plans are told; `None` when they are not.
+    /// How ends of plans are reported; `None` when they are not.
     pub webhooks: Option<webhook::Settings>,
-    /// Pages from elsewhere that may use this service.
+    /// Pages of other origins that may use this service.
     pub cors: Origins,
-    /// What it may be called.
+    /// Names that this service answers to.
     pub hosts: Hosts,
-    /// Where the service stands between its start and its end.
+    /// The stage of the service between its start and its end.
     pub phase: watch::Receiver<Phase>,
     /// What is reported to the operator.
     pub instruments: Arc<Instruments>,
@@ -124,12 +123,13 @@ pub struct Parts {
 pub struct Capacity {
     /// Plans run at the same time by this node; other nodes of its store may run more.
     pub workers: usize,
-    /// Plans waiting at most.
+    /// Maximum number of waiting plans.
     pub queue: usize,
 }
 
 impl Capacity {
-    /// Plans run at the same time by all nodes of a store, at least 1: somebody is to run what is accepted.
+    /// Plans run at the same time by all nodes of a store, at least 1: accepted plans are expected to be run by
+    /// somebody.
     fn all_workers(self, stats: Option<&Stats>) -> usize {
         let of_all = stats.and_then(|stats| stats.slots);
         of_all.unwrap_or(self.workers).max(1)
@@ -138,16 +138,16 @@ impl Capacity {
 
 /// One row of the table of routes.
 pub struct Route {
-    /// Of the request.
+    /// Method of the request.
     pub method: &'static str,
     /// With `{id}` for a plan's id and `{name}` for a dataset's name.
     pub path: &'static str,
-    /// Of its caller.
+    /// What it requires of its caller.
     pub needs: Needs,
     guarded: Box<dyn FnOnce(Layered<Gate>) -> MethodRouter<AppState>>,
 }
 
-/// Every route there is.
+/// All routes.
 #[must_use]
 pub fn routes() -> Vec<Route> {
     vec![
@@ -185,13 +185,13 @@ pub fn routes() -> Vec<Route> {
     ]
 }
 
-/// The service: every route, every refusal a problem, every answer with its request's id.
+/// The service: all routes, every refusal a problem, every answer with its request's id.
 pub fn router(parts: Parts) -> Router {
     let nowhere = async |uri: Uri| Problem::NoSuchResource(uri.path().to_owned());
     assemble(parts, routes(), nowhere)
 }
 
-/// A node that only runs plans: the routes of those who look after it, and no word of plans.
+/// A node that only runs plans: the routes for its operators, and none about plans.
 pub fn upkeep_router(parts: Parts) -> Router {
     const UPKEEP: [&str; 4] = ["/livez", "/readyz", "/metrics", "/version"];
     let mut routes = routes();
@@ -200,7 +200,7 @@ pub fn upkeep_router(parts: Parts) -> Router {
     assemble(parts, routes, nowhere)
 }
 
-/// These routes, and what is said where there is none.
+/// These routes, and the answer where there is none.
 fn assemble<T: 'static>(
     parts: Parts,
     routes: Vec<Route>,
@@ -221,7 +221,7 @@ fn assemble<T: 'static>(
     wrap(router, &cors, hosts, instruments)
 }
 
-/// Streams are not: what is told must leave at once.
+/// Streams are not compressed: each event must be sent at once.
 fn worth_compressing() -> impl Predicate {
     let plain = NotForContentType::const_new;
     SizeAbove::new(1024)
@@ -229,16 +229,15 @@ fn worth_compressing() -> impl Predicate {
         .and(plain("application/x-ndjson"))
 }
 
-/// Which status an answer has, in a place where compression leaves it alone.
+/// Keeps an answer's status in a place where compression leaves it alone.
 fn note_status(mut answer: Response) -> Response {
     let status = answer.status();
     answer.extensions_mut().insert(status);
     answer
 }
 
-/// Room for a compressor is given to what is compressed alone: else every open stream holds it. To a
-/// caller who takes no coding that there is, compression would say 406 when all has been done: they get
-/// the answer as it is.
+/// Only compressed answers keep a compressor, else every open stream would hold one. `CompressionLayer` answers 406
+/// after the work is done if no coding is acceptable; we send the plain answer instead.
 fn unwrap_uncompressed(mut answer: Response<CompressionBody<Body>>) -> Response {
     if let Some(status) = answer.extensions_mut().remove::<StatusCode>() {
         *answer.status_mut() = status;
@@ -253,9 +252,9 @@ fn unwrap_uncompressed(mut answer: Response<CompressionBody<Body>>) -> Response 
     })
 }
 
-/// What goes round every handler.
+/// The layers around every handler.
 fn wrap(router: Router, cors: &Origins, hosts: Hosts, instruments: Arc<Instruments>) -> Router {
-    // The outermost first. One stack, for the router puts what it is given in a box of its own for each request.
+    // The outermost first. One stack, because the router boxes each layer it is given anew for each request.
     let layers = ServiceBuilder::new()
         .layer(Layered(request_id::Assign(instruments)))
         .layer(cors.layer())
@@ -283,7 +282,7 @@ fn delete<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -
     row("DELETE", path, |gate| routing::delete(handler.layer(gate)))
 }
 
-/// The gate belongs to the handler: as a layer of the route it would be one more box that is made anew for each request.
+/// The gate wraps the handler: as a layer of the route it would be one more box allocated for each request.
 fn row(
     method: &'static str,
     path: &'static str,

@@ -1,4 +1,4 @@
-//! Long work away from the threads that answer.
+//! Long work, away from the threads that answer requests.
 
 use std::num::NonZero;
 use std::sync::LazyLock;
@@ -8,18 +8,18 @@ use tokio::sync::Semaphore;
 
 use super::problem::Problem;
 
-/// As many at once as there are cores: more would only take time from each other, and memory.
+/// One place per core: more would only compete for time and memory.
 static PLACES: LazyLock<Semaphore> =
     LazyLock::new(|| Semaphore::new(available_parallelism().map_or(1, NonZero::get)));
 
-/// Do `work` on a thread of its own; a panic there is one here. Its log lines keep the request's id.
+/// Do `work` on a thread of its own; a panic there is passed on here. Its log lines keep the request's id.
 pub(super) async fn run<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, Problem> {
     let span = tracing::Span::current();
     let place = PLACES.acquire().await.expect("it is never closed");
     let work = move || {
-        // Work goes on when its caller has hung up, and keeps its place until it is done.
+        // Work continues when its caller has hung up, and keeps its place until it is done.
         let _place = place;
         span.in_scope(work)
     };

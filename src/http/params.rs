@@ -1,5 +1,5 @@
-//! Query parameters and plan ids, read strictly: an unknown, doubled or unreadable parameter is
-//! refused, because ignoring it would give another answer than the one asked for.
+//! Query parameters and plan ids, read strictly: an unknown, duplicate or unreadable parameter is refused, because
+//! ignoring it would give another answer than the one asked for.
 
 use std::str::FromStr;
 
@@ -18,7 +18,7 @@ use crate::telemetry::spans;
 pub(super) struct Params(Vec<(String, String)>);
 
 impl Params {
-    /// Of `uri`, which may have those that `known` names.
+    /// The parameters of `uri`, which may have those in `known`.
     pub(super) fn read(uri: &Uri, known: &[&str]) -> Result<Self, Problem> {
         let pairs = pairs_of(uri).map_err(|error| invalid("query", &error.to_string()))?;
         for (position, (name, _)) in pairs.iter().enumerate() {
@@ -32,20 +32,20 @@ impl Params {
         Ok(Self(pairs))
     }
 
-    /// As they were sent.
+    /// The parameters as they were sent.
     pub(super) fn pairs(&self) -> impl Iterator<Item = (&str, &str)> {
         self.0
             .iter()
             .map(|(name, value)| (name.as_str(), value.as_str()))
     }
 
-    /// As it was sent.
+    /// The value as it was sent.
     pub(super) fn text(&self, name: &str) -> Option<&str> {
         let (_, value) = self.0.iter().find(|(given, _)| given == name)?;
         Some(value)
     }
 
-    /// Parsed; `allowed` says what would have been.
+    /// The parsed value; `allowed` is for a refusal.
     pub(super) fn parse<T: FromStr>(
         &self,
         name: &str,
@@ -57,16 +57,16 @@ impl Params {
     }
 }
 
-/// What the query says.
+/// The parameters in the query.
 fn pairs_of(uri: &Uri) -> Result<Vec<(String, String)>, QueryRejection> {
-    // Most addresses have none, and each is looked at more than once.
+    // Most addresses have none, and each is examined more than once.
     if uri.query().is_none() {
         return Ok(Vec::new());
     }
     Query::try_from_uri(uri).map(|Query(pairs)| pairs)
 }
 
-/// `value` is not what `name` may be.
+/// `value` is not allowed for `name`.
 pub(super) fn refused(name: &str, value: &str, allowed: &str) -> Problem {
     invalid(name, &format!("{name} is {value:?}, must be {allowed}"))
 }
@@ -86,7 +86,7 @@ fn unknown(name: &str, known: &[&str]) -> String {
     }
 }
 
-/// Names of parameters that elsewhere are for credentials.
+/// Parameter names that are used for credentials elsewhere.
 const CREDENTIALS: [&str; 7] = [
     "access_token",
     "api-key",
@@ -97,7 +97,7 @@ const CREDENTIALS: [&str; 7] = [
     "token",
 ];
 
-/// Whether a key stands in the address, or what is meant to be one.
+/// Whether the address contains a key, or what is meant to be one.
 pub(super) fn brings_a_key(uri: &Uri) -> bool {
     let in_query = pairs_of(uri).is_ok_and(|pairs| {
         pairs.iter().any(|(name, value)| {
@@ -109,7 +109,7 @@ pub(super) fn brings_a_key(uri: &Uri) -> bool {
     in_query || holds_a_key(uri.path()) || uri.query().is_some_and(holds_a_key)
 }
 
-/// The ticket of the query, and the plan of the path, which is that of `/plans/{id}/events`.
+/// The ticket in the query, and the plan in the path, which is that of `/plans/{id}/events`.
 pub(super) fn ticket_of(uri: &Uri) -> Option<(String, Option<PlanId>)> {
     let mut pairs = pairs_of(uri).ok()?.into_iter();
     let (_, ticket) = pairs.find(|(name, _)| name == "ticket")?;
@@ -117,7 +117,7 @@ pub(super) fn ticket_of(uri: &Uri) -> Option<(String, Option<PlanId>)> {
     Some((ticket, Uuid::try_parse(id).ok()))
 }
 
-/// Of a request that may have no parameters.
+/// Extracts nothing, and refuses any parameters.
 pub(super) struct NoParams;
 
 impl<S: Send + Sync> FromRequestParts<S> for NoParams {
@@ -128,7 +128,7 @@ impl<S: Send + Sync> FromRequestParts<S> for NoParams {
     }
 }
 
-/// The `{id}` of the path. What cannot be an id names no plan.
+/// The `{id}` of the path. A malformed id names no plan.
 pub(super) struct Id(pub(super) PlanId);
 
 impl<S: Send + Sync> FromRequestParts<S> for Id {
@@ -139,7 +139,7 @@ impl<S: Send + Sync> FromRequestParts<S> for Id {
             return Err(Problem::NoSuchResource(parts.uri.path().to_owned()));
         };
         match Uuid::try_parse(&text) {
-            // Only the canonical spelling: each plan has one address.
+            // Only the canonical spelling is accepted: each plan has one address.
             Ok(id) if id.to_string() == text => {
                 spans::name_plan(id);
                 Ok(Self(id))

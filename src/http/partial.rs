@@ -1,5 +1,5 @@
-//! `GET /plans/{id}/result?partial=true` before the end: the best route so far, measured as a
-//! result is, as if the plan were cancelled now.
+//! `GET /plans/{id}/result?partial=true` before the end: the best route so far, measured like a result, as if the plan
+//! were cancelled now.
 
 use std::collections::VecDeque;
 
@@ -10,13 +10,13 @@ use crate::job::{Event, Plan};
 use crate::planner;
 use crate::scenario::json::{self, Rules};
 
-/// Points of the curve in it, the newest.
+/// Maximum number of points of the curve in it, the newest.
 const CURVE: usize = 10_000;
 
 /// Events read at once.
 const PAGE: usize = 1_000;
 
-/// The document, or `None` when the run has not told of a route yet.
+/// The document, or `None` when the run has not reported a route yet.
 pub(super) async fn result(state: &AppState, plan: &Plan) -> Result<Option<String>, Problem> {
     let Some(best) = state.store.incumbent(plan.id).await? else {
         return Ok(None);
@@ -31,7 +31,7 @@ pub(super) async fn result(state: &AppState, plan: &Plan) -> Result<Option<Strin
     off_thread::run(move || measure(&scenario, &rules, best, curve, origin).map(Some)).await?
 }
 
-/// The curve of the present run; an earlier one that was broken off is not part of it.
+/// The curve of the present run, excluding an earlier one that was cut off.
 async fn curve(state: &AppState, plan: &Plan) -> Result<Vec<Convergence>, Problem> {
     let mut curve = VecDeque::new();
     let mut after = 0;

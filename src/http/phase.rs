@@ -1,4 +1,4 @@
-//! Where the service stands between its start and its end.
+//! The stages of the service between its start and its end.
 
 use tokio::sync::watch;
 
@@ -7,14 +7,14 @@ use tokio::sync::watch;
 pub enum Phase {
     /// Takes plans.
     Serving,
-    /// Still answers, takes no plans; what runs may finish.
+    /// Still answers, takes no new plans; running plans may finish.
     Draining,
     /// Streams end, waits return, the listener closes.
     Stopping,
 }
 
-/// Until the service stops.
+/// Resolves when the service stops.
 pub(super) async fn stopping(phase: &mut watch::Receiver<Phase>) {
-    // A sender that is gone cannot say anything else either.
+    // Without its sender the service is gone too.
     let _ = phase.wait_for(|phase| *phase == Phase::Stopping).await;
 }

@@ -1,5 +1,4 @@
-//! What a plan must be for a change to be made to it: `If-Match` and `If-None-Match`, RFC 9110
-//! section 13.1.
+//! What state a plan must be in for a change to be made: `If-Match` and `If-None-Match`, RFC 9110 section 13.1.
 
 use std::convert::Infallible;
 
@@ -12,17 +11,17 @@ use super::problem::Problem;
 use super::status::etag;
 use crate::job::{Plan, PlanId};
 
-/// What the two headers say.
+/// The conditions in the two headers.
 pub(super) struct Precondition {
     one_of: Option<EntityTags>,
     none_of: Option<EntityTags>,
 }
 
 impl Precondition {
-    /// Refused unless `plan` is as the caller expects.
+    /// Refuses unless `plan` is as the caller expects.
     ///
-    /// Deviation: `If-Match` compares weakly, too. Plans' tags are weak only because the bytes of a document
-    /// may differ, and a strong comparison would never match any of them.
+    /// Deviation: `If-Match` compares weakly too. Plans' tags are weak only because the bytes of a document may differ,
+    /// and a strong comparison would never match any of them.
     pub(super) fn check(&self, plan: &Plan) -> Result<(), Problem> {
         let tag = etag(plan);
         if self.holds(Some(&tag)) {
@@ -35,7 +34,7 @@ impl Precondition {
         )))
     }
 
-    /// Refused if the caller expects something of a plan that was removed.
+    /// Refuses if the caller expects anything of a plan that was removed.
     pub(super) fn check_removed(&self, id: PlanId) -> Result<(), Problem> {
         if self.holds(None) {
             return Ok(());

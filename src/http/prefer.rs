@@ -15,7 +15,7 @@ pub(super) const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("prefe
 /// Longest wait, seconds; a longer one is cut to this.
 pub(super) const MAX_WAIT_S: u8 = 30;
 
-/// A wait that was asked for.
+/// A requested wait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Wait(u8);
 

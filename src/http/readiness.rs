@@ -1,5 +1,5 @@
-//! Whether the store takes writes, asked once for all who want to know at the same time: to ask is a write that waits for
-//! the disk or for other machines, and anybody may.
+//! Whether the store accepts writes, asked once for all who want to know at the same time: asking is a write that waits
+//! for the disk or for other machines, and anybody may ask.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -9,10 +9,10 @@ use tokio::time::Instant;
 
 use crate::store::StoreError;
 
-/// For so long an answer is told to whoever comes.
+/// How long an answer is reused.
 const GOOD_FOR: Duration = Duration::from_millis(500);
 
-/// What the store said of itself last.
+/// The store's last answer.
 #[derive(Debug, Clone, Default)]
 pub struct Readiness(Arc<Mutex<Option<Answer>>>);
 
@@ -23,12 +23,12 @@ struct Answer {
 }
 
 impl Readiness {
-    /// What `ask` answers, or what it has just answered to somebody else.
+    /// The answer of `ask`, or the one it has just given to somebody else.
     pub(super) async fn told(
         &self,
         ask: impl Future<Output = Result<(), StoreError>>,
     ) -> Result<(), StoreError> {
-        // Who comes meanwhile waits here and finds the answer; who asks and goes away leaves it to the next.
+        // Later callers wait here and find the answer; if the one asking goes away, the next one asks.
         let mut last = self.0.lock().await;
         if let Some(answer) = &*last
             && answer.came.elapsed() < GOOD_FOR

@@ -1,5 +1,5 @@
-//! A request's id: taken from the caller or drawn, in the log's span, on the answer and in its
-//! problem document.
+//! A request's id: taken from the caller or generated; it appears in the log's span, on the answer and in its problem
+//! document.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -23,7 +23,7 @@ const X_REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 /// Longest id taken from a caller.
 const MAX_LENGTH: usize = 128;
 
-/// The outermost layer: every answer leaves through here.
+/// The outermost layer: every answer passes through here.
 #[derive(Clone)]
 pub(super) struct Assign(pub(super) Arc<Instruments>);
 
@@ -61,7 +61,7 @@ impl Around for Assign {
     }
 }
 
-/// The path as it may be written down.
+/// The path in a form safe to log.
 fn printable(path: &str) -> &str {
     if auth::holds_a_key(path) {
         "(with a key in it)"
@@ -70,7 +70,7 @@ fn printable(path: &str) -> &str {
     }
 }
 
-/// The caller's own id, if it can stand as it is in a log line and in a URI reference.
+/// The caller's own id, if it is safe in a log line and in a URI reference.
 fn of_caller(headers: &HeaderMap) -> Option<String> {
     let id = headers.get(X_REQUEST_ID)?.to_str().ok()?;
     let sane = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~=;+/@,".contains(&byte);
@@ -78,7 +78,7 @@ fn of_caller(headers: &HeaderMap) -> Option<String> {
     sane_length.then(|| id.bytes().all(sane).then(|| id.to_owned()))?
 }
 
-/// One that cannot be read is as none.
+/// A header that cannot be read counts as absent.
 fn traceparent_of(headers: &HeaderMap) -> Option<TraceParent> {
     headers
         .get(traceparent::HEADER)?
@@ -88,7 +88,7 @@ fn traceparent_of(headers: &HeaderMap) -> Option<TraceParent> {
         .ok()
 }
 
-/// The whole answer where no request was read that could be answered.
+/// The whole answer where no request could be read.
 pub(super) fn refuse(problem: Problem, instruments: &Instruments) -> Response<String> {
     let id = Uuid::now_v7().to_string();
     let body = problem.document(&id);

@@ -1,21 +1,20 @@
-//! When asking again makes sense: `Retry-After`, from the queue's own figures.
+//! When to ask again: `Retry-After`, computed from the queue.
 
 use super::Capacity;
 use crate::job::{Plan, Status};
 use crate::store::Stats;
 
-/// Longest advice, seconds.
+/// Longest value, seconds.
 const MAX_S: f64 = 600.0;
 
-/// What a run is taken to last before the first has ended, milliseconds.
+/// Assumed duration of a run before the first has ended, milliseconds.
 const UNKNOWN_RUN_MS: f64 = 1000.0;
 
-/// Seconds after which a refused plan may find room: until a tenth of those waiting has been
-/// taken up,
+/// Seconds after which a refused plan may find room: until a tenth of the waiting plans has been started,
 ///
 /// `ceil((queued / 10 + 1) * mean_run_ms / workers / 1000)`, within 1 to 600.
 ///
-/// A tenth rather than one place, so that not everyone refused comes back for the same place.
+/// A tenth rather than one place, so that not everyone refused returns for the same place.
 pub(super) fn for_room(stats: &Stats, capacity: Capacity) -> u64 {
     let runs = stats.queued as f64 / 10.0 + 1.0;
     seconds(runs * mean_run_ms(stats) / capacity.all_workers(Some(stats)) as f64)

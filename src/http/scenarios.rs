@@ -1,4 +1,4 @@
-//! Scenarios that are no plans yet.
+//! Scenarios that are not plans yet.
 
 use axum::Json;
 use axum::body::Body;

@@ -1,7 +1,6 @@
-//! Accept connections, answer them, and let them end.
+//! Accepts connections, answers them, and ends them.
 //!
-//! An accept loop of our own because `axum::serve` lets whoever holds a connection and asks for nothing
-//! hold it for ever.
+//! An accept loop of our own because `axum::serve` lets a caller hold an idle connection for ever.
 
 mod complaints;
 mod socket;
@@ -36,28 +35,28 @@ use super::Phase;
 use super::phase::stopping;
 use crate::telemetry::Instruments;
 
-/// How connections are kept.
+/// How connections are handled.
 #[derive(Debug, Clone)]
 pub struct Settings {
     /// A request's head must be complete after this; also how long a connection may idle.
     pub head_timeout: Duration,
-    /// After that, whoever still does not take an answer is let go when this has passed, too.
+    /// After that, a caller that still does not take an answer is cut off after this time too.
     pub body_timeout: Duration,
     /// Connections open at once; more wait in the listener's backlog.
     pub max_connections: usize,
-    /// At the end, open connections may finish their answers for so long.
+    /// At shutdown, how long open connections may take to finish their answers.
     pub patience: Duration,
-    /// Connections are counted there.
+    /// Where connections are counted.
     pub instruments: Arc<Instruments>,
 }
 
 /// Pause after a failed accept, such as when file descriptors run out.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// A request of HTTP/1 may have so many bytes before its body; what is read at once with the last of them, too.
+/// Maximum size of what precedes the body in HTTP/1, including what is read at once with the end of it.
 const HEAD_BYTES: usize = 64 * 1024;
 
-/// What an HTTP/2 connection begins with, RFC 9113 section 3.4.
+/// The first bytes of an HTTP/2 connection, RFC 9113 section 3.4.
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 
 /// Answer on `listener` until the phase is [`Phase::Stopping`], then let open connections finish
@@ -99,7 +98,7 @@ pub async fn serve(
         }
     }
     drop(listener);
-    // Each connection gives its place back at its end.
+    // Each connection returns its place when it ends.
     let all_ended = places.acquire_many(n_places);
     if tokio::time::timeout(settings.patience, all_ended)
         .await
@@ -109,12 +108,12 @@ pub async fn serve(
     }
 }
 
-/// How long a connection may stand still.
+/// How long a connection may go without traffic.
 #[derive(Clone, Copy)]
 struct Times {
-    /// Then it ends as soon as what was asked is answered.
+    /// After this, it ends as soon as pending requests are answered.
     idle: Duration,
-    /// Then it is over.
+    /// After this, it is closed.
     unread: Duration,
 }
 
@@ -131,7 +130,7 @@ async fn accept(
 /// Answer the requests of one connection.
 async fn answer(socket: Socket, router: Router, mut phase: watch::Receiver<Phase>, times: Times) {
     let http1 = tokio::select! {
-        // Who has asked already is answered.
+        // Callers that have already sent a request get an answer.
         biased;
         http1 = speaks_http1(&socket.stream) => http1,
         () = stopping(&mut phase) => return,
@@ -143,7 +142,7 @@ async fn answer(socket: Socket, router: Router, mut phase: watch::Receiver<Phase
     let traffic = socket.traffic.clone();
     let socket = TokioIo::new(socket);
     let watched = traffic.clone();
-    // One for all requests of the connection; it is ready at all times.
+    // One for all requests of the connection; it is always ready.
     let router = RefCell::new(router);
     let service = service_fn(move |request: Request<Incoming>| {
         let busy = watched.clone().begin();
@@ -153,12 +152,12 @@ async fn answer(socket: Socket, router: Router, mut phase: watch::Receiver<Phase
     if http1 {
         let mut builder = http1::Builder::new();
         builder.max_buf_size(HEAD_BYTES);
-        // Without what the other version needs: whatever is held here, every open stream holds.
+        // Without HTTP/2's parts: whatever is held here is held by every open stream.
         let connection = builder.serve_connection(socket, service);
         keep(connection, phase, &traffic, times, true).await;
     } else {
         let mut builder = auto::Builder::new(TokioExecutor::new());
-        // Who begins like the other version and goes on in this one: few, and `keep` does not tell them apart.
+        // For callers that begin like HTTP/2 and continue in HTTP/1: few, and `keep` does not tell them apart.
         builder
             .http1()
             .timer(TokioTimer::new())
@@ -174,7 +173,7 @@ async fn answer(socket: Socket, router: Router, mut phase: watch::Receiver<Phase
     }
 }
 
-/// Let a connection go on until it ends, the service does, or nothing moves on it any more.
+/// Run a connection until it ends, the service stops, or there is no more traffic on it.
 async fn keep<C: GracefulConnection<Error: Display>>(
     connection: C,
     mut phase: watch::Receiver<Phase>,
@@ -188,7 +187,7 @@ async fn keep<C: GracefulConnection<Error: Display>>(
         ended = &mut connection => return note(ended),
         () = stopping(&mut phase) => {}
         () = traffic.still_for(times.idle) => {
-            // Nothing is left to be said; of a request there is no more than a part of its head.
+            // Nothing is left to be sent; at most part of a request's head has been received.
             if http1 && !traffic.is_held_up() {
                 tracing::debug!("a connection asked for nothing");
                 return;
@@ -210,13 +209,13 @@ fn note(ended: Result<(), impl Display>) {
     }
 }
 
-/// Whether the first bytes are the beginning of no HTTP/2; hyper finds out about the rest.
+/// Whether the first bytes rule out HTTP/2; hyper detects the rest.
 ///
-/// It could about all, but then reads what it has looked at apart from what follows, keeps a buffer twice as
-/// large for as long as the connection lives, and room for what either version needs.
+/// hyper could detect the version by itself, but then it reads the peeked bytes apart from what follows, keeps a buffer
+/// twice as large for as long as the connection lives, and room for either version's needs.
 async fn speaks_http1(stream: &TcpStream) -> bool {
     let mut first = [0; PREFACE.len()];
-    // What cannot be looked at cannot be read either.
+    // A failed peek means that a read will fail too.
     let length = stream.peek(&mut first).await.unwrap_or(0);
     !PREFACE.starts_with(&first[..length])
 }

@@ -1,4 +1,4 @@
-//! The service about itself: alive, ready, its version, its limits, its algorithms.
+//! The service about itself: liveness, readiness, version, limits, algorithms.
 
 use axum::Json;
 use axum::extract::State;
@@ -17,7 +17,7 @@ pub(super) async fn livez(_: NoParams) -> Result<Response, Problem> {
     Ok(ok())
 }
 
-/// `GET /readyz`: it takes plans.
+/// `GET /readyz`: whether it accepts plans.
 pub(super) async fn readyz(
     State(state): State<AppState>,
     _: NoParams,
@@ -46,7 +46,7 @@ pub(super) async fn version(_: NoParams) -> Result<Json<Value>, Problem> {
     })))
 }
 
-/// What the operator allows.
+/// The operator's limits.
 #[derive(Serialize)]
 struct LimitsDocument {
     body_bytes: usize,
@@ -100,10 +100,10 @@ pub(super) async fn limits(
     Ok(Json(document).into_response())
 }
 
-/// What may be named in `planner.algorithm`.
+/// The values of `planner.algorithm`.
 #[derive(Serialize)]
 pub(super) struct AlgorithmsDocument {
-    /// What every one of them has.
+    /// Parameters common to all of them.
     parameters: Vec<ParameterDocument>,
     algorithms: Vec<AlgorithmDocument>,
 }

@@ -1,4 +1,4 @@
-//! Scenarios that come with the program, to begin with.
+//! Example scenarios that come with the program.
 
 use std::sync::LazyLock;
 
@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::params::NoParams;
 use super::problem::Problem;
 
-/// Name and document, in the order in which they are offered.
+/// Name and document, in the order in which they are listed.
 static SHIPPED: [(&str, &str); 6] = [
     (
         "jacksboro-wgs84",
@@ -25,13 +25,13 @@ static SHIPPED: [(&str, &str); 6] = [
     ("paper-4", include_str!("../../scenarios/paper-4.json")),
 ];
 
-/// What is offered.
+/// The list of scenarios.
 #[derive(Clone, Serialize)]
 pub(super) struct ScenariosDocument {
     scenarios: Vec<Entry>,
 }
 
-/// One of them, so far as one must know it to choose.
+/// One of them, with what is needed to choose.
 #[derive(Clone, Serialize)]
 struct Entry {
     name: &'static str,
@@ -69,7 +69,7 @@ pub(super) async fn list(_: NoParams) -> Result<Json<ScenariosDocument>, Problem
     }))
 }
 
-/// `GET /scenarios/{name}`: a document as it may be posted.
+/// `GET /scenarios/{name}`: a document that can be posted.
 pub(super) async fn show(
     uri: Uri,
     name: Option<Path<String>>,

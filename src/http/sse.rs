@@ -1,4 +1,4 @@
-//! Events on the wire: frames of `text/event-stream`, and the same as lines of JSON.
+//! Events on the wire: frames of `text/event-stream`, or lines of JSON.
 
 use std::fmt::Write as _;
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::status::{StatusDocument, location};
 use crate::job::{Event, NumberedEvent, PlanId, Status};
 
-/// How a stream is written.
+/// The format of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Wire {
     /// `text/event-stream`.
@@ -17,7 +17,7 @@ pub(super) enum Wire {
 }
 
 impl Wire {
-    /// The media types, the usual one first.
+    /// The media types, the default first.
     pub(super) const MEDIA_TYPES: [&str; 2] = ["text/event-stream", "application/x-ndjson"];
 
     pub(super) fn of(media_type: &str) -> Self {
@@ -35,7 +35,7 @@ impl Wire {
         }
     }
 
-    /// What a stream begins with: when to come back after a cut, milliseconds.
+    /// Start of a stream: how long to wait before reconnecting, milliseconds.
     pub(super) fn prologue(self) -> &'static str {
         match self {
             Self::Sse => "retry: 2000\n\n",
@@ -43,7 +43,7 @@ impl Wire {
         }
     }
 
-    /// Says nothing, and keeps the connection; readers of JSON lines skip empty ones.
+    /// Keeps the connection alive without an event; readers of JSON lines skip empty ones.
     pub(super) fn silence(self) -> &'static str {
         match self {
             Self::Sse => ":\n\n",
@@ -51,7 +51,7 @@ impl Wire {
         }
     }
 
-    /// Says that the server ends, not the plan.
+    /// Says that the server is stopping, not that the plan has ended.
     pub(super) fn stopping(self) -> &'static str {
         match self {
             Self::Sse => ": the service is shutting down\n\n",
@@ -79,7 +79,7 @@ pub(super) struct Outgoing {
 }
 
 impl Outgoing {
-    /// `has_result` is asked for at the end only.
+    /// `has_result` is used only for the end.
     pub(super) fn new(plan: PlanId, event: NumberedEvent, has_result: bool) -> Self {
         let NumberedEvent { id, event } = event;
         let (event, data) = match event {
@@ -133,7 +133,7 @@ fn json(data: impl Serialize) -> String {
 mod tests {
     use super::*;
 
-    /// Else a reader that is gone is never noticed, and a proxy cuts who is still there.
+    /// Without this, a reader that is gone is never noticed, and a proxy cuts those still there.
     #[test]
     fn silence_is_written_and_tells_nothing() {
         for wire in [Wire::Sse, Wire::Lines] {

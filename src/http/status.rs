@@ -9,7 +9,7 @@ use serde::{Serialize, Serializer};
 use super::problem::FailureDocument;
 use crate::job::{Plan, PlanId};
 
-/// Of `GET /plans/{id}` and of `status` events.
+/// The body of `GET /plans/{id}` and the data of `status` events.
 #[derive(Debug, Serialize)]
 pub(super) struct StatusDocument {
     id: PlanId,
@@ -75,10 +75,10 @@ impl From<Plan> for StatusDocument {
     }
 }
 
-/// Most documents have room in so many bytes.
+/// Most documents fit in this many bytes.
 const ROOM: usize = 1_024;
 
-/// Answers with one have at most so many headers, of which the layers round the handlers bring most.
+/// Maximum number of headers of an answer with one, most of which come from the layers around the handlers.
 const N_HEADERS: usize = 12;
 
 impl IntoResponse for StatusDocument {
@@ -107,7 +107,7 @@ impl Links {
     }
 }
 
-/// The address of something of a plan.
+/// The address of a part of a plan.
 #[derive(Debug)]
 struct Link {
     id: PlanId,
@@ -125,8 +125,8 @@ pub(super) fn location(id: PlanId) -> String {
     format!("/plans/{id}")
 }
 
-/// Changes whenever the status document does. Weak, for the bytes are written anew each time; the
-/// place in the queue moves without a change of the record.
+/// Changes whenever the status document does. Weak, because the bytes are written anew each time; the place in the
+/// queue changes without a change of the record.
 pub(super) fn etag(plan: &Plan) -> HeaderValue {
     let position = plan.queue_position.unwrap_or(0);
     HeaderValue::from_str(&format!("W/\"{}-{position}\"", plan.revision))

@@ -1,9 +1,9 @@
-//! `?rate=`: of a fast run, so many points a second and no more.
+//! `?rate=`: thins a fast run to a maximum number of points a second.
 //!
-//! Time is cut into windows by the events' own `elapsed_ms`, so that a reader who resumes meets the
-//! same windows. Of each window the latest convergence and the latest incumbent remain; they leave
-//! in the order of their ids when the window closes: at the first event beyond it, at a status or
-//! the end, or when [`Throttle::flush`] is called because nothing comes any more.
+//! Time is divided into windows by the events' own `elapsed_ms`, so that a reader who resumes gets the same windows. Of
+//! each window the latest convergence and the latest incumbent remain; they are sent in the order of their ids when the
+//! window closes: at the first event beyond it, at a status or the end, or when [`Throttle::flush`] is called because
+//! nothing more comes.
 
 use crate::job::{Event, NumberedEvent};
 
@@ -34,12 +34,12 @@ impl Throttle {
         self.window_ms
     }
 
-    /// Whether events are held back.
+    /// Whether events are being held back.
     pub(super) fn holds(&self) -> bool {
         self.convergence.is_some() || self.incumbent.is_some()
     }
 
-    /// Take the next event; what may leave is added to `out`.
+    /// Take the next event; events that may be sent are added to `out`.
     pub(super) fn push(&mut self, event: NumberedEvent, out: &mut Vec<NumberedEvent>) {
         let Some(window_ms) = self.window_ms else {
             out.push(event);
@@ -69,7 +69,7 @@ impl Throttle {
         }
     }
 
-    /// Close the window: what is held leaves.
+    /// Close the window: held events are released.
     pub(super) fn flush(&mut self, out: &mut Vec<NumberedEvent>) {
         let mut held = [self.convergence.take(), self.incumbent.take()];
         held.sort_by_key(|event| event.as_ref().map(|event| event.id));

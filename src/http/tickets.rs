@@ -1,4 +1,4 @@
-//! `POST /plans/{id}/tickets`: leave to follow one plan for some minutes, in a form that fits a URL.
+//! `POST /plans/{id}/tickets`: permission to follow one plan for some minutes, in a form that fits a URL.
 
 use axum::Json;
 use axum::extract::State;
@@ -11,7 +11,7 @@ use super::params::{Id, NoParams};
 use super::problem::Problem;
 use super::status::location;
 
-/// The ticket, until when it opens streams, and where.
+/// The ticket, when it expires, and the streams it opens.
 #[derive(Serialize)]
 pub(super) struct TicketDocument {
     ticket: String,

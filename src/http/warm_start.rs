@@ -1,5 +1,5 @@
-//! `planner.warm_start.plan_id`: a stored plan's waypoints in place of its id, so that what is
-//! planned depends on the accepted document alone.
+//! `planner.warm_start.plan_id`: replaced by that stored plan's waypoints, so that the result depends on the accepted
+//! document alone.
 
 use serde::Deserialize;
 
@@ -14,7 +14,7 @@ use crate::scenario::frame::{Datum, Frame};
 use crate::scenario::json::Fault;
 use crate::scenario::{Scenario, WarmStart};
 
-/// The part of a result document that counts here.
+/// The part of a result document that is needed here.
 #[derive(Deserialize)]
 struct Route {
     frame: Option<FrameDocument>,
@@ -49,15 +49,15 @@ impl Route {
     }
 }
 
-/// Whether [`resolve`] has something to do.
+/// Whether [`resolve`] has anything to do.
 pub(super) fn names_a_plan(scenario: &Scenario) -> bool {
     matches!(scenario.planner.warm_start, Some(WarmStart::Plan(_)))
 }
 
-/// Put the waypoints of the plan that `scenario` starts from into it.
+/// Insert the waypoints of the plan that `scenario` starts from.
 ///
 /// # Errors
-/// An invalid scenario when that plan is not there or has no route yet.
+/// An invalid scenario when that plan does not exist or has no route yet.
 pub(super) async fn resolve(
     state: &AppState,
     caller: &Caller,

@@ -1,4 +1,4 @@
-//! What happens to a plan, in the order in which it happens.
+//! What happens to a plan, in order.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,9 +9,9 @@ use crate::export::document::{Convergence, Incumbent};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", content = "data", rename_all = "lowercase")]
 pub enum Event {
-    /// Its status changed; the record as it then was.
+    /// Its status changed; holds the record at that time.
     Status(Box<Plan>),
-    /// An iteration was done.
+    /// An iteration was completed.
     Convergence(Convergence),
     /// A better route was found.
     Incumbent(Incumbent),
@@ -19,7 +19,7 @@ pub enum Event {
     End(Status),
 }
 
-/// An event with its place in its plan's own sequence, which grows from 1 and may have holes.
+/// An event with its number in its plan's own sequence, which grows from 1 and may have gaps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NumberedEvent {
     /// Greater than that of every event before it.

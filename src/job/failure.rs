@@ -5,25 +5,25 @@ use serde::{Deserialize, Serialize};
 /// Why a plan failed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Failure {
-    /// Last part of the problem's `type`, as [`FailureKind::name`] gives it; in a record of a later version
-    /// it may be another one.
+    /// Last part of the problem's `type`, as [`FailureKind::name`] gives it; a record of a later version may hold
+    /// another one.
     pub kind: String,
     /// For people.
     pub detail: String,
 }
 
-/// Everything that a plan fails for.
+/// Every reason for which a plan can fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FailureKind {
-    /// The planner met a defect of its own.
+    /// The planner hit a bug of its own.
     PlannerPanic,
-    /// One worker after the other was lost while it ran the plan.
+    /// One worker after another was lost while running the plan.
     WorkerLost,
     /// The dataset that it was accepted over is gone.
     NoGround,
-    /// This version does not read the document that was accepted.
+    /// This version cannot read the document that was accepted.
     InvalidScenario,
-    /// The store does not have the document any more that was accepted.
+    /// The store has lost the document that was accepted.
     ScenarioLost,
 }
 
@@ -37,7 +37,7 @@ impl FailureKind {
         Self::ScenarioLost,
     ];
 
-    /// As it is kept and told.
+    /// The name in records and on the wire.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -49,7 +49,7 @@ impl FailureKind {
         }
     }
 
-    /// The kind with that name.
+    /// The kind with this name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)

@@ -8,7 +8,7 @@ use uuid::{Timestamp, Uuid};
 
 use super::PlanId;
 
-/// Keeps ids in order that are given in the same millisecond.
+/// Keeps ids created in the same millisecond in order.
 static ORDER: Mutex<ContextV7> = Mutex::new(ContextV7::new());
 
 /// A new id at `now_ms`, milliseconds since 1970; ids sort by the time of acceptance.

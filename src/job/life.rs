@@ -1,4 +1,4 @@
-//! How each step of a plan's life changes its record. Every step goes through the transition table.
+//! How each step in a plan's life changes its record. Every step is checked against the transition table.
 
 use super::state::{Refused, Status};
 use super::{Event, Failure, Plan, Submission};
@@ -6,7 +6,7 @@ use crate::digest::sha256_hex;
 use crate::export::document::{Convergence, Origin, Timing};
 
 impl Plan {
-    /// The record of a plan that has just been accepted as number `queue_position` in the queue.
+    /// The record of a plan that has just been accepted at `queue_position`.
     #[must_use]
     pub fn accepted(submission: &Submission, queue_position: u64) -> Self {
         Self {
@@ -34,7 +34,7 @@ impl Plan {
         }
     }
 
-    /// This record as it was when it had been accepted as number `queue_position`.
+    /// This record as it was on acceptance at `queue_position`.
     #[must_use]
     pub fn as_accepted(self, queue_position: u64) -> Self {
         Self {
@@ -56,7 +56,7 @@ impl Plan {
         }
     }
 
-    /// A worker begins with it: queued -> running.
+    /// A worker starts on it: queued -> running.
     ///
     /// # Errors
     /// [`Refused`] from any other status.
@@ -67,8 +67,7 @@ impl Plan {
         Ok(())
     }
 
-    /// Its worker is gone: running -> queued. The next run begins again from the seed, so nothing
-    /// of this one remains.
+    /// Its worker is gone: running -> queued. The next run begins again from the seed, so nothing of this one remains.
     ///
     /// # Errors
     /// [`Refused`] from any other status.
@@ -83,13 +82,13 @@ impl Plan {
         Ok(())
     }
 
-    /// Somebody asked for its end, and a worker will see to it.
+    /// Its end has been requested, and a worker will see to it.
     pub fn request_cancel(&mut self) {
         self.cancel_requested = true;
         self.revision += 1;
     }
 
-    /// It ends on request without a result: no worker has it, or the one that had it is gone.
+    /// It ends on request without a result: no worker has it, or the worker that had it is gone.
     ///
     /// # Errors
     /// [`Refused`] when it had already ended.
@@ -99,7 +98,7 @@ impl Plan {
         Ok(())
     }
 
-    /// Its run broke.
+    /// Its run failed.
     ///
     /// # Errors
     /// [`Refused`] when it was not running.
@@ -109,7 +108,7 @@ impl Plan {
         Ok(())
     }
 
-    /// It ends as `status`, one of the final ones.
+    /// It ends as `status`, which must be final.
     ///
     /// # Errors
     /// [`Refused`] when the table does not allow it, or when `status` is not final.
@@ -126,7 +125,7 @@ impl Plan {
         Ok(())
     }
 
-    /// Its run has told this: it has come as far as the last convergence point, if there is one.
+    /// Its run has told these events: progress moves to the last convergence point among them, if any.
     pub fn advance(&mut self, told: &[Event]) {
         let point = told.iter().rev().find_map(|event| match event {
             Event::Convergence(point) => Some(point),
@@ -150,7 +149,7 @@ impl Plan {
         self.revision += 1;
     }
 
-    /// What the result of its run says of its origin; `scenario` is the accepted document.
+    /// The origin recorded in the result of its run; `scenario` is the accepted document.
     #[must_use]
     pub fn origin(&self, scenario: &str, run_ms: f64) -> Origin {
         let started_ms = self.started_ms.unwrap_or(self.created_ms);

@@ -1,4 +1,4 @@
-//! The record of a plan: everything a status document tells.
+//! The record of a plan: everything in a status document.
 
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
@@ -17,7 +17,7 @@ pub struct Submission {
     pub name: Option<String>,
     /// The algorithm's name.
     pub algorithm: String,
-    /// Of the run.
+    /// Seed of the run.
     pub seed: u64,
     /// Iterations asked for.
     pub iterations: u64,
@@ -25,24 +25,24 @@ pub struct Submission {
     pub work: u64,
     /// The accepted document, defaults filled in.
     pub scenario: String,
-    /// Now, milliseconds since 1970.
+    /// Time of acceptance, milliseconds since 1970.
     pub created_ms: i64,
-    /// Whose plan it is; `None` where nobody has a key.
+    /// Owner of the plan; `None` where no keys are in use.
     pub owner: Option<Owner>,
-    /// Active plans that its owner may have, this one included; `None` for any number.
+    /// Active plans that its owner may have, including this one; `None` for any number.
     pub quota: Option<u64>,
-    /// Where its end is to be told.
+    /// Where to send word of its end.
     pub webhook: Option<String>,
     /// Tells a repeated request from a new one.
     pub idempotency: Option<Idempotency>,
-    /// What stands for the dataset that it is planned over.
+    /// Identifies the dataset that it is planned over.
     pub dataset: Option<String>,
 }
 
-/// The name of the key that a plan was handed in with.
+/// The name of the owner of the key that a plan was submitted with.
 pub type Owner = String;
 
-/// What makes a request the same as an earlier one of the same owner.
+/// What identifies a request as a repetition of an earlier one of the same owner.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Idempotency {
     /// Chosen by the caller.
@@ -56,20 +56,20 @@ pub struct Idempotency {
 pub struct Plan {
     /// See [`PlanId`].
     pub id: PlanId,
-    /// Whose plan it is; `None` where nobody has a key.
+    /// Owner of the plan; `None` where no keys are in use.
     #[serde(default)]
     pub owner: Option<Owner>,
     /// The scenario's name.
     pub name: Option<String>,
-    /// Where it stands.
+    /// Its present status.
     pub status: Status,
     /// Why the search ended, once it has.
     pub stop_reason: Option<String>,
     /// Whether the best route so far meets every constraint; `None` before the first.
     pub feasible: Option<bool>,
-    /// Of the best feasible route so far.
+    /// Cost of the best feasible route so far.
     pub best_cost: Option<f64>,
-    /// Share of the iterations done, 0 to 1; 1 at a result.
+    /// Fraction of the iterations done, 0 to 1; 1 once there is a result.
     pub progress: f64,
     /// Iterations done.
     pub iteration: u64,
@@ -81,7 +81,7 @@ pub struct Plan {
     pub queue_position: Option<u64>,
     /// The algorithm's name.
     pub algorithm: String,
-    /// Of the run.
+    /// Seed of the run.
     pub seed: u64,
     /// When it was accepted.
     pub created_ms: i64,
@@ -89,11 +89,11 @@ pub struct Plan {
     pub started_ms: Option<i64>,
     /// When it ended.
     pub finished_ms: Option<i64>,
-    /// When its record will be removed; `None` is never.
+    /// When its record will be removed; `None` for never.
     pub expires_ms: Option<i64>,
-    /// Whether somebody asked for its end.
+    /// Whether its end has been requested.
     pub cancel_requested: bool,
-    /// What broke, when failed.
+    /// The failure, when failed.
     pub error: Option<Failure>,
     /// Grows with every change of this record.
     pub revision: u64,

@@ -1,18 +1,18 @@
-//! The one table of what may follow what.
+//! The one table of the allowed transitions.
 
 use serde::{Deserialize, Serialize};
 
-/// Where a plan stands.
+/// The state of a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
     /// Accepted, durable, waiting for a worker.
     Queued,
-    /// A worker plans it.
+    /// A worker is planning it.
     Running,
     /// It has a result, feasible or not.
     Succeeded,
-    /// It has no result and gets none; the plan says which [`FailureKind`](super::FailureKind) it is.
+    /// It has no result and gets none; the record says which [`FailureKind`](super::FailureKind) it is.
     Failed,
     /// Ended on request, with the best route so far if it had begun.
     Cancelled,
@@ -28,7 +28,7 @@ impl Status {
         Self::Cancelled,
     ];
 
-    /// As on the wire.
+    /// The name on the wire.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -40,13 +40,13 @@ impl Status {
         }
     }
 
-    /// The status of that name.
+    /// The status with this name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|status| status.name() == name)
     }
 
-    /// Whether nothing follows it.
+    /// Whether it is final.
     #[must_use]
     pub fn is_final(self) -> bool {
         self.next().is_empty()
@@ -74,9 +74,9 @@ impl Status {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("a {} plan cannot become {}", from.name(), to.name())]
 pub struct Refused {
-    /// Where the plan stands.
+    /// The present status.
     pub from: Status,
-    /// What it was to become.
+    /// The status that was requested.
     pub to: Status,
 }
 

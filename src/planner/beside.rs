@@ -1,4 +1,4 @@
-//! Two things at a time: the proven bound is computed beside the search.
+//! Runs two things at a time: the proven bound is computed beside the search.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -9,8 +9,8 @@ use crate::seeding;
 
 /// Run `search`, and compute the bound of `scenario` on a thread of its own meanwhile.
 ///
-/// The bound is the same as alone. Only a search that ends before its time, as its reason tells, takes
-/// the bound as far as it was proven by then. Where no thread can be had, it is computed afterwards.
+/// The bound is the same as when computed alone. Only when a search ends early, as its reason shows, is the bound taken
+/// as far as it was proven by then. Where no thread can be had, it is computed afterwards.
 pub(super) fn bounded(
     scenario: &Scenario,
     search: impl FnOnce() -> StopReason,
@@ -21,7 +21,7 @@ pub(super) fn bounded(
         let beside = thread::Builder::new()
             .name("bound".to_owned())
             .spawn_scoped(scope, bound);
-        // However the search ends, even by a panic, nobody waits for a bound that nobody asks for.
+        // However the search ends, even by a panic, nobody waits for a bound that is no longer wanted.
         let give_up = OnDrop(&is_over);
         let reason = search();
         if matches!(reason, StopReason::Iterations | StopReason::Converged) {
@@ -39,7 +39,7 @@ pub(super) fn bounded(
     })
 }
 
-/// Sets a flag when it goes.
+/// Sets a flag when dropped.
 struct OnDrop<'f>(&'f AtomicBool);
 
 impl Drop for OnDrop<'_> {

@@ -1,9 +1,9 @@
 //! Positions priced side by side, a block of [`LANES`] at a time.
 //!
-//! Where a position matters only if it beats a rival, most are known not to by their fuel and heights alone;
-//! only the others are priced, in blocks of their own. Above hills most of the time goes into the heights of legs,
-//! so that routes are first priced as if they kept them; of those that may still win, those legs are
-//! measured of which it is not known how they fare. No price depends on which other positions are in a block.
+//! Where a position matters only if it beats a rival, fuel and heights alone show that most do not; only the others are
+//! priced, in blocks of their own. Above hills most of the time goes into the heights of legs, so routes are first
+//! priced as if they kept them; of those that may still win, only legs with unknown heights are measured. No price
+//! depends on which other positions are in a block.
 
 use super::coding::Coding;
 use super::kept::{End, Kept};
@@ -17,12 +17,12 @@ pub(super) struct Blocks<'a, 's> {
     kept: &'a mut Kept,
     hilly: bool,
     points: Vec<PointRow>,
-    /// Below free waypoints.
+    /// Elevation below free waypoints.
     ground: Vec<Row>,
     waiting: Waiting,
     /// Legs that keep their heights for certain, of the routes that have just been priced.
     proven: Vec<Row>,
-    /// Of positions whose rivals break no limit, and of others.
+    /// Legs of positions whose rivals break no limit, and of others.
     unmeasured: [Unmeasured; 2],
 }
 
@@ -30,7 +30,7 @@ pub(super) struct Blocks<'a, 's> {
 #[derive(Default)]
 struct Waiting {
     points: Vec<PointRow>,
-    /// Below free waypoints.
+    /// Elevation below free waypoints.
     ground: Vec<Row>,
     /// The numbers of their positions.
     owners: Vec<usize>,
@@ -43,7 +43,7 @@ struct Unmeasured {
     from: Vec<PointRow>,
     to: Vec<PointRow>,
     prices: Vec<Price>,
-    /// Of `legs`, those not known.
+    /// Number of `legs` whose violation is not known.
     unknown: usize,
 }
 
@@ -56,14 +56,14 @@ struct Leg {
     known: Option<f64>,
 }
 
-/// So many are measured at once.
+/// Number of legs measured at once.
 const LEGS_AT_ONCE: usize = 16 * LANES;
 
 /// What prices routes.
 pub(super) struct Pricers<'s> {
-    /// In full.
+    /// Prices in full.
     full: Pricer<'s>,
-    /// Where a route that breaks a limit is worth nothing.
+    /// For cases in which a route that breaks a limit is worth nothing.
     verdicts: Pricer<'s>,
 }
 
@@ -75,7 +75,7 @@ impl<'s> Pricers<'s> {
         }
     }
 
-    /// Whether heights take long to measure, so that legs are worth remembering.
+    /// Whether heights take long to measure, so that remembering legs pays.
     pub(super) fn is_hilly(&self) -> bool {
         self.full.is_hilly()
     }
@@ -100,8 +100,8 @@ impl<'a, 's> Blocks<'a, 's> {
         }
     }
 
-    /// Price `fitness.len()` positions, as [`Objective::evaluate_against`] says where there are `rivals`.
-    /// `may_go_on` is asked before each block, of so many; what it refuses is [`Fitness::WORST`].
+    /// Price `fitness.len()` positions, as [`Objective::evaluate_against`] says where there are `rivals`. `may_go_on`
+    /// is asked before each block, with its size; a block that it refuses gets [`Fitness::WORST`].
     ///
     /// [`Objective::evaluate_against`]: crate::optimizer::Objective::evaluate_against
     pub(super) fn price(
@@ -167,7 +167,7 @@ impl<'a, 's> Blocks<'a, 's> {
         }
     }
 
-    /// Measure the legs that wait, if they are at least so many.
+    /// Measure the waiting legs, if there are at least `count`.
     fn settle(&mut self, count: usize, fitness: &mut [Fitness]) {
         // Where a violation is worth nothing, it is not known exactly and not worth knowing.
         let ways = [(&self.pricers.verdicts, false), (&self.pricers.full, true)];
@@ -181,7 +181,7 @@ impl<'a, 's> Blocks<'a, 's> {
     /// The routes of up to [`LANES`] positions.
     fn decode(&mut self, positions: &[f64], count: usize) {
         let dimension = self.coding.bounds().dimension();
-        // Spare lanes repeat the last position.
+        // Unused lanes repeat the last position.
         let lanes = std::array::from_fn(|lane| {
             let from = lane.min(count - 1) * dimension;
             &positions[from..from + dimension]
@@ -212,7 +212,7 @@ impl Waiting {
 }
 
 impl Unmeasured {
-    /// Add the legs of the route in lane `lane` of `points`, but for those that are `proven` or `kept`.
+    /// Add the legs of the route in lane `lane` of `points`, except those that are `proven` or `kept`.
     fn push(
         &mut self,
         points: &[PointRow],
@@ -304,8 +304,8 @@ mod tests {
     use crate::planner::{Nobody, plan};
     use crate::scenario::Scenario;
 
-    /// Whatever is known of legs, and against whatever rivals: a position that beats its rival has the
-    /// fitness that it has alone, in full, to the bit; no other beats its rival.
+    /// Whatever is known of legs, and whatever the rivals: a position that beats its rival has, to the bit, the fitness
+    /// that it has when priced alone in full; no other beats its rival.
     #[test]
     fn a_position_that_beats_its_rival_is_priced_as_alone() {
         for scenario in [hilly_scenario(), scenario()] {

@@ -1,4 +1,4 @@
-//! What is measured of a delivered route, continuously and not at samples.
+//! The measurements of a delivered route, continuous rather than at samples.
 
 use std::borrow::Cow;
 
@@ -19,7 +19,7 @@ pub(super) fn legs(route: &[Point3]) -> Vec<Leg> {
     segments(route).zip(turns(route)).map(leg).collect()
 }
 
-/// The certificate of `route`, be it of waypoints or of a path's samples.
+/// The certificate of `route`, which may consist of waypoints or of a path's samples.
 pub(super) fn measure(model: &Model, route: &[Point3]) -> Measures {
     let threats = model.scenario.threats.iter().enumerate();
     let flown = flown(route);
@@ -92,7 +92,7 @@ fn describe(model: &Model, breach: &Breach) -> Violation {
     }
 }
 
-/// The way flown horizontally up to each point of `route`, metres.
+/// The horizontal distance flown up to each point of `route`, metres.
 fn flown(route: &[Point3]) -> Vec<f64> {
     let mut way = 0.0;
     std::iter::once(0.0)
@@ -103,8 +103,8 @@ fn flown(route: &[Point3]) -> Vec<f64> {
         .collect()
 }
 
-/// The least clearance of the legs of `route`, by branch and bound: no point is nearer to a threat
-/// than a point in its neighbourhood less the way between them.
+/// The least clearance of the legs of `route`, by branch and bound: no point is nearer to a threat than a neighbouring
+/// point, less the distance between them.
 fn least_clearance(
     threat: &Threat,
     route: &[Point3],
@@ -123,7 +123,7 @@ fn least_clearance(
         Cow::Owned(every_leg.iter().copied().filter(is_at_its_height).collect())
     };
     let mut least = f64::INFINITY;
-    // Runs of those legs, with what their clearance is at least.
+    // Runs of those legs, with lower bounds of their clearance.
     let mut open = vec![(&at_its_height[..], f64::NEG_INFINITY)];
     while let Some((legs, bound)) = open.pop() {
         if bound >= least {
@@ -140,7 +140,7 @@ fn least_clearance(
         let bounded = |legs: &'_ [usize]| {
             let from = flown[middle] - flown[legs[0]];
             let to = flown[legs[legs.len() - 1] + 1] - flown[middle];
-            // The way is a sum; a hair of it is left to rounding.
+            // The distance is a sum; allow a hair for rounding.
             here - from.max(to) * (1.0 + 1e-9) - 1e-9
         };
         let mut halves = [(before, bounded(before)), (after, bounded(after))];

@@ -1,5 +1,5 @@
-//! What becomes of the routes that a search ends with: the best is polished and brought home, and so are some that lead
-//! elsewhere.
+//! What happens to the routes that a search ends with: the best is polished and refined by Newton's method, and so are
+//! some that lead elsewhere.
 
 use super::log::Log;
 use super::newton::{self, Newton};
@@ -10,23 +10,23 @@ use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
 
-/// Routes that lead elsewhere than the best and are polished in the end, too, at most,
+/// Maximum number of routes polished at the end that lead elsewhere than the best, unless waypoints are [`FEW`].
 const CHALLENGERS: usize = 5;
 
-/// but all where there are no more waypoints than this: so few cannot follow a coarse route, and what that costs is not made
-/// up for before the polish.
+/// Up to this many waypoints, all routes that lead elsewhere are polished: so few waypoints cannot follow a coarse
+/// route, and that loss is only made up by the polish.
 const FEW: usize = 8;
 
-/// So many times fewer routes are priced for that than the bats were asked for, at least.
+/// The routes priced for challengers are at most the bats' budget divided by this.
 const CHALLENGE_PART: usize = 2;
 
-/// A challenger that costs this share more than the best once it is roughly polished is left.
+/// A challenger that costs this share more than the best after the rough polish is dropped.
 const CLOSE: f64 = 0.002;
 
-/// Over hills, so many waypoints are more than there are bends: where the spare ones lie costs something.
+/// Over hills, this many waypoints are more than there are bends: where the spare ones lie affects the cost.
 const ROOMY: usize = 16;
 
-/// Of the polish at the end.
+/// Steps of the polish at the end.
 const LAST_STEPS: Steps = Steps {
     from: 0.01,
     to: 5e-5,
@@ -34,20 +34,20 @@ const LAST_STEPS: Steps = Steps {
     violation_m: f64::INFINITY,
 };
 
-/// Of the rough polish of a challenger,
+/// Steps of the rough polish of a challenger.
 const ROUGH_STEPS: Steps = Steps {
     from: 0.01,
     ..COARSE_STEPS
 };
 
-/// and of what follows.
+/// Steps of the fine polish that follows for a promising challenger.
 const FINE_STEPS: Steps = Steps {
     from: 1e-3,
     ..LAST_STEPS
 };
 
-/// Polish the best route, as the last point of the curve, unless it is good enough already; it may be after. Of the `others`
-/// that lead elsewhere one may become better, and so may one of those `beyond` limits.
+/// Polish the best route, as the last point of the curve, unless it is already good enough; the polish may make it so.
+/// One of the `others` that lead elsewhere may become better, and so may one of those `beyond` limits.
 pub(super) fn finish(
     model: &Model,
     reason: StopReason,
@@ -57,7 +57,7 @@ pub(super) fn finish(
 ) -> StopReason {
     if model.scenario.planner.polish && reason != StopReason::Converged {
         let mut candidates = vec![log.route.clone()];
-        // Where the best so far is as a search began, what its bats came to may be better when polished.
+        // Where the best so far is still a start of the search, what its bats found may be better once polished.
         candidates.extend(others.first().filter(|other| **other != log.route).cloned());
         let before = log.evaluations;
         for mut route in candidates {
@@ -78,9 +78,9 @@ pub(super) fn finish(
     reason
 }
 
-/// Which of two ways is the cheaper one is told by their last metres: some of the `others`, which were no better than the
-/// best before the polish, may be after; whether one is. The first of them has been polished with the best. None is begun
-/// where fewer routes are left to price than the `spent` ones of that.
+/// The last metres decide which of two ways is cheaper: one of the `others`, which were no better than the best before
+/// the polish, may be better after it; returns whether one is. The first of them has been polished with the best. No
+/// challenger is begun when fewer routes are left to price than the `spent` ones of that polish.
 fn challenge(model: &Model, others: &[Vec<Point3>], spent: u64, log: &mut Log) -> bool {
     let settings = &model.scenario.planner;
     let asked_for = settings.population * settings.iterations;
@@ -120,7 +120,7 @@ fn elsewhere<'r>(
     met
 }
 
-/// Polish `route` as long as it may become better than the best; `None` where it does not.
+/// Polish `route` while it may still become better than the best; `None` when it does not.
 fn challenger(model: &Model, route: &mut Vec<Point3>, log: &mut Log) -> Option<Fitness> {
     let best = log.best;
     let known = [(best, log.route.clone())];
@@ -136,7 +136,7 @@ fn challenger(model: &Model, route: &mut Vec<Point3>, log: &mut Log) -> Option<F
     fine
 }
 
-/// The last metres of a route that turns or climbs as sharply as it may, or has many waypoints over hills.
+/// Refine the last metres of a route that turns or climbs as sharply as it may, or has many waypoints over hills.
 fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
     let mut route = log.route.clone();
     let is_free = log.best.is_feasible() && !newton::is_felt(model, &route);
@@ -153,8 +153,7 @@ fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
     log.offer(&route, fitness);
 }
 
-/// What becomes of routes that break limits when these are felt: from round to round of Newton's method, what is beyond them
-/// costs more.
+/// Bring routes that break limits within them: from round to round of Newton's method, breaches cost more.
 fn bring_within(model: &Model, beyond: &[Vec<Point3>], log: &mut Log) {
     for route in beyond {
         if why_stop(model.scenario, log.stop).is_some() {
@@ -188,8 +187,8 @@ mod tests {
     use crate::planner::tests::{radar, scenario};
     use crate::scenario::Scenario;
 
-    /// Start and target on a level, what lies in the way off to one side, and a route round it on either side: a smooth one
-    /// on the long side, and one that is dearer as long as nothing is done about it.
+    /// Start and target on one level, an obstacle off to one side, and a route round it on either side: a smooth one on
+    /// the long side, and one that is more expensive until it is improved.
     fn one_in_the_way() -> (Scenario, [Vec<Point3>; 2]) {
         let mut scenario = scenario();
         scenario.planner.waypoints = 3;

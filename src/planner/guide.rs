@@ -1,4 +1,4 @@
-//! What a guided search knows that a plain one does not: routes to start from, and moves of a route.
+//! What a guided search has that a plain one lacks: routes to start from, and moves of a route.
 
 use super::coding::{Cartesian, Spherical};
 use super::moves::Moves;
@@ -6,10 +6,10 @@ use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::Random;
 
-/// Of so many members, one comes from anywhere; the others are near to a seed.
+/// One of this many members comes from anywhere; the others are near a seed.
 const STRANGERS: usize = 4;
 
-/// Moves by which a member differs from its seed.
+/// Number of moves by which a member differs from its seed.
 const MOVES: usize = 3;
 
 /// How far such a move may go, as a share of the way.
@@ -30,7 +30,7 @@ pub(super) struct Guide<'s> {
 }
 
 impl<'s> Guide<'s> {
-    /// From `seeds`, each of `waypoints` free waypoints.
+    /// A guide from `seeds`, each brought to `waypoints` free waypoints.
     pub(super) fn new(model: &Model<'s>, waypoints: usize, seeds: &[Vec<Point3>]) -> Self {
         let space = Cartesian::with_ends(model, waypoints);
         let spherical = Spherical::new(model.scenario, waypoints);

@@ -1,12 +1,11 @@
-//! By how much legs are known to leave the heights asked of them; most keep them.
+//! A cache of how far legs leave the allowed heights; most keep them.
 //!
-//! Most legs of a candidate are those of the route that it comes from, to the last bit, and what was measured
-//! once need not be measured again. A leg that is forgotten is measured anew, so that nothing depends on what
-//! is remembered but time.
+//! Most legs of a candidate are bit for bit those of the route that it comes from, and need not be measured again. A
+//! leg that is forgotten is measured anew, so that nothing but time depends on what is remembered.
 
 use crate::geometry::Point3;
 
-/// Legs that there is room for, at least and at most.
+/// Least and greatest capacity, in legs.
 const FEWEST: usize = 1 << 10;
 const MOST: usize = 1 << 16;
 
@@ -17,7 +16,7 @@ pub(super) struct End {
     mixed: u64,
 }
 
-/// No leg has it: no coordinate is such a number.
+/// No leg has this key: no coordinate is such a number.
 const NONE: [u64; 6] = [u64::MAX; 6];
 
 /// An odd number whose bits are spread evenly.
@@ -33,14 +32,14 @@ impl End {
     }
 }
 
-/// Each leg has one place; of those that share it the last is known.
+/// A cache in which each leg has one slot; of legs that share it the last is known.
 pub(super) struct Kept {
     /// The bits of both ends, and the violation.
     places: Vec<([u64; 6], f64)>,
 }
 
 impl Kept {
-    /// With room for about `legs`.
+    /// With room for about this many `legs`.
     pub(super) fn of(legs: usize) -> Self {
         let places = (2 * legs).next_power_of_two().clamp(FEWEST, MOST);
         Self {

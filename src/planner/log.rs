@@ -6,7 +6,7 @@ use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::{Fitness, Swarm};
 
-/// What a run tells, and what it will deliver.
+/// What a run reports, and what it will deliver.
 pub(super) struct Log<'o> {
     model: &'o Model<'o>,
     observer: &'o mut dyn Observer,
@@ -15,11 +15,11 @@ pub(super) struct Log<'o> {
     /// Start, free waypoints, target.
     pub(super) route: Vec<Point3>,
     pub(super) best: Fitness,
-    /// The last route that the observer was told.
+    /// The last route passed to the observer.
     told: Option<Vec<Point3>>,
     /// Routes priced so far.
     pub(super) evaluations: u64,
-    /// Proven: no route costs less. Known only where the search makes use of it.
+    /// Proven lower bound of a route's cost. Known only where the search makes use of it.
     pub(super) lower: Option<f64>,
 }
 
@@ -42,16 +42,16 @@ impl<'o> Log<'o> {
         }
     }
 
-    /// Whether the best so far is proven to be as near to the optimum as was asked for.
+    /// Whether the best so far is proven to be as near to the optimum as requested.
     pub(super) fn has_converged(&self) -> bool {
         let gap = self.model.scenario.planner.gap;
         let near = |lower: f64| self.best.cost <= lower * (1.0 + gap);
         gap > 0.0 && self.best.is_feasible() && self.lower.is_some_and(near)
     }
 
-    /// Keep `route`, whose fitness was found in lanes, if it is the best so far; whether it is.
+    /// Keep `route`, whose fitness was found in lanes, if it is the best so far; returns whether it is.
     pub(super) fn offer(&mut self, route: &[Point3], fitness: Fitness) -> bool {
-        // What is told and delivered is the scalar figure, to the last digit.
+        // What is reported and delivered is the scalar figure, to the last digit.
         (self.route.is_empty() || fitness.beats(&self.best))
             && self.keep_better(route, price(self.model, route))
     }
@@ -65,7 +65,7 @@ impl<'o> Log<'o> {
         better
     }
 
-    /// As [`Log::offer`], of a route that is not priced yet.
+    /// As [`Log::offer`], for a route that is not priced yet.
     pub(super) fn offer_unpriced(&mut self, route: &[Point3]) -> bool {
         self.evaluations += 1;
         self.keep_better(route, price(self.model, route))
@@ -83,7 +83,7 @@ impl<'o> Log<'o> {
         self.record(iteration, mean_cost, feasible / count);
     }
 
-    /// One point more of the last iteration: what came after it.
+    /// One more point for the last iteration: for what came after it.
     pub(super) fn last_point(&mut self) {
         let Some(&last) = self.convergence.last() else {
             return;

@@ -1,4 +1,5 @@
-//! From a scenario to a route: what the search and the bound beside it come to, priced, smoothed and certified.
+//! From a scenario to a route: the outcome of the search and of the bound computed beside it, priced, smoothed and
+//! certified.
 //!
 //! Plain functions: no async, no store, no clock of their own.
 
@@ -52,17 +53,17 @@ pub trait Observer {
     fn incumbent(&mut self, incumbent: &Incumbent);
 }
 
-/// Tells a run when to end and what time it is; asked once an iteration, and now and then within
-/// one whose routes take long to price.
+/// Tells a run when to end and what time it is; asked once an iteration, and occasionally within one whose routes take
+/// long to price.
 pub trait Stop {
-    /// Whether somebody wants the run to end with the best route so far.
+    /// Whether the run should end with the best route so far.
     fn requested(&self) -> bool;
     /// Milliseconds since the run began. It is reported, and compared to the request's time
     /// limit; no other decision may look at it.
     fn elapsed_ms(&self) -> f64;
 }
 
-/// Nobody looks on, and nobody stops the run: for planning without an audience.
+/// No observer, and nobody to stop the run: for planning without an audience.
 #[derive(Debug, Clone, Copy)]
 pub struct Nobody;
 
@@ -82,8 +83,8 @@ impl Stop for Nobody {
 
 /// Plan a route for `scenario`.
 ///
-/// The outcome depends on the scenario alone, unless it sets a time limit or `stop` ends the run;
-/// `elapsed_ms` is the only figure that a clock has a part in.
+/// The outcome depends on the scenario alone, unless it sets a time limit or `stop` ends the run; `elapsed_ms` is the
+/// only figure that depends on a clock.
 ///
 /// # Panics
 /// When the scenario names an algorithm that is not in the table; its reader refuses those.
@@ -91,7 +92,7 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
     let model = Model::new(scenario);
     let mut log = Log::new(&model, observer, stop);
     if scenario.planner.gap > 0.0 {
-        // The search asks at each step whether it is near enough to the bound.
+        // At each step the search checks whether it is near enough to the bound.
         let is_over = || why_stop(scenario, stop).is_some();
         let lower = seeding::lower_bound_until(scenario, &is_over);
         log.lower = Some(lower);
@@ -140,13 +141,13 @@ pub fn decoder(scenario: &Scenario) -> impl Fn(&[f64]) -> Vec<Point3> + '_ {
     }
 }
 
-/// The path that a vehicle flies along `route`, start to target; `None` where none is found that keeps every limit.
+/// The path that a vehicle flies along `route`, start to target; `None` where no path keeps every limit.
 #[must_use]
 pub fn smoothed(scenario: &Scenario, route: &[Point3]) -> Option<Path> {
     smoothing::smooth(&Model::new(scenario), route)
 }
 
-/// Routes are the same when no waypoint is farther from its like than this share of the way.
+/// Routes are the same when no waypoint is farther from its counterpart than this share of the way.
 const SAME: f64 = 0.02;
 
 fn same(scenario: &Scenario, one: &[Point3], other: &[Point3]) -> bool {
@@ -190,7 +191,7 @@ fn measured(
     let violations = certificate::violations(model, &route);
     let feasible = violations.is_empty();
     if let Some(last) = convergence.last_mut() {
-        // The search aims at half the tolerance; what is delivered counts by the whole.
+        // The search aims at half the tolerance; the delivered route is judged by all of it.
         last.best_cost = feasible.then_some(cost.total);
         last.best_violation = violations.iter().map(|violation| violation.amount).sum();
     }

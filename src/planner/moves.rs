@@ -1,7 +1,7 @@
 //! Eq. 13 as a move of the route: a neighbour that differs in one place, drawn in space.
 //!
-//! A route is here the position of its Cartesian coding: x, y and the height above ground of each
-//! free waypoint. Moves keep heights above ground, so that none asks for the elevation anywhere.
+//! Here a route is the position of its Cartesian coding: x, y and the height above ground of each free waypoint. Moves
+//! keep heights above ground, so that none needs an elevation anywhere.
 
 use super::coding::PER_WAYPOINT;
 use crate::cost::Model;
@@ -11,7 +11,7 @@ use crate::optimizer::Random;
 /// x, y, height above ground.
 type Waypoint = [f64; PER_WAYPOINT];
 
-/// Moves of the routes of one scenario.
+/// Moves for the routes of one scenario.
 pub(super) struct Moves<'s> {
     model: Model<'s>,
     /// Metres from start to target.
@@ -49,7 +49,7 @@ impl<'s> Moves<'s> {
         }
     }
 
-    /// One to four neighbouring waypoints aside, the middle one farthest.
+    /// Move one to four neighbouring waypoints sideways, the middle one farthest.
     fn shift(&self, route: &mut [Waypoint], random: &mut Random, reach: f64) {
         let (first, count) = part(route.len(), random);
         let [dx, dy] = random.normals().map(|normal| normal * reach);
@@ -60,7 +60,7 @@ impl<'s> Moves<'s> {
         }
     }
 
-    /// One to four neighbouring waypoints up or down.
+    /// Move one to four neighbouring waypoints up or down.
     fn lift(&self, route: &mut [Waypoint], random: &mut Random, reach: f64) {
         let (first, count) = part(route.len(), random);
         let rise = random.normal() * reach;
@@ -70,7 +70,7 @@ impl<'s> Moves<'s> {
         }
     }
 
-    /// A waypoint along one of its legs.
+    /// Move a waypoint along one of its legs.
     fn slide(&self, route: &mut [Waypoint], random: &mut Random) {
         let idx = random.below(route.len());
         let [before, after] = self.neighbours(route, idx);
@@ -81,7 +81,7 @@ impl<'s> Moves<'s> {
         route[idx] = self.within([at(x, towards[0]), at(y, towards[1]), height]);
     }
 
-    /// A waypoint out of its place and into another leg.
+    /// Move a waypoint from its place into another leg.
     fn transplant(&self, route: &mut [Waypoint], random: &mut Random, reach: f64) {
         let from = random.below(route.len());
         let into = random.below(route.len());
@@ -100,7 +100,7 @@ impl<'s> Moves<'s> {
         } else {
             random.normal() * reach / length
         };
-        // Where a leg climbs over a threat, or down from it, what is put on it is too high or too low.
+        // Where a leg climbs over a threat, or down from it, a waypoint placed on it is too high or too low.
         let height = if random.unit() < 0.5 {
             between(2)
         } else {
@@ -128,15 +128,14 @@ impl<'s> Moves<'s> {
     }
 }
 
-/// Sizes of every order down to exp(-5), as `share` goes from 0 to 1: most steps near the optimum must
-/// be small.
+/// Sizes of every order down to exp(-5), as `share` goes from 0 to 1: near the optimum most steps must be small.
 fn order(share: f64) -> f64 {
     let sixth = 1.0 - 0.5654 * share;
     let half = sixth * sixth * sixth;
     half * half
 }
 
-/// The first of one to four neighbours among so many free waypoints, and how many they are.
+/// The first of one to four neighbours among `free` waypoints, and how many they are.
 fn part(free: usize, random: &mut Random) -> (usize, usize) {
     let count = 1 + random.below(4.min(free));
     (random.below(free - count + 1), count)
@@ -154,7 +153,7 @@ mod tests {
     use crate::planner::coding::Cartesian;
     use crate::planner::tests::scenario;
 
-    /// Every move keeps to the box, and of many every waypoint takes part in some.
+    /// Every move stays in the box, and over many moves every waypoint takes part in some.
     #[test]
     fn moves_stay_in_the_box_and_reach_every_waypoint() {
         let scenario = scenario();

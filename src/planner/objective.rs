@@ -18,27 +18,27 @@ use crate::optimizer::{Bounds, Fitness, Objective, Random};
 /// The routes of one scenario.
 pub(super) struct Routes<'s> {
     pub(super) coding: Coding<'s>,
-    /// Of a guided search.
+    /// Guide of a guided search.
     guide: Option<Guide<'s>>,
     pricers: Pricers<'s>,
-    /// Of each thread that prices.
+    /// Known legs, for each pricing thread.
     kept: Vec<Kept>,
     pub(super) watch: Watch<'s>,
 }
 
-/// Fewer routes are not worth the start of a thread.
+/// Fewer routes than this are not worth starting a thread.
 const WORTH_THREADS: usize = 64;
 
 impl<'s> Routes<'s> {
-    /// Of a plain search in the coding of its algorithm.
+    /// For a plain search in the coding of its algorithm.
     pub(super) fn plain(model: &Model<'s>, stop: &'s dyn Stop) -> Self {
         let scenario = model.scenario;
         let coding = Coding::of(scenario, scenario.planner.waypoints);
         Self::new(coding, None, model, stop)
     }
 
-    /// Of a search in space that starts from `seeds`, all with as many waypoints, and whose local
-    /// walk is a move of the route.
+    /// For a search in space that starts from `seeds`, all with the same number of waypoints, and whose local walk is a
+    /// move of the route.
     pub(super) fn guided(model: &Model<'s>, stop: &'s dyn Stop, seeds: &[Vec<Point3>]) -> Self {
         let waypoints = seeds[0].len() - 2;
         let coding = Coding::Cartesian(Cartesian::with_ends(model, waypoints));
@@ -61,7 +61,7 @@ impl<'s> Routes<'s> {
         } else {
             0
         };
-        // More would have nothing to do.
+        // More threads would have nothing to do.
         let blocks = settings.population.div_ceil(LANES);
         let threads = settings.threads.clamp(1, blocks.max(1));
         Self {
@@ -86,7 +86,7 @@ impl<'s> Routes<'s> {
         );
     }
 
-    /// Price all positions on several threads, as many at once as may be between two looks at the clock.
+    /// Price all positions on several threads, as many at once as are allowed between two looks at the clock.
     fn side_by_side(
         &mut self,
         positions: &[f64],
@@ -110,8 +110,8 @@ impl<'s> Routes<'s> {
         }
     }
 
-    /// Each thread, this one among them, prices runs of whole blocks as long as there are any; no price depends on which.
-    /// Where no more threads can be had, the others do the work.
+    /// Each thread, including this one, prices runs of whole blocks while there are any; no price depends on which
+    /// thread it is. Where no more threads can be had, the others do the work.
     fn share_out(
         &mut self,
         positions: &[f64],

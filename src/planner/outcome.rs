@@ -7,7 +7,7 @@ use crate::scenario::Frame;
 /// The end of a run: the best route, its price, its certificate and how it was found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// What the request's coordinates mean; all here are in the local plane.
+    /// The meaning of the request's coordinates; all coordinates here are in the local plane.
     pub frame: Frame,
     /// Whether the waypoints meet every constraint.
     pub feasible: bool,
@@ -15,7 +15,7 @@ pub struct Outcome {
     pub stop_reason: StopReason,
     /// The figures that were minimised.
     pub cost: CostFigures,
-    /// With the paper's quadrature: the same route priced by the exact integral.
+    /// With the paper's quadrature, the same route priced by the exact integral.
     pub cost_integral: Option<CostFigures>,
     /// How far from the optimum the route can be.
     pub bound: Bound,
@@ -51,7 +51,7 @@ pub enum StopReason {
 }
 
 impl StopReason {
-    /// As on the wire.
+    /// The name on the wire.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -88,13 +88,13 @@ pub struct Leg {
 pub struct Path {
     /// Samples of the spline; the polyline through them is free of violations.
     pub points: Vec<Point3>,
-    /// Of that polyline.
+    /// Length of that polyline.
     pub length: f64,
-    /// Of the spline.
+    /// Degree of the spline.
     pub degree: usize,
     /// `control_points + degree + 1` clamped knots.
     pub knots: Vec<f64>,
-    /// Of the spline.
+    /// Control points of the spline.
     pub control_points: Vec<Point3>,
     /// `length` over the cruise speed, seconds.
     pub duration_s: f64,
@@ -103,7 +103,7 @@ pub struct Path {
 /// What was measured along a polyline, continuously.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measures {
-    /// One a threat, in order.
+    /// One per threat, in order.
     pub clearance: Vec<Clearance>,
     /// Least height above ground outside the terminal zones; `None` when the route never leaves them.
     pub min_agl: Option<f64>,
@@ -120,7 +120,7 @@ pub struct Measures {
 /// How close a route comes to one threat.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clearance {
-    /// Index in the scenario.
+    /// Index of the threat in the scenario.
     pub threat: usize,
     /// The threat's name.
     pub name: Option<String>,
@@ -132,7 +132,7 @@ pub struct Clearance {
 /// One broken constraint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Violation {
-    /// `threat`, `altitude`, `terrain`, `turn`, `climb`, `leg` or `area`.
+    /// One of `threat`, `altitude`, `terrain`, `turn`, `climb`, `leg` and `area`.
     pub kind: &'static str,
     /// Such as `leg 3` or `waypoint 2`.
     pub place: String,

@@ -1,11 +1,11 @@
-//! What a route is worth to the search.
+//! The value of a route to the search.
 
 use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
 
-/// Violations count from this share of the tolerance on, so that a delivered route is feasible for
-/// others' rounding too.
+/// Violations count from this share of the tolerance on, so that a delivered route is also feasible with others'
+/// rounding.
 pub(super) const PRICED_FROM: f64 = 0.5;
 
 /// The fitness of `route`, which may be a part of one: its ends are not free waypoints.

@@ -1,5 +1,5 @@
-//! What is done where no route is found that keeps every limit: one of more waypoints is sought, which is easier, and
-//! waypoints of it are left out again until there are as many as were asked for.
+//! The fallback where no route is found that keeps every limit: search for one with more waypoints, which is easier,
+//! then remove waypoints until the requested number is left.
 
 use super::finish::{finish, polish};
 use super::log::Log;
@@ -12,28 +12,28 @@ use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
 
-/// So many times as many waypoints,
+/// How many times the requested number of waypoints each attempt uses.
 const TIMES: [f64; 2] = [1.4, 2.0];
 
-/// but at least so many more.
+/// An attempt uses at least this many waypoints more than requested.
 const MORE: usize = 3;
 
-/// A roomier search is no larger than this, however large a search was asked for: what it is to find is any route.
+/// Largest population of such a search, however large a search was requested: any feasible route will do.
 const POPULATION: usize = 200;
 
-/// The same of its iterations.
+/// Largest number of iterations of such a search.
 const ITERATIONS: usize = 200;
 
-/// Waypoints that are tried to be left out, at each step.
+/// Waypoints whose removal is tried at each step.
 const TRIES: usize = 3;
 
-/// Of what is left of a route when a waypoint has been left out.
+/// Polish of the rest of a route after a waypoint has been removed.
 const STEPS: Steps = Steps {
     from: 0.05,
     ..COARSE_STEPS
 };
 
-/// Look for a route that keeps every limit by way of routes with more waypoints.
+/// Look for a route that keeps every limit, starting from routes with more waypoints.
 pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     for times in TIMES {
         if let Some(reason) = why_stop(model.scenario, log.stop) {
@@ -51,7 +51,7 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     StopReason::Iterations
 }
 
-/// A route of more waypoints that keeps every limit, if one is found.
+/// A route with more waypoints that keeps every limit, if one is found.
 fn roomy(model: &Model, times: f64, log: &mut Log) -> Option<Vec<Point3>> {
     let mut scenario = model.scenario.clone();
     let settings = &mut scenario.planner;
@@ -78,7 +78,7 @@ fn more(waypoints: usize, times: f64) -> usize {
     many.max(waypoints + MORE)
 }
 
-/// Leave out one waypoint after the other, always that without which the rest is best once it is pulled into place.
+/// Remove one waypoint after another, always the one without which the rest is best once pulled into place.
 fn leave_out(model: &Model, route: &mut Vec<Point3>, log: &mut Log) -> Fitness {
     let mut best = price(model, route);
     while route.len() - 2 > model.scenario.planner.waypoints {

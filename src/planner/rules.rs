@@ -1,10 +1,10 @@
-//! What the planner can be asked for, as the reader of scenarios wants to know it.
+//! The requests that the planner accepts, in the form needed by the reader of scenarios.
 
 use crate::optimizer::{self, Algorithm};
 use crate::scenario::json::{AlgorithmRule, ParameterRule, Rules};
 use crate::scenario::limits::Limits;
 
-/// What a document is held to where `limits` are in force.
+/// The rules for documents where `limits` are in force.
 #[must_use]
 pub fn rules(limits: Limits) -> Rules {
     let rule = |parameter: &optimizer::Parameter| ParameterRule {

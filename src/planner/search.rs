@@ -13,16 +13,16 @@ use crate::optimizer::{self, Algorithm, Fitness, Optimizer, Settings};
 /// Share of the iterations that a guided search spends on coarse routes.
 const COARSE_SHARE: f64 = 0.4;
 
-/// Routes that go on from one stage of a guided search to the next.
+/// Routes carried over from one stage of a guided search to the next.
 const ELITES: usize = 4;
 
-/// A route that goes on costs at most this share more than the best.
+/// A route that is carried over costs at most this share more than the best.
 const PROMISING: f64 = 0.05;
 
-/// Starts that compete in the end, at most.
+/// Maximum number of starts that compete in the end.
 const RIVALS: usize = 8;
 
-/// Of the polish between the stages.
+/// Steps of the polish between the stages.
 pub(super) const COARSE_STEPS: Steps = Steps {
     from: 0.02,
     to: 1e-3,
@@ -30,7 +30,7 @@ pub(super) const COARSE_STEPS: Steps = Steps {
     violation_m: f64::INFINITY,
 };
 
-/// The algorithm alone, from random routes: the paper's.
+/// The algorithm alone, from random routes: as in the paper.
 pub(super) fn plain(model: &Model, log: &mut Log) -> StopReason {
     let mut routes = Routes::plain(model, log.stop);
     let scenario = model.scenario;
@@ -39,7 +39,7 @@ pub(super) fn plain(model: &Model, log: &mut Log) -> StopReason {
     finish(model, reason, &[], &[], log)
 }
 
-/// From `starts`, best first: bats about coarse routes, then about whole ones, then polish.
+/// From `starts`, best first: bats around coarse routes, then around whole ones, then polish.
 pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason {
     let settings = &model.scenario.planner;
     log.evaluations += starts.evaluations;
@@ -74,7 +74,7 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         }
     }
     let mut elites = whole(elites, log);
-    // What spare waypoints cost is not seen in coarse routes: one that was left may be the best of all.
+    // Coarse routes do not show what spare waypoints cost: a start that was dropped may be the best of all.
     let best_starts = whole(best_starts, log);
     if reason == StopReason::Iterations {
         let mut routes = Routes::guided(model, log.stop, &elites);
@@ -145,7 +145,7 @@ fn run(
         let progress = (iteration + 1 - first.max(1)) as f64 / count as f64;
         search.iterate(routes, progress);
         if routes.watch.interrupted {
-            // Half an iteration is none: the result is that of the one before.
+            // Half an iteration does not count: the result is that of the one before.
             let reason = why_stop(model.scenario, log.stop).unwrap_or(StopReason::Cancelled);
             return (search, reason);
         }
@@ -164,7 +164,7 @@ fn search_settings(model: &Model, algorithm: &Algorithm) -> Settings {
     }
 }
 
-/// The best few routes of the swarm that are not all but the same.
+/// The best few routes of the swarm that are not nearly the same.
 fn distinct(model: &Model, routes: &Routes, search: &dyn Optimizer) -> Vec<Vec<Point3>> {
     let swarm = search.swarm();
     let best = swarm.best_fitness();

@@ -24,7 +24,7 @@ const SAGITTA: f64 = 0.02;
 /// The fine polyline that stands for the curve keeps this near to it, metres.
 const DEVIATION: f64 = 5e-4;
 
-/// What the curve may be missed by, less [`DEVIATION`]: 1 mm at threats, 1 cm at heights.
+/// By how much the curve may miss a limit, less [`DEVIATION`]: 1 mm at threats, 1 cm at heights.
 const CURVE_TOLERANCE: Tolerance = Tolerance {
     length_m: 4e-4,
     height_m: 9e-3,
@@ -34,7 +34,7 @@ const CURVE_TOLERANCE: Tolerance = Tolerance {
 /// A chord of a curve may climb this much steeper than the limit, degrees.
 const CHORD_CLIMB_SLACK: f64 = 0.05;
 
-/// More samples than this are not delivered; the spacing grows instead.
+/// Maximum number of samples delivered; beyond it the spacing grows instead.
 const MOST_SAMPLES: f64 = 200_000.0;
 
 /// A sample of the curve.
@@ -68,11 +68,11 @@ pub(super) fn smooth(model: &Model, route: &[Point3]) -> Option<Path> {
             return Some(deliver(model, spline, &samples));
         }
         let shaped_by = |piece: usize| corners[piece..=piece + spline.degree].iter().copied();
-        // Where waypoints all but coincide, so do samples, and the corner may be another's.
+        // Where waypoints nearly coincide, so do samples, and the corner may be another's.
         if !tighten(&mut tightness, cutting.into_iter().flat_map(shaped_by))
             && !tighten(&mut tightness, 0..route.len())
         {
-            // Legs shorter than samples lie apart turn, too.
+            // Legs shorter than the sample spacing turn too.
             let corners = corners_alone(route, spacing);
             let points: Vec<Point3> = corners.iter().map(|sample| sample.point).collect();
             return keeps_limits(model, &points).then(|| deliver(model, spline, &corners));
@@ -96,7 +96,7 @@ fn deliver(model: &Model, spline: BSpline, samples: &[Sample]) -> Path {
     }
 }
 
-/// Draw each of `corners` one step tighter, once; whether any could be.
+/// Draw each of `corners` one step tighter, once; returns whether any could be.
 fn tighten(tightness: &mut [Tightness], corners: impl IntoIterator<Item = usize>) -> bool {
     let before = tightness.to_vec();
     for corner in corners {
@@ -187,7 +187,7 @@ fn corners_alone(route: &[Point3], spacing: f64) -> Vec<Sample> {
     samples
 }
 
-/// Whether a path is held to nothing that `points` break.
+/// Whether `points` break none of the constraints that apply to a path.
 pub(crate) fn keeps_limits(model: &Model, points: &[Point3]) -> bool {
     let mut keeps = true;
     model.assess(points, Quadrature::Integral, model.tolerance, |breach| {
@@ -196,7 +196,7 @@ pub(crate) fn keeps_limits(model: &Model, points: &[Point3]) -> bool {
     keeps
 }
 
-/// Samples nearer than this are one, metres.
+/// Samples nearer than this count as one, metres.
 const SHORTEST_CHORD: f64 = 1e-6;
 
 fn bisect(spline: &BSpline, spacing: f64, start: Sample, end: Sample, samples: &mut Vec<Sample>) {
@@ -221,8 +221,8 @@ fn bisect(spline: &BSpline, spacing: f64, start: Sample, end: Sample, samples: &
     }
 }
 
-/// Whether a path is held to what `breach` breaks: its samples are no waypoints, whose legs have a
-/// least length and whose places an area, and its chords may be a hair steeper than the curve.
+/// Whether `breach` counts for a path: its samples are not waypoints, so least leg length and area do not apply, and
+/// its chords may be slightly steeper than the curve.
 fn binds(breach: &Breach) -> bool {
     match breach.constraint {
         Constraint::Threat | Constraint::Altitude | Constraint::Terrain | Constraint::Turn => true,
@@ -348,7 +348,7 @@ mod tests {
         }
     }
 
-    /// Round within some nanometres, and back: turns that no samples show.
+    /// Round a corner within some nanometres, and back: turns that no samples show.
     #[test]
     fn a_route_that_turns_within_nanometres_has_a_path() {
         let mut scenario = scenario();

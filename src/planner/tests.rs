@@ -6,7 +6,7 @@ use crate::scenario::{AltitudeBand, Frame, PlannerSettings, Seeding, Vehicle, Wa
 use crate::terrain::{Flat, Peak, Peaks, Terrain};
 use crate::threat::{Cylinder, Shape, Threat};
 
-/// Mountains, each by its centre, its height, and how wide and deep it is.
+/// Mountains, each given by its centre, height, width and depth.
 pub(super) fn peaks(base: f64, peaks: &[[f64; 5]]) -> Terrain {
     let peak = |&[x, y, height, wide, deep]: &[f64; 5]| Peak {
         center: Point2::new(x, y),
@@ -17,7 +17,7 @@ pub(super) fn peaks(base: f64, peaks: &[[f64; 5]]) -> Terrain {
     Terrain::Peaks(Peaks { base, peaks })
 }
 
-/// The same among hills, over which a route must keep between 30 and 150 m.
+/// The same among hills, over which a route must stay between 30 and 150 m.
 pub(super) fn hilly_scenario() -> Scenario {
     let mut scenario = scenario();
     let round = |x, y, height, spread| [x, y, height, spread, 0.8 * spread];
@@ -40,7 +40,7 @@ pub(super) fn radar(x: f64, y: f64, radius: f64) -> Threat {
     disc([x, y, radius, radius + 30.0])
 }
 
-/// By its centre, radius and influence.
+/// Given by its centre, radius and influence.
 pub(super) fn disc([x, y, radius, influence]: [f64; 4]) -> Threat {
     Threat {
         name: Some(format!("radar at {x}, {y}")),
@@ -54,7 +54,7 @@ pub(super) fn disc([x, y, radius, influence]: [f64; 4]) -> Threat {
     }
 }
 
-/// Start, free waypoints, target of the three radars; those between are given.
+/// Start, free waypoints, target of the scenario with three radars; the free ones are given.
 pub(super) fn route(free: &[[f64; 3]]) -> Vec<Point3> {
     let scenario = scenario();
     let free = free.iter().map(|&point| Point3::from(point));
@@ -122,7 +122,7 @@ impl Observer for Diary {
     }
 }
 
-/// A clock that only moves when looked at, and a stop after so many looks.
+/// A clock that only moves when looked at, and a stop after a number of looks.
 struct Looks {
     count: std::cell::Cell<u32>,
     stop_after: u32,
@@ -189,7 +189,7 @@ fn the_same_seed_gives_the_same_bits_and_another_does_not() {
     assert_ne!(run(1).waypoints, run(2).waypoints);
 }
 
-/// A radar pops up beside the route: from the known one, a tenth of the work does as well.
+/// A radar pops up beside the route: starting from the known route, a tenth of the work does as well.
 #[test]
 fn a_warm_start_needs_a_tenth_of_the_evaluations() {
     let mut scenario = scenario();
@@ -272,7 +272,8 @@ fn a_stop_within_an_iteration_is_heard() {
     );
 }
 
-/// Over one disc and round another: waypoints are high over the first alone. With all of them there, the route costs 901.
+/// Over one disc and round another: waypoints are high over the first alone. With all of them there, the route costs
+/// 901.
 #[test]
 fn a_threat_is_flown_over_by_no_more_waypoints_than_it_takes() {
     let mut scenario = scenario();
@@ -292,8 +293,8 @@ fn a_threat_is_flown_over_by_no_more_waypoints_than_it_takes() {
     assert!(outcome.cost.total < 812.0, "{}", outcome.cost.total);
 }
 
-/// Where spare waypoints are dear, coarse routes that stay low look cheap: what a search began with may be better than all
-/// that its bats come to, and is not lost.
+/// Where spare waypoints are expensive, coarse routes that stay low look cheap: the start of a search may be better
+/// than anything its bats find, and must not be lost.
 #[test]
 fn a_longer_run_is_no_dearer_than_its_starts() {
     let mut scenario = scenario();
@@ -325,7 +326,7 @@ fn a_longer_run_is_no_dearer_than_its_starts() {
     assert!(longer < 1.001 * starts, "{longer} {starts}");
 }
 
-/// Where waypoints cost nothing but the way up and down hills, moving them one by one leaves some of it.
+/// Where waypoints cost only the way up and down hills, moving them one by one leaves some of that cost.
 #[test]
 fn many_waypoints_over_hills_are_moved_together() {
     let mut scenario = scenario();

@@ -1,4 +1,4 @@
-//! Counts the routes that a search prices, and looks at the clock between them now and then.
+//! Counts the routes that a search prices, and checks the clock between them occasionally.
 
 use super::{Stop, why_stop};
 use crate::cost::batch::LANES;
@@ -6,18 +6,18 @@ use crate::scenario::Scenario;
 use crate::terrain::Terrain;
 use crate::threat::Shape;
 
-/// So many steps, each some nanoseconds, may pass between two looks at the clock.
+/// Number of steps, each of some nanoseconds, between two checks of the clock.
 const STEPS_UNWATCHED: usize = 1_000_000;
 
 /// What a search has priced, and whether it may go on.
 pub(super) struct Watch<'s> {
     scenario: &'s Scenario,
     stop: &'s dyn Stop,
-    /// Evaluations between two looks at the clock; a block of them at least, which are priced side by side.
+    /// Evaluations between two checks of the clock; at least one block of them, which are priced side by side.
     pub(super) stride: u64,
     /// Routes priced so far.
     pub(super) evaluations: u64,
-    /// Whether the run was stopped within an iteration: what was left of it is
+    /// Whether the run was stopped within an iteration: the rest of it is
     /// [`Fitness::WORST`](crate::optimizer::Fitness::WORST).
     pub(super) interrupted: bool,
 }
@@ -33,11 +33,11 @@ impl<'s> Watch<'s> {
         }
     }
 
-    /// Whether the next `count` routes may be priced, which are counted if so.
+    /// Whether the next `count` routes may be priced; if so they are counted.
     pub(super) fn may_price(&mut self, count: usize) -> bool {
         let count = count as u64;
         let since = self.evaluations % self.stride;
-        // There is always one route to deliver.
+        // There must always be one route to deliver.
         let due = self.evaluations > 0 && (since == 0 || since + count > self.stride);
         if due && !self.interrupted {
             self.interrupted = why_stop(self.scenario, self.stop).is_some();
@@ -49,7 +49,7 @@ impl<'s> Watch<'s> {
     }
 }
 
-/// About how many steps the pricing of one route takes, if no threat is too far away to be asked.
+/// The approximate number of steps for pricing one route, if no threat is too far away to matter.
 fn steps(scenario: &Scenario) -> usize {
     let vertices = |shape: &Shape| match shape {
         Shape::Cylinder(_) => 1,

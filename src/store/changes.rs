@@ -1,4 +1,4 @@
-//! Who wants to know of which plan's changes.
+//! Notifies those who follow a plan of its changes.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
@@ -7,14 +7,14 @@ use tokio::sync::watch;
 
 use crate::job::PlanId;
 
-/// A watch for each plan that somebody follows.
+/// A watch channel for each plan that somebody follows.
 #[derive(Default)]
 pub(super) struct Changes(Mutex<Watches>);
 
 #[derive(Default)]
 struct Watches {
     ticks: HashMap<PlanId, watch::Sender<u64>>,
-    /// Sweep when there are more than so many.
+    /// Sweep when there are more watches than this.
     sweep_at: usize,
 }
 

@@ -1,4 +1,4 @@
-//! What time it is, for all that is stamped and all that expires.
+//! The time, for timestamps and expiry.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -17,15 +17,15 @@ pub fn wall_clock() -> Clock {
     })
 }
 
-/// A clock that is ahead of the time that has passed, or behind it, by more than this has jumped.
+/// A clock that is ahead of or behind the elapsed time by more than this has jumped.
 const TOLERANCE_MS: i64 = 60_000;
 
-/// A clock that has jumped is believed once it has gone on steadily for so long.
+/// A clock that has jumped is trusted again once it has run steadily for this long.
 const PROBATION: Duration = Duration::from_secs(60 * 60);
 
-/// A clock that does not follow another when that one jumps, but goes on from where it was until the other
-/// is back, or has been steady for an hour. So nothing is stamped with a wrong time for long, and nothing
-/// expires before so much time has passed as it was given.
+/// A clock that does not follow another when that one jumps, but continues from where it was until the other is back,
+/// or has been steady for an hour. So nothing is stamped with a wrong time for long, and nothing expires before its
+/// allotted time has passed.
 pub struct SteadyClock {
     followed: Clock,
     passed: Box<dyn Fn() -> Duration + Send + Sync>,
@@ -40,7 +40,7 @@ impl SteadyClock {
         Self::beside(clock, move || since_boot().saturating_sub(began))
     }
 
-    /// The same, where `passed` tells the time that has passed since now.
+    /// The same, where `passed` returns the time elapsed since now.
     #[must_use]
     pub fn beside(
         clock: Clock,
@@ -60,29 +60,29 @@ impl SteadyClock {
         shown_ms.saturating_sub(jump_ms.unwrap_or(0))
     }
 
-    /// By how much the clock that is followed has jumped, milliseconds, while it is not believed.
+    /// How far the followed clock has jumped, milliseconds, while it is not trusted.
     #[must_use]
     pub fn jump_ms(&self) -> Option<i64> {
         self.look().1
     }
 
-    /// For whom it is one clock like any other.
+    /// For code that takes any clock.
     #[must_use]
     pub fn clock(self: &Arc<Self>) -> Clock {
         let clock = Arc::clone(self);
         Arc::new(move || clock.now_ms())
     }
 
-    /// What the clock that is followed shows, and how far that is off.
+    /// What the followed clock shows, and how far off it is.
     fn look(&self) -> (i64, Option<i64>) {
-        // Every look is whole, so one that panics leaves nothing behind that is wrong.
+        // The state is consistent after every look, so a panic leaves nothing wrong behind.
         let mut judge = self.judge.lock().unwrap_or_else(PoisonError::into_inner);
         let shown_ms = (self.followed)();
         (shown_ms, judge.jump_ms(shown_ms, (self.passed)()))
     }
 }
 
-/// A machine that sleeps has not jumped: where the system counts that time, it has passed.
+/// A machine that sleeps has not jumped: where the system counts that time, it counts as elapsed.
 fn since_boot() -> Duration {
     #[cfg(target_os = "linux")]
     const PASSING: ClockId = ClockId::Boottime;
@@ -91,9 +91,9 @@ fn since_boot() -> Duration {
     Duration::try_from(clock_gettime(PASSING)).unwrap_or_default()
 }
 
-/// Compares the wall clock with the time that has passed.
+/// Compares the wall clock with elapsed time.
 struct Judge {
-    /// What the wall clock showed when no time had passed, as far as it is believed.
+    /// What the wall clock showed at elapsed time 0, as far as it is trusted.
     origin_ms: i64,
     /// Another origin that the clock has kept to, and since when.
     doubtful: Option<(i64, Duration)>,
@@ -107,8 +107,7 @@ impl Judge {
         }
     }
 
-    /// How far the clock is from where it should be when so much time has passed, while it is not
-    /// believed.
+    /// How far the clock is from where it should be at this elapsed time, while it is not trusted.
     fn jump_ms(&mut self, now_ms: i64, passed: Duration) -> Option<i64> {
         let passed_ms = i64::try_from(passed.as_millis()).unwrap_or(i64::MAX);
         let origin_ms = now_ms.saturating_sub(passed_ms);
@@ -153,7 +152,7 @@ mod tests {
 
     const YEAR_MS: i64 = 365 * 24 * 60 * 60 * 1_000;
 
-    /// What the judge says `minutes` after the start to a clock that is ahead.
+    /// The judge's verdict `minutes` after the start on a clock that is ahead.
     fn judged(judge: &mut Judge, minutes: u64, ahead_ms: i64) -> Option<i64> {
         let passed = Duration::from_secs(60 * minutes);
         judge.jump_ms(

@@ -16,7 +16,7 @@ pub enum Ending {
         stop_reason: String,
         /// Whether the route meets every constraint.
         feasible: bool,
-        /// Of the route when feasible.
+        /// Cost of the route, when feasible.
         best_cost: Option<f64>,
         /// Routes priced.
         evaluations: u64,
@@ -25,19 +25,19 @@ pub enum Ending {
         /// The result document.
         document: String,
     },
-    /// Without one.
+    /// Without a result.
     Failed(Failure),
 }
 
 impl Ending {
-    /// At that time, with nothing told since the last [`Store::append`](super::Store::append).
+    /// At this time, with no events since the last [`Store::append`](super::Store::append).
     #[must_use]
     pub fn at(self, at_ms: i64) -> Arc<End> {
         self.after(Vec::new(), at_ms)
     }
 
-    /// At that time, `told` since the last [`Store::append`](super::Store::append). Shared, for a store that
-    /// fails is asked again.
+    /// At this time, with `told` the events since the last [`Store::append`](super::Store::append). Shared, because a
+    /// failed store call is retried.
     #[must_use]
     pub fn after(self, told: Vec<Event>, at_ms: i64) -> Arc<End> {
         let ending = self;
@@ -52,7 +52,7 @@ impl Ending {
 /// The end of a run.
 #[derive(Debug)]
 pub struct End {
-    /// What the run told since the last [`Store::append`](super::Store::append).
+    /// Events of the run since the last [`Store::append`](super::Store::append).
     pub told: Vec<Event>,
     /// How it ended.
     pub ending: Ending,
@@ -61,7 +61,7 @@ pub struct End {
 }
 
 impl End {
-    /// Change the record as this end does; the result document is left to the store.
+    /// Apply this end to the record; the result document is left to the store.
     ///
     /// # Errors
     /// [`Refused`] when the plan is not running.

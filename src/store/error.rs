@@ -1,10 +1,10 @@
-//! Why a store does not do what it is asked.
+//! Errors of a store.
 
 use super::Tombstone;
 use crate::job::PlanId;
 use crate::job::state::Refused;
 
-/// Why a store did not do what it was asked.
+/// Why a store did not do what was asked.
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum StoreError {
     /// There never was such a plan, or its tombstone has expired.
@@ -13,24 +13,24 @@ pub enum StoreError {
     /// It was removed, less than a day ago.
     #[error("plan {} is gone", .0.id)]
     Gone(Tombstone),
-    /// As many plans are queued as the store was opened for.
+    /// The queue holds as many plans as the store was opened for.
     #[error("the queue holds {queued} plans, its limit")]
     QueueFull {
-        /// How many.
+        /// Number of queued plans.
         queued: u64,
     },
     /// The owner has as many active plans as the submission allows.
     #[error("the owner has {active} active plans, its quota is {quota}")]
     QuotaReached {
-        /// How many.
+        /// Number of active plans.
         active: u64,
-        /// How many there may be.
+        /// Maximum number of active plans.
         quota: u64,
     },
-    /// The idempotency key came with another body before.
+    /// The idempotency key was used before with another body.
     #[error("the idempotency key was used with another body")]
     KeyReused,
-    /// Another request with the idempotency key is being accepted, or broke off a moment ago.
+    /// Another request with the idempotency key is being accepted, or was interrupted a moment ago.
     #[error("another request with the idempotency key has not been answered")]
     KeyInFlight,
     /// The plan ended, was deleted or was claimed by another worker.
@@ -50,7 +50,7 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    /// For no reason that has a name.
+    /// Unavailable for a reason that has no [`Trouble`] of its own.
     pub fn unavailable(detail: impl Into<String>) -> Self {
         Self::Unavailable {
             trouble: Trouble::Other,
@@ -72,7 +72,7 @@ pub enum Trouble {
     Full,
     /// The directory or its files cannot be written or made.
     ReadOnly,
-    /// What is in the file is not what was written.
+    /// The file's content is not what was written.
     Damaged,
     /// The file was written by a newer version of the program.
     Newer,

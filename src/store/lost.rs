@@ -1,14 +1,14 @@
-//! What becomes of a plan whose run was cut off, by the end of its process or of the machine: the one rule, for
-//! all stores. A run that was given back was not cut off.
+//! What becomes of a plan whose run was cut off because its process or machine died: one rule for all stores. A run
+//! that was given back was not cut off.
 
 use crate::job::state::Refused;
 use crate::job::{FailureKind, Plan};
 
-/// Runs of a plan that are cut off, after which it is taken to be the reason.
+/// After this many cut-off runs, the plan itself is taken to be the cause.
 const LOST_RUNS: u64 = 5;
 
-/// End a running plan that is not to run again after its `lost`th run was cut off, counted from 1: it is cancelled
-/// where that was asked for, or has failed. True when so; else the caller queues it.
+/// End a running plan that must not run again after its `lost`th run was cut off, counted from 1: it is cancelled if
+/// that was requested, otherwise it has failed. Returns true if ended; if not, the caller queues it.
 ///
 /// # Errors
 /// [`Refused`] when the plan is not running.

@@ -37,7 +37,7 @@ impl MeasuredStore {
         self.counted(operation, done)
     }
 
-    /// What a caller got wrong is no failure of the store.
+    /// A caller's mistake is not a failure of the store.
     fn counted<T>(
         &self,
         operation: &'static str,

@@ -33,19 +33,19 @@ use crate::job::{Event, Idempotency, NumberedEvent, Owner, Plan, PlanId, Status,
 #[async_trait]
 pub trait Store: Send + Sync + 'static {
     /// Put a plan at the end of the queue; its first event is its `queued` status. A submission
-    /// whose idempotency key has been seen within [`IDEMPOTENCY_MS`] changes nothing and gets the
-    /// plan of the first one, however full the queue is.
+    /// whose idempotency key has been seen within [`IDEMPOTENCY_MS`] changes nothing and returns the plan of the first
+    /// one, however full the queue is.
     ///
     /// # Errors
-    /// [`StoreError::QueueFull`] when as many plans are queued as the store was opened for,
+    /// [`StoreError::QueueFull`] when the queue holds as many plans as the store was opened for,
     /// [`StoreError::QuotaReached`] when its owner has as many active plans as the submission allows,
     /// [`StoreError::KeyReused`] when its idempotency key came with another body,
     /// [`StoreError::KeyInFlight`] when a request with the key has not been answered,
-    /// [`StoreError::Gone`] when the plan of the first one was deleted.
+    /// [`StoreError::Gone`] when the plan of the first submission was deleted.
     async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError>;
 
-    /// What [`Store::submit`] would answer to a repetition, for one that can be read no more because what it
-    /// names has gone since; `None` when the key has not been seen within [`IDEMPOTENCY_MS`].
+    /// What [`Store::submit`] would answer to a repeated request that can no longer be read because what it refers to
+    /// has gone; `None` when the key has not been seen within [`IDEMPOTENCY_MS`].
     ///
     /// # Errors
     /// [`StoreError::KeyReused`], [`StoreError::Gone`].
@@ -55,19 +55,19 @@ pub trait Store: Send + Sync + 'static {
         idempotency: &Idempotency,
     ) -> Result<Option<Plan>, StoreError>;
 
-    /// Wait for the plan at the head of the queue and take it: queued -> running, at the time that
-    /// the store's clock shows then. A plan whose run was cut off by the end of its process, and not given back, is
-    /// handed out again; after the fifth time it fails, `worker-lost`. One whose document the store has lost fails,
-    /// `scenario-lost`, and the next is taken. Dropping the future before it is done takes nothing; what was on its way
-    /// goes back, and meanwhile others are given what stands behind it.
+    /// Wait for the plan at the head of the queue and take it: queued -> running, at the time that the store's clock
+    /// shows then. A plan whose run was cut off by the end of its process, and not given back, is handed out again;
+    /// after the fifth time it fails, `worker-lost`. One whose document the store has lost fails, `scenario-lost`, and
+    /// the next is taken. Dropping the future before it completes takes nothing: a plan already on its way returns to
+    /// its place; until then other claimers get the plans behind it.
     ///
     /// # Errors
     /// [`StoreError::Unavailable`] when the store fails or is closed meanwhile.
     async fn claim(&self) -> Result<Lease, StoreError>;
 
-    /// As [`Store::claim`], but the lease may come before the claim is durable, or seen by anybody: a run
-    /// may begin while the disk is being waited for, since one that is forgotten is only run again. If
-    /// the claim fails after all, the lease is lost: whatever is written under it, is refused.
+    /// As [`Store::claim`], but the lease may come before the claim is durable or visible: a run may begin during the
+    /// wait for the disk, since a forgotten run is only repeated. If the claim fails after all, the lease is lost:
+    /// whatever is written under it is refused.
     ///
     /// # Errors
     /// As [`Store::claim`].
@@ -75,35 +75,35 @@ pub trait Store: Send + Sync + 'static {
         self.claim().await
     }
 
-    /// Add what a run tells; convergence points also move the record's progress.
+    /// Add events of a run; convergence points also update the record's progress.
     ///
     /// # Errors
     /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.
     async fn append(&self, lease: &Lease, events: Vec<Event>) -> Result<(), StoreError>;
 
-    /// End a run: what it told last, state, result, last status and `end` event in one step.
+    /// End a run: its last events, state, result, last status and `end` event in one step.
     ///
     /// # Errors
     /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.
     async fn finish(&self, lease: &Lease, end: Arc<End>) -> Result<Plan, StoreError>;
 
-    /// Give a plan back, to its old place in the queue, which is the head: running -> queued. Its
-    /// next run begins again from its seed. When its end has been asked for, it is cancelled
-    /// instead, without a result. Returns it as it now stands.
+    /// Give a plan back to its old place in the queue, which is the head: running -> queued. Its next run begins again
+    /// from its seed. When its end has been requested, it is cancelled instead, without a result. Returns its new
+    /// record.
     ///
     /// # Errors
     /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.
     async fn release(&self, lease: &Lease) -> Result<Plan, StoreError>;
 
-    /// Ask for the end of a plan. A queued one ends at once, without a result; a running one's lease
-    /// is told; at the end of its life nothing changes.
+    /// Request the end of a plan. A queued one ends at once, without a result; a running one's lease is notified;
+    /// nothing changes for one that has ended.
     ///
     /// # Errors
     /// [`StoreError::NotFound`], [`StoreError::Gone`].
     async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError>;
 
-    /// Remove a plan and all that belongs to it; a running one's lease is told, and lost. A tombstone
-    /// remains for [`TOMBSTONE_MS`]; while it does, removing the plan again is no error.
+    /// Remove a plan and all that belongs to it; a running one's lease is notified, and lost. A tombstone remains for
+    /// [`TOMBSTONE_MS`]; until it expires, removing the plan again is no error.
     ///
     /// # Errors
     /// [`StoreError::NotFound`] when there is neither such a plan nor its tombstone.
@@ -144,8 +144,8 @@ pub trait Store: Send + Sync + 'static {
     /// As [`Store::get`].
     async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<EventPage, StoreError>;
 
-    /// Whether the plan has an event of this number by now, on whichever node: another one may have told events
-    /// that are not known here yet.
+    /// Whether the plan has an event of this number by now, on any node: another node may have stored events that are
+    /// not known here yet.
     ///
     /// # Errors
     /// As [`Store::get`].
@@ -155,21 +155,21 @@ pub trait Store: Send + Sync + 'static {
     /// Subscribe before reading, and no change is missed.
     fn changes(&self, id: PlanId) -> watch::Receiver<u64>;
 
-    /// Remove ended plans that are past their time or beyond the limits of [`Retention`], the longest
-    /// ended first, at most [`SWEEP`] of them; returns how many. Their tombstones say so for
-    /// [`TOMBSTONE_MS`]. What has expired of tombstones and idempotency keys goes too.
+    /// Remove ended plans that are past their time or beyond the limits of [`Retention`], those that ended longest ago
+    /// first, at most [`SWEEP`] of them; returns how many. Their tombstones mark them as expired for [`TOMBSTONE_MS`].
+    /// Expired tombstones and idempotency keys are removed too.
     async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError>;
 
-    /// Webhooks of ended plans that are due, the longest due first, at most `limit`. A submission's
-    /// webhook is due as soon as its plan has ended: it is kept in the same step as the submission
-    /// and made due in the same step as the end. It goes with its plan.
+    /// Webhooks of ended plans that are due, the longest due first, at most `limit`. A submission's webhook is due as
+    /// soon as its plan has ended: it is stored in the same step as the submission and made due in the same step as the
+    /// end. It is removed with its plan.
     async fn due_webhooks(&self, now_ms: i64, limit: usize) -> Result<Vec<Webhook>, StoreError>;
 
-    /// A plan's webhook has been tried; it is due again at `next_ms`, or done with. One that is no
-    /// longer there is no error.
+    /// A plan's webhook has been tried; it is due again at `next_ms`, or done with. It is no error if it no longer
+    /// exists.
     async fn webhook_tried(&self, id: PlanId, next_ms: Option<i64>) -> Result<(), StoreError>;
 
-    /// The datasets that plans are planned over, whoever's the plans are, in the order of their sums.
+    /// The datasets that plans of any owner use, in the order of their sums.
     async fn datasets_in_use(&self) -> Result<Vec<DatasetUse>, StoreError>;
 
     /// Counts for the queue's head-room and `Retry-After`.
@@ -178,8 +178,8 @@ pub trait Store: Send + Sync + 'static {
     /// Whether the store can take a write now: it makes a small one durable.
     async fn health(&self) -> Result<(), StoreError>;
 
-    /// Finish what is being written, give back what is still run here, and let go of files. Waiting claims and later
-    /// calls fail.
+    /// Finish pending writes, give back what is still being run here, and release files. Waiting claims and later calls
+    /// fail.
     async fn close(&self);
 }
 
@@ -189,15 +189,15 @@ pub const TOMBSTONE_MS: i64 = 24 * 60 * 60 * 1_000;
 /// How long an idempotency key is remembered, milliseconds.
 pub const IDEMPOTENCY_MS: i64 = 24 * 60 * 60 * 1_000;
 
-/// Plans that one [`Store::sweep`] removes at most, so that nobody waits long behind it.
+/// Maximum number of plans removed by one [`Store::sweep`], so that nobody waits long behind it.
 pub const SWEEP: usize = 256;
 
 /// The answer to a submission.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Submitted {
-    /// As it now stands.
+    /// The plan's present record.
     pub plan: Plan,
-    /// Whether an earlier submission with the same idempotency key had made it.
+    /// Whether it was made by an earlier submission with the same idempotency key.
     pub replayed: bool,
 }
 
@@ -206,29 +206,29 @@ pub struct Submitted {
 pub struct EventPage {
     /// Events up to this id are no longer kept; 0 when all are.
     pub forgotten: u64,
-    /// In order.
+    /// The events, in order.
     pub events: Vec<NumberedEvent>,
 }
 
-/// The end of a plan, to be told.
+/// A notification of a plan's end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Webhook {
-    /// As it ended.
+    /// The plan as it ended.
     pub plan: Plan,
-    /// Where to.
+    /// Where to send it.
     pub url: String,
-    /// How often that has been tried.
+    /// How often sending has been tried.
     pub tries: u32,
 }
 
-/// How many plans are planned over a dataset.
+/// How many plans use a dataset.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DatasetUse {
     /// As in [`Submission::dataset`].
     pub sha256: String,
     /// Plans that are queued or running.
     pub active: u64,
-    /// All that are kept.
+    /// All plans in the store.
     pub plans: u64,
 }
 
@@ -237,9 +237,9 @@ pub struct DatasetUse {
 pub struct Tombstone {
     /// Which plan it was.
     pub id: PlanId,
-    /// Whose.
+    /// Its owner.
     pub owner: Option<Owner>,
-    /// Whether its time had come; otherwise somebody deleted it.
+    /// Whether it had expired; otherwise somebody deleted it.
     pub expired: bool,
 }
 
@@ -250,22 +250,22 @@ pub struct Lease {
     pub plan: Plan,
     /// The accepted scenario document.
     pub scenario: Arc<str>,
-    /// Fences off earlier runs of the same plan.
+    /// Distinguishes this run from earlier runs of the same plan.
     pub attempt: u64,
-    /// Becomes true when somebody asks for the end of the plan or deletes it.
+    /// Becomes true when somebody requests the end of the plan or deletes it.
     pub cancel: watch::Receiver<bool>,
 }
 
 /// What [`Store::list`] returns.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ListQuery {
-    /// Only these, or all.
+    /// Only plans with this status, or all.
     pub status: Option<Status>,
     /// Only this owner's, or everybody's.
     pub owner: Option<Owner>,
     /// Only plans older than this one.
     pub before: Option<PlanId>,
-    /// At most so many.
+    /// Maximum number returned.
     pub limit: usize,
 }
 

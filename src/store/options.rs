@@ -5,22 +5,22 @@ use std::sync::Arc;
 use super::clock::{Clock, wall_clock};
 use crate::job::Plan;
 
-/// Told of a plan, as it now stands.
+/// Called with a plan in its present state.
 pub type Tell = Arc<dyn Fn(&Plan) + Send + Sync>;
 
 /// What a store is opened with.
 #[derive(Clone)]
 pub struct Options {
-    /// As many plans may wait; see [`StoreError::QueueFull`](super::StoreError::QueueFull).
+    /// How many plans may wait; see [`StoreError::QueueFull`](super::StoreError::QueueFull).
     pub queue_limit: u64,
-    /// Of claims, tombstones and recovery.
+    /// The clock for claims, tombstones and recovery.
     pub clock: Clock,
     /// How long plans are kept.
     pub retention: Retention,
-    /// Events kept of each plan; of a longer history the oldest are forgotten.
+    /// Events kept of each plan; of a longer history the oldest are deleted.
     pub events_kept: u64,
-    /// Told of each plan that the store itself ends because its workers, or its document, were lost, once that is
-    /// durable: there is no run that could tell of it.
+    /// Called with each plan that the store itself ends because its workers, or its document, were lost, once that is
+    /// durable: there is no run that could report it.
     pub lost: Tell,
 }
 
@@ -38,11 +38,11 @@ impl Options {
     }
 }
 
-/// How long ended plans are kept: until the first of these limits; `None` is no limit.
+/// How long ended plans are kept: until the first of these limits is reached; `None` is no limit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Retention {
-    /// From the end of a plan, milliseconds. It becomes the plan's `expires_ms` when it ends, and
-    /// that stands whatever is set later.
+    /// Counted from the end of a plan, milliseconds. Sets the plan's `expires_ms` when it ends; later changes of this
+    /// setting do not alter it.
     pub age_ms: Option<i64>,
     /// Ended plans kept.
     pub plans: Option<u64>,
@@ -51,7 +51,7 @@ pub struct Retention {
 }
 
 impl Retention {
-    /// What becomes the `expires_ms` of a plan that has just ended.
+    /// The `expires_ms` of a plan that has just ended.
     pub(super) fn expires_ms(self, plan: &Plan) -> Option<i64> {
         let (finished_ms, age_ms) = plan.finished_ms.zip(self.age_ms)?;
         Some(finished_ms.saturating_add(age_ms))

@@ -1,7 +1,7 @@
 //! A store that is opened as soon as it can be, and again when it turns out to be damaged.
 //!
-//! A service whose store cannot be opened does not end: whatever starts it again would only do so
-//! for ever. It answers, says that it is not ready and why, and takes plans when the cause is gone.
+//! A service whose store cannot be opened does not exit: whatever restarts it would only do so for ever. It answers,
+//! says that it is not ready and why, and accepts plans once the cause is gone.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,10 +20,10 @@ use crate::job::{Event, Idempotency, Owner, Plan, PlanId, Submission};
 /// Opens the store; `true` asks it to look for damage first. May block.
 pub type Open = Arc<dyn Fn(bool) -> Result<Arc<dyn Store>, StoreError> + Send + Sync>;
 
-/// Between two tries to open it.
+/// Pause between attempts to open it.
 const PAUSE: Duration = Duration::from_secs(1);
 
-/// How it stands: open, or why not.
+/// Its state: open, or why not.
 type State = Result<Arc<dyn Store>, StoreError>;
 
 /// See the module's documentation.
@@ -58,7 +58,7 @@ impl Reopening {
         self.state.borrow().clone()
     }
 
-    /// The store, as soon as it is open.
+    /// Wait until the store is open.
     async fn opened(&self) -> State {
         let mut state = self.state.clone();
         let opened = state.wait_for(Result::is_ok).await;
@@ -67,7 +67,7 @@ impl Reopening {
             .clone()
     }
 
-    /// Pass an answer on, and have the store opened anew when it says that it is damaged.
+    /// Pass an answer on, and have the store reopened when the answer says that it is damaged.
     fn heed<T>(
         &self,
         store: &Arc<dyn Store>,
@@ -114,7 +114,7 @@ async fn keep_open(
                 return;
             }
             let reported = reports.borrow_and_update().clone();
-            // A late word about a store that has been replaced since says nothing.
+            // A late report about a store that has since been replaced is ignored.
             if reported.is_none_or(|reported| !Arc::ptr_eq(&reported, &store)) {
                 continue;
             }
@@ -151,7 +151,7 @@ impl Store for Reopening {
         self.heed(&store, store.repeated(owner, idempotency).await)
     }
 
-    /// Waits for the store to be open, too.
+    /// Also waits for the store to be open.
     async fn claim(&self) -> Result<Lease, StoreError> {
         let store = self.opened().await?;
         self.heed(&store, store.claim().await)
@@ -222,7 +222,7 @@ impl Store for Reopening {
         self.heed(&store, store.has_told(id, event).await)
     }
 
-    /// While it is not open, the sender is gone: whoever waits reads again, and learns why.
+    /// While it is not open, the sender is gone: a waiting reader reads again, and learns why.
     fn changes(&self, id: PlanId) -> watch::Receiver<u64> {
         self.store()
             .map_or_else(|_| watch::channel(0).1, |store| store.changes(id))

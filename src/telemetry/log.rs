@@ -14,12 +14,12 @@ use tracing_subscriber::{Layer as _, fmt};
 use super::otlp::Exporter;
 use crate::config::{Config, LogFormat};
 
-/// Whatever is written to until the end of the program.
+/// What must be closed at the end of the program.
 #[must_use = "what is left is sent when it is closed"]
 pub struct Log(Option<Exporter>);
 
 impl Log {
-    /// Let go of what has been taken in.
+    /// Send what is left, and close.
     pub fn close(self) {
         if let Some(exporter) = self.0 {
             exporter.close();
@@ -27,7 +27,7 @@ impl Log {
     }
 }
 
-/// Start to write log lines, and to export traces if there is a collector. Panics are among the lines.
+/// Start writing log lines, and exporting traces if there is a collector. Panics are logged too.
 ///
 /// # Panics
 /// When called twice.
@@ -60,7 +60,7 @@ pub fn init(config: &Config) -> Log {
     Log(exporter)
 }
 
-/// The program's own spans and their usual lines, whatever is written to the log.
+/// The program's own spans and their usual lines, whatever the log filter says.
 fn is_exported(metadata: &Metadata) -> bool {
     metadata.target().starts_with(env!("CARGO_PKG_NAME")) && *metadata.level() <= Level::INFO
 }

@@ -13,7 +13,7 @@ pub use origins::{Origin, Origins};
 /// What the parts of the service report to.
 #[derive(Debug, Default)]
 pub struct Instruments {
-    /// Counts and times.
+    /// Counters and times.
     pub metrics: Metrics,
     /// Which request each plan came from.
     pub origins: Origins,

@@ -1,4 +1,4 @@
-//! Which request a plan came from, so that the lines of its run can name it.
+//! Which request a plan came from, so that log lines of its run can name it.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -7,20 +7,21 @@ use uuid::Uuid;
 
 use super::traceparent::TraceParent;
 
-/// Plans that are remembered; of more, the oldest are forgotten.
+/// Number of plans remembered; beyond it, the oldest are forgotten.
 const REMEMBERED: usize = 10_000;
 
 /// The request that a plan came from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Origin {
-    /// In its answer's `x-request-id`.
+    /// Value of `x-request-id` in its answer.
     pub request_id: String,
     /// The trace that it belongs to.
     pub traceparent: Option<TraceParent>,
 }
 
-/// Of the plans that this process accepted, until they end here. Those that end elsewhere, as all do that another node
-/// runs, are forgotten when they are among the oldest. It is lost at a restart: plans that were accepted earlier have none.
+/// Origins of the plans that this process accepted, until they end here. Plans that end elsewhere, such as those run by
+/// another node, are forgotten once they are among the oldest. The table is lost at a restart: plans accepted earlier
+/// have no origin.
 #[derive(Debug, Default)]
 pub struct Origins(Mutex<BTreeMap<Uuid, Origin>>);
 
@@ -42,7 +43,7 @@ impl Origins {
         known.get(&plan).cloned()
     }
 
-    /// It has ended, or is gone.
+    /// The plan has ended, or is gone.
     pub fn forget(&self, plan: Uuid) {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         known.remove(&plan);

@@ -1,6 +1,6 @@
-//! Traces for a collector: OTLP as JSON over HTTP, sent in batches from a thread of its own.
+//! Trace export: OTLP as JSON over HTTP, sent in batches from a thread of its own.
 //!
-//! When the collector does not keep up, spans are dropped; no request waits for it.
+//! When the collector cannot keep up, spans are dropped; no request waits for it.
 
 use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -16,17 +16,17 @@ use opentelemetry_sdk::trace::{SdkTracer, SdkTracerProvider};
 
 use crate::config::{Endpoint, Headers};
 
-/// For the connection, and for each read and write.
+/// Timeout for the connection, and for each read and write.
 const TIMEOUT: Duration = Duration::from_secs(5);
 
-/// For what is left at the end.
+/// Time for sending the remaining spans at the end.
 const LAST_SPANS: Duration = Duration::from_secs(1);
 
 /// Sends spans until it is closed.
 pub(super) struct Exporter(SdkTracerProvider);
 
 impl Exporter {
-    /// To the collector at `endpoint`, with `headers`.
+    /// An exporter to the collector at `endpoint`, with `headers`.
     pub(super) fn to(endpoint: &Endpoint, headers: Headers) -> Self {
         let exporter = SpanExporter::builder()
             .with_http()
@@ -40,7 +40,7 @@ impl Exporter {
             .build()
             .expect("the endpoint is a URL, and nothing else can be wrong");
         let resource = Resource::builder();
-        // What the variables of OpenTelemetry say is already in there.
+        // The resource already contains what OpenTelemetry's own variables say.
         let resource = if is_named_by_environment() {
             resource
         } else {
@@ -54,14 +54,14 @@ impl Exporter {
         )
     }
 
-    /// What makes spans that are sent.
+    /// Creates spans that are exported.
     pub(super) fn tracer(&self) -> SdkTracer {
         self.0.tracer(env!("CARGO_PKG_NAME"))
     }
 
-    /// Send what is left, if that does not take long.
+    /// Send the remaining spans, if that does not take long.
     pub(super) fn close(self) {
-        // What failed has been logged.
+        // Failures have been logged.
         let _ = self.0.shutdown_with_timeout(LAST_SPANS);
     }
 }
@@ -73,10 +73,10 @@ fn is_named_by_environment() -> bool {
     says("OTEL_SERVICE_NAME", "") || says("OTEL_RESOURCE_ATTRIBUTES", "service.name=")
 }
 
-/// Blocks, for it has a thread to itself.
+/// Blocks, which is fine on a thread of its own.
 #[derive(Debug)]
 struct Client {
-    /// Those of the same name count before what the library sends.
+    /// These override headers of the same name from the library.
     headers: Headers,
     /// Whether the last batch was refused or lost.
     failing: AtomicBool,
@@ -97,7 +97,7 @@ impl HttpClient for Client {
 }
 
 impl Client {
-    /// One line when sending begins to fail, and one when it works again.
+    /// Logs one line when sending begins to fail, and one when it works again.
     fn tell(&self, collector: &str, failure: Option<String>) {
         let failed = self.failing.swap(failure.is_some(), Ordering::Relaxed);
         match failure {
@@ -114,7 +114,7 @@ impl Client {
     }
 }
 
-/// The status of the answer.
+/// Returns the status of the answer.
 fn post(request: &Request<Bytes>, own: &Headers) -> io::Result<u16> {
     let uri = request.uri();
     let invalid = || io::Error::from(io::ErrorKind::InvalidInput);
@@ -145,7 +145,7 @@ fn post(request: &Request<Bytes>, own: &Headers) -> io::Result<u16> {
     stream.write_all(&head)?;
     stream.write_all(request.body())?;
 
-    // The status line; what follows is of no use here.
+    // The status line; the rest is not needed.
     let mut line = [0; 12];
     stream.read_exact(&mut line)?;
     let status = std::str::from_utf8(&line[9..]).ok();

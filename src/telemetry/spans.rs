@@ -1,6 +1,6 @@
-//! The two spans of the service: a request, and a plan's run. Every line within one has its fields.
+//! The service's two spans: a request, and a plan's run. Every log line within one carries its fields.
 //!
-//! They are of a level that no filter but `off` leaves out, for lines of any level need the fields.
+//! Their level is one that no filter but `off` excludes, because lines of any level need the fields.
 
 use opentelemetry::trace::{
     SpanContext, SpanId, Status, TraceContextExt as _, TraceFlags, TraceId, TraceState,
@@ -14,7 +14,7 @@ use uuid::Uuid;
 use super::Origin;
 use super::traceparent::TraceParent;
 
-/// Round a request. With it, what a plan that it brings comes from.
+/// The span of a request. Returned with it: the origin of a plan that it submits.
 #[must_use]
 pub fn of_request(request_id: String, caller: Option<TraceParent>) -> (Span, Origin) {
     let span = tracing::error_span!("request", request_id = %request_id, trace_id = Empty, plan_id = Empty, key = Empty);
@@ -26,7 +26,7 @@ pub fn of_request(request_id: String, caller: Option<TraceParent>) -> (Span, Ori
     (span, origin)
 }
 
-/// Round a plan's run, which belongs to the trace of the request that brought it, if it is known.
+/// The span of a plan's run, which belongs to the trace of the request that submitted it, if that is known.
 #[must_use]
 pub fn of_run(plan: Uuid, origin: Option<&Origin>) -> Span {
     let span = tracing::error_span!("plan", plan_id = %plan, request_id = Empty, trace_id = Empty);
@@ -38,17 +38,17 @@ pub fn of_run(plan: Uuid, origin: Option<&Origin>) -> Span {
     span
 }
 
-/// The current request came with the key of this name.
+/// Record that the current request came with the key of this name.
 pub fn name_key(name: &str) {
     Span::current().record("key", name);
 }
 
-/// The current request is about this plan.
+/// Record that the current request is about this plan.
 pub fn name_plan(plan: Uuid) {
     Span::current().record("plan_id", display(plan));
 }
 
-/// What the exported span of a request says of its answer.
+/// Record the answer in the exported span of a request.
 pub fn answered(span: &Span, method: &str, route: Option<&str>, status: u16) {
     let context = span.context();
     if !context.has_active_span() {
@@ -64,8 +64,8 @@ pub fn answered(span: &Span, method: &str, route: Option<&str>, status: u16) {
     }
 }
 
-/// Make `span` a part of the caller's trace. What callees shall name as their caller: this span when
-/// traces are exported, else the caller's.
+/// Make `span` part of the caller's trace. Returns the parent to name in outgoing requests: this span when traces are
+/// exported, otherwise the caller's.
 fn join(span: &Span, caller: Option<TraceParent>) -> Option<TraceParent> {
     if let Some(caller) = caller {
         let flags = TraceFlags::default().with_sampled(caller.sampled);

@@ -3,29 +3,29 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Its header.
+/// Name of the header.
 pub const HEADER: &str = "traceparent";
 
-/// What the header says. Both ids are other than 0.
+/// Content of the header. Neither id is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TraceParent {
-    /// Of the whole trace.
+    /// Id of the whole trace.
     pub trace_id: u128,
-    /// Of the span that the request was sent in.
+    /// Id of the span that the request was sent in.
     pub span_id: u64,
     /// Whether the caller records the trace.
     pub sampled: bool,
 }
 
 impl TraceParent {
-    /// As logs write it: 32 hexadecimal digits.
+    /// The trace id as logs write it: 32 hexadecimal digits.
     #[must_use]
     pub fn trace_id_text(&self) -> String {
         format!("{:032x}", self.trace_id)
     }
 }
 
-/// The header does not say it as version 00 or a later one does.
+/// The header has neither the form of version 00 nor that of a later one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("not a traceparent")]
 pub struct NotATraceParent;
@@ -39,7 +39,7 @@ impl FromStr for TraceParent {
             return Err(NotATraceParent);
         };
         let version = hex(version, 2)?;
-        // Later versions may add parts; the first has none.
+        // Later versions may add parts; version 00 has no more.
         if version == 0xff || (version == 0 && !later.is_empty()) {
             return Err(NotATraceParent);
         }
@@ -68,7 +68,7 @@ impl fmt::Display for TraceParent {
     }
 }
 
-/// So many lower-case digits.
+/// Exactly `digits` lower-case digits.
 fn hex(text: &str, digits: usize) -> Result<u128, NotATraceParent> {
     let is_digit = |byte: u8| matches!(byte, b'0'..=b'9' | b'a'..=b'f');
     if text.len() != digits || !text.bytes().all(is_digit) {

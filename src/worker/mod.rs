@@ -1,7 +1,6 @@
-//! The pool: takes plans off the queue, runs a bounded number of them at a time, writes down what
-//! they tell and how they end.
+//! The pool: takes plans off the queue, runs a bounded number of them at a time, stores their events and how they end.
 //!
-//! Planning has threads of its own, one a slot, so that it never holds up those that serve.
+//! Planning has threads of its own, one per slot, so that it never blocks the threads that serve requests.
 //! Deliberately absent: what planning is, and how anybody learns of its progress.
 
 mod planning;
@@ -25,28 +24,27 @@ use crate::planner::{Observer, Outcome, Stop};
 use crate::store::{Clock, Lease, Store, StoreError};
 use crate::telemetry::{Instruments, spans};
 
-/// Plans an accepted scenario document, calling back as it goes. A panic of it fails its plan only.
+/// Plans an accepted scenario document, calling back as it goes. If it panics, only its plan fails.
 pub type Engine =
     Arc<dyn Fn(&str, &mut dyn Observer, &dyn Stop) -> Result<Outcome, Unplanned> + Send + Sync>;
 
-/// Why an engine does not plan.
+/// Why an engine did not plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Unplanned {
     /// It never will: the plan fails.
     Failed(Failure),
-    /// Something that it needs cannot be had now: it is asked again for a while, then the plan goes back
-    /// to the queue.
+    /// Something it needs is unavailable for now: it is retried for a while, then the plan goes back to the queue.
     NotNow(String),
 }
 
 /// What a pool is started with.
 #[derive(Clone)]
 pub struct Settings {
-    /// Plans run at the same time; none are with 0.
+    /// Plans run at the same time; with 0, none are run.
     pub workers: usize,
-    /// Of the time of ending.
+    /// The clock for times of ending.
     pub clock: Clock,
-    /// Runs are counted there.
+    /// Where runs are counted.
     pub instruments: Arc<Instruments>,
 }
 
@@ -58,14 +56,14 @@ pub struct Pool {
     slots: JoinSet<()>,
 }
 
-/// How far the end of the pool has come.
+/// The stages of the pool's shutdown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Phase {
     /// Plans are claimed and run.
     Open,
     /// No plan is claimed any more.
     Draining,
-    /// Those that still run go back to the queue.
+    /// Plans that still run go back to the queue.
     Stopping,
 }
 
@@ -96,8 +94,8 @@ impl Pool {
         Self { phase, slots }
     }
 
-    /// Claim nothing from now on, let what runs run for `grace` longer, then stop it and give it
-    /// back to the queue. Returns when all is quiet, which an engine that does not heed its stop delays.
+    /// Claim nothing from now on, let running plans continue for `grace`, then stop them and give them back to the
+    /// queue. Returns when all is quiet, which an engine that ignores its stop delays.
     pub async fn drain(mut self, grace: Duration) {
         self.phase.send_replace(Phase::Draining);
         if tokio::time::timeout(grace, self.quiet()).await.is_err() {
@@ -132,8 +130,8 @@ impl Slot {
         let mut thread = None;
         let mut over = None;
         loop {
-            // The next run does not wait until the disk has the end of the one before, nor its own beginning.
-            // Its claim goes first, and the end right behind it: so the store can take both in one step.
+            // The next run does not wait until the end of the previous one, or its own beginning, is on the disk. Its
+            // claim is sent first, and the end right behind it, so that the store can take both in one step.
             let conclusion = async {
                 if let Some(over) = over.take() {
                     self.conclude(over).await;
@@ -157,7 +155,7 @@ impl Slot {
         }
     }
 
-    /// Claim a plan and run it; `None` when no more are to be.
+    /// Claim a plan and run it; `None` when no more should be run.
     async fn run_next(
         &self,
         thread: &mut Option<Thread>,
@@ -171,7 +169,7 @@ impl Slot {
         Some(Ok(self.run(lease, thread).instrument(span).await))
     }
 
-    /// The next plan to run; `None` when no more are to be.
+    /// The next plan to run; `None` when no more should be run.
     async fn claim(&self) -> Option<Result<Lease, StoreError>> {
         tokio::select! {
             biased;
@@ -181,13 +179,13 @@ impl Slot {
     }
 }
 
-/// Returns once the pool's end has come so far.
+/// Returns once the pool has reached this stage of its shutdown.
 async fn reached(mut phase: watch::Receiver<Phase>, wanted: Phase) {
-    // Without its sender the pool is gone, which is further than any phase.
+    // Without its sender the pool is gone, which is beyond any phase.
     let _ = phase.wait_for(|phase| *phase >= wanted).await;
 }
 
-/// Longer and longer waits between tries.
+/// Increasing waits between retries.
 #[derive(Debug)]
 struct Pause(Duration);
 

@@ -1,4 +1,4 @@
-//! The threads that plan: each calls the engine, hands on what it tells, and makes its ending.
+//! The planning threads: each calls the engine, passes on its events, and builds the ending.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -19,35 +19,35 @@ use crate::planner::{ConvergencePoint, Incumbent, Observer, Outcome, Stop, StopR
 use crate::store::{Ending, Lease};
 use crate::telemetry::Instruments;
 
-/// An engine that cannot plan now is asked again for so long; then another worker may have more luck.
+/// An engine that cannot plan now is retried for this long; after that, another worker may succeed.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Between two such questions, at first and at most.
+/// Pause between such retries, at first and at most.
 const PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(2)];
 
-/// How much lower than the others' the priority of a planning thread is, and of those that it starts.
+/// How much lower the priority of a planning thread is than the others', and that of the threads that it starts.
 #[cfg(target_os = "linux")]
 const POLITE: i32 = 5;
 
-/// While it waits, a thread looks so often whether it shall stop.
+/// How often a waiting thread checks whether it must stop.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Why a run shall stop.
+/// Why a run must stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Reason {
-    /// Somebody asked for the end of the plan, and wants the best route so far.
+    /// Somebody requested the end of the plan, and wants the best route so far.
     Cancelled = 1,
-    /// Nobody wants its outcome: it will be run again, or is no longer this worker's.
+    /// Nobody wants its outcome: the plan will be run again, or is no longer this worker's.
     Abandoned = 2,
 }
 
-/// Shared by a run's thread and those who may stop it.
+/// Shared by a run's thread and the code that may stop it.
 #[derive(Debug, Default)]
 pub(super) struct StopFlag(AtomicU8);
 
 impl StopFlag {
-    /// The first reason stands.
+    /// The first reason wins.
     pub(super) fn raise(&self, reason: Reason) {
         let _ = self
             .0
@@ -63,25 +63,25 @@ impl StopFlag {
     }
 }
 
-/// Where a run's thread tells what it does, and learns that it shall stop.
+/// Where a run's thread reports its events, and learns that it must stop.
 pub(super) struct Reports {
-    /// To be stored.
+    /// Events to be stored.
     pub(super) events: mpsc::Sender<Event>,
-    /// Ticks after each [`BATCH`] of them; dropped when nothing more is told.
+    /// Ticks after each [`BATCH`] of them; dropped when no more will come.
     pub(super) telling: watch::Sender<()>,
-    /// Shared with those who may stop it.
+    /// Shared with the code that may stop the run.
     pub(super) stop: Arc<StopFlag>,
-    /// For the operator.
+    /// Metrics for the operator.
     pub(super) instruments: Arc<Instruments>,
 }
 
-/// A thread that plans one plan after the other, and ends when this is dropped.
+/// A thread that plans one plan after another, and ends when this is dropped.
 pub(super) struct Thread {
     tasks: std::sync::mpsc::Sender<Task>,
 }
 
-/// Let other threads of this process go first: a plan takes long anyway, and whoever asks something meanwhile waits for
-/// an answer of a millisecond. Elsewhere than on Linux that would hold back all of them.
+/// Let other threads of this process go first: a plan takes long anyway, while a request waits for an answer that takes
+/// a millisecond. Only on Linux: elsewhere it would lower the priority of the whole process.
 fn step_back() {
     #[cfg(target_os = "linux")]
     if let Err(error) = rustix::process::nice(POLITE) {
@@ -112,8 +112,7 @@ impl Thread {
         Ok(Self { tasks })
     }
 
-    /// Plan the plan of `lease` within the span of the caller. `None` is the ending of one that must go
-    /// back to the queue.
+    /// Plan the plan of `lease` within the caller's span. An ending of `None` means that it must go back to the queue.
     pub(super) fn plan(
         &self,
         lease: &Lease,
@@ -149,7 +148,7 @@ impl Task {
         let _ = self
             .ended
             .send(end.unwrap_or_else(|payload| Some(panicked(&*payload))));
-        // Who is woken by the end of the telling finds the ending there.
+        // Whoever is woken by the end of the events finds the ending there.
         drop(teller);
     }
 }
@@ -164,7 +163,7 @@ fn plan_to_its_end(
     let asked = Instant::now();
     let mut pause = PAUSES[0];
     loop {
-        // What was waited for is not the search's time.
+        // The time spent waiting is not the search's.
         let watch = Watch {
             began: Instant::now(),
             stop: Arc::clone(&stop),
@@ -190,7 +189,7 @@ fn plan_to_its_end(
     }
 }
 
-/// Wait, but no longer than until a stop.
+/// Wait, but only until a stop.
 fn stopped_within(pause: Duration, stop: &StopFlag) -> bool {
     let began = Instant::now();
     while !stop.is_raised() {
@@ -232,19 +231,19 @@ fn panicked(payload: &(dyn Any + Send)) -> Ending {
     Ending::Failed(FailureKind::PlannerPanic.because(detail))
 }
 
-/// Hands events on; waits when they come faster than they can be stored.
+/// Passes events on; waits when they come faster than they can be stored.
 struct Teller {
     reports: Reports,
     /// Events so far.
     told: usize,
-    /// Counted so far.
+    /// Iterations counted so far.
     iterations: u64,
     evaluations: u64,
 }
 
 impl Teller {
     fn tell(&mut self, event: Event) {
-        // To wait is set up at a price, and there is room but for a search that outruns the disk.
+        // Setting up a wait has a cost, and there is room unless a search outruns the disk.
         let sent = match self.reports.events.try_send(event) {
             Err(TrySendError::Full(event)) => self.reports.events.blocking_send(event).is_ok(),
             sent => sent.is_ok(),

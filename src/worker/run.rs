@@ -13,19 +13,19 @@ use crate::job::{Event, Plan};
 use crate::store::{Ending, Lease, StoreError};
 use crate::telemetry::metrics::Ended;
 
-/// Events on their way from the planning thread; when there are more, it waits.
+/// Events in the channel from the planning thread; when it is full, the thread waits.
 const ON_THE_WAY: usize = 1024;
 
-/// Events are stored as soon as there are so many,
+/// Events are stored as soon as there are this many.
 pub(super) const BATCH: usize = 512;
 
-/// and at the latest so long after they happened: waking up for each costs more than storing it.
+/// Longest delay before fewer events are stored: waking up for each costs more than storing it.
 const DELAY: Duration = Duration::from_millis(50);
 
 /// A run that is over, but not yet in the store.
 pub(super) struct Over {
     lease: Lease,
-    /// What it told last; stored with its end.
+    /// Its last events; stored with its end.
     told: Vec<Event>,
     /// `None` when its plan goes back to the queue.
     ending: Option<Ending>,
@@ -33,8 +33,7 @@ pub(super) struct Over {
 }
 
 impl Slot {
-    /// Run the plan on `thread`, which is started when there is none yet, and store what it tells; the
-    /// caller concludes it.
+    /// Run the plan on `thread`, which is started if there is none yet, and store its events; the caller concludes it.
     pub(super) async fn run(&self, lease: Lease, thread: &mut Option<Thread>) -> Option<Over> {
         tracing::info!(
             worker = self.number,
@@ -59,7 +58,7 @@ impl Slot {
             Err(error) => {
                 tracing::error!(%error, "no thread to plan on; the plan goes back to the queue");
                 self.give_back(&lease).await;
-                // Soon there may be one.
+                // A thread may become available soon.
                 Pause::default().wait().await;
                 return None;
             }
@@ -110,8 +109,8 @@ impl Slot {
         conclusion.instrument(span).await;
     }
 
-    /// Store events until there are no more; returns the last of them, which go with the end, and `None`
-    /// when storing them became pointless. `news` ticks when there are many, and loses its sender after the last.
+    /// Store events until there are no more; returns the last of them, which are stored with the end, or `None` when
+    /// storing them became pointless. `news` ticks when there are many, and loses its sender after the last.
     async fn keep_events(
         &self,
         lease: &Lease,
@@ -153,7 +152,7 @@ impl Slot {
     async fn give_back(&self, lease: &Lease) {
         let release = || self.store.release(lease);
         match self.persist("release", release).await {
-            // Somebody had asked for its end, and it has none of its own to wait for.
+            // Its end had been requested, and it has no ending of its own to wait for.
             Some(plan) if plan.status.is_final() => self.tell_end(&plan),
             Some(_) => tracing::info!("plan given back to the queue"),
             None => {}
@@ -173,8 +172,8 @@ impl Slot {
         });
     }
 
-    /// Do a step of the store, again and again while the store fails; `None` when the plan is no
-    /// longer ours, or when the pool must end.
+    /// Do a store operation, and retry while the store fails; `None` when the plan is no longer ours, or when the pool
+    /// must end.
     async fn persist<T, F>(&self, what: &str, step: impl Fn() -> F) -> Option<T>
     where
         F: Future<Output = Result<T, StoreError>>,
@@ -204,7 +203,7 @@ impl Slot {
     }
 }
 
-/// Hand the wish to stop on to the planning thread.
+/// Pass a request to stop on to the planning thread.
 async fn stop_when_asked(
     lease: &Lease,
     phase: watch::Receiver<Phase>,

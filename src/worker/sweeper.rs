@@ -1,4 +1,4 @@
-//! Removes plans whose time has come, and datasets that nothing refers to any more.
+//! Removes expired plans, and datasets that nothing refers to any more.
 
 use std::collections::BTreeSet;
 use std::error::Error;
@@ -10,14 +10,14 @@ use tokio::task::JoinHandle;
 use crate::catalogue::Catalogue;
 use crate::store::{Clock, SWEEP, Store};
 
-/// Between two sweeps.
+/// Pause between two sweeps.
 const PERIOD: Duration = Duration::from_secs(5);
 
-/// Sweeps until it is dropped.
+/// Sweeps until dropped.
 pub struct Sweeper(JoinHandle<()>);
 
 impl Sweeper {
-    /// Start to sweep.
+    /// Start sweeping.
     ///
     /// # Panics
     /// Outside a tokio runtime.
@@ -55,7 +55,7 @@ async fn sweep(store: Arc<dyn Store>, catalogue: Arc<dyn Catalogue>, clock: Cloc
     }
 }
 
-/// Content that no name stands for goes with the last plan over it.
+/// Content that no name refers to is removed with the last plan over it.
 async fn sweep_datasets(
     store: &dyn Store,
     catalogue: &Arc<dyn Catalogue>,

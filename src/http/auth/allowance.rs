@@ -10,17 +10,17 @@ const RATELIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-policy")
 /// What is left of a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::http) struct Allowance {
-    /// The limit's.
+    /// Name of the limit.
     pub(in crate::http) name: &'static str,
-    /// How many there may be.
+    /// Maximum number.
     pub(in crate::http) quota: u64,
-    /// How many more there may be now.
+    /// How many more are allowed now.
     pub(in crate::http) left: u64,
-    /// Of a limit that fills with time alone.
+    /// For a limit that refills with time alone.
     pub(in crate::http) filling: Option<Filling>,
 }
 
-/// How a limit fills.
+/// How a limit refills.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::http) struct Filling {
     /// Seconds from empty to full.
@@ -30,7 +30,7 @@ pub(in crate::http) struct Filling {
 }
 
 impl Allowance {
-    /// Of a limit that is reached, and gives way when something ends: nobody knows when, so there is no `t`.
+    /// A limit that is reached, and frees up when something ends: nobody knows when, so there is no `t`.
     pub(in crate::http) fn none_left(name: &'static str, quota: u64) -> Self {
         Self {
             name,
@@ -40,7 +40,7 @@ impl Allowance {
         }
     }
 
-    /// Before what the fields tell of other limits.
+    /// Put in front of what the fields say about other limits.
     pub(in crate::http) fn write(&self, headers: &mut HeaderMap) {
         let mut policy = format!("\"{}\";q={}", self.name, self.quota);
         let mut limit = format!("\"{}\";r={}", self.name, self.left);

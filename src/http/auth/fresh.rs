@@ -1,4 +1,4 @@
-//! Keys that nobody can guess.
+//! New keys that nobody can guess.
 
 use data_encoding::HEXLOWER;
 
@@ -7,7 +7,7 @@ use super::keys::PREFIX;
 /// A new key: 256 random bits.
 ///
 /// # Errors
-/// When the operating system has no randomness.
+/// When the operating system provides no random bytes.
 pub fn key() -> Result<String, getrandom::Error> {
     let mut bytes = [0_u8; 32];
     getrandom::fill(&mut bytes)?;

@@ -1,7 +1,7 @@
-//! How the operator writes keys down: TOML, a `[[key]]` each.
+//! The operator's file of keys: TOML, one `[[key]]` each.
 //!
-//! Refusals name the entry but never repeat its sum: whoever put the key itself there by mistake
-//! would find it in the log.
+//! Refusals name the entry but never repeat its sum: an operator who put the key itself there by mistake would find it
+//! in the log.
 
 use data_encoding::HEXLOWER_PERMISSIVE;
 use jiff::Timestamp;
@@ -35,7 +35,7 @@ struct Entry {
     burst: Option<u32>,
 }
 
-/// The keys of a file that are right, and what is wrong with the others.
+/// The valid keys of a file, and what is wrong with the others.
 pub(super) fn read(text: &str) -> (Vec<Key>, Vec<String>) {
     let file: File = match toml::from_str(text) {
         Ok(file) => file,
@@ -59,7 +59,7 @@ pub(super) fn read(text: &str) -> (Vec<Key>, Vec<String>) {
     (keys, faults)
 }
 
-/// An entry by its name, or by its place where it has none.
+/// An entry's name, or its position where it has none.
 fn place(position: usize, table: &toml::Table) -> String {
     match table.get("name").and_then(toml::Value::as_str) {
         Some(name) => format!("key {name:?}"),
@@ -123,7 +123,7 @@ fn scopes(names: &[String]) -> Result<Vec<Scope>, String> {
     names.iter().map(read).collect()
 }
 
-/// As a time of TOML, or as text.
+/// Given as a TOML time, or as text.
 fn expires(value: &toml::Value) -> Result<Timestamp, String> {
     let text = match value {
         toml::Value::String(text) => text.clone(),

@@ -1,7 +1,7 @@
-//! The keys that are in force, and which of them a caller has brought.
+//! The keys in force, and finding the one a caller has sent.
 //!
-//! Only hashes are kept. A key is 256 random bits, so there is no guessing at it and nothing that a
-//! slow hash would slow down: SHA-256 hides it as well, and costs each request less than a microsecond.
+//! Only hashes are kept. A key is 256 random bits, so it cannot be guessed and a slow hash would gain nothing: SHA-256
+//! hides it as well, and costs each request less than a microsecond.
 
 use std::collections::HashSet;
 use std::fmt;
@@ -16,7 +16,7 @@ use super::rate::Rate;
 use super::scope::Scope;
 use crate::job::Owner;
 
-/// What every key begins with, so that people and scanners know one when they see it.
+/// Prefix of every key, so that people and scanners recognise one.
 pub(super) const PREFIX: &str = "noctule_";
 
 /// A SHA-256 sum.
@@ -25,19 +25,19 @@ pub(in crate::http) type Digest = [u8; 32];
 /// A key in force.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Key {
-    /// What people call it.
+    /// Its name for people.
     pub name: String,
-    /// Whose plans are its own; several keys may share an owner.
+    /// Whose plans it gives access to; several keys may share an owner.
     pub owner: Owner,
     /// What it may do.
     pub scopes: Vec<Scope>,
-    /// From then on it is none.
+    /// From then on it is not valid.
     pub expires: Option<Timestamp>,
     /// Active plans that its owner may have.
     pub active_plans: Option<u64>,
-    /// Requests that it may send.
+    /// Rate at which it may send requests.
     pub rate: Option<Rate>,
-    /// Of the whole key, prefix included.
+    /// Sum of the whole key, prefix included.
     pub(super) sha256: Digest,
 }
 
@@ -59,7 +59,7 @@ impl Key {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Keys(Vec<Key>);
 
-/// Why a file of keys is refused: all its faults, with the entries named.
+/// Why a file of keys is refused: all its faults, naming the entries.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub struct KeysError(pub Vec<String>);
 
@@ -73,8 +73,8 @@ impl Keys {
     /// Read the text of a file of keys.
     ///
     /// # Errors
-    /// Everything that is wrong with it: what is no TOML, unknown fields and scopes, what is no
-    /// SHA-256 sum, names and sums that come twice, and a file without a key.
+    /// Everything that is wrong with it: invalid TOML, unknown fields and scopes, invalid SHA-256 sums, duplicate names
+    /// and sums, and a file without a key.
     pub fn read(text: &str) -> Result<Self, KeysError> {
         let (keys, mut faults) = key_file::read(text);
         let (mut names, mut sums) = (HashSet::new(), HashSet::new());
@@ -103,7 +103,7 @@ impl Keys {
         self.0.len()
     }
 
-    /// The key that `secret` is. Takes as long whichever it is, or none.
+    /// The key that matches `secret`. Takes the same time whichever matches, or none.
     pub(super) fn find(&self, secret: &[u8]) -> Option<&Key> {
         self.with_digest(&digest(secret))
     }
@@ -131,14 +131,14 @@ pub(super) fn digest(secret: &[u8]) -> Digest {
     Sha256::digest(secret).into()
 }
 
-/// Whether `text` holds what looks like a key, percent-encoded or not.
+/// Whether `text` contains what looks like a key, percent-encoded or not.
 pub(in crate::http) fn holds_a_key(text: &str) -> bool {
     let decoded = percent_decode_str(text).decode_utf8_lossy();
     looks_like_a_key(text) || looks_like_a_key(&decoded)
 }
 
 fn looks_like_a_key(text: &str) -> bool {
-    /// Of a key's own length; half a key in a log is too much already.
+    /// Characters of a key that suffice: even half a key in a log is too much.
     const ENOUGH: usize = 16;
     text.match_indices(PREFIX).any(|(start, _)| {
         let rest = text[start + PREFIX.len()..].bytes();

@@ -1,8 +1,8 @@
-//! Who asks, and whether they may.
+//! Who the caller is, and what they may do.
 //!
-//! One gate before each route that is not for everybody: it takes the caller's key or ticket, and
-//! leaves a `Caller` in the request. Whose plan is whose is decided there and in the store, not
-//! here. Deliberately absent: names of people, passwords, sessions, any key in readable form.
+//! One gate before each route that is not public: it takes the caller's key or ticket, and puts a `Caller` into the
+//! request. Whose plan is whose is decided there and in the store, not here. Deliberately absent: names of people,
+//! passwords, sessions, any key in readable form.
 
 mod allowance;
 mod fresh;
@@ -45,10 +45,10 @@ use crate::telemetry::spans;
 use rate::{Buckets, Taken};
 use streams::Streams;
 
-/// How often a stream looks whether its key has expired.
+/// How often a stream checks whether its key has expired.
 const EXPIRY_LOOK: Duration = Duration::from_secs(60);
 
-/// The keys in force, and what their holders have.
+/// The keys in force, and what their holders are using.
 #[derive(Debug, Clone)]
 pub struct Access(Arc<Inner>);
 
@@ -60,27 +60,27 @@ struct Inner {
     settings: Settings,
 }
 
-/// How much callers may have beside what their keys say.
+/// Limits on callers apart from those in their keys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
     /// Event streams open at once.
     pub streams: usize,
-    /// Event streams of one key's owner.
+    /// Event streams open at once per key owner.
     pub streams_per_key: usize,
     /// How long a ticket opens streams.
     pub ticket_life: Duration,
 }
 
-/// Why a caller is not let in.
+/// Why a caller is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Unauthorized {
     /// Neither a key nor a ticket came.
     Nothing,
-    /// What came is no key.
+    /// What was sent is not a valid key.
     NoKey,
-    /// It was one.
+    /// The key was valid once.
     Expired,
-    /// What came is no ticket for this plan.
+    /// What was sent is not a valid ticket for this plan.
     NoTicket,
 }
 
@@ -110,25 +110,25 @@ impl Access {
         }))
     }
 
-    /// From now on these keys are in force. What others have opened ends.
+    /// Put these keys in force. Whatever was opened with other keys ends.
     pub fn replace(&self, keys: Keys) {
         self.0.buckets.keep(&keys.names());
         self.0.keys.send_replace(Some(Arc::new(keys)));
     }
 
-    /// Whether there are keys.
+    /// Whether keys are required.
     #[must_use]
     pub fn is_guarded(&self) -> bool {
         self.0.keys.borrow().is_some()
     }
 
-    /// What callers may have.
+    /// The limits on callers.
     #[must_use]
     pub fn settings(&self) -> Settings {
         self.0.settings
     }
 
-    /// A ticket for the plan's events, and until when it is one.
+    /// A ticket for the plan's events, and when it expires.
     pub(super) fn ticket(
         &self,
         plan: PlanId,
@@ -136,7 +136,7 @@ impl Access {
     ) -> Result<(String, Timestamp), Unauthorized> {
         let keys = self.0.keys.borrow().clone();
         let key = match (caller.key, &keys) {
-            // It may have been withdrawn since the caller was let in.
+            // The key may have been withdrawn since the caller was admitted.
             (Some(key), Some(keys)) => Some(keys.with_digest(&key).ok_or(Unauthorized::NoKey)?),
             _ => None,
         };
@@ -145,15 +145,15 @@ impl Access {
         Ok((ticket::issue(plan, key, until.as_millisecond()), until))
     }
 
-    /// Leave to have one more stream open.
+    /// Permission to open one more stream.
     pub(super) fn open_stream(&self, owner: Option<&Owner>) -> Result<Permit, TooMany> {
         self.0.streams.open(owner.cloned())
     }
 
-    /// Until the key is none any more; for who has none, for ever.
+    /// Resolves when the key is withdrawn, expires or may no longer read; never for callers without a key.
     pub(super) async fn withdrawn(&self, key: Option<Digest>) {
         match key {
-            // Streams without a key are not to keep room for this.
+            // Boxed so that streams without a key need no room for this.
             Some(key) => Box::pin(self.withdrawn_from(key)).await,
             None => std::future::pending().await,
         }
@@ -177,7 +177,7 @@ impl Access {
         }
     }
 
-    /// The caller, and what is left of their rate; for everybody where there are no keys.
+    /// The caller, and what is left of their rate; admits everybody where there are no keys.
     fn admit(&self, needs: Needs, uri: &Uri, headers: &HeaderMap) -> Result<Admitted, Refused> {
         let keys = self.0.keys.borrow().clone();
         let asked = match needs {
@@ -243,15 +243,15 @@ impl Default for Settings {
     }
 }
 
-/// A request that may go on.
+/// A request that may proceed.
 #[derive(Default)]
 struct Admitted {
-    /// `None` where it does not matter who asks.
+    /// `None` where the caller's identity does not matter.
     caller: Option<Caller>,
     taken: Option<Taken>,
 }
 
-/// A request that may not.
+/// A request that is refused.
 struct Refused {
     problem: Problem,
     taken: Option<Taken>,
@@ -266,7 +266,7 @@ impl From<Unauthorized> for Refused {
     }
 }
 
-/// What follows `Bearer` in the one header that there is.
+/// What follows `Bearer` in the only such header.
 fn secret(headers: &HeaderMap) -> Result<&[u8], Unauthorized> {
     let mut values = headers.get_all(header::AUTHORIZATION).iter();
     let Some(value) = values.next() else {
@@ -281,7 +281,7 @@ fn secret(headers: &HeaderMap) -> Result<&[u8], Unauthorized> {
     }
 }
 
-/// The layer before one route.
+/// The layer in front of one route.
 #[derive(Clone)]
 pub(super) struct Gate(Arc<(Access, Needs)>);
 
@@ -316,8 +316,7 @@ impl Around for Gate {
     }
 }
 
-/// For every route: an address is written down by proxies, browsers and logs, so a key in one has been
-/// given away.
+/// Checked on every route: proxies, browsers and logs record addresses, so a key in one has been given away.
 pub(super) fn refuse_key_in_url(uri: &Uri) -> Result<(), Problem> {
     if super::params::brings_a_key(uri) {
         tracing::warn!(

@@ -1,4 +1,4 @@
-//! How fast a key may ask: a bucket of tokens each.
+//! How fast a key may send requests: one token bucket each.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::{Mutex, PoisonError};
@@ -26,17 +26,17 @@ struct Bucket {
     filled: Instant,
 }
 
-/// What came of a request for a token.
+/// The outcome of a request for a token.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Taken {
     rate: Rate,
-    /// Left in the bucket; below 1 with `granted` false when there was none to take.
+    /// Tokens left in the bucket; below 1 with `granted` false when there was none to take.
     left: f64,
     pub(super) granted: bool,
 }
 
 impl Buckets {
-    /// Take a token of the key called `name`.
+    /// Take a token for the key called `name`.
     pub(super) fn take(&self, name: &str, rate: Rate, now: Instant) -> Taken {
         let full = f64::from(rate.burst);
         let mut buckets = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -58,7 +58,7 @@ impl Buckets {
         }
     }
 
-    /// Forget the others.
+    /// Forget all buckets except those of `names`.
     pub(super) fn keep(&self, names: &HashSet<&str>) {
         let mut buckets = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         buckets.retain(|name, _| names.contains(name.as_str()));
@@ -71,7 +71,7 @@ impl Taken {
         seconds((1.0 - self.left) / self.rate.per_second).max(1)
     }
 
-    /// What the bucket holds now.
+    /// The bucket's contents as header fields.
     pub(super) fn allowance(&self) -> Allowance {
         let full = f64::from(self.rate.burst);
         Allowance {

@@ -1,9 +1,9 @@
-//! What a key may do, and what each route asks for.
+//! What a key may do, and what each route requires.
 
 /// What a key may do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
-    /// Look at one's own plans, and follow them.
+    /// Read and follow one's own plans.
     Read,
     /// Submit, cancel and delete plans as well.
     Plan,
@@ -17,7 +17,7 @@ impl Scope {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Read, Self::Plan, Self::Metrics, Self::Admin];
 
-    /// As it is written in the file of keys.
+    /// Its name in the file of keys.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -28,20 +28,20 @@ impl Scope {
         }
     }
 
-    /// The one of that name.
+    /// The scope with this name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|scope| scope.name() == name)
     }
 
-    /// Whether who has this may do what `other` says.
+    /// Whether this scope includes what `other` allows.
     #[must_use]
     pub fn includes(self, other: Self) -> bool {
         self == other || self == Self::Admin || (self, other) == (Self::Plan, Self::Read)
     }
 }
 
-/// What a route asks of its caller.
+/// What a route requires of its caller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Needs {
     /// No key.
@@ -53,7 +53,7 @@ pub enum Needs {
 }
 
 impl Needs {
-    /// Of the route with this method and path. What is not named here asks for more rather than less.
+    /// For the route with this method and path. Unlisted routes require more rather than less.
     pub(in crate::http) fn of(method: &str, path: &str) -> Self {
         match (method, path) {
             (
@@ -77,7 +77,7 @@ impl Needs {
             ("GET", "/plans/{id}/events") => Self::Ticket,
             ("GET", _) | ("POST", "/plans/{id}/tickets") => Self::Scope(Scope::Read),
             (_, path) if path.starts_with("/plans") => Self::Scope(Scope::Plan),
-            // Whose a dataset is not to change is told by the handler.
+            // The handler decides who may change a dataset.
             ("PUT" | "DELETE", "/terrains/{name}")
             | ("POST", "/scenarios:convert" | "/scenarios:ground") => Self::Scope(Scope::Plan),
             _ => Self::Scope(Scope::Admin),

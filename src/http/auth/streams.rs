@@ -1,11 +1,11 @@
-//! How many event streams are open: a permit each, held for as long as the stream lives.
+//! Limits on open event streams: one permit each, held for as long as the stream lives.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::job::Owner;
 
-/// Streams that are open.
+/// Counts of open streams.
 #[derive(Debug)]
 pub(super) struct Streams {
     most: usize,
@@ -19,16 +19,16 @@ struct Open {
     by_owner: HashMap<Owner, usize>,
 }
 
-/// Which limit is reached.
+/// Which limit was reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::http) struct TooMany {
     /// Its name in `GET /limits`.
     pub(in crate::http) limit: &'static str,
-    /// Streams at most.
+    /// Maximum number of streams.
     pub(in crate::http) most: usize,
 }
 
-/// Leave to have a stream open, until it is dropped.
+/// Permission to hold a stream open, until it is dropped.
 #[derive(Debug)]
 pub(in crate::http) struct Permit {
     streams: Arc<Streams>,
@@ -44,7 +44,7 @@ impl Streams {
         })
     }
 
-    /// Leave for one more stream. Who has no name shares in `most` alone.
+    /// Permission for one more stream. Callers without a name are limited by `most` alone.
     pub(super) fn open(self: &Arc<Self>, owner: Option<Owner>) -> Result<Permit, TooMany> {
         let mut open = self.lock();
         let too_many = |limit, most| Err(TooMany { limit, most });

@@ -1,7 +1,7 @@
-//! Tickets: what a browser's `EventSource`, which can send no header, follows one plan with.
+//! Tickets: with one, a browser's `EventSource`, which cannot send headers, can follow one plan.
 //!
-//! Nothing is kept of them. Each says in whose name it was issued and until when, signed with the sum of that key, which
-//! every node has read from the same file: so a ticket of one node is one on all of them, and ends with its key.
+//! They are not stored. Each states under which key it was issued and until when, signed with that key's sum, which
+//! every node has read from the same file: so a ticket from one node is valid on all of them, and ends with its key.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD as BASE64;
@@ -12,13 +12,13 @@ use super::Unauthorized;
 use super::keys::{Key, Keys};
 use crate::job::PlanId;
 
-/// What is signed begins so, lest anything else that is signed with a key's sum be taken for a ticket.
+/// Prefix of what is signed, so that nothing else signed with a key's sum can be taken for a ticket.
 const LABEL: &[u8] = b"noctule ticket ";
 
-/// Signs where nobody has a key: there everybody may follow every plan, and there is nothing to forge.
+/// Signing key where no keys are in use: there everybody may follow every plan, and there is nothing to forge.
 const NOBODY_S: [u8; 32] = [0; 32];
 
-/// A ticket for the plan's events until then, in the name of that key; `None` where there are none.
+/// A ticket for the plan's events until then, in the name of `key`; `None` where no keys are in use.
 pub(super) fn issue(plan: PlanId, key: Option<&Key>, until_ms: i64) -> String {
     let until = until_ms.to_be_bytes();
     let tag = signing(plan, key, until).finalize().into_bytes();
@@ -26,10 +26,10 @@ pub(super) fn issue(plan: PlanId, key: Option<&Key>, until_ms: i64) -> String {
     BASE64.encode([until.as_slice(), tag.as_slice(), name.as_bytes()].concat())
 }
 
-/// In whose name `text` is a ticket for the plan; `None` where nobody has a key.
+/// The key in whose name `text` is a ticket for the plan; `None` where no keys are in use.
 ///
 /// # Errors
-/// [`Unauthorized::NoTicket`] when it is none, or none any more.
+/// [`Unauthorized::NoTicket`] when it is invalid or has expired.
 pub(super) fn holder<'k>(
     text: &str,
     plan: PlanId,
@@ -43,7 +43,7 @@ pub(super) fn holder<'k>(
         Some(keys) => Some(keys.named(name).ok_or(Unauthorized::NoTicket)?),
         None => None,
     };
-    // In a time that tells nothing of how much of it is right.
+    // Compares in constant time, which reveals nothing about how much of it is right.
     let signed = signing(plan, key, until).verify_slice(tag).is_ok();
     if signed && i64::from_be_bytes(until) > now_ms {
         Ok(key)
@@ -52,7 +52,7 @@ pub(super) fn holder<'k>(
     }
 }
 
-/// Until when, the tag, and the name of the key.
+/// Expiry time, tag, and name of the key.
 fn parts(bytes: &[u8]) -> Option<([u8; 8], &[u8; 32], &str)> {
     let (until, rest) = bytes.split_first_chunk()?;
     let (tag, name) = rest.split_first_chunk()?;
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
     use crate::job::new_id;
 
-    /// A file of one key.
+    /// A file with one key.
     fn keys(name: &str, digit: char) -> Keys {
         let sum = digit.to_string().repeat(64);
         let text = format!("[[key]]\nname = {name:?}\nsha256 = \"{sum}\"\nscopes = [\"read\"]\n");

@@ -1,7 +1,7 @@
-//! The page at `/` and the files that it is made of: all within the program, as they lie in `src/page`.
+//! The page at `/` and its files: all built into the program, laid out as in `src/page`.
 //!
-//! What is vendored comes compressed by brotli ahead of time; everything is also kept as gzip, made when
-//! it is first asked for. A browser asks again each time and is told that nothing has changed.
+//! Vendored files were compressed with brotli ahead of time; everything is also kept as gzip, made on the first request
+//! for it. A browser asks again each time and is told that nothing has changed.
 
 use std::io::Write as _;
 use std::sync::LazyLock;
@@ -18,13 +18,13 @@ use crate::http::entity_tags::EntityTags;
 use crate::http::params::NoParams;
 use crate::http::problem::Problem;
 
-/// Scripts and styles of its own, requests to where it comes from, pictures that it makes itself.
+/// Its own scripts and styles, requests to its own origin, images that it creates itself.
 const POLICY: HeaderValue = HeaderValue::from_static(
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; \
      img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
 );
 
-/// It may be kept, and is asked about each time.
+/// It may be cached, and is revalidated each time.
 const CACHING: HeaderValue = HeaderValue::from_static("no-cache");
 
 /// A file of the page.
@@ -34,11 +34,11 @@ struct File {
     bytes: &'static [u8],
     brotli: Option<&'static [u8]>,
     gzip: LazyLock<Vec<u8>>,
-    /// Of the plain bytes.
+    /// Hash of the plain bytes.
     hash: LazyLock<String>,
 }
 
-/// How the bytes are coded.
+/// The content coding of the bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Coding {
     Plain,
@@ -182,7 +182,7 @@ fn serve(name: &str, uri: &Uri, headers: &HeaderMap) -> Result<Response, Problem
 }
 
 impl File {
-    /// The shortest of what the caller takes.
+    /// The shortest coding that the caller accepts.
     fn coded(&'static self, headers: &HeaderMap) -> (Coding, &'static [u8]) {
         if let Some(brotli) = self.brotli
             && takes(headers, "br")
@@ -208,7 +208,7 @@ impl File {
 }
 
 impl Coding {
-    /// As in `Content-Encoding`.
+    /// The name in `Content-Encoding`.
     fn name(self) -> Option<&'static str> {
         match self {
             Self::Plain => None,
@@ -217,7 +217,7 @@ impl Coding {
         }
     }
 
-    /// The entity tag of what has this hash, coded so.
+    /// The entity tag of content with this hash, in this coding.
     fn tag(self, hash: &str) -> HeaderValue {
         let tag = match self.name() {
             None => format!("\"{hash}\""),
@@ -258,7 +258,7 @@ mod tests {
         assert_eq!(there, listed);
     }
 
-    /// What was bundled is what is served: nobody has written into it since.
+    /// What is served is what was bundled: nobody has edited it since.
     #[test]
     fn what_is_vendored_has_the_hashes_that_were_recorded() {
         let sums = fs::read_to_string(directory().join("vendor/SHA256SUMS")).expect("it is there");

@@ -1,7 +1,7 @@
-//! Pages for people: the one to plan with, the reference of the interface, and one for each type of problem.
+//! Pages for people: the planning page, the API reference, and one page for each type of problem.
 //!
-//! The reference and the problems are made once, of the same documents that programs read, and need nothing
-//! from elsewhere: no script, no font, one style sheet within the page, which its policy names by its hash.
+//! The reference and the problem pages are generated once, from the documents that programs read, and load nothing
+//! else: no script, no font, one style sheet within the page, whose hash the page's policy names.
 
 pub(super) mod front;
 mod markdown;
@@ -21,7 +21,7 @@ use sha2::{Digest as _, Sha256};
 use super::params::NoParams;
 use super::problem::Problem;
 
-/// The description of this service.
+/// The API description of this service.
 const OPENAPI_YAML: &str = include_str!("../../../openapi.yaml");
 
 /// A section for each type of problem.
@@ -29,7 +29,7 @@ const PROBLEMS: &str = include_str!("../../../docs/PROBLEMS.md");
 
 const STYLE: &str = include_str!("style.css");
 
-/// The description, read.
+/// The parsed description.
 static DESCRIPTION: LazyLock<Value> = LazyLock::new(|| {
     serde_yaml_ng::from_str(OPENAPI_YAML).expect("the description is well-formed, as its tests say")
 });
@@ -54,7 +54,7 @@ pub(super) async fn docs(_: NoParams) -> Result<Response, Problem> {
     Ok(html(&PAGE))
 }
 
-/// `GET /problems/{slug}`: what the `type` of a problem leads to.
+/// `GET /problems/{slug}`: the page that a problem's `type` links to.
 pub(super) async fn problem(
     uri: Uri,
     slug: Option<Path<String>>,
@@ -72,7 +72,7 @@ pub(super) async fn problem(
     Ok(html(&page(title.trim_start_matches("## "), &body)))
 }
 
-/// The section of the page of problems called `slug`, with its heading.
+/// The section about the problem called `slug`, with its heading.
 fn section(slug: &str) -> Option<&'static str> {
     let heading = format!("\n## {slug}\n");
     let start = PROBLEMS.find(&heading)? + 1;
@@ -81,7 +81,7 @@ fn section(slug: &str) -> Option<&'static str> {
     Some(&text[..end])
 }
 
-/// A whole page; `title` is text, `body` is HTML.
+/// A complete page; `title` is text, `body` is HTML.
 fn page(title: &str, body: &str) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -110,7 +110,7 @@ fn html(page: &str) -> Response {
     (headers, page.to_owned()).into_response()
 }
 
-/// `text` as it may stand in an element or an attribute.
+/// `text` escaped for use in an element or an attribute.
 fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {

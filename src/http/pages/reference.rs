@@ -1,4 +1,4 @@
-//! The reference: every operation with what it takes and answers, and every schema.
+//! The API reference: every operation with its parameters and answers, and every schema.
 
 use std::fmt::{self, Write as _};
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::{escape, markdown, schema};
 
-/// What stands between `<body>` and `</body>`.
+/// The content between `<body>` and `</body>`.
 pub(super) fn body(description: &Value) -> String {
     let page = Page { description };
     let mut text = String::new();
@@ -23,7 +23,7 @@ struct Page<'a> {
 struct Operation<'a> {
     method: String,
     path: &'a str,
-    /// Those of the path and its own.
+    /// Parameters of the path and its own.
     parameters: Vec<&'a Value>,
     about: &'a Value,
 }
@@ -141,7 +141,7 @@ impl<'a> Page<'a> {
         Ok(())
     }
 
-    /// The call on a command line, with the shortest body that is described.
+    /// An example call on a command line, with the shortest body in the description.
     fn curl(&self, operation: &Operation) -> String {
         let server = self.description["servers"][0]["url"].as_str();
         let method = match operation.method.as_str() {
@@ -160,7 +160,7 @@ impl<'a> Page<'a> {
         format!("curl {method}'{url}'{}", body.unwrap_or_default())
     }
 
-    /// Follow a reference within the description.
+    /// Resolve a reference within the description.
     fn resolve(&self, node: &'a Value) -> &'a Value {
         let pointer = node["$ref"]
             .as_str()

@@ -1,4 +1,4 @@
-//! A JSON schema for people: a line for a type, a table for an object.
+//! A JSON schema for people: one line for a type, a table for an object.
 
 use std::fmt::Write as _;
 
@@ -65,7 +65,7 @@ fn of_type(name: &str, schema: &Value) -> String {
     text
 }
 
-/// What it means, and what stands for it when it is absent.
+/// Its description and its default.
 pub(super) fn meaning(schema: &Value) -> String {
     let mut text = String::new();
     if let Some(description) = schema["description"].as_str() {
@@ -80,7 +80,7 @@ pub(super) fn meaning(schema: &Value) -> String {
     text
 }
 
-/// A section for a schema by its name.
+/// A section for the schema called `name`.
 pub(super) fn section(name: &str, schema: &Value) -> String {
     let name = escape(name);
     let fields = properties(schema).unwrap_or_else(|| format!("<p>{}</p>\n", kind(schema)));
@@ -93,7 +93,7 @@ pub(super) fn section(name: &str, schema: &Value) -> String {
     )
 }
 
-/// A table of an object's fields, those of objects within it included.
+/// A table of an object's fields, including those of nested objects.
 fn properties(schema: &Value) -> Option<String> {
     schema["properties"].as_object()?;
     let mut rows = String::new();

@@ -17,9 +17,9 @@ use crate::http::status::StatusDocument;
 use crate::job::{PlanId, Status};
 use crate::store::ListQuery;
 
-/// Plans on a page of the list, unless asked otherwise.
+/// Plans on a page by default.
 const DEFAULT_PAGE: usize = 50;
-/// Plans on a page of the list at most.
+/// Maximum number of plans on a page.
 pub(in crate::http) const MAX_PAGE: usize = 1000;
 
 /// A page of the list.
@@ -87,7 +87,7 @@ fn read_status(name: &str) -> Result<Status, Problem> {
     Status::from_name(name).ok_or_else(|| params::refused("status", name, &allowed()))
 }
 
-/// A cursor is the last id of the page before it; callers are not to know.
+/// A cursor is the last id of the previous page; callers should treat it as opaque.
 fn read_cursor(text: &str) -> Result<PlanId, Problem> {
     let bytes = BASE64
         .decode(text)

@@ -24,7 +24,7 @@ use super::status::{StatusDocument, etag};
 use super::{AppState, retry};
 use crate::job::{Plan, PlanId, Status};
 
-/// Between two looks at a waiting plan's place in the queue.
+/// Pause between checks of a waiting plan's place in the queue.
 const PLACE_LOOK: Duration = Duration::from_secs(1);
 
 /// `GET /plans/{id}`.
@@ -38,12 +38,12 @@ pub(super) async fn show(
 ) -> Result<Response, Problem> {
     let mut plan = caller.plan(&*state.store, id).await?;
     if let Some(wait) = wait {
-        // Who knows a version waits for another one; who knows none waits for the end.
+        // With a known version, wait for a different one; without, wait for the end.
         let changed = wait_for(&state, id, wait.duration(), |plan| match &known {
             Some(known) => !known.contain(&etag(plan)),
             None => plan.status.is_final(),
         });
-        // Few wait, and the others' futures need not have room for it.
+        // Few requests wait, so the future is boxed to keep the others' small.
         plan = Box::pin(changed).await?;
     }
 
@@ -57,7 +57,7 @@ pub(super) async fn show(
     };
     let headers = response.headers_mut();
     headers.insert(header::ETAG, tag);
-    // It may be kept, but must be asked for again each time.
+    // It may be cached, but must be revalidated each time.
     headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
     if let Some(wait) = wait {
         headers.insert(PREFERENCE_APPLIED, wait.applied());
@@ -107,14 +107,14 @@ pub(super) async fn delete(
             state.store.delete(id, state.clock.now_ms()).await?;
             state.instruments.origins.forget(id);
         }
-        // Whoever asks again had no answer the first time.
+        // Whoever repeats the request got no answer the first time.
         Err(Problem::Gone(_)) => precondition.check_removed(id)?,
         Err(problem) => return Err(problem),
     }
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// The plan as soon as it is `enough`, or as it is when the time or the service comes to its end.
+/// The plan once it is `enough`, or its current record when time runs out or the service stops.
 async fn wait_for(
     state: &AppState,
     id: PlanId,
@@ -131,7 +131,7 @@ async fn wait_for(
         if enough(&plan) {
             return Ok(plan);
         }
-        // Its place changes with other plans, of which nothing is heard here.
+        // Its place changes with other plans, whose changes are not signalled here.
         let moves = plan.status == Status::Queued;
         tokio::select! {
             changed = changes.changed() => if changed.is_err() { return Ok(plan) },

@@ -24,7 +24,7 @@ use crate::store::{StoreError, Submitted};
 use crate::telemetry::{Origin, spans};
 use crate::terrain::Terrain;
 
-/// `POST /plans`. What is asked is read before the future begins, which holds what is left of the request alone.
+/// `POST /plans`. The head is read before the future begins, which then holds only what is left of the request.
 pub(in crate::http) fn submit(
     State(state): State<AppState>,
     caller: Caller,
@@ -71,14 +71,14 @@ pub(in crate::http) fn submit(
     })
 }
 
-/// What a request says beside its document.
+/// What a request specifies apart from its document.
 struct Asked {
     validate_only: bool,
     webhook: Option<String>,
     once: Option<Once>,
     wait: Option<Wait>,
     announced: Announced,
-    /// `None` for a request that came past the layer that leaves it.
+    /// `None` for a request that bypassed the layer that sets it.
     origin: Option<Origin>,
 }
 
@@ -97,7 +97,8 @@ impl Asked {
     }
 }
 
-/// The plan of a request that came before, for what this one names may have gone since. `refusal` when none did.
+/// The plan of an earlier identical request, since what this one names may have gone meanwhile. `refusal` when there
+/// was none.
 async fn repeated(
     state: &AppState,
     caller: &Caller,
@@ -126,7 +127,7 @@ fn hand_in(
 ) -> impl Future<Output = Result<Submitted, Problem>> {
     let id = submission.id;
     if let Some(origin) = origin {
-        // Before it can be claimed.
+        // Must be set before the plan can be claimed.
         state.instruments.origins.remember(id, origin);
     }
     let submitting = state.store.submit(submission);
@@ -151,7 +152,7 @@ fn hand_in(
     }
 }
 
-/// What a plan is refused with that the store did not take.
+/// The problem for a plan that the store did not accept.
 async fn refusal(state: &AppState, error: StoreError) -> Problem {
     let room = async || -> Result<u64, StoreError> {
         Ok(retry::for_room(&state.store.stats().await?, state.capacity))
@@ -176,11 +177,11 @@ async fn refusal(state: &AppState, error: StoreError) -> Problem {
     }
 }
 
-/// The plan's end, or that it was accepted when that does not come in time or cannot be told.
+/// The plan's final record, or that it was accepted when the end does not come in time or cannot be read.
 async fn ended(state: &AppState, wait: Wait, plan: Plan, address: HeaderValue) -> Response {
     let is_over = |plan: &Plan| plan.status.is_final();
     let waited = wait_for(state, plan.id, wait.duration(), is_over).await;
-    // What is on the disk was accepted, whatever the store says of it since.
+    // A plan on the disk was accepted, whatever the store reports afterwards.
     let plan = waited.unwrap_or(plan);
     if !is_over(&plan) {
         return accepted(plan, address);
@@ -210,10 +211,10 @@ async fn refuse_when_draining(state: &AppState) -> Result<(), Problem> {
     Err(Problem::Draining { retry_after_s })
 }
 
-/// Length of a document, bytes, that is read in less time than it takes to hand it to another thread.
+/// A document of this length, bytes, is read in less time than it takes to hand it to another thread.
 const SHORT: usize = 4_096;
 
-/// What stands for the dataset of a scenario.
+/// Identifies the dataset of a scenario.
 fn dataset(terrain: &Terrain) -> Option<String> {
     match terrain {
         Terrain::Dem(dem) => Some(dem.sha256().to_owned()),
@@ -221,12 +222,12 @@ fn dataset(terrain: &Terrain) -> Option<String> {
     }
 }
 
-/// Whether reading a document may read files: a name can be hidden in escapes. What is no text is refused before.
+/// Whether reading a document may require files: escapes can hide a name. Invalid text is refused before that.
 fn may_name_a_dataset(document: &[u8]) -> bool {
     str::from_utf8(document).is_ok_and(|text| text.contains('\\') || text.contains("dataset"))
 }
 
-/// Read a document into a submission. Most are short and name nothing that has to be looked up.
+/// Read a document into a submission. Most are short and name nothing that must be looked up.
 async fn accept(state: &AppState, caller: &Caller, document: Bytes) -> Result<Submission, Problem> {
     if document.len() <= SHORT && !may_name_a_dataset(&document) {
         let scenario = json::read(&document, &state.rules, job::draw_seed())?;
@@ -237,7 +238,7 @@ async fn accept(state: &AppState, caller: &Caller, document: Bytes) -> Result<Su
     Box::pin(accept_slowly(state, caller, document)).await
 }
 
-/// Read any document into a submission, off the threads that answer.
+/// Read any document into a submission, off the request threads.
 async fn accept_slowly(
     state: &AppState,
     caller: &Caller,
@@ -274,7 +275,7 @@ fn submission(scenario: Scenario, caller: Caller, now_ms: i64) -> Submission {
     }
 }
 
-/// The answer to `?validate_only=true`. The accepted document is put in as the text it is.
+/// The answer to `?validate_only=true`. The accepted document is inserted as text.
 fn valid(submission: &Submission) -> Response {
     let document = format!(r#"{{"valid":true,"scenario":{}}}"#, submission.scenario);
     ([(header::CONTENT_TYPE, "application/json")], document).into_response()

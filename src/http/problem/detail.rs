@@ -1,11 +1,11 @@
-//! What a problem says to people.
+//! A problem's explanation for people.
 
 use super::Problem;
 use crate::http::auth::TooMany;
 use crate::store::{Tombstone, Trouble};
 
 impl Problem {
-    /// For people: what happened this time, and what would help.
+    /// For people: what happened in this case, and what would help.
     #[expect(clippy::too_many_lines, reason = "one table")]
     pub(super) fn detail(&self) -> String {
         match self {

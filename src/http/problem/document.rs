@@ -23,7 +23,7 @@ impl Problem {
         serde_json::to_string(&document).expect("every map key is a string")
     }
 
-    /// The members that only this kind of problem has.
+    /// The members specific to this kind of problem.
     fn more(&self) -> Value {
         match self {
             Self::InvalidScenario(faults) => {
@@ -64,7 +64,7 @@ fn error(fault: &Fault) -> Value {
     json!({"pointer": fault.pointer, "code": fault.code, "detail": fault.detail})
 }
 
-/// What stands in a status document for a failed plan: a problem without an instance.
+/// Describes a failed plan in a status document: a problem without an instance.
 #[derive(Debug, Serialize)]
 pub(in crate::http) struct FailureDocument {
     r#type: String,

@@ -1,4 +1,4 @@
-//! What goes wrong below, as problems.
+//! Converts errors from lower layers into problems.
 
 use std::io::ErrorKind;
 

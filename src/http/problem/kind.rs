@@ -1,11 +1,11 @@
-//! Which status, type and title for which error: the one table.
+//! Which status, type and title each error has: the one table.
 
 use axum::http::StatusCode;
 
 use super::Problem;
 use crate::job::FailureKind;
 
-/// What a kind of problem is called: status, the last part of `type`, title.
+/// The type of a problem: status, the last part of `type`, title.
 pub(super) type Kind = (StatusCode, &'static str, &'static str);
 
 const NO_GROUND: Kind = (
@@ -20,7 +20,7 @@ const INVALID_SCENARIO: Kind = (
     "The scenario cannot be planned",
 );
 
-/// Status and title of what a plan failed for: where a request is refused for the same, those.
+/// Status and title for the reason of a plan's failure; the same as for a request refused for that reason.
 pub(super) fn of_failure(name: &str) -> (StatusCode, &'static str) {
     let (status, _, title) = match FailureKind::named(name) {
         Some(FailureKind::NoGround) => NO_GROUND,

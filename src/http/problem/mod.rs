@@ -1,8 +1,7 @@
-//! What a request can be refused for: RFC 9457 problem documents.
+//! The reasons for refusing a request: RFC 9457 problem documents.
 //!
-//! A handler returns a [`Problem`]; its response carries it as an extension, and
-//! [`super::request_id`] writes the body, because only there the request's id is known. What only
-//! the operator should read goes to the log, not into a document.
+//! A handler returns a [`Problem`]; its response carries it as an extension, and [`super::request_id`] writes the body,
+//! because only there is the request's id known. Details for the operator only go to the log, not into a document.
 
 mod detail;
 mod document;
@@ -24,10 +23,10 @@ use crate::job::{Failure, PlanId, Status};
 use crate::scenario::json::Fault;
 use crate::store::{Tombstone, Trouble};
 
-/// Everything that a request can be refused for.
+/// Everything for which a request can be refused.
 #[derive(Debug, Clone)]
 pub(super) enum Problem {
-    /// What came is no request of HTTP.
+    /// The input is not an HTTP request.
     Malformed,
     /// Address and headers are too long, or too many; the limit in bytes.
     HeadTooLarge(usize),
@@ -35,9 +34,9 @@ pub(super) enum Problem {
     NoSuchResource(String),
     /// This node only runs plans, and has no route for the path.
     NotServedHere(String),
-    /// There never was such a plan, or nothing with that name can be one.
+    /// There never was such a plan, or the id is malformed.
     NoSuchPlan(String),
-    /// No dataset is called so.
+    /// No dataset has this name.
     NoSuchTerrain(String),
     /// The file cannot be used as a dataset; why.
     InvalidTerrain(String),
@@ -48,9 +47,9 @@ pub(super) enum Problem {
         /// How many.
         plans: u64,
     },
-    /// The dataset is a file of the operator's.
+    /// The dataset is one of the operator's files.
     TerrainMounted(String),
-    /// The dataset that a plan was made over is not there any more; why.
+    /// The dataset that a plan was made over no longer exists; why.
     NoGround(String),
     /// A plan or a dataset is not what the request expects; which.
     PreconditionFailed(String),
@@ -58,24 +57,24 @@ pub(super) enum Problem {
     TerrainTooLarge(u64),
     /// A dataset came too slowly; how long it may pause.
     UploadStalled(Duration),
-    /// As many datasets are coming in as may.
+    /// The maximum number of datasets is being uploaded.
     TooManyUploads(usize),
     /// The plan was removed.
     Gone(Tombstone),
     /// The path exists, the method does not; axum adds `Allow`.
     MethodNotAllowed,
-    /// None of the formats the caller accepts is there.
+    /// The caller accepts none of the available formats.
     NotAcceptable {
-        /// What the caller named.
+        /// What the caller accepts.
         asked: String,
-        /// What there is.
+        /// What is available.
         available: Vec<&'static str>,
     },
-    /// The body is of another kind, or of an unnamed one.
+    /// The body has a wrong media type, or none.
     UnsupportedMediaType {
-        /// What it is said to be.
+        /// The declared media type.
         found: Option<String>,
-        /// What it may be.
+        /// The allowed one.
         allowed: &'static str,
     },
     /// The body is compressed or otherwise coded; how.
@@ -84,13 +83,13 @@ pub(super) enum Problem {
     BodyTooLarge(usize),
     /// The body came too slowly; the limit.
     BodyTooSlow(Duration),
-    /// The body broke off.
+    /// The body was cut short.
     BodyIncomplete,
-    /// The chunks that the body comes in cannot be read.
+    /// The body's chunked coding is malformed.
     BodyUnreadable,
-    /// The body's transfer is coded in a way that is not read here; how.
+    /// The body has an unsupported transfer coding; which.
     UnsupportedTransferCoding(String),
-    /// The body is said to be gzip and is not; what the reader met.
+    /// The body is declared as gzip and is not; the reader's error.
     BodyNotGzip(String),
     /// The body is not JSON.
     InvalidJson {
@@ -100,7 +99,7 @@ pub(super) enum Problem {
         column: usize,
         /// As far as the reader got.
         pointer: String,
-        /// What the reader met.
+        /// The reader's error.
         detail: String,
     },
     /// A query parameter or a header cannot be read.
@@ -110,28 +109,28 @@ pub(super) enum Problem {
         /// The value and what is allowed.
         detail: String,
     },
-    /// A key stands in the address.
+    /// The address contains a key.
     KeyInUrl,
     /// The request is for another host; which.
     Misdirected(String),
-    /// The caller has shown nothing that lets them in.
+    /// The caller has sent nothing that grants access.
     Unauthorized(Unauthorized),
-    /// The caller's key has not this scope.
+    /// The caller's key lacks this scope.
     Forbidden(Scope),
     /// The body is JSON, but not a scenario that can be planned.
     InvalidScenario(Vec<Fault>),
     /// The plan has not ended yet.
     NotReady {
-        /// Which.
+        /// Which one.
         id: PlanId,
-        /// Where it stands.
+        /// Its present status.
         status: Status,
         /// When asking again makes sense, seconds.
         retry_after_s: u64,
     },
     /// The plan ended without a result.
     NoResult {
-        /// Which.
+        /// Which one.
         id: PlanId,
         /// How it ended.
         status: Status,
@@ -142,50 +141,50 @@ pub(super) enum Problem {
     NoGeodeticFrame(String),
     /// The format is for flying, the route breaks constraints; what would help.
     Infeasible(String),
-    /// No mission can be made as the options ask; why.
+    /// No mission can be made with the requested options; why.
     Unflyable(String),
-    /// The body is not XML that is read here; what the reader met.
+    /// The body is not XML that can be read; the reader's error.
     InvalidXml(String),
     /// The body is well-formed and holds no scenario.
     NoScenario {
         /// Why.
         detail: String,
-        /// What it holds instead.
+        /// What it contains instead.
         unused: Vec<Unused>,
     },
-    /// As many plans wait as may.
+    /// The maximum number of plans is waiting.
     QueueFull {
-        /// How many.
+        /// Number of waiting plans.
         queued: u64,
         /// See [`super::retry`].
         retry_after_s: u64,
     },
-    /// The caller has as many active plans as it may.
+    /// The caller has the maximum number of active plans.
     QuotaReached {
-        /// How many.
+        /// Number of active plans.
         active: u64,
-        /// How many it may have.
+        /// Maximum number.
         quota: u64,
         /// See [`super::retry`].
         retry_after_s: u64,
     },
     /// The caller asks faster than their key may.
     RateLimited {
-        /// Until the key may ask again.
+        /// Seconds until the key may be used again.
         retry_after_s: u64,
     },
-    /// As many event streams are open as may be.
+    /// The maximum number of event streams is open.
     TooManyStreams(TooMany),
-    /// The idempotency key came with another body before.
+    /// The idempotency key was used before with another body.
     IdempotencyKeyReused,
     /// Another request with the same idempotency key has not been accepted yet.
     IdempotencyInFlight,
-    /// The service is about to end.
+    /// The service is about to stop.
     Draining {
         /// See [`super::retry`].
         retry_after_s: u64,
     },
-    /// The store cannot be read or written now; `None` when another process has it.
+    /// The store cannot be read or written now; `None` when another process is using it.
     StoreUnavailable(Option<Trouble>),
     /// A defect of the service.
     Internal,
@@ -205,8 +204,8 @@ impl Problem {
         }
     }
 
-    /// What is left of the limit that the caller has met; the gate writes down that of a rate, which is told
-    /// with every answer.
+    /// What is left of the limit that the caller has reached; the gate writes that of a rate, which is sent with every
+    /// answer.
     fn allowance(&self) -> Option<Allowance> {
         match self {
             Self::QuotaReached { quota, .. } => Some(Allowance::none_left("plans", *quota)),
@@ -217,7 +216,7 @@ impl Problem {
         }
     }
 
-    /// What would let the caller in, RFC 6750 section 3.
+    /// What would give the caller access, RFC 6750 section 3.
     fn challenge(&self) -> Option<HeaderValue> {
         match self {
             Self::Unauthorized(Unauthorized::Nothing) => {
@@ -266,7 +265,7 @@ impl IntoResponse for Problem {
     }
 }
 
-/// Answers for a handler that panicked; the panic hook has written the log.
+/// Answers for a handler that panicked; the panic hook has logged it.
 pub(super) fn after_panic(_: Box<dyn Any + Send>) -> axum::http::Response<Body> {
     Problem::Internal.into_response()
 }

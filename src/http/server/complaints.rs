@@ -1,13 +1,13 @@
-//! What goes wrong again and again, in few lines.
+//! Repeated failures, logged in few lines.
 
 use std::time::Duration;
 
 use tokio::time::Instant;
 
-/// From one line to the next at least.
+/// Minimum pause between log lines.
 const PAUSE: Duration = Duration::from_secs(10);
 
-/// When a line is due, and what it stands for.
+/// When the next line is due, and how many failures it covers.
 #[derive(Debug, Default)]
 pub(super) struct Complaints {
     told: Option<Instant>,
@@ -15,7 +15,7 @@ pub(super) struct Complaints {
 }
 
 impl Complaints {
-    /// Something went wrong at `now`. How often it did since the last line, if there is to be one.
+    /// A failure at `now`. Returns the number of failures since the last line, if one is due.
     pub(super) fn count(&mut self, now: Instant) -> Option<u64> {
         self.untold += 1;
         if self.told.is_some_and(|told| now < told + PAUSE) {

@@ -1,4 +1,4 @@
-//! A caller's socket that says how much is taken from it, and what was wrong with a request that cannot be read.
+//! A caller's socket that reports how much is taken from it, and explains what was wrong with an unreadable request.
 
 use std::io::{self, IoSlice};
 use std::pin::Pin;
@@ -12,12 +12,12 @@ use super::traffic::Traffic;
 use super::unread;
 use crate::telemetry::Instruments;
 
-/// What is written to it counts as traffic once the system has taken it.
+/// Data written to it counts as traffic once the system has taken it.
 pub(super) struct Socket {
     pub(super) stream: TcpStream,
     pub(super) traffic: Arc<Traffic>,
     instruments: Arc<Instruments>,
-    /// What is left to be said in place of the last that was written.
+    /// What remains to be sent in place of hyper's last write.
     instead: Vec<u8>,
 }
 
@@ -31,7 +31,7 @@ impl Socket {
         }
     }
 
-    /// Whether something else is said in place of `bytes`, which then count as written.
+    /// Whether something else is sent in place of `bytes`, which then count as written.
     fn is_told_better(&mut self, bytes: &[u8]) -> bool {
         let Some(told) = unread::told_better(bytes, &self.instruments) else {
             return false;

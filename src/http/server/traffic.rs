@@ -1,8 +1,8 @@
-//! Whether anything still moves on a connection.
+//! Whether there is still any traffic on a connection.
 //!
-//! A caller who asks for nothing, whose request never has its whole head, or who takes nothing of what it asked
-//! for, holds a connection and whatever waits to be sent on it. Of these hyper knows the first two alone, only where
-//! it speaks HTTP/1, and winds up a clock for each request.
+//! A caller who asks for nothing, never completes a request's head, or takes nothing of what it asked for, holds a
+//! connection and whatever waits to be sent on it. hyper detects only the first two, only for HTTP/1, and starts a
+//! timer for each request.
 
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,27 +14,27 @@ use axum::response::Response;
 use hyper::body::{Frame, SizeHint};
 use tokio::time::Instant;
 
-/// An answer that may stand still for as long as it likes, says so by having this among its extensions.
+/// Among an answer's extensions, marks one that may stand still for as long as it likes.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::http) struct MayStandStill;
 
-/// So much has to be sent to count: more than pings and acknowledgements of HTTP/2, which go on while
-/// nobody asks for anything.
+/// Minimum number of bytes sent that count as traffic: more than HTTP/2's pings and acknowledgements, which continue
+/// while nobody asks for anything.
 const WORTH_NOTING: usize = 1024;
 
-/// What moves on one connection.
+/// The traffic on one connection.
 #[derive(Debug)]
 pub(super) struct Traffic(Mutex<State>);
 
 #[derive(Debug)]
 struct State {
-    /// Requests that are being worked on, and answers that may stand still.
+    /// Requests being worked on, and answers that may stand still.
     busy: usize,
-    /// When something last moved.
+    /// Time of the last traffic.
     moved: Instant,
-    /// Sent since, in bytes.
+    /// Bytes sent since then.
     unnoted: usize,
-    /// Whether something waits to be sent and is not taken.
+    /// Whether data is waiting that the caller does not take.
     held_up: bool,
 }
 
@@ -48,13 +48,13 @@ impl Traffic {
         }))
     }
 
-    /// A request has come. It moves until it is answered.
+    /// A request has come. The connection counts as active until it is answered.
     pub(super) fn begin(self: Arc<Self>) -> Busy {
         self.state().busy += 1;
         Busy(self)
     }
 
-    /// So many bytes have been taken from the service.
+    /// The caller has taken this many bytes.
     pub(super) fn sent(&self, bytes: usize) {
         let mut state = self.state();
         state.held_up = false;
@@ -64,17 +64,17 @@ impl Traffic {
         }
     }
 
-    /// What is to be sent next is not taken for now.
+    /// The caller does not take the next data for now.
     pub(super) fn hold_up(&self) {
         self.state().held_up = true;
     }
 
-    /// Whether there is something to be sent that is not taken.
+    /// Whether data is waiting that the caller does not take.
     pub(super) fn is_held_up(&self) -> bool {
         self.state().held_up
     }
 
-    /// Until nothing has moved for `time`, from now on.
+    /// Returns once there has been no traffic for `time`, counted from now at the earliest.
     pub(super) async fn still_for(&self, time: Duration) {
         let mut due = Instant::now() + time;
         loop {
@@ -103,12 +103,12 @@ impl State {
     }
 }
 
-/// What keeps a connection from standing still.
+/// Keeps a connection from counting as idle.
 #[derive(Debug)]
 pub(super) struct Busy(Arc<Traffic>);
 
 impl Busy {
-    /// What was begun is answered with this.
+    /// The request is answered with this.
     pub(super) fn answered(self, answer: Response) -> Response<Answer> {
         let may_stand_still = answer.extensions().get::<MayStandStill>().is_some();
         let busy = may_stand_still.then_some(self);
@@ -127,7 +127,7 @@ impl Drop for Busy {
 /// The body of an answer.
 pub(super) struct Answer {
     body: Body,
-    /// Of one that may stand still.
+    /// Held by an answer that may stand still.
     _busy: Option<Busy>,
 }
 
@@ -157,7 +157,7 @@ mod tests {
 
     const TIME: Duration = Duration::from_secs(30);
 
-    /// Seconds until `traffic` has stood still for [`TIME`].
+    /// Seconds until `traffic` has been still for [`TIME`].
     async fn still_after_s(traffic: &Traffic) -> u64 {
         let begin = Instant::now();
         traffic.still_for(TIME).await;

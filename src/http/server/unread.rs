@@ -1,5 +1,5 @@
-//! Requests that hyper refuses before anybody sees them: what it answers says nothing but a status, and nothing
-//! that can be set would make it say more.
+//! Requests that hyper refuses before any handler sees them: its answer holds nothing but a status, and no setting adds
+//! more.
 
 use std::str;
 
@@ -8,16 +8,16 @@ use crate::http::problem::Problem;
 use crate::http::request_id;
 use crate::telemetry::Instruments;
 
-/// No such answer is longer.
+/// Longer answers are not hyper's refusals.
 const MOST: usize = 200;
 
-/// What is said in place of `bytes`, if those are such an answer.
+/// What to send in place of `bytes`, if they are such a refusal.
 pub(super) fn told_better(bytes: &[u8], instruments: &Instruments) -> Option<Vec<u8>> {
     if bytes.len() > MOST || !bytes.starts_with(b"HTTP/1.1 4") {
         return None;
     }
     let text = str::from_utf8(bytes).ok()?;
-    // Answers of the service have more lines than these, and the date.
+    // The service's own answers have more header lines than these and the date.
     let (status, rest) = text.split_once("\r\nconnection: close\r\ncontent-length: 0\r\n")?;
     if !rest.starts_with("date: ") || rest.matches("\r\n").count() != 2 {
         return None;
@@ -35,7 +35,7 @@ pub(super) fn told_better(bytes: &[u8], instruments: &Instruments) -> Option<Vec
             told.extend_from_slice(part);
         }
     }
-    // It ends the head.
+    // The rest ends the head.
     told.extend_from_slice(rest.as_bytes());
     told.extend_from_slice(body.as_bytes());
     Some(told)

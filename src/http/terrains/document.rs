@@ -7,7 +7,7 @@ use crate::catalogue::Entry;
 use crate::geometry::geodesy::wrapped;
 use crate::terrain::dem::{Degrees, Format};
 
-/// What formats are called.
+/// Names of the formats.
 pub(super) const FORMATS: [(&str, Format); 3] = [
     ("geotiff", Format::GeoTiff),
     ("asc", Format::AsciiGrid),
@@ -35,7 +35,7 @@ pub(super) struct TerrainDocument {
     in_use: u64,
 }
 
-/// In the unit of the reference system.
+/// In units of the reference system.
 #[derive(Debug, Serialize)]
 struct Pair {
     x: f64,
@@ -55,7 +55,7 @@ pub(super) struct Corners<T> {
 }
 
 impl TerrainDocument {
-    /// `in_use` plans are queued or running over it.
+    /// `in_use` is the number of plans queued or running over it.
     pub(super) fn new(entry: Entry, in_use: u64) -> Self {
         let mounted = entry.is_mounted();
         let lattice = &entry.metadata.lattice;
@@ -93,7 +93,7 @@ impl TerrainDocument {
 }
 
 impl Corners<Place> {
-    /// As a scenario writes an area.
+    /// In the form in which a scenario gives an area.
     pub(super) fn of(degrees: Degrees) -> Self {
         let place = |lat: f64, lon: f64| Place {
             lat,

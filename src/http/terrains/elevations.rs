@@ -1,4 +1,4 @@
-//! `GET /terrains/{name}/elevations`: a dataset sampled on a grid of degrees, to be drawn.
+//! `GET /terrains/{name}/elevations`: a dataset sampled on a grid of degrees, for drawing.
 
 use axum::Json;
 use axum::extract::State;
@@ -16,11 +16,11 @@ use crate::http::problem::Problem;
 use crate::terrain::dem::Degrees;
 use crate::terrain::{DatasetError, Datasets};
 
-/// Samples along one side at most.
+/// Maximum number of samples along one side.
 const MOST_LOOKS_ALONG: usize = 512;
-/// Samples at most.
+/// Maximum number of samples.
 const MOST_LOOKS: usize = 131_072;
-/// Samples along one side, unless asked otherwise.
+/// Samples along one side by default.
 const LOOKS_ALONG: usize = 64;
 
 const PARAMETERS: [&str; 7] = [
@@ -54,7 +54,7 @@ pub(in crate::http) async fn elevations(
     let (tag, document) = sampled.map_err(|error| refusal(error, &name))?;
     let answer = match document {
         Some(document) => Json(document).into_response(),
-        // As compression says of the answer itself.
+        // As compression does for the answer itself.
         None => (
             StatusCode::NOT_MODIFIED,
             [(header::VARY, "accept-encoding")],
@@ -64,11 +64,11 @@ pub(in crate::http) async fn elevations(
     Ok(tagged(answer, Some(tag)))
 }
 
-/// What is asked of a dataset.
+/// The request for samples.
 struct Asked {
     name: String,
     sha256: Option<String>,
-    /// `None` is all of it.
+    /// `None` for all of it.
     area: Option<Degrees>,
     columns: usize,
     rows: usize,
@@ -91,7 +91,7 @@ impl Asked {
         })
     }
 
-    /// The content's entity tag, and its samples for who does not know them.
+    /// The content's entity tag, and its samples unless the caller has them already.
     fn sample(
         self,
         datasets: &dyn Datasets,
@@ -119,7 +119,7 @@ impl Asked {
     }
 }
 
-/// The entity tag of samples of a content. Weak, for compressed they are other bytes.
+/// The entity tag for samples of a content. Weak, because the bytes differ when compressed.
 fn weak_etag(sha256: &str) -> HeaderValue {
     HeaderValue::from_str(&format!("W/\"{sha256}\"")).expect("digits and quotes are visible ASCII")
 }
@@ -142,7 +142,7 @@ fn looks(params: &Params, name: &str) -> Result<usize, Problem> {
     Err(params::refused(name, &looks.to_string(), &allowed))
 }
 
-/// What was asked for; `None` is all of it.
+/// The requested area; `None` for all of it.
 fn area(params: &Params) -> Result<Option<Degrees>, Problem> {
     let degrees = |name: &str, most: f64| -> Result<Option<f64>, Problem> {
         let allowed = format!("degrees from {} to {most}", -most);
@@ -178,7 +178,7 @@ fn area(params: &Params) -> Result<Option<Degrees>, Problem> {
         let allowed = format!("more than south, {south}");
         return Err(params::refused("north", &north.to_string(), &allowed));
     }
-    // West is west, also across the antimeridian.
+    // The first longitude is the western one, also across the antimeridian.
     let east = if east > west { east } else { east + 360.0 };
     Ok(Some(Degrees {
         west,
@@ -188,7 +188,7 @@ fn area(params: &Params) -> Result<Option<Degrees>, Problem> {
     }))
 }
 
-/// From the south-west along the parallels, as a grid of a scenario goes.
+/// From the south-west along the parallels, in the order of a scenario's grid.
 fn places(area: Degrees, columns: usize, rows: usize) -> impl Iterator<Item = LatLon> {
     let at = |from: f64, to: f64, i: usize, n: usize| {
         let last = n - 1;

@@ -1,7 +1,7 @@
 //! Datasets: upload, list, show, delete, sample.
 //!
-//! All of them are everybody's to plan over; a name is its uploader's to change. Files are read and
-//! written on threads of their own, few at a time.
+//! Every dataset may be used in anybody's plans; only its uploader may change a name. Files are read and written on
+//! threads of their own, few at a time.
 
 mod document;
 mod elevations;
@@ -32,17 +32,17 @@ use crate::catalogue::{Catalogue, CatalogueError, Claim, Entry, Expected, Naming
 use crate::digest::sha256_hex;
 use crate::terrain::is_dataset_name;
 
-/// Uploads at the same time; more wait, as long as a body may pause.
+/// Uploads at the same time; further ones wait, as long as a body may pause.
 const UPLOADS: usize = 4;
 /// Uploads whose files are read through at the same time.
 const CHECKS: usize = 2;
 /// Scenarios and samples that may read from datasets at the same time.
 const READS: usize = 4;
 
-/// The datasets, and how much may be done with them at once.
+/// The datasets, and limits on concurrent work with them.
 #[derive(Clone)]
 pub struct Terrains {
-    /// Where they are.
+    /// Where they are kept.
     pub catalogue: Arc<dyn Catalogue>,
     uploads: Arc<Semaphore>,
     checks: Arc<Semaphore>,
@@ -50,7 +50,7 @@ pub struct Terrains {
 }
 
 impl Terrains {
-    /// Over a catalogue.
+    /// The datasets of a catalogue.
     #[must_use]
     pub fn new(catalogue: Arc<dyn Catalogue>) -> Self {
         Self {
@@ -61,7 +61,7 @@ impl Terrains {
         }
     }
 
-    /// Do something with the catalogue where it may block.
+    /// Use the catalogue on a thread that may block.
     async fn ask<T: Send + 'static>(
         &self,
         work: impl FnOnce(&dyn Catalogue) -> Result<T, CatalogueError> + Send + 'static,
@@ -70,14 +70,14 @@ impl Terrains {
         Ok(off_thread::run(move || work(&*catalogue)).await??)
     }
 
-    /// How many there are, as far as is known at once; behind no other work.
+    /// How many there are, as far as is known at once; never waits behind other work.
     pub(super) async fn tally(&self) -> Tally {
         let catalogue = self.catalogue.clone();
         let tally = tokio::task::spawn_blocking(move || catalogue.tally()).await;
         tally.unwrap_or_default()
     }
 
-    /// Do what reads from datasets, when fewer others do.
+    /// Do work that reads from datasets, once few enough others do.
     pub(super) async fn read<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
@@ -86,8 +86,8 @@ impl Terrains {
     }
 }
 
-/// Do `work` on a thread of its own once there is a permit; it is given back when the work is done,
-/// whoever waits for it.
+/// Do `work` on a thread of its own once there is a permit; the permit is returned when the work is done, even if
+/// nobody waits for it.
 async fn one_of_few<T: Send + 'static>(
     permits: &Arc<Semaphore>,
     work: impl FnOnce() -> T + Send + 'static,
@@ -102,7 +102,7 @@ async fn one_of_few<T: Send + 'static>(
     .await
 }
 
-/// The `{name}` of the path. What cannot be a name names nothing.
+/// The `{name}` of the path. An invalid name refers to no dataset.
 pub(super) struct Name(String);
 
 impl<S: Send + Sync> FromRequestParts<S> for Name {
@@ -116,7 +116,7 @@ impl<S: Send + Sync> FromRequestParts<S> for Name {
     }
 }
 
-/// What the caller does to a name, and under which condition.
+/// What the caller does to a name, and on which condition.
 fn naming(state: &AppState, name: String, caller: &Caller, headers: &HeaderMap) -> Naming {
     Naming {
         name,
@@ -129,7 +129,7 @@ fn naming(state: &AppState, name: String, caller: &Caller, headers: &HeaderMap) 
     }
 }
 
-/// What no dataset can be called is told from what none is called.
+/// Distinguishes an invalid dataset name from one that does not exist.
 fn check_name(name: &str) -> Result<(), Problem> {
     if is_dataset_name(name) {
         return Ok(());
@@ -138,7 +138,7 @@ fn check_name(name: &str) -> Result<(), Problem> {
     Err(params::refused("name", name, allowed))
 }
 
-/// What `If-Match` and `If-None-Match` say.
+/// The conditions in `If-Match` and `If-None-Match`.
 fn expected(headers: &HeaderMap) -> Expected {
     let matching = EntityTags::of(headers, header::IF_MATCH);
     let known = EntityTags::known(headers);
@@ -150,7 +150,7 @@ fn expected(headers: &HeaderMap) -> Expected {
     }
 }
 
-/// Of the entity tag of a content or of a document; names change with the first alone.
+/// The content's sum from the entity tag of a content or of a document; names change only with the content.
 fn content_of(tag: &str) -> String {
     let tag = tag.trim_matches('"');
     let content = tag.split_once(OF).map_or(tag, |(content, _)| content);
@@ -205,7 +205,7 @@ pub(super) async fn show(
     })
 }
 
-/// What is known of a dataset now, as it is sent.
+/// The current document of a dataset, as it is sent.
 async fn document(state: &AppState, entry: Entry) -> Result<String, Problem> {
     let uses = state.store.datasets_in_use().await?;
     let active = active(&uses, entry.sha256.as_deref());
@@ -224,12 +224,11 @@ fn tagged(mut answer: Response, tag: Option<HeaderValue>) -> Response {
     answer
 }
 
-/// Between the sum of a content and that of what is said of it, in a document's entity tag.
+/// In a document's entity tag, separates the content's sum from that of the document.
 const OF: char = '.';
 
-/// The entity tag of a document. It begins with its content's sum, so that a dataset can be replaced or
-/// deleted by it; what follows changes with all else that the document says, such as how many plans
-/// need it.
+/// The entity tag of a document. It begins with its content's sum, so that it can serve as the condition for replacing
+/// or deleting a dataset; the rest changes with everything else in the document, such as how many plans need it.
 fn document_etag(sha256: &str, document: &str) -> HeaderValue {
     let of_document = sha256_hex(document.as_bytes());
     etag(&format!("{sha256}{OF}{}", &of_document[..16]))
@@ -258,7 +257,7 @@ pub(super) async fn delete(
             found => found.map(Some),
         })
         .await?;
-    // Whoever asks again had no answer the first time.
+    // Whoever repeats the request got no answer the first time.
     let Some(sha256) = removed else {
         return Ok(StatusCode::NO_CONTENT);
     };

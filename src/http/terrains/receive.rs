@@ -1,4 +1,4 @@
-//! The body of an upload: to the disk as it comes, never in memory, not too long, not too slow.
+//! The body of an upload: written to disk as it arrives, never held in memory; limits on length and slowness.
 
 use std::io::Write as _;
 use std::time::Duration;
@@ -17,19 +17,19 @@ use crate::http::AppState;
 use crate::http::body::{Coding, announced_length, broken_off};
 use crate::http::problem::Problem;
 
-/// Bytes a second that must come on the whole: who sends less holds a place for nothing.
+/// Minimum average bytes a second: a slower sender would hold a place for nothing.
 const SLOWEST: f64 = 8.0 * 1024.0;
 
-/// Pieces on their way from the connection to the disk.
+/// Capacity of the channel from the connection to the disk.
 const PIECES: usize = 4;
 
-/// What the thread that writes is told.
+/// Messages to the writing thread.
 enum Piece {
     Bytes(Bytes),
     End,
 }
 
-/// The whole body as a file that has come.
+/// The whole body, once received, as a file.
 pub(super) async fn receive(
     state: &AppState,
     headers: &HeaderMap,
@@ -48,10 +48,10 @@ pub(super) async fn receive(
     let sink = Sink::new(staged.await?, coding);
     let (pieces, coming) = mpsc::channel(PIECES);
     let span = tracing::Span::current();
-    // It waits for its caller most of the time, and must not keep work from a core meanwhile.
+    // It mostly waits for its caller, so it must not take one of the per-core places for work.
     let writing = spawn_blocking(move || span.in_scope(|| write(sink, coming)));
     let sent = send(body, &pieces, timeout).await;
-    // What was cut off ends without its end, and is removed.
+    // An upload that was cut off never sends its end marker, and is removed.
     drop(pieces);
     let written = writing.await.unwrap_or(Err(Problem::Internal));
     drop(place);
@@ -78,16 +78,16 @@ async fn send(body: Body, pieces: &mpsc::Sender<Piece>, timeout: Duration) -> Re
         };
         let is_end = matches!(piece, Piece::End);
         let handed = Instant::now();
-        // It listens no more when it has failed, and says why.
+        // The writer stops listening when it has failed, and reports why.
         if pieces.send(piece).await.is_err() || is_end {
             return Ok(());
         }
-        // The disk's time is not the caller's.
+        // Time spent on the disk does not count against the caller.
         since += handed.elapsed();
     }
 }
 
-/// Where bytes go.
+/// Where the bytes are written.
 enum Sink {
     Plain(Staged),
     Gzip(Box<MultiGzDecoder<Staged>>),

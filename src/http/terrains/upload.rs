@@ -14,7 +14,7 @@ use crate::http::params::{self, Params};
 use crate::http::problem::Problem;
 use crate::terrain::dem::Format;
 
-/// Of a file, as its uploader calls it.
+/// Maximum length of the name that an uploader gives to a file.
 const MAX_FILENAME_CHARS: usize = 200;
 
 /// `PUT /terrains/{name}`.
@@ -28,7 +28,7 @@ pub(in crate::http) async fn put(
 ) -> Result<Response, Problem> {
     let said = Said::read(&name, &uri)?;
     let naming = naming(&state, name, &caller, &headers);
-    // Before a long body has been sent for nothing.
+    // Checked first, so that no long body is sent in vain.
     permit(&state.terrains, naming.clone()).await?;
     let staged = receive(&state, &headers, body).await?;
     let checked = check(&state.terrains, staged, said).await?;
@@ -40,9 +40,9 @@ pub(in crate::http) async fn put(
     })
 }
 
-/// What its uploader says of a file.
+/// What its uploader states about a file.
 struct Said {
-    /// `None` where the file tells.
+    /// `None` to detect it from the file.
     format: Option<Format>,
     declaration: Declaration,
 }
@@ -78,13 +78,13 @@ async fn permit(terrains: &Terrains, naming: Naming) -> Result<(), Problem> {
         .await
 }
 
-/// Read it through.
+/// Read the file through.
 async fn check(terrains: &Terrains, staged: Staged, said: Said) -> Result<Checked, Problem> {
     let check = move || staged.check(said.format, said.declaration);
     Ok(one_of_few(&terrains.checks, check).await??)
 }
 
-/// Give it its name.
+/// Store it under its name.
 async fn keep(
     terrains: &Terrains,
     checked: Checked,
@@ -101,7 +101,7 @@ async fn keep(
     Ok((kept, entry))
 }
 
-/// What the name stands for now.
+/// Answers with what the name now refers to.
 async fn answer(state: &AppState, entry: Entry) -> Result<Response, Problem> {
     let content = entry.sha256.as_deref().map(etag);
     let document = document(state, entry).await?;

@@ -1,11 +1,11 @@
-//! Where a webhook may go: to hosts of the public internet, over TLS. Callers name the address, so
-//! anything else would let them reach what only this machine can.
+//! Where a webhook may be sent: to hosts of the public internet, over TLS. Callers name the address, so anything else
+//! would let them reach what only this machine can.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 
 use axum::http::Uri;
 
-/// Longest address, bytes.
+/// Maximum length of an address, bytes.
 const MAX_LENGTH: usize = 2_000;
 
 /// An address that a webhook can be sent to.
@@ -18,11 +18,11 @@ pub(in crate::http) struct Target {
 }
 
 impl Target {
-    /// What is allowed instead.
+    /// The allowed addresses, for a refusal.
     pub(in crate::http) const ALLOWED: &'static str =
         "an https address without user or fragment, of at most 2000 characters";
 
-    /// Read an address; one of plain `http` only where private receivers are allowed.
+    /// Read an address; plain `http` is accepted only where private receivers are allowed.
     pub(in crate::http) fn read(text: &str, private: bool) -> Option<Self> {
         if text.len() > MAX_LENGTH || text.contains('#') {
             return None;
@@ -71,7 +71,7 @@ pub(super) fn is_public(address: IpAddr) -> bool {
     }
 }
 
-/// All but the blocks of IANA's registry of special purposes.
+/// All but the blocks in IANA's registry of special-purpose addresses.
 fn is_public_v4(address: Ipv4Addr) -> bool {
     let [a, b, c, _] = address.octets();
     !(a == 0
@@ -89,7 +89,7 @@ fn is_public_v4(address: Ipv4Addr) -> bool {
         || a >= 224)
 }
 
-/// Global unicast, `2000::/3`, but for its special blocks and those that hold an address of version 4.
+/// Global unicast, `2000::/3`, except its special blocks and those that embed an IPv4 address.
 fn is_public_v6(address: Ipv6Addr) -> bool {
     let [a, b, ..] = address.segments();
     (0x2000..0x4000).contains(&a)

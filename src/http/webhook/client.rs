@@ -1,4 +1,4 @@
-//! One request to a receiver: to an address that was looked at, without redirects, within a time.
+//! One request to a receiver: to an address that was checked, without redirects, within a time limit.
 
 use std::io;
 use std::net::SocketAddr;
@@ -18,7 +18,7 @@ use tokio_rustls::rustls::{ClientConfig, RootCertStore, crypto::ring};
 
 use super::address::{Target, is_public};
 
-/// For the whole of it: name, connection, request and the head of the answer.
+/// Time limit for all of it: name lookup, connection, request and the head of the answer.
 const TIMEOUT: Duration = Duration::from_secs(15);
 
 /// Sends webhooks.
@@ -29,7 +29,7 @@ pub(super) struct Client {
 }
 
 impl Client {
-    /// Trusting whom the machine trusts; `private` receivers are those not on the public internet.
+    /// A client with the machine's trusted certificates; `private` allows receivers outside the public internet.
     pub(super) fn new(private: bool) -> Self {
         let mut roots = RootCertStore::empty();
         let found = rustls_native_certs::load_native_certs();
@@ -51,7 +51,7 @@ impl Client {
         }
     }
 
-    /// The status of the answer to `body`.
+    /// Send `body`; returns the status of the answer.
     pub(super) async fn post(
         &self,
         target: &Target,
@@ -77,7 +77,8 @@ impl Client {
         send(self.tls.connect(name, stream).await?, request).await
     }
 
-    /// To the very address that was looked at: a name that answers otherwise the next time leads nowhere.
+    /// Connects to the very address that was checked, so a name that resolves differently the next time achieves
+    /// nothing.
     async fn connect(&self, target: &Target) -> io::Result<TcpStream> {
         let found = tokio::net::lookup_host((target.host.as_str(), target.port)).await?;
         let allowed: Vec<SocketAddr> = found
@@ -109,7 +110,7 @@ fn request(
     );
     let path = target.uri.path_and_query();
     let path = path.map_or("", |path| path.as_str());
-    // A query may follow the host without a path between them.
+    // A query may follow the host directly, without a path.
     let slash = if path.starts_with('/') { "" } else { "/" };
     let mut request = Request::new(Full::new(Bytes::from(body)));
     *request.method_mut() = Method::POST;
@@ -131,8 +132,8 @@ async fn send(
     let answer = tokio::select! {
         biased;
         answer = &mut answer => answer,
-        // However it ended: an answer that came before is there now, and what was heard is not to be sent again. Where
-        // there is none, its error says why.
+        // However the connection ended: an answer that came before is available now, and a delivered webhook must not
+        // be sent again. Where there is no answer, its error says why.
         _ = &mut connection => answer.await,
     };
     answer
@@ -149,7 +150,7 @@ mod tests {
 
     use super::*;
 
-    /// Breaks as soon as it has answered what was written to it, or in place of the answer.
+    /// Breaks as soon as it has answered what was written to it, or instead of answering.
     struct Breaking {
         answer: &'static [u8],
         heard: bool,

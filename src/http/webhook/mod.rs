@@ -1,7 +1,7 @@
-//! Webhooks: a plan's end, told to an address that its caller named.
+//! Webhooks: reports a plan's end to an address that its caller named.
 //!
-//! The store keeps what is to be told from the plan's acceptance until it has been told, so that a
-//! restart forgets nothing; a receiver may hear of an end twice and knows it by its id.
+//! The store keeps each webhook from the plan's acceptance until it has been delivered, so a restart forgets nothing; a
+//! receiver may be told of an end twice and recognises it by its id.
 
 mod address;
 mod client;
@@ -35,28 +35,28 @@ const WEBHOOK_ID: HeaderName = HeaderName::from_static("webhook-id");
 const WEBHOOK_TIMESTAMP: HeaderName = HeaderName::from_static("webhook-timestamp");
 const WEBHOOK_SIGNATURE: HeaderName = HeaderName::from_static("webhook-signature");
 
-/// How often the store is asked what is due.
+/// How often the store is asked for due webhooks.
 const LOOK: Duration = Duration::from_millis(500);
 
-/// Webhooks on their way at once.
+/// Webhooks in flight at once.
 const AT_ONCE: usize = 64;
 
-/// Pauses between tries to write down what came of one: the first, and the longest.
+/// Pauses between attempts to record the outcome: the first, and the longest.
 const WRITING_PAUSES: [Duration; 2] = [Duration::from_millis(250), Duration::from_secs(60)];
 
 /// How webhooks are sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Settings {
-    /// Shared with receivers.
+    /// The secret shared with receivers.
     pub secret: Secret,
-    /// Whether receivers may be elsewhere than on the public internet, and without TLS.
+    /// Whether receivers may be outside the public internet, and without TLS.
     pub allow_private: bool,
 }
 
-/// Where the caller wants to be told of the end.
+/// Where the caller wants to be told of the plan's end.
 ///
 /// # Errors
-/// An invalid parameter when it is no address to which webhooks go, or when there are none.
+/// An invalid parameter when webhooks may not go to the address, or when webhooks are disabled.
 pub(super) fn asked(
     settings: Option<&Settings>,
     headers: &HeaderMap,
@@ -76,11 +76,11 @@ pub(super) fn asked(
     Ok(Some(text))
 }
 
-/// Sends what is due, until it is dropped.
+/// Sends due webhooks, until dropped.
 pub struct Sender(JoinHandle<()>);
 
 impl Sender {
-    /// Send what `store` has to tell.
+    /// Send the webhooks in `store`.
     #[must_use]
     pub fn start(store: Arc<dyn Store>, settings: Settings, clock: Clock) -> Self {
         let client = Client::new(settings.allow_private);
@@ -104,7 +104,7 @@ struct Delivery {
     store: Arc<dyn Store>,
     settings: Settings,
     client: Client,
-    /// When to try; a receiver is told the time of the wall.
+    /// Decides when to try; receivers are sent wall-clock time.
     clock: Clock,
 }
 
@@ -117,7 +117,7 @@ async fn deliver_all(delivery: Arc<Delivery>) {
         tokio::select! {
             _ = looks.tick() => {}
             Some(ended) = tasks.join_next_with_id() => {
-                // One that broke is no longer on its way either.
+                // A webhook whose task panicked is no longer in flight either.
                 let task = ended.map_or_else(|broken| broken.id(), |(task, ())| task);
                 on_their_way.remove(&task);
                 continue;
@@ -143,10 +143,10 @@ async fn deliver_all(delivery: Arc<Delivery>) {
 }
 
 impl Delivery {
-    /// Try once, and write down what came of it.
+    /// Try once, and record the outcome.
     async fn deliver(&self, webhook: Webhook) {
         let (id, tries) = (webhook.plan.id, webhook.tries + 1);
-        // What breaks counts as tried, or it would break again at the next look.
+        // A panic counts as a try, or it would happen again at the next look.
         let trying = AssertUnwindSafe(self.try_once(webhook)).catch_unwind();
         let broke = |_| Err(std::io::Error::other("sending it broke"));
         let pause_ms = match trying.await.unwrap_or_else(broke) {
@@ -165,12 +165,12 @@ impl Delivery {
         self.write_down(id, next_ms).await;
     }
 
-    /// Again and again while the store fails: a webhook whose try is not written down is still due, and the next
-    /// look would send it once more.
+    /// Retries while the store fails: a webhook whose outcome is not recorded is still due, and the next look would
+    /// send it once more.
     async fn write_down(&self, id: PlanId, next_ms: Option<i64>) {
         let [mut pause, longest] = WRITING_PAUSES;
         while let Err(error) = self.store.webhook_tried(id, next_ms).await {
-            // Of a plan that has been deleted meanwhile nobody wants to hear.
+            // The plan has been deleted meanwhile, so there is nothing to record.
             if matches!(error, StoreError::NotFound(_) | StoreError::Gone(_)) {
                 return;
             }
@@ -204,7 +204,7 @@ impl Delivery {
     }
 }
 
-/// Milliseconds after which to try again. The address stays out of the log: it may hold the receiver's own secret.
+/// Milliseconds until the next try. The address stays out of the log: it may contain the receiver's own secret.
 fn again(id: PlanId, tries: u32, why: &str) -> Option<i64> {
     let jitter = f64::from(getrandom::u32().unwrap_or(u32::MAX / 2)) / f64::from(u32::MAX);
     if let Some(pause_ms) = retry::pause_ms(tries, jitter) {
@@ -217,11 +217,11 @@ fn again(id: PlanId, tries: u32, why: &str) -> Option<i64> {
     }
 }
 
-/// What is told.
+/// The body of a webhook.
 #[derive(Serialize)]
 struct Message {
     r#type: &'static str,
-    /// Of the end.
+    /// Time of the end.
     timestamp: String,
     data: StatusDocument,
 }

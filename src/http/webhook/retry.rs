@@ -1,4 +1,4 @@
-//! When a webhook that did not get through is tried again.
+//! When an undelivered webhook is tried again.
 
 /// Pauses after the first, the second, ... try, seconds; a day in all.
 const PAUSES_S: [i64; 8] = [
@@ -12,8 +12,8 @@ const PAUSES_S: [i64; 8] = [
     11 * 3600,
 ];
 
-/// Milliseconds from the `tries`th try to the next one; `None` when it was the last. `jitter`, from 0
-/// to 1, moves it by up to a fifth either way, so that what failed together does not come back together.
+/// Milliseconds from the `tries`th try to the next one; `None` when it was the last. `jitter`, from 0 to 1, shifts it
+/// by up to a fifth either way, so that webhooks that failed together are not retried together.
 pub(super) fn pause_ms(tries: u32, jitter: f64) -> Option<i64> {
     let position = usize::try_from(tries).ok()?.checked_sub(1)?;
     let pause_s = *PAUSES_S.get(position)?;

@@ -1,4 +1,4 @@
-//! What receivers know a webhook by: a signature of Standard Webhooks over id, time and body.
+//! How receivers verify a webhook: a Standard Webhooks signature over id, time and body.
 
 use std::fmt;
 
@@ -7,21 +7,21 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use hmac::{Hmac, KeyInit as _, Mac as _};
 use sha2::Sha256;
 
-/// What secrets are written with.
+/// Prefix of a secret's text form.
 const PREFIX: &str = "whsec_";
 
-/// Lengths of secrets, bytes, as Standard Webhooks asks.
+/// Lengths of secrets, bytes, as Standard Webhooks requires.
 const LENGTHS: std::ops::RangeInclusive<usize> = 24..=64;
 
-/// What the operator shares with receivers.
+/// The secret that the operator shares with receivers.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Secret(Vec<u8>);
 
 impl Secret {
-    /// Of the text of a file: `whsec_` and 24 to 64 bytes in base64.
+    /// Read the text of a file: `whsec_` and 24 to 64 bytes in base64.
     ///
     /// # Errors
-    /// What is allowed, without a word of what was there.
+    /// The allowed form, without repeating any of the text.
     pub fn read(text: &str) -> Result<Self, &'static str> {
         const ALLOWED: &str =
             "must be whsec_ and 24 to 64 bytes in base64, such as whsec_$(openssl rand -base64 32)";
@@ -71,7 +71,7 @@ mod tests {
         assert_eq!(format!("{secret:?}"), "Secret(..)");
     }
 
-    /// As `openssl dgst -sha256 -hmac` has it.
+    /// Compared with `openssl dgst -sha256 -hmac`.
     #[test]
     fn signs_id_time_and_body() {
         let secret =

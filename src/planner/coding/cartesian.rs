@@ -1,7 +1,7 @@
-//! A route as its waypoints: three numbers each, as most planners before the spherical vector have it.
+//! A route as its waypoints: three numbers each, as in most planners before the spherical vector.
 //!
-//! A position holds N waypoints: x and y within the area, and the height above ground within the
-//! band, or within what the ends allow besides. Nothing is assumed of how one waypoint lies to the next.
+//! A position holds N waypoints: x and y within the area, and the height above ground within the band, or within what
+//! the ends additionally allow. Nothing is assumed about how one waypoint lies relative to the next.
 
 use crate::cost::Model;
 use crate::cost::batch::{LANES, PointRow};
@@ -20,14 +20,14 @@ pub(in crate::planner) struct Cartesian<'s> {
 pub(in crate::planner) const PER_WAYPOINT: usize = 3;
 
 impl<'s> Cartesian<'s> {
-    /// The coding of routes of `scenario` with so many free waypoints.
+    /// The coding for routes of `scenario` with `waypoints` free waypoints.
     #[must_use]
     pub(in crate::planner) fn new(scenario: &'s Scenario, waypoints: usize) -> Self {
         let band = scenario.altitude;
         Self::within(scenario, waypoints, (band.min, band.max))
     }
 
-    /// With room for what only start and target allow, too: lower or higher than the band.
+    /// Also allows heights that only start and target have: lower or higher than the band.
     #[must_use]
     pub(in crate::planner) fn with_ends(model: &Model<'s>, waypoints: usize) -> Self {
         Self::within(model.scenario, waypoints, model.heights_anywhere())
@@ -44,7 +44,7 @@ impl<'s> Cartesian<'s> {
         }
     }
 
-    /// Where positions may lie.
+    /// The bounds of positions.
     #[must_use]
     pub(in crate::planner) fn bounds(&self) -> &Bounds {
         &self.bounds
@@ -64,8 +64,7 @@ impl<'s> Cartesian<'s> {
         route.push(self.scenario.target);
     }
 
-    /// As `decode`, of as many positions as there are lanes, but with free waypoints' heights above
-    /// ground.
+    /// As `decode`, for as many positions as there are lanes, but with free waypoints' heights above ground.
     pub(in crate::planner) fn decode_lanes(
         &self,
         positions: [&[f64]; LANES],
@@ -85,7 +84,7 @@ impl<'s> Cartesian<'s> {
         points.push(PointRow::splat(self.scenario.target));
     }
 
-    /// Write the position of `route` into `position`; what the bounds do not hold is cut off.
+    /// Write the position of `route` into `position`; values outside the bounds are clamped.
     pub(in crate::planner) fn encode(&self, route: &[Point3], position: &mut [f64]) {
         for (waypoint, point) in position.chunks_exact_mut(PER_WAYPOINT).zip(&route[1..]) {
             let ground = self.scenario.terrain.elevation(point.xy());
@@ -128,7 +127,7 @@ mod tests {
         }
     }
 
-    /// Where a vehicle takes off under the band, waypoints may lie under it, too.
+    /// Where a vehicle takes off below the band, waypoints may lie below it too.
     #[test]
     fn what_only_the_ends_allow_is_not_cut_off() {
         let mut scenario = scenario();

@@ -37,7 +37,7 @@ const PER_LEG: usize = 3;
 const SECTOR: f64 = std::f64::consts::FRAC_PI_4;
 
 impl<'s> Course<'s> {
-    /// The coding of routes of `scenario` with so many free waypoints, as many vectors.
+    /// The coding for routes of `scenario` with `waypoints` free waypoints, and as many vectors.
     #[must_use]
     pub(in crate::planner) fn new(scenario: &'s Scenario, legs: usize) -> Self {
         let way = scenario.target - scenario.start;
@@ -53,7 +53,7 @@ impl<'s> Course<'s> {
         }
     }
 
-    /// Where positions may lie.
+    /// The bounds of positions.
     #[must_use]
     pub(in crate::planner) fn bounds(&self) -> &Bounds {
         &self.bounds
@@ -93,7 +93,7 @@ mod tests {
         route
     }
 
-    /// A target due east: outside of the mirrored sector, in the middle of this one.
+    /// A target due east: outside the mirrored sector, in the middle of this one.
     #[test]
     fn straight_ahead_is_towards_the_target() {
         let mut scenario = scenario();

@@ -1,7 +1,7 @@
 //! Routes as points in a box: what the numbers of a position mean.
 //!
-//! A coding says where positions may lie and draws the route of one. Which algorithm searches in
-//! which coding is the table [`CODINGS`]; the optimizers know of none.
+//! A coding says where positions may lie and computes the route of one. The table [`CODINGS`] says which algorithm
+//! searches in which coding; the optimizers know none of them.
 
 mod cartesian;
 mod course;
@@ -28,7 +28,7 @@ pub(super) enum Coding<'s> {
     Course(Course<'s>),
 }
 
-/// Of a scenario and so many free waypoints.
+/// Makes the coding for a scenario and a number of free waypoints.
 type Make = for<'s> fn(&'s Scenario, usize) -> Coding<'s>;
 
 const SPHERICAL: Make =
@@ -48,8 +48,7 @@ const CODINGS: [(&str, Make); 6] = [
 ];
 
 impl<'s> Coding<'s> {
-    /// The coding that the algorithm of `scenario` searches in, of routes with so many free
-    /// waypoints.
+    /// The coding that the algorithm of `scenario` searches in, for routes with `waypoints` free waypoints.
     ///
     /// # Panics
     /// When that algorithm has no row in the table of codings.
@@ -62,7 +61,7 @@ impl<'s> Coding<'s> {
         make(scenario, waypoints)
     }
 
-    /// Where positions may lie.
+    /// The bounds of positions.
     pub(super) fn bounds(&self) -> &Bounds {
         match self {
             Self::Spherical(coding) => coding.bounds(),
@@ -80,8 +79,8 @@ impl<'s> Coding<'s> {
         }
     }
 
-    /// As `decode`, of as many positions as there are lanes; within rounding the same. The elevation below
-    /// free waypoints is written to `ground`.
+    /// As `decode`, for as many positions as there are lanes; the same within rounding. The elevation below free
+    /// waypoints is written to `ground`.
     pub(super) fn decode_lanes(
         &self,
         positions: [&[f64]; LANES],

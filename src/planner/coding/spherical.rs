@@ -37,7 +37,7 @@ pub(in crate::planner) struct Spherical<'s> {
 const PER_LEG: usize = 3;
 
 impl<'s> Spherical<'s> {
-    /// The coding of routes of `scenario` with so many free waypoints.
+    /// The coding for routes of `scenario` with `waypoints` free waypoints.
     #[must_use]
     pub(in crate::planner) fn new(scenario: &'s Scenario, waypoints: usize) -> Self {
         let legs = waypoints + 1;
@@ -65,7 +65,7 @@ impl<'s> Spherical<'s> {
         }
     }
 
-    /// Where positions may lie.
+    /// The bounds of positions.
     #[must_use]
     pub(in crate::planner) fn bounds(&self) -> &Bounds {
         &self.bounds
@@ -112,8 +112,8 @@ impl<'s> Spherical<'s> {
         route[last] = target;
     }
 
-    /// As `decode`, of as many positions as there are lanes, but with free waypoints' heights above
-    /// ground; within rounding the same.
+    /// As `decode`, for as many positions as there are lanes, but with free waypoints' heights above ground; the same
+    /// within rounding.
     pub(in crate::planner) fn decode_lanes(
         &self,
         positions: [&[f64]; LANES],
@@ -139,8 +139,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Whatever the position: the ends are exact, the turns within the limit but for the first
-        /// leg's own direction, the heights within the band.
+        /// Whatever the position: the ends are exact, the turns within the limit except for the first leg's own
+        /// direction, the heights within the band.
         #[test]
         fn every_position_is_a_route_within_turn_and_band(shares in prop::collection::vec(0.0..1.0f64, 33)) {
             let scenario = scenario();

@@ -1,6 +1,6 @@
-//! Systems of equations whose unknowns are tied to near ones alone.
+//! Systems of equations whose unknowns are coupled to near ones only.
 
-/// Unknowns that are tied lie at most so far apart: three waypoints of three coordinates each.
+/// Coupled unknowns are at most this far apart: three waypoints of three coordinates each.
 const REACH: usize = 8;
 
 /// A symmetric matrix, its lower half: of each row the entries up to the diagonal, which is the last.
@@ -23,7 +23,7 @@ impl Banded {
         }
     }
 
-    /// What a vector of unknowns gives.
+    /// The product with a vector of unknowns.
     #[cfg(test)]
     pub(super) fn times(&self, vector: &[f64]) -> Vec<f64> {
         let mut product = vec![0.0; vector.len()];
@@ -39,7 +39,8 @@ impl Banded {
         product
     }
 
-    /// The solution for `right` when `shifts` are added to the diagonal; `None` unless all is positive then.
+    /// The solution for `right` when `shifts` are added to the diagonal; `None` unless the matrix is then positive
+    /// definite.
     pub(super) fn solve(
         &self,
         shifts: impl Iterator<Item = f64>,

@@ -1,11 +1,11 @@
-//! Waypoints dealt out anew: a route has no more than it was given, and they count where it turns and climbs.
+//! Waypoints redistributed: a route has a fixed number, and they matter where it turns and climbs.
 
 use crate::geometry::Point3;
 
-/// Legs that it may be put on.
+/// Number of legs that it is tried on.
 const PLACES: usize = 4;
 
-/// `route` with its least waypoint put where limits are felt most: one for each of a few legs.
+/// `route` with its least useful waypoint put where limits are felt most: one route for each of a few legs.
 pub(super) fn deals(felt: &[f64], route: &[Point3]) -> Vec<Vec<Point3>> {
     let detour = |idx: &usize| {
         let [before, at, after] = [route[idx - 1], route[*idx], route[idx + 1]];

@@ -5,30 +5,30 @@ use super::limits::Limits;
 use super::merit::{Merit, Prices};
 use super::{Newton, Place};
 
-/// Steps at most.
+/// Maximum number of steps.
 const STEPS: usize = 12;
 
-/// Tries to damp one step.
+/// Attempts to damp one step.
 const TRIES: usize = 20;
 
-/// A step that is expected to gain less than this share is none.
+/// A step that is expected to gain less than this share is not taken.
 const NO_GAIN: f64 = 3e-7;
 
-/// No step is damped less,
+/// Least damping of a step.
 const LEAST_DAMPING: f64 = 1e-4;
 
-/// and the cost counts as bending with each coordinate by this much more, in metres flown over the hundredth of the way.
+/// Extra curvature assumed for each coordinate, in metres flown over the hundredth of the way.
 const SOFT: f64 = 1e-2;
 
-/// A step that gains this many times what was expected of it is gone on along, for so many doublings at most.
+/// A step that gains this many times what was expected is extended, for at most [`DOUBLINGS`] doublings.
 const AHEAD: f64 = 1.2;
 const DOUBLINGS: usize = 12;
 
-/// A step is taken if it gains this share of what was expected of it.
+/// A step is taken if it gains this share of what was expected.
 const TAKEN: f64 = 1e-3;
 
 impl Newton<'_, '_> {
-    /// Steps until none gains.
+    /// Take steps until none gains.
     pub(super) fn descend(
         &mut self,
         places: &mut Vec<Place>,
@@ -50,8 +50,8 @@ impl Newton<'_, '_> {
         merit
     }
 
-    /// Damp a step until it gains, take it, and tell how many times what was expected it gains; `None` where too little
-    /// is expected of any.
+    /// Damp a step until it gains, take it, and return its gain as a multiple of the expected one; `None` where too
+    /// little is expected of any step.
     fn step(
         &mut self,
         equations: &Equations,
@@ -100,7 +100,7 @@ impl Newton<'_, '_> {
         }
     }
 
-    /// Whether `step` gains more than `least`; then it is taken.
+    /// Whether `step` gains more than `least`; if so it is taken.
     fn gains(
         &mut self,
         step: &[f64],

@@ -6,11 +6,11 @@ use super::banded::Banded;
 /// Linear equations for a step of all free waypoints.
 pub(super) struct Equations {
     free: usize,
-    /// Second derivatives.
+    /// Second derivatives of the merit.
     pub(super) matrix: Banded,
-    /// Negative first ones.
+    /// Negative first derivatives.
     pub(super) down: Vec<f64>,
-    /// How much what a coordinate costs bends with it, all bends counting alike.
+    /// How strongly each coordinate's cost bends, with all bends counted as positive.
     stiffness: Vec<f64>,
 }
 
@@ -24,7 +24,7 @@ impl Equations {
         }
     }
 
-    /// The unknown that coordinate `idx` from those of waypoint `first` on is; none of start and target.
+    /// The index of the unknown for coordinate `idx` counted from waypoint `first` on; `None` for start and target.
     fn unknown(&self, first: usize, idx: usize) -> Option<usize> {
         let at = first + idx / 3;
         (at >= 1 && at <= self.free).then(|| 3 * (at - 1) + idx % 3)
@@ -51,7 +51,7 @@ impl Equations {
         }
     }
 
-    /// Add a penalty by the `gradient` of what it is for: so great a `force`, which grows by `rate` a metre.
+    /// Add a penalty by the `gradient` of its quantity: a `force` that grows by `rate` a metre.
     pub(super) fn press<const SIZE: usize>(
         &mut self,
         first: usize,
@@ -76,7 +76,7 @@ impl Equations {
         Some((step, expected))
     }
 
-    /// Ask for a figure to become so much less.
+    /// Ask for a quantity to decrease by this amount.
     pub(super) fn bring_back<const SIZE: usize>(
         &mut self,
         first: usize,

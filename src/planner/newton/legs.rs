@@ -8,7 +8,7 @@ use nalgebra::{Cholesky, Matrix6, SymmetricEigen};
 /// East, north and up, of both ends of a leg.
 pub(super) const ENDS: usize = 6;
 
-/// Of a waypoint: itself, a step on and back along each axis, and a step along two.
+/// Places around a waypoint: itself, a step in both directions along each axis, and a step along two.
 const AROUND: usize = 10;
 
 /// Places along two axes by these.
@@ -51,22 +51,22 @@ const MIXED: [(usize, usize, usize, usize); 15] = [
     (2, 5, 5, 5),
 ];
 
-/// Legs that are priced for the derivatives of one.
+/// Legs priced for the derivatives of one.
 pub(super) const LEGS_EACH: u64 = (FIRST.len() + MIXED.len()) as u64;
 
-/// What bends the other way by no more than this share of the most is as good as flat.
+/// Negative curvature of no more than this share of the greatest counts as zero.
 const FLAT: f64 = 1e-2;
 
 /// A leg by its ends.
 #[derive(Clone, Copy)]
 pub(super) struct Slopes {
-    /// Of the cost.
+    /// Gradient of the cost.
     pub(super) gradient: [f64; ENDS],
-    /// Of the cost; both halves.
+    /// Curvature of the cost; both halves.
     pub(super) curvature: [[f64; ENDS]; ENDS],
-    /// How far the leg breaks limits that no vehicle is asked about: threats, band and ground, metres.
+    /// How far the leg breaks limits that do not depend on the vehicle: threats, band and ground, metres.
     pub(super) beyond: f64,
-    /// Of that.
+    /// Gradient of `beyond`.
     pub(super) away: [f64; ENDS],
 }
 
@@ -160,7 +160,7 @@ impl Legs<'_, '_> {
         around
     }
 
-    /// Cost of each leg; and, if that is asked for, how far it is beyond what is not asked of a vehicle.
+    /// Cost of each leg; and, if `limits` are asked for, how far it breaks those that do not depend on the vehicle.
     fn price(&self, ends: &[[Point3; 2]], limits: bool) -> Vec<(f64, f64)> {
         let [from, to] = [0, 1].map(|end| PointRow::of(ends.iter().map(|ends| ends[end])));
         let mut prices = vec![Price::ZERO; from.len()];
@@ -183,7 +183,7 @@ impl Legs<'_, '_> {
     }
 }
 
-/// `curvature` without what bends the other way. Where a leg touches the edge of a soft zone, what it costs has no second
+/// `curvature` without its negative part. Where a leg touches the edge of a soft zone, its cost has no second
 /// derivative, and differences along both of two coordinates may see a zone that those along each do not.
 fn convex(curvature: &[[f64; ENDS]; ENDS]) -> [[f64; ENDS]; ENDS] {
     let matrix = Matrix6::from_fn(|i, j| curvature[i][j]);
@@ -199,7 +199,7 @@ fn convex(curvature: &[[f64; ENDS]; ENDS]) -> [[f64; ENDS]; ENDS] {
     std::array::from_fn(|i| std::array::from_fn(|j| convex[(i, j)]))
 }
 
-/// Less is rounding, metres.
+/// Less than this is rounding, metres.
 const NOTHING: f64 = 1e-9;
 
 /// The elevation of the ground below `points`.

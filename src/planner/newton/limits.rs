@@ -1,4 +1,4 @@
-//! How far a route is from what the vehicle, the band and the area allow, and how that changes with its waypoints.
+//! How far a route is from the limits of the vehicle, the band and the area, and how that changes with its waypoints.
 //!
 //! Each limit is a figure in metres that may not be above zero, with its derivatives by the coordinates of the up to
 //! three waypoints that it is about: east, north, and height above ground.
@@ -21,15 +21,15 @@ const HEADLESS: f64 = 1e-7;
 /// What is limited.
 #[derive(Clone, Copy)]
 pub(super) enum Limit {
-    /// Metres that a leg rises beyond the steepest climb; with -1 that it sinks.
+    /// Metres that a leg rises beyond the steepest climb; with sign -1, metres that it sinks beyond it.
     Climb { leg: usize, sign: f64 },
-    /// Of a leg.
+    /// Metres that a leg is too short.
     Short { leg: usize },
-    /// At a waypoint, to the left; with -1 to the right.
+    /// Turn at a waypoint beyond the limit, to the left; with sign -1 to the right.
     Turn { at: usize, sign: f64 },
-    /// Of a waypoint below the least height; with 1 above the greatest.
+    /// Metres of a waypoint below the least height; with sign 1 above the greatest.
     Height { at: usize, sign: f64 },
-    /// Of a waypoint beyond the area's edge on this axis, towards less; with 1 towards more.
+    /// Metres of a waypoint beyond the area's edge on this axis, downwards; with sign 1 upwards.
     Edge { at: usize, axis: usize, sign: f64 },
 }
 
@@ -48,12 +48,12 @@ pub(super) struct Limits<'m, 's> {
     steepest: f64,
     max_turn: f64,
     min_leg: f64,
-    /// What a radian of turning counts, metres: about a leg.
+    /// How many metres a radian of turning counts: about a leg.
     arm: f64,
     way: f64,
 }
 
-/// All limits of a route of so many waypoints, ends included.
+/// All limits of a route of this many points, ends included.
 pub(super) fn all(points: usize) -> Vec<Limit> {
     let both = [-1.0, 1.0];
     let legs = (0..points - 1).flat_map(|leg| {
@@ -157,8 +157,8 @@ impl<'m, 's> Limits<'m, 's> {
         }
     }
 
-    /// Of the heading d of a way (x, y) with r its length: the gradient is (-y, x) / r², the second
-    /// derivatives are 2xy / r⁴, (y² - x²) / r⁴ and -2xy / r⁴.
+    /// For the heading of a way (x, y) with r its length: the gradient is (-y, x) / r², the second derivatives are 2xy
+    /// / r⁴, (y² - x²) / r⁴ and -2xy / r⁴.
     fn turn(&self, at: usize, sign: f64, route: &[Point3]) -> Slope {
         let mut slope = Slope::from(at - 1);
         for (way_idx, way) in ways(route, at).into_iter().enumerate() {

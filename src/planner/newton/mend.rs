@@ -1,4 +1,4 @@
-//! The last micrometres: from a route that is all but within its limits to one that is.
+//! The last micrometres: from a route that is nearly within its limits to one that is.
 
 use std::iter::repeat;
 
@@ -7,21 +7,21 @@ use super::legs::LEGS_EACH;
 use super::limits::{Limit, Limits};
 use super::{Newton, Place};
 
-/// Steps that bring a route within its limits, at most.
+/// Maximum number of steps that bring a route within its limits.
 const MENDS: usize = 8;
 
-/// Limits that a route is brought back within are kept by this share of the way.
+/// Margin left when a route is brought back within its limits, as a share of the way.
 const MARGIN: f64 = 5e-9;
 
-/// Of a square metre beyond a limit the share that a square metre of moving counts as.
+/// Weight of a square metre of movement relative to a square metre beyond a limit.
 const LEAST: f64 = 1e-9;
 
 impl Newton<'_, '_> {
-    /// Move `places` as little as brings them within `all` limits: Gauss and Newton's method on what is beyond.
+    /// Move `places` as little as needed to bring them within `all` limits: Gauss-Newton on the breaches.
     pub(super) fn mend(&mut self, places: &mut [Place], limits: &Limits, all: &[Limit]) {
         let margin = MARGIN * self.way();
         let free = places.len() - 2;
-        // What was beyond once must not be again: its limit is kept as it is, to either side.
+        // A limit that was exceeded once must not be again: from then on it is held exactly, on both sides.
         let mut held = vec![false; all.len()];
         for _ in 0..MENDS {
             let slopes = self.legs().slopes(places);

@@ -1,18 +1,18 @@
-//! What the method makes smaller: the cost, and what limits that are broken or felt add to it.
+//! What the method minimises: the cost, and what broken or felt limits add to it.
 
 use super::equations::Equations;
 use super::legs::LEGS_EACH;
 use super::limits::{self, Limit, Limits, NEAR};
 use super::{Newton, Place};
 
-/// What the method makes smaller, at one place.
+/// The value minimised, at one place.
 pub(super) struct Merit {
     pub(super) value: f64,
     /// Greatest breach, metres.
     pub(super) worst: f64,
 }
 
-/// Multipliers, and how dear breaches are, a unit of cost for a square metre.
+/// Multipliers, and the price of breaches, a unit of cost for a square metre.
 pub(super) struct Prices {
     pub(super) limits: Vec<Limit>,
     pub(super) multipliers: Vec<f64>,
@@ -23,7 +23,7 @@ pub(super) struct Prices {
 }
 
 impl Prices {
-    /// Of a route of so many points, ends included, before any limit is felt.
+    /// For a route of this many points, ends included, before any limit is felt.
     pub(super) fn new(points: usize, rate: f64) -> Self {
         let limits = limits::all(points);
         Self {
@@ -34,7 +34,7 @@ impl Prices {
         }
     }
 
-    /// What a metre more would save along each leg by the limits that hold it.
+    /// How much one more metre would save along each leg, according to the limits that hold it.
     pub(super) fn felt(&self, legs: usize) -> Vec<f64> {
         let mut felt = vec![0.0; legs];
         for (limit, multiplier) in self.limits.iter().zip(&self.multipliers) {
@@ -52,7 +52,8 @@ impl Prices {
 }
 
 impl Newton<'_, '_> {
-    /// Feel each limit by as much as `places` are beyond it, and heights by how far they are off the middle of the band.
+    /// Update each limit's multiplier by how far `places` are beyond it, and the heights' by how far they are off the
+    /// middle of the band.
     pub(super) fn feel(&self, limits: &Limits, places: &[Place], prices: &mut Prices) {
         let route = self.route(places);
         for (limit, multiplier) in prices.limits.iter().zip(&mut prices.multipliers) {
@@ -102,7 +103,7 @@ impl Newton<'_, '_> {
         merit
     }
 
-    /// Second derivatives of what the method makes smaller, and the negative first ones.
+    /// Second derivatives of the merit, and the negative first ones.
     pub(super) fn equations(
         &mut self,
         places: &mut [Place],

@@ -35,46 +35,46 @@ use merit::Prices;
 #[derive(Clone, Copy)]
 struct Place {
     at: Point3,
-    /// Of the ground below, east and north.
+    /// Slope of the ground below, east and north.
     slope: [f64; 2],
 }
 
-/// Multipliers are set so many times at most.
+/// Maximum number of updates of the multipliers.
 const ROUNDS: usize = 14;
 
-/// A route that costs more than another by this share is given up as dear, after so many rounds.
+/// A route that costs more than another by this share is given up as too expensive, after [`SURE`] rounds.
 const HOPE: f64 = 0.003;
 const SURE: usize = 2;
 
-/// A search begins with this damping, as a share of how much the cost bends with each coordinate,
+/// Damping at the start of a search, as a share of how much the cost bends with each coordinate.
 const DAMPING: f64 = 0.1;
 
-/// and no round with a greater one.
+/// Greatest damping that a round begins with.
 const MOST_DAMPING: f64 = 1e2;
 
-/// Where breaches shrink to no less than this share, time after time, no way within the limits is near.
+/// If breaches repeatedly shrink to no less than this share, no way within the limits is near.
 const LOST: f64 = 0.7;
 
 /// Differences are taken over this share of the way.
 const STEP: f64 = 2e-5;
 
-/// A limit that is this near, as a share of it, is felt.
+/// A limit within this share of being reached is felt.
 const FELT: f64 = 2e-3;
 
-/// A route this near to its limits, as a share of the way, is mended and done.
+/// A route this near to its limits, as a share of the way, is mended and finished.
 const KEPT: f64 = 1e-6;
 
-/// How dear a breach of the hundredth of the way is to begin with, a metre of it in metres flown; the second where
-/// with the first, which lets a route bend more freely, it lost its way.
+/// Initial price of a breach of the hundredth of the way, a metre of it in metres flown; the second is for routes that
+/// got lost with the first, which lets a route bend more freely.
 const RATES: [f64; 2] = [5.0, 500.0];
 
-/// A metre flown counts this share of the other weights at least, in the scales of the method.
+/// Least weight of a metre flown relative to the other weights, in the scales of the method.
 const FREE: f64 = 0.01;
 
-/// How many times as dear breaches become that have not shrunk to a quarter.
+/// Factor by which breaches become more expensive when they have not shrunk to a quarter.
 const DEARER: f64 = 3.0;
 
-/// What is gained in a round that is worth another, as a share of the cost.
+/// Gain of a round that is worth another, as a share of the cost.
 const WORTH: f64 = 3e-6;
 
 /// Searches for the best route near one.
@@ -82,14 +82,14 @@ pub(super) struct Newton<'m, 's> {
     model: &'m Model<'s>,
     pricer: Pricer<'s>,
     stop: &'m dyn Stop,
-    /// Routes priced, about.
+    /// Approximate number of routes priced.
     pub(super) evaluations: u64,
 }
 
 impl<'m, 's> Newton<'m, 's> {
     pub(super) fn new(model: &'m Model<'s>, stop: &'m dyn Stop) -> Self {
         let tolerance = model.tolerance.scaled(PRICED_FROM);
-        // Climbs are limits of the vehicle, looked at apart.
+        // Climbs are limits of the vehicle, handled separately.
         let mut blind = tolerance;
         blind.angle_deg = 360.0;
         Self {
@@ -100,7 +100,7 @@ impl<'m, 's> Newton<'m, 's> {
         }
     }
 
-    /// Improve `route`, or put in its place what becomes of one of `others`; as it is, where nothing better that
+    /// Improve `route`, or replace it by what one of `others` becomes; it stays as it is where nothing better that
     /// keeps the limits is found.
     pub(super) fn improve(&mut self, route: &mut Vec<Point3>, others: &[Vec<Point3>]) -> Fitness {
         let mut best = price(self.model, route);
@@ -139,7 +139,7 @@ impl<'m, 's> Newton<'m, 's> {
         }
     }
 
-    /// Whether as much was priced as the bats were asked to.
+    /// Whether as many routes were priced as the bats' budget allows.
     fn is_spent(&self) -> bool {
         let settings = &self.model.scenario.planner;
         self.evaluations >= (settings.population * settings.iterations) as u64
@@ -166,8 +166,8 @@ impl<'m, 's> Newton<'m, 's> {
         better
     }
 
-    /// The best route near `route`, and what is felt of limits along each of its legs; given up where it would cost
-    /// more than `known`.
+    /// The best route near `route`, and the forces of limits along each of its legs; given up where it would cost more
+    /// than `known`.
     fn search(&mut self, route: &[Point3], rate: f64, known: f64) -> (Vec<Point3>, Vec<f64>) {
         let way = self.way();
         let limits = Limits::of(self.model, route.len() - 2);
@@ -215,7 +215,7 @@ impl<'m, 's> Newton<'m, 's> {
         }
     }
 
-    /// A metre flown, over the hundredth of the way; where fuel is for nothing, a little of what else counts.
+    /// Cost of a metre flown, over the hundredth of the way; where fuel is free, a little of the other weights.
     fn dear(&self) -> f64 {
         let weights = &self.model.scenario.weights;
         let least = FREE * weights.threat.max(weights.altitude);
@@ -253,19 +253,19 @@ impl<'m, 's> Newton<'m, 's> {
     }
 }
 
-/// Whether the limits of turning and climbing have a say in the shape of `route`.
+/// Whether the limits of turning and climbing influence the shape of `route`.
 pub(super) fn is_felt(model: &Model, route: &[Point3]) -> bool {
     let limits = Limits::of(model, route.len() - 2);
     let way = (model.scenario.target - model.scenario.start).norm();
     let reach = -FELT * way / (route.len() - 1) as f64;
     limits::all(route.len()).into_iter().any(|limit| {
-        // Neither asks for heights above ground.
+        // Neither needs heights above ground.
         matches!(limit, Limit::Climb { .. } | Limit::Turn { .. })
             && limits.beyond(limit, &[], route) > reach
     })
 }
 
-/// What a route may cost that is still to become better than the best.
+/// Maximum cost of a route that may still become better than the best.
 fn known(best: Fitness) -> f64 {
     if best.is_feasible() {
         best.cost

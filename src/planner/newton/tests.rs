@@ -1,4 +1,4 @@
-//! The derivatives are those of what is made smaller, and what comes of a route is better and keeps the limits.
+//! The derivatives are those of the merit, and the resulting route is better and keeps the limits.
 
 use super::equations::advance;
 use super::*;
@@ -16,7 +16,7 @@ fn stiff() -> Scenario {
     scenario.planner.waypoints = 8;
     (scenario.planner.population, scenario.planner.iterations) = (200, 200);
     (scenario.start.z, scenario.target.z) = (100.0, 100.0);
-    // The first is in the way at once.
+    // The first radar is in the way at once.
     scenario.threats = vec![radar(270.0, 180.0, 75.0), radar(560.0, 520.0, 110.0)];
     scenario
 }
@@ -39,7 +39,7 @@ fn arc(scenario: &Scenario, free: usize, bulge: f64, off: f64, random: &mut Rand
     route
 }
 
-/// Along random directions, what the equations say and what two steps show.
+/// Along random directions, compares the equations with two steps.
 #[test]
 fn derivatives_are_those_of_the_merit() {
     let mut random = Random::new(11);
@@ -89,7 +89,7 @@ fn derivatives_are_those_of_the_merit() {
                 .sum();
             let scale = 1.0 + bend.abs().max(expected.abs());
             assert!(bend - expected < accuracy * scale, "{bend} {expected}");
-            // What bends the other way in soft zones and over hills is left out.
+            // Negative curvature in soft zones and over hills is left out.
             if scenario.threats.is_empty() && scenario.terrain.is_flat() {
                 assert!(expected - bend < accuracy * scale, "{bend} {expected}");
             }
@@ -97,7 +97,7 @@ fn derivatives_are_those_of_the_merit() {
     }
 }
 
-/// Whatever a route looks like to begin with, it ends at the one that is best about there, within the limits.
+/// Whatever a route looks like to begin with, it ends at the best one nearby, within the limits.
 #[test]
 fn routes_that_lead_one_way_end_as_one() {
     let scenario = stiff();
@@ -139,7 +139,7 @@ fn a_bend_is_moved_as_a_whole() {
     assert!(newton.evaluations > 0);
 }
 
-/// Another route takes the place of the first if more comes of it, and only then.
+/// Another route replaces the first only if it leads to a better one.
 #[test]
 fn the_better_one_of_several_is_taken() {
     let scenario = stiff();
@@ -178,7 +178,7 @@ fn limits_that_nothing_comes_near_are_not_felt() {
     assert!(!is_felt(&model, &route));
 }
 
-/// Weights of nothing, ends above each other and other rims give a route as good as before, or a better one.
+/// Zero weights, ends above each other and other edge cases give a route at least as good as before.
 #[test]
 fn what_counts_for_nothing_does_no_harm() {
     let mut random = Random::new(4);

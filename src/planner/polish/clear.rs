@@ -1,14 +1,14 @@
 //! The best way that breaks no limit, where one is known already: the route itself.
 //!
-//! What breaks a limit, and what cannot become cheaper than the known way, is left out from the start, so
-//! that little is left to join. Legs may be found to break a limit later; what they have no part in stays.
+//! Whatever breaks a limit, or cannot become cheaper than the known way, is left out from the start, so that little is
+//! left to join. Legs may be found to break a limit later; results that do not involve them stay.
 
 use super::turns::Turns;
 use super::ways::{CHOICES, Each, Leg, Pairs, count};
 use crate::geometry::Vector2;
 
-/// Costs are summed from either end; a way dearer than the known one by more than this share is dearer in
-/// truth.
+/// Costs are summed from either end; a way more expensive than the known one by more than this share really is more
+/// expensive.
 const ROUNDING: f64 = 1e-9;
 
 /// Every place: a bit for each.
@@ -17,7 +17,7 @@ const ALL: u16 = (1 << CHOICES) - 1;
 /// Joins legs to ways that break no limit.
 pub(super) struct ClearWays {
     turns: Turns,
-    /// More than this the way may not cost.
+    /// Maximum cost of the way.
     limit: f64,
     legs: Vec<Joint>,
 }
@@ -26,12 +26,12 @@ pub(super) struct ClearWays {
 struct Joint {
     /// What it costs; infinite where it breaks a limit.
     own: Pairs,
-    /// What the target costs from its end, at least.
+    /// Lower bound of the cost from its end to the target.
     rest: Each,
     /// What it costs to its end from the start, and from which place of the waypoint before.
     reached: Pairs,
     from: [[u8; CHOICES]; CHOICES],
-    /// Places from which it is worse than the last time.
+    /// Places from which it is worse than last time.
     touched: u16,
 }
 

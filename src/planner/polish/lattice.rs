@@ -13,7 +13,7 @@ use crate::cost::{Model, Tolerance};
 use crate::geometry::{LEVEL, Point2, Point3, Vector2};
 use crate::optimizer::Fitness;
 
-/// To join the legs again costs more than to measure a few that may be asked for next.
+/// Joining the legs again costs more than measuring a few that may be needed next.
 const AT_ONCE: usize = 3 * LANES;
 
 /// The new places, as shares of the step along the route, across it, and up.
@@ -36,7 +36,7 @@ const fn pattern(diagonal: f64) -> [[f64; 3]; LANES] {
 pub(super) struct Lattice<'m, 's> {
     model: &'m Model<'s>,
     pricer: Pricer<'s>,
-    /// Where a leg that breaks a limit is worth nothing.
+    /// For searches in which a leg that breaks a limit is worth nothing.
     verdicts: Pricer<'s>,
     tolerance: Tolerance,
     /// Tangent of the steepest climb.
@@ -54,7 +54,7 @@ pub(super) struct Lattice<'m, 's> {
     clear: ClearWays,
     /// Place of each waypoint on the best way.
     chosen: Vec<usize>,
-    /// Of each leg, by the places of its ends: whether its heights are in its price.
+    /// For each leg, by the places of its ends: whether its heights are in its price.
     measured: Vec<[[bool; CHOICES]; CHOICES]>,
     from: Vec<PointRow>,
     to: Vec<PointRow>,
@@ -99,9 +99,8 @@ impl<'m, 's> Lattice<'m, 's> {
         }
     }
 
-    /// Move the waypoints of `route` to the best combination of places one `step` away; `turn` tells one
-    /// sweep from the next. Of a route that is not `feasible`, a unit of violation costs `rate`. Whether any
-    /// waypoint moved.
+    /// Move the waypoints of `route` to the best combination of places one `step` away; `turn` distinguishes sweeps. If
+    /// the route is not `feasible`, a unit of violation costs `rate`. Returns whether any waypoint moved.
     pub(super) fn sweep(
         &mut self,
         route: &mut [Point3],
@@ -125,8 +124,8 @@ impl<'m, 's> Lattice<'m, 's> {
         moved
     }
 
-    /// Choose the best way where the route keeps every limit; the best way then keeps them, too. Above hills
-    /// legs are priced at best, and measured until all those of the best way are as good as that.
+    /// Choose the best way where the route keeps every limit; the best way then keeps them too. Above hills legs are
+    /// priced as if they kept their heights, and measured until all those of the best way are proven to.
     fn find_clear(&mut self, last: usize) -> bool {
         self.price_legs(last, self.hilly);
         self.clear.set(&self.legs);
@@ -182,7 +181,7 @@ impl<'m, 's> Lattice<'m, 's> {
         (waypoint.violation[0], waypoint.cost[0]) = price(own, below);
         for (lane, [.., rise]) in PATTERNS[turn % 2].into_iter().enumerate() {
             let mut raised = height + rise * step;
-            // F3 has its kink at the middle of the band: no step may miss it.
+            // F3 has its kink at the middle of the band: no step may skip it.
             if (height - middle) * (raised - middle) < 0.0 {
                 raised = middle;
             }
@@ -299,7 +298,7 @@ impl<'m, 's> Lattice<'m, 's> {
     /// Add a leg as number `idx` of those priced lane by lane.
     fn push_leg(&mut self, idx: usize, a: Point3, b: Point3) {
         if idx.is_multiple_of(LANES) {
-            // Lanes that are left over repeat a leg.
+            // Unused lanes repeat a leg.
             self.from.push(PointRow::splat(a));
             self.to.push(PointRow::splat(b));
         } else {

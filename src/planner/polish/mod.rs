@@ -17,25 +17,24 @@ use ways::paid;
 pub(super) struct Steps {
     /// Greatest step, as a share of the way.
     pub(super) from: f64,
-    /// Least.
+    /// Least step.
     pub(super) to: f64,
-    /// A gain below this share of the cost is none.
+    /// A gain below this share of the cost does not count.
     pub(super) gain: f64,
-    /// What a metre or degree beyond a limit costs at the greatest step, in metres flown. It grows as
-    /// the step shrinks, and at the least one no cost makes up for it: a short way that breaks limits is
-    /// so mended where it is, not led round everything that makes way for it.
+    /// Cost of a metre or degree beyond a limit at the greatest step, in metres flown. It grows as the step shrinks,
+    /// and at the least step no cost makes up for it: so a short way that breaks limits is repaired where it is, not
+    /// led round everything that gets in its way.
     pub(super) violation_m: f64,
 }
 
-/// By which a route may still become cheaper, as a share, when the greatest step gains no more; at
-/// half that step half as much.
+/// By what share a route may still become cheaper when the greatest step gains no more; at half that step half as much.
 const HOPE: f64 = 0.12;
 
-/// What is beyond limits must shrink by this share for a sweep to be worth another: what cannot be mended
-/// would else shrink by less and less for ever.
+/// Violation must shrink by this share for a sweep to be worth another: otherwise what cannot be repaired would shrink
+/// by less and less for ever.
 const MENDED: f64 = 1e-3;
 
-/// By which a violation becomes dearer as the step is halved.
+/// Factor by which a violation becomes more expensive as the step is halved.
 const DEARER: f64 = 8.0;
 
 /// Polishes routes of one scenario.
@@ -54,7 +53,7 @@ impl<'m, 's> Polish<'m, 's> {
         }
     }
 
-    /// What was priced, in routes of so many free waypoints.
+    /// Routes priced, for routes of `waypoints` free waypoints.
     pub(super) fn evaluations(&self, waypoints: usize) -> u64 {
         self.lattice.legs_priced.div_ceil(waypoints as u64 + 1)
     }

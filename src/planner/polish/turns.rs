@@ -3,7 +3,7 @@
 use crate::cost::{Model, Tolerance};
 use crate::geometry::{Vector2, wrap_angle};
 
-/// Cosines nearer than this to that of the greatest turn are not decided by it.
+/// Turns whose cosine is within this of the greatest turn's are not decided by the cosine.
 const NEAR_LIMIT: f64 = 1e-9;
 
 /// Cosines farther than this below it are those of turns that count as too far: no angle is nearer to
@@ -19,7 +19,7 @@ pub(super) struct Turns {
 }
 
 impl Turns {
-    /// Of `model`, where they count beyond `tolerance`.
+    /// For `model`, where turns count beyond `tolerance`.
     pub(super) fn new(model: &Model, tolerance: Tolerance) -> Self {
         let max_turn_deg = model.scenario.vehicle.max_turn_deg;
         Self {

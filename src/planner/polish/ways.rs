@@ -15,7 +15,7 @@ pub(super) type Each = [f64; CHOICES];
 /// A number for each pair of places of two neighbours, by the first one's place.
 pub(super) type Pairs = [Each; CHOICES];
 
-/// Where a waypoint may go; an end of the route stays, and none but its own place counts.
+/// Where a waypoint may go; an end of the route stays, and only its own place counts.
 pub(super) struct Waypoint {
     pub(super) own: Point3,
     pub(super) new: PointRow,
@@ -43,12 +43,12 @@ struct Reached {
 
 const EMPTY: Pairs = [[0.0; CHOICES]; CHOICES];
 
-/// Places that waypoint `idx` of a route up to `last` has.
+/// Number of places of waypoint `idx` of a route up to `last`.
 pub(super) fn count(idx: usize, last: usize) -> usize {
     if idx == 0 || idx == last { 1 } else { CHOICES }
 }
 
-/// `fitness` with a cost of `rate` in place of each unit of violation, if it is finite.
+/// `fitness` with each unit of violation replaced by a cost of `rate`, if that is finite.
 pub(super) fn paid(fitness: Fitness, rate: f64) -> Fitness {
     if rate.is_finite() {
         Fitness {
@@ -63,7 +63,7 @@ pub(super) fn paid(fitness: Fitness, rate: f64) -> Fitness {
 /// Joins legs to ways.
 pub(super) struct Ways {
     turns: Turns,
-    /// What a unit of violation costs; infinite where no cost makes up for it.
+    /// Cost of a unit of violation; infinite where no cost makes up for it.
     rate: f64,
     /// By leg.
     reached: Vec<Reached>,
@@ -73,12 +73,12 @@ pub(super) struct Ways {
 struct Order {
     places: [usize; CHOICES],
     count: usize,
-    /// How many break limits as little as the first.
+    /// How many break limits as little as the first one.
     least: usize,
 }
 
 impl Ways {
-    /// Of routes of `model`, whose turns count beyond `tolerance`.
+    /// For routes of `model`, whose turns count beyond `tolerance`.
     pub(super) fn new(model: &Model, tolerance: Tolerance) -> Self {
         Self {
             turns: Turns::new(model, tolerance),
@@ -87,8 +87,7 @@ impl Ways {
         }
     }
 
-    /// Find the best way to the end of every one of `legs` between places, where a unit of violation costs
-    /// `rate`.
+    /// Find the best way to the end of every one of `legs` between places, where a unit of violation costs `rate`.
     pub(super) fn reach(&mut self, legs: &mut [Leg], rate: f64) {
         self.rate = rate;
         self.reached.clear();
@@ -130,7 +129,7 @@ impl Ways {
         let order = Order::of(sources, price);
         for c in 0..count(leg_idx + 1, last) {
             let onto = Vector2::new(leg.east[b][c], leg.north[b][c]);
-            // Of those that break limits by no more than the best, the first that need not turn too far.
+            // Among those that break limits no more than the best, the first that does not require too sharp a turn.
             let straight = order.least().find(|&from| turns.allow(way(from), onto));
             let (arrival, from) = if let Some(from) = straight {
                 (price(from), from)
@@ -234,7 +233,7 @@ impl Leg {
         north: EMPTY,
     };
 
-    /// Put a cost of `rate` in place of each unit of violation, if it is finite.
+    /// Replace each unit of violation by a cost of `rate`, if that is finite.
     fn pay(&mut self, rate: f64) {
         let violations = self.violation.iter_mut().flatten();
         for (violation, cost) in violations.zip(self.cost.iter_mut().flatten()) {
@@ -246,7 +245,7 @@ impl Leg {
         }
     }
 
-    /// Add what the places of `b` cost, and the ways from those of `a`, of which so many count.
+    /// Add the cost of the places of `b`, and of the ways from those of `a`, the first `count` of which are valid.
     pub(super) fn finish(&mut self, a: &Waypoint, b: &Waypoint, count: usize) {
         let xs = Waypoint::each(b.own.x, &b.new.x);
         let ys = Waypoint::each(b.own.y, &b.new.y);

@@ -1,9 +1,9 @@
-//! Ways down a mountain too steep to be flown straight down: along its flanks, as steeply as the vehicle can.
+//! Ways down a mountain too steep to fly straight down: along its flanks, as steeply as the vehicle can.
 //!
-//! A net of places has no such ways unless its legs happen to run along the contours, and a straight leg between two
-//! places on a steep flank leaves the band of altitudes. A walker finds them: it goes straight for the target where the
-//! ground lets it, and elsewhere turns aside, always to the same side, until the ground under it is only as steep as it
-//! may be.
+//! A net of places has no such ways unless its legs happen to follow the contours, and a straight leg between two
+//! places on a steep flank leaves the altitude band. A walker finds them: it goes straight for the target where the
+//! ground allows, and elsewhere turns aside, always to the same side, until the ground under it is just steep enough to
+//! fly.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,37 +16,37 @@ use crate::geometry::{Point2, Point3, Vector2};
 use crate::planner::price::PRICED_FROM;
 use crate::scenario::Scenario;
 
-/// How steep the ground under the walker may be, as shares of what the vehicle can climb. The route lies inside its bends,
-/// and where it has few waypoints it must make do with less.
+/// How steep the ground under the walker may be, as shares of what the vehicle can climb. The route lies inside its
+/// bends, and needs a lower share where it has few waypoints.
 const SHARES: [f64; 3] = [0.6, 0.85, 0.97];
 
-/// To which side it turns aside.
+/// The side to which it turns aside.
 const SIDES: [f64; 2] = [1.0, -1.0];
 
 /// Its steps, as a share of the direct way.
 const STEP: f64 = 0.005;
 
-/// One that has not arrived after so many walks in circles.
+/// A walker that has not arrived after this many steps is going in circles.
 const STEPS: usize = 4_000;
 
-/// The most that it turns at a step, radians.
+/// Its greatest turn per step, radians.
 const TURN: f64 = 0.12;
 
-/// Whoever goes round a mountain goes on until the target lies ahead, no more than this to either side, radians: to turn back
-/// to it sooner leads to and fro on one flank, where the bends take the waypoints.
+/// A walker going round a mountain continues until the target is ahead, no more than this to either side, radians:
+/// turning back sooner leads to and fro on one flank, where the bends use up the waypoints.
 const AHEAD: f64 = 0.5;
 
-/// Along its way a place is kept at each so many radians of turning,
+/// A place is kept along the way for each of this many radians of turning.
 const PLACE_TURN: f64 = 0.15;
 
-/// and at each such share of it,
+/// A place is kept for each such share of the way's length.
 const PLACE_SHARE: f64 = 0.05;
 
-/// but not more than this.
+/// Maximum number of places kept.
 const PLACES: usize = 120;
 
-/// Routes that follow the ground round mountains, from the higher end to the lower; none where the way straight ahead is not
-/// too steep. Once `is_over`, those that have been found.
+/// Routes that follow the ground round mountains, from the higher end to the lower; none where the straight way is not
+/// too steep. Once `is_over`, those found so far.
 pub(super) fn routes(model: &Model, is_over: &dyn Fn() -> bool) -> Found {
     let scenario = model.scenario;
     let tolerance = model.tolerance.scaled(PRICED_FROM);
@@ -61,8 +61,8 @@ pub(super) fn routes(model: &Model, is_over: &dyn Fn() -> bool) -> Found {
         }
         if let Some(way) = walk(scenario, side, share * steepest(scenario)) {
             let (route, legs_priced) = thin(model, &pricer, &places(scenario, &way, PLACES));
-            // The best places for as few waypoints may be those of a short cut that breaks one limit by far, in place of
-            // many by a little, which are soon mended.
+            // For few waypoints the best places may be those of a short cut that breaks one limit by far, instead of
+            // many by a little, which are easily repaired.
             let even = places(scenario, &way, scenario.planner.waypoints);
             found.routes.extend([route, even]);
             found.legs_priced += legs_priced;
@@ -71,7 +71,7 @@ pub(super) fn routes(model: &Model, is_over: &dyn Fn() -> bool) -> Found {
     found
 }
 
-/// The way of the walker, from the start to the target; `None` when it never had to turn aside, or does not arrive.
+/// The way of the walker, from the start to the target; `None` when it never had to turn aside, or did not arrive.
 fn walk(scenario: &Scenario, side: f64, steep: f64) -> Option<Vec<Point2>> {
     let ends = [scenario.start, scenario.target].map(|end| end.xy());
     let height = |at: Point2| scenario.terrain.elevation(at);
@@ -97,7 +97,7 @@ fn walk(scenario: &Scenario, side: f64, steep: f64) -> Option<Vec<Point2>> {
         is_aside = rise.norm() > steep && (is_too_steep || goes_on);
         was_aside |= is_aside;
         let wanted = if is_aside {
-            // Down from where it comes from, even where that leads round the back, and up to where it goes.
+            // Downhill from the start, even where that leads round the back, and uphill to the target.
             let is_near = (to - at).norm() < (from - at).norm();
             let goes_up = is_near && height(at) < height(to);
             let fall_line = heading_of(if goes_up { rise } else { -rise });
@@ -117,7 +117,7 @@ fn walk(scenario: &Scenario, side: f64, steep: f64) -> Option<Vec<Point2>> {
     was_aside.then_some(way)
 }
 
-/// Metres by which the ground rises in a metre, and where to.
+/// Metres that the ground rises per metre, and in which direction.
 fn rise(scenario: &Scenario, at: Point2, step: f64) -> Vector2 {
     let height = |x: f64, y: f64| scenario.terrain.elevation(Point2::new(at.x + x, at.y + y));
     Vector2::new(
@@ -134,12 +134,12 @@ fn towards(heading: f64) -> Vector2 {
     Vector2::new(libm::cos(heading), libm::sin(heading))
 }
 
-/// The same angle, from -π to π.
+/// The same angle, within -π to π.
 fn wrapped(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
 }
 
-/// So many places along a way, or fewer where that has few bends, in the middle of the band.
+/// At most `most` places along a way, fewer where it has few bends, in the middle of the band.
 fn places(scenario: &Scenario, way: &[Point2], most: usize) -> Vec<Point3> {
     let whole: f64 = way.windows(2).map(|step| (step[1] - step[0]).norm()).sum();
     let progress = |steps: &[Point2]| {
@@ -206,7 +206,7 @@ mod tests {
                 let way = walk(&scenario, side, steep).expect("it arrives");
                 assert_eq!(way[0], scenario.start.xy());
                 assert_eq!(way[way.len() - 1], scenario.target.xy());
-                // Where it has turned as it wants, the ground under it is as steep as it may be.
+                // Once it has turned as it wants, the ground under it is as steep as allowed.
                 let slopes = way.windows(2).skip(20).map(|step| {
                     let heights = [step[0], step[1]].map(|at| scenario.terrain.elevation(at));
                     (heights[1] - heights[0]).abs() / (step[1] - step[0]).norm()

@@ -1,4 +1,4 @@
-//! Routes of as many waypoints as asked for.
+//! Routes with exactly the requested number of waypoints.
 
 use super::{spare, surplus};
 use crate::cost::Model;

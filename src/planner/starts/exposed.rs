@@ -1,16 +1,16 @@
-//! Whether the best start pays so much for soft zones that a way far about may be cheaper.
+//! Whether the best start pays so much for soft zones that a long detour may be cheaper.
 
 use crate::cost::{Model, metre};
 use crate::geometry::Point3;
 
-/// A route pays much for soft zones if they are this share of what it pays for its way.
+/// A route pays much for soft zones if they cost this share of what its length costs.
 const MUCH: f64 = 0.1;
 
-/// Nets do not reach farther about than this, in direct ways: their steps would be too long.
+/// Nets reach no farther than this multiple of the direct way: their steps would be too long.
 const FARTHEST: f64 = 4.0;
 
-/// How many times longer than the direct way a cheaper way than `route` may be, where that is worth a look: a way
-/// whose fuel alone costs more is not cheaper.
+/// How many times longer than the direct way a cheaper way than `route` may be, if it is worth a look: a way whose fuel
+/// alone costs more is not cheaper.
 pub(super) fn detour(model: &Model, route: &[Point3]) -> Option<f64> {
     let scenario = model.scenario;
     let quadrature = scenario.planner.quadrature;
@@ -26,7 +26,7 @@ mod tests {
     use crate::planner::tests::scenario;
     use crate::scenario::Weights;
 
-    /// Straight through the soft zones a way costs more than one that is longer by as much.
+    /// Crossing the soft zones straight costs more than a way that is longer by as much.
     #[test]
     fn ways_are_looked_for_as_far_about_as_they_may_pay() {
         let mut scenario = scenario();

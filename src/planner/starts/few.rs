@@ -1,8 +1,9 @@
-//! Chains of no more legs than a route may have, none of them turned into more sharply than the vehicle can.
+//! Chains of no more legs than a route may have, with no turn sharper than the vehicle can fly.
 //!
-//! The cheapest chain of all may have a leg too many, or bend too sharply; what is left when its waypoints are left
-//! out may be far from what so few allow, which is another way altogether. Here chains are told apart by their last
-//! leg and by how many they have: A*, with what the rest costs at least with as many legs as are left, turns apart.
+//! The cheapest chain of all may have a leg too many, or bend too sharply; what is left after removing its waypoints
+//! may be far from the best way with so few, which can be an entirely different one. Here chains are distinguished by
+//! their last leg and by their number of legs: A*, with a lower bound of the rest of the cost for the remaining number
+//! of legs, ignoring turns.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -12,10 +13,10 @@ pub(super) trait Legs {
     /// How many places there are.
     fn places(&self) -> usize;
 
-    /// What the leg from one place to each costs at least; infinite where there is none.
+    /// A lower bound of the cost of the leg from one place to each; infinite where there is none.
     fn onward(&self, from: usize) -> &[f64];
 
-    /// What a leg costs, where that is only looked at when its turn comes.
+    /// The cost of a leg, where it is only computed when its turn comes.
     fn cost(&mut self, from: usize, to: usize) -> f64 {
         self.onward(from)[to]
     }
@@ -24,18 +25,18 @@ pub(super) trait Legs {
     fn may_turn(&self, corner: [usize; 3]) -> bool;
 }
 
-/// A chain on its way.
+/// A chain under construction.
 #[derive(Clone, Copy)]
 struct Chain {
     place: usize,
-    /// The one that it goes on from, of all chains; its own number at the start.
+    /// Index of the chain that it extends; its own index at the start.
     before: usize,
     legs: usize,
     cost: f64,
 }
 
-/// The places of chains of at most `most` legs, the cheapest first, until one that `is_last`, or until so many chains
-/// were looked at as `effort` tells.
+/// The places of chains of at most `most` legs, the cheapest first, until one that `is_last`, or until `effort` chains
+/// have been looked at.
 pub(super) fn chains(
     legs: &mut impl Legs,
     (most, effort): (usize, usize),
@@ -94,10 +95,10 @@ pub(super) fn chains(
     }
 }
 
-/// What chains cost that are known, by their last leg and by how many they have.
+/// The costs of known chains, by their last leg and number of legs.
 struct Known {
     most: usize,
-    /// Of each place that chains go on from: by the next, what the cheapest of at most 0, 1, … legs costs.
+    /// For each place that chains go on from: by the next place, the cost of the cheapest with at most 0, 1, … legs.
     onward: Vec<Vec<f64>>,
 }
 
@@ -109,14 +110,14 @@ impl Known {
         }
     }
 
-    /// What the cheapest costs that comes from the place `from` to where `chain` ends, in no more legs.
+    /// The cost of the cheapest chain that comes from the place `from` to where `chain` ends, in no more legs.
     fn least(&self, from: usize, chain: &Chain) -> f64 {
         let onward = &self.onward[from];
         let idx = chain.place * (self.most + 1) + chain.legs;
         onward.get(idx).copied().unwrap_or(f64::INFINITY)
     }
 
-    /// Know a `chain` that comes from the place `from`.
+    /// Record a `chain` that comes from the place `from`.
     fn note(&mut self, from: usize, chain: &Chain) {
         let (places, counts) = (self.onward.len(), self.most + 1);
         let onward = &mut self.onward[from];
@@ -129,7 +130,7 @@ impl Known {
     }
 }
 
-/// What the cheapest chains from each place to the target cost, of at most 0, 1, … legs, turns apart.
+/// The cost of the cheapest chains from each place to the target with at most 0, 1, … legs, ignoring turns.
 fn rest(legs: &impl Legs, most: usize) -> Vec<Vec<f64>> {
     let count = legs.places();
     let mut none = vec![f64::INFINITY; count];
@@ -168,7 +169,7 @@ mod tests {
 
     const SHARPEST: f64 = 0.0;
 
-    /// Legs between random points, some of which turn out not to be there.
+    /// Legs between random points, some of which turn out to be missing.
     struct Net {
         points: Vec<Point3>,
         costs: Vec<Vec<f64>>,
@@ -207,7 +208,7 @@ mod tests {
                 .sum()
         }
 
-        /// What the cheapest costs of all chains that go on from `chain`, which itself costs `cost`.
+        /// The cost of the cheapest of all chains that extend `chain`, which itself costs `cost`.
         fn cheapest(&mut self, chain: &mut Vec<usize>, cost: f64, most: usize) -> f64 {
             let last = chain[chain.len() - 1];
             if last + 1 == self.places() {

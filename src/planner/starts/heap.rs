@@ -1,4 +1,4 @@
-//! Waypoints that lie on one place, put apart: none such leave the planner.
+//! Separates waypoints that coincide: none such leave the planner.
 
 use super::spare::NOTHING;
 use super::with_waypoints;
@@ -6,17 +6,17 @@ use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::planner::price::price;
 
-/// Waypoints nearer than this, metres, are one.
+/// Waypoints nearer than this, metres, count as coinciding.
 const ONE_PLACE: f64 = 1e-6;
 
-/// So far apart, metres, are those put that every farther place makes dearer.
+/// Distance, metres, between waypoints that become more expensive with any larger one.
 const HAIR: f64 = 1e-3;
 
-/// A waypoint tells a direction from here on, metres.
+/// A waypoint at this distance or more defines a direction, metres.
 const FAR: f64 = 1.0;
 
-/// `route` with waypoints that lie on one place spread along its legs, or a hair apart where that is dearer; as it is,
-/// where it breaks more.
+/// `route` with coinciding waypoints spread along its legs, or a hair apart where spreading costs more; unchanged where
+/// that breaks more limits.
 pub(in crate::planner) fn spread(model: &Model, route: Vec<Point3>) -> Vec<Point3> {
     let mut apart = route.clone();
     apart.dedup_by(|next, before| (*next - *before).norm() < ONE_PLACE);
@@ -36,8 +36,8 @@ pub(in crate::planner) fn spread(model: &Model, route: Vec<Point3>) -> Vec<Point
     apart
 }
 
-/// Those that lie on one place, one after the other along the leg that leads away, or along the one that leads to it at
-/// the end.
+/// Coinciding waypoints are placed one after the other along the leg that leads away, or, at the end, along the one
+/// that leads there.
 fn a_hair_apart(route: &[Point3]) -> Vec<Point3> {
     let mut apart = route.to_vec();
     let last = route.len() - 1;
@@ -81,7 +81,7 @@ mod tests {
         assert!((price(&model, &apart).cost - price(&model, &heap).cost).abs() < 1e-6);
     }
 
-    /// Where one place alone is in the middle of the band, those that crowd there part by a hair.
+    /// Where only one place is in the middle of the band, the waypoints crowded there are put a hair apart.
     #[test]
     fn waypoints_on_the_best_place_are_put_a_hair_apart() {
         let mut scenario = scenario();

@@ -1,10 +1,10 @@
-//! A known route as one to start from.
+//! A known route as a start.
 
 use crate::cost::Model;
 use crate::geometry::Point3;
 
-/// From start to target through `points`, in which the ends may be named; points outside of the
-/// area or of the heights that are allowed there are brought in.
+/// From start to target through `points`, which may include the ends; points outside the area or the allowed heights
+/// are brought inside.
 pub(super) fn route(model: &Model, points: &[Point3]) -> Vec<Point3> {
     let scenario = model.scenario;
     let near =

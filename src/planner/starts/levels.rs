@@ -1,5 +1,5 @@
-//! At which heights a place is worth being flown over: in the middle of the band, and where a threat can be passed
-//! above or below, just clear of it.
+//! The heights at which a place is worth flying over: in the middle of the band, and where a threat can be passed above
+//! or below, just clear of it.
 
 use super::{lifted, steepest};
 use crate::geometry::{Point2, Point3, Vector2};
@@ -8,16 +8,16 @@ use crate::scenario::Scenario;
 /// A leg at the height of a base touches it; metres below, it does not.
 const TOUCH: f64 = 1e-3;
 
-/// By which tops and bases are kept clear of besides, as a share of the band: so much may a leg slope over a threat.
+/// Additional clearance from tops and bases, as a share of the band: a leg may slope by this much over a threat.
 const CLEAR: f64 = 0.02;
 
-/// Ways on which a climb can begin.
+/// Number of directions in which a climb can begin.
 const DIRECTIONS: usize = 24;
 
-/// Of the threats about a place, the heights of so many at most.
+/// Maximum number of threats around a place whose heights are considered.
 const MOST: usize = 4;
 
-/// Heights nearer to each other than this share of the band are one.
+/// Heights nearer to each other than this share of the band count as one.
 const ALIKE: f64 = 0.01;
 
 /// `spot` in the middle of the band, then at the heights that clear threats within `reach` of it, those nearest to the
@@ -57,7 +57,7 @@ pub(super) fn over(scenario: &Scenario, spot: Point2, reach: f64) -> Vec<Point3>
     places
 }
 
-/// Places round start and target from which on, or up to which, the way is in the middle of the band: those that one leg
+/// Places around start and target from which, or up to which, the way is in the middle of the band: those that one leg
 /// reaches as steeply as the vehicle can climb, if that is farther than `least`.
 pub(super) fn about_ends(scenario: &Scenario, least: f64) -> Vec<Point3> {
     let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max);
@@ -151,7 +151,7 @@ mod tests {
     fn a_climb_from_an_end_is_over_after_one_leg() {
         let mut scenario = scenario();
         (scenario.start.x, scenario.start.y) = (300.0, 300.0);
-        // The target is 50 m above the middle, which a leg reaches nearer than that.
+        // The target is 50 m above the middle, which a leg reaches before that.
         let places = about_ends(&scenario, 60.0);
         assert_eq!(places.len(), DIRECTIONS);
         for b in places {

@@ -1,5 +1,5 @@
 //! Routes to start from: along taut strings round the threats, over the ground, long enough to climb, and along a route
-//! that is known.
+//! that is already known.
 
 mod climbs;
 mod contours;
@@ -39,38 +39,38 @@ use net::Found;
 /// Strings taken from each scene of obstacles.
 const STRINGS: usize = 5;
 
-/// Where mountains are obstacles, too: a net of places finds ways through them as well.
+/// The same where mountains are obstacles too: there a net of places also finds ways through them.
 const STRINGS_ROUND_MOUNTAINS: usize = 2;
 
 /// Routes to start from at most.
 const STARTS: usize = 16;
 
-/// Free waypoints of a coarse route, unless its bends ask for more.
+/// Free waypoints of a coarse route, unless its bends need more.
 const COARSE: usize = 4;
 
 /// Over hills, where every leg must also follow the ground.
 const COARSE_OVER_HILLS: usize = 7;
 
-/// Free waypoints of a coarse route at most, unless there is none so good of so few.
+/// Maximum number of free waypoints of a coarse route, unless no route with so few is good enough.
 const MOST_COARSE: usize = 20;
 
 /// Routes taken from the net of places.
 const OVERLAND: usize = 8;
 
-/// And from each of the nets that reach far about.
+/// Routes taken from each of the nets for long detours.
 const FAR_ABOUT: usize = 16;
 
-/// A start this much dearer than the best one refined, as a share, is not worth refining. Corners drawn round a string may
-/// reach into the next soft zone.
+/// A start more expensive than the best refined one by this share is not worth refining. Corners drawn round a string
+/// may reach into the next soft zone.
 const HOPELESS: f64 = 0.12;
 
-/// Over hills, where starts follow the ground as they are.
+/// The same over hills, where starts already follow the ground.
 const HOPELESS_OVER_HILLS: f64 = 0.08;
 
-/// Where soft zones are dear or many, a small shift changes more of what it costs.
+/// The same where soft zones are expensive or many, so that a small shift changes more of the cost.
 const HOPELESS_IN_ZONES: f64 = 0.3;
 
-/// By which a start is pulled into place.
+/// Steps by which a start is pulled into place.
 const ROUGH_STEPS: Steps = Steps {
     from: 0.03,
     to: 0.005,
@@ -78,14 +78,14 @@ const ROUGH_STEPS: Steps = Steps {
     violation_m: 10.0,
 };
 
-/// A known route is in place but for what has changed; the polish at the end goes on with it.
+/// A known route is in place except for what has changed; the polish at the end does the rest.
 const GAIN_OF_KNOWN: f64 = 1e-4;
 
 /// Where a search starts.
 pub(super) struct Starts {
-    /// Best first, all with as many waypoints.
+    /// Best first, all with the same number of waypoints.
     pub(super) routes: Vec<Vec<Point3>>,
-    /// Routes of as many waypoints as are asked for that break limits, but may become better than all others.
+    /// Routes with the requested number of waypoints that break limits, but may become better than all others.
     pub(super) beyond: Vec<Vec<Point3>>,
     /// Routes priced on the way.
     pub(super) evaluations: u64,
@@ -110,7 +110,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     };
     if settings.seeding == Seeding::Tangent {
         shapes.extend(along_strings(model, &is_over));
-        // Who brings a route has been over the hills already.
+        // A caller who supplies a route has dealt with the hills already.
         if !warm {
             let (found, is_rough) = over_ground(model, &shapes, &is_over);
             rough = is_rough;
@@ -137,7 +137,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     if shapes.is_empty() {
         return None;
     }
-    // A known route keeps its bends; a string needs but as many waypoints as it has.
+    // A known route keeps its bends; a string needs only as many waypoints as it has bends.
     let coarse = if warm || low {
         settings.waypoints
     } else {
@@ -159,7 +159,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
             priced.push((price(model, &route), route));
         }
     }
-    // The known route goes first, so that others are refined only where they are cheaper as they are.
+    // The known route goes first, so that others are refined only where they are already cheaper.
     let others = usize::from(warm);
     priced[others..].sort_by(|one, other| one.0.rank(&other.0));
     if settings.polish {
@@ -176,8 +176,8 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
     Some(starts)
 }
 
-/// Pull the routes that may still win roughly into place, and leave out those that end up where
-/// another one is. One that breaks limits is not going to be cheaper without.
+/// Pull the routes that may still win roughly into place, and drop those that end up where another one is. One that
+/// breaks limits will not be cheaper once it keeps them.
 fn refine(
     model: &Model,
     priced: &mut Vec<(Fitness, Vec<Point3>)>,
@@ -220,8 +220,8 @@ fn refine(
     *priced = refined;
 }
 
-/// Bends of the routes that may still win, at most: those that are less than `hopeless` dearer than the best. So many that
-/// the one with the fewest keeps its own.
+/// Greatest number of bends of the routes that may still win, which are less than `hopeless` more expensive than the
+/// best; limited to [`MOST_COARSE`], but not below the bends of the route with the fewest.
 fn bends(model: &Model, shapes: &[Vec<Point3>], hopeless: f64) -> usize {
     let priced: Vec<(Fitness, usize)> = shapes
         .iter()
@@ -281,9 +281,9 @@ fn along_strings(model: &Model, is_over: &dyn Fn() -> bool) -> Vec<Vec<Point3>> 
     shapes
 }
 
-/// Routes over the ground: through a fine net only where the coarse one has none that can be flown as it is, and
-/// far about where the best so far pays much for soft zones, and along the ways between threats where these are many or
-/// near to each other; and whether there are such zones or ways. What has been found once `is_over`.
+/// Routes over the ground: through a fine net only where the coarse one has none that can be flown as it is, as long
+/// detours where the best so far pays much for soft zones, and along the ways between threats where these are many or
+/// near to each other; and whether there are such zones or ways. Once `is_over`, what has been found so far.
 fn over_ground(
     model: &Model,
     strings: &[Vec<Point3>],
@@ -367,8 +367,7 @@ fn lifted(scenario: &Scenario, point: Point2, share: f64) -> Point3 {
     Point3::new(point.x, point.y, z)
 }
 
-/// Whether a turn from the first leg between `corner`'s points into the second is no sharper than that of which
-/// `sharpest` is the cosine.
+/// Whether the turn at the middle of `corner` is no sharper than the one with cosine `sharpest`.
 fn may_turn(corner: [Point3; 3], sharpest: f64) -> bool {
     let [before, at, after] = corner.map(|point| point.xy());
     let [one, other]: [Vector2; 2] = [at - before, after - at];
@@ -376,13 +375,13 @@ fn may_turn(corner: [Point3; 3], sharpest: f64) -> bool {
     lengths < LEVEL * LEVEL || one.dot(&other) >= sharpest * lengths
 }
 
-/// Whether all turns of `chain` are such.
+/// Whether that holds for all turns of `chain`.
 fn may_turn_along(chain: &[Point3], sharpest: f64) -> bool {
     let mut corners = chain.windows(3);
     corners.all(|corner| may_turn([corner[0], corner[1], corner[2]], sharpest))
 }
 
-/// Metres the vehicle may climb in a metre seen from above, less a hair.
+/// Metres that the vehicle may climb per metre seen from above, less a hair.
 pub(super) fn steepest(scenario: &Scenario) -> f64 {
     libm::tan(scenario.vehicle.max_climb_deg.to_radians()) * (1.0 - 1e-9)
 }

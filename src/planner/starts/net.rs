@@ -1,17 +1,17 @@
-//! What ways over the ground have in common: a net of spots, and the cheapest chains through it.
+//! Common parts of ways over the ground: a net of spots, and the cheapest chains through it.
 
 use crate::cost::Model;
 use crate::cost::batch::PointRow;
 use crate::geometry::{Point2, Point3, Vector2};
 use crate::scenario::Scenario;
 
-/// Chains that are nowhere farther apart, as a share of the direct way, are one.
+/// Chains that are nowhere farther apart than this share of the direct way count as one.
 pub(super) const NEAR: f64 = 2.0 * super::super::SAME;
 
-/// Chains that lead another way are somewhere so far apart.
+/// Chains that take a different way are somewhere this far apart, as a share of the direct way.
 const APART: f64 = 0.12;
 
-/// What a search for ways gave.
+/// The result of a search for ways.
 #[derive(Default)]
 pub(super) struct Found {
     /// Routes that differ; those of a net have the cheapest first.
@@ -31,12 +31,12 @@ impl Found {
 /// A hexagonal net.
 pub(super) struct Spots {
     pub(super) points: Vec<Point2>,
-    /// From each to the next, metres.
+    /// Distance from each to the next, metres.
     pub(super) step: f64,
 }
 
-/// About `count` spots over all points of which the way over them from start to target is at most
-/// `detour` times the direct one, within the area.
+/// About `count` spots within the area over all points through which the way from start to target is at most `detour`
+/// times the direct one.
 pub(super) fn spots(scenario: &Scenario, count: usize, detour: f64) -> Spots {
     let (start, target) = (scenario.start.xy(), scenario.target.xy());
     let way = target - start;
@@ -79,7 +79,7 @@ pub(super) fn rows(places: &[Point3], ends: &[(usize, usize)]) -> [Vec<PointRow>
 
 /// The cheapest chains from one place to all others.
 pub(super) struct Tree {
-    /// Of each place.
+    /// Cost for each place.
     pub(super) costs: Vec<f64>,
     /// The place before it; where there is none, itself.
     pub(super) before: Vec<usize>,
@@ -114,7 +114,7 @@ pub(super) fn chains(
     [from_start, from_target]: &[Tree; 2],
     count: usize,
 ) -> Vec<Vec<Point3>> {
-    // The cheapest chain over each place; neighbours of a chain's own places give it again.
+    // The cheapest chain over each place; neighbouring places of a chain give it again.
     let mut over: Vec<(f64, usize)> = (0..places.len())
         .map(|place| (from_start.costs[place] + from_target.costs[place], place))
         .filter(|(cost, _)| cost.is_finite())
@@ -127,10 +127,10 @@ pub(super) fn chains(
         chain
     };
     let mut chains: Vec<Vec<Point3>> = Vec::new();
-    // First those that lead another way altogether.
+    // First those that take an entirely different way.
     for (count, reach) in [(count / 2, APART), (count, NEAR)] {
         let reach = reach * (model.scenario.target - model.scenario.start).norm();
-        // Most chains lead over places that others led over.
+        // Most chains lead over places that others lead over.
         let mut is_near: Vec<Vec<Option<bool>>> = vec![vec![None; places.len()]; chains.len()];
         for &(_, place) in &over {
             if chains.len() >= count {

@@ -11,8 +11,8 @@ pub(super) fn passable(scenario: &Scenario, threat: &Threat) -> bool {
     threat.top.is_some_and(|top| top <= highest) || threat.base.is_some_and(|base| base > lowest)
 }
 
-/// The least and the greatest height in the frame at which a route may pass over the middle and the
-/// corners of the box round `threat`.
+/// The least and the greatest height in the frame at which a route may pass over the middle and the corners of the box
+/// around `threat`.
 fn heights(scenario: &Scenario, threat: &Threat) -> (f64, f64) {
     let extent = threat.extent();
     let middle = nalgebra::center(&extent.min, &extent.max);

@@ -1,10 +1,10 @@
 //! Ways over the ground: the cheapest routes through a net of places in the middle of the band, and just above or
 //! below threats that can be passed so.
 //!
-//! Taut strings know threats, but neither mountains nor what crossing a soft zone costs. Here every
-//! leg between two of some hundred places is priced as it is, those that break a limit left out, and
-//! the cheapest chains from start to target are found; turns, and how many legs there may be, are looked at only where
-//! the cheapest of all cannot be flown as it is (`few`).
+//! Taut strings take account of threats, but neither of mountains nor of the cost of crossing a soft zone. Here every
+//! leg between two of some hundred places is priced as it is, those that break a limit left out, and the cheapest
+//! chains from start to target are found; turns, and the allowed number of legs, are considered only where the cheapest
+//! of all cannot be flown as it is (`few`).
 
 use super::net::{self, Found, Tree};
 use super::{few, levels, may_turn, may_turn_along};
@@ -16,36 +16,37 @@ use crate::scenario::Scenario;
 use crate::terrain::Terrain;
 use crate::threat::{Shape, Threat};
 
-/// Places of the net, besides both ends, on level ground.
+/// Places of the net, apart from both ends, on level ground.
 const PLACES: usize = 160;
 
-/// Over hills, where passes are narrow.
+/// The same over hills, where passes are narrow.
 const PLACES_OVER_HILLS: usize = 320;
 
-/// The net covers all points of which the way over them is at most so many times the direct one, and legs alike.
+/// The net covers all points over which the way is at most this many times the direct one; the same limit holds for
+/// legs.
 const DETOUR: f64 = 1.4;
 
-/// A place has the height that clears a threat from so many steps of the net beside it on.
+/// Within this many steps of the net from a threat, a place also has the height that clears it.
 const NEAR: f64 = 1.5;
 
 /// What a waypoint must gain, as a share of the direct way's fuel.
 const WORTH: f64 = 1e-4;
 
-/// Chains of few legs, at most.
+/// Maximum number of chains of few legs.
 const FEW: usize = 4;
 
-/// Chains of more legs are as good as those of any number.
+/// Chains of more legs than this are as good as those of any number.
 const MOST_LEGS: usize = 12;
 
-/// Chains of few legs looked at, at most.
+/// Maximum number of chains of few legs looked at.
 const EFFORT: usize = 4_000;
 
-/// So many threats, corners of rings and peaks, each time that a leg is priced, are met between two questions whether to
-/// stop: the net of an ordinary scene takes so little time that it is worth its while even where that is over.
+/// Number of threats, ring corners and peaks, counted for each leg priced, between two checks whether to stop: the net
+/// of an ordinary scene takes so little time that it pays even where time is over.
 const MET_UNWATCHED: usize = 4_000_000;
 
-/// Up to `count` routes that differ, where one that costs `known` is to be had without, about; and where not even
-/// the first of them can be flown as it is, some of so few legs and so soft turns that they can. None where it takes
+/// Up to `count` routes that differ, given that one costing about `known` is available without them; and where not even
+/// the first of them can be flown as it is, some with few enough legs and gentle enough turns. None where it takes
 /// long, once `is_over`.
 pub(super) fn routes(
     model: &Model,
@@ -98,7 +99,7 @@ fn places(model: &Model) -> Vec<Point3> {
         .collect()
 }
 
-/// Legs between two questions whether to stop.
+/// Legs between two checks whether to stop.
 fn legs_unwatched(scenario: &Scenario) -> usize {
     let met = |threat: &Threat| match &threat.shape {
         Shape::Cylinder(_) => 1,
@@ -116,9 +117,9 @@ fn legs_unwatched(scenario: &Scenario) -> usize {
 struct Legs<'p, 's> {
     places: &'p [Point3],
     pricer: Pricer<'s>,
-    /// What each costs, row by row; infinite where it breaks a limit.
+    /// The cost of each, row by row; infinite where it breaks a limit.
     costs: Vec<Vec<f64>>,
-    /// Whether it is known to keep its heights; where those take long to measure, few legs are asked.
+    /// Whether it is known to keep its heights; where those take long to measure, few legs are.
     measured: Vec<Vec<bool>>,
     priced: u64,
     /// Whether there was no time to price all of them.
@@ -128,7 +129,7 @@ struct Legs<'p, 's> {
 }
 
 impl<'p, 's> Legs<'p, 's> {
-    /// All legs, or, where they take long, those that have been priced once `is_over`.
+    /// All legs, or, where they take long, those that were priced before `is_over`.
     fn new(
         model: &Model<'s>,
         places: &'p [Point3],
@@ -142,7 +143,7 @@ impl<'p, 's> Legs<'p, 's> {
         let count = places.len();
         let direct = (scenario.target - scenario.start).norm();
         let worth = WORTH * direct * metre(scenario);
-        // Half of what either end costs as a waypoint; the ends of the route cost nothing.
+        // Half the cost of either end as a waypoint; the ends of the route cost nothing.
         let mut own: Vec<f64> = places
             .iter()
             .map(|&place| 0.5 * (model.waypoint(place, tolerance).1 + worth))
@@ -151,10 +152,10 @@ impl<'p, 's> Legs<'p, 's> {
         let away = [scenario.start, scenario.target]
             .map(|end| -> Vec<f64> { places.iter().map(|place| (place - end).norm()).collect() });
         let ways = away[0].iter().zip(&away[1]).map(|(one, other)| one + other);
-        // A leg farther about is part of no route that is worth its fuel, and need not be priced.
+        // A longer leg is part of no route that is worth its fuel, and need not be priced.
         let worthwhile = known / metre(scenario);
         let farthest = ways.fold(worthwhile.max(DETOUR * direct), f64::max);
-        // One by one of them, as all at once would fill megabytes.
+        // Priced in portions, as all at once would fill megabytes.
         let mut costs = vec![vec![f64::INFINITY; count]; count];
         let (mut priced, mut unwatched, mut is_broken_off) = (0, 0, false);
         let most_unwatched = legs_unwatched(scenario);
@@ -202,7 +203,7 @@ impl<'p, 's> Legs<'p, 's> {
         }
     }
 
-    /// The cheapest chains of at most `most` legs that the vehicle can turn along, none like another.
+    /// The cheapest chains of at most `most` legs with turns that the vehicle can fly, no two alike.
     fn few(&mut self, model: &Model, most: usize) -> Vec<Vec<Point3>> {
         let places = self.places;
         let mut found: Vec<Vec<Point3>> = Vec::new();
@@ -237,8 +238,8 @@ impl<'p, 's> Legs<'p, 's> {
 
     /// The cheapest chains from `source`.
     ///
-    /// A leg is measured when the cheapest chain to a place is about to end with it: others are no part of
-    /// any. If it breaks a limit, the place waits for its next best chain.
+    /// A leg is measured when the cheapest chain to a place is about to end with it: others are part of none. If it
+    /// breaks a limit, the place waits for its next best chain.
     fn cheapest(&mut self, source: usize) -> Tree {
         let count = self.places.len();
         let mut tree = Tree::from(source, count);
@@ -277,8 +278,8 @@ impl<'p, 's> Legs<'p, 's> {
         tree
     }
 
-    /// Of the places that are `closed`, the few by which `place` is reached cheapest by a leg not yet
-    /// measured: as many as are measured at once.
+    /// Of the places that are `closed`, those few from which an unmeasured leg reaches `place` most cheaply: as many as
+    /// are measured at once.
     fn likeliest(&self, closed: &[usize], costs: &[f64], place: usize) -> Vec<usize> {
         let mut few: Vec<(f64, usize)> = Vec::with_capacity(LANES + 1);
         let (legs, measured) = (&self.costs[place], &self.measured[place]);
@@ -327,7 +328,7 @@ mod tests {
     use crate::planner::tests::{hilly_scenario, scenario};
     use crate::threat::Polygon;
 
-    /// Legs take long to price round a coast of thousands of corners, and none of the time that there is otherwise.
+    /// Legs take long to price round a coast of thousands of corners, and hardly any of the usual time.
     #[test]
     fn a_stop_is_heard_where_legs_take_long() {
         let mut scenario = scenario();
@@ -358,7 +359,7 @@ mod tests {
         assert!(0 < few && few <= 3 * most && 3 * most < all, "{few} {all}");
     }
 
-    /// Chains are the same whether legs are measured when their turn comes or all of them before.
+    /// Chains are the same whether legs are measured when their turn comes or all beforehand.
     #[test]
     fn legs_measured_late_change_no_chain() {
         let scenario = hilly_scenario();

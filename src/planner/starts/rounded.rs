@@ -1,12 +1,13 @@
-//! Chains of a net know no turns: where one is too sharp, it is flown in several.
+//! Chains of a net ignore turns: where one is too sharp, it is split into several.
 
 use crate::geometry::{LEVEL, Point3, Vector2};
 use crate::scenario::Scenario;
 
-/// Legs between turns that stand for one are this share of the direct way, or the shortest that are allowed.
+/// Legs between the parts of a split turn are this share of the direct way, or the shortest allowed.
 const SHORT: f64 = 0.004;
 
-/// `chain` with waypoints put after those at which it turns more than the vehicle can, if it has then no more than it may have.
+/// `chain` with waypoints added after those where it turns more than the vehicle can, if it then has no more than
+/// allowed.
 pub(super) fn rounded(scenario: &Scenario, chain: &[Point3]) -> Option<Vec<Point3>> {
     let most = scenario.vehicle.max_turn_deg.to_radians() * (1.0 - 1e-6);
     let short = (SHORT * (scenario.target - scenario.start).norm())
@@ -22,7 +23,7 @@ pub(super) fn rounded(scenario: &Scenario, chain: &[Point3]) -> Option<Vec<Point
         if turn.abs() <= most {
             continue;
         }
-        // A hair less each, for what is shifted by flying them one after the other.
+        // Slightly smaller turns each, because flying them one after the other shifts them.
         let count = (turn.abs() / most * 1.05).ceil();
         if count > scenario.planner.waypoints as f64 {
             return None;

@@ -7,13 +7,14 @@ use crate::geometry::Point3;
 use crate::optimizer::Fitness;
 use crate::planner::price::price;
 
-/// Waypoints are put no nearer to each other than this share of the way, if the legs allow it.
+/// Waypoints are placed no nearer to each other than this share of the way, if the legs allow it.
 const APART: f64 = 1e-4;
 
-/// A waypoint that costs more than this share of the direct way's fuel is not put on its leg unless there is no other place.
+/// A waypoint that costs more than this share of the direct way's fuel is put on its leg only if there is no other
+/// place.
 const DEAR: f64 = 1e-3;
 
-/// So many spare waypoints may share one way to the middle of the band; over hills it leads up and down anyway.
+/// Up to this many spare waypoints may share one way to the middle of the band; over hills it leads up and down anyway.
 const SEVERAL: usize = 2;
 
 /// Ways off a leg to the middle of the band and back: shares of it, and whether the way is up there or on the leg, as it
@@ -26,10 +27,10 @@ const RISES: [&[(f64, bool)]; 5] = [
     &[(0.5, false), (0.75, true)],
 ];
 
-/// Costs nearer than this are the same.
+/// Costs nearer than this count as equal.
 pub(super) const NOTHING: f64 = 1e-9;
 
-/// `route` with spare waypoints up to so many, each where it costs the least.
+/// `route` with spare waypoints added up to `waypoints`, each where it costs least.
 pub(super) fn fill(model: &Model, route: Vec<Point3>, waypoints: usize) -> Vec<Point3> {
     let spare = waypoints + 2 - route.len();
     if spare < SEVERAL || !model.scenario.terrain.is_flat() {
@@ -39,7 +40,8 @@ pub(super) fn fill(model: &Model, route: Vec<Point3>, waypoints: usize) -> Vec<P
     if added <= dear(model) {
         return filled;
     }
-    // One that leaves its leg for the middle of the band is dear by itself, and may make room for all others.
+    // A waypoint that leaves its leg for the middle of the band is expensive by itself, but may make room for all
+    // others.
     let raised = with_one_raised(model, route, waypoints);
     if price(model, &raised).beats(&price(model, &filled)) {
         raised
@@ -48,7 +50,7 @@ pub(super) fn fill(model: &Model, route: Vec<Point3>, waypoints: usize) -> Vec<P
     }
 }
 
-/// Each where it costs the least as the route is by then, and what they add.
+/// Adds each where it costs least given the route so far; returns what they add.
 fn one_by_one(model: &Model, mut route: Vec<Point3>, waypoints: usize) -> (Vec<Point3>, f64) {
     let mut splits: Vec<Split> = route
         .windows(2)
@@ -70,7 +72,7 @@ fn one_by_one(model: &Model, mut route: Vec<Point3>, waypoints: usize) -> (Vec<P
     (route, added)
 }
 
-/// As [`one_by_one`], but that the first leaves its leg for the middle of the band, where this costs the least.
+/// As [`one_by_one`], except that the first leaves its leg for the middle of the band, where this costs least.
 fn with_one_raised(model: &Model, mut route: Vec<Point3>, waypoints: usize) -> Vec<Point3> {
     let room = waypoints + 2 - route.len();
     let ways = route.windows(2).enumerate().flat_map(|(leg, ends)| {
@@ -85,7 +87,7 @@ fn with_one_raised(model: &Model, mut route: Vec<Point3>, waypoints: usize) -> V
     one_by_one(model, route, waypoints).0
 }
 
-/// The leg between `ends` by `way`: what it changes, and the points on it.
+/// The leg between `ends` by `way`: the change in fitness, and the points on it.
 fn raised(model: &Model, (a, b): (Point3, Point3), way: &[(f64, bool)]) -> (Fitness, Vec<Point3>) {
     let point = |&(share, is_raised): &(f64, bool)| {
         let at = a + (b - a) * share;
@@ -103,18 +105,18 @@ fn raised(model: &Model, (a, b): (Point3, Point3), way: &[(f64, bool)]) -> (Fitn
     (change(model, &[a, b], &whole), points)
 }
 
-/// More than this a waypoint must not cost to be put on its leg as a matter of course.
+/// Maximum cost of a waypoint that is put on its leg without looking further.
 fn dear(model: &Model) -> f64 {
     let way = (model.scenario.target - model.scenario.start).norm();
     DEAR * way * metre(model.scenario)
 }
 
-/// Where a leg is best split.
+/// The best place to split a leg.
 struct Split {
     at: Point3,
-    /// What it adds.
+    /// The added fitness.
     added: Fitness,
-    /// Of the leg.
+    /// Length of the leg.
     length: f64,
 }
 
@@ -152,8 +154,8 @@ impl Split {
         }
     }
 
-    /// As near to the middle of the band as the vehicle can climb to and back: where a leg is high or low from end to end,
-    /// as between one threat that is flown over and the next.
+    /// As near to the middle of the band as the vehicle can climb to and back: for a leg that is high or low from end
+    /// to end, as between one threat that is flown over and the next.
     fn off_leg(model: &Model, a: Point3, b: Point3) -> Self {
         let scenario = model.scenario;
         let tolerance = model.tolerance.scaled(0.5);
@@ -239,7 +241,8 @@ mod tests {
         assert!(many.cost < few.cost + 3.0, "{few:?} {many:?}");
     }
 
-    /// One that goes up to the middle of the band costs more than one on the leg, and makes room there for all others.
+    /// A waypoint that goes up to the middle of the band costs more than one on the leg, and makes room there for all
+    /// others.
     #[test]
     fn spare_waypoints_share_one_way_up() {
         let mut scenario = scenario();

@@ -1,11 +1,11 @@
-//! Which surplus waypoints of a route are missed least.
+//! Finds the surplus waypoints of a route that are missed least.
 
 use crate::cost::Model;
 use crate::geometry::{LEVEL, Point3};
 use crate::optimizer::Fitness;
 use crate::planner::price::price;
 
-/// Leave out the waypoint that is missed least, or put one in place of two, until `waypoints` free ones are left.
+/// Remove the waypoint that is missed least, or replace two by one, until `waypoints` free ones are left.
 pub(super) fn leave_out(model: &Model, route: &mut Vec<Point3>, waypoints: usize) {
     let points = waypoints + 2;
     if route.len() <= points {
@@ -27,7 +27,7 @@ pub(super) fn leave_out(model: &Model, route: &mut Vec<Point3>, waypoints: usize
         if let Some(corner) = omission.instead {
             route[idx] = corner;
         }
-        // Of the others, only those that see what has changed.
+        // Of the others, only those whose neighbourhood has changed.
         let sees = idx.saturating_sub(Omission::AFTER).max(1)..idx + Omission::BEFORE + 1;
         for near in sees.start..sees.end.min(route.len() - 1) {
             omissions[near - 1] = Omission::of(model, route, near);
@@ -35,17 +35,17 @@ pub(super) fn leave_out(model: &Model, route: &mut Vec<Point3>, waypoints: usize
     }
 }
 
-/// How a waypoint is best left out.
+/// The best way to remove a waypoint.
 struct Omission {
     change: Fitness,
-    /// In place of it and the next.
+    /// The point that replaces it and the next one.
     instead: Option<Point3>,
 }
 
 impl Omission {
-    /// Points looked at before the waypoint.
+    /// Number of points considered before the waypoint.
     const BEFORE: usize = 2;
-    /// And after it, at most.
+    /// Maximum number of points considered after it.
     const AFTER: usize = 3;
 
     fn of(model: &Model, route: &[Point3], idx: usize) -> Self {
@@ -83,7 +83,7 @@ impl Omission {
     }
 }
 
-/// What it changes to fly `new` in place of `old`.
+/// The change in fitness when `new` is flown in place of `old`.
 pub(super) fn change(model: &Model, old: &[Point3], new: &[Point3]) -> Fitness {
     let (old, new) = (price(model, old), price(model, new));
     Fitness {
@@ -92,11 +92,11 @@ pub(super) fn change(model: &Model, old: &[Point3], new: &[Point3]) -> Fitness {
     }
 }
 
-/// Where the leg from `a` to `b`, flown on, meets that from `c` to `d`, flown back.
+/// Where the leg from `a` to `b`, extended, meets the leg from `c` to `d`, extended backwards.
 fn crossing(a: Point3, b: Point3, c: Point3, d: Point3) -> Option<Point3> {
     let (ahead, back, gap) = (b.xy() - a.xy(), c.xy() - d.xy(), c.xy() - b.xy());
     let area = ahead.perp(&back);
-    // Legs without extent have no direction either.
+    // Legs without extent have no direction.
     if area.abs() <= LEVEL * (ahead.norm() + back.norm()) {
         return None;
     }
@@ -129,7 +129,7 @@ mod tests {
         assert!(!price(&model, &without_the_middle).beats(&price(&model, &few)));
     }
 
-    /// Each of the single steps looks at every waypoint anew.
+    /// Each single step examines every waypoint anew.
     #[test]
     fn many_are_left_out_as_one_by_one() {
         let scenario = scenario();

@@ -1,4 +1,4 @@
-//! From a taut string to waypoints: every arc becomes the corners of a polygon drawn round it.
+//! From a taut string to waypoints: every arc becomes the corners of a polygon drawn around it.
 
 use crate::geometry::{LEVEL, Point2};
 use crate::scenario::Scenario;
@@ -7,21 +7,21 @@ use crate::seeding::{Piece, TautString};
 /// An arc of a taut string.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Arc {
-    /// Of the circle, metres.
+    /// Centre of the circle, metres.
     center: Point2,
-    /// Of the circle; 0 at the corner of a polygon.
+    /// Radius of the circle; 0 at the corner of a polygon.
     radius: f64,
-    /// Of the string where it meets the circle, radians counter-clockwise from east.
+    /// Heading of the string where it meets the circle, radians counter-clockwise from east.
     heading: f64,
-    /// How far it goes round, radians, left positive.
+    /// Angle of the arc, radians, left positive.
     angle: f64,
 }
 
-/// Arcs of less than this, radians, bend nothing.
+/// Arcs of less than this, radians, count as straight.
 const STRAIGHT: f64 = 1e-9;
 
-/// The corners of the route that follows `arcs` outside of them: as few as the turn limit allows,
-/// and as many more, up to `waypoints`, as shorten it most.
+/// The corners of the route that follows `arcs` on the outside: as few as the turn limit allows, and as many more, up
+/// to `waypoints`, as shorten it most.
 ///
 /// With `k` corners an arc of angle `a` and radius `r` is flown in `2 k r tan(a / 2k)`, so that the
 /// gain of one corner more falls with each: taking the greatest gain first is optimal.
@@ -106,7 +106,7 @@ fn half_turn(arc: &Arc, count: usize) -> f64 {
     arc.angle.abs() / (2.0 * count as f64)
 }
 
-/// Way round the arc by `count` corners.
+/// Distance flown round the arc with `count` corners.
 fn flown(arc: &Arc, count: usize) -> f64 {
     let half = half_turn(arc, count);
     if half >= std::f64::consts::FRAC_PI_2 {
@@ -122,10 +122,10 @@ fn side(arc: &Arc, count: usize, radius: f64) -> f64 {
 }
 
 fn around(arc: &Arc, count: usize, min_leg: f64) -> impl Iterator<Item = Point2> {
-    // Few enough that no corner runs away where the string turns back.
+    // Few enough corners that none runs away where the string turns back.
     let count = count.max(1);
     let half = half_turn(arc, count).min(1.2);
-    // Round a small circle the legs between corners would be too short: keep farther off.
+    // Round a small circle the legs between corners would be too short: stay farther away.
     let radius = if count > 1 {
         arc.radius
             .max(0.5 * min_leg * (1.0 + 1e-6) / libm::tan(half))

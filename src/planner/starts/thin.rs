@@ -1,4 +1,4 @@
-//! A chain of many short legs as a route of few waypoints.
+//! Turns a chain of many short legs into a route of few waypoints.
 
 use std::cell::LazyCell;
 
@@ -9,17 +9,18 @@ use crate::geometry::Point3;
 use crate::optimizer::Fitness;
 use crate::planner::price::PRICED_FROM;
 
-/// Routes along a chain looked at for one that can be turned along, at most.
+/// Maximum number of routes along a chain examined for one that can be flown with the allowed turns.
 const EFFORT: usize = 40_000;
 
-/// Of a chain of no more places all legs are priced at once.
+/// For a chain of no more places than this, all legs are priced at once.
 const SHORT: usize = 64;
 
-/// Of a longer one so many legs from each place are, the shortest first, until all of them break limits: a long leg
-/// through thousands of threats is dear to price, and hardly ever one to keep.
+/// For a longer chain this many legs from each place are priced at once, the shortest first, until all of them break
+/// limits: a long leg through thousands of threats is expensive to price, and hardly ever one to keep.
 const AT_ONCE: usize = 16;
 
-/// A route of as many legs as a coarse one may have that costs this share more than one of any number is too coarse.
+/// If the best route with a coarse route's number of legs costs this share more than one of any number, it is too
+/// coarse.
 const FAR_FROM: f64 = 0.02;
 
 /// Nothing flown yet.
@@ -28,8 +29,8 @@ const NOTHING: Fitness = Fitness {
     cost: 0.0,
 };
 
-/// Of the places of `chain`, those that make the best route of as many free waypoints as a coarse one may have, and how
-/// many legs were priced to tell. Turns are looked at only where those of the best are too sharp.
+/// The places of `chain` that make the best route with as many free waypoints as a coarse one may have, and how many
+/// legs were priced to find it. Turns are considered only where those of the best route are too sharp.
 pub(super) fn thin(model: &Model, pricer: &Pricer, chain: &[Point3]) -> (Vec<Point3>, u64) {
     let all = chain.len();
     let at_once = if all > SHORT { AT_ONCE } else { all };
@@ -53,16 +54,17 @@ pub(super) fn thin(model: &Model, pricer: &Pricer, chain: &[Point3]) -> (Vec<Poi
 /// The legs from each place of a chain to later ones.
 struct Legs<'c> {
     chain: &'c [Point3],
-    /// By where they begin, then by how many places later they end, less one; with their ends as waypoints.
+    /// Indexed by where they begin, then by how many places later they end, less one; including the cost of their ends
+    /// as waypoints.
     worth: Vec<Vec<Fitness>>,
-    /// As many legs a whole route may have.
+    /// Maximum number of legs of a whole route.
     most: usize,
     /// Cosine of the sharpest turn.
     sharpest: f64,
 }
 
 impl<'c> Legs<'c> {
-    /// From each place so many, and as many more as long as any of these breaks no limit.
+    /// From each place `at_once` legs, and as many more while any of these breaks no limit.
     fn new(model: &Model, pricer: &Pricer, chain: &'c [Point3], at_once: usize) -> Self {
         let last = chain.len() - 1;
         let tolerance = model.tolerance.scaled(PRICED_FROM);
@@ -111,20 +113,20 @@ impl<'c> Legs<'c> {
         self.chain.len() - 1
     }
 
-    /// How many are known.
+    /// How many legs are known.
     fn count(&self) -> u64 {
         self.worth.iter().map(|legs| legs.len() as u64).sum()
     }
 
-    /// The places of the best route, turns apart; `None` where there is none of so few legs. It has no more legs than a
-    /// coarse one unless that is far from as good as any number.
+    /// The places of the best route, ignoring turns; `None` where there is none with so few legs. It has no more legs
+    /// than a coarse one unless that is far from as good as any number.
     fn best(&self) -> Option<Vec<usize>> {
         let last = self.last();
         let any = LazyCell::new(|| self.of_any_number());
         let is_near = |way: &Fitness| {
             way.violation <= any.violation && way.cost <= any.cost * (1.0 + FAR_FROM)
         };
-        // The best way to each place, by so many legs.
+        // The best way to each place, by number of legs.
         let mut ways = vec![vec![(Fitness::WORST, 0); self.chain.len()]];
         ways[0][0].0 = NOTHING;
         let mut legs = 1;
@@ -150,7 +152,7 @@ impl<'c> Legs<'c> {
         Some(route)
     }
 
-    /// The best way to each place by one leg more than `known`, and where that begins.
+    /// The best way to each place by one leg more than `known`, and where that leg begins.
     fn one_more(&self, known: &[(Fitness, usize)]) -> Vec<(Fitness, usize)> {
         let mut best = vec![(Fitness::WORST, 0); known.len()];
         for (a, legs) in self.worth.iter().enumerate() {
@@ -167,7 +169,7 @@ impl<'c> Legs<'c> {
         best
     }
 
-    /// What the best way of any number of legs costs.
+    /// The cost of the best way of any number of legs.
     fn of_any_number(&self) -> Fitness {
         let mut best = vec![Fitness::WORST; self.chain.len()];
         best[0] = NOTHING;
@@ -182,8 +184,8 @@ impl<'c> Legs<'c> {
         best[self.last()]
     }
 
-    /// The places of the cheapest route that breaks no limit, if it is found: of `about` so many legs, or as few as of a
-    /// coarse one.
+    /// The places of the cheapest route that breaks no limit, if it is found: of `about` that many legs, or as few as a
+    /// coarse one has.
     fn best_to_turn_along(&self, about: usize) -> Option<Vec<usize>> {
         let count = self.chain.len();
         let mut legs = Feasible {
@@ -207,7 +209,7 @@ impl<'c> Legs<'c> {
     }
 }
 
-/// What a way costs with one more `leg`.
+/// The fitness of a way with one more `leg`.
 fn further(way: Fitness, leg: &Fitness) -> Fitness {
     Fitness {
         violation: way.violation + leg.violation,
@@ -215,10 +217,10 @@ fn further(way: Fitness, leg: &Fitness) -> Fitness {
     }
 }
 
-/// Those that break no limit.
+/// The legs that break no limit.
 struct Feasible<'l, 'c> {
     legs: &'l Legs<'c>,
-    /// From each place to each; infinite where there is none.
+    /// From each place to each; infinite where there is no leg.
     costs: Vec<Vec<f64>>,
 }
 
@@ -243,7 +245,7 @@ mod tests {
     use crate::planner::tests::{radar, scenario};
     use crate::scenario::Scenario;
 
-    /// A chain that leaves the direct way at once, and what its legs cost by the way they are defined, turns apart.
+    /// A chain that leaves the direct way at once, and the cost of its legs by definition, ignoring turns.
     fn astray(scenario: &Scenario) -> Vec<Point3> {
         let between = [
             (0.15, 130.0),
@@ -293,7 +295,7 @@ mod tests {
         (sum_of_legs(&model, &thin), thin)
     }
 
-    /// Of a chain those places are kept that make the best route through them that the vehicle can turn along.
+    /// Those places of a chain are kept that make the best route through them with turns that the vehicle can fly.
     #[test]
     fn a_chain_is_thinned_to_the_best_of_its_places() {
         let mut scenario = scenario();
@@ -318,7 +320,7 @@ mod tests {
             }
             costs.push(found.cost);
         }
-        // To turn softly costs more here.
+        // Turning gently costs more here.
         assert!(costs[1] > 1.001 * costs[0], "{costs:?}");
     }
 

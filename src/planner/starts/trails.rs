@@ -1,9 +1,9 @@
 //! Ways where there are few: through a fine net of places, over hills at several heights of the band.
 //!
-//! Where no chain of long legs keeps the limits, over hard ground or among crowded threats, the way is found in
-//! small steps: every place is joined to those about it, and over hills some of them are so much lower or higher
-//! above the ground that a leg need not climb as it does. Of the chain that is found, as many waypoints are kept as
-//! the route may have.
+//! Where no chain of long legs keeps the limits, over hard ground or among crowded threats, the way is found in small
+//! steps: every place is joined to those around it, and over hills some of them are enough lower or higher above the
+//! ground that a leg need not climb with it. Of the chain that is found, as many waypoints are kept as the route may
+//! have.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -17,20 +17,20 @@ use crate::geometry::Point3;
 use crate::planner::price::PRICED_FROM;
 use crate::scenario::Scenario;
 
-/// Spots of the net, besides both ends.
+/// Spots of the net, apart from both ends.
 const SPOTS: usize = 1000;
 
 /// Heights of each spot, as shares of the band.
 const HEIGHTS: [f64; 1] = [0.5];
 const HEIGHTS_OVER_HILLS: [f64; 3] = [1.0 / 6.0, 0.5, 5.0 / 6.0];
 
-/// The net covers all points of which the way over them is at most so many times the direct one, or more.
+/// The net covers all points over which the way is at most this many times the direct one, or more.
 const DETOUR: f64 = 1.5;
 
 /// Spots of a net that covers more.
 const SPOTS_FAR_ABOUT: usize = 2500;
 
-/// Places are joined to those within so many steps of the net.
+/// Places are joined to those within this many steps of the net.
 const REACH: f64 = 2.1;
 
 /// Up to `count` routes that differ through each of its nets, of at most as many free waypoints as `model` asks for:
@@ -59,8 +59,8 @@ pub(super) fn routes(
     found
 }
 
-/// Of what lies far about, most may be outside of the area: then a finer net finds gaps, and a coarse one more ways
-/// that differ.
+/// For long detours, most points may be outside the area: then a finer net finds gaps, and a coarse one more ways that
+/// differ.
 fn nets(scenario: &Scenario, far_about: Option<f64>) -> Vec<Spots> {
     let Some(detour) = far_about else {
         return vec![net::spots(scenario, SPOTS, DETOUR)];
@@ -78,7 +78,7 @@ fn nets(scenario: &Scenario, far_about: Option<f64>) -> Vec<Spots> {
 struct Net<'s> {
     places: Vec<Point3>,
     pricer: Pricer<'s>,
-    /// Of each place.
+    /// For each place.
     legs: Vec<Vec<Leg>>,
     legs_priced: u64,
 }
@@ -86,13 +86,13 @@ struct Net<'s> {
 #[derive(Clone, Copy)]
 struct Leg {
     to: usize,
-    /// Infinite where it breaks a limit.
+    /// Cost; infinite where the leg breaks a limit.
     cost: f64,
     /// Whether it is known to keep its heights.
     measured: bool,
 }
 
-/// A chain that is about to end at `place`, which it comes to by leg number `leg` of place `via`.
+/// A chain about to end at `place`, which it reaches by leg number `leg` of place `via`.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 struct Arrival {
     /// The bits of its cost, in the same order.
@@ -122,7 +122,7 @@ impl<'s> Net<'s> {
         let [from, to] = net::rows(&places, &ends);
         let mut prices = vec![Price::ZERO; from.len()];
         pricer.legs_at_best(&from, &to, &mut prices);
-        // A route has so many waypoints to the metre, not one at every place.
+        // A route has one waypoint per certain distance, not one at every place.
         let way = (scenario.target - scenario.start).norm();
         let waypoints = (scenario.planner.waypoints + 1) as f64 / way;
         let own: Vec<f64> = places
@@ -172,7 +172,7 @@ impl<'s> Net<'s> {
                 self.spread(first.place, cost, &closed, &mut open);
                 continue;
             }
-            // Those that come next are measured with it.
+            // The next ones in line are measured with it.
             let mut few = vec![first];
             while few.len() < LANES
                 && let Some(Reverse(next)) = open.peek()
@@ -188,7 +188,7 @@ impl<'s> Net<'s> {
         tree
     }
 
-    /// Add the chains that go on from `place` to those that are `open`.
+    /// Add the chains that extend from `place` to those that are `open`.
     fn spread(
         &self,
         place: usize,
@@ -286,7 +286,7 @@ mod tests {
         [290.0, 212.0, 261.0, 82.0, 96.0],
     ];
 
-    /// Slopes of twice what the vehicle climbs, 20 to 120 m above which it must keep.
+    /// Slopes twice as steep as the vehicle climbs, 20 to 120 m above which it must stay.
     fn mountains() -> Scenario {
         let mut scenario = scenario();
         scenario.terrain = Terrain::Peaks(Peaks {

@@ -1,7 +1,7 @@
 //! Ways between threats that are near to each other.
 //!
-//! A gap of ten metres lies between the places of a net whose steps are thirty, and strings see soft zones that overlap as
-//! closed. Cheap ways over a mesh that has vertices along the edges of all zones pass such gaps; of each, those places are
+//! A ten-metre gap falls between the places of a net with steps of thirty, and strings treat overlapping soft zones as
+//! closed. Cheap ways over a mesh with vertices along the edges of all zones pass such gaps; of each, those places are
 //! kept that make the best route of N waypoints.
 
 use super::lifted;
@@ -13,28 +13,28 @@ use crate::geometry::Point3;
 use crate::planner::price::PRICED_FROM;
 use crate::seeding::{WaysSought, cheap_ways, cheapest_slip};
 
-/// So many threats are a crowd, in which gaps follow on gaps.
+/// From this many threats on they are a crowd, in which one gap follows another.
 const CROWD: usize = 16;
 
-/// There, all that could be followed on.
+/// In a crowd, all ways found are used.
 const IN_CROWDS: WaysSought = WaysSought {
     vertices: 1000,
     most: 24,
     dearest: f64::INFINITY,
 };
 
-/// Elsewhere: strings and nets bring most of the ways.
+/// Outside crowds: strings and nets find most of the ways.
 const AMONG_FEW: WaysSought = WaysSought {
     vertices: 800,
     most: 8,
     dearest: f64::INFINITY,
 };
 
-/// There, a way so many times as dear as what is known is not worth a look. In steps over a mesh it may be a little dearer
-/// than the route that comes of it.
+/// Outside crowds, a way this many times as expensive as the best known is not worth a look. In steps over a mesh it
+/// may be a little more expensive than the resulting route.
 const DEAREST: f64 = 1.1;
 
-/// How closely such ways are looked for, if they are worth a look: in a crowd, and where one through a gap may cost less
+/// How closely to look for such ways, if they are worth a look: in a crowd, and where one through a gap may cost less
 /// than what is `known`.
 pub(super) fn sought(
     model: &Model,
@@ -52,7 +52,7 @@ pub(super) fn sought(
     })
 }
 
-/// Routes of at most as many free waypoints as `model` asks for, each along another way; fewer once `is_over`.
+/// Routes of at most as many free waypoints as `model` asks for, each along a different way; fewer once `is_over`.
 pub(super) fn routes(model: &Model, sought: WaysSought, is_over: &dyn Fn() -> bool) -> Found {
     let scenario = model.scenario;
     let tolerance = model.tolerance.scaled(PRICED_FROM);
@@ -113,8 +113,8 @@ mod tests {
         scenario
     }
 
-    /// Fourteen discs, of which the soft zones of two overlap by four metres: a route costs 588 through that gap, 699 round
-    /// it. So it is with a hill far off.
+    /// Fourteen discs, of which the soft zones of two overlap by four metres: a route costs 588 through that gap, 699
+    /// round it. The same holds with a distant hill.
     #[test]
     fn a_gap_between_few_threats_is_passed() {
         let discs = [
@@ -148,7 +148,7 @@ mod tests {
         }
     }
 
-    /// Among few threats where a gap is no dearer than what is known, and only there.
+    /// Among few threats such ways are sought where a gap is no more expensive than what is known, and only there.
     #[test]
     fn ways_among_few_threats_are_looked_for_where_a_gap_may_be_cheaper() {
         let mut scenario = scenario();

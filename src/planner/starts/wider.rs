@@ -11,21 +11,21 @@ use crate::optimizer::Fitness;
 use crate::planner::price::price;
 use crate::planner::{Stop, why_stop};
 
-/// By which the band is wider on either side, as a share of its height.
+/// How much wider the band is on either side, as a share of its height.
 const WIDER: f64 = 0.3;
 
-/// A chain of the net so many times as dear as the best route in the band is not worth a look: pulled into place it
-/// becomes that much cheaper at most.
+/// A chain of the net this many times as expensive as the best route in the band is not worth a look: pulling it into
+/// place makes it cheaper by that much at most.
 const PROMISING: f64 = 1.1;
 
 /// A route that costs at least this share of the best one in a wider band gains nothing in the band.
 const CHEAPER: f64 = 0.99;
 
-/// Routes taken, at most.
+/// Maximum number of routes taken.
 const MOST: usize = 2;
 
-/// Routes of as many waypoints as are asked for that break limits of the band, but would cost less in a wider one than all
-/// that were `found` in it; and how many routes were priced to tell.
+/// Routes with the requested number of waypoints that break limits of the band, but would cost less in a wider one than
+/// all that were `found` in it; and how many routes were priced to find them.
 pub(super) fn routes(
     model: &Model,
     found: &[(Fitness, Vec<Point3>)],
@@ -118,7 +118,8 @@ mod tests {
         assert!(outcome.cost.total < 600.0, "{}", outcome.cost.total);
     }
 
-    /// Whatever is given on breaks limits of the band, and is cheaper in a wider one; nothing is where nothing can be.
+    /// Every route passed on breaks limits of the band and is cheaper in a wider one; none is passed on where that is
+    /// impossible.
     #[test]
     fn only_what_a_wider_band_makes_cheaper_is_taken() {
         let scenario = between_mountains();

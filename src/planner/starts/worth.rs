@@ -1,4 +1,4 @@
-//! What a start is worth once it has all its waypoints: where the way is low, each of them is dear.
+//! What a start is worth once it has all its waypoints: where the way is low, each waypoint is expensive.
 
 use super::with_waypoints;
 use crate::cost::Model;
@@ -6,14 +6,15 @@ use crate::geometry::Point3;
 use crate::optimizer::Fitness;
 use crate::planner::price::price;
 
-/// A route this much dearer than the best, as a share, is left out.
+/// A route more expensive than the best by this share is dropped.
 const DEAR: f64 = 0.16;
 
-/// Where spare waypoints cost more than this share of the best route, its climb is not to be searched with fewer.
+/// Where spare waypoints cost more than this share of the best route, its climb must not be searched with fewer
+/// waypoints.
 const LOW: f64 = 0.1;
 
-/// Those of `shapes` that may still win once they have all their waypoints, and whether these are too low to be
-/// left out in a coarse search.
+/// Those of `shapes` that may still win once they have all their waypoints, and whether spare waypoints are too
+/// expensive to be left out in a coarse search.
 pub(super) fn promising(model: &Model, shapes: Vec<Vec<Point3>>) -> (Vec<Vec<Point3>>, bool) {
     let mut worth: Vec<(Worth, Vec<Point3>)> = shapes
         .into_iter()
@@ -35,10 +36,10 @@ pub(super) fn promising(model: &Model, shapes: Vec<Vec<Point3>>) -> (Vec<Vec<Poi
     (worth.into_iter().map(|(_, route)| route).collect(), low)
 }
 
-/// What a route is worth with all its waypoints.
+/// The value of a route with all its waypoints.
 struct Worth {
     fitness: Fitness,
-    /// Share of its cost for the waypoints that are not there yet, each where it is cheapest.
+    /// The part of its cost that is for the waypoints that it does not have yet, each where it is cheapest.
     spare: f64,
 }
 

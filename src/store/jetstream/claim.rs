@@ -1,4 +1,4 @@
-//! How a plan is taken to be run.
+//! How a plan is claimed to be run.
 
 use std::sync::{Arc, PoisonError};
 use std::time::Duration;
@@ -20,18 +20,18 @@ use super::{JetStream, closed};
 use crate::job::{Plan, PlanId, Status};
 use crate::store::{Lease, StoreError, lost};
 
-/// A job may be seen before its record; for so long a claim waits.
+/// A job may be seen before its record; a claim waits this long for the record.
 const RECORD_PATIENCE: Duration = Duration::from_millis(100);
 
-/// Tries at lanes whose jobs others took faster.
+/// Attempts on lanes whose jobs others claim first.
 const TRIES: usize = 4;
 
-/// Between two of them.
+/// Pause between two attempts.
 const BREATH: Duration = Duration::from_millis(5);
 
 impl JetStream {
-    /// See [`Store::claim`](crate::store::Store::claim). Taking is a task of its own, so that a caller
-    /// who goes away in the middle of it leaves no plan behind.
+    /// See [`Store::claim`](crate::store::Store::claim). Claiming is a task of its own, so that a caller who goes away
+    /// in the middle of it leaves no plan behind.
     pub(super) async fn claim(self: &Arc<Self>) -> Result<Lease, StoreError> {
         let (give, take) = oneshot::channel();
         let store = Arc::clone(self);
@@ -47,7 +47,7 @@ impl JetStream {
         let mut waiting = self.view.waiting();
         let mut end = self.end.subscribe();
         loop {
-            // One slot at a time: two would ask the same lanes, and get its jobs out of order.
+            // One slot at a time: two would ask the same lanes, and get their jobs out of order.
             let turn = self.turn.lock().await;
             waiting.mark_unchanged();
             if give.is_closed() {
@@ -85,8 +85,7 @@ impl JetStream {
         }
     }
 
-    /// Nobody waits for it any more. Whoever takes next finds the job back in its place, and not only
-    /// the record.
+    /// The caller is gone. The job is put back in its place too, not only the record, so that the next claim finds it.
     async fn take_back(&self, lease: &Lease) {
         let _turn = self.turn.lock().await;
         if let Err(error) = self.release(lease.plan.id, lease.attempt).await {
@@ -95,12 +94,12 @@ impl JetStream {
         }
     }
 
-    /// How often lanes are asked for jobs whose workers were lost.
+    /// How often lanes are checked for jobs whose workers were lost.
     fn patrol(&self) -> Duration {
         (self.settings.lease / 4).min(Duration::from_secs(1))
     }
 
-    /// The next job, from the lane whose turn it is or from one whose workers were lost.
+    /// The next job, from the lane whose turn it is or from a lane with lost workers.
     async fn next_job(&self) -> Result<Option<Message>, StoreError> {
         for _ in 0..TRIES {
             let lane = self.view.known().next_lane(Version::own(), self.slots());
@@ -125,7 +124,7 @@ impl JetStream {
         Ok(None)
     }
 
-    /// One slot of the node goes on patrol for all.
+    /// One slot of the node checks for all.
     fn is_patrol_due(&self) -> bool {
         let mut last = self
             .last_patrol
@@ -138,7 +137,7 @@ impl JetStream {
         due
     }
 
-    /// There may be more where something was found.
+    /// Where one lost job was found there may be more.
     fn patrol_again(&self) {
         *self
             .last_patrol
@@ -205,7 +204,7 @@ impl JetStream {
         Ok(None)
     }
 
-    /// Jobs are written before records; who has been waited for once is not waited for again.
+    /// Jobs are written before records; a record that was waited for once is not waited for again.
     async fn record_of_job(&self, id: PlanId) -> Result<Standing, StoreError> {
         let is_late = self.orphans.is_known(id);
         let until = Instant::now() + RECORD_PATIENCE;
@@ -274,7 +273,7 @@ impl JetStream {
     ) -> Result<Lease, StoreError> {
         let (id, attempt) = (record.id(), record.attempt);
         let cancel = self.leases.hold(id, attempt, job, self.settings.lease);
-        // What was asked between the step and the hold.
+        // Take in requests that came between the step and the hold.
         if let Some(standing) = self.view.standing(id) {
             self.leases.heed(id, &standing.state);
         }
@@ -293,7 +292,7 @@ impl JetStream {
     }
 }
 
-/// Who waits for a plan. A plan that was handed over and not looked at goes back.
+/// A caller waiting for a plan. A plan that was handed over but not picked up goes back.
 struct Caller {
     store: Arc<JetStream>,
     take: oneshot::Receiver<Result<Lease, StoreError>>,
@@ -315,16 +314,16 @@ impl Drop for Caller {
 enum Found {
     /// To be run, as it now stands.
     Run(Box<Record>),
-    /// It is run here, under a lease that was not renewed in time.
+    /// It is already run here, under a lease that was not renewed in time.
     Ours,
-    /// Done, or removed.
+    /// Ended, or removed.
     Over,
-    /// At its end, as this node has written down, for its workers were lost.
+    /// Ended by this node, because its workers were lost.
     Lost(Box<Plan>),
 }
 
-/// Answer a delivery. A lost answer is made good by the next delivery, so nobody waits for one to be
-/// heard, except where a job is given back: it comes before whatever is asked for next.
+/// Answer a delivery. If the answer is lost, the next delivery makes up for it, so nobody waits for confirmation,
+/// except where a job is given back: that must arrive before the next fetch.
 pub(super) async fn answer(plan: impl Into<Option<PlanId>>, job: &Job, answer: AckKind) {
     let answered = match answer {
         AckKind::Nak(_) => job.double_ack_with(answer).await,

@@ -1,4 +1,4 @@
-//! The connection, and the streams and buckets on the servers, made where they are missing.
+//! The connection, and the streams and buckets on the servers, created where missing.
 
 use std::collections::HashMap;
 use std::time::Duration;
@@ -16,19 +16,19 @@ use super::trouble::{failed, passes};
 use crate::job::PlanId;
 use crate::store::{IDEMPOTENCY_MS, Options, StoreError};
 
-/// The oldest server that gives what is promised.
+/// The oldest server version that provides what the store promises.
 const OLDEST_SERVER: &str = "2.12.0";
 
-/// A server that says nothing for so long is taken for lost.
+/// A server that does not answer for this long is considered lost.
 pub(super) const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Jobs beyond the queue's limit that the stream has room for: those that are being run.
+/// Room in the stream for jobs beyond the queue's limit: those being run.
 const RUNNING: i64 = 4_096;
 
-/// How long a node is believed to live after it last said so.
+/// How long a node counts as alive after its last announcement.
 pub(super) const ALIVE: Duration = Duration::from_secs(30);
 
-/// How long a node has for the telling of one end.
+/// How long a node has to deliver one webhook.
 const TELLING: Duration = Duration::from_secs(120);
 
 /// All that the store keeps on the servers.
@@ -42,13 +42,13 @@ pub(super) struct Servers {
     pub(super) jobs: Stream,
     /// Documents, by plan.
     pub(super) documents: kv::Store,
-    /// Those that are too long for a message.
+    /// Documents that are too long for a message.
     pub(super) objects: ObjectStore,
     /// Idempotency keys.
     pub(super) keys: kv::Store,
     /// Which nodes there are.
     pub(super) nodes: kv::Store,
-    /// Which node tells which end.
+    /// Which node delivers which webhook.
     pub(super) tellers: kv::Store,
 }
 
@@ -62,7 +62,7 @@ pub(super) async fn connect(settings: &Settings) -> Result<Client, StoreError> {
         .connection_timeout(PATIENCE)
         .ping_interval(PATIENCE)
         .request_timeout(Some(PATIENCE))
-        // A reader that falls behind is caught up from the stream; it must not lose others' answers.
+        // A reader that falls behind is caught up from the stream; it must not cause other readers to lose answers.
         .subscription_capacity(65_536)
         .reconnect_delay_callback(|tries| {
             let longest = Duration::from_secs(2);
@@ -150,11 +150,11 @@ impl Servers {
         self.client.connection_state() == Connection::Connected
     }
 
-    /// Do again what may be done twice, while a server is there and refuses what passes with an election. As [`outlast`] does,
-    /// whose work cannot be sent between threads.
+    /// Retry idempotent work while the servers refuse it with an error that passes with an election. Like the free
+    /// [`outlast`](super::election::outlast), for work that cannot be sent between threads.
     ///
     /// # Errors
-    /// The last one of `work`.
+    /// The last error of `work`.
     pub(super) async fn outlast<T, F>(&self, work: impl Fn() -> F) -> Result<T, StoreError>
     where
         F: Future<Output = Result<T, StoreError>>,
@@ -170,7 +170,7 @@ impl Servers {
     }
 }
 
-/// Steps of plans' lives; as many of each plan as its readers are promised.
+/// Steps of plans' lives, as many per plan as its readers are promised.
 fn plans(options: &Options) -> Config {
     Config {
         name: "plans".to_owned(),
@@ -180,7 +180,7 @@ fn plans(options: &Options) -> Config {
     }
 }
 
-/// The queue: no longer than its limit, each job until somebody says that it is done.
+/// The queue: no longer than its limit; each job stays until it is acknowledged.
 fn jobs(options: &Options) -> Config {
     let limit = i64::try_from(options.queue_limit).unwrap_or(i64::MAX);
     Config {
@@ -192,14 +192,14 @@ fn jobs(options: &Options) -> Config {
     }
 }
 
-/// Makes what is missing on the servers.
+/// Creates what is missing on the servers.
 pub(super) struct Maker<'a> {
     context: &'a Context,
     namespace: &'a str,
     replicas: usize,
 }
 
-/// For the namespace of the settings.
+/// For the namespace in the settings.
 pub(super) fn maker<'a>(context: &'a Context, settings: &'a Settings) -> Maker<'a> {
     Maker {
         context,
@@ -213,7 +213,7 @@ impl Maker<'_> {
         format!("{}-{what}", self.namespace)
     }
 
-    /// Make a stream, or bring one that is there to what is wanted; never to fewer replicas.
+    /// Create a stream, or bring an existing one to the wanted configuration; never to fewer replicas.
     async fn stream(&self, wanted: Config) -> Result<Stream, StoreError> {
         let name = self.name(&wanted.name);
         let what = || format!("stream {name}");
@@ -298,14 +298,14 @@ impl Maker<'_> {
             .map_err(|error| failed(&what, &error))
     }
 
-    /// The stream of an object store.
+    /// The stream underlying an object store.
     pub(super) async fn beneath(&self, bucket: &str) -> Result<Stream, StoreError> {
         let stream = format!("OBJ_{bucket}");
         let found = self.context.get_stream(&stream).await;
         found.map_err(|error| failed(&format!("stream {stream}"), &error))
     }
 
-    /// Bring what lies beneath a bucket to the replicas that are wanted; never to fewer.
+    /// Bring the stream underlying a bucket to the wanted number of replicas; never to fewer.
     async fn raise(&self, there: &Config) -> Result<(), StoreError> {
         if there.num_replicas >= self.replicas {
             return Ok(());
@@ -322,7 +322,7 @@ impl Maker<'_> {
     }
 }
 
-/// The plan of whose step or job a subject is: its last part.
+/// The plan id in the subject of a step or job: its last part.
 pub(super) fn plan_of(subject: &str) -> Option<PlanId> {
     let (_, id) = subject.rsplit_once('.')?;
     PlanId::parse_str(id).ok()

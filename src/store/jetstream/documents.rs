@@ -10,7 +10,7 @@ use super::trouble::failed;
 use crate::job::PlanId;
 use crate::store::StoreError;
 
-/// The longest document that goes into a message; servers take messages of 1 MiB unless told otherwise.
+/// The longest document that goes into a message; servers accept messages of 1 MiB by default.
 const LONGEST: usize = 512 << 10;
 
 impl Document {
@@ -22,7 +22,7 @@ impl Document {
         format!("{id}.result.{attempt}")
     }
 
-    /// Where the accepted scenario of a plan goes.
+    /// Where the accepted scenario of a plan is stored.
     pub(super) fn scenario(id: PlanId, text: &str) -> Self {
         Self {
             key: Self::scenario_key(id),
@@ -30,7 +30,7 @@ impl Document {
         }
     }
 
-    /// Where the result of a run goes; that of a late worker lies beside it, and nobody reads it.
+    /// Where the result of a run is stored; that of a late worker has its own key, and nobody reads it.
     pub(super) fn result(id: PlanId, attempt: u64, text: &str) -> Self {
         Self {
             key: Self::result_key(id, attempt),
@@ -89,7 +89,7 @@ impl Servers {
         String::from_utf8(bytes).map_err(|error| failed(&what(), &error))
     }
 
-    /// Remove all documents of a plan. `objects` are the keys of those that may be among the objects.
+    /// Remove all documents of a plan. `objects` are the keys of those that may be in the object store.
     pub(super) async fn remove_documents(
         &self,
         id: PlanId,

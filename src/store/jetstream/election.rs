@@ -1,4 +1,4 @@
-//! Asking again what the servers did not answer: while they elect a leader, they drop what they are asked.
+//! Retries of requests that the servers did not answer: while they elect a leader, they drop requests.
 
 use std::time::Duration;
 
@@ -7,20 +7,20 @@ use tokio::time::{Instant, sleep};
 /// An election takes a few seconds.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Before the first time of asking again; twice as long each time.
+/// Pause before the first retry; doubled each time.
 const SHORTEST: Duration = Duration::from_millis(20);
 
-/// Between two times of asking, at most.
+/// Longest pause between retries.
 const LONGEST: Duration = Duration::from_secs(1);
 
-/// An election that may be under way, since it was first asked about.
+/// An election that may be under way, timed from the first sign of it.
 pub(super) struct Election {
     until: Option<Instant>,
     pause: Duration,
 }
 
 impl Election {
-    /// One that nothing has yet been heard of.
+    /// No sign of an election yet.
     pub(super) fn perhaps() -> Self {
         Self {
             until: None,
@@ -28,7 +28,7 @@ impl Election {
         }
     }
 
-    /// Wait before asking again; false when it is no election that they do not answer for.
+    /// Wait before the next retry; false when it has lasted too long to be an election.
     pub(super) async fn goes_on(&mut self) -> bool {
         let now = Instant::now();
         if now > *self.until.get_or_insert(now + PATIENCE) {
@@ -40,10 +40,10 @@ impl Election {
     }
 }
 
-/// Do `work` until it is done or fails for what `passes` does not say passes with an election.
+/// Retry `work` until it succeeds or fails with an error that does not pass with an election.
 ///
 /// # Errors
-/// The last one of `work`.
+/// The last error of `work`.
 pub(super) async fn outlast<T, E>(
     passes: impl Fn(&E) -> bool,
     mut work: impl AsyncFnMut() -> Result<T, E>,

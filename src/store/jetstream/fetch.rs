@@ -1,4 +1,4 @@
-//! A lane's jobs, as the servers give them.
+//! A lane's jobs, as the servers deliver them.
 
 use std::collections::HashMap;
 use std::sync::{MutexGuard, PoisonError};
@@ -14,14 +14,14 @@ use super::lane::Lane;
 use super::trouble::{failed, refused};
 use crate::store::StoreError;
 
-/// How long a consumer is kept that nobody asks.
+/// How long the servers keep a consumer that is not used.
 const UNASKED: Duration = Duration::from_secs(24 * 60 * 60);
 
-/// Jobs that came again and are put in order, at most.
+/// Maximum number of redelivered jobs that are sorted.
 const MOST_SORTED: usize = 64;
 
 impl JetStream {
-    /// The next job of a lane, if there is one that nobody has.
+    /// The next job of a lane, if there is one that nobody holds.
     pub(super) async fn fetch(&self, lane: &Lane) -> Result<Option<Message>, StoreError> {
         let Some(first) = self.fetch_any(lane).await? else {
             return Ok(None);
@@ -29,7 +29,7 @@ impl JetStream {
         if !came_again(&first) {
             return Ok(Some(first));
         }
-        // The servers give jobs again in the order in which they were given back.
+        // The servers redeliver jobs in the order in which they were given back.
         let mut jobs = vec![first];
         while jobs.len() < MOST_SORTED
             && let Some(job) = self.fetch_any(lane).await?
@@ -63,12 +63,12 @@ impl JetStream {
                 Err(error) => Err(failed(&what(), &error)),
             }
         };
-        // A server that is lost while it is asked never answers.
+        // A server that is lost during a request never answers.
         let fetched = tokio::time::timeout(PATIENCE, asked)
             .await
             .unwrap_or_else(|_| Err(refused(&what(), "no server answered")));
         if fetched.is_err() {
-            // It may have been removed, for nobody asked it for long.
+            // It may have been removed after a long time without use.
             self.consumers().remove(lane);
         }
         fetched
@@ -83,7 +83,7 @@ impl JetStream {
             filter_subject: format!("{}.jobs.{}.*", self.servers.namespace, lane.subject()),
             ack_policy: AckPolicy::Explicit,
             ack_wait: self.settings.lease,
-            // Runs that were lost are counted in the record, where giving back does not count.
+            // Lost runs are counted in the record, where giving back does not count.
             max_deliver: -1,
             max_ack_pending: 65_536,
             inactive_threshold: UNASKED,

@@ -1,4 +1,4 @@
-//! Keeps the view: reads the plans' stream as it grows, and takes it up again where it broke off.
+//! Keeps the view current: reads the plans' stream as it grows, and resumes after an interruption.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -16,7 +16,7 @@ use super::trouble::{failed, refused};
 use crate::job::PlanId;
 use crate::store::StoreError;
 
-/// Between two tries to read on.
+/// Pause between attempts to resume.
 const PAUSE: Duration = Duration::from_millis(250);
 
 /// How far the reading has come.
@@ -24,14 +24,14 @@ const PAUSE: Duration = Duration::from_millis(250);
 pub(super) enum Reading {
     /// What was there at the start is still being read.
     Catching,
-    /// All that is told is known at once.
+    /// Every new step is known at once.
     Current,
-    /// It broke off and is being taken up.
+    /// Reading was interrupted and is being resumed.
     Broken,
 }
 
 impl JetStream {
-    /// Read for ever; `told` how it stands.
+    /// Read for ever; report the state of reading to `told`.
     pub(super) async fn follow(self: Arc<Self>, told: watch::Sender<Reading>) {
         let mut read = 0;
         loop {
@@ -49,7 +49,7 @@ impl JetStream {
         }
     }
 
-    /// Read from behind `read`, the last place that was; ends when the connection is lost for good.
+    /// Read on after `read`, the last sequence read; ends when the connection is lost for good.
     async fn read_on(
         &self,
         read: &mut u64,
@@ -91,7 +91,7 @@ impl JetStream {
         let Some(id) = plan_of(&message.subject) else {
             return;
         };
-        // What this node wrote itself is known already.
+        // This node's own writes are already known.
         if self
             .view
             .standing(id)
@@ -107,7 +107,7 @@ impl JetStream {
         }
     }
 
-    /// The steps of a subject from a place on, as they come, and whether there are none so far.
+    /// The steps of a subject from a sequence number on, as they come, and whether there are none so far.
     async fn read_steps(
         &self,
         what: &str,
@@ -126,14 +126,14 @@ impl JetStream {
             .info()
             .await
             .map_err(|error| failed(what, &error))?;
-        // Nothing is delivered before somebody listens. (What is told as delivered is no measure: of a
-        // consumer that begins at a place it is the place before.)
+        // Nothing is delivered before somebody listens. (The delivered count does not tell: for a consumer that starts
+        // at a sequence number it is the number before.)
         let is_empty = info.num_pending == 0;
         let messages = consumer.messages().await;
         Ok((is_empty, messages.map_err(|error| failed(what, &error))?))
     }
 
-    /// All that the stream keeps of a plan's events.
+    /// All events of a plan that the stream still keeps.
     pub(super) async fn read_history(&self, id: PlanId) -> Result<History, StoreError> {
         let what = format!("events of plan {id}");
         let subject = self.servers.subject_of(id);

@@ -1,4 +1,4 @@
-//! Events of plans that are read much: kept in memory as far as there is room.
+//! Events of plans that are read often: kept in memory as far as there is room.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::sync::Arc;
@@ -8,16 +8,16 @@ use crate::export::document::Incumbent;
 use crate::job::{Event, NumberedEvent, PlanId};
 use crate::store::EventPage;
 
-/// Bytes of events in memory, about.
+/// Approximate bytes of events in memory.
 const ROOM: usize = 64 << 20;
 
-/// Bytes that are reckoned for an event that is no route.
+/// Bytes assumed for an event that is not a route.
 const SMALL_EVENT: usize = 256;
 
 /// What one step told.
 #[derive(Debug, Clone)]
 struct Batch {
-    /// Id of the newest event until then.
+    /// Id of the newest event up to and including this step.
     last: u64,
     events: Arc<[NumberedEvent]>,
     bytes: usize,
@@ -28,7 +28,7 @@ struct Batch {
 pub(super) struct History {
     /// Events up to this one are not here.
     before: u64,
-    /// Whether they are nowhere else either.
+    /// Whether the stream no longer has them either.
     complete: bool,
     batches: VecDeque<Batch>,
     incumbent: Option<(u64, Incumbent)>,
@@ -37,7 +37,7 @@ pub(super) struct History {
 }
 
 impl History {
-    /// Begin where the stream begins to know of the plan.
+    /// Begin where the stream's knowledge of the plan begins.
     pub(super) fn whole() -> Self {
         Self {
             complete: true,
@@ -50,7 +50,7 @@ impl History {
         self.batches.back().map_or(self.before, |batch| batch.last)
     }
 
-    /// Add a step; false when there is a hole before it.
+    /// Add a step; false when steps before it are missing.
     pub(super) fn push(&mut self, step: &Step, events_kept: u64) -> bool {
         let State::Kept(record) = &*step.state else {
             return true;
@@ -95,7 +95,7 @@ impl History {
         }
     }
 
-    /// Whether it has what follows `after`.
+    /// Whether it has everything after `after`.
     fn reaches(&self, after: u64) -> bool {
         self.complete || after >= self.before
     }
@@ -123,7 +123,7 @@ impl History {
     }
 }
 
-/// In memory, and at most about so many in a message.
+/// Approximate bytes in memory, and an upper bound on bytes in a message.
 pub(super) fn bytes_of(event: &Event) -> usize {
     match event {
         Event::Incumbent(route) => SMALL_EVENT + 64 * route.waypoints.len(),
@@ -132,7 +132,7 @@ pub(super) fn bytes_of(event: &Event) -> usize {
     }
 }
 
-/// The histories in memory; those that nobody has touched for long make room.
+/// The histories in memory; the least recently used make room.
 #[derive(Debug)]
 pub(super) struct Histories {
     plans: HashMap<PlanId, History>,
@@ -143,7 +143,7 @@ pub(super) struct Histories {
 }
 
 impl Histories {
-    /// Of each plan that has them the newest `events_kept` are kept, in whole steps.
+    /// For each plan in memory the newest `events_kept` are kept, in whole steps.
     pub(super) fn new(events_kept: u64) -> Self {
         Self {
             plans: HashMap::new(),
@@ -154,7 +154,7 @@ impl Histories {
         }
     }
 
-    /// A step has come. Of plans whose beginning was not seen nothing is kept.
+    /// A step has come. Nothing is kept of plans whose beginning was not seen.
     pub(super) fn push(&mut self, id: PlanId, step: &Step) {
         let begins = matches!(&*step.state, State::Kept(record) if step.first_event(record) == 1);
         let known = self.take(id);
@@ -166,19 +166,19 @@ impl Histories {
         }
     }
 
-    /// What there is after an event; `None` when the stream must be asked.
+    /// The events after this one; `None` when the stream must be asked.
     pub(super) fn page(&mut self, id: PlanId, after: u64, limit: usize) -> Option<EventPage> {
         self.touched(id)
             .filter(|history| history.reaches(after))
             .map(|history| history.page(after, limit))
     }
 
-    /// What there is of a plan; `None` when the stream must be asked.
+    /// All events of a plan; `None` when the stream must be asked.
     pub(super) fn whole(&mut self, id: PlanId) -> Option<&History> {
         self.touched(id).filter(|history| history.complete)
     }
 
-    /// Keep it, in place of what there was.
+    /// Store it in place of what there was.
     pub(super) fn put(&mut self, id: PlanId, mut history: History) {
         self.take(id);
         self.touches += 1;
@@ -249,7 +249,7 @@ mod tests {
         for step in steps(10) {
             histories.push(Uuid::nil(), &step);
         }
-        // Fifteen events; the last four steps have six of them.
+        // Fifteen events; the last four steps hold six of them.
         let page = histories.page(Uuid::nil(), 0, 100).expect("it began here");
         assert_eq!(page.forgotten, 9);
         let ids: Vec<_> = page.events.iter().map(|event| event.id).collect();

@@ -1,4 +1,4 @@
-//! Ends that are to be told: each by one node at a time.
+//! Webhooks for ends of plans: each sent by one node at a time.
 
 use std::collections::BTreeSet;
 use std::sync::PoisonError;
@@ -38,7 +38,7 @@ impl JetStream {
         Ok(taken)
     }
 
-    /// Whether this node tells that end; for two minutes no other does.
+    /// Whether this node may send this webhook; for two minutes no other does.
     async fn may_tell(&self, id: PlanId) -> Result<bool, StoreError> {
         if self.telling().contains(&id) {
             return Ok(true);
@@ -82,7 +82,7 @@ impl JetStream {
                 Ok(Some(Change::silent(State::Kept(record))))
             })
             .await;
-        // No other node may send again what has yet to be written down.
+        // Until the outcome is recorded, no other node may send it again.
         if !matches!(tried, Err(StoreError::Unavailable { .. })) {
             self.let_tell(id).await;
         }
@@ -92,7 +92,7 @@ impl JetStream {
         }
     }
 
-    /// Leave an end to whichever node is first.
+    /// Leave this webhook to whichever node is first.
     async fn let_tell(&self, id: PlanId) {
         if self.telling().remove(&id)
             && let Err(error) = self.servers.tellers.purge(id.to_string()).await
@@ -101,7 +101,7 @@ impl JetStream {
         }
     }
 
-    /// Leave all of them to others.
+    /// Leave all of them to other nodes.
     pub(super) async fn let_tell_all(&self) {
         let all = self.telling().clone();
         for id in all {

@@ -1,5 +1,4 @@
-//! The plans that a node knows of, and what is counted of them: lists by which each question is
-//! answered without looking at all plans.
+//! The plans that a node knows of, indexed and counted so that each question is answered without looking at all plans.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::sync::Arc;
@@ -12,10 +11,10 @@ use super::view::Standing;
 use crate::job::{Plan, PlanId, Status};
 use crate::store::{DatasetUse, ListQuery, Stats, StoreError, TOMBSTONE_MS};
 
-/// Runs over which the mean time is taken.
+/// Number of runs in the mean time.
 const RUNS: usize = 20;
 
-/// The plans, and what is counted of them.
+/// The plans, and their counts.
 #[derive(Debug)]
 pub(super) struct Known {
     plans: BTreeMap<PlanId, Standing>,
@@ -55,7 +54,7 @@ impl Known {
         }
     }
 
-    /// False when as much or more was known already.
+    /// False when the step was already known or superseded.
     pub(super) fn stand(&mut self, id: PlanId, placed: &Placed) -> bool {
         if self
             .plans
@@ -86,8 +85,8 @@ impl Known {
         self.histories.take(id);
     }
 
-    /// Keep what was read from the stream of a plan's events, unless it has told more meanwhile: that found no history
-    /// to be added to, and would be missing from this one for good.
+    /// Store a history read from the stream, unless the plan has told more meanwhile: those events found no history to
+    /// be added to, and would be missing from this one for good.
     pub(super) fn keep_history(&mut self, id: PlanId, history: History) {
         let told = self.kept(id).map(|record| record.last_event);
         if told.is_some_and(|last| last <= history.last()) {
@@ -131,7 +130,7 @@ impl Known {
             .extend(hook.and_then(|hook| hook.due_ms).map(|at| (at, id)));
     }
 
-    /// Of one that has ended with a result.
+    /// Count the run time of a plan that has ended with a result.
     fn time_run(&mut self, plan: &Plan) {
         if plan.stop_reason.is_some()
             && let Some((end_ms, began_ms)) = plan.finished_ms.zip(plan.started_ms)
@@ -183,7 +182,7 @@ impl Known {
             .is_some_and(|record| record.plan.status == Status::Queued)
     }
 
-    /// A record as it is shown: with its place in the queue.
+    /// A record as it is shown: including its place in the queue.
     pub(super) fn shown(&self, record: &Record) -> Plan {
         Plan {
             queue_position: (record.plan.status == Status::Queued)
@@ -197,7 +196,7 @@ impl Known {
         self.queue.range(..(place, PlanId::nil())).count() as u64 + 1
     }
 
-    /// Place of a plan, when it is kept.
+    /// Queue place of a plan, if the plan exists.
     pub(super) fn place(&self, id: PlanId) -> Option<u64> {
         self.kept(id).map(|record| record.place)
     }
@@ -222,7 +221,7 @@ impl Known {
         plans
     }
 
-    /// Tell each its place in the queue; the queue is walked once for all of them.
+    /// Set each plan's position in the queue; the queue is walked once for all of them.
     fn place_in_queue(&self, plans: &mut [Plan]) {
         let queued = |plan: &&mut Plan| plan.status == Status::Queued;
         let mut waiting: HashMap<PlanId, &mut Option<u64>> = plans
@@ -273,8 +272,7 @@ impl Known {
             .collect()
     }
 
-    /// Make room for a submission in the queue and its owner's quota; returns its place. Give it back
-    /// with [`Known::arrived`].
+    /// Make room for a submission in the queue and its owner's quota; returns its place. Undo with [`Known::arrived`].
     pub(super) fn expect(
         &mut self,
         limit: u64,
@@ -301,7 +299,7 @@ impl Known {
         Ok(queued + 1)
     }
 
-    /// A queued plan whose job is here counts as running until its step says so.
+    /// A queued plan whose job is here counts as running until its step confirms it.
     pub(super) fn expect_run(&mut self, id: PlanId) {
         let Some(standing) = self.standing(id) else {
             return;
@@ -314,7 +312,7 @@ impl Known {
         }
     }
 
-    /// It stays as it is; true when it is queued.
+    /// The plan keeps its state; true when it is queued.
     pub(super) fn expect_no_run(&mut self, id: PlanId) -> bool {
         if let Some(standing) = self.standing(id) {
             self.unlist(id);
@@ -323,7 +321,7 @@ impl Known {
         self.is_queued(id)
     }
 
-    /// A submission that was expected is there, or will not come.
+    /// An expected submission has arrived, or will not come.
     pub(super) fn arrived(&mut self, lane: &Lane) {
         self.coming_in_all -= 1;
         if let Some(coming) = self.coming.get_mut(&lane.owner) {
@@ -345,7 +343,7 @@ impl Known {
         lanes.cloned().collect()
     }
 
-    /// Plans to be removed by then, the longest ended first, beyond what is kept.
+    /// Plans due for removal at this time or beyond the limits, those that ended longest ago first.
     pub(super) fn removable(
         &self,
         now_ms: i64,
@@ -371,14 +369,14 @@ impl Known {
         going
     }
 
-    /// Tombstones whose time is over.
+    /// Tombstones that have expired.
     pub(super) fn expired_tombstones(&self, now_ms: i64, at_most: usize) -> Vec<PlanId> {
         let until = (now_ms.saturating_sub(TOMBSTONE_MS), PlanId::max());
         let graves = self.graves.range(..=until).take(at_most);
         graves.map(|(_, id)| *id).collect()
     }
 
-    /// Ends that are to be told by then, the longest due first.
+    /// Webhooks due at this time, the longest due first.
     pub(super) fn due(&self, now_ms: i64, at_most: usize) -> Vec<PlanId> {
         let due = self.due.range(..=(now_ms, PlanId::max())).take(at_most);
         due.map(|(_, id)| *id).collect()

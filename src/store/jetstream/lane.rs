@@ -1,11 +1,11 @@
-//! The lanes of the queue: who may take a plan, and who waits for whom.
+//! The lanes of the queue: who may claim a plan, and who waits for whom.
 
 use serde::{Deserialize, Serialize};
 
 use crate::digest::sha256_hex;
 use crate::job::Submission;
 
-/// From so much [`Submission::work`] on a plan is large: about a second of it.
+/// From this [`Submission::work`] on a plan is large: about a second of it.
 const LARGE: u64 = 4_000_000;
 
 /// A version of the program, as `major.minor.patch` orders them.
@@ -57,11 +57,11 @@ impl Size {
 /// Plans of one lane are run in the order of their acceptance.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub(super) struct Lane {
-    /// Of the program that accepted them; older workers leave them alone.
+    /// Version of the program that accepted them; older workers leave them alone.
     pub(super) version: Version,
     /// See [`Size`].
     pub(super) size: Size,
-    /// Stands for their owner.
+    /// Derived from the owner's name.
     pub(super) owner: String,
 }
 

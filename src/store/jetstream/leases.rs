@@ -1,4 +1,4 @@
-//! The runs of this node: each keeps its job by saying again and again that it is being done.
+//! The runs of this node: each keeps its job by telling the servers again and again that it is in progress.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -13,7 +13,7 @@ use super::record::State;
 use super::told::Told;
 use crate::job::PlanId;
 
-/// Says so as many times within the time after which the job would be given to another.
+/// Renewals within the time after which the job would be given to another node.
 const RENEWALS: u32 = 4;
 
 /// The runs of this node.
@@ -39,7 +39,7 @@ impl Leases {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Hold a job from now on; tells when its run shall end.
+    /// Hold a job from now on; returns what tells its run to stop.
     pub(super) fn hold(
         &self,
         id: PlanId,
@@ -63,7 +63,7 @@ impl Leases {
         cancelled
     }
 
-    /// A job came again while it is being done here: the servers missed what was said. True when so.
+    /// A job was delivered again while it is being done here: the servers missed a renewal. True when so.
     pub(super) fn again(&self, id: PlanId, attempt: u64, job: &Job) -> bool {
         self.held()
             .get(&id)
@@ -72,7 +72,7 @@ impl Leases {
             .is_some()
     }
 
-    /// A plan has changed; its run here is stopped when that was asked for, or is no longer ours.
+    /// A plan has changed; its run here is stopped when that was requested, or when it is no longer ours.
     pub(super) fn heed(&self, id: PlanId, state: &State) {
         let all = self.held();
         let Some(held) = all.get(&id) else { return };
@@ -82,7 +82,7 @@ impl Leases {
             held.cancel.send_replace(true);
         }
         if !own {
-            // Its worker will ask what became of it, and let go.
+            // Its worker will find out what happened, and let go.
             held.renewing.abort();
         }
     }
@@ -104,7 +104,7 @@ impl Leases {
         }
     }
 
-    /// Look at, or write down, what a run has told; `None` when it is not held here.
+    /// Read or update what a run has told; `None` when it is not held here.
     pub(super) fn told<T>(
         &self,
         id: PlanId,
@@ -116,7 +116,7 @@ impl Leases {
         Some(look(&mut held.told))
     }
 
-    /// Let go of a run; its job, if it was held.
+    /// Let go of a run; returns its job, if it was held.
     pub(super) fn let_go(&self, id: PlanId, attempt: u64) -> Option<Job> {
         let mut all = self.held();
         if all.get(&id).is_none_or(|held| held.attempt != attempt) {

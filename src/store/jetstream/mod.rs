@@ -1,8 +1,9 @@
-//! The store of many machines: plans, documents and events on the servers of a NATS system, with
-//! `JetStream` as queue, memory and judge.
+//! The store for several machines: plans, documents and events on the servers of a NATS system, with `JetStream` as
+//! queue, storage and arbiter.
 //!
-//! Any number of nodes share it. What is accepted is on the servers before it is answered; a plan's
-//! every step is written only if nobody was faster; a run is this node's for as long as the node says
+//! Any number of nodes share it. What is accepted is on the servers before it is answered; each step of a plan is
+//! written only if nobody was faster; a run belongs to this node for as long as the node renews its lease in time.
+//! Deliberately absent: any queue, election or replication of our own.
 //! so in time. Deliberately absent: any queue, election or replication of our own.
 
 mod claim;
@@ -60,10 +61,10 @@ use super::{
 use crate::export::document::Incumbent;
 use crate::job::{Event, Idempotency, Owner, Plan, PlanId, Submission};
 
-/// What was there must be read so soon at the start.
+/// At the start, existing data must be read within this time.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// The store of many machines.
+/// The store for several machines.
 ///
 /// Dropping it without [`Store::close`] leaves its runs to the other nodes, as a crash would.
 pub struct JetStreamStore {
@@ -72,22 +73,22 @@ pub struct JetStreamStore {
     tasks: Vec<JoinHandle<()>>,
 }
 
-/// What all its methods and tasks share.
+/// Shared by all its methods and tasks.
 struct JetStream {
     servers: Servers,
     view: View,
     leases: Leases,
     settings: Settings,
     options: Options,
-    /// Among the other nodes.
+    /// Identifies this node among the others.
     node: Uuid,
     consumers: Mutex<HashMap<Lane, PullConsumer>>,
-    /// Whose turn it is to claim.
+    /// Held by the claim whose turn it is.
     turn: tokio::sync::Mutex<()>,
     last_patrol: Mutex<Option<Instant>>,
     orphans: Orphans,
     all_slots: AtomicUsize,
-    /// Ends that this node tells.
+    /// Plans whose webhooks this node is sending.
     telling: Mutex<BTreeSet<PlanId>>,
     /// Becomes true when the store is closed.
     end: watch::Sender<bool>,
@@ -110,7 +111,7 @@ impl JetStream {
 }
 
 impl JetStreamStore {
-    /// Connect, make what is missing on the servers, and read what is there.
+    /// Connect, create what is missing on the servers, and read what is there.
     ///
     /// # Errors
     /// [`StoreError::Unavailable`] when no server answers, when it is too old or without `JetStream`,
@@ -331,7 +332,7 @@ impl Store for JetStreamStore {
             return;
         }
         let mut runs = self.store.leases.all();
-        // In the order in which they are to be run again.
+        // In the order in which they are to run again.
         runs.sort_by_key(|(id, _)| self.store.view.known().place(*id));
         for (id, attempt) in runs {
             if let Err(error) = self.store.release(id, attempt).await {
@@ -349,7 +350,7 @@ impl Store for JetStreamStore {
     }
 }
 
-/// Go on with several writes even when the caller goes away between them; their lines of the log stay the caller's.
+/// Complete several writes even when the caller goes away between them; their log lines keep the caller's span.
 async fn detached<T: Send + 'static>(
     writes: impl Future<Output = Result<T, StoreError>> + Send + 'static,
 ) -> Result<T, StoreError> {

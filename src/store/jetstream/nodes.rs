@@ -1,4 +1,4 @@
-//! Which nodes there are, and what they can do.
+//! Which nodes exist, and what they can do.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -13,7 +13,7 @@ use super::connect::ALIVE;
 use super::trouble::failed;
 use crate::store::StoreError;
 
-/// What a node says of itself.
+/// What a node announces about itself.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Node {
     /// Version of its program; it runs no plans of newer ones.
@@ -23,7 +23,7 @@ struct Node {
 }
 
 impl JetStream {
-    /// Say that this node is there. A small durable write, like any other.
+    /// Announce this node. A small durable write, like any other.
     pub(super) async fn announce(&self) -> Result<(), StoreError> {
         let node = Node {
             engine_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -39,7 +39,7 @@ impl JetStream {
         Ok(())
     }
 
-    /// Say it again and again, and count what the others say.
+    /// Keep announcing this node, and count the announcements of others.
     pub(super) async fn keep_announcing(self: Arc<Self>) {
         loop {
             if let Err(error) = self.count_nodes().await {
@@ -95,7 +95,7 @@ impl JetStream {
         self.all_slots.load(Ordering::Relaxed).max(1)
     }
 
-    /// This node goes.
+    /// Withdraw this node's announcement.
     pub(super) async fn take_leave(&self) {
         if let Err(error) = self.servers.nodes.purge(self.node.to_string()).await {
             tracing::debug!(%error, "this node is missed only after a while");

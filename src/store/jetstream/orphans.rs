@@ -1,4 +1,4 @@
-//! Jobs without a record: the plan is about to be accepted, or never was.
+//! Jobs without a record: either the plan is about to be accepted, or it never was.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -8,36 +8,36 @@ use tokio::time::Instant;
 
 use crate::job::PlanId;
 
-/// A submission writes the job first and has given up on the record long before; a job that this node has missed the
-/// record of for so long is nobody's.
+/// A job whose record this node has not found for this long is abandoned: a submission writes the job first, and would
+/// have given up on the record long before.
 const NOBODYS: Duration = Duration::from_secs(60);
 
-/// A job comes again after so long, at least and at most.
+/// Shortest and longest delay before such a job is delivered again.
 const SOONEST: Duration = Duration::from_millis(250);
 const LATEST: Duration = Duration::from_secs(15);
 
-/// What is missed longer than this, another node has thrown away.
+/// After this long, another node has discarded the job.
 const FORGOTTEN: Duration = Duration::from_secs(10 * 60);
 
-/// Since when the record of each job has been missed. The time is this node's own: clocks of nodes may differ, and how
-/// often a job has come says little, for it comes again at once where it is only put in order.
+/// Since when each job's record has been missing. Measured on this node: clocks of nodes may differ, and the number of
+/// deliveries says little, since a job that is only being sorted is redelivered at once.
 #[derive(Default)]
 pub(super) struct Orphans {
     missed: Mutex<HashMap<PlanId, Instant>>,
 }
 
-/// What is to be done with a job without a record.
+/// What to do with a job without a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Orphan {
-    /// It comes again after so long: as long again as it has been missed, so that many of them, as the loss of
-    /// a server may leave, soon cost the plans behind them little.
+    /// It is delivered again after this delay, which equals the time its record has been missing, so that many such
+    /// jobs, as the loss of a server may leave, soon cost the plans behind them little.
     Waits(Duration),
-    /// It is thrown away.
+    /// It is discarded.
     Nobodys,
 }
 
 impl Orphans {
-    /// The record of this job is missed.
+    /// The record of this job is missing.
     pub(super) fn miss(&self, id: PlanId) -> Orphan {
         let now = Instant::now();
         let mut missed = self.missed();
@@ -56,7 +56,7 @@ impl Orphans {
         self.missed().contains_key(&id)
     }
 
-    /// The record of this job is there.
+    /// The record of this job is found.
     pub(super) fn found(&self, id: PlanId) {
         self.missed().remove(&id);
     }
@@ -96,7 +96,7 @@ mod tests {
         orphans.found(id);
         assert_eq!(orphans.miss(id), Orphan::Waits(SOONEST));
         assert_eq!(orphans.miss(other), Orphan::Nobodys);
-        // Those that others threw away are forgotten.
+        // Jobs that other nodes discarded are forgotten.
         tokio::time::sleep(FORGOTTEN).await;
         orphans.miss(other);
         assert!(!orphans.is_known(id));

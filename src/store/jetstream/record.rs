@@ -1,7 +1,7 @@
-//! What the plans' stream holds: steps of their lives.
+//! The messages in the plans' stream: steps of plans' lives.
 //!
-//! Each message is one step: the plan as it became, and the events that this tells. So a state and
-//! its events are one write, which is there wholly or not at all.
+//! Each message is one step: the plan's new state, and the events that go with it. So a state and its events are one
+//! write, which happens entirely or not at all.
 
 use std::sync::Arc;
 
@@ -17,29 +17,29 @@ use crate::store::{Retention, StoreError, Tombstone};
 /// A step, as it is written.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Step {
-    /// By which a writer whose answer was lost recognises its own.
+    /// Lets a writer whose acknowledgement was lost recognise its own step.
     pub(super) mark: Uuid,
-    /// As the step left it.
+    /// The state after the step.
     #[serde(with = "shared")]
     pub(super) state: Arc<State>,
-    /// What was told before it.
+    /// Events before that of the new state.
     pub(super) events: Vec<Event>,
-    /// Whether the plan as it left it is told too, and its end when it has come to one: they are in the
-    /// state, and not written twice.
+    /// Whether the new state is an event too, and the end when the plan has ended: both can be derived from the state,
+    /// so they are not written twice.
     pub(super) told: bool,
 }
 
-/// How a plan stands.
+/// The state of a plan.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum State {
-    /// It is kept.
+    /// The plan exists.
     Kept(Box<Record>),
-    /// It was removed.
+    /// The plan was removed.
     Buried(Grave),
 }
 
-/// A plan with what the store alone knows of it.
+/// A plan with the data that only the store knows.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Record {
     pub(super) plan: Plan,
@@ -48,15 +48,15 @@ pub(super) struct Record {
     pub(super) place: u64,
     /// Runs begun.
     pub(super) attempt: u64,
-    /// Runs whose worker was lost.
+    /// Runs that were lost with their worker.
     pub(super) lost: u32,
-    /// Steps that the present run has appended.
+    /// Steps appended by the present run.
     pub(super) appended: u64,
     /// Id of the newest event.
     pub(super) last_event: u64,
-    /// Of its documents.
+    /// Bytes of its documents.
     pub(super) bytes: u64,
-    /// Of its events that are kept.
+    /// Bytes of its events that are kept.
     #[serde(default)]
     pub(super) event_bytes: u64,
     pub(super) scenario: Document,
@@ -65,7 +65,7 @@ pub(super) struct Record {
     pub(super) webhook: Option<Hook>,
 }
 
-/// Where a plan waits.
+/// A plan's position in the queue.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Queued {
     /// See [`Record::place`].
@@ -74,15 +74,15 @@ pub(super) struct Queued {
     pub(super) position: u64,
 }
 
-/// Where a document lies.
+/// Where a document is stored.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Document {
     pub(super) key: String,
-    /// Whether among the objects, for it is too long for a message.
+    /// Whether it is in the object store, being too long for a message.
     pub(super) large: bool,
 }
 
-/// Where an end is told.
+/// Where to send word of the end.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Hook {
     pub(super) url: String,
@@ -103,7 +103,7 @@ pub(super) struct Grave {
 }
 
 impl Record {
-    /// Of a plan that has just been accepted.
+    /// The record of a plan that has just been accepted.
     pub(super) fn accepted(submission: &Submission, queued: Queued, scenario: Document) -> Self {
         Self {
             plan: Plan::accepted(submission, queued.position),
@@ -130,8 +130,8 @@ impl Record {
         self.plan.id
     }
 
-    /// Keys of its documents that are among the objects, or may be: what a run that was superseded, or ended
-    /// without a result, wrote is told of nowhere.
+    /// Keys of its documents that are, or may be, in the object store: what a superseded run, or one that ended without
+    /// a result, wrote is recorded nowhere.
     pub(super) fn objects(&self) -> Vec<String> {
         let known = [Some(&self.scenario), self.result.as_ref()];
         let known = known.into_iter().flatten();
@@ -147,17 +147,17 @@ impl Record {
         objects
     }
 
-    /// What it takes up on the servers, about: documents and events.
+    /// Approximate bytes it takes up on the servers: documents and events.
     pub(super) fn size(&self) -> u64 {
         self.bytes + self.event_bytes
     }
 
-    /// The event of its status.
+    /// Its current status as an event.
     pub(super) fn status(&self) -> Event {
         Event::Status(Box::new(self.plan.clone()))
     }
 
-    /// It has ended: its time runs, and its end is to be told.
+    /// The plan has ended: its retention time starts, and its webhook is due.
     pub(super) fn ended(&mut self, retention: Retention) {
         self.plan.expires_ms = retention.expires_ms(&self.plan);
         if let Some(hook) = &mut self.webhook {
@@ -181,7 +181,7 @@ impl Grave {
 }
 
 impl Step {
-    /// As `change` says, with the events counted.
+    /// The step for `change`, with the events counted.
     pub(super) fn of(change: Change) -> Self {
         let Change {
             mut state,
@@ -200,12 +200,12 @@ impl Step {
         }
     }
 
-    /// Id of the first event that it tells; of the next one, when it tells none.
+    /// Id of its first event; of the next one, when it has none.
     pub(super) fn first_event(&self, record: &Record) -> u64 {
         record.last_event + 1 - count(self.events.len(), self.told, &record.plan)
     }
 
-    /// All events that it tells, with their ids.
+    /// All its events, with their ids.
     pub(super) fn numbered(&self) -> Vec<NumberedEvent> {
         let State::Kept(record) = &*self.state else {
             return Vec::new();
@@ -234,12 +234,12 @@ impl Step {
     }
 }
 
-/// Events of a step that tells so many before the plan as it leaves it, and perhaps this.
+/// Number of events of a step with `before` explicit ones, and that of the new state when `told`.
 fn count(before: usize, told: bool, plan: &Plan) -> u64 {
     before as u64 + u64::from(told) + u64::from(told && plan.status.is_final())
 }
 
-/// Bytes of events, as a step holds them.
+/// Bytes of events as stored in a step.
 pub(super) fn length(events: &[Event]) -> u64 {
     struct Count(u64);
     impl std::io::Write for Count {
@@ -253,12 +253,12 @@ pub(super) fn length(events: &[Event]) -> u64 {
         }
     }
     let mut count = Count(0);
-    // What cannot be written makes no step either, and is told there.
+    // Events that cannot be serialised cannot be written as a step either; the error is reported there.
     let _ = serde_json::to_writer(&mut count, events);
     count.0
 }
 
-/// A state is read and written as if it were not shared.
+/// Serialises a state as if it were not shared.
 mod shared {
     use std::sync::Arc;
 
@@ -275,7 +275,7 @@ mod shared {
     }
 }
 
-/// A step with its place in the stream.
+/// A step with its sequence in the stream.
 #[derive(Debug, Clone)]
 pub(super) struct Placed {
     pub(super) sequence: u64,

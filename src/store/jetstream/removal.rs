@@ -37,7 +37,7 @@ impl JetStream {
             self.withdraw(id, place).await;
             self.servers.remove_documents(id, &objects).await?;
         }
-        // Last: where steps are still there, documents may be, too.
+        // Last: while steps remain, documents may remain too.
         let steps = self.servers.plans.purge();
         let steps = steps.filter(self.servers.subject_of(id));
         let purged = steps.sequence(standing.sequence).await;
@@ -45,7 +45,7 @@ impl JetStream {
         Ok(())
     }
 
-    /// Remove a tombstone, and what a removal that broke off has left.
+    /// Remove a tombstone, and what an interrupted removal has left.
     async fn forget_tombstone(&self, id: PlanId) -> Result<(), StoreError> {
         let steps = self.servers.plans.purge();
         let purged = steps.filter(self.servers.subject_of(id)).await;
@@ -60,7 +60,7 @@ impl JetStream {
         Ok(())
     }
 
-    /// Take a job out of the queue, by its place. One that stays is thrown away by whoever is given it.
+    /// Take a job out of the queue, by its place. One that stays is discarded by whichever node receives it.
     ///
     /// (To purge its subject would also make the servers forget which jobs were given back.)
     pub(super) async fn withdraw(&self, id: PlanId, place: u64) {

@@ -1,4 +1,4 @@
-//! What the worker of a plan tells of its run, and how the run ends.
+//! What a plan's worker reports of its run, and how the run ends.
 
 use async_nats::jetstream::AckKind;
 
@@ -12,10 +12,10 @@ use super::view::Standing;
 use crate::job::{Event, Plan, PlanId, Status};
 use crate::store::{End, Ending, StoreError};
 
-/// Events of one step, at most.
+/// Maximum number of events in one step.
 const EVENTS: usize = 256;
 
-/// Bytes of them, about; servers take messages of 1 MiB unless told otherwise.
+/// Approximate bytes of events in one step; servers accept messages of 1 MiB by default.
 const BYTES: usize = 256 << 10;
 
 impl JetStream {
@@ -39,8 +39,8 @@ impl JetStream {
         own(&standing, id, attempt).map(drop)
     }
 
-    /// Append a step for each part; returns the number of the last. Until that is noted, doing it again
-    /// writes only what was not written.
+    /// Append a step for each part; returns the number of the last. Until that is recorded, a retry writes only what
+    /// was not written before.
     async fn append_all(
         &self,
         id: PlanId,
@@ -60,7 +60,7 @@ impl JetStream {
         Ok(number)
     }
 
-    /// Of a run that tells much, the servers keep the newest. Tried again at the next step when it fails.
+    /// Delete the oldest events of a run that tells many. A failure is retried at the next step.
     async fn forget_old_events(&self, id: PlanId, attempt: u64) {
         let kept = self.options.events_kept;
         let excess = |told: &mut Told| told.excess(kept);
@@ -92,7 +92,7 @@ impl JetStream {
             .change(id, |standing| {
                 let record = own(standing, id, attempt)?;
                 if record.appended >= number {
-                    // Written before, when no answer came.
+                    // It was written earlier, but the answer was lost.
                     return Ok(None);
                 }
                 let mut record = Box::new(record.clone());
@@ -216,7 +216,7 @@ impl JetStream {
     }
 }
 
-/// The record of a plan that is run under that attempt.
+/// The record of a plan that is being run under this attempt.
 fn own(standing: &Standing, id: PlanId, attempt: u64) -> Result<&Record, StoreError> {
     match &*standing.state {
         State::Kept(record) if record.is_run_under(attempt) => Ok(record),
@@ -224,7 +224,7 @@ fn own(standing: &Standing, id: PlanId, attempt: u64) -> Result<&Record, StoreEr
     }
 }
 
-/// A plan that is nowhere is nobody's to run.
+/// A plan that does not exist cannot be run under any lease.
 fn lost(error: StoreError, id: PlanId) -> StoreError {
     match error {
         StoreError::NotFound(_) | StoreError::Gone(_) => StoreError::LeaseLost(id),
@@ -232,7 +232,7 @@ fn lost(error: StoreError, id: PlanId) -> StoreError {
     }
 }
 
-/// What goes into a step each.
+/// Split the events so that each part fits in a step.
 fn parts(events: &[Event]) -> Vec<&[Event]> {
     let mut parts = Vec::new();
     let mut rest = events;

@@ -1,4 +1,4 @@
-//! The one way in which a plan changes: a step that is written if nobody was faster.
+//! The only way to change a plan: a step that is written if nobody was faster.
 
 use async_nats::jetstream::context::PublishErrorKind;
 use async_nats::jetstream::message::PublishMessage;
@@ -14,18 +14,18 @@ use super::view::{Standing, View};
 use crate::job::{Event, PlanId};
 use crate::store::StoreError;
 
-/// What a step makes of a plan.
+/// The effect of a step on a plan.
 pub(super) struct Change {
-    /// The plan as it becomes; ids of the events are counted on by the writer.
+    /// The new state; the writer assigns the event ids.
     pub(super) state: State,
-    /// What is told first.
+    /// Events before that of the new state.
     pub(super) events: Vec<Event>,
-    /// Whether the plan as it becomes is told, and its end with it.
+    /// Whether the new state is an event too, and the end with it.
     pub(super) told: bool,
 }
 
 impl Change {
-    /// The plan becomes this, and that is told.
+    /// The plan takes this state, and an event tells of it.
     pub(super) fn told(record: Box<Record>) -> Self {
         Self {
             state: State::Kept(record),
@@ -34,7 +34,7 @@ impl Change {
         }
     }
 
-    /// The plan becomes this, and nobody need know.
+    /// The plan takes this state, without an event.
     pub(super) fn silent(state: State) -> Self {
         Self {
             state,
@@ -44,7 +44,7 @@ impl Change {
     }
 }
 
-/// The plans: on the servers, and as they are known here.
+/// The plans: on the servers, and as known here.
 pub(super) struct Plans<'a> {
     pub(super) servers: &'a Servers,
     pub(super) view: &'a View,
@@ -59,7 +59,7 @@ impl Plans<'_> {
         }
     }
 
-    /// How a plan stands, as far as is known here; asked of the servers when it is not.
+    /// A plan's state as known here; the servers are asked when it is not.
     pub(super) async fn standing(&self, id: PlanId) -> Result<Standing, StoreError> {
         if let Some(standing) = self.view.standing(id) {
             return Ok(standing);
@@ -67,7 +67,7 @@ impl Plans<'_> {
         self.look_up(id).await
     }
 
-    /// How a plan stands for the servers.
+    /// A plan's state on the servers.
     pub(super) async fn look_up(&self, id: PlanId) -> Result<Standing, StoreError> {
         let newest = self.newest(id).await?.ok_or(StoreError::NotFound(id))?;
         self.learn(id, &newest);
@@ -107,8 +107,8 @@ impl Plans<'_> {
         self.write(id, None, begin).await.map(drop)
     }
 
-    /// Change a plan as `change` says of how it stands; returns how it then stands. `None` of `change`
-    /// leaves it as it is. When somebody else was faster, `change` is asked again.
+    /// Change a plan as `change` decides from its present state; returns the resulting state. `None` from `change`
+    /// leaves it as it is. When another writer was faster, `change` is called again.
     pub(super) async fn change(
         &self,
         id: PlanId,
@@ -144,7 +144,7 @@ impl Plans<'_> {
                     Ok(sequence) => break Some(Placed { sequence, step }),
                     Err(PublishError::Outrun) => break self.newest(id).await?,
                     Err(PublishError::Hopeless(error)) => return Err(error),
-                    // It may have been written. Written again it is refused, and found by its mark.
+                    // It may have been written. Written again, it is refused, and recognised by its mark.
                     Err(PublishError::Unanswered(error)) => {
                         if !election.goes_on().await {
                             return Err(error);
@@ -197,8 +197,8 @@ impl Plans<'_> {
 enum PublishError {
     /// The plan has changed meanwhile.
     Outrun,
-    /// Perhaps it was written.
+    /// It may have been written.
     Unanswered(StoreError),
-    /// It never will be.
+    /// It can never be written.
     Hopeless(StoreError),
 }

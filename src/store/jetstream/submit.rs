@@ -1,7 +1,7 @@
 //! How a plan is accepted.
 //!
-//! Its document and its job are written first, its record last: what broke off before that was never
-//! accepted, and its job, which no record stands behind, is thrown away by whoever finds it.
+//! Its document and its job are written first, its record last: a submission that was interrupted before that was never
+//! accepted, and its job, which has no record, is discarded by whichever node finds it.
 
 use std::error::Error;
 use std::time::Duration;
@@ -25,11 +25,11 @@ use crate::store::{IDEMPOTENCY_MS, StoreError, Submitted};
 /// How long a request waits for an earlier one with the same idempotency key.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// How long a submission with an idempotency key may last; nothing of it is written later.
+/// How long a submission with an idempotency key may take; after that, it writes nothing more.
 const LONGEST: Duration = Duration::from_secs(30);
 
-/// An earlier request that is older, and whose plan is not there, broke off. The clocks of two nodes may differ by as
-/// much as this is longer than [`LONGEST`].
+/// A request older than this whose plan does not exist was interrupted. The difference from [`LONGEST`] is how far the
+/// clocks of two nodes may differ.
 const BROKEN_OFF_MS: i64 = 60_000;
 
 /// Which submission came first with a key.
@@ -41,7 +41,7 @@ struct First {
 }
 
 impl First {
-    /// The first submission, unless that was too long ago.
+    /// The first submission, unless it was too long ago.
     fn read(
         entry: &Entry,
         idempotency: &Idempotency,
@@ -83,7 +83,7 @@ impl JetStream {
             return Ok(None);
         };
         match self.get(first.plan).await {
-            // It was never accepted, or not yet.
+            // It was never accepted, or is not yet.
             Err(StoreError::NotFound(_)) => Ok(None),
             found => found.map(Some),
         }
@@ -120,7 +120,7 @@ impl JetStream {
         match self.accept(submission).await {
             Ok(plan) => Ok(newly(plan)),
             Err(NotAccepted { error, is_certain }) => {
-                // Where that is open the key must stand for it.
+                // While that is uncertain the key must be kept.
                 if is_certain {
                     let undone = self
                         .servers
@@ -161,7 +161,7 @@ impl JetStream {
         let place = match document.and(job) {
             Ok(place) => place,
             Err(error) => {
-                // What remains of it is thrown away with its job.
+                // What remains of it is removed with its job.
                 let _ = self.servers.remove_documents(id, &[scenario.key]).await;
                 return Err(NotAccepted::certainly(error));
             }
@@ -176,8 +176,8 @@ impl JetStream {
         })
     }
 
-    /// Its place in the queue's stream. A job that is written twice, since no answer came, is there once: the
-    /// servers know it by its plan.
+    /// Its place in the queue's stream. A job written twice because the answer was lost is there once: the servers
+    /// identify it by its plan.
     async fn enqueue(&self, id: PlanId, lane: &Lane) -> Result<u64, StoreError> {
         self.servers.outlast(|| self.try_to_enqueue(id, lane)).await
     }
@@ -212,7 +212,7 @@ impl JetStream {
         format!("{}.jobs.{}.{id}", self.servers.namespace, lane.subject())
     }
 
-    /// Take a key, or find the plan of who has it.
+    /// Claim a key, or find the plan of the submission that holds it.
     async fn be_first(
         &self,
         key: &str,
@@ -254,7 +254,7 @@ impl JetStream {
             };
             if let Some(first) = First::read(&entry, idempotency, now_ms)? {
                 if first.plan == submission.id {
-                    // Taken before, when no answer came.
+                    // It was claimed earlier, but the answer was lost.
                     let revision = entry.revision;
                     return Ok(Turn::First { revision });
                 }
@@ -298,7 +298,7 @@ impl NotAccepted {
 
 enum Turn {
     First {
-        /// Of the key.
+        /// Revision of the key.
         revision: u64,
     },
     Later(Box<Plan>),
@@ -311,7 +311,7 @@ fn newly(plan: Plan) -> Submitted {
     }
 }
 
-/// Callers choose keys freely; a bucket does not take all of them.
+/// Callers choose keys freely; a bucket does not allow all characters.
 fn key_of(owner: Option<&Owner>, idempotency: &Idempotency) -> String {
     let owner = owner.map_or("", String::as_str);
     sha256_hex(format!("{owner}\n{}", idempotency.key).as_bytes())

@@ -1,11 +1,11 @@
-//! What a run has told so far, step by step, so that the oldest can be forgotten when there is too much of it.
+//! What a run has told so far, step by step, so that the oldest steps can be deleted when there are too many events.
 
 use std::collections::VecDeque;
 
 /// A step that a run appended.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Appended {
-    /// Its place in the plans' stream.
+    /// Its sequence in the plans' stream.
     pub(super) sequence: u64,
     pub(super) events: u64,
     pub(super) bytes: u64,
@@ -17,7 +17,7 @@ pub(super) struct Told {
     steps: VecDeque<Appended>,
     events: u64,
     bytes: u64,
-    /// Whether some have been forgotten: with them goes all that earlier runs of the plan told.
+    /// Whether some have been deleted: everything told by earlier runs of the plan goes with them.
     has_forgotten: bool,
 }
 
@@ -28,8 +28,8 @@ impl Told {
         self.steps.push_back(step);
     }
 
-    /// Where what is to be kept begins, when there is half as much again as `events_kept`: so that most steps make
-    /// the servers forget nothing.
+    /// Where the steps to keep begin, once there are half again as many events as `events_kept`, so that most steps do
+    /// not cause a deletion on the servers.
     pub(super) fn excess(&self, events_kept: u64) -> Option<u64> {
         if self.events <= events_kept.saturating_add(events_kept / 2) {
             return None;
@@ -44,7 +44,7 @@ impl Told {
         Some(first.sequence)
     }
 
-    /// What stood before that place is kept no longer.
+    /// Steps before this sequence are no longer kept.
     pub(super) fn forget_before(&mut self, sequence: u64) {
         self.has_forgotten = true;
         let spare = self.steps.partition_point(|step| step.sequence < sequence);
@@ -54,7 +54,7 @@ impl Told {
         }
     }
 
-    /// Bytes of all events that are kept of the plan, where they are no longer the sum of what was written.
+    /// Bytes of all kept events of the plan, once they are no longer the sum of what was written.
     pub(super) fn bytes_left(&self) -> Option<u64> {
         self.has_forgotten.then_some(self.bytes)
     }
@@ -85,7 +85,7 @@ mod tests {
         told.forget_before(40);
         assert_eq!((told.events, told.bytes_left()), (20, Some(500)));
         assert_eq!(told.excess(20), None);
-        // One that is too long by itself is kept whole.
+        // A step that is too long by itself is kept whole.
         told.push(Appended {
             sequence: 90,
             events: 256,

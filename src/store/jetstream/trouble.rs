@@ -1,11 +1,11 @@
-//! What is said of the servers' refusals.
+//! How errors from the servers are reported.
 
 use std::error::Error;
 use std::fmt::Display;
 
 use crate::store::{StoreError, Trouble};
 
-/// A step that failed, with what the server or the client says of it.
+/// An error for a step that failed, with the message of the server or client.
 pub(super) fn failed(what: &str, error: &(impl Error + 'static)) -> StoreError {
     let mut detail = format!("{what}: {error}");
     let mut source = error.source();
@@ -19,12 +19,12 @@ pub(super) fn failed(what: &str, error: &(impl Error + 'static)) -> StoreError {
     described(detail)
 }
 
-/// As [`failed`], of an error that has no source.
+/// As [`failed`], for an error that has no source.
 pub(super) fn refused(what: &str, error: &(impl Display + ?Sized)) -> StoreError {
     described(format!("{what}: {error}"))
 }
 
-/// Whether it comes of an election among the servers, or of another short absence: asked again, they answer.
+/// Whether it results from an election among the servers, or another short outage: a retry will succeed.
 pub(super) fn passes(error: &StoreError) -> bool {
     let StoreError::Unavailable {
         trouble: Trouble::Other,
@@ -33,7 +33,7 @@ pub(super) fn passes(error: &StoreError) -> bool {
     else {
         return false;
     };
-    // The last is what the client makes of "no responders" where something is written.
+    // The last is what the client makes of "no responders" on a write.
     [
         "timed out",
         "temporarily unavailable",
@@ -44,8 +44,8 @@ pub(super) fn passes(error: &StoreError) -> bool {
     .any(|sign| detail.contains(sign))
 }
 
-/// Whether a write was refused since what it builds on has been written over. The servers have two codes
-/// for it, of which the client knows one.
+/// Whether a write was refused because what it builds on has been overwritten. The servers have two codes for it, of
+/// which the client knows one.
 pub(super) fn is_outrun(error: &(impl Error + 'static)) -> bool {
     let said = failed("", error).to_string();
     said.contains("wrong last sequence")

@@ -8,9 +8,9 @@ use crate::job::PlanId;
 /// Plans by lane, each with its place in the queue.
 pub(super) type Lanes = HashMap<Lane, BTreeSet<(u64, PlanId)>>;
 
-/// The lane of which a worker of that version takes the next plan, in a system of so many slots: that
-/// of the owner who has the fewest plans running, of equals that of the oldest plan. Large plans leave
-/// a quarter of the slots to small ones. Lanes of newer versions are left to newer workers.
+/// The lane from which a worker of this version takes the next plan, in a system of `slots` slots: that of the owner
+/// with the fewest plans running; between equals, that of the oldest plan. Large plans leave a quarter of the slots to
+/// small ones. Lanes of newer versions are left to newer workers.
 pub(super) fn next(
     queued: &Lanes,
     running: &Lanes,

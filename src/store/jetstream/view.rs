@@ -1,5 +1,5 @@
-//! What a node knows of all plans: kept from the plans' stream, and from what the node writes itself,
-//! so that whoever has been answered finds what was answered.
+//! A node's knowledge of all plans: kept from the plans' stream, and from what the node writes itself, so that whoever
+//! has been answered can read what they were told.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -11,7 +11,7 @@ use crate::job::PlanId;
 use crate::store::changes::Changes;
 use crate::store::{StoreError, TOMBSTONE_MS};
 
-/// See the module's documentation.
+/// The module's documentation describes it.
 pub(super) struct View {
     known: Mutex<Known>,
     /// Ticks whenever there may be something to claim.
@@ -19,7 +19,7 @@ pub(super) struct View {
     pub(super) changes: Changes,
 }
 
-/// How a plan stands, and since which place in the stream.
+/// A plan's state, and the stream sequence it dates from.
 #[derive(Debug, Clone)]
 pub(super) struct Standing {
     pub(super) sequence: u64,
@@ -44,7 +44,7 @@ impl View {
         self.waiting.subscribe()
     }
 
-    /// Take in a step, whoever wrote it; false when as much or more was known already.
+    /// Take in a step, whoever wrote it; false when it was already known or superseded.
     pub(super) fn learn(&self, id: PlanId, placed: &Placed) -> bool {
         let queued = {
             let mut known = self.known();
@@ -61,14 +61,14 @@ impl View {
         true
     }
 
-    /// A plan whose run was expected is not run here.
+    /// A plan that was expected to run here does not.
     pub(super) fn expect_no_run(&self, id: PlanId) {
         if self.known().expect_no_run(id) {
             self.waiting.send_modify(|ticks| *ticks += 1);
         }
     }
 
-    /// A plan whose tombstone's time is over.
+    /// A plan whose tombstone has expired.
     pub(super) fn forget(&self, id: PlanId) {
         self.known().forget(id);
     }
@@ -79,7 +79,7 @@ impl View {
 }
 
 impl Standing {
-    /// The record of a plan that is kept.
+    /// The record of a plan that has not been removed.
     ///
     /// # Errors
     /// [`StoreError::Gone`], [`StoreError::NotFound`].

@@ -1,5 +1,5 @@
-//! Plans on their way to those who run them: chosen in the writer's transaction, given out before or after
-//! its commit, and back in the queue when nobody takes them.
+//! Plans on their way to the workers that claimed them: chosen in the writer's transaction, handed out before or after
+//! its commit, and put back in the queue when nobody takes them.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::Sender;
@@ -14,13 +14,13 @@ use crate::store::{Lease, StoreError};
 /// When a claimer is given its lease.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum When {
-    /// As soon as its plan is chosen; the commit may fail yet.
+    /// As soon as its plan is chosen; the commit may still fail.
     Chosen,
     /// After the commit.
     Durable,
 }
 
-/// Who waits for a plan to run.
+/// A caller waiting for a plan to run.
 pub(super) struct Claimer {
     pub(super) when: When,
     pub(super) reply: oneshot::Sender<Result<Delivery, StoreError>>,
@@ -31,9 +31,9 @@ pub(super) struct Claims {
     messages: Sender<Message>,
     /// To be answered after the commit.
     held: Vec<(Claimer, Result<Lease, StoreError>)>,
-    /// Whether the transaction may hold what a claim did.
+    /// Whether the transaction may contain changes made by a claim.
     pub(super) any: bool,
-    /// The greatest attempt whose lease was given out before it.
+    /// The greatest attempt whose lease was handed out before the commit.
     pub(super) early_attempt: u64,
 }
 
@@ -47,7 +47,7 @@ impl Claims {
         }
     }
 
-    /// Choose a plan for each who waits, as long as there are any.
+    /// Choose a plan for each waiting claimer, while there are any.
     pub(super) fn serve(&mut self, tx: &mut Transaction<'_>, waiting: &mut VecDeque<Claimer>) {
         while tx.queued > 0
             && tx.sound().is_ok()
@@ -76,7 +76,7 @@ impl Claims {
         }
     }
 
-    /// What cannot be delivered goes back to the queue when it is dropped.
+    /// A claim that cannot be delivered goes back to the queue when it is dropped.
     fn send(&self, claimer: Claimer, claim: Result<Lease, StoreError>) {
         let delivery = claim.map(|lease| Delivery {
             lease: Some(lease),
@@ -107,7 +107,7 @@ impl Drop for Delivery {
         let give_back = operation(
             move |tx| operations::release(tx, id, attempt),
             move |released| {
-                // A plan that was deleted meanwhile is nobody's loss.
+                // If the plan was deleted meanwhile, there is nothing to give back.
                 if let Err(error) = released
                     && !matches!(error, StoreError::LeaseLost(_))
                 {

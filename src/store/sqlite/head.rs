@@ -1,5 +1,5 @@
-//! The head of the queue: the next plan that can be run, and what becomes of one before it that cannot be read, for
-//! whom all others would wait for ever.
+//! The head of the queue: the next plan that can be run, and what becomes of an unreadable one before it, which would
+//! otherwise block all others for ever.
 
 use rusqlite::Connection;
 
@@ -9,9 +9,8 @@ use super::transaction::{Effect, Transaction};
 use crate::job::FailureKind;
 use crate::store::StoreError;
 
-/// What whoever runs it needs of the first plan that has all of it, its record and its document; those before it have
-/// failed. `None` when there is none. Nothing of it is written yet, so whatever keeps it from being read, the
-/// transaction remains sound.
+/// The record and document of the first plan that has both; those before it have failed. `None` when there is none.
+/// Nothing of a plan has been written when reading it fails, so the transaction remains sound.
 pub(super) fn take(tx: &mut Transaction<'_>) -> Result<Option<(PlanRow, String)>, StoreError> {
     loop {
         let row = match PlanRow::head(tx.connection) {
@@ -37,8 +36,8 @@ fn document(connection: &Connection, seq: i64) -> rusqlite::Result<String> {
         .query_row([seq], |row| row.get(0))
 }
 
-/// Whether it is what stands in the row, or that there is none, and not the database, which may do better next time
-/// and has its own way to tell of damage.
+/// Whether the error comes from the row's content or its absence, and not from the database, which may recover by the
+/// next try and reports damage in its own way.
 fn is_the_row_s(error: &rusqlite::Error) -> bool {
     error.sqlite_error_code().is_none()
 }
@@ -61,8 +60,8 @@ fn fail(
     Ok(())
 }
 
-/// Without its record nobody can be told of it, and it cannot be removed under its id: it only leaves the queue, and is
-/// kept, without a time, for whoever looks at the file.
+/// Without its record the plan's owner cannot be notified, and it cannot be removed by its id: it only leaves the
+/// queue, and is kept, without an expiry time, for whoever inspects the file.
 fn set_aside(tx: &mut Transaction<'_>, error: &rusqlite::Error) -> Result<(), StoreError> {
     let seq: i64 = tx
         .connection

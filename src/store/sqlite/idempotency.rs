@@ -1,4 +1,4 @@
-//! Which submission was the first with its idempotency key.
+//! Which submission came first with its idempotency key.
 
 use rusqlite::{Connection, OptionalExtension, params};
 
@@ -7,7 +7,7 @@ use super::transaction::Transaction;
 use crate::job::{Idempotency, Owner, Plan, PlanId, Submission};
 use crate::store::{IDEMPOTENCY_MS, StoreError};
 
-/// The plan of the first submission with this key, owner and body, as it stands.
+/// The current record of the plan from the first submission with this key, owner and body.
 pub(super) fn earlier(
     connection: &Connection,
     owner: Option<&Owner>,
@@ -35,10 +35,10 @@ pub(super) fn earlier(
     read::get(connection, plan, now_ms).map(Some)
 }
 
-/// Keep the key of a submission that made a plan.
+/// Store the key of a submission that made a plan.
 pub(super) fn remember(tx: &Transaction<'_>, submission: &Submission) -> Result<(), StoreError> {
     if let Some(idempotency) = &submission.idempotency {
-        // One that has expired but was not swept yet is replaced.
+        // A key that has expired but was not swept yet is replaced.
         tx.connection
             .prepare_cached(
                 "INSERT OR REPLACE INTO idempotency_keys (owner, key, body_sha256, plan_id, seen_ms) \
@@ -67,7 +67,7 @@ fn oldest(now_ms: i64) -> i64 {
     now_ms.saturating_sub(IDEMPOTENCY_MS)
 }
 
-/// A part of the key must not be null.
+/// No part of the key may be null.
 fn named(owner: Option<&Owner>) -> &str {
     owner.map_or("", String::as_str)
 }

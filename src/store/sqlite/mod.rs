@@ -1,7 +1,7 @@
 //! The embedded store: one `SQLite` file in the data directory, written by one thread.
 //!
-//! Every acknowledged change is on the disk (WAL, `synchronous = FULL`); what was being run when a
-//! process died is queued again when the next one opens the file.
+//! Every acknowledged change is on the disk (WAL, `synchronous = FULL`); plans that were running when a process died
+//! are queued again when the next one opens the file.
 
 mod claims;
 mod head;
@@ -44,12 +44,12 @@ use crate::job::{Event, Idempotency, Owner, Plan, PlanId, Submission};
 /// Name of the database in the data directory.
 const DATABASE: &str = "noctule.db";
 
-/// How long to wait for a person who holds the database in `sqlite3`.
+/// How long to wait for a person who has the database locked in `sqlite3`.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// The embedded store.
 ///
-/// Its methods want a tokio runtime. Dropping it finishes what has been sent to the writer.
+/// Its methods need a tokio runtime. Dropping it finishes what has been sent to the writer.
 pub struct SqliteStore {
     writer: Writer,
     readers: Arc<Readers>,
@@ -59,8 +59,8 @@ pub struct SqliteStore {
 }
 
 impl SqliteStore {
-    /// Open the store in `data_dir`, both created if need be, and give what an earlier process was
-    /// running back to the queue. Blocks on the disk.
+    /// Open the store in `data_dir`, both created if need be, and return plans that an earlier process was running to
+    /// the queue. Blocks on the disk.
     ///
     /// # Errors
     /// [`StoreError::InUse`] when another process has it open; [`StoreError::Unavailable`] when the
@@ -69,7 +69,7 @@ impl SqliteStore {
         Self::open_after(data_dir, options, |_| Ok(Vec::new()))
     }
 
-    /// As [`SqliteStore::open`], of a file that may be damaged.
+    /// As [`SqliteStore::open`], for a file that may be damaged.
     ///
     /// # Errors
     /// Also [`StoreError::Unavailable`] with [`Trouble::Damaged`] when it is.
@@ -99,9 +99,8 @@ impl SqliteStore {
                 detail: format!("database {}: {first}", file.display()),
             });
         }
-        // Until here they hold what was found and what is taken over from earlier versions; of what is written from now
-        // on types allow nothing else. For each row that it holds to a list of five names SQLite makes a table of
-        // them, a quarter of the time of adding a plan's row.
+        // CHECK constraints guard opening and migration. From here only typed code writes, so they are off: for each
+        // `IN (...)` check SQLite builds a temporary table, a quarter of the cost of inserting a plan.
         connection.pragma_update(None, "ignore_check_constraints", true)?;
         sync_directory(data_dir)?;
         Self::assemble(connection, lock, file, options)
@@ -337,8 +336,8 @@ mod tests {
         }
     }
 
-    /// What the writer's own connection says of itself, after all that opening a store does: only so does a commit
-    /// come back when the log is on the disk, and only so is it the log that is waited for.
+    /// What the writer's own connection reports after the store has been opened: only with these settings does a commit
+    /// return after the log is on the disk, and only then is it the log that is waited for.
     #[tokio::test]
     async fn a_commit_waits_for_the_disk() {
         let directory = tempfile::TempDir::new().expect("a temporary directory");
@@ -351,13 +350,13 @@ mod tests {
         };
         let wal = Value::Text("wal".to_owned());
         assert_eq!(set("journal_mode").await.expect("it is told"), wal);
-        // From OFF, 0, to EXTRA, 3: FULL.
+        // On the scale from OFF, 0, to EXTRA, 3, this is FULL.
         let full = Value::Integer(2);
         assert_eq!(set("synchronous").await.expect("it is told"), full);
         store.close().await;
     }
 
-    /// Other programs are held to the states there are; a file in which one is not, is damaged.
+    /// Other programs are held to the known states; a file with an unknown one is damaged.
     #[test]
     fn a_plan_is_in_no_state_that_there_is_not() {
         let directory = tempfile::TempDir::new().expect("a temporary directory");
@@ -412,7 +411,7 @@ mod tests {
         let stats = store.stats().await.expect("reading goes on");
         assert_eq!(stats.queued, accepted.len() as u64);
 
-        // Those that came with one that has no room are refused at worst, never half done.
+        // Submissions that share a transaction with one that does not fit are at worst refused, never half done.
         let together = [20, 500_000, 30].map(|bytes| store.submit(submission(bytes)));
         for answer in futures_util::future::join_all(together).await {
             accepted.extend(answer.map(|submitted| submitted.plan.id));

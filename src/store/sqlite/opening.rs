@@ -1,4 +1,4 @@
-//! The files in the data directory: made, locked, opened, and found again after a power failure.
+//! The files in the data directory: created, locked, opened, and made to survive a power failure.
 
 use std::fs::{DirBuilder, File, TryLockError};
 use std::path::Path;
@@ -52,7 +52,7 @@ pub(super) fn open_database(file: &Path) -> Result<Connection, StoreError> {
     Ok(connection)
 }
 
-/// A new file is only found again after a power failure when its directory is on the disk too.
+/// A new file survives a power failure only when its directory entry is on the disk too.
 pub(super) fn sync_directory(data_dir: &Path) -> Result<(), StoreError> {
     #[cfg(unix)]
     File::open(data_dir)

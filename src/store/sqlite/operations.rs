@@ -1,4 +1,4 @@
-//! What changes the store, each as a step of the writer's transaction.
+//! Operations that change the store, each a step of the writer's transaction.
 
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ pub(super) fn submit(
     let mut row = PlanRow {
         seq: 0,
         attempt: 0,
-        // That of its acceptance.
+        // The event of its acceptance.
         last_event: 1,
         forgotten: 0,
         bytes: submission.scenario.len() as u64,
@@ -78,7 +78,7 @@ pub(super) fn claim(tx: &mut Transaction<'_>) -> Result<Option<Lease>, StoreErro
         return Ok(None);
     };
     row.plan.start(tx.now_ms())?;
-    // A claim that came to nothing after its lease was given out must not be taken for this one.
+    // A claim that failed after its lease was handed out must not be mistaken for this one.
     row.attempt = row.attempt.max(tx.void_attempt) + 1;
     tx.queued -= 1;
     tell_status(tx, &mut row)?;
@@ -144,7 +144,7 @@ pub(super) fn release(
     give_back(tx, row)
 }
 
-/// Give back all that is being run, when the store is closed.
+/// Give back everything that is being run, when the store is closed.
 pub(super) fn release_all(tx: &mut Transaction<'_>) -> Result<(), StoreError> {
     for row in running(tx)? {
         give_back(tx, row)?;
@@ -152,8 +152,8 @@ pub(super) fn release_all(tx: &mut Transaction<'_>) -> Result<(), StoreError> {
     Ok(())
 }
 
-/// What an earlier process was running when it died is queued again, or is at its end; nobody holds those leases any
-/// more. Returns what has ended.
+/// Plans that an earlier process was running when it died are queued again, or ended; their leases are void. Returns
+/// the plans that have ended.
 pub(super) fn recover(tx: &mut Transaction<'_>) -> Result<Vec<Plan>, StoreError> {
     let mut ended = Vec::new();
     for mut row in running(tx)? {
@@ -170,7 +170,7 @@ pub(super) fn recover(tx: &mut Transaction<'_>) -> Result<Vec<Plan>, StoreError>
     Ok(ended)
 }
 
-/// In the order in which they were accepted.
+/// Running plans in order of acceptance.
 fn running(tx: &Transaction<'_>) -> Result<Vec<PlanRow>, StoreError> {
     let rows = tx
         .connection
@@ -235,14 +235,14 @@ pub(super) fn touch(tx: &mut Transaction<'_>) -> Result<(), StoreError> {
     Ok(())
 }
 
-/// The row of a plan that is run under that attempt.
+/// The row of a plan that is being run under this attempt.
 fn leased(tx: &Transaction<'_>, id: PlanId, attempt: u64) -> Result<PlanRow, StoreError> {
     PlanRow::load(tx.connection, id)?
         .filter(|row| row.plan.status == Status::Running && row.attempt == attempt)
         .ok_or(StoreError::LeaseLost(id))
 }
 
-/// Back to the queue, or to its end when that was asked for.
+/// Back to the queue, or ended if that was requested.
 fn give_back(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<Plan, StoreError> {
     tx.effects.push(Effect::Unleased(row.plan.id));
     if row.plan.cancel_requested {
@@ -258,7 +258,7 @@ fn requeue(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<Plan, StoreErro
     row.plan.requeue()?;
     forget_incumbent(tx, &row)?;
     tx.queued += 1;
-    // Its place is counted over the others, so its own state must be in the table first.
+    // Its queue position is counted from the table, so its own new state must be there first.
     row.update(tx.connection)?;
     row = row.placed(tx.connection)?;
     tell_status(tx, &mut row)?;
@@ -288,7 +288,7 @@ pub(super) fn tell_status(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result
     tx.tell(row, &[status])
 }
 
-/// The caller has just ended the plan. From now on its time runs.
+/// The caller has just ended the plan. Its retention time starts now.
 pub(super) fn tell_end(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
     row.plan.expires_ms = tx.options.retention.expires_ms(&row.plan);
     let status = Event::Status(Box::new(row.plan.clone()));

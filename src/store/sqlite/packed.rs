@@ -1,13 +1,13 @@
-//! What a search tells, as bytes: a third of its JSON, and no figure is turned into digits and back.
+//! Search events as bytes: a third of the size of their JSON, and no number is converted to digits and back.
 //!
-//! Most of what the store writes are these events. All others stay text, as all were in earlier versions.
+//! Most of what the store writes is these events. All others stay text, as all were in earlier versions.
 
 use serde::{Deserialize, Serialize};
 
 use crate::export::document::{Convergence, Incumbent, Position};
 use crate::job::Event;
 
-/// An event of a search. New kinds come last: what is in a file is told by its place in this list.
+/// A search event. New kinds go last: files identify the kind by its position in this list.
 #[derive(Serialize, Deserialize)]
 enum Packed {
     Convergence {
@@ -28,7 +28,7 @@ enum Packed {
     },
 }
 
-/// In one of the two frames.
+/// Positions in one of the two frames.
 #[derive(Serialize, Deserialize)]
 struct Waypoints {
     geodetic: bool,
@@ -36,7 +36,7 @@ struct Waypoints {
     points: Vec<[f64; 3]>,
 }
 
-/// The events as bytes; `None` when there are others among them.
+/// The events as bytes; `None` when other kinds are among them.
 pub(super) fn pack(events: &[Event]) -> Option<Vec<u8>> {
     let packed: Option<Vec<Packed>> = events.iter().map(Packed::of).collect();
     postcard::to_stdvec(&packed?).ok()
@@ -45,7 +45,7 @@ pub(super) fn pack(events: &[Event]) -> Option<Vec<u8>> {
 /// The events that were packed.
 ///
 /// # Errors
-/// When the bytes are none of [`pack`].
+/// When the bytes were not made by [`pack`].
 pub(super) fn unpack(bytes: &[u8]) -> Result<Vec<Event>, postcard::Error> {
     let packed: Vec<Packed> = postcard::from_bytes(bytes)?;
     Ok(packed.into_iter().map(Into::into).collect())
@@ -76,7 +76,7 @@ impl Packed {
 }
 
 impl Waypoints {
-    /// `None` when they are of two frames.
+    /// `None` when the positions are in both frames.
     fn of(positions: &[Position]) -> Option<Self> {
         let is_geodetic = |position: &Position| matches!(position, Position::Geodetic { .. });
         let geodetic = positions.first().is_some_and(is_geodetic);
@@ -149,7 +149,7 @@ impl From<Waypoints> for Vec<Position> {
     }
 }
 
-/// Of a file that may come from a machine with more memory.
+/// The file may come from a machine with a larger `usize`.
 fn count(iterations: u64) -> usize {
     usize::try_from(iterations).unwrap_or(usize::MAX)
 }
@@ -217,7 +217,7 @@ mod tests {
         }
     }
 
-    /// What is in files is read by later versions.
+    /// Later versions read what is in the files.
     #[test]
     fn bytes_stay_what_they_are() {
         let bytes = pack(&[point(None)]).expect("it is of a search");

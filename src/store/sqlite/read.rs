@@ -1,4 +1,4 @@
-//! What is asked of the store, over a few read-only connections beside the writer's.
+//! Reads from the store, over a few read-only connections beside the writer's.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -15,10 +15,10 @@ use crate::export::document::Incumbent;
 use crate::job::{Event, NumberedEvent, Plan, PlanId, Status};
 use crate::store::{DatasetUse, EventPage, ListQuery, Stats, StoreError, TOMBSTONE_MS, Tombstone};
 
-/// Reads at the same time; more wait.
+/// Concurrent reads; further ones wait.
 const CONNECTIONS: u32 = 8;
 
-/// Runs that [`Stats::mean_run_ms`] looks back on.
+/// Number of recent runs that [`Stats::mean_run_ms`] averages.
 const RUNS: i64 = 20;
 
 /// The pool of read-only connections.
@@ -195,7 +195,7 @@ fn queue(connection: &Connection) -> rusqlite::Result<Vec<i64>> {
         .collect()
 }
 
-/// The events of a row.
+/// The events in a row.
 fn batch(text: ValueRef<'_>, packed: ValueRef<'_>) -> Result<Vec<Event>, Box<dyn Error>> {
     Ok(match packed.as_blob_or_null()? {
         Some(bytes) => packed::unpack(bytes)?,
@@ -269,7 +269,8 @@ pub(super) fn datasets_in_use(connection: &Connection) -> Result<Vec<DatasetUse>
 }
 
 pub(super) fn stats(connection: &Connection) -> Result<Stats, StoreError> {
-    // With the name as a parameter, SQLite would plan the query anew each time, for an index may serve one alone.
+    // With the name as a parameter, SQLite would plan the query anew each time, since an index may apply to one name
+    // only.
     let count = |sql: &str| -> rusqlite::Result<u64> {
         connection
             .prepare_cached(sql)?

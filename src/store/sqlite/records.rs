@@ -1,8 +1,7 @@
-//! Records that were read lately, so that asking where a plan stands again costs no query.
+//! A cache of recently read records, so that asking for a plan's status again costs no query.
 //!
-//! What is returned is what a query would: nothing is, while a commit is under way, that the commit
-//! may change, and nothing read before a commit is kept after it. So whoever was answered about a
-//! change finds it.
+//! It returns what a query would: while a commit is under way, nothing that the commit may change is returned, and
+//! nothing read before a commit is kept after it. So whoever got an answer about a change also sees that change.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -10,7 +9,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use crate::job::{Plan, PlanId};
 use crate::store::Stats;
 
-/// Records kept at most; when there are as many, all are forgotten.
+/// Maximum number of records; on reaching it, all are dropped.
 const CAPACITY: usize = 4_096;
 
 /// What was read, and as of which commit.
@@ -29,13 +28,13 @@ struct Kept {
 }
 
 impl Records {
-    /// To be taken before what is to be kept is read.
+    /// Take this before reading what is to be kept.
     pub(super) fn version(&self) -> Version {
         Version(self.lock().version)
     }
 
-    /// The record, if it is known to be as it was read: nothing has been committed since, or it has
-    /// ended and was not touched.
+    /// The record, if it is known to be current: nothing has been committed since it was read, or it had ended and was
+    /// not touched.
     pub(super) fn plan(&self, id: PlanId) -> Option<Plan> {
         let kept = self.lock();
         let (version, plan) = kept.plans.get(&id)?;
@@ -68,7 +67,7 @@ impl Records {
         }
     }
 
-    /// A commit begins, which changes or removes these plans, and may change the places and counts of all.
+    /// A commit begins that changes or removes these plans, and may change the queue positions and counts of all.
     pub(super) fn begin(&self, changed: impl Iterator<Item = PlanId>) {
         let mut kept = self.lock();
         kept.version += 1;
@@ -82,7 +81,7 @@ impl Records {
         self.lock().version += 1;
     }
 
-    /// Forget all for good.
+    /// Drop everything and cache nothing from now on.
     pub(super) fn close(&self) {
         let mut kept = self.lock();
         *kept = Kept {
@@ -149,7 +148,7 @@ mod tests {
             assert_eq!(records.plan(touched.id), None);
             assert_eq!(records.plan(ended.id).as_ref(), Some(&ended));
             if during {
-                // Whether this was read before or after the commit cannot be known.
+                // It cannot be known whether this was read before or after the commit.
                 records.keep_plan(records.version(), &touched);
                 records.keep_plan(before, &touched);
                 records.end();

@@ -1,4 +1,4 @@
-//! Plans whose time has come, and what remains of the removed ones.
+//! Removal of plans that have expired, and what remains of removed ones.
 
 use rusqlite::{Params, params};
 
@@ -7,7 +7,7 @@ use super::transaction::{Effect, Transaction};
 use crate::job::PlanId;
 use crate::store::{SWEEP, StoreError, TOMBSTONE_MS, Tombstone};
 
-/// An ended plan that may have to go.
+/// An ended plan that may have to be removed.
 struct Ended {
     seq: i64,
     id: String,
@@ -39,7 +39,7 @@ fn expired(tx: &Transaction<'_>, now_ms: i64) -> Result<Vec<Ended>, StoreError> 
     )
 }
 
-/// The longest ended plans, as far as there are more, or more bytes of them, than are kept.
+/// The plans that ended longest ago, where count or bytes exceed what is to be kept.
 fn beyond_limits(tx: &Transaction<'_>, at_most: usize) -> Result<Vec<Ended>, StoreError> {
     let retention = tx.options.retention;
     let max_plans = retention.plans.unwrap_or(u64::MAX);
@@ -118,7 +118,7 @@ pub(super) fn remove(
     Ok(())
 }
 
-/// Forget the tombstones that have expired.
+/// Delete the tombstones that have expired.
 pub(super) fn bury_for_good(tx: &Transaction<'_>, now_ms: i64) -> Result<(), StoreError> {
     tx.connection
         .prepare_cached("DELETE FROM tombstones WHERE deleted_ms <= ?1")?

@@ -5,13 +5,13 @@ use rusqlite::{Connection, OptionalExtension, Row, params};
 
 use crate::job::{Failure, Plan, PlanId, Status};
 
-/// The columns that [`PlanRow::read`] wants, in their order there.
+/// The columns that [`PlanRow::read`] expects, in its order.
 pub(super) const COLUMNS: &str = "seq, id, owner, name, status, stop_reason, feasible, best_cost, progress, \
      iteration, iterations, evaluations, algorithm, seed, created_ms, started_ms, finished_ms, expires_ms, \
      cancel_requested, error_kind, error_detail, revision, attempt, last_event, \
      forgotten, bytes, lost";
 
-/// A record with what the store alone knows of it.
+/// A record with the data that only the store knows.
 #[derive(Debug)]
 pub(super) struct PlanRow {
     pub(super) seq: i64,
@@ -19,17 +19,17 @@ pub(super) struct PlanRow {
     pub(super) last_event: u64,
     /// Events up to this one are no longer kept.
     pub(super) forgotten: u64,
-    /// Of its documents and events.
+    /// Bytes of its documents and events.
     pub(super) bytes: u64,
-    /// Runs that ended with their process.
+    /// Runs that were cut off when their process died.
     pub(super) lost: u64,
-    /// `queue_position` is no column: see [`queue_position`].
+    /// `queue_position` is not a column: see [`queue_position`].
     pub(super) plan: Plan,
 }
 
 impl PlanRow {
     pub(super) fn read(row: &Row<'_>) -> rusqlite::Result<Self> {
-        // In the order of the columns: looking a name up compares it with all before it.
+        // In column order: looking a column up by name compares it with all before it.
         let mut row = Cells { row, next: 0 };
         let seq = row.take()?;
         let plan = Plan {
@@ -66,7 +66,7 @@ impl PlanRow {
         })
     }
 
-    /// The row of that plan, its place in the queue included.
+    /// The row of this plan, including its place in the queue.
     pub(super) fn load(connection: &Connection, id: PlanId) -> rusqlite::Result<Option<Self>> {
         let row = connection
             .prepare_cached(&format!("SELECT {COLUMNS} FROM plans WHERE id = ?1"))?
@@ -75,8 +75,8 @@ impl PlanRow {
         row.map(|row| row.placed(connection)).transpose()
     }
 
-    /// The row at the head of the queue, whose place is the first. Left to itself, the database would take
-    /// the index by status and sort the whole queue.
+    /// The row at the head of the queue, at position 1. Without the hint, the database would take the index by status
+    /// and sort the whole queue.
     pub(super) fn head(connection: &Connection) -> rusqlite::Result<Option<Self>> {
         connection
             .prepare_cached(&format!(
@@ -87,7 +87,7 @@ impl PlanRow {
             .optional()
     }
 
-    /// With its place in the queue.
+    /// Adds its place in the queue.
     pub(super) fn placed(mut self, connection: &Connection) -> rusqlite::Result<Self> {
         self.plan.queue_position = match self.plan.status {
             Status::Queued => Some(queue_position(connection, self.seq)?),
@@ -96,8 +96,8 @@ impl PlanRow {
         Ok(self)
     }
 
-    /// Add it to the table; its `seq` is given by the table. The event of its acceptance needs no row of its own:
-    /// [`Plan::as_accepted`] tells it.
+    /// Add it to the table, which assigns its `seq`. The acceptance event needs no row of its own:
+    /// [`Plan::as_accepted`] reconstructs it.
     pub(super) fn insert(
         &mut self,
         connection: &Connection,
@@ -134,7 +134,7 @@ impl PlanRow {
         Ok(())
     }
 
-    /// Write what changes within a state. No index of active plans has these columns, so this is cheaper
+    /// Write the columns that change within a state. No index of active plans has these columns, so this is cheaper
     /// than [`PlanRow::update`].
     pub(super) fn update_progress(&self, connection: &Connection) -> rusqlite::Result<()> {
         let plan = &self.plan;
@@ -159,7 +159,7 @@ impl PlanRow {
         Ok(())
     }
 
-    /// Write what may have changed since it was read.
+    /// Write every column that may have changed since it was read.
     pub(super) fn update(&self, connection: &Connection) -> rusqlite::Result<()> {
         let plan = &self.plan;
         let error = plan.error.as_ref();
@@ -220,12 +220,12 @@ impl Cells<'_, '_> {
         cell
     }
 
-    /// Counts are kept bit for bit in `SQLite`'s signed integers.
+    /// Counts are stored bit for bit in `SQLite`'s signed integers.
     fn count(&mut self) -> rusqlite::Result<u64> {
         self.take().map(i64::cast_unsigned)
     }
 
-    /// What stands in the column of that name as text.
+    /// Parse the text in the column of this name.
     fn text<T>(&mut self, column: &str, parse: impl Fn(&str) -> Option<T>) -> rusqlite::Result<T> {
         let at = self.next;
         self.next += 1;

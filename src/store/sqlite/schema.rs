@@ -4,9 +4,9 @@ use rusqlite::Connection;
 
 use crate::store::{StoreError, Trouble};
 
-/// What leads from each version to the next, the first from an empty file. The version reached is
-/// kept in `user_version`. Rows are only ever added here: a file of any earlier version is brought
-/// up step by step, and a new one takes the same way.
+/// The migration from each version to the next, the first from an empty file. The version reached is kept in
+/// `user_version`. Rows are only ever added here: a file of any earlier version is brought up step by step, and a new
+/// one goes the same way.
 const STEPS: &[&str] = &[
     "
 CREATE TABLE plans (
@@ -123,7 +123,7 @@ ALTER TABLE plans ADD COLUMN place INTEGER; -- in the queue as it was accepted; 
 ",
 ];
 
-/// Bring the file up to this version; refuse those of a newer one.
+/// Bring the file up to this version; refuse files of a newer one.
 pub(super) fn prepare(connection: &mut Connection) -> Result<(), StoreError> {
     let transaction = connection.transaction()?;
     let version: i64 = transaction.query_row("PRAGMA user_version", [], |row| row.get(0))?;

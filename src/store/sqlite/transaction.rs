@@ -1,4 +1,4 @@
-//! The writer's transaction: many operations.
+//! The writer's transaction, which combines many operations.
 
 use rusqlite::{Connection, params};
 use tokio::sync::watch;
@@ -11,27 +11,27 @@ use crate::store::{Options, StoreError};
 /// Events in a row of the table, at most.
 const BATCH: usize = 256;
 
-/// An open transaction and what it has come to so far.
+/// An open transaction and its state so far.
 pub(super) struct Transaction<'a> {
     pub(super) connection: &'a Connection,
     pub(super) options: &'a Options,
-    /// Plans queued, what this transaction did included.
+    /// Plans queued, including changes made in this transaction.
     pub(super) queued: u64,
-    /// No claim that came to nothing had a greater attempt.
+    /// No claim whose commit failed had a greater attempt.
     pub(super) void_attempt: u64,
-    /// What the world is told once it is durable.
+    /// Notifications to send once the transaction is durable.
     pub(super) effects: Vec<Effect>,
-    /// The failure after which it cannot be committed.
+    /// The failure that makes a commit impossible.
     pub(super) spoiled: Option<StoreError>,
 }
 
-/// What the world is told once a change is durable.
+/// A notification to send once a change is durable.
 pub(super) enum Effect {
     /// A plan, or its events, changed.
     Changed(PlanId),
-    /// A plan is being run; whoever runs it listens here.
+    /// A plan is being run; its worker listens here for a stop.
     Leased(PlanId, watch::Sender<bool>),
-    /// Whoever runs the plan shall stop.
+    /// The plan's worker must stop.
     Stop(PlanId),
     /// Nobody runs the plan any more.
     Unleased(PlanId),
@@ -40,9 +40,8 @@ pub(super) enum Effect {
 }
 
 impl Transaction<'_> {
-    /// Do `work` wholly or not at all: when it fails after it has changed something, the whole transaction
-    /// is spoiled, does nothing more and cannot be committed. That is rare, and cheaper than to be able to
-    /// take back each step.
+    /// Do `work` entirely or not at all: when it fails after it has changed something, the whole transaction is
+    /// spoiled, does nothing more and cannot be committed. That is rare, and cheaper than a savepoint for each step.
     pub(super) fn step<T>(
         &mut self,
         work: impl FnOnce(&mut Self) -> Result<T, StoreError>,
@@ -62,7 +61,7 @@ impl Transaction<'_> {
         result
     }
 
-    /// Fails with what spoiled it.
+    /// Fails with the error that spoiled it.
     pub(super) fn sound(&self) -> Result<(), StoreError> {
         self.spoiled.clone().map_or(Ok(()), Err)
     }
@@ -72,8 +71,7 @@ impl Transaction<'_> {
         (self.options.clock)()
     }
 
-    /// Add to the events of a plan, and forget its oldest when there are too many; the caller writes
-    /// the row.
+    /// Add to the events of a plan, and delete its oldest when there are too many; the caller writes the row.
     pub(super) fn tell(&mut self, row: &mut PlanRow, events: &[Event]) -> Result<(), StoreError> {
         for batch in events.chunks(BATCH) {
             let batch = Batch::of(row, batch)?;
@@ -93,14 +91,14 @@ impl Transaction<'_> {
         Ok(())
     }
 
-    /// Whole batches at once, and only when there are half as many again as are to be kept: so that
-    /// most steps delete nothing.
+    /// Deletes whole batches, and only once there are half again as many events as are to be kept, so that most steps
+    /// delete nothing.
     fn forget(&mut self, row: &mut PlanRow) -> Result<(), StoreError> {
         let kept = self.options.events_kept;
         if row.last_event - row.forgotten <= kept.saturating_add(kept / 2) {
             return Ok(());
         }
-        // The first of all goes with the plan's row.
+        // The first event has no row of its own, so it counts as forgotten.
         row.forgotten = row.forgotten.max(1);
         let oldest = (row.last_event - kept).cast_signed();
         let (last_id, bytes): (Option<i64>, Option<i64>) = self

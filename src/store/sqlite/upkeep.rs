@@ -1,4 +1,4 @@
-//! What an operator does with the file: look for damage, and copy it.
+//! Operator's maintenance of the file: check for damage, and back up.
 
 use std::fs::File;
 use std::path::Path;
@@ -13,13 +13,13 @@ use crate::store::Trouble;
 /// What [`check`] looked at, and what it found wrong.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Findings {
-    /// Plans looked at; none in a file that is damaged.
+    /// Plans checked; 0 in a damaged file.
     pub plans: u64,
-    /// A sentence for each thing that is wrong.
+    /// One sentence for each fault.
     pub faults: Vec<String>,
 }
 
-/// Damage that the database itself finds in its file: pages, indexes, rows that refer to none.
+/// Damage that the database itself finds in its file: pages, indexes, rows with dangling references.
 pub(super) fn damage(connection: &Connection) -> rusqlite::Result<Vec<String>> {
     let mut faults: Vec<String> = connection
         .prepare("PRAGMA quick_check(20)")?
@@ -29,11 +29,11 @@ pub(super) fn damage(connection: &Connection) -> rusqlite::Result<Vec<String>> {
     Ok(faults)
 }
 
-/// Look at the whole store in `data_dir`, beside a service that uses it or not: the database's own
-/// integrity, and that each plan's record, documents and events agree.
+/// Check the whole store in `data_dir`, whether a service is using it or not: the database's own integrity, and that
+/// each plan's record, documents and events agree.
 ///
 /// # Errors
-/// [`StoreError::Unavailable`] when there is no store to look at, or it cannot be read at all.
+/// [`StoreError::Unavailable`] when there is no store to check, or it cannot be read at all.
 pub fn check(data_dir: &Path) -> Result<Findings, StoreError> {
     let mut connection = open(data_dir)?;
     // All in one transaction, or a busy service would seem to contradict itself.
@@ -46,13 +46,13 @@ pub fn check(data_dir: &Path) -> Result<Findings, StoreError> {
     let plans = if faults.is_empty() {
         records(&connection, &mut faults)?
     } else {
-        // Its records cannot be relied on, or not even be read.
+        // Its records cannot be relied on, or cannot even be read.
         0
     };
     Ok(Findings { plans, faults })
 }
 
-/// Whether each plan's record, documents and events agree; returns how many plans there are.
+/// Check that each plan's record, documents and events agree; returns the number of plans.
 fn records(connection: &Connection, faults: &mut Vec<String>) -> Result<u64, StoreError> {
     for (sql, what) in CONTRADICTIONS {
         let plans = connection
@@ -85,7 +85,7 @@ fn records(connection: &Connection, faults: &mut Vec<String>) -> Result<u64, Sto
     Ok(plans)
 }
 
-/// What no plan may be, and the ids of those that are.
+/// States that no plan may be in, and the queries for the ids of those that are.
 const CONTRADICTIONS: [(&str, &str); 5] = [
     (
         "SELECT id FROM plans LEFT JOIN scenarios ON plan_seq = seq WHERE document IS NULL",
@@ -106,7 +106,7 @@ const CONTRADICTIONS: [(&str, &str); 5] = [
         "has ended without a time, or has a time without an end",
     ),
     (
-        // The first has no row of its own but in files of earlier versions.
+        // The first event has a row of its own only in files of earlier versions.
         "SELECT id FROM plans WHERE last_event - max(forgotten, 1) <> (SELECT \
          coalesce(sum(last_id - first_id + 1), 0) FROM events WHERE plan_seq = seq AND last_id > 1)",
         "has lost events",
@@ -118,8 +118,8 @@ fn ends(batch: &str) -> bool {
     events.last().is_some_and(|event| event["event"] == "end")
 }
 
-/// Write a compact copy of the store in `data_dir` to the new file `to`, as it is at one moment,
-/// beside a service that uses it or not. It is on the disk when this returns.
+/// Write a compact copy of the store in `data_dir`, as of one moment, to the new file `to`, whether a service is using
+/// the store or not. The copy is on the disk when this returns.
 ///
 /// # Errors
 /// [`StoreError::Unavailable`] when there is no store, or `to` exists or cannot be written.
@@ -130,12 +130,12 @@ pub fn backup(data_dir: &Path, to: &Path) -> Result<(), StoreError> {
         return Err(StoreError::unavailable(format!("{} exists", to.display())));
     }
     let connection = open(data_dir)?;
-    // Under another name until it is whole, so that nobody takes half of it for a backup.
+    // Written under another name until complete, so that nobody takes half of it for a backup.
     let mut name = to.file_name().unwrap_or_default().to_owned();
     name.push(".part");
     let part = to.with_file_name(name);
     let _ = std::fs::remove_file(&part);
-    // SQLite passes it on to the system as it is, whatever text that makes.
+    // SQLite passes the path to the system unchanged, even when it is not valid UTF-8.
     let path = ToSqlOutput::Borrowed(ValueRef::Text(part.as_os_str().as_encoded_bytes()));
     let written = connection
         .execute("VACUUM INTO ?1", [path])
@@ -147,7 +147,7 @@ pub fn backup(data_dir: &Path, to: &Path) -> Result<(), StoreError> {
     written
 }
 
-/// Give a whole file its name, both of them on the disk when this returns.
+/// Rename a complete file to its final name; file and name are on the disk when this returns.
 fn put_in_place(part: &Path, to: &Path) -> std::io::Result<()> {
     File::open(part)?.sync_all()?;
     std::fs::rename(part, to)?;
@@ -165,7 +165,7 @@ fn open(data_dir: &Path) -> Result<Connection, StoreError> {
     }
     let connection = Connection::open_with_flags(&file, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
     connection.busy_timeout(BUSY_TIMEOUT)?;
-    // Of a database that is none of ours, a copy would be no backup.
+    // A copy of a database that is not ours would be no backup.
     connection.prepare("SELECT id FROM plans")?;
     Ok(connection)
 }

@@ -1,4 +1,4 @@
-//! Ends of plans that are to be told: kept with the plan, due with its end.
+//! Webhooks for ends of plans: stored with the plan, due when it ends.
 
 use rusqlite::{Connection, params};
 
@@ -7,7 +7,7 @@ use super::transaction::Transaction;
 use crate::job::{PlanId, Submission};
 use crate::store::{StoreError, Webhook};
 
-/// Keep where the end of an accepted plan is to be told.
+/// Store where the end of an accepted plan is to be sent.
 pub(super) fn keep(
     tx: &Transaction<'_>,
     seq: i64,

@@ -23,23 +23,23 @@ use crate::store::{Lease, Options, StoreError};
 /// Operations in one transaction, at most.
 const BATCH: usize = 256;
 
-/// What is done in a transaction, and answered after its commit.
+/// Work done in a transaction, and answered after its commit.
 pub(super) trait Operation: Send {
-    /// Do it; once more when the transaction came to nothing.
+    /// Do it; called again when the transaction was rolled back.
     fn run(&mut self, tx: &mut Transaction<'_>);
 
-    /// What was done last is durable, or is not.
+    /// The last run is durable, or has failed.
     fn answer(self: Box<Self>, durable: Result<(), &StoreError>);
 }
 
-/// A step of the store, and who is told what came of it.
+/// A store operation, and who gets its outcome.
 struct Change<T, W, A> {
     work: W,
     done: Result<T, StoreError>,
     answer: A,
 }
 
-/// `work`, whose outcome `answer` is called with once it is durable.
+/// `work`, whose outcome is passed to `answer` once it is durable.
 pub(super) fn operation<T, W, A>(work: W, answer: A) -> Box<dyn Operation>
 where
     T: Send + 'static,
@@ -72,13 +72,13 @@ where
     }
 }
 
-/// What the thread is sent.
+/// Messages to the thread.
 pub(super) enum Message {
     Change(Box<dyn Operation>),
     Claim(Claimer),
-    /// Give back what is run, and end.
+    /// Give back everything that is being run, and end.
     Close(oneshot::Sender<()>),
-    /// End as if the process did.
+    /// End as if the process had died.
     Leave,
 }
 
@@ -89,7 +89,7 @@ pub(super) struct Writer {
 }
 
 impl Writer {
-    /// Recover what an earlier process left and start the thread. `lock` is held until its end.
+    /// Recover what an earlier process left and start the thread, which holds `lock` until it ends.
     pub(super) fn start(
         connection: Connection,
         lock: File,
@@ -138,7 +138,7 @@ impl Writer {
     {
         let (reply, answer) = oneshot::channel();
         self.send(Message::Change(operation(work, move |outcome| {
-            // Nobody waits when the caller was dropped; the change stands all the same.
+            // If the caller was dropped, nobody waits; the change stands all the same.
             reply.send(outcome).ok();
         })))?;
         answer.await.map_err(|_| closed())?
@@ -152,7 +152,7 @@ impl Writer {
         Ok(delivery.accept())
     }
 
-    /// Write what has been sent, give back what is run, and end.
+    /// Write what has been sent, give back what is being run, and end.
     pub(super) async fn close(&self) {
         let (reply, done) = oneshot::channel();
         if self.send(Message::Close(reply)).is_ok() {
@@ -180,22 +180,22 @@ impl Drop for Writer {
     }
 }
 
-/// What the thread has in front of it.
+/// The state of the writing thread.
 struct Desk {
     connection: Connection,
     options: Options,
     changes: Arc<Changes>,
     records: Arc<Records>,
     messages: Sender<Message>,
-    /// Where those wait who are answered; `None` when the store was opened outside of it.
+    /// The runtime of the callers; `None` when the store was opened outside one.
     runtime: Option<Handle>,
-    /// Claimers, in the order in which they came.
+    /// Claimers, in order of arrival.
     waiting: VecDeque<Claimer>,
     /// How each running plan's worker is told to stop.
     leases: HashMap<PlanId, watch::Sender<bool>>,
     /// Plans queued, as committed.
     queued: u64,
-    /// The greatest attempt whose lease was given out and whose claim was then not committed.
+    /// The greatest attempt whose lease was handed out but whose claim was not committed.
     void_attempt: u64,
 }
 
@@ -222,7 +222,7 @@ impl Desk {
         Ok(())
     }
 
-    /// Serve until somebody closes the store or drops it; returns whom to tell.
+    /// Serve until the store is closed or dropped; returns whom to notify.
     fn serve(&mut self, inbox: &Receiver<Message>) -> Vec<oneshot::Sender<()>> {
         let mut closing = Vec::new();
         while let Ok(first) = inbox.recv() {
@@ -251,7 +251,7 @@ impl Desk {
         closing
     }
 
-    /// What cannot be given back now is taken at the next start for what was run when the process died.
+    /// Plans that cannot be given back now are recovered at the next start, as if the process had died.
     fn release_all(&mut self) {
         let released = self.commit(|tx, _| tx.step(operations::release_all));
         if let Err(error) = released.flatten() {
@@ -266,12 +266,12 @@ impl Desk {
         }
     }
 
-    /// Do a batch in one transaction, and what claims there are, if `claiming`.
+    /// Do a batch in one transaction, and the waiting claims too if `claiming`.
     fn write(&mut self, mut batch: Vec<Box<dyn Operation>>, claiming: bool) {
         let mut claims = Claims::new(self.messages.clone());
         let mut spoiled = false;
         let durable = self.commit(|tx, waiting| {
-            // Whoever can be given a plan need not wait until all else is written.
+            // A claimer that can be given a plan now need not wait until everything else is written.
             if claiming {
                 claims.serve(tx, waiting);
             }
@@ -289,14 +289,14 @@ impl Desk {
         let any_claimed = claims.any;
         claims.answer(durable.as_ref().copied());
         if durable.is_err() && any_claimed && !batch.is_empty() {
-            // Nor must what a claim did be the failure of whoever shared its transaction.
+            // A claim's failure must not fail the operations that shared its transaction.
             self.write(batch, false);
-            // Those who have not been served go on waiting for a plan, not for the next message.
+            // Claimers not yet served wait for a plan, not for the next message.
             self.serve_batch(Vec::new());
             return;
         }
         if spoiled && batch.len() > 1 {
-            // What one of them did must not be the others' failure.
+            // One operation's failure must not fail the others.
             for operation in batch {
                 self.serve_batch(vec![operation]);
             }
@@ -308,7 +308,7 @@ impl Desk {
         self.answer(batch, durable);
     }
 
-    /// To wake a task from outside of the runtime costs calls of the system for each, so many are woken from within.
+    /// Waking a task from outside the runtime costs a system call each; one spawned task wakes them all.
     fn answer(&self, batch: Vec<Box<dyn Operation>>, durable: Result<(), StoreError>) {
         let is_one = batch.len() == 1;
         let answer = move || {
@@ -322,7 +322,7 @@ impl Desk {
         }
     }
 
-    /// Run `work` in a transaction, make it durable, and tell whom it concerns.
+    /// Run `work` in a transaction, make it durable, and notify those concerned.
     fn commit<T>(
         &mut self,
         work: impl FnOnce(&mut Transaction<'_>, &mut VecDeque<Claimer>) -> T,

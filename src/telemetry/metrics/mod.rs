@@ -1,7 +1,7 @@
-//! What is counted of this process, and when.
+//! This process's counters and when they are counted.
 //!
-//! Labels come from tables of the program, never from a caller, so that there are only so many
-//! series. What is known at the time of reading only is handed to [`Metrics::text`].
+//! Labels come from tables in the program, never from a caller, so that the number of series is bounded. Values known
+//! only at the time of reading are passed to [`Metrics::text`].
 
 mod names;
 
@@ -16,16 +16,16 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::registry::Registry;
 
-/// Of what [`Metrics::text`] writes.
+/// The media type of what [`Metrics::text`] writes.
 pub const MEDIA_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
-/// What a request's method is called when it is none of those that routes have.
+/// Label for a request's method when no route has it.
 const OTHER: &str = "OTHER";
 
-/// How a copy ends.
+/// How copying a dataset can end.
 const FETCHES: [&str; 2] = ["fetched", "failed"];
 
-/// Counts and times of this process.
+/// Counters and times of this process.
 #[derive(Debug)]
 pub struct Metrics {
     registry: Registry,
@@ -55,7 +55,7 @@ pub struct Metrics {
     terrain_fetched: Counter,
 }
 
-/// A figure that is read when it is asked for; not a number when it cannot be read.
+/// A gauge read on request; NaN when it cannot be read.
 type Level = Gauge<f64, AtomicU64>;
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
@@ -86,18 +86,18 @@ struct Fetch {
     outcome: &'static str,
 }
 
-/// What the queue is like at the time of reading.
+/// The state of the queue at the time of reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Queue {
     /// Plans waiting; `None` when the store does not say.
     pub queued: Option<u64>,
     /// Plans being run.
     pub running: Option<u64>,
-    /// For how long the oldest has been waiting, milliseconds; `None` when none waits.
+    /// How long the oldest has been waiting, milliseconds; `None` when none waits.
     pub oldest_queued_ms: Option<i64>,
-    /// Plans that may wait.
+    /// Maximum number of waiting plans.
     pub limit: usize,
-    /// Plans that may run.
+    /// Maximum number of running plans.
     pub workers: usize,
 }
 
@@ -111,12 +111,13 @@ pub struct Ended {
 }
 
 impl Metrics {
-    /// The process began, milliseconds since 1970.
+    /// The process started, milliseconds since 1970.
     pub fn began(&self, at_ms: i64) {
         self.start.set(seconds(at_ms));
     }
 
-    /// A request was answered, or something that is none. `route` is the template, `None` when no route has the path.
+    /// A request was answered, or input that is not a request. `route` is the template, `None` when no route has the
+    /// path.
     pub fn answered(&self, method: &str, route: Option<&str>, status: u16, took: Duration) {
         const METHODS: [&str; 5] = ["GET", "POST", "DELETE", "PUT", "HEAD"];
         let known = METHODS.into_iter().find(|known| *known == method);
@@ -130,13 +131,13 @@ impl Metrics {
         self.requests.get_or_create(&request).inc();
     }
 
-    /// A connection is open until what is returned is dropped.
+    /// A connection was opened; it is open until the returned value is dropped.
     #[must_use]
     pub fn connection(&self) -> Held {
         Held::new(&self.connections)
     }
 
-    /// A stream of events is open until what is returned is dropped.
+    /// An event stream was opened; it is open until the returned value is dropped.
     #[must_use]
     pub fn stream(&self) -> Held {
         Held::new(&self.streams)
@@ -147,12 +148,12 @@ impl Metrics {
         self.accepted.inc();
     }
 
-    /// A plan's run began after so long a wait.
+    /// A plan's run began after this wait.
     pub fn started(&self, waited_ms: i64) {
         self.wait_times.observe(seconds(waited_ms));
     }
 
-    /// A plan that had been run ended.
+    /// The end of a plan that had been run.
     pub fn ended(&self, ended: Ended) {
         let status = Status {
             status: ended.status,
@@ -165,46 +166,46 @@ impl Metrics {
         }
     }
 
-    /// A plan was taken from its run.
+    /// A run lost its plan: it was deleted, or another node runs it.
     pub fn lost(&self) {
         self.lost.inc();
     }
 
-    /// A route was delivered that is proven to be so near to the best.
+    /// A route was delivered that is proven to be within this gap of the best.
     pub fn gap(&self, gap: f64) {
         self.gaps.observe(gap);
     }
 
-    /// A search went on.
+    /// A search progressed.
     pub fn searched(&self, iterations: u64, evaluations: u64) {
         self.iterations.inc_by(iterations);
         self.evaluations.inc_by(evaluations);
     }
 
-    /// The store did an operation.
+    /// The store performed an operation.
     pub fn stored(&self, operation: &'static str, took: Duration) {
         let operation = Operation { operation };
-        // Seen as 0 before it rises.
+        // The series must be seen as 0 before it rises.
         drop(self.operation_faults.get_or_create(&operation));
         self.operation_times
             .get_or_create(&operation)
             .observe(took.as_secs_f64());
     }
 
-    /// The store failed to do an operation.
+    /// The store failed to perform an operation.
     pub fn store_failed(&self, operation: &'static str) {
         let operation = Operation { operation };
         self.operation_faults.get_or_create(&operation).inc();
     }
 
-    /// A shared dataset was copied to this node, or so many bytes of it before that failed.
+    /// A shared dataset was copied to this node, or `bytes` of it before that failed.
     pub fn terrain_fetched(&self, wholly: bool, bytes: u64) {
         let outcome = FETCHES[usize::from(!wholly)];
         self.terrain_fetches.get_or_create(&Fetch { outcome }).inc();
         self.terrain_fetched.inc_by(bytes);
     }
 
-    /// There are so many datasets, so many bytes long, with so many bytes of copies on this node.
+    /// The number and total size of datasets, and the bytes of copies on this node.
     pub fn terrains(&self, datasets: u64, bytes: u64, cached_bytes: u64) {
         self.terrains.set(datasets as f64);
         self.terrain_sizes.set(bytes as f64);
@@ -251,7 +252,7 @@ impl Drop for Held {
     }
 }
 
-/// Of a time by the wall clock, which may have been set back meanwhile.
+/// Seconds, from a wall clock that may have been set back meanwhile.
 fn seconds(ms: i64) -> f64 {
     ms.max(0) as f64 / 1e3
 }
@@ -260,7 +261,7 @@ fn seconds(ms: i64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The operator reads metrics also when the store cannot be read.
+    /// The operator needs metrics even when the store cannot be read.
     #[test]
     fn what_is_not_known_is_not_a_number() {
         let queue = Queue {

@@ -1,4 +1,4 @@
-//! Every metric's name, unit, buckets and what it says.
+//! Every metric's name, unit, buckets and description.
 
 use prometheus_client::encoding::EncodeLabelSet;
 use prometheus_client::metrics::family::Family;
@@ -105,7 +105,7 @@ impl Default for Metrics {
 }
 
 impl Metrics {
-    /// Series that are 0 from the start, so that a first event is seen as a rise.
+    /// Creates all series at 0, so that a first event is seen as a rise.
     fn with_all_series(self) -> Self {
         for status in ["succeeded", "failed", "cancelled"] {
             drop(self.ended.get_or_create(&Status { status }));
@@ -120,7 +120,7 @@ impl Metrics {
     }
 }
 
-/// Gives names to metrics as they are made.
+/// Registers metrics under their names as they are created.
 struct Registrar<'a>(&'a mut Registry);
 
 impl Registrar<'_> {

@@ -1,9 +1,9 @@
-//! Longer ways, where the direct one is too short to climb: out and back, round about, to and fro.
+//! Longer ways for cases where the direct one is too short to climb: out and back, round about, to and fro.
 //!
-//! A vehicle that climbs by so many degrees needs so many metres of way to reach the middle of the altitude band, or
-//! even the target. Where start and target are nearer to each other than that, the cheapest chains of legs through
-//! a few places are found along which it gets there, by what each leg costs and how far from that height the bends
-//! at its end are. One search begins at the start and one at the target; they meet where both have climbed.
+//! A vehicle with a limited climb angle needs a certain length of way to reach the middle of the altitude band, or even
+//! the target. Where start and target are nearer to each other than that, the cheapest chains of legs through a few
+//! places are found along which it gets there, from the cost of each leg and of how far the bends at its end are from
+//! that height. One search begins at the start and one at the target; they meet where both have climbed.
 
 mod places;
 mod ways;
@@ -14,38 +14,38 @@ use crate::cost::Model;
 use crate::scenario::Scenario;
 use ways::Ways;
 
-/// How far to climb, as shares of what lies between the middle of the band and that end of the route which is
-/// nearer to it; the first at which the searches meet is taken.
+/// How far to climb, as shares of the distance between the middle of the band and the nearer end of the route; the
+/// first share for which the searches meet is used.
 const SHARES: [f64; 4] = [1.0, 0.75, 0.5, 0.25];
 
-/// No farther than from one end to the other.
+/// Only as far as from one end to the other.
 const BETWEEN: f64 = 0.0;
 
 /// How long ways are, as a share of what the climb takes, and how much room there is at the area's edge, as a
 /// multiple of the radius of a bend: ways that can be flown as they are, and tighter ones for the polish to stretch.
 const TRIES: [(f64, f64); 2] = [(1.0, 2.0), (0.97, 1.0)];
 
-/// Of the waypoints, the share for which there is room at the height.
+/// Share of the waypoints for which there must be room at the height.
 const LEVEL: f64 = 0.7;
 
-/// Ways are longer than they must be by this share, and turns less sharp.
+/// Ways are longer than necessary by this share, and turns gentler.
 const SLACK: f64 = 1e-6;
 
-/// What a way has to reach.
+/// The goal of a climb.
 #[derive(Clone, Copy)]
 struct Climb {
-    /// Above ground, metres.
+    /// Height above ground, metres.
     height: f64,
-    /// Along the ground from start to target, metres, for nothing but to climb.
+    /// Length along the ground from start to target just for the climb, metres.
     least: f64,
-    /// Along the ground from start and from target to there, with room for the waypoints that stay there.
+    /// Lengths along the ground from start and from target to that height, with room for the waypoints that stay there.
     needed: [f64; 2],
-    /// What the target's being higher than the start, or lower, takes more than that.
+    /// Extra length because the target is higher or lower than the start.
     more: f64,
 }
 
-/// Routes that are long enough to climb, of no more waypoints than `model` asks for; none where the direct way is
-/// long enough. Once `is_over`, those that have been found.
+/// Routes long enough to climb, with no more waypoints than `model` asks for; none where the direct way is long enough.
+/// Once `is_over`, those found so far.
 pub(super) fn routes(model: &Model, is_over: &dyn Fn() -> bool) -> Found {
     if is_over() {
         return Found::default();
@@ -67,7 +67,7 @@ pub(super) fn routes(model: &Model, is_over: &dyn Fn() -> bool) -> Found {
     found
 }
 
-/// Of one climb.
+/// The routes for one climb.
 fn ways(model: &Model, share: f64) -> Found {
     let mut found = Found::default();
     let climb = Climb::by(model.scenario, share);
@@ -91,7 +91,7 @@ impl Climb {
             .min_by(|one, other| (one - middle).abs().total_cmp(&(other - middle).abs()))
             .expect("two ends");
         let height = nearer + share * (middle - nearer);
-        // Waypoints up there keep their distance from each other.
+        // Waypoints at that height keep their distance from each other.
         let level = LEVEL * scenario.planner.waypoints as f64 * scenario.vehicle.min_leg;
         let climb = |rise: f64| rise.abs() / steepest(scenario) * (1.0 + SLACK);
         let climbs = own.map(|own| climb(own - height));
@@ -105,7 +105,7 @@ impl Climb {
         }
     }
 
-    /// From start to target, along the ground.
+    /// Length from start to target, along the ground.
     fn length(&self) -> f64 {
         self.needed[0] + self.needed[1] + self.more
     }
@@ -120,7 +120,8 @@ mod tests {
     use crate::planner::{Nobody, plan};
     use crate::scenario::Seeding;
 
-    /// Over level ground in a band of 400 m: so far from start to target, so much higher, at most so steep and so sharp.
+    /// Over level ground in a band of 400 m: with this distance from start to target, rise, greatest climb and greatest
+    /// turn.
     fn steep([distance, rise, climb, turn]: [f64; 4], waypoints: usize) -> Scenario {
         let mut scenario = scenario();
         scenario.threats.clear();
@@ -175,7 +176,7 @@ mod tests {
         }
     }
 
-    /// The plans, not only where they start; with what each must not cost more than.
+    /// The plans themselves, not only their starts; with what each must not exceed in cost.
     #[test]
     fn steep_climbs_are_planned() {
         for (shape, waypoints, most) in [

@@ -1,4 +1,4 @@
-//! Where longer ways may lead: few places, and what each leg between two of them costs.
+//! Where longer ways may lead: a few places, and the cost of each leg between two of them.
 
 use super::super::net;
 use super::Climb;
@@ -8,29 +8,29 @@ use crate::geometry::{Point2, Point3, Rect, Vector2};
 use crate::planner::price::PRICED_FROM;
 use crate::scenario::Scenario;
 
-/// Of the places, start and target come first.
+/// Start and target come first among the places.
 pub(super) const ENDS: usize = 2;
 
-/// Places on each side of a grid over what of the area may be crossed.
+/// Places on each side of a grid over the usable part of the area.
 const ROWS: usize = 5;
 
-/// Places about each end, as far from it as its climb takes.
+/// Places around each end, as far from it as its climb takes.
 const ROUND: usize = 8;
 
-/// Places over which the way from start to target is just as long as both climbs take.
+/// Number of places over which the way from start to target is just as long as both climbs.
 const OVAL: usize = 16;
 
 #[derive(Clone, Copy)]
 pub(super) struct Leg {
-    /// Along the ground, metres.
+    /// Length along the ground, metres.
     pub(super) length: f64,
-    /// Radians.
+    /// Heading, radians.
     pub(super) heading: f64,
-    /// Level; infinite where it breaks a limit.
+    /// Cost when level; infinite where it breaks a limit.
     pub(super) cost: f64,
 }
 
-/// Start, target, and places beside each of which there is `room` to bend, metres.
+/// Start, target, and places with `room` to bend beside each, metres.
 pub(super) fn places(scenario: &Scenario, climb: Climb, room: f64) -> Vec<Point2> {
     let area = &scenario.area;
     let room = Vector2::repeat(room).inf(&((area.max - area.min) * 0.25));
@@ -64,12 +64,12 @@ pub(super) fn places(scenario: &Scenario, climb: Climb, room: f64) -> Vec<Point2
     places
 }
 
-/// So many directions.
+/// `count` directions, evenly spread.
 fn round(count: usize) -> impl Iterator<Item = Vector2> {
     (0..count).map(move |number| direction(std::f64::consts::TAU * number as f64 / count as f64))
 }
 
-/// Of length 1.
+/// A vector of length 1.
 pub(super) fn direction(heading: f64) -> Vector2 {
     Vector2::new(libm::cos(heading), libm::sin(heading))
 }

@@ -1,4 +1,4 @@
-//! The cheapest chains of legs that climb: from each end on until they have climbed, and put together where they meet.
+//! The cheapest chains of legs that climb: built from each end until they have climbed, and joined where they meet.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -9,16 +9,16 @@ use crate::cost::{Model, metre};
 use crate::geometry::{Point2, Point3, wrap_angle};
 use crate::planner::same;
 
-/// Routes that are given at most.
+/// Maximum number of routes returned.
 const ROUTES: usize = 5;
 
-/// Meetings looked at for them.
+/// Maximum number of meetings examined for them.
 const MEETINGS: usize = 400;
 
-/// Chains to one place by one leg are kept beside each other if so great a part of the climb lies between them.
+/// Chains to one place by one leg are kept side by side if they differ by at least one of this many parts of the climb.
 const PARTS: usize = 10;
 
-/// What a bend must gain, as a share of the fuel of the climb.
+/// What a bend must gain, as a share of the fuel for the climb.
 const WORTH: f64 = 1e-3;
 
 /// Ways of one scenario that climb.
@@ -26,15 +26,15 @@ pub(super) struct Ways<'m, 's> {
     model: &'m Model<'s>,
     climb: Climb,
     places: Vec<Point2>,
-    /// Of each place, where the climb leads over it, metres in the frame.
+    /// For each place, the height at which the climb leads over it, metres in the frame.
     levels: Vec<f64>,
     /// From each place, row by row, to each.
     legs: Vec<Leg>,
     /// Tangent of the steepest climb.
     steepest: f64,
-    /// Radians.
+    /// Greatest turn, radians.
     max_turn: f64,
-    /// Between two bends, metres.
+    /// Distance between two bends, metres.
     side: f64,
     /// What a bend must gain.
     worth: f64,
@@ -44,22 +44,22 @@ pub(super) struct Ways<'m, 's> {
 #[derive(Clone, Copy)]
 struct Chain {
     cost: f64,
-    /// Along the ground, metres; no more than the climb may take.
+    /// Length along the ground, metres; no more than the climb may take.
     length: f64,
-    /// Waypoints that its turns take.
+    /// Waypoints needed for its turns.
     bends: usize,
-    /// The state before its last leg.
+    /// State before its last leg.
     before: Option<usize>,
 }
 
-/// Of each state its cheapest chain. A state is a leg, and how much of the climb has been flown at its end.
+/// For each state its cheapest chain. A state is a leg, and how much of the climb has been flown at its end.
 type Search = Vec<Option<Chain>>;
 
-/// Chains to be gone on with, the cheapest first: the bits of their cost, in the same order, and the state.
+/// Chains to be extended, the cheapest first: the bits of their cost, which have the same order, and the state.
 type Open = BinaryHeap<Reverse<(u64, usize)>>;
 
 impl<'m, 's> Ways<'m, 's> {
-    /// With bends at least `room` times their radius from the edge of the area.
+    /// With bends at least `room` times their radius away from the edge of the area.
     pub(super) fn new(model: &'m Model<'s>, climb: Climb, room: f64) -> Self {
         let scenario = model.scenario;
         let max_turn = scenario.vehicle.max_turn_deg.to_radians() * (1.0 - SLACK);
@@ -81,7 +81,7 @@ impl<'m, 's> Ways<'m, 's> {
         }
     }
 
-    /// Routes that differ, the cheapest first, as long as the share `near` of what the climb takes.
+    /// Routes that differ, the cheapest first, with the share `near` of the length that the climb takes.
     pub(super) fn routes(&self, near: f64) -> Vec<Vec<Point3>> {
         let searches = [0, 1].map(|end| self.search(end, near));
         let mut routes: Vec<Vec<Point3>> = Vec::new();
@@ -98,7 +98,7 @@ impl<'m, 's> Ways<'m, 's> {
         routes
     }
 
-    /// How many were priced for it: those of half the square, since a leg costs the same both ways.
+    /// How many legs were priced: those of half the square, since a leg costs the same both ways.
     pub(super) fn legs_priced(&self) -> u64 {
         (self.places.len() * (self.places.len() - 1) / 2) as u64
     }
@@ -186,20 +186,20 @@ impl<'m, 's> Ways<'m, 's> {
         can_be_flown.then(|| (self.state(from, to, part), chain))
     }
 
-    /// How far from its level a chain is over place `at`, after so much way.
+    /// How far a chain is from its level over place `at`, after this length.
     fn low(&self, end: usize, at: usize, length: f64) -> f64 {
         let ends = [self.model.scenario.start, self.model.scenario.target];
         let climb = (ends[end].z - self.levels[at]).abs();
         (climb - length * self.steepest).max(0.0)
     }
 
-    /// Waypoints that it takes to turn from one leg to the next.
+    /// Waypoints needed to turn from one leg to the next.
     fn bends(&self, one: (usize, usize), next: (usize, usize)) -> usize {
         let turn = self.leg(next.0, next.1).heading - self.leg(one.0, one.1).heading;
         bends(wrap_angle(turn), self.max_turn)
     }
 
-    /// Where chains from both ends have climbed and meet, by their states, the cheapest first.
+    /// Where chains from both ends have climbed and meet, as pairs of states, the cheapest first.
     fn meetings(&self, searches: &[Search; 2]) -> Vec<[usize; 2]> {
         let mut meetings: Vec<(f64, [usize; 2])> = Vec::new();
         for at in ENDS..self.places.len() {
@@ -247,7 +247,7 @@ impl<'m, 's> Ways<'m, 's> {
             let before = three[1] - way[way.len() - 1];
             let heading = libm::atan2(before.y, before.x);
             let mut bends = Vec::new();
-            // Bends lead away from the corner, and so change the turn that they have to make.
+            // Bends lead away from the corner, which changes the turn that they have to make.
             for _ in 0..4 {
                 let after = three[2] - bends.last().unwrap_or(&three[1]);
                 let turn = wrap_angle(libm::atan2(after.y, after.x) - heading);
@@ -272,7 +272,7 @@ impl<'m, 's> Ways<'m, 's> {
         (0..count).map(bend).collect()
     }
 
-    /// The route over `way`: where it leads, or as near to that as so much way, flown and left, lets it climb.
+    /// The route over `way`: at the heights where it should lead, or as near as the way flown and the way left allow.
     fn lifted(&self, way: &[Point2]) -> Vec<Point3> {
         let scenario = self.model.scenario;
         let lengths = way.windows(2).map(|ends| (ends[1] - ends[0]).norm());

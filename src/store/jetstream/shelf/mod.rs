@@ -1,7 +1,7 @@
 //! Where the nodes share their datasets: records in a bucket, files in an object store.
 //!
-//! Deliberately absent: what is in them (`catalogue`). A file is an object of a name that nothing else
-//! ever has; chunks of one that was never finished are told by the stream alone, and go by their own name.
+//! Deliberately absent: what is in them (`catalogue`). Every file is an object with a name that is never reused; chunks
+//! of an unfinished file appear in the stream alone, and are identified by their own name.
 
 mod opened;
 
@@ -21,29 +21,28 @@ use super::trouble::passes;
 use crate::catalogue::{Changes, Shelf, Source};
 use crate::store::{StoreError, Trouble};
 
-/// Records are read and written so soon, or the servers are away.
+/// If records are not read or written within this time, the servers are considered away.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// A file that has not been put by then never is: whoever finds its chunks later may remove them.
+/// A file not stored within this time never will be: whoever finds its chunks later may remove them.
 const LONGEST_PUT: Duration = Duration::from_secs(30 * 60);
 
-/// A file that has not been fetched by then is asked for again.
+/// A file not fetched within this time is requested again.
 const LONGEST_FETCH: Duration = LONGEST_PUT;
 
-/// Servers that could not be reached a moment ago are taken to be away still.
+/// Servers that could not be reached less than this ago are assumed to be still away.
 const RESPITE: Duration = Duration::from_secs(1);
 
 /// Where the nodes of a namespace share their datasets; connected when something is first asked for.
 ///
-/// Its methods block: they may be called from threads that plan or are kept for blocking work, not from
-/// tasks.
+/// Its methods block: call them from planning threads or threads for blocking work, not from tasks.
 pub struct JetStreamShelf {
     runtime: Handle,
     settings: Settings,
     opening: Mutex<Opening>,
 }
 
-/// How far the connection is.
+/// The state of the connection.
 #[derive(Default)]
 struct Opening {
     opened: Option<Arc<Opened>>,
@@ -51,7 +50,7 @@ struct Opening {
 }
 
 impl JetStreamShelf {
-    /// On the servers of the settings.
+    /// On the servers in the settings.
     ///
     /// # Panics
     /// Outside a tokio runtime.
@@ -83,7 +82,7 @@ impl JetStreamShelf {
         }
     }
 
-    /// Have the servers do something, but wait no longer than that; during an election again and again.
+    /// Ask the servers for something, with this time limit; retry during an election.
     fn ask<T, E: Into<Failure>>(
         &self,
         patience: Duration,
@@ -179,7 +178,7 @@ impl Shelf for JetStreamShelf {
 /// Which side failed.
 enum Failure {
     Servers(StoreError),
-    /// What was to be read or written here.
+    /// Reading or writing the local file failed.
     File(io::Error),
 }
 

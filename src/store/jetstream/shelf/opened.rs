@@ -1,4 +1,4 @@
-//! What each question to a shelf is to the servers.
+//! The requests to the servers behind each shelf operation.
 
 use std::collections::BTreeSet;
 use std::io::{self, SeekFrom, Write};
@@ -28,28 +28,28 @@ use crate::store::jetstream::election::outlast;
 use crate::store::jetstream::settings::Settings;
 use crate::store::jetstream::trouble::{failed, is_outrun, passes};
 
-/// Some of a file comes in so long, or the servers are away.
+/// If no part of a file arrives for this long, the servers are considered away.
 const STALL: Duration = Duration::from_secs(10);
 
-/// Bytes in a message; servers take messages of 1 MiB unless told otherwise.
+/// Bytes in a message; servers accept messages of 1 MiB by default.
 const CHUNK: usize = 256 << 10;
 
-/// What chunks of unfinished files go by.
+/// Name prefix for chunks of unfinished files.
 const UNFINISHED: &str = "unfinished.";
 
-/// What is there once the servers have been reached; the client comes back to them by itself.
+/// What exists once the servers have been reached; the client reconnects by itself.
 pub(super) struct Opened {
     client: Client,
     records: kv::Store,
     files: ObjectStore,
-    /// The stream of `files`.
+    /// The underlying stream of `files`.
     chunks: Stream,
-    /// Their bucket.
+    /// Its bucket.
     bucket: String,
 }
 
 impl Opened {
-    /// Connect, and make what is missing on the servers.
+    /// Connect, and create what is missing on the servers.
     pub(super) async fn new(settings: &Settings) -> Result<Self, StoreError> {
         let client = connect(settings).await?;
         let context = Servers::context(&client);
@@ -96,7 +96,7 @@ impl Opened {
                 value,
                 revision: record.revision,
             });
-            // To the very end: a record that is written over meanwhile comes later, not twice.
+            // Read to the very end: a record overwritten meanwhile comes later, not twice.
             if record.delta == 0 && record.revision >= state.last_sequence {
                 read.revision = record.revision;
                 return Ok(read);
@@ -105,7 +105,7 @@ impl Opened {
         Err(StoreError::unavailable(format!("{} broke off", what())))
     }
 
-    /// The revision of this write; `None` when somebody was faster.
+    /// The revision of this write; `None` when another writer was faster.
     pub(super) async fn write(
         &self,
         key: &str,
@@ -120,7 +120,7 @@ impl Opened {
         }
     }
 
-    /// `None` when somebody was faster.
+    /// `None` when another writer was faster.
     pub(super) async fn erase(&self, key: &str, expected: u64) -> Result<Option<()>, StoreError> {
         let erased = self.records.delete_expect_revision(key, Some(expected));
         match erased.await {
@@ -130,8 +130,8 @@ impl Opened {
         }
     }
 
-    /// The revision of a write since `expected` that says just this, or, of `None`, takes it away: of one
-    /// that was not answered, perhaps.
+    /// The revision of a write after `expected` with exactly this content, or of a removal for `None`: perhaps our own
+    /// write whose answer was lost.
     pub(super) async fn said_already(
         &self,
         key: &str,
@@ -182,10 +182,10 @@ impl Opened {
     }
 
     pub(super) async fn files(&self) -> Result<BTreeSet<String>, StoreError> {
-        // Chunks first: those of a file that is finished meanwhile are its own.
+        // Chunks first: those of a file that is finished meanwhile then belong to it.
         let mut unfinished = self.under(&self.chunks_of("")).await?;
         let mut files = BTreeSet::new();
-        // One by one: a list of the client's waits for ever for what another node takes away meanwhile.
+        // One by one: the client's own listing waits for ever for entries that another node removes meanwhile.
         for head in self.under(&self.head_of("")).await? {
             let name = URL_SAFE.decode(&head).ok();
             let Some(name) = name.and_then(|name| String::from_utf8(name).ok()) else {
@@ -205,7 +205,7 @@ impl Opened {
         Ok(files)
     }
 
-    /// What follows a prefix in subjects of the stream.
+    /// The rest of each of the stream's subjects with this prefix.
     async fn under(&self, prefix: &str) -> Result<BTreeSet<String>, StoreError> {
         let what = || format!("files of {}", self.bucket);
         let subjects = self.chunks.info_with_subjects(format!("{prefix}>")).await;
@@ -226,7 +226,7 @@ impl Opened {
             Err(error) if error.kind() == InfoErrorKind::NotFound => return Ok(()),
             Err(error) => return Err(failed(&format!("file {name}"), &error)),
         };
-        // Without its head it is not found any more; chunks that remain are found as unfinished.
+        // Without its head the file is no longer found; remaining chunks are found as unfinished.
         let head = self.head_of(&URL_SAFE.encode(name));
         self.purge(head).await?;
         self.purge(self.chunks_of(&object.nuid)).await
@@ -252,7 +252,7 @@ fn stalled(name: &str) -> StoreError {
     StoreError::unavailable(format!("file {name}: nothing came for {patience} s"))
 }
 
-/// A file that is read on the thread that waits for it anyway.
+/// A file read on a thread that may block anyway.
 struct Blocking<'a> {
     file: &'a mut dyn Source,
     failed: Option<io::Error>,

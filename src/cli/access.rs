@@ -1,4 +1,5 @@
-//! The keys of a service: read at its start, and again at SIGHUP; and no service for strangers by accident.
+//! The keys of a service: read at its start, and again at SIGHUP; and a safeguard against serving strangers by
+//! accident.
 
 use std::path::Path;
 
@@ -9,13 +10,13 @@ use crate::config::Config;
 use crate::http::auth::{Access, Keys, Settings};
 use crate::http::{Hosts, Origins};
 
-/// Keys themselves, in the form of the file.
+/// The keys themselves, in the form of the file.
 const VARIABLE: &str = "NOCTULE_KEYS";
 
 /// Who may use the service.
 ///
 /// # Errors
-/// When the keys cannot be read, and when there are none though other machines reach the service.
+/// When the keys cannot be read, and when there are none although other machines can reach the service.
 pub(super) fn open(config: &Config) -> anyhow::Result<Access> {
     let of_environment = match std::env::var(VARIABLE) {
         Ok(text) => Some(text).filter(|text| !text.trim().is_empty()),
@@ -48,8 +49,8 @@ pub(super) fn open(config: &Config) -> anyhow::Result<Access> {
     Ok(Access::new(keys, settings))
 }
 
-/// What the service may be called. Without keys it is for this machine alone, which pages of other names
-/// are not; with them, or with leave for everybody, a proxy may call it whatever it likes.
+/// The names that the service answers to. Without keys it is for this machine alone, which excludes pages with other
+/// names; with keys, or when everybody is allowed, a proxy may call it whatever it likes.
 pub(super) fn hosts(config: &Config, access: &Access, cors: &Origins) -> Hosts {
     if access.is_guarded() || config.allow_anonymous {
         Hosts::any()

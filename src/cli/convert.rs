@@ -1,4 +1,4 @@
-//! `noctule convert`: files of other programs as scenarios.
+//! `noctule convert`: other programs' files as scenarios.
 
 use std::path::PathBuf;
 
@@ -17,7 +17,7 @@ pub(super) struct Arguments {
     out: Option<PathBuf>,
 }
 
-/// Write the scenario; what was assumed and what was not used is told on standard error.
+/// Write the scenario; assumptions and unused parts are reported on standard error.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let text = files::read(&arguments.file)?;
     let file = arguments.file.display();

@@ -30,14 +30,14 @@ pub(super) struct Arguments {
     ground: Ground,
 }
 
-/// What a result says of its scenario.
+/// What a result says about its scenario.
 #[derive(Deserialize)]
 struct Origin {
     seed: u64,
     scenario_sha256: String,
 }
 
-/// Write the result, and say by the exit code why it is not.
+/// Write the result; the exit code tells why it could not be written.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let chosen = arguments.choice.of(arguments.out.as_deref().as_slice())?;
     let [chosen] = chosen.as_slice() else {
@@ -70,7 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     }
 }
 
-/// The exit code of a plan that is not written.
+/// The exit code for a plan that cannot be exported.
 pub(super) fn code(error: &ExportError) -> u8 {
     match error {
         ExportError::Infeasible { .. } => exit::INFEASIBLE,
@@ -87,7 +87,7 @@ fn pair(result: &[u8], scenario: &[u8], rules: &Rules) -> Result<(String, String
     let result = String::from_utf8(result.to_vec()).map_err(|error| error.to_string())?;
     let origin: Origin =
         serde_json::from_str(&result).map_err(|error| format!("no result document: {error}"))?;
-    // One that names no seed was planned with the one that the result tells.
+    // A scenario without a seed was planned with the one in the result.
     let scenario = json::read(scenario, rules, origin.seed)
         .map_err(|refusal| format!("its scenario is refused: {refusal}"))?;
     let accepted = json::write(&scenario);

@@ -1,4 +1,4 @@
-//! Files that commands read and write, and the formats of results among them.
+//! Files that commands read and write, including the formats of results.
 
 use std::fs;
 use std::io::{self, Read, Write};
@@ -57,7 +57,7 @@ impl Choice {
         let known = |format: &Format, name: &str| format.options.contains(&name);
         let mut chosen = Vec::new();
         for &format in &formats {
-            // An option is for those of several formats that know it.
+            // An option applies to those formats that know it.
             let given = self.options.iter().filter(|(name, _)| {
                 known(format, name) || !formats.iter().any(|format| known(format, name))
             });
@@ -104,7 +104,7 @@ pub(super) fn write(out: Option<&Path>, document: &str) -> anyhow::Result<()> {
     }
 }
 
-/// Write to standard output. Who reads no further, as `head` does, has what they want.
+/// Write to standard output. A reader that stops early, such as `head`, has what it wants.
 pub(super) fn print(text: &str) -> anyhow::Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {

@@ -1,4 +1,4 @@
-//! Where commands find the datasets that a scenario names.
+//! Where commands find the datasets that a scenario refers to.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ pub(super) struct Ground {
 }
 
 impl Ground {
-    /// What a scenario over them is held to.
+    /// The rules for a scenario that uses them.
     pub(super) fn rules(&self, limits: Limits) -> anyhow::Result<Rules> {
         let rules = planner::rules(limits);
         Ok(match &self.terrain_dir {

@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use axum::http::Uri;
 use clap::Args;
 
-/// For the connection, and for each read and write.
+/// Timeout for the connection, and for each read and write.
 const TIMEOUT: Duration = Duration::from_secs(3);
 
 #[derive(Args)]
@@ -22,7 +22,7 @@ pub(super) struct Arguments {
     url: Uri,
 }
 
-/// Done when the answer is 200.
+/// Succeeds when the answer is 200.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let url = &arguments.url;
     if url.scheme_str() != Some("http") {

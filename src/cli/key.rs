@@ -1,4 +1,4 @@
-//! `noctule key new`: a key, told once, and what the service is to know of it.
+//! `noctule key new`: a new key, shown once, and the entry that the service needs for it.
 
 use std::io::Write as _;
 
@@ -56,7 +56,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<()> {
     let key = fresh_key()?;
     let entry = entry(arguments, &key);
     Keys::read(&entry).map_err(|error| anyhow!("there can be no such key: {error}"))?;
-    // Apart from each other, so that `>> keys.toml` takes what belongs there and the key stays outside.
+    // On separate streams, so that `>> keys.toml` takes the entry and the key stays out.
     eprintln!(
         "the key, for its holder alone; it is kept nowhere and cannot be shown again:\n{key}"
     );
@@ -93,7 +93,7 @@ fn entry(arguments: &Arguments, key: &str) -> String {
     format!("[[key]]\n{}", lines.collect::<String>())
 }
 
-/// TOML knows no whole numbers above those of 63 bits.
+/// TOML has no whole numbers above 63 bits.
 fn whole(number: u64) -> toml::Value {
     i64::try_from(number).unwrap_or(i64::MAX).into()
 }

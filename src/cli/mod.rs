@@ -64,7 +64,7 @@ mod exit {
     pub(super) const INFEASIBLE: u8 = 3;
 }
 
-/// Do what the command line says.
+/// Run the command line.
 #[must_use]
 pub fn run() -> ExitCode {
     let parsed = heeding_variables(Cli::command()).try_get_matches();
@@ -100,7 +100,7 @@ pub fn run() -> ExitCode {
     .into()
 }
 
-/// An empty variable is as none, whichever command looks at it.
+/// An empty variable counts as unset, whichever command reads it.
 fn heeding_variables(command: clap::Command) -> clap::Command {
     let is_empty = |argument: &Arg| {
         let value = argument.get_env().and_then(std::env::var_os);

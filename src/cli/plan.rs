@@ -35,7 +35,7 @@ pub(super) struct Arguments {
     ground: Ground,
 }
 
-/// Plan, write the result, and say by the exit code how it went.
+/// Plan and write the result; the exit code tells how it went.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let outs: Vec<&Path> = arguments.out.iter().map(PathBuf::as_path).collect();
     let chosen = arguments.choice.of(&outs)?;
@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         }
     };
 
-    // Told before the search, not after it.
+    // Reported before the search, not after it.
     let degrees = chosen.iter().find(|chosen| chosen.format.geodetic);
     if let (Some(chosen), None) = (degrees, scenario.frame.wgs84()) {
         let format = chosen.format.name;
@@ -90,7 +90,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     Ok(code)
 }
 
-/// No plans are kept here that a route could be taken from.
+/// There is no store here from which a route could be taken.
 fn without_a_store(scenario: Scenario) -> Result<Scenario, Refusal> {
     match &scenario.planner.warm_start {
         Some(WarmStart::Plan(id)) => {
@@ -115,7 +115,7 @@ fn document(scenario: &Scenario, accepted: &str, outcome: &Outcome, run_ms: f64)
     ResultDocument::new(outcome, origin).to_json()
 }
 
-/// The faults that the service would answer with, a line each.
+/// Print the faults with which the service would answer, one line each.
 pub(super) fn report(file: &Path, refusal: &Refusal) {
     let file = file.display();
     match refusal {

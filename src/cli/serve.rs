@@ -1,4 +1,4 @@
-//! `noctule serve`: put the parts together and set them going; `ending` takes them apart.
+//! `noctule serve`: puts the parts together and starts them; `ending` stops them.
 
 mod backend;
 mod datasets;
@@ -29,11 +29,11 @@ use crate::scenario::json::{self, Refusal, Rules};
 use crate::telemetry;
 use crate::worker::{self, Engine, Pool, Sweeper, Unplanned};
 
-/// Callers that may wait to be let in; Linux allows as many since 5.4. Who comes when there are more
-/// may be left waiting for an answer that never comes.
+/// Callers that may wait to be accepted; the Linux limit since 5.4. With more, some may be left waiting for an answer
+/// that never comes.
 const BACKLOG: u32 = 4_096;
 
-/// Connections may finish their answers for so long at the end, if the grace period lasts so long.
+/// How long connections may take to finish their answers at the end, if the grace period is that long.
 const LAST_ANSWERS: Duration = Duration::from_secs(5);
 
 /// Serve until a signal, or print the configuration.
@@ -55,7 +55,7 @@ pub(super) fn start(config: &Config) -> anyhow::Result<()> {
         .enable_all()
         .build()?;
     let served = runtime.block_on(serve(config));
-    // Whatever still runs has been given back to the queue, or has hardly begun; the process does not wait for it.
+    // Everything still running has been given back to the queue, or has hardly begun; the process does not wait for it.
     runtime.shutdown_background();
     log.close();
     served
@@ -110,7 +110,7 @@ fn sweeper(parts: &Parts) -> Sweeper {
     Sweeper::start(parts.store.clone(), catalogue, parts.clock.clock())
 }
 
-/// `None` where nobody is told, or other nodes do it.
+/// `None` where webhooks are off, or other nodes send them.
 fn sender(config: &Config, parts: &Parts) -> Option<Sender> {
     let settings = parts.webhooks.clone().filter(|_| config.role.serves());
     settings.map(|settings| Sender::start(parts.store.clone(), settings, parts.clock.clock()))
@@ -124,7 +124,7 @@ fn router(config: &Config, parts: Parts) -> Router {
     }
 }
 
-/// What the pool runs: the accepted document, read again, and planned.
+/// The pool's engine: reads the accepted document again, and plans it.
 fn engine(rules: Arc<Rules>) -> Engine {
     Arc::new(move |document, observer, stop| {
         let scenario = json::read_accepted(document, &rules).map_err(|refusal| {
@@ -137,7 +137,7 @@ fn engine(rules: Arc<Rules>) -> Engine {
     })
 }
 
-/// Why a document is not read that was once.
+/// Why a document that was accepted can no longer be read.
 fn unread(refusal: &Refusal) -> Failure {
     match refusal.lost_ground() {
         Some(fault) => FailureKind::NoGround.because(format!(
@@ -164,7 +164,7 @@ fn data_dir(config: &Config) -> anyhow::Result<PathBuf> {
     data_dir.context("the user has no home; name a directory with --data-dir")
 }
 
-/// Take the address, for as many callers at once as the system lets wait.
+/// Bind the address, with the largest backlog that the system allows.
 fn listen(address: SocketAddr) -> std::io::Result<TcpListener> {
     let socket = if address.is_ipv4() {
         TcpSocket::new_v4()

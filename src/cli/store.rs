@@ -44,7 +44,7 @@ pub(super) struct Place {
 
 impl Place {
     fn data_dir(self, instead: &str) -> anyhow::Result<PathBuf> {
-        // Whatever is no file is looked after by those who keep it.
+        // A store that is not a file has its own tools.
         if self
             .store
             .is_some_and(|store| !["", "sqlite"].contains(&store.as_str()))

@@ -1,4 +1,4 @@
-//! `noctule terrain`: what a file of elevations holds, and the elevations in it.
+//! `noctule terrain`: the content of an elevation file, and its elevations at points.
 
 use std::fmt::Write as _;
 use std::io::{self, Read};

@@ -1,4 +1,4 @@
-//! Eq. 6-7: free waypoints like the middle of the altitude band.
+//! Eq. 6-7: free waypoints should be in the middle of the altitude band.
 
 use super::Model;
 use crate::geometry::Point3;
@@ -13,7 +13,7 @@ impl Model<'_> {
             .sum()
     }
 
-    /// The share of one of them, above `ground`.
+    /// The share of one waypoint, above `ground`.
     pub(super) fn off_middle(&self, point: Point3, ground: f64) -> f64 {
         let band = self.scenario.altitude;
         let middle = 0.5 * (band.max + band.min);

@@ -92,7 +92,7 @@ impl TerminalZones {
                 if part.is_some_and(|(t0, t1)| t0 <= middle && middle <= t1) {
                     let first = !section.terminal;
                     section.terminal = true;
-                    // In both zones the more permissive counts.
+                    // Where both zones overlap the more permissive applies.
                     section.floor = if first {
                         zone.floor
                     } else {
@@ -135,7 +135,7 @@ impl Model<'_> {
         self.join_heights(self.zones.iter().filter(allowed))
     }
 
-    /// The heights above ground that are allowed somewhere.
+    /// The lowest and highest height above ground allowed anywhere.
     #[must_use]
     pub fn heights_anywhere(&self) -> (f64, f64) {
         self.join_heights(self.zones.iter().filter(|zone| zone.radius > 0.0))

@@ -1,8 +1,8 @@
-//! The paper's infinities as constraints, each with a measured violation.
+//! The paper's infinite costs as constraints, each with a measured violation.
 
 use crate::scenario::Scenario;
 
-/// What a route must keep.
+/// A constraint on a route.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Constraint {
     /// Out of every threat.
@@ -22,7 +22,7 @@ pub enum Constraint {
 }
 
 impl Constraint {
-    /// As on the wire.
+    /// The name on the wire.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -51,9 +51,9 @@ impl Constraint {
 pub struct Breach {
     /// Which.
     pub constraint: Constraint,
-    /// Index of the leg; of [`Constraint::Area`], of the waypoint.
+    /// Index of the leg; for [`Constraint::Area`], of the waypoint.
     pub index: usize,
-    /// Index of the threat, of [`Constraint::Threat`] alone.
+    /// Index of the threat, for [`Constraint::Threat`] only.
     pub threat: Option<usize>,
     /// Metres or degrees beyond the limit, > 0.
     pub amount: f64,
@@ -77,17 +77,17 @@ impl Breach {
 /// By how much a constraint may be missed and still count as kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
-    /// Of lengths, metres.
+    /// Tolerance of lengths, metres.
     pub length_m: f64,
-    /// Of heights above ground, metres.
+    /// Tolerance of heights above ground, metres.
     pub height_m: f64,
-    /// Of angles, degrees.
+    /// Tolerance of angles, degrees.
     pub angle_deg: f64,
 }
 
 impl Tolerance {
-    /// What feasible means: a micrometre, or a billionth of the area's diagonal; a millionth of a
-    /// degree; what the ground is known to.
+    /// What counts as feasible: a micrometre, or a billionth of the area's diagonal; a millionth of a degree; and the
+    /// accuracy of the ground.
     #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
         let length_m = (1e-9 * scenario.area.diagonal()).max(1e-6);
@@ -98,7 +98,7 @@ impl Tolerance {
         }
     }
 
-    /// A share of it, for a search that must end well within.
+    /// A share of it, for a search that must end well within the limits.
     #[must_use]
     pub fn scaled(self, share: f64) -> Self {
         Self {

@@ -2,7 +2,7 @@
 
 use crate::scenario::{Scenario, Vehicle};
 
-/// F1 of a route of `length` metres; with 1000 a kilometre, a metre costs 1.
+/// F1 of a route of `length` metres; at 1000 per kilometre, a metre costs 1.
 pub(super) fn fuel(vehicle: &Vehicle, length: f64) -> f64 {
     vehicle.fuel_per_km / 1000.0 * length
 }

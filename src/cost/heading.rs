@@ -1,4 +1,4 @@
-//! Eq. 8-9 by their meaning: limits on turning, climbing, and on the shortness of a leg.
+//! Eq. 8-9 by their meaning: limits on turning, on climbing, and on how short a leg may be.
 //!
 //! As printed, `arctan(dy / dx)` folds headings and calls a straight diagonal flight a turn.
 

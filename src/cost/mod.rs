@@ -40,7 +40,7 @@ pub struct CostFigures {
 /// A scenario made ready for pricing routes.
 #[derive(Debug, Clone)]
 pub struct Model<'s> {
-    /// What is asked for.
+    /// The scenario.
     pub scenario: &'s Scenario,
     /// By how much a constraint may be missed.
     pub tolerance: Tolerance,
@@ -48,7 +48,7 @@ pub struct Model<'s> {
 }
 
 impl<'s> Model<'s> {
-    /// Precompute what routes of `scenario` have in common.
+    /// Precompute what all routes of `scenario` share.
     #[must_use]
     pub fn new(scenario: &'s Scenario) -> Self {
         Self {
@@ -107,8 +107,8 @@ impl<'s> Model<'s> {
         }
     }
 
-    /// Price one leg by itself: its violation beyond `tolerance`, its fuel and its exposure. What
-    /// depends on more than its two ends, turns and waypoints, is not in it.
+    /// Price one leg by itself: its violation beyond `tolerance`, its fuel and its exposure. Turns and waypoints, which
+    /// depend on more than its two ends, are not included.
     #[must_use]
     pub fn leg(
         &self,
@@ -152,7 +152,7 @@ impl<'s> Model<'s> {
         )
     }
 
-    /// The figures alone.
+    /// The cost figures alone.
     #[must_use]
     pub fn figures(&self, route: &[Point3], quadrature: Quadrature) -> CostFigures {
         self.assess(route, quadrature, self.tolerance, |_| {})

@@ -90,7 +90,7 @@ fn the_three_terms_of_a_straight_route() {
     assert!((figures.total - (figures.fuel + figures.threat + figures.altitude)).abs() < 1e-12);
 }
 
-/// A long route past many threats costs what it costs leg by leg and threat by threat.
+/// A long route past many threats costs the sum over its legs and threats.
 #[test]
 fn threats_out_of_reach_are_left_out_without_a_trace() {
     let mut scenario = scenario();
@@ -154,7 +154,7 @@ fn five_samples_a_leg() {
     );
 }
 
-/// A leg that ends at a base is in the threat there, one that ends at a top is not, whatever rounding makes of its middle.
+/// A leg that ends at a base is in the threat there, one that ends at a top is not, however its middle is rounded.
 #[test]
 fn a_sample_at_the_end_of_a_leg_is_where_it_ends() {
     let mut scenario = scenario();
@@ -163,7 +163,7 @@ fn a_sample_at_the_end_of_a_leg_is_where_it_ends() {
         for (base, top, share) in [(Some(to), None, 0.2), (None, Some(to), 0.0)] {
             let threat = &mut scenario.threats[0];
             (threat.base, threat.top) = (base, top);
-            // Nearer than the soft zone at the end alone.
+            // Nearer than the soft zone only at the end.
             let leg = route(&[[0.0, 0.0, from], [35.0, 0.0, to]]);
             let climbs_to_base = base.is_some() && from < to;
             let descends_to_top = top.is_some() && from > to;

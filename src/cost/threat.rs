@@ -1,4 +1,4 @@
-//! Eq. 4-5: exposure to threats along a leg, and keeping out of them.
+//! Eq. 4-5: exposure to threats along a leg, and staying out of them.
 
 use super::{Breach, Constraint, Model, Tolerance};
 use crate::geometry::{Point3, Rect, Segment};
@@ -11,11 +11,11 @@ pub(crate) const SHARE: f64 = 0.2;
 /// Where Eq. 4 samples a leg. The paper lists four of the five points; all five are used.
 pub(super) const SAMPLES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
-/// With so many threats or fewer, all are looked at.
+/// With this many threats or fewer, all are examined.
 const FEW_THREATS: usize = 16;
 
-/// The threats whose soft zones a run of legs may reach. Where a route has thousands of legs or a
-/// scenario thousands of threats, most need not be looked at leg by leg.
+/// The threats whose soft zones a run of legs may reach. Where a route has thousands of legs or a scenario thousands of
+/// threats, most need not be examined leg by leg.
 #[derive(Debug)]
 pub(super) enum Nearby {
     All(usize),
@@ -23,10 +23,10 @@ pub(super) enum Nearby {
 }
 
 impl Nearby {
-    /// So many legs are looked at together.
+    /// Number of legs examined together.
     pub(super) const RUN: usize = 32;
 
-    /// Those near to the legs between `points`, in order.
+    /// The threats near to the legs between `points`, in order.
     pub(super) fn to(threats: &[Threat], points: &[Point3]) -> Self {
         if threats.len() <= FEW_THREATS {
             return Self::All(threats.len());
@@ -36,7 +36,7 @@ impl Nearby {
         };
         let near = threats.iter().enumerate().filter(|(_, threat)| {
             let extent = threat.extent();
-            // Written so that a hair of rounding rather takes a threat in.
+            // Written so that rounding errs on the side of including a threat.
             let hair = 1e-6 * (1.0 + extent.diagonal());
             run.min.x <= extent.max.x + hair
                 && run.max.x >= extent.min.x - hair
@@ -87,7 +87,7 @@ impl Model<'_> {
 
 /// The integral of Eq. 4 as printed: the mean of five samples times the leg's length.
 pub(super) fn sampled_exposure(threat: &Threat, leg: &Segment) -> f64 {
-    // The last is where the leg ends, to the last digit: at a base or top as a rule.
+    // The last sample is exactly where the leg ends, which is usually at a base or top.
     let sample = |&t: &f64| if t < 1.0 { leg.at(t) } else { leg.b };
     let sum: f64 = SAMPLES.iter().map(|t| threat.intensity(sample(t))).sum();
     sum / SAMPLES.len() as f64 * leg.length()

@@ -6,10 +6,10 @@ use nalgebra::Vector2;
 
 use crate::geometry::Point2;
 
-/// Turns within this many radians of a whole circle are rounding of none.
+/// Turns within this many radians of a whole circle are zero turns with rounding.
 const NO_TURN: f64 = 1e-9;
 
-/// In which sense a string goes round a circle.
+/// The sense in which a string goes round a circle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Sense {
     /// Counter-clockwise: the circle lies to the left.
@@ -106,8 +106,8 @@ impl Arc {
         self.on.center + self.to * self.on.radius
     }
 
-    /// Whether the arc passes the direction `way` from the centre: whether [`turn`] from its beginning to there is no more
-    /// than its own, told without an angle.
+    /// Whether the arc passes the direction `way` from the centre: whether [`turn`] from its beginning to there is no
+    /// more than its own, without computing an angle.
     pub(super) fn passes(&self, way: Vector2<f64>) -> bool {
         let sign = self.on.sense.sign();
         let (aside, ahead) = (sign * self.from.perp(&way), self.from.dot(&way));
@@ -226,8 +226,7 @@ pub(super) fn segment_segment(one: (Point2, Point2), other: (Point2, Point2)) ->
     (p - q).norm()
 }
 
-/// Where on the first of two segments they cross, as a share of it; `None` where they do not, or
-/// only touch.
+/// Where on the first of two segments they cross, as a share of it; `None` where they do not, or only touch.
 pub(super) fn crossing((a, b): (Point2, Point2), (c, d): (Point2, Point2)) -> Option<f64> {
     let (one, other) = (b - a, d - c);
     let (a_off, b_off) = (other.perp(&(a - c)), other.perp(&(b - c)));
@@ -250,7 +249,7 @@ mod tests {
         }
     }
 
-    /// Also where an arc is none, all but a circle, or half of one, and begins or ends in the direction that is asked for.
+    /// Also where an arc is empty, nearly a circle, or half of one, and begins or ends in the requested direction.
     #[test]
     fn an_arc_passes_what_it_turns_by() {
         let unit = |degrees: i32| {
@@ -266,7 +265,7 @@ mod tests {
                 let arc = Arc::new(rounding(3.0, 4.0, 5.0, sense), unit(start), to);
                 for degrees in 0..360 {
                     let passes = arc.passes(unit(start + sign * degrees) * 7.0);
-                    // Where it ends is a matter of rounding.
+                    // At its end the result is a matter of rounding.
                     assert!(
                         passes == (degrees <= turned) || degrees == turned,
                         "{arc:?} {degrees}"

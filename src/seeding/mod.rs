@@ -1,5 +1,5 @@
-//! What the geometry of a scenario tells before any search: the taut strings round its obstacles,
-//! and a cost that no route can undercut.
+//! What can be computed from a scenario's geometry before any search: the taut strings round its obstacles, and a cost
+//! that no route can undercut.
 //!
 //! Deliberately absent: routes of waypoints, and everything that a vehicle can or cannot fly.
 
@@ -31,7 +31,7 @@ mod tests {
         json::read(document.as_bytes(), &rules, 1).unwrap_or_else(|fault| panic!("{fault:?}"))
     }
 
-    /// From (200, 100, 0) to (800, 800, 150) in a square of a kilometre, with `members` besides.
+    /// From (200, 100, 0) to (800, 800, 150) in a square of a kilometre, with `members` added.
     pub(super) fn scenario(members: &str) -> Scenario {
         read(&format!(
             r#"{{ "frame": "local",
@@ -44,7 +44,7 @@ mod tests {
         ))
     }
 
-    /// The same among cylinders of all heights, each by its centre, radius and influence.
+    /// The same among cylinders of all heights, each given by its centre, radius and influence.
     pub(super) fn among(discs: impl IntoIterator<Item = [f64; 4]>) -> Scenario {
         let discs = discs.into_iter();
         let threats: Vec<String> = discs.map(|[x, y, r, i]| disc(x, y, r, i)).collect();

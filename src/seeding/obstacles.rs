@@ -13,7 +13,7 @@ use crate::geometry::{Point2, Rect, ring};
 use crate::scenario::Scenario;
 use crate::threat::Threat;
 
-/// What is looked through one by one; beyond it a tree is built.
+/// Up to this many bodies are searched one by one; beyond it a tree is built.
 const FEW_BODIES: usize = 24;
 
 /// Touching is not entering: bodies count as smaller by this share of the scene's extent.
@@ -25,16 +25,16 @@ pub struct Obstacles {
     pub(super) ends: [Point2; 2],
     pub(super) bodies: Vec<Body>,
     pub(super) corners: Vec<Corner>,
-    /// By index of the outline, where its corners are; those of outlines left out are empty.
+    /// By index of the outline, the range of its corners; empty for outlines left out.
     pub(super) corners_of: Vec<std::ops::Range<usize>>,
     rings: Vec<Ring>,
     tree: Option<RTree<Entry>>,
-    /// Metres of a straight way that are looked up in the tree at once.
+    /// Metres of a straight way that are looked up in the tree at a time.
     stride: f64,
-    /// No straight or round part of a string and what remains behind it is longer, metres.
+    /// No straight or round part of a string, plus what remains after it, is longer, metres.
     pub(super) longest_way: f64,
     pub(super) area: Option<Rect>,
-    /// Metres by which a body may be touched.
+    /// How deep a body may be touched, metres.
     pub(super) touch: f64,
 }
 
@@ -55,7 +55,7 @@ pub(super) struct Body {
 pub(super) struct Corner {
     pub(super) center: Point2,
     pub(super) radius: f64,
-    /// The bodies that it belongs to; twice the same for a disc.
+    /// The bodies that it belongs to; the same one twice for a disc.
     pub(super) bodies: [usize; 2],
     /// Unit vectors along the edges that meet at the corner of a ring.
     pub(super) edges: Option<[Vector2<f64>; 2]>,
@@ -79,14 +79,13 @@ impl Obstacles {
         Self::of(scenario, counts, Outline::hard)
     }
 
-    /// As [`Obstacles::hard`], the threats widened by their soft zones, but not over an end of the
-    /// way.
+    /// As [`Obstacles::hard`], with the threats widened by their soft zones, but not over an end of the way.
     #[must_use]
     pub fn soft(scenario: &Scenario, counts: impl Fn(usize, &Threat) -> bool) -> Self {
         Self::of(scenario, counts, Outline::soft)
     }
 
-    /// As [`Obstacles::hard`], each threat by an outline of the caller's making.
+    /// As [`Obstacles::hard`], with each threat's outline made by the caller.
     #[must_use]
     pub fn of(
         scenario: &Scenario,
@@ -105,9 +104,8 @@ impl Obstacles {
         )
     }
 
-    /// `outlines` (`None` leaves one out but keeps the numbers of the others) between two ends. An
-    /// outline that reaches over an end is made smaller, down to its core. Strings bend inside
-    /// `area` alone, if there is one.
+    /// `outlines` (`None` leaves one out but keeps the numbers of the others) between two ends. An outline that reaches
+    /// over an end is shrunk, down to its core. Strings bend only inside `area`, if there is one.
     #[must_use]
     pub fn new(
         outlines: impl IntoIterator<Item = Option<Outline>>,
@@ -153,7 +151,7 @@ impl Obstacles {
                 GeomWithData::new(Rectangle::from_corners(low, high), idx)
             });
             scene.tree = Some(RTree::bulk_load(entries.collect()));
-            // About as far as one sees among so many.
+            // Roughly the visible distance among that many bodies.
             scene.stride = 2.0 * extent.diagonal() / (scene.bodies.len() as f64).sqrt();
         }
         scene
@@ -239,8 +237,8 @@ impl Obstacles {
         }
     }
 
-    /// A body that the straight way from `a` to `b` enters, the bodies `own` apart; the index of
-    /// its outline.
+    /// A body that the straight way from `a` to `b` enters, other than the bodies `own`; returns the index of its
+    /// outline.
     pub(super) fn blocks_segment(&self, a: Point2, b: Point2, own: &[usize]) -> Option<usize> {
         let blocks = |body: &Body| {
             if body.radius > self.touch {
@@ -269,7 +267,7 @@ impl Obstacles {
         self.slips_into_ring(a, b)
     }
 
-    /// A body that `arc` enters, its own bodies apart; the index of its outline.
+    /// A body that `arc` enters, other than its own bodies; returns the index of its outline.
     pub(super) fn blocks_arc(&self, arc: &Arc, own: &[usize]) -> Option<usize> {
         if arc.length() <= 0.0 {
             return None;

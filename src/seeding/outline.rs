@@ -10,8 +10,8 @@ pub struct Outline {
     pub shape: OutlineShape,
     /// Metres by which the shape is widened: the radius of a disc.
     pub radius: f64,
-    /// Never made smaller than this where an end of the way lies within; an end within the core
-    /// itself means that the obstacle is none at that height, and it is left out.
+    /// Never shrunk below this where an end of the way lies within; if an end lies within the core itself, there is no
+    /// obstacle at that height, and it is left out.
     pub core: f64,
 }
 

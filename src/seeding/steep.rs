@@ -1,7 +1,7 @@
 //! Where the ground rises faster than the aircraft climbs.
 //!
-//! Coarse on purpose: it tells seeds which mountains to go round. What a route may really do is
-//! measured by `cost`, and no bound rests on this.
+//! Coarse on purpose: it tells seeds which mountains to go round. What a route may really do is measured by `cost`, and
+//! no bound depends on this.
 
 use nalgebra::Vector2;
 
@@ -15,12 +15,12 @@ const CELLS: usize = 32;
 /// Half extents, in half cells, over which a rise is measured.
 const EXTENTS: [usize; 4] = [1, 2, 4, 8];
 
-/// The greatest of them: so far beyond the area the ground is looked at, too.
+/// The greatest of them: the ground is examined this far beyond the area too.
 const MARGIN: usize = EXTENTS[EXTENTS.len() - 1];
 
-/// A disc over each cell at the rim of what cannot be crossed uphill: over some extent round it the
-/// ground rises by more than the steepest climb and the height of the altitude band together. The
-/// cells of a coarse lattice within the rim cannot be reached, and are left out.
+/// A disc over each cell at the rim of what cannot be crossed uphill: over some extent around it the ground rises by
+/// more than the steepest climb and the height of the altitude band together. The cells of a coarse lattice within the
+/// rim cannot be reached, and are left out.
 #[must_use]
 pub fn steep_ground(scenario: &Scenario) -> Vec<Outline> {
     if scenario.terrain.is_flat() {
@@ -51,7 +51,7 @@ pub fn steep_ground(scenario: &Scenario) -> Vec<Outline> {
             if steep[row][column] && !is_enclosed(&steep, row, column) {
                 outlines.push(Outline {
                     shape: OutlineShape::Disc(ground.center(column, row)),
-                    // As wide as the cell is from corner to corner: no gap is left between two.
+                    // As wide as the diagonal of the cell, so that there is no gap between two.
                     radius: 0.5 * cell * std::f64::consts::SQRT_2,
                     core: 0.0,
                 });
@@ -64,7 +64,7 @@ pub fn steep_ground(scenario: &Scenario) -> Vec<Outline> {
 /// The elevation at all corners, middles of sides and centers of cells.
 struct Ground<'s> {
     scenario: &'s Scenario,
-    /// From one of them to the next, metres.
+    /// Distance from one of them to the next, metres.
     step: f64,
     /// Row by row, [`MARGIN`] on each side.
     elevations: Vec<Vec<f64>>,
@@ -154,7 +154,7 @@ mod tests {
         for outline in &outlines {
             assert!(outline.distance(Point2::new(500.0, 450.0)) < 400.0);
         }
-        // A ring of discs, two cells deep at most where it runs aslant.
+        // A ring of discs, at most two cells deep where it runs diagonally.
         let around = |at: Point2| {
             let near = |outline: &&Outline| outline.distance(at) < 40.0;
             outlines.iter().filter(near).count()

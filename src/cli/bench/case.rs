@@ -1,4 +1,4 @@
-//! The scenarios that are measured.
+//! The scenarios that are benchmarked.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,9 +13,9 @@ use crate::scenario::limits::Limits;
 
 /// A scenario document whose `planner` is ours to fill in.
 pub(super) struct Case {
-    /// Such as `paper-1`.
+    /// A name such as `paper-1`.
     pub(super) name: String,
-    /// Least cost that anybody has found with [`BEST_KNOWN_WAYPOINTS`] waypoints.
+    /// Least cost found by anybody with [`BEST_KNOWN_WAYPOINTS`] waypoints.
     pub(super) best_known: Option<f64>,
     file: PathBuf,
     document: Value,
@@ -32,8 +32,8 @@ pub(super) struct Refused {
 /// N of the best known routes.
 pub(super) const BEST_KNOWN_WAYPOINTS: usize = 10;
 
-/// The shipped scenarios, and the cost of the best route known for each: the least that long runs of
-/// several searches and polishing ended at, so an upper bound of the optimum.
+/// The shipped scenarios, and the cost of the best route known for each: the least that long runs of several searches
+/// and polishing reached, so an upper bound of the optimum.
 const SHIPPED: [(&str, &str, f64); 4] = [
     (
         "paper-1",
@@ -93,7 +93,7 @@ fn from_file(file: &Path) -> anyhow::Result<Case> {
         file: file.to_owned(),
         refusal,
     };
-    // The document's own faults first, before its planner is exchanged.
+    // Check the document's own faults first, before its planner is replaced.
     json::read(&text, &rules(), 1).map_err(refused)?;
     Ok(Case {
         name: file
@@ -112,7 +112,7 @@ fn rules() -> Rules {
 }
 
 impl Case {
-    /// A document of our own making, under its own name.
+    /// A generated document, under its own name.
     pub(super) fn drawn(document: Value) -> Self {
         let name = document["name"].as_str().unwrap_or_default();
         Self {
@@ -144,7 +144,7 @@ impl Case {
     /// The same, with `threats` beside the scenario's own.
     ///
     /// # Errors
-    /// As of [`Case::with`].
+    /// As for [`Case::with`].
     pub(super) fn with_threats(
         &self,
         planner: &Value,

@@ -94,7 +94,7 @@ pub(super) fn draw(title: &str, curves: &[Curve]) -> String {
     svg + "</svg>\n"
 }
 
-/// To three digits.
+/// Rounded to three digits.
 fn rounded(value: f64) -> f64 {
     let scale = libm::pow(10.0, 2.0 - libm::floor(libm::log10(value)));
     (value * scale).round() / scale
@@ -132,7 +132,7 @@ mod tests {
         assert_eq!(lines, ["352.0,44.0 640.0,390.0", ""]);
         let texts: Vec<&str> = tree.descendants().filter_map(|node| node.text()).collect();
         assert!(texts.contains(&"R&D") && texts.contains(&"a<b") && texts.contains(&"900"));
-        // Nothing at all is still a drawing.
+        // An empty drawing is still valid.
         assert!(roxmltree::Document::parse(&draw("", &[])).is_ok());
     }
 }

@@ -1,4 +1,4 @@
-//! The processor's time, which a busy machine stretches less than the time on the wall.
+//! Processor time, which a busy machine distorts less than wall-clock time.
 
 use rustix::time::{ClockId, clock_gettime};
 
@@ -35,7 +35,7 @@ mod tests {
             assert!(now >= before);
             before = now;
         }
-        // Other tests run in this process too, on so many cores at most.
+        // Other tests run in this process too, on at most this many cores.
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         assert!(before <= (wall.elapsed().as_secs_f64() + 1e-3) * cores as f64);
     }

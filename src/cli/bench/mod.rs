@@ -1,6 +1,6 @@
-//! `noctule bench`: what the planner and the algorithms behind it do, measured.
+//! `noctule bench`: measures the planner and the algorithms behind it.
 //!
-//! Everything but times depends on the scenarios, the sizes and the seeds 1, 2, ... alone.
+//! Everything but times depends only on the scenarios, the sizes and the seeds 1, 2, ...
 
 mod case;
 mod chart;
@@ -65,7 +65,7 @@ struct Output {
     out: Option<PathBuf>,
 }
 
-/// Do what is asked, and say by the exit code how it went.
+/// Do what is asked; the exit code tells how it went.
 pub(super) fn run(command: &Command) -> anyhow::Result<u8> {
     let done = match command {
         Command::Paper(arguments) => report(&arguments.common, "paper", |cases| {
@@ -104,7 +104,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<u8> {
     Ok(exit::BAD_INPUT)
 }
 
-/// Measure all cases, and write what came of it.
+/// Measure all cases, and write the results.
 fn report(
     common: &Common,
     name: &str,

@@ -33,10 +33,10 @@ pub(in crate::cli) struct Arguments {
     waypoints: usize,
 }
 
-/// What all others are compared with.
+/// The algorithm that all others are compared with.
 const REFERENCE: &str = "tms-sba";
 
-/// Its variants in the table of what its parts add: a constant, and its value.
+/// Its variants in the ablation table: a constant, and its value.
 const ABLATIONS: [(&str, f64); 4] = [
     ("truncation", 0.0),
     ("truncation", 0.8),
@@ -44,11 +44,11 @@ const ABLATIONS: [(&str, f64); 4] = [
     ("expansion", 10.0),
 ];
 
-/// How to plan, but for the seed.
+/// How to plan, except for the seed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Setting {
     algorithm: &'static str,
-    /// A constant of the algorithm that is not at its default.
+    /// A constant of the algorithm that differs from its default.
     constant: Option<(&'static str, f64)>,
     waypoints: usize,
     population: usize,
@@ -85,7 +85,7 @@ struct Experiment {
     name: &'static str,
     title: &'static str,
     note: &'static str,
-    /// The column that tells the groups apart.
+    /// The column that distinguishes the groups.
     axis: Option<&'static str>,
     groups: Vec<(usize, Vec<Setting>)>,
 }
@@ -103,7 +103,7 @@ impl Runs {
     }
 }
 
-/// Run everything that the tables need, once each.
+/// Run everything that the tables need, each setting once.
 pub(super) fn measure(arguments: &Arguments, cases: &[Case]) -> anyhow::Result<Report> {
     let base = Setting {
         algorithm: REFERENCE,

@@ -1,4 +1,4 @@
-//! `noctule bench price`: prices routes that other programs come up with.
+//! `noctule bench price`: prices routes that other programs propose.
 //!
 //! Each line of standard input is a JSON array of routes, each an array of its free waypoints
 //! `[x, y, z]`, metres; start and target are the scenario's. Each is answered by a line, an array
@@ -38,7 +38,7 @@ pub(super) struct BadLine {
 /// The free waypoints of a route.
 type Waypoints = Vec<[f64; 3]>;
 
-/// No coordinate is further from zero, metres; far beyond any area, and its square is a number.
+/// Maximum absolute coordinate, metres; far beyond any area, and its square is a finite number.
 const FURTHEST: f64 = 1e9;
 
 /// Answer every line until standard input ends.
@@ -58,14 +58,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             why,
         })?;
         let prices = price(&pricer, &scenario, &routes, arguments.above_ground);
-        // Whoever asks waits for the whole line.
+        // The caller waits for the whole line.
         let written =
             writeln!(out, "{}", serde_json::to_string(&prices)?).and_then(|()| out.flush());
         if written
             .as_ref()
             .is_err_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
         {
-            // Nobody asks any more.
+            // The caller has gone.
             break;
         }
         written.context("cannot write to standard output")?;
@@ -102,7 +102,7 @@ fn price(
     above_ground: bool,
 ) -> Vec<[f64; 2]> {
     let mut prices = Vec::with_capacity(routes.len());
-    // Only routes of as many waypoints fit side by side; lanes left over repeat the first route.
+    // Only routes with the same number of waypoints fit side by side; unused lanes repeat the first route.
     let alike = routes.chunk_by(|one, next| one.len() == next.len());
     for routes in alike.flat_map(|alike| alike.chunks(LANES)) {
         let free = routes[0].len();

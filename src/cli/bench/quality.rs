@@ -30,7 +30,7 @@ pub(in crate::cli) struct Arguments {
 }
 
 impl Arguments {
-    /// Nothing but what the caller says: all else is the planner's own default.
+    /// Only what the caller specifies: the rest is the planner's own default.
     fn planner(&self, waypoints: usize, seed: u64) -> Value {
         let mut planner = json!({"waypoints": waypoints, "seed": seed});
         if let Some(population) = self.population {
@@ -109,13 +109,13 @@ impl Runs<'_> {
             .filter(|_| self.waypoints == BEST_KNOWN_WAYPOINTS)
     }
 
-    /// What the gaps are measured from.
+    /// The cost from which the gaps are measured.
     fn reference(&self) -> Option<f64> {
         let known = self.best_known().into_iter();
         known.chain(self.best()).reduce(f64::min)
     }
 
-    /// Of each feasible run.
+    /// The gaps of feasible runs.
     fn gaps(&self) -> Vec<f64> {
         let costs = self.trials.iter().filter_map(Trial::cost);
         let Some(reference) = self.reference() else {

@@ -1,4 +1,4 @@
-//! What a measurement hands over: pages for people, tables for programs, drawings.
+//! The output of a measurement: pages for people, tables for programs, drawings.
 
 use std::fs;
 use std::io;
@@ -20,7 +20,7 @@ pub(super) struct Report {
 
 /// A drawing with its caption.
 pub(super) struct Drawing {
-    /// Of its file.
+    /// Name of its file.
     pub(super) name: String,
     pub(super) caption: String,
     pub(super) svg: String,

@@ -29,26 +29,26 @@ pub(in crate::cli) struct Arguments {
     time_ms: u32,
 }
 
-/// Where the growth with waypoints, threats and population is measured.
+/// The scenario in which the growth with waypoints, threats and population is measured.
 const GROUND: &str = "paper-2";
 
 const WAYPOINTS: [usize; 7] = [3, 5, 10, 20, 40, 80, 160];
 const POPULATIONS: [usize; 6] = [2, 8, 40, 200, 1000, 5000];
 const FAR_THREATS: [u32; 4] = [0, 10, 100, 1000];
 
-/// The size of a population where it is not what is varied.
+/// Population size in measurements that do not vary it.
 const POPULATION: usize = 200;
 /// Members and iterations of the search that gathers the positions which are then priced.
 const GATHERED: usize = 40;
 const GATHERING: u32 = 50;
 /// How far from a route its neighbours are, as a share of the way.
 const NEIGHBOURHOOD: f64 = 0.01;
-/// A measurement is cut into so many; the fastest counts, for the others were disturbed.
+/// A measurement is divided into this many; the fastest counts, because the others were disturbed.
 const SLICES: u32 = 5;
-/// Plans of each scenario, of which the median counts.
+/// Plans of each scenario; the median counts.
 const PLANS: u64 = 5;
 
-/// What is priced, in one row.
+/// One row of what is priced.
 struct Row {
     label: Cell,
     scenario: Scenario,
@@ -244,7 +244,7 @@ fn rate(objective: &mut impl Objective, positions: &[f64], batch: usize, time_ms
     let mut positions = positions.to_vec();
     let dimension = positions.len() / batch;
     best_rate(batch, time_ms, || {
-        // By a hair another course: what is remembered of legs is of no use.
+        // Shift the course slightly, so that remembered legs are of no use.
         for position in positions.chunks_exact_mut(dimension) {
             position[1] = position[1].next_up();
         }
@@ -253,7 +253,7 @@ fn rate(objective: &mut impl Objective, positions: &[f64], batch: usize, time_ms
     })
 }
 
-/// How many a second `price` does, which does `count` at a time.
+/// How many per second `price` does, which does `count` per call.
 fn best_rate(count: usize, time_ms: u32, mut price: impl FnMut()) -> f64 {
     let slice_s = f64::from(time_ms) * 1e-3 / f64::from(SLICES);
     let mut best = 0.0;
@@ -273,10 +273,10 @@ fn best_rate(count: usize, time_ms: u32, mut price: impl FnMut()) -> f64 {
     best
 }
 
-/// Number `idx` of `count`, on a spiral round the area, from half a kilometre off its edge outwards.
+/// Number `idx` of `count`, on a spiral round the area, from half a kilometre beyond its edge outwards.
 fn far_threat(idx: u32, count: u32) -> Value {
     let share = f64::from(idx) / f64::from(count);
-    // Neighbours stand 137.5 degrees apart, so that no direction is left out.
+    // Neighbours are 137.5 degrees apart, so that every direction is covered.
     let angle = TAU * 0.381_966 * f64::from(idx);
     let distance = 1200.0 + 8800.0 * share.sqrt();
     json!({

@@ -1,4 +1,4 @@
-//! What many runs come to.
+//! Summarises many runs.
 
 use super::trial::Trial;
 
@@ -33,7 +33,7 @@ impl Summary {
     }
 }
 
-/// None of nothing.
+/// `None` for an empty list.
 pub(super) fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }

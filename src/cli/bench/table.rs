@@ -6,11 +6,11 @@ use std::fmt::Write;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Cell {
     Text(String),
-    /// So many digits after the point for people, all of them for programs.
+    /// With this many digits after the point for people, all of them for programs.
     Number(f64, usize),
     /// In per cent for people.
     Share(f64),
-    /// A probability, of which people want to know whether it is small.
+    /// A probability; people want to know whether it is small.
     Probability(f64),
     Missing,
 }
@@ -56,7 +56,7 @@ impl Cell {
 /// Rows under one heading.
 #[derive(Debug, Clone)]
 pub(super) struct Table {
-    /// Of its file.
+    /// Name of its file.
     pub(super) name: &'static str,
     pub(super) title: String,
     /// What the figures mean; a paragraph.
@@ -83,7 +83,7 @@ impl Table {
         page
     }
 
-    /// RFC 4180 but for the line ends.
+    /// RFC 4180 except for the line ends.
     pub(super) fn to_csv(&self) -> String {
         let mut page = String::new();
         let columns = self.columns.iter().map(|&column| Cell::text(column));

@@ -1,4 +1,4 @@
-//! One run of the planner, and what is kept of it.
+//! One run of the planner, and the figures kept of it.
 
 use std::cmp::Ordering;
 
@@ -8,7 +8,7 @@ use crate::optimizer::Fitness;
 use crate::planner::{self, Nobody};
 use crate::scenario::Scenario;
 
-/// What is kept of a run.
+/// The figures kept of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Trial {
     pub(super) seed: u64,
@@ -25,7 +25,7 @@ pub(super) struct Trial {
 }
 
 impl Trial {
-    /// What [`Trial::cells`] are.
+    /// Headings of [`Trial::cells`].
     pub(super) const COLUMNS: [&str; 7] = [
         "seed",
         "is_feasible",

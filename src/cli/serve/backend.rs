@@ -1,4 +1,4 @@
-//! Which store the configuration names, opened: a row each.
+//! Opens the store that the configuration names: one row each.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -45,7 +45,7 @@ fn sqlite(data_dir: PathBuf, options: Options) -> Open {
     })
 }
 
-/// Opened on a thread that may block.
+/// Opens it on a thread that may block.
 fn jetstream(settings: Settings, options: Options) -> Open {
     let runtime = Handle::current();
     Arc::new(move |_| {
@@ -57,7 +57,7 @@ fn jetstream(settings: Settings, options: Options) -> Open {
     })
 }
 
-/// What nodes share their datasets through; `None` where there is one node.
+/// Where nodes share their datasets; `None` where there is one node.
 pub(super) fn shelf(config: &Config) -> Option<Arc<dyn Shelf>> {
     match &config.store {
         Place::Sqlite => None,
@@ -85,7 +85,7 @@ fn options(config: &Config, clock: Clock, instruments: &Arc<Instruments>) -> Opt
     }
 }
 
-/// Counts a plan among those that ended; for how long its last run went on, nobody knows.
+/// Counts a plan as ended; the duration of its last run is unknown.
 fn counted(instruments: &Arc<Instruments>) -> Tell {
     let instruments = Arc::clone(instruments);
     Arc::new(move |plan| {
@@ -97,7 +97,7 @@ fn counted(instruments: &Arc<Instruments>) -> Tell {
     })
 }
 
-/// Of a setting, 0 is no limit.
+/// In the settings, 0 means no limit.
 fn retention(settings: config::Retention) -> Retention {
     let limit = |setting: u64| (setting > 0).then_some(setting);
     let age_ms = i64::try_from(settings.age.as_millis()).unwrap_or(i64::MAX);

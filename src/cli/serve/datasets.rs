@@ -1,4 +1,4 @@
-//! Where the datasets are that the configuration names.
+//! Opens the datasets where the configuration places them.
 
 use std::sync::Arc;
 
@@ -10,8 +10,8 @@ use crate::config::Config;
 use crate::store;
 use crate::telemetry::Instruments;
 
-/// Those of the data directory, or of the store that nodes share, and those of the operator's own. A place
-/// that is new gets the dataset that comes with the program.
+/// The datasets of the data directory, or of the store that nodes share, and the operator's own. A new place gets the
+/// dataset that comes with the program.
 ///
 /// # Errors
 /// When the configuration names no place, or the operator's directory cannot be read.

@@ -1,16 +1,15 @@
-//! File descriptors: as many as the system lets the process have, and connections no more than that.
+//! File descriptors: as many as the system allows the process, and no more connections than that.
 //!
-//! A service that runs out of them can accept nobody, not even who asks whether it is ready; one that
-//! stops accepting before leaves callers in the listener's backlog until others go.
+//! A service that runs out of them can accept nobody, not even to say whether it is ready; one that stops accepting
+//! before that leaves callers in the listener's backlog until others go.
 
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
-/// For everything that is no connection: the store, datasets that are read or come in, webhooks, the
-/// log. Most of what it is for are threads that read files, of which tokio starts up to 512.
+/// For everything except connections: the store, datasets being read or uploaded, webhooks, the log. Most of it is for
+/// threads that read files, of which tokio starts up to 512.
 const RESERVE: u64 = 512;
 
-/// Raise the limit of this process as far as it may go, and say how many connections fit below it, at
-/// most `wished`.
+/// Raise the limit of this process as far as possible, and return how many connections fit below it, at most `wished`.
 pub(super) fn connections(wished: usize) -> usize {
     let Some(limit) = raise() else {
         return wished;
@@ -26,7 +25,7 @@ pub(super) fn connections(wished: usize) -> usize {
     fitting
 }
 
-/// The limit in force from now on; `None` when there is none.
+/// The limit now in force; `None` when there is none.
 fn raise() -> Option<u64> {
     let limit = getrlimit(Resource::Nofile);
     let raised = Rlimit {

@@ -1,4 +1,5 @@
-//! The end of a service: the signals that ask for it, the order in which it is taken apart, and how its time is spent.
+//! The end of a service: the signals that request it, the order in which parts are stopped, and how the time is
+//! divided.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,7 +16,7 @@ use crate::http::webhook::Sender;
 use crate::store::Store;
 use crate::worker::{Pool, Sweeper};
 
-/// What has been set going.
+/// The running parts of the service.
 pub(super) struct Running {
     pub(super) phase: watch::Sender<Phase>,
     pub(super) pool: Pool,
@@ -26,7 +27,7 @@ pub(super) struct Running {
 }
 
 impl Running {
-    /// Take it apart in the right order once a signal asks for it, in `grace` at most.
+    /// Stop them in the right order once a signal requests it, within `grace`.
     pub(super) async fn end_on(self, mut signals: Signals, grace: Duration) -> anyhow::Result<()> {
         let name = signals.next().await;
         let signalled = Instant::now();
@@ -60,7 +61,7 @@ impl Running {
     }
 }
 
-/// Who asks twice does not want to wait.
+/// A second signal means that the user does not want to wait.
 fn leave_on_another(mut signals: Signals) {
     tokio::spawn(async move {
         signals.next().await;
@@ -69,8 +70,8 @@ fn leave_on_another(mut signals: Signals) {
     });
 }
 
-/// Let runs finish, then give them back; without those that do not heed their stop in time, which
-/// the next process finds as after a crash.
+/// Let runs finish, then give them back; runs that do not stop in time are left for the next process to find, as after
+/// a crash.
 async fn drain(pool: Pool, times: &Times) {
     if timeout(times.runs + times.giving_back, pool.drain(times.runs))
         .await
@@ -82,11 +83,11 @@ async fn drain(pool: Pool, times: &Times) {
 
 /// How the grace period is spent.
 struct Times {
-    /// Runs may finish until then.
+    /// How long runs may take to finish.
     runs: Duration,
-    /// Then they are stopped and given back.
+    /// How long stopping them and giving them back may take after that.
     giving_back: Duration,
-    /// Connections may finish their answers until then; what remains is for the store.
+    /// Until when, counted from the signal, connections may finish their answers; the rest is for the store.
     answers: Duration,
 }
 

@@ -1,4 +1,4 @@
-//! What the service is made of, as the configuration says.
+//! The parts of the service, put together from the configuration.
 
 use std::sync::Arc;
 
@@ -16,7 +16,8 @@ use crate::store::measured::MeasuredStore;
 use crate::store::{self, SteadyClock};
 use crate::telemetry::Instruments;
 
-/// Who may call, and who is told: what can be wrong of the configuration, read before anything is taken or opened.
+/// Who may call, and who is notified: the fallible parts of the configuration, read before anything is locked or
+/// opened.
 pub(super) struct Callers {
     access: Access,
     cors: Origins,
@@ -38,7 +39,7 @@ impl Callers {
     }
 }
 
-/// Open the store and the datasets, and put all of it together.
+/// Open the store and the datasets, and put everything together.
 pub(super) async fn open(
     config: &Config,
     callers: Callers,
@@ -77,7 +78,7 @@ pub(super) async fn open(
     })
 }
 
-/// How ends of plans are told; `None` when nobody is.
+/// How ends of plans are reported; `None` when they are not.
 fn webhooks(config: &config::Webhook) -> anyhow::Result<Option<webhook::Settings>> {
     let Some(path) = &config.secret_file else {
         return Ok(None);

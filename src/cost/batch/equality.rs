@@ -1,5 +1,5 @@
-//! That lanes come to what the scalar code comes to, whatever the scenario and the routes, and to
-//! the same bits whatever the processor and the neighbours.
+//! Tests that lanes agree with the scalar code, whatever the scenario and the routes, and give the same bits whatever
+//! the processor and the neighbours.
 
 use proptest::prelude::*;
 use pulp::Arch;
@@ -15,7 +15,7 @@ use crate::terrain::dem::{Crs, Lattice, Raster};
 use crate::terrain::{Dem, Flat, Grid, Peak, Peaks, Terrain};
 use crate::threat::{Cylinder, Polygon, Shape, Threat};
 
-/// A choice after the other out of a case of proptest.
+/// Successive choices from a proptest case.
 struct Choices(std::vec::IntoIter<f64>);
 
 impl Choices {
@@ -84,7 +84,7 @@ impl Choices {
             across * metre / libm::cos(corner.lat.to_radians()),
             -along * metre,
         ];
-        // Of the shortest cells so many span the routes.
+        // Number of the shortest cells that span the routes.
         let [columns, rows] = [44; 2];
         let raster = Raster {
             lattice: Lattice {
@@ -117,7 +117,7 @@ impl Choices {
             let corner = |angle: f64, away: f64| {
                 center + nalgebra::Vector2::new(libm::cos(angle), libm::sin(angle)) * away
             };
-            // Some that are convex, some with bays narrower and wider than their soft zones.
+            // Some are convex, some have bays narrower and wider than their soft zones.
             let count = 3.0 + (9.0 * self.share()).floor();
             let least = if self.one_in(3.0) { 85.0 } else { 20.0 };
             let step = std::f64::consts::TAU / count;
@@ -145,7 +145,7 @@ impl Choices {
         }
     }
 
-    /// From the reader, for what does not matter here, and then at random.
+    /// Read by the reader for the parts that do not matter here, and random otherwise.
     fn scenario(&mut self) -> Scenario {
         let algorithm = AlgorithmRule {
             name: "any",
@@ -304,7 +304,7 @@ proptest! {
             prop_assert!(close(together.violation[lane], violation), "{} {violation}", together.violation[lane]);
             prop_assert!(close(together.cost[lane], figures.total), "{} {figures:?}", together.cost[lane]);
             prop_assert!(close(least[lane], figures.fuel + figures.altitude), "{} {figures:?}", least[lane]);
-            // Its neighbours have no part in it.
+            // Its neighbours have no influence.
             let alone = pricer.routes(&rows(&vec![route.clone(); LANES]));
             prop_assert_eq!(bits(&alone).map(|row| row[0]), bits(&together).map(|row| row[lane]));
             for (leg_idx, ends) in route.windows(2).enumerate() {

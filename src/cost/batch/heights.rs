@@ -1,5 +1,5 @@
-//! The band and the ground in lanes: most legs are proven to keep within them; the rest are measured,
-//! above peaks in lanes, too, above grids and files by the scalar code.
+//! The band and the ground in lanes: most legs are proven to keep within them; the rest are measured, above peaks also
+//! in lanes, above grids and files by the scalar code.
 
 use pulp::Simd;
 
@@ -14,7 +14,7 @@ use crate::geometry::lane::{Lane, Mask};
 use crate::geometry::{Point2, Segment};
 use crate::terrain::Terrain;
 
-/// What a proof may overlook: less than what counts as a breach.
+/// What a proof may overlook, as a share of what counts as a breach.
 const OVERLOOKED: f64 = 0.5;
 
 /// The heights that routes must keep, made ready for proofs.
@@ -23,9 +23,9 @@ pub(super) struct Heights {
     zones: Vec<Zone>,
     /// Lowest height above ground outside the terminal zones, less what may be overlooked.
     floor: f64,
-    /// Lowest in any of them, likewise.
+    /// Lowest height above ground in any of them, likewise.
     ground: f64,
-    /// Highest anywhere, likewise.
+    /// Highest height above ground anywhere, likewise.
     ceiling: f64,
     /// What may be overlooked, metres.
     pub(super) overlooked: f64,
@@ -34,13 +34,13 @@ pub(super) struct Heights {
     pub(super) below_ends: [f64; 2],
 }
 
-/// What lies below.
+/// The ground below.
 #[derive(Debug, Clone)]
 enum Surface {
     Flat(f64),
     Peaks(Massif),
     Grid(Pyramid),
-    /// Which looks at blocks of itself first.
+    /// A file, which first examines blocks of itself.
     Dem,
 }
 
@@ -50,10 +50,10 @@ struct Zone {
     radius: f64,
 }
 
-/// Points of a section, as shares of it, at which a breach may be seen.
+/// Points of a section, as shares of it, at which a breach may be noticed.
 const GLANCES: [f64; 3] = [0.5, 0.25, 0.75];
 
-/// A breach seen at a point, of more metres than this, is one.
+/// More than this at a point, metres, certainly is a breach.
 pub(super) const SURELY: f64 = 0.05;
 
 /// The part of each leg in a terminal zone: `[enter, leave]`, 1 to 1 where there is none.

@@ -6,11 +6,11 @@ use crate::geometry::{Point2, Rect, Segment};
 #[derive(Debug, Clone)]
 pub(super) struct Index {
     extent: Rect,
-    /// Cells a metre, east and north.
+    /// Cells per metre, east and north.
     per_metre: Point2,
     columns: usize,
     rows: usize,
-    /// Where the threats of each cell begin in `threats`; one more than cells.
+    /// Where the threats of each cell begin in `threats`; one entry more than cells.
     starts: Vec<u32>,
     threats: Vec<u32>,
     boxes: Vec<Rect>,
@@ -23,9 +23,9 @@ struct Cells {
 }
 
 impl Index {
-    /// Of the boxes round threats and their soft zones, one or more.
+    /// For the boxes round threats and their soft zones, at least one.
     pub(super) fn of(boxes: impl Iterator<Item = Rect>) -> Self {
-        // A hair of rounding rather takes a threat in.
+        // Rounding errs on the side of including a threat.
         let boxes: Vec<Rect> = boxes
             .map(|extent| extent.grown(1e-6 * (1.0 + extent.diagonal())))
             .collect();
@@ -71,20 +71,20 @@ impl Index {
         };
         let together = self.cells(&around).count();
         let cells_of = |leg: Segment| self.cells(&box_of(&leg)).count();
-        // Each leg has one cell at least.
+        // Each leg has at least one cell.
         if together <= 2 * legs.clone().count()
             || together <= 2 * legs.clone().map(cells_of).sum::<usize>()
         {
             self.find_in(&around, found);
             if together == 1 {
-                // In order, and each once.
+                // In order, and each only once.
                 return;
             }
         } else {
             legs.for_each(|leg| self.find_in(&box_of(&leg), found));
         }
         if found.len() >= self.boxes.len() {
-            // So often over that all of them are sooner looked at than sorted.
+            // So many duplicates that examining all threats is faster than sorting.
             found.clear();
             found.extend((0_u32..).take(self.boxes.len()));
             return;

@@ -25,7 +25,7 @@ impl<S: Simd> Point<S> {
     }
 }
 
-/// From `a` (t = 0) to `b` (t = 1) in each lane, and what is asked of it more than once.
+/// From `a` (t = 0) to `b` (t = 1) in each lane, with the values that are needed more than once.
 #[derive(Clone, Copy)]
 pub(super) struct Leg<'a, S: Simd> {
     pub(super) simd: S,
@@ -36,13 +36,13 @@ pub(super) struct Leg<'a, S: Simd> {
     pub(super) dz: Lane<S>,
     /// Horizontal length, metres.
     pub(super) level: Lane<S>,
-    /// 1 over it; 0 for a leg that stands still or only climbs.
+    /// 1 / `level`; 0 for a leg that stands still or only climbs.
     pub(super) inverse: Lane<S>,
-    /// The square of that.
+    /// The square of `inverse`.
     pub(super) inverse_square: Lane<S>,
     /// 3-D length, metres.
     pub(super) length: Lane<S>,
-    /// Of its middle.
+    /// Position of its middle.
     pub(super) middle: [Lane<S>; 2],
     /// Where it moves horizontally, so that it has a heading.
     pub(super) moves: Mask<S>,
@@ -94,11 +94,11 @@ impl<'a, S: Simd> Leg<'a, S> {
         self.near(center, radius).any()
     }
 
-    /// Where it may.
+    /// Where it may do so.
     #[inline(always)]
     pub(super) fn near(&self, center: Point2, radius: f64) -> Mask<S> {
         let (x, y) = (self.middle[0] - center.x, self.middle[1] - center.y);
-        // A hair more than half, for rounding.
+        // Slightly more than half, for rounding.
         let reach = self.level * (0.5 + 1e-9) + radius * (1.0 + 1e-9);
         (x * x + y * y).le(reach * reach)
     }

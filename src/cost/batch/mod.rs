@@ -1,9 +1,9 @@
 //! Many routes priced at once, in lanes.
 //!
-//! [`Pricer`] asks of [`LANES`] routes side by side what [`Model::assess`] asks of one, and comes to
-//! the same within rounding: what it cannot settle in lanes (a leg that breaks the band above a grid,
-//! that enters a polygon) it leaves to the scalar code, lane by lane. A lane's bits depend on its own route alone,
-//! not on its neighbours nor on the width of the processor.
+//! [`Pricer`] computes for [`LANES`] routes side by side what [`Model::assess`] computes for one, with the same results
+//! within rounding: what it cannot settle in lanes (a leg that breaks the band above a grid, that enters a polygon) it
+//! leaves to the scalar code, lane by lane. A lane's bits depend on its own route alone, not on its neighbours nor on
+//! the width of the processor.
 
 #[cfg(test)]
 mod equality;
@@ -44,7 +44,7 @@ pub struct PointRow {
 }
 
 impl PointRow {
-    /// `points` in rows; lanes that are left over repeat the first of theirs.
+    /// `points` in rows; unused lanes repeat the first of them.
     #[must_use]
     pub fn of(points: impl Iterator<Item = Point3>) -> Vec<Self> {
         let mut rows: Vec<Self> = Vec::new();
@@ -95,7 +95,7 @@ pub struct Price {
 }
 
 impl Price {
-    /// Of nothing.
+    /// Zero in every lane.
     pub const ZERO: Self = Self {
         violation: [0.0; LANES],
         cost: [0.0; LANES],
@@ -107,7 +107,7 @@ impl Price {
 pub struct Pricer<'s> {
     model: Model<'s>,
     tolerance: Tolerance,
-    /// Whether it matters only that a leg leaves the band, not how far.
+    /// Whether it matters only that a leg leaves the band, not by how much.
     verdict: bool,
     quadrature: Quadrature,
     limits: Limits,
@@ -132,15 +132,15 @@ impl<'s> Pricer<'s> {
         }
     }
 
-    /// Does not measure how far a leg leaves the band once it is seen to: for a search that has no
-    /// use for such a leg. Where there is no violation, and all else, stays as it is.
+    /// Skips measuring how far a leg leaves the band once it is seen to leave it: for a search that has no use for such
+    /// a leg. Whether there is a violation, and everything else, stays the same.
     #[must_use]
     pub fn verdicts(mut self) -> Self {
         self.verdict = true;
         self
     }
 
-    /// Price [`LANES`] routes of as many points: start, free waypoints, target.
+    /// Price [`LANES`] routes with equally many points: start, free waypoints, target.
     ///
     /// # Panics
     /// With fewer than two points.
@@ -149,7 +149,7 @@ impl<'s> Pricer<'s> {
         self.first_routes(points, LANES)
     }
 
-    /// As [`Pricer::routes`], of the first `count` of them alone; the others are free.
+    /// As [`Pricer::routes`], for the first `count` of them only; the others are unused.
     ///
     /// # Panics
     /// With fewer than two points.
@@ -158,11 +158,11 @@ impl<'s> Pricer<'s> {
         self.dispatch::<true>(points, &[], count, &mut [])
     }
 
-    /// As [`Pricer::first_routes`], did every leg keep the heights that are asked of it: above hills, where
-    /// those take longest to measure, this tells of most routes that they are not good enough. No
-    /// violation is more than that by `routes`, and the costs are the same bits. `ground` is the elevation
-    /// below each free waypoint. In `proven`, a row for each leg, is 1 where its heights above ground at both
-    /// ends prove that a leg keeps them; elsewhere 0.
+    /// As [`Pricer::first_routes`], assuming that every leg keeps the required heights: above hills, where those take
+    /// longest to measure, this shows for most routes that they are not good enough. No violation is more than that
+    /// from `routes`, and the costs are the same bits. `ground` is the elevation below each free waypoint. `proven`, a
+    /// row for each leg, is set to 1 where its heights above ground at both ends prove that a leg keeps them; elsewhere
+    /// to 0.
     ///
     /// # Panics
     /// With fewer than two points, or where there is not as much ground.
@@ -182,11 +182,11 @@ impl<'s> Pricer<'s> {
         self.dispatch::<false>(points, ground, count, proven)
     }
 
-    /// What routes cost for their fuel and heights alone: no route costs less, by the same bits. `ground` is
-    /// the elevation below each free waypoint.
+    /// The cost of routes for their fuel and heights alone: no route costs less, to the bit. `ground` is the elevation
+    /// below each free waypoint.
     ///
     /// # Panics
-    /// With fewer than two points, or where there is not as much ground.
+    /// With fewer than two points, or where `ground` has another number of rows.
     #[must_use]
     pub fn least_costs(&self, points: &[PointRow], ground: &[Row]) -> Row {
         assert!(
@@ -239,7 +239,7 @@ impl<'s> Pricer<'s> {
         self.dispatch_legs::<true, true>(a, b, usize::MAX, prices);
     }
 
-    /// As [`Pricer::legs`], of the first `count` of them alone; the others are free.
+    /// As [`Pricer::legs`], for the first `count` of them only; the others are unused.
     ///
     /// # Panics
     /// When the slices differ in length.
@@ -247,8 +247,7 @@ impl<'s> Pricer<'s> {
         self.dispatch_legs::<true, true>(a, b, count, prices);
     }
 
-    /// As [`Pricer::legs`], did every leg keep the heights that are asked of it, see
-    /// [`Pricer::routes_at_best`].
+    /// As [`Pricer::legs`], assuming that every leg keeps the required heights, see [`Pricer::routes_at_best`].
     ///
     /// # Panics
     /// When the slices differ in length.
@@ -256,8 +255,8 @@ impl<'s> Pricer<'s> {
         self.dispatch_legs::<true, false>(a, b, usize::MAX, prices);
     }
 
-    /// As [`Pricer::first_legs`], but for everything except the heights that are asked of a leg: what
-    /// [`Pricer::legs_at_best`] leaves out.
+    /// As [`Pricer::first_legs`], for the required heights of a leg only: the part that [`Pricer::legs_at_best`] leaves
+    /// out.
     ///
     /// # Panics
     /// When the slices differ in length.
@@ -353,7 +352,7 @@ impl WithSimd for Ground<'_, '_> {
 struct Routes<'a, 's, const HEIGHTS: bool> {
     pricer: &'a Pricer<'s>,
     points: &'a [PointRow],
-    /// Of the free waypoints; known where heights are left out.
+    /// Ground below the free waypoints; known where heights are left out.
     ground: &'a [Row],
     count: usize,
     /// See [`Pricer::routes_at_best`].
@@ -384,7 +383,7 @@ impl<const HEIGHTS: bool> WithSimd for Routes<'_, '_, HEIGHTS> {
     }
 }
 
-/// Rows of legs whose suspects wait for each other.
+/// Rows of legs whose suspects are measured together.
 const AT_ONCE: usize = 64;
 
 struct Legs<'a, 's, const FLIGHT: bool, const HEIGHTS: bool> {

@@ -36,7 +36,7 @@ const BETWEEN: f64 = 1.285;
 pub(super) struct Massif {
     base: f64,
     pub(super) peaks: Vec<Mountain>,
-    /// By how much the ground may be higher or lower than a proof's sum.
+    /// How much higher or lower the ground may be than a proof's sum.
     allowed: f64,
     pub(super) swing: Swing,
 }
@@ -49,7 +49,7 @@ pub(super) struct Mountain {
     pub(super) narrowness: Point2,
     /// Farther than this from the center the exponent is beyond [`NEGLIGIBLE`].
     pub(super) end: f64,
-    /// Farther than this, beyond [`FAR`].
+    /// Farther than this, the exponent is beyond [`FAR`].
     reach: f64,
 }
 
@@ -59,7 +59,7 @@ pub(super) struct Outlook<S: Simd> {
     pub(super) clear: Mask<S>,
     /// Above ground, at equal distances from one end to the other.
     pub(super) heights: [Lane<S>; POINTS],
-    /// By how much those may be off, metres.
+    /// How inaccurate the heights may be, metres.
     pub(super) allowed: f64,
     /// The squared length in spreads of the narrowest peak near it.
     pub(super) widest: Lane<S>,
@@ -184,7 +184,7 @@ impl Massif {
 }
 
 impl Mountain {
-    /// By how much it lifts the ground at `point`.
+    /// How much it lifts the ground at `point`.
     #[inline(always)]
     fn at<S: Simd>(&self, point: Point<S>) -> Lane<S> {
         let p = (point.x - self.center.x) * self.narrowness.x;

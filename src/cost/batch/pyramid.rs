@@ -5,7 +5,7 @@ use super::index::onto;
 use crate::geometry::{Point2, Segment};
 use crate::terrain::{Grid, HeightRange};
 
-/// A leg is cut in halves so often; one that is then not proven clear is left to the scalar code.
+/// How often a leg is halved; one that is then not proven clear is left to the scalar code.
 const CUTS: u32 = 1;
 
 /// A grid's elevations by blocks of cells.
@@ -13,7 +13,7 @@ const CUTS: u32 = 1;
 pub(super) struct Pyramid {
     origin: Point2,
     cells_a_metre: f64,
-    /// Each of blocks twice as wide as those of the one before; the first of cells.
+    /// Each with blocks twice as wide as the one before; the first with single cells.
     levels: Vec<Level>,
 }
 
@@ -81,7 +81,7 @@ impl Pyramid {
             && self.clears_part([middle, b], floor, ceiling, cuts - 1)
     }
 
-    /// Elevations of the blocks round `a` and `b`; beyond an edge the edge's go on.
+    /// Elevation range of the blocks round `a` and `b`; beyond an edge the edge's values continue.
     fn below(&self, a: Place, b: Place) -> HeightRange {
         let cells = &self.levels[0];
         // A hair on either side, for rounding.

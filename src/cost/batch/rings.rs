@@ -1,6 +1,6 @@
-//! Rings in lanes: where each of their edges and corners has a part of the soft zone to itself, a leg's exposure
-//! is a sum over them. Legs that touch or enter a ring are left to the scalar code, and so are those where two
-//! features may be as near as each other, and those that only climb.
+//! Rings in lanes: where each of their edges and corners has a part of the soft zone to itself, a leg's exposure is a
+//! sum over them. Legs that touch or enter a ring are left to the scalar code, and so are those for which two features
+//! may be equally near, and those that only climb.
 
 use pulp::Simd;
 
@@ -16,21 +16,21 @@ use crate::threat::{Polygon, Zone};
 /// A ring between two heights.
 #[derive(Debug, Clone)]
 pub(super) struct Ring {
-    /// Round the soft zone.
+    /// Box round the soft zone.
     extent: Rect,
-    /// Round the ring itself.
+    /// Box round the ring itself.
     bounds: Rect,
     vertices: Vec<Point2>,
     margin: f64,
     span: Span,
-    /// `None` where the scalar code is asked of every leg.
+    /// `None` where every leg is left to the scalar code.
     zones: Option<Vec<Zone>>,
 }
 
-/// What of a ring was settled in lanes.
+/// The part of a ring's exposure computed in lanes.
 struct Settled<S: Simd> {
     exposure: Lane<S>,
-    /// Where nothing was.
+    /// Where it was not.
     left: Mask<S>,
 }
 
@@ -67,7 +67,7 @@ impl Ring {
         let met = met & window.some;
         let mut exposure = leg.splat(0.0);
         let mut left = met & !(leg.moves & window.t0.lt(window.t1));
-        // As the scalar code, which counts an edge as a hair longer.
+        // As in the scalar code, which treats an edge as slightly longer.
         let touch = leg.level * 1e-8 + 1e-6;
         for zone in zones {
             let (x, y) = (leg.middle[0] - zone.center.x, leg.middle[1] - zone.center.y);

@@ -11,8 +11,7 @@ use crate::cost::threat::SHARE;
 use crate::geometry::lane::{Lane, Mask};
 use crate::scenario::Scenario;
 
-/// Angles are compared by their tangents and cosines; from this share of the limit up they are
-/// worked out.
+/// Angles are compared by their tangents and cosines; from this share of the limit on they are computed.
 const NEAR_LIMIT: f64 = 0.999;
 
 /// Rounding of a cosine that is the quotient of products, rounded up.
@@ -228,7 +227,7 @@ impl Pricer<'_> {
             | point.y.with(area.max.y).lt(point.y)
     }
 
-    /// How far.
+    /// How far it lies outside.
     #[inline(always)]
     fn area<S: Simd>(&self, point: Point<S>) -> Lane<S> {
         let area = &self.model.scenario.area;
@@ -246,5 +245,5 @@ fn beyond<S: Simd>(value: Lane<S>, min: f64, max: f64) -> Lane<S> {
     outside.max(value.with(0.0))
 }
 
-/// Of a radian.
+/// Degrees per radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;

@@ -49,7 +49,7 @@ pub(super) struct Stretch<S: Simd> {
 pub(super) struct Beyond<S: Simd> {
     pub(super) below: Lane<S>,
     pub(super) above: Lane<S>,
-    /// Where that is not known.
+    /// Where the result is not known.
     pub(super) unknown: Mask<S>,
 }
 

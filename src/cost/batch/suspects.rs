@@ -12,21 +12,21 @@ use crate::cost::band::Excess;
 use crate::geometry::lane::{LANES, Lane, Row};
 use crate::geometry::{Point3, Segment};
 
-/// A leg is cut in no more stretches; narrower peaks are left to the scalar code.
+/// Maximum number of stretches of a leg; narrower peaks are left to the scalar code.
 const MOST_CUTS: f64 = 32.0;
 
 /// Suspect legs, in the order in which they came.
 #[derive(Debug)]
 pub(super) struct Suspects {
     legs: Vec<Suspect>,
-    /// Slots from this on are nobody's.
+    /// Slots from this one on are unused.
     slots: usize,
 }
 
 /// A leg to be measured.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Suspect {
-    /// Whose violation it counts to.
+    /// The slot to which its violation is added.
     pub(super) slot: usize,
     pub(super) leg: Segment,
     /// Its squared length in spreads of the narrowest peak near it.
@@ -65,7 +65,7 @@ impl Suspects {
         }
     }
 
-    /// Whether anybody asks for `slot`.
+    /// Whether `slot` is used.
     pub(super) fn wants(&self, slot: usize) -> bool {
         slot < self.slots
     }
@@ -82,7 +82,7 @@ impl Suspects {
 }
 
 impl Suspect {
-    /// Cut the part `section` of it into stretches.
+    /// Cut the part `section` of the leg into stretches.
     fn cut(&self, leg_idx: usize, section: &Section, cuts: &mut Vec<Cut>) {
         let share = section.t1 - section.t0;
         let count = (share * (self.widest * (1.0 / WIDEST)).sqrt()).ceil();
@@ -118,7 +118,7 @@ impl Cut {
         }
     }
 
-    /// Side by side; lanes that are left over repeat the first.
+    /// Measures them side by side; unused lanes repeat the first.
     #[inline(always)]
     fn load<S: Simd>(simd: S, cuts: &[Self]) -> Stretch<S> {
         let (mut from, mut way) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);

@@ -11,8 +11,8 @@ use crate::terrain::Peaks;
 /// `4 e^-1.5`, rounded up: the greatest of `(4 x - 2) e^-x`.
 const CONVEX: f64 = 0.893;
 
-/// How far the ground may rise above, and fall below, the line that joins it at both ends of a leg: so much for
-/// each square metre of the squares of the leg's ways east and north.
+/// How far the ground may rise above, and fall below, the line that joins it at both ends of a leg, per square metre of
+/// the squares of the leg's extents east and north.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Swing {
     rises: Point2,

@@ -12,7 +12,7 @@ use crate::geometry::lane::{Lane, Mask};
 use crate::scenario::{Quadrature, Scenario};
 use crate::threat::{Cylinder, Shape, Threat};
 
-/// With so many threats or fewer, all are looked at.
+/// With this many threats or fewer, all are examined.
 const FEW_THREATS: usize = 24;
 
 /// Twice the line integral of 1 / d is a logarithm of a quotient that grows without end as the
@@ -23,7 +23,7 @@ const LARGEST_QUOTIENT: f64 = 1e18;
 #[derive(Debug, Clone)]
 pub(super) struct Threats {
     all: Vec<Outline>,
-    /// Where there are many.
+    /// Set where there are many.
     index: Option<Index>,
 }
 
@@ -56,7 +56,7 @@ pub(super) struct Candidates(Vec<u32>);
 pub(super) struct Window<S: Simd> {
     pub(super) t0: Lane<S>,
     pub(super) t1: Lane<S>,
-    /// Where there is one.
+    /// Where there is such a part.
     pub(super) some: Mask<S>,
 }
 
@@ -95,7 +95,7 @@ impl Pricer<'_> {
             }
             return;
         };
-        // In the order of the request, so that sums are the same whoever the neighbours are.
+        // In the order of the request, so that sums are the same whatever the neighbours are.
         index.find(
             (0..S::F64_LANES).map(|lane| leg.segment(lane)),
             &mut candidates.0,

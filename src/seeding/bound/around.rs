@@ -1,4 +1,4 @@
-//! How far each wall may be widened: not over the ends, but for one wall around each.
+//! How far each wall may be widened: not over the ends, except for one wall around each.
 
 use super::prices::Prices;
 use super::toll::Heights;
@@ -16,7 +16,7 @@ pub(super) fn walls(scenario: &Scenario, prices: &Prices) -> Vec<Wall> {
     let first = Around::of(&walls, ends, None, prices);
     let taken = first.map(|first| first.wall);
     let around = [first, Around::of(&walls, [ends[1], ends[0]], taken, prices)];
-    // Of each end, the way straight out of the wall around it.
+    // For each end, the way straight out of the wall around it.
     let out = [0, 1].map(|end| {
         let farthest = around[end].map(|around| walls[around.wall].out(ends[end], around.radius));
         (ends[end], farthest.unwrap_or(ends[end]))
@@ -32,7 +32,7 @@ pub(super) fn walls(scenario: &Scenario, prices: &Prices) -> Vec<Wall> {
         wall.widen(prices, most);
     }
     for end in 0..2 {
-        // What is too near to the other end's way out to be around this one.
+        // A wall too near to the other end's way out cannot be around this one.
         if let Some(around) = around[end]
             && !walls[around.wall].is_around(ends[end])
         {
@@ -49,12 +49,12 @@ pub(super) fn walls(scenario: &Scenario, prices: &Prices) -> Vec<Wall> {
 #[derive(Debug, Clone, Copy)]
 struct Around {
     wall: usize,
-    /// By so much at most: straight out to there, no other wall is in the way.
+    /// Maximum radius: straight out to there, no other wall is in the way.
     radius: f64,
 }
 
 impl Around {
-    /// Of the walls that can be, the one in whose soft zone the first of `ends` is the deepest, but for the one that is
+    /// Of the eligible walls, the one in whose soft zone the first of `ends` is deepest, except the one that is
     /// `taken`.
     fn of(
         walls: &[Wall],

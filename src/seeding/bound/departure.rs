@@ -1,5 +1,5 @@
-//! What it costs to leave the soft zones that a route begins in, or, seen backwards, ends in. The argument is section 5
-//! of docs/BOUND.md.
+//! The cost of leaving the soft zones that a route begins in, or, seen backwards, ends in. The argument is section 5 of
+//! docs/BOUND.md.
 
 use super::event::ramp;
 use super::prices::Prices;
@@ -8,31 +8,31 @@ use crate::geometry::{Point2, ring};
 use crate::seeding::arc::segment_segment;
 use crate::seeding::outline::OutlineShape;
 
-/// Parts in which what a metre outwards costs is summed up.
+/// Number of parts over which the cost per metre outwards is summed.
 const PARTS: u32 = 200;
 
 /// Where a way begins or ends.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
     pub(super) at: Point2,
-    /// It may be any point within so many metres instead.
+    /// It may be any point within this many metres instead.
     pub(super) spread: f64,
-    /// The end of the whole route that it is, if it is one: 0 is the start.
+    /// Which end of the whole route it is, if it is one: 0 is the start.
     pub(super) end: Option<usize>,
 }
 
 /// An end of a route as the string sees it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Departure {
-    /// On the outside of the widened wall that is around the end, if one is; else the end itself.
+    /// On the outside of the widened wall that surrounds the end, if there is one; otherwise the end itself.
     pub(super) at: Point2,
-    /// What the way out of the soft zones costs at least, on top of the string from there.
+    /// Lower bound of the cost of the way out of the soft zones, on top of the string from there.
     pub(super) toll: f64,
 }
 
 impl Departure {
-    /// From `place`, round `walls` widened to `radii`, one of which may be around it, to the `other`. Soft zones that are
-    /// `spent` pay for something else.
+    /// From `place`, round `walls` widened to `radii`, one of which may surround it, to the `other`. Soft zones that
+    /// are `spent` are already counted for something else.
     pub(super) fn of(
         (walls, radii): (&[Wall], &[Option<f64>]),
         prices: &Prices,
@@ -70,8 +70,8 @@ impl Departure {
     }
 }
 
-/// What a route pays at least in the soft zones of those `walls` that it may pass, before it can after the start and
-/// before the target.
+/// The least that a route pays in the soft zones of those `walls` that it may pass, near the start and the target,
+/// where it cannot pass them yet.
 pub(super) fn early(walls: &[Wall], prices: &Prices) -> f64 {
     let passable = walls.iter().filter(|wall| wall.toll.is_some());
     let exposed = passable.flat_map(|wall| {
@@ -81,19 +81,19 @@ pub(super) fn early(walls: &[Wall], prices: &Prices) -> f64 {
     prices.exposure * exposed.sum::<f64>()
 }
 
-/// Least exposure to `wall` on the first `metres` of a way from within so many metres of a place: no way leaves a zone
-/// faster than straight out of it.
+/// Least exposure to `wall` on the first `metres` of a way that begins within `spread` of a place: no way leaves a zone
+/// faster than straight outwards.
 pub(super) fn leaving(wall: &Wall, (from, spread): (Point2, f64), metres: f64) -> f64 {
     let depth = wall.influence - wall.distance(from) - spread;
     ramp(depth, 1.0, metres.max(0.0))
 }
 
-/// Integral of the depth in the soft zone of `wall` from one distance to the next, none of which is beyond it.
+/// Integral of the depth in the soft zone of `wall` from one distance to the next, neither of which is beyond it.
 fn depths(wall: &Wall, [from, to]: [f64; 2]) -> f64 {
     (to - from).max(0.0) * (wall.influence - 0.5 * (from + to))
 }
 
-/// What it costs to come from one distance of `wall` to the next, to which it is widened, on top of going round it there.
+/// The cost of getting from one distance of `wall` to the next, to which it is widened, on top of going round it there.
 /// Beyond `alone` metres other walls may be gone round.
 fn outwards(wall: &Wall, prices: &Prices, [from, to]: [f64; 2], alone: f64) -> f64 {
     let part = (to - from) / f64::from(PARTS);
@@ -114,7 +114,7 @@ fn outwards(wall: &Wall, prices: &Prices, [from, to]: [f64; 2], alone: f64) -> f
     part * sum
 }
 
-/// Metres from wall number `idx` within which no route goes round another one.
+/// Metres from wall number `idx` within which no route goes round another wall.
 fn alone((walls, radii): (&[Wall], &[Option<f64>]), idx: usize, other: Point2) -> f64 {
     let wall = &walls[idx];
     let own = radii[idx].unwrap_or(0.0);
@@ -124,7 +124,7 @@ fn alone((walls, radii): (&[Wall], &[Option<f64>]), idx: usize, other: Point2) -
         if apart >= own + radius {
             f64::INFINITY
         } else if radius > neighbour.distance(other) {
-            // It is around the other end: both would make use of the fuel.
+            // It surrounds the other end: both would use the same fuel.
             0.0
         } else if let (OutlineShape::Disc(_), OutlineShape::Disc(_)) =
             (&wall.shape, &neighbour.shape)
@@ -181,8 +181,8 @@ mod tests {
         examine(&prices, ends_of((&walls, &radii), &prices, &[]));
     }
 
-    /// Straight out of a zone on the far side of its core, as the way leads on: all of it is paid for, but for what
-    /// going round takes at the end.
+    /// Straight out of a zone on the far side of its core, in the direction of the way: all of it is counted, except
+    /// for what going round takes at the end.
     #[test]
     fn straight_out() {
         // The target is (600, 700) away from the start.
@@ -218,13 +218,13 @@ mod tests {
             assert!((start.toll - paid).abs() < 1e-4 * paid, "{start:?} {paid}");
             assert!(target.toll <= 0.0 && start.at == prices.ends[0].xy());
             assert!((early(&walls, &prices) - start.toll).abs() < 1e-9);
-            // It pays for something else.
+            // It is counted for something else.
             assert!(ends_of((&walls, &[None]), &prices, &[0])[0].toll <= 0.0);
         }
     }
 
-    /// Of two zones one is widened over the end, and the other one pays for the way out alone; a zone that both ends
-    /// are in pays for what one is deeper.
+    /// Of two zones, one is widened over the end, and only the other counts for the way out; a zone that contains both
+    /// ends counts for the difference in depth.
     #[test]
     fn out_of_several() {
         departures(

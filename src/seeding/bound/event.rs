@@ -1,5 +1,5 @@
-//! What a route would have to do to beat the string round the widened walls, and what that costs
-//! at least: slip between two walls, cut a corner, fly over or under.
+//! What a route would have to do to beat the string round the widened walls, and the least cost of doing so: slip
+//! between two walls, cut a corner, fly over or under.
 
 use super::departure::early;
 use super::prices::Prices;
@@ -11,23 +11,23 @@ use crate::seeding::outline::OutlineShape;
 /// Pairs of cores looked at before the search for gaps gives up.
 const MOST_PAIRS: usize = 300_000;
 
-/// So many pairs are looked at between two questions whether to stop: of a ring of thousands of corners, each takes a while.
+/// Number of pairs examined between two checks whether to stop: in a ring of thousands of corners, each takes a while.
 const PAIRS_UNWATCHED: usize = 64;
 
 /// A way to beat the string.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Event {
     pub(super) kind: Kind,
-    /// No route does it for less.
+    /// No route does it for less than this.
     pub(super) cost: f64,
-    /// What it costs beyond the string round walls that are not widened.
+    /// Its cost beyond the string round walls that are not widened.
     pub(super) extra: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Kind {
-    /// Pass between two walls where their shapes are nearest to each other; twice the same wall where a ring
-    /// nearly closes.
+    /// Pass between two walls where their shapes are nearest to each other; the same wall twice where a ring nearly
+    /// closes.
     Slip {
         walls: [usize; 2],
         between: [Point2; 2],
@@ -39,7 +39,7 @@ pub(super) enum Kind {
 }
 
 impl Event {
-    /// Those that it has to do with, at times one twice.
+    /// The walls involved, sometimes the same one twice.
     pub(super) fn walls(&self) -> impl Iterator<Item = usize> + use<> {
         let walls = match self.kind {
             Kind::Slip { walls, .. } => walls,
@@ -58,7 +58,7 @@ struct Core {
     edge: usize,
 }
 
-/// All events, cheapest first; `None` when there are too many to tell, or once `stop` asks for it.
+/// All events, cheapest first; `None` when there are too many to examine, or once `stop` asks for it.
 pub(super) fn events(
     walls: &[Wall],
     prices: &Prices,
@@ -83,8 +83,8 @@ pub(super) fn events(
     Some(events)
 }
 
-/// Coming as near to a wall as `dip`, and away again: on either side the soft zone is crossed at
-/// least as fast as the distance to the corner grows.
+/// Coming as near to a wall as `dip`, and away again: on either side the soft zone is crossed at least as fast as the
+/// distance to the corner grows.
 fn dip(idx: usize, wall: &Wall, prices: &Prices) -> Event {
     let (mut cost, mut extra) = (f64::INFINITY, f64::INFINITY);
     for center in wall.centers() {

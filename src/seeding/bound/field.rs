@@ -1,4 +1,4 @@
-//! What is proven of routes that make use of some events.
+//! What is proven about routes that use some of the events.
 
 use std::cell::Cell;
 
@@ -10,10 +10,10 @@ use super::string;
 use super::wall::Wall;
 use crate::scenario::Scenario;
 
-/// What telling first and last legs apart may take.
+/// Effort allowed for distinguishing first and last legs.
 const EFFORT: usize = 40_000;
 
-/// Events that are looked at one by one, at most.
+/// Maximum number of events examined one by one.
 const MOST_ALLOWED: usize = 40;
 
 /// Cost of the first event that is not allowed at `level`.
@@ -21,22 +21,21 @@ pub(super) fn cost_of(events: &[Event], level: usize) -> f64 {
     events.get(level).map_or(f64::INFINITY, |event| event.cost)
 }
 
-/// Times that more of them are allowed for the sake of the climb into the band.
+/// How often more of them are allowed for the climb into the band.
 const MOST_RISING: usize = 4;
 
-/// A scenario as a bound sees it.
+/// A scenario as used by a bound.
 pub(super) struct Field<'a> {
     pub(super) scenario: &'a Scenario,
     pub(super) prices: &'a Prices,
     pub(super) walls: &'a [Wall],
-    /// Looked at so far.
+    /// Ways looked at so far.
     pub(super) ways: Cell<usize>,
     pub(super) stop: &'a dyn Fn() -> bool,
 }
 
 impl Field<'_> {
-    /// What no route undercuts that makes use of `allowed` events at most; `enough` or more where it
-    /// costs that much.
+    /// A lower bound for routes that use at most the `allowed` events; `enough` or more where that is reached.
     pub(super) fn level(&self, allowed: &[Event], enough: f64) -> f64 {
         let enough_across = self.prices.across(enough);
         let cost = |radii: &[Option<f64>], spent: &[usize]| {
@@ -49,8 +48,8 @@ impl Field<'_> {
         if allowed.is_empty() || tame >= enough {
             return tame;
         }
-        // Either no event happens, or one does: then its price comes on top, but what it is made
-        // of must not be used twice.
+        // Either no event happens, or one does: then its price is added, but what it is made of must not be counted
+        // twice.
         let extra = allowed
             .iter()
             .map(|event| event.extra)
@@ -63,12 +62,12 @@ impl Field<'_> {
         tame.max(with.min(cost(&self.radii(&[]), &[])))
     }
 
-    /// What no route undercuts, event by event, and by the legs that begin at the start and end at the target; none costs
-    /// less than `dense` seen from above.
+    /// A lower bound for all routes, event by event, and by the legs that begin at the start and end at the target;
+    /// none costs less than `dense` seen from above.
     pub(super) fn one_by_one(&self, events: &[Event], dense: f64) -> f64 {
         let radii = self.radii(&[]);
         let least = dense.max(self.across(&radii, &[]));
-        // Of routes that use no event.
+        // The bound for routes that use no event.
         let mut effort = EFFORT;
         let mut legs = self.legs(&radii, least, effort / 2);
         let without = legs.bound(least, f64::INFINITY);
@@ -77,7 +76,7 @@ impl Field<'_> {
         let count = affordable.min(MOST_ALLOWED);
         let proven = without.min(cost_of(events, count));
         let mut allowed = events[..count].to_vec();
-        // Events that no route uses for less than that leave more of the walls to the others.
+        // Events that no route uses for less than that leave more of the walls for the others.
         while !allowed.is_empty() {
             let radii = self.radii(&allowed);
             let least = dense.max(self.across(&radii, &[]));
@@ -113,8 +112,8 @@ impl Field<'_> {
         proven
     }
 
-    /// What no route undercuts by what it takes to come into the band from ends outside it, where those that use more than
-    /// the first `count` of `events` may be cheaper.
+    /// A lower bound for all routes from what it takes to enter the band from ends outside it, where routes that use
+    /// more than the first `count` of `events` may be cheaper.
     pub(super) fn rising(&self, events: &[Event], mut count: usize) -> f64 {
         let mut proven = 0.0_f64;
         for _ in 0..MOST_RISING {
@@ -142,12 +141,12 @@ impl Field<'_> {
         )
     }
 
-    /// What no route undercuts, seen from above, that uses `event`, where each wall counts as hard at one of these `radii`
-    /// whatever else it uses.
+    /// A lower bound, seen from above, for routes that use `event`, where each wall counts as hard at one of these
+    /// `radii` whatever else the route uses.
     fn using(&self, event: &Event, radii: &[Option<f64>]) -> f64 {
         let spent: Vec<usize> = event.walls().collect();
         match event.kind {
-            // The toll may be what a first or last leg pays.
+            // The toll may coincide with what a first or last leg pays.
             Kind::Pass { .. } => 0.0,
             Kind::Dip { wall } => {
                 let mut bare = radii.to_vec();
@@ -163,7 +162,7 @@ impl Field<'_> {
         }
     }
 
-    /// What no route undercuts, seen from above, that goes round the walls widened to `radii`.
+    /// A lower bound, seen from above, for routes round the walls widened to `radii`.
     fn across(&self, radii: &[Option<f64>], spent: &[usize]) -> f64 {
         let limits = (f64::INFINITY, self.stop);
         let (cost, ways) = string::cost((self.walls, radii), self.prices, spent, limits);
@@ -208,7 +207,7 @@ impl Field<'_> {
         radii
     }
 
-    /// The walls with nothing of their soft zones used that `allowed` events touch.
+    /// The walls without those soft zones that `allowed` events touch.
     fn bare(&self, allowed: &[Event]) -> Vec<Option<f64>> {
         let mut radii = self.radii(&[]);
         for event in allowed {

@@ -1,11 +1,11 @@
-//! What legs cost at least that must be so long, wherever they lead. The argument is section 7 of docs/BOUND.md.
+//! The least cost of legs that have a minimum length, wherever they lead. The argument is section 7 of docs/BOUND.md.
 
 use super::prices::Prices;
 use super::toll::{below_middle, steepest};
 use crate::scenario::Scenario;
 
-/// What no route undercuts since each of its legs has a least length, and waypoints before the middle of the band cost
-/// something: one half of them counts on the way up from the start, the other on the way down to the target.
+/// A lower bound for all routes because each leg has a minimum length, and waypoints before the middle of the band cost
+/// something: one half of the waypoints counts on the way up from the start, the other on the way down to the target.
 pub(super) fn least_legs(scenario: &Scenario, prices: &Prices) -> f64 {
     let legs = Legs {
         metre: prices.fuel,
@@ -19,22 +19,22 @@ pub(super) fn least_legs(scenario: &Scenario, prices: &Prices) -> f64 {
     legs.from(start, waypoints.div_ceil(2)) + between + legs.from(target, waypoints / 2)
 }
 
-/// Legs from an end on.
+/// Legs from an end onwards.
 struct Legs {
-    /// What a metre of them costs.
+    /// Cost of a metre of leg.
     metre: f64,
-    /// Metres that each is long at least,
+    /// Least length of each leg, metres.
     shortest: f64,
-    /// of which it climbs so many at most for each.
+    /// Greatest climb per metre of leg, metres.
     climb: f64,
-    /// Of a metre between a waypoint and the middle of the band.
+    /// Cost of a metre between a waypoint and the middle of the band.
     weight: f64,
 }
 
 impl Legs {
-    /// What the first costs at least with so many `waypoints` after it, from an end so far off the middle of the band. A metre
-    /// that any of the legs is longer than it must be brings most waypoints closer in the first; and there as long as that
-    /// brings enough of them closer.
+    /// The least cost of the first legs with `waypoints` after them, from an end this far off the middle of the band. A
+    /// metre that any leg is longer than necessary brings the most waypoints closer in the first leg; and is worth it
+    /// there while it brings enough of them closer.
     fn from(&self, off_middle: f64, waypoints: usize) -> f64 {
         let least = self.shortest * self.climb;
         let off = |first: f64| {
@@ -75,14 +75,15 @@ mod tests {
             assert!((found - expected).abs() < 1e-3, "{found} {expected}");
         };
         check(least(0.0, 9), 10.0 * 40.0);
-        // Each leg brings the next waypoints 20 m closer; four are off: a metre longer would bring them closer by half of one.
+        // Each leg brings the next waypoints 20 m closer; four are off: one more metre would bring them closer by half
+        // a metre.
         check(
             least(0.1, 9),
             10.0 * 40.0 + 0.1 * (50.0 + 30.0 + 10.0 + 10.0),
         );
-        // Of two or more it is worth it, of one not.
+        // With two or more it is worth it, with one it is not.
         check(least(1.0, 9), 8.0 * 40.0 + 100.0 + 20.0 + 40.0 + 10.0);
-        // No waypoint is worth being off.
+        // It is not worth having any waypoint off the middle.
         check(least(3.0, 9), 8.0 * 40.0 + 140.0 + 60.0);
         // A single one counts once.
         check(least(1.0, 1), 40.0 + 50.0 + 40.0);

@@ -1,12 +1,11 @@
 //! A cost that no route can undercut, with its proof in docs/BOUND.md.
 //!
-//! Seen from above, a soft zone costs so much that going through it is never cheaper than going
-//! round it: its threat can be widened and counts as hard. The string round the widened threats,
-//! priced by its fuel, is then a lower bound for all routes that pass none of the few places where
-//! that argument has a gap, and those places are priced one by one; the way out of a soft zone, where an end
-//! lies in one, comes on top. Where soft zones must be crossed, a potential in the field of all prices proves
-//! more; the better of both counts. Last, start and target at another height than the middle of the band cost
-//! what their straight legs do.
+//! Seen from above, a soft zone costs so much that going through it is never cheaper than going round it: its threat
+//! can be widened and counts as hard. The string round the widened threats, priced by its fuel, is then a lower bound
+//! for all routes that pass none of the few places where that argument has a gap, and those places are priced one by
+//! one; the way out of a soft zone that contains an end is added. Where soft zones must be crossed, a potential in the
+//! field of all prices proves more; the better of both counts. Finally, a start or target at another height than the
+//! middle of the band costs what its straight legs do.
 
 mod around;
 mod departure;
@@ -35,29 +34,29 @@ use promise::promise;
 /// Covers the rounding of the sums behind a bound, so that it holds in floating point too.
 const ROUNDING: f64 = 1e-9;
 
-/// Ways looked at in all before the number of events is no longer bisected.
+/// Total number of ways examined before the bisection on the number of events ends.
 const MOST_WAYS_IN_ALL: usize = 120_000;
 
-/// Bisections on the number of events that a cheaper route may make use of.
+/// Bisections on the number of events that a cheaper route may use.
 const MOST_LEVELS: usize = 24;
 
-/// Where the string itself is not this many times as dear as what is known, a potential promises nothing;
+/// If the string is not this many times as expensive as the known bound, a potential is not worth trying.
 const WORTHWHILE: f64 = 1.02;
 
-/// nor where it is not with its climbs, of which a route that leaves the string pays less.
+/// The same for the string with its climbs, of which a route that leaves the string pays less.
 const WORTHWHILE_CLIMBING: f64 = 1.03;
 
-/// A potential that proves so many times what strings do leaves nothing to the legs of these.
+/// If a potential proves this many times what strings do, the legs of strings prove nothing more.
 const BEYOND_STRINGS: f64 = 1.04;
 
-/// A proven lower bound on the total cost of any feasible route from start to target, Eq. 1; 0
-/// where fuel costs nothing. The argument is in docs/BOUND.md.
+/// A proven lower bound on the total cost of any feasible route from start to target, Eq. 1; 0 where fuel costs
+/// nothing. The argument is in docs/BOUND.md.
 #[must_use]
 pub fn lower_bound(scenario: &Scenario) -> f64 {
     lower_bound_until(scenario, &|| false)
 }
 
-/// As [`lower_bound`]; once `stop` asks for it, what was proven so far.
+/// As [`lower_bound`]; once `stop` asks for it, returns what was proven so far.
 #[must_use]
 pub fn lower_bound_until(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
     let prices = Prices::of(scenario);
@@ -72,8 +71,8 @@ pub fn lower_bound_until(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
     bound * (1.0 - ROUNDING)
 }
 
-/// What no route undercuts that slips through a gap between threats, where their soft zones would have it go round;
-/// infinite where there is no such gap, fuel costs nothing, or the threats have too many corners to tell soon.
+/// A lower bound for routes that slip through a gap between threats that their soft zones would have them avoid;
+/// infinite where there is no such gap, fuel costs nothing, or the threats have too many corners to examine quickly.
 #[must_use]
 pub fn cheapest_slip(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
     let prices = Prices::of(scenario);
@@ -129,15 +128,15 @@ fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) ->
 }
 
 /// The largest cost that strings prove: a route cheaper than it could use only the events that cost less, and without
-/// the others no route is cheaper; and how many events these are.
+/// the others no route is cheaper; and the number of these events.
 fn without_others(field: &Field, events: &[Event]) -> (f64, usize) {
-    // The first level at which the next event costs as much as can be proven without it; beyond
-    // it, less can be proven.
+    // The first level at which the next event costs as much as can be proven without it; beyond that, less can be
+    // proven.
     let (mut low, mut high) = (0, events.len());
     let (mut proven, mut level, mut best) = (0.0_f64, 0, 0);
     for _ in 0..MOST_LEVELS {
         let next = cost_of(events, level);
-        // The string without any event is pulled to its end: it tells which events matter at all.
+        // The string without any event is searched to the end: it shows which events matter at all.
         let enough = if level == 0 { f64::INFINITY } else { next };
         let bound = field.level(&events[..level], enough);
         if bound.min(next) > proven {
@@ -151,11 +150,11 @@ fn without_others(field: &Field, events: &[Event]) -> (f64, usize) {
         } else {
             low = level + 1;
             if level == 0 {
-                // No event dearer than what was proven without it need be looked at.
+                // Events more expensive than what was proven without them need not be examined.
                 high = events.partition_point(|event| event.cost < bound).max(low);
             }
         }
-        // At the highest level first: there, all that is proven is the bound itself.
+        // The highest level comes next: there, what is proven is the bound itself.
         level = if level == 0 {
             high
         } else if field.ways.get() > MOST_WAYS_IN_ALL || (field.stop)() {
@@ -167,8 +166,8 @@ fn without_others(field: &Field, events: &[Event]) -> (f64, usize) {
     (proven, best)
 }
 
-/// What is proven beyond that by a potential where soft zones may have to be crossed, and by legs; strings that use some
-/// events at most prove what is `known`.
+/// What a potential proves beyond `known` where soft zones may have to be crossed, and what legs prove; `known` is what
+/// strings prove that use some events at most.
 fn crossing(field: &Field, events: &[Event], used: &[Event], known: f64) -> f64 {
     let Field {
         scenario,
@@ -198,7 +197,7 @@ fn crossing(field: &Field, events: &[Event], used: &[Event], known: f64) -> f64 
         return level.max(legs(field, events, dense));
     }
     let known = known.max(legs(field, events, 0.0));
-    // Not for its own sake, but for what the legs that leave the ends cost beyond it.
+    // Not for its own sake, but for the cost of the legs at the ends beyond it.
     let climbing = ends::climbing(scenario, prices, walls, &promise.places, stop);
     if climbing <= 0.0 || promise.cost + climbing <= WORTHWHILE_CLIMBING * known {
         return known;
@@ -206,8 +205,8 @@ fn crossing(field: &Field, events: &[Event], used: &[Event], known: f64) -> f64 
     prove(0.0).map_or(known, |proof| known.max(over(proof)))
 }
 
-/// What no route undercuts by the events one by one and by the legs of strings, where none costs less than `dense` seen
-/// from above; 0 where there are too many corners.
+/// A lower bound from the events one by one and the legs of strings, where no route costs less than `dense` seen from
+/// above; 0 where there are too many corners.
 fn legs(field: &Field, events: &[Event], dense: f64) -> f64 {
     if ends::are_too_many(field.walls) {
         0.0

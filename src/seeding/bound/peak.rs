@@ -1,5 +1,5 @@
-//! What it costs that waypoints are to be at the middle of the band, where both ends are below it or above it: the
-//! route climbs towards it, or all waypoints stay off it. The argument is section 7 of docs/BOUND.md.
+//! The cost of waypoints having to be at the middle of the band, where both ends are below it or above it: the route
+//! climbs towards it, or all waypoints stay off it. The argument is section 7 of docs/BOUND.md.
 
 use super::toll::{below_middle, climb_worth, steepest};
 use crate::scenario::Scenario;
@@ -7,16 +7,17 @@ use crate::scenario::Scenario;
 /// Both ends on one side of the middle of a band above level ground.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Peak {
-    /// Metres of each between it and the middle.
+    /// Metres between each end and the middle.
     off_middle: [f64; 2],
-    /// Of a metre that all waypoints are off the middle.
+    /// Cost of a metre by which all waypoints are off the middle.
     weight: f64,
-    /// Metres of climb in a metre seen from above, at most.
+    /// Greatest climb per metre seen from above, metres.
     steepest: f64,
 }
 
 impl Peak {
-    /// `None` where nothing is told: over hills, from one side of the middle to the other, or where heights cost nothing.
+    /// `None` where nothing can be proven: over hills, with ends on different sides of the middle, or where heights
+    /// cost nothing.
     pub(super) fn of(scenario: &Scenario) -> Option<Self> {
         let below = below_middle(scenario)?;
         let weight = scenario.weights.altitude * scenario.planner.waypoints as f64;
@@ -28,12 +29,12 @@ impl Peak {
         })
     }
 
-    /// Least cost of a way that costs `across` or more seen from above, waypoints included, where a metre costs `fuel`: of
-    /// all distances off the middle that the waypoint nearest to it may keep.
+    /// Least cost of a way that costs at least `across` seen from above, waypoints included, where a metre costs
+    /// `fuel`: over all distances off the middle that the waypoint nearest to it may have.
     pub(super) fn least(&self, fuel: f64, across: f64) -> f64 {
         let [one, other] = self.off_middle;
-        // Convex in what is climbed: two metres more are worth one off the middle of all waypoints up to some slope. Where
-        // the way has to be longer for them, each costs the same.
+        // Convex in the climb: up to some slope, two more metres are worth having all waypoints one metre closer. Where
+        // the way has to be longer for that, each costs the same.
         let share = 0.5 * self.weight / fuel;
         let steep = libm::hypot(self.steepest.recip(), 1.0);
         let best = if share < steep {
@@ -71,9 +72,9 @@ mod tests {
             assert!((found - expected).abs() < 1e-6, "{found} {expected}");
         };
         check(50.0, 1000.0, libm::hypot(1000.0, 100.0));
-        // Ten metres are worth it.
+        // Ten metres are worth the climb.
         check(0.01, 1000.0, libm::hypot(1000.0, 10.0) + 0.9);
-        // No room to climb so high without a longer way.
+        // No room to climb that high without a longer way.
         check(50.0, 60.0, 100.0 * 2.0_f64.sqrt());
     }
 

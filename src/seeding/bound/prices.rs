@@ -1,21 +1,21 @@
-//! What a bound pays for a metre.
+//! The prices of a metre used by a bound.
 
 use super::peak::Peak;
 use crate::cost::{THREAT_SHARE, Tolerance, metre};
 use crate::geometry::Point3;
 use crate::scenario::{Quadrature, Scenario};
 
-/// What a metre costs, and where it is flown.
+/// The cost of a metre, and where it is flown.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Prices {
-    /// Of a metre, `w`.
+    /// Price of a metre, `w`.
     pub(super) fuel: f64,
-    /// Of a metre in a soft zone, for each metre of its depth, `s`.
+    /// Price of a metre in a soft zone per metre of its depth, `s`.
     pub(super) exposure: f64,
     /// Metres by which a feasible route may miss a limit.
     pub(super) tolerance: f64,
     pub(super) ends: [Point3; 2],
-    /// Towards the middle of the band.
+    /// The climb towards the middle of the band.
     peak: Option<Peak>,
 }
 
@@ -23,7 +23,7 @@ impl Prices {
     pub(super) fn of(scenario: &Scenario) -> Self {
         let exposure = match scenario.planner.quadrature {
             Quadrature::Integral => scenario.weights.threat * THREAT_SHARE,
-            // Sampled, a soft zone can be crossed for nothing.
+            // With sampling, a soft zone can be crossed for nothing.
             Quadrature::Paper => 0.0,
         };
         Self {
@@ -51,7 +51,7 @@ impl Prices {
         self.fuel * (length * length + vertical * vertical).sqrt()
     }
 
-    /// Least cost of a way between the ends that costs so much or more seen from above, waypoints included.
+    /// Least cost of a way between the ends that costs at least `cost` seen from above, waypoints included.
     pub(super) fn climbing_at(&self, cost: f64) -> f64 {
         let rise = self.fuel * self.rise();
         let level = (cost * cost + rise * rise).sqrt();
@@ -59,13 +59,13 @@ impl Prices {
         peak.map_or(level, |peak| peak.least(self.fuel, cost).max(level))
     }
 
-    /// Least cost of a way between the ends of that `length` seen from above or more, with `extra` for soft zones.
+    /// Least cost of a way between the ends at least `length` long seen from above, with `extra` for soft zones.
     pub(super) fn reaching(&self, length: f64, extra: f64) -> f64 {
         let level = self.climbing(length, self.rise()) + extra;
         level.max(self.climbing_at(self.fuel * length + extra))
     }
 
-    /// What a way costs seen from above at most that costs `cost` with the rise of the ends, and a hair more.
+    /// The greatest cost seen from above of a way that costs `cost` including the rise of the ends, and a hair more.
     pub(super) fn across(&self, cost: f64) -> f64 {
         let rise = self.fuel * self.rise();
         (cost * cost - rise * rise).max(0.0).sqrt() * (1.0 + 1e-9)

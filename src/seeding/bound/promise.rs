@@ -1,4 +1,4 @@
-//! What may be hoped for: the string's own price.
+//! An estimate of what can be proven: the string's own price.
 
 use super::departure::early;
 use super::potential::whole;
@@ -7,24 +7,24 @@ use super::string::{departures, pulled, scene};
 use super::wall::Wall;
 use crate::geometry::{Point2, Rect};
 
-/// Share of the direct way by which a string may leave the area: a way within it is about as long.
+/// Share of the direct way by which a string may leave the area: a way inside it is about as long.
 const OUTSIDE: f64 = 0.01;
 
-/// Pieces of a string in which soft zones are looked up,
+/// Number of pieces of a string at which soft zones are looked up.
 const PIECES: u32 = 256;
 
-/// and of a way straight out of one.
+/// Number of pieces of a way straight out of a soft zone.
 const PIECES_OUT: u32 = 32;
 
-/// What is hoped for: more than that cannot be proven.
+/// The estimate: no more than this can be proven.
 pub(super) struct Promise {
-    /// What the string costs with all its soft zones, about; infinite where it leaves the area.
+    /// Approximate cost of the string with all its soft zones; infinite where it leaves the area.
     pub(super) cost: f64,
-    /// Places along it from the start to the target, and what it costs up to each seen from above.
+    /// Places along it from the start to the target, and the cost up to each seen from above.
     pub(super) places: Vec<(Point2, f64)>,
 }
 
-/// What the string round `walls` widened to `radii` promises.
+/// The estimate for the string round `walls` widened to `radii`.
 pub(super) fn promise(
     walls: &[Wall],
     radii: &[Option<f64>],
@@ -58,7 +58,7 @@ pub(super) fn promise(
         if let (Some((_, across)), false) =
             (promise.places.last(), promise.places.iter().any(leaves))
         {
-            // Waypoints off the middle of the band are no reason to look farther.
+            // Waypoints off the middle of the band are no reason to search further.
             let length = (across + early(walls, prices)) / prices.fuel;
             promise.cost = prices.climbing(length, prices.rise());
         }
@@ -66,7 +66,7 @@ pub(super) fn promise(
     promise
 }
 
-/// What a way over `places` costs up to each of them seen from above, about.
+/// The approximate cost of a way over `places` up to each of them, seen from above.
 fn paid(
     walls: &[Wall],
     prices: &Prices,

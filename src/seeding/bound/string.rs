@@ -1,4 +1,4 @@
-//! The taut string round walls that are widened, pulled for a bound.
+//! The taut string round widened walls, computed for a bound.
 
 use super::departure::{Departure, Place};
 use super::prices::Prices;
@@ -8,11 +8,11 @@ use crate::seeding::obstacles::Obstacles;
 use crate::seeding::outline::Outline;
 use crate::seeding::taut::{Limits, TautStrings, taut_strings_within};
 
-/// Ways looked at for one string: beyond a few hundred walls, the search ends with what it has
-/// proven so far.
+/// Maximum number of ways examined for one string: beyond a few hundred walls, the search ends with what it has proven
+/// so far.
 const MOST_WAYS: usize = 60_000;
 
-/// Without widening anything: where there are too many gaps to look at.
+/// Without widening anything: for cases with too many gaps to examine.
 pub(super) fn plain(
     walls: &[Wall],
     radii: &[Option<f64>],
@@ -23,16 +23,16 @@ pub(super) fn plain(
     prices.climbing_at(cost)
 }
 
-/// Radii of nothing but cores.
+/// Radii of the cores alone.
 pub(super) fn cores(walls: &[Wall]) -> Vec<Option<f64>> {
     let radius = |wall: &Wall| wall.toll.is_none().then_some(wall.core);
     walls.iter().map(radius).collect()
 }
 
-/// What no route undercuts, seen from above, that goes round `walls` widened to `radii` (`None` leaves one out): the
-/// string, less what routes may cut off corners, but not below 0, and the ways out of soft zones that are not `spent`;
-/// infinite where there is none. Once that is proven to be `enough`, or `stop` asks for it, what is proven. With it, the
-/// ways looked at.
+/// A lower bound, seen from above, for routes round `walls` widened to `radii` (`None` leaves one out): the string,
+/// less what routes may save by cutting corners, but not below 0, plus the ways out of soft zones that are not `spent`;
+/// infinite where there is no string. Once `enough` is proven, or `stop` asks for it, what is proven so far. Also
+/// returns the ways examined.
 pub(super) fn cost(
     (walls, radii): (&[Wall], &[Option<f64>]),
     prices: &Prices,
@@ -57,20 +57,20 @@ pub(super) fn between(
         &scene((walls, radii), ends.map(|end| end.at)),
         (enough, stop),
     );
-    // Where little is paid for fuel and much for soft zones, corners may be worth more than the way.
+    // Where fuel is cheap and soft zones are expensive, cutting corners may save more than the way costs.
     ((prices.fuel * (shortest - slack) + tolls).max(0.0), ways)
 }
 
-/// Between two cores.
+/// A gap between two cores.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gap {
     middle: Point2,
-    /// From there to each core, metres.
+    /// Distance from there to each core, metres.
     half: f64,
 }
 
 impl Gap {
-    /// Between shapes that come nearest to each other at two points, which their `cores` are around.
+    /// Between shapes that are nearest to each other at two points, which are surrounded by their `cores`.
     pub(super) fn new([p, q]: [Point2; 2], cores: [f64; 2]) -> Self {
         let along = (q - p).normalize();
         let (p, q) = (p + along * cores[0], q - along * cores[1]);
@@ -81,7 +81,7 @@ impl Gap {
     }
 }
 
-/// As `cost`, of routes that lead through `gap`; of the walls on both sides, the soft zones are `spent`.
+/// As `cost`, for routes through `gap`; the soft zones of the walls on both sides are `spent`.
 pub(super) fn through(
     (walls, radii): (&[Wall], &[Option<f64>]),
     prices: &Prices,
@@ -89,7 +89,7 @@ pub(super) fn through(
     gap: Gap,
     stop: &dyn Fn() -> bool,
 ) -> f64 {
-    // Free to move to the middle of the gap on the way.
+    // The way may use the middle of the gap for free.
     let radii = narrowed((walls, radii), gap.middle, gap.half);
     let ends = departures((walls, &radii), prices, spent);
     let halves: f64 = ends
@@ -103,7 +103,7 @@ pub(super) fn through(
     (prices.fuel * (halves - slack) + ends[0].toll + ends[1].toll).max(0.0)
 }
 
-/// Radii at which no wall comes nearer to a point than so many metres; `None` of those whose shapes do.
+/// Radii at which no wall comes nearer to a point than `spread` metres; `None` for those whose shapes do.
 pub(super) fn narrowed(
     (walls, radii): (&[Wall], &[Option<f64>]),
     at: Point2,
@@ -116,7 +116,7 @@ pub(super) fn narrowed(
     walls.iter().zip(radii).map(narrowed).collect()
 }
 
-/// Both ends as a string sees them.
+/// Both ends as seen by a string.
 pub(super) fn departures(
     field: (&[Wall], &[Option<f64>]),
     prices: &Prices,
@@ -142,7 +142,7 @@ pub(super) fn scene((walls, radii): (&[Wall], &[Option<f64>]), ends: [Point2; 2]
     Obstacles::new(outlines, ends, None)
 }
 
-/// Metres by which the string may be shorter since routes may cut off corners, or pay for it.
+/// Metres by which the string may be shorter because routes may cut corners, or pay to do so.
 pub(super) fn slack(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> f64 {
     let kept = walls
         .iter()
@@ -154,7 +154,7 @@ pub(super) fn slack(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> f
     length * (1.0 + prices.exposure * dearest / prices.fuel)
 }
 
-/// Length that no string in `scene` undercuts, or `enough` of it, and the ways looked at.
+/// The length that no string in `scene` undercuts, up to `enough`, and the ways examined.
 pub(super) fn shortest(
     scene: &Obstacles,
     (enough, stop): (f64, &dyn Fn() -> bool),

@@ -24,7 +24,7 @@ fn within_half_a_percent_where_a_route_takes_off_and_lands() {
     check(two, [30, 120], 510.5145);
 }
 
-/// Where only the length counts, the way out of the ground's zone and back into it may be flown in any legs.
+/// Where only the length counts, the way out of the ground's zone and back into it may be flown in any number of legs.
 #[test]
 fn a_short_route_climbs_out_of_the_zones_round_its_ends() {
     let mut scenario = scenario(
@@ -43,8 +43,8 @@ fn a_short_route_climbs_out_of_the_zones_round_its_ends() {
     );
 }
 
-/// Strings tell of neither: the last leg climbs through the soft zone that the target lies in, and the best route leaves
-/// the string for where it may do so straight ahead.
+/// Strings account for neither: the last leg climbs through the soft zone that the target lies in, and the best route
+/// leaves the string where it may do so straight ahead.
 #[test]
 fn within_a_percent_where_the_last_leg_climbs_out_of_a_gap() {
     let discs = [
@@ -66,7 +66,7 @@ fn within_a_percent_where_the_last_leg_climbs_out_of_a_gap() {
     assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
 }
 
-/// The least legs leave a vehicle that climbs so slowly no other way than the route that is known.
+/// The minimum legs leave such a slowly climbing vehicle no other way than the known route.
 #[test]
 fn tight_where_legs_are_long_and_climbs_slow() {
     let mut scenario = scenario(r#""threats": []"#);
@@ -110,7 +110,8 @@ fn within_two_percent_of_the_best_routes_known() {
     );
 }
 
-/// A start and a target in soft zones, in the way of each, and three gaps between: the best known has 30 waypoints.
+/// A start and a target in soft zones that are in each other's way, with three gaps between: the best known has 30
+/// waypoints.
 #[test]
 fn within_a_percent_where_soft_zones_are_left_and_gaps_are_passed() {
     let mut scenario = scenario(
@@ -144,7 +145,7 @@ fn within_two_percent_where_a_leg_climbs_in_soft_zones() {
     assert!(bound <= best && bound > 0.98 * best, "{bound} {best}");
 }
 
-/// Ends low in soft zones that could be flown over if there were room to climb: the best known has 30 waypoints.
+/// Ends low in soft zones that could be flown over with enough room to climb: the best known has 30 waypoints.
 #[test]
 fn within_a_percent_where_what_may_be_passed_cannot_be_at_once() {
     let mut scenario = scenario(
@@ -178,8 +179,8 @@ fn within_a_percent_where_the_last_leg_leads_over_a_top() {
     assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
 }
 
-/// What a route may cut off corners can be worth more than the way; and it may go through what
-/// is thinner than its tolerance.
+/// The gain from cutting corners can be worth more than the way; and a route may go through what is thinner than its
+/// tolerance.
 #[test]
 fn never_above_a_way_through_what_is_no_obstacle() {
     let check = |ring: &str, fuel: f64, threat: f64| {
@@ -193,7 +194,7 @@ fn never_above_a_way_through_what_is_no_obstacle() {
         let bound = lower_bound(&scenario);
         assert!(bound <= straight, "{bound} {straight}");
     };
-    // Both keep out of the way, with their soft zones.
+    // Both stay out of the way, including their soft zones.
     let triangle = r#"{"x": 900, "y": 0}, {"x": 990, "y": 0}, {"x": 950, "y": 90}"#;
     check(triangle, 1e-6, 1000.0);
     let needle = r#"{"x": 900, "y": 0}, {"x": 900.001, "y": 0}, {"x": 900, "y": 100}"#;
@@ -213,7 +214,7 @@ fn never_above_a_way_through_what_is_no_obstacle() {
     );
 }
 
-/// A comb whose teeth are near to each other: nearly as many pairs as teeth squared, each of which asks all teeth.
+/// A comb with close teeth: nearly as many pairs as teeth squared, each of which involves all teeth.
 #[test]
 fn a_stop_is_heard_among_gaps() {
     let teeth = 20;

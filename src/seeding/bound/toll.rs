@@ -1,4 +1,4 @@
-//! What it costs to pass a threat above or below, and how soon that can be.
+//! The cost of passing a threat above or below, and how soon that is possible.
 
 use super::prices::Prices;
 use crate::cost::Tolerance;
@@ -6,22 +6,22 @@ use crate::scenario::Scenario;
 use crate::terrain::Terrain;
 use crate::threat::Threat;
 
-/// What it takes to pass a threat above or below.
+/// The requirements for passing a threat above or below.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Toll {
-    /// Part of F3 that a waypoint beyond the threat's height costs at least.
+    /// Least part of F3 for a waypoint beyond the threat's height.
     pub(super) altitude: f64,
-    /// Metres that are climbed and descended at least.
+    /// Least number of metres climbed and descended.
     pub(super) vertical: f64,
 }
 
-/// Metres that a route may climb in a metre seen from above.
+/// Greatest climb per metre seen from above, metres.
 pub(super) fn steepest(scenario: &Scenario) -> f64 {
     let angle = scenario.vehicle.max_climb_deg + Tolerance::of(scenario).angle_deg;
     libm::tan(angle.min(90.0).to_radians()) * (1.0 + 1e-12)
 }
 
-/// Metres from start and target up to the middle of the band, less than nothing from above it; `None` over hills.
+/// Metres from start and target up to the middle of the band, negative from above it; `None` over hills.
 pub(super) fn below_middle(scenario: &Scenario) -> Option<[f64; 2]> {
     let Terrain::Flat(ground) = &scenario.terrain else {
         return None;
@@ -30,8 +30,8 @@ pub(super) fn below_middle(scenario: &Scenario) -> Option<[f64; 2]> {
     Some([scenario.start, scenario.target].map(|end| middle - end.z))
 }
 
-/// Metres of climb in a metre seen from above from which on one more costs this `share` of a metre flown; infinite where it
-/// never does.
+/// The climb per metre seen from above, metres, from which on one more metre of climb costs this `share` of a metre
+/// flown; infinite where it never does.
 pub(super) fn climb_worth(share: f64) -> f64 {
     if share < 1.0 {
         share / (1.0 - share * share).sqrt()
@@ -40,8 +40,8 @@ pub(super) fn climb_worth(share: f64) -> f64 {
     }
 }
 
-/// Metres seen from above that a route flies at the heights of `threat` at least, after the start and before the target:
-/// what climbing or descending out of them takes, but no more than half of the straight way.
+/// Least number of metres seen from above that a route flies at the heights of `threat`, after the start and before the
+/// target: what climbing or descending out of them takes, but no more than half of the straight way.
 pub(super) fn stays(threat: &Threat, scenario: &Scenario) -> [f64; 2] {
     let (start, target) = (scenario.start, scenario.target);
     let half = 0.5 * (target.xy() - start.xy()).norm();
@@ -56,8 +56,8 @@ pub(super) fn stays(threat: &Threat, scenario: &Scenario) -> [f64; 2] {
     })
 }
 
-/// From start and target, metres up to the top of `threat` and down to its base, a hair less than there are; infinite where
-/// there is none.
+/// From start and target, metres up to the top of `threat` and down to its base, a hair less than the real ones;
+/// infinite where there is none.
 pub(super) fn climbs(threat: &Threat, prices: &Prices) -> [[f64; 2]; 2] {
     prices.ends.map(|end| {
         let hair = prices.tolerance + 1e-9 * (1.0 + end.z.abs());
@@ -121,7 +121,7 @@ impl Heights {
         }
     }
 
-    /// What it takes to pass `threat` above or below; `None` when there is no room.
+    /// What passing `threat` above or below requires; `None` when there is no room.
     pub(super) fn toll(&self, threat: &Threat, scenario: &Scenario) -> Option<Toll> {
         let (start, target) = (scenario.start.z, scenario.target.z);
         let weight = scenario.weights.altitude;

@@ -1,5 +1,5 @@
-//! Threats as a bound sees them: how far each may be widened for free, and which may be passed by
-//! flying over or under them.
+//! Threats as used by a bound: how far each may be widened for free, and which may be passed by flying over or under
+//! them.
 
 use super::prices::Prices;
 use super::toll::{Heights, Toll, climbs, stays};
@@ -9,29 +9,29 @@ use crate::seeding::arc::{nearest_points, point_segment, segment_segment};
 use crate::seeding::outline::{Outline, OutlineShape};
 use crate::threat::{Shape, Threat};
 
-/// A threat that reaches over all heights, or that costs a toll to pass above or below.
+/// A threat that covers all heights, or that costs a toll to pass above or below.
 #[derive(Debug, Clone)]
 pub(super) struct Wall {
     pub(super) shape: OutlineShape,
-    /// Metres that no route comes nearer than; 0 of a ring.
+    /// No route comes nearer than this, metres; 0 for a ring.
     pub(super) core: f64,
     /// End of the soft zone, metres.
     pub(super) influence: f64,
-    /// Widened by so much, it counts as hard for routes that do not dip below `dip` of it.
+    /// Widened by this, it counts as hard for routes that do not come nearer than `dip`.
     pub(super) wide: f64,
     /// Below this distance to a disc's centre or a ring's corner the way round is so short that
     /// cutting the corner could pay; not above `core` where it never does.
     pub(super) dip: f64,
-    /// Widened by so much, it counts as hard for every route.
+    /// Widened by this, it counts as hard for every route.
     pub(super) safe: f64,
     /// Cost of a route that passes above or below, beyond fuel for the way seen from above; `None`
     /// when there is no room.
     pub(super) toll: Option<Toll>,
-    /// Metres seen from above that a route flies at its heights at least, after the start and before the target; what
-    /// matters of a wall that may be passed.
+    /// Least number of metres seen from above that a route flies at the wall's heights, after the start and before the
+    /// target; only used for a wall that may be passed.
     pub(super) stays: [f64; 2],
-    /// From the start and from the target, metres up to its top and down to its base; less than nothing where these have
-    /// been passed, infinite where there is none.
+    /// From the start and from the target, metres up to its top and down to its base; negative where these have been
+    /// passed, infinite where there is none.
     pub(super) climbs: [[f64; 2]; 2],
 }
 
@@ -70,7 +70,7 @@ impl Wall {
         if let OutlineShape::Ring(ring) = &wall.shape
             && (wall.slack(slack) >= perimeter(ring) || is_thin(ring, 2.0 * slack))
         {
-            // A route may cut through: no obstacle to speak of.
+            // A route may cut through: effectively no obstacle.
             return None;
         }
         Some(wall)
@@ -78,8 +78,8 @@ impl Wall {
 
     /// Widen it by `most` at most.
     pub(super) fn widen(&mut self, prices: &Prices, most: f64) {
-        // (w + s (I - r)) r is concave in r, so that its ends decide whether it is w R or more all
-        // the way from the core to R.
+        // (w + s (I - r)) r is concave in r, so its ends decide whether it is at least w R all the way from the core to
+        // R.
         let (w, s, core, influence) = (prices.fuel, prices.exposure, self.core, self.influence);
         let reach = influence.min(most).max(core);
         let at_core = (w + s * (influence - core).max(0.0)) * core / w;
@@ -114,18 +114,18 @@ impl Wall {
         }
     }
 
-    /// Whether `point` lies in what is added to it by widening, where it is no dip.
+    /// Whether `point` lies in the part added by widening, where it is not a dip.
     pub(super) fn is_around(&self, point: Point2) -> bool {
         let away = self.distance(point);
         away > self.core && away >= self.dip && away < self.wide
     }
 
-    /// Metres to its shape before it is widened, 0 within a ring: what its soft zone is measured by.
+    /// Metres to its shape before it is widened, 0 within a ring: the distance that its soft zone is based on.
     pub(super) fn distance(&self, point: Point2) -> f64 {
         self.shape.distance(point)
     }
 
-    /// Of a straight way to its shape.
+    /// Distance of a straight way to its shape.
     pub(super) fn distance_to_way(&self, (a, b): (Point2, Point2)) -> f64 {
         match &self.shape {
             OutlineShape::Disc(center) => point_segment(*center, a, b),
@@ -136,7 +136,7 @@ impl Wall {
         }
     }
 
-    /// The place as far from its shape as `radius`, straight out by `point`, which lies outside of the shape.
+    /// The place at distance `radius` from its shape, straight out through `point`, which lies outside the shape.
     pub(super) fn out(&self, point: Point2, radius: f64) -> Point2 {
         let nearest = match &self.shape {
             OutlineShape::Disc(center) => *center,
@@ -148,7 +148,7 @@ impl Wall {
         nearest + (point - nearest).normalize() * radius
     }
 
-    /// How many a ring has.
+    /// Number of corners of a ring.
     pub(super) fn corners(&self) -> usize {
         match &self.shape {
             OutlineShape::Disc(_) => 0,
@@ -182,8 +182,7 @@ impl Wall {
         }
     }
 
-    /// Centres of the circles that bound the widened wall: of a disc its own, of a ring those of
-    /// its corners.
+    /// Centres of the circles that bound the widened wall: for a disc its own, for a ring those of its corners.
     pub(super) fn centers(&self) -> &[Point2] {
         match &self.shape {
             OutlineShape::Disc(center) => std::slice::from_ref(center),
@@ -191,8 +190,8 @@ impl Wall {
         }
     }
 
-    /// Metres by which a string may be shorter since a route may enter by the tolerance: of a disc
-    /// it is in the core already; of a ring, twice the way into each of its corners.
+    /// Metres by which a string may be shorter because a route may enter by the tolerance: for a disc this is already
+    /// part of the core; for a ring it is twice the way into each of its corners.
     pub(super) fn slack(&self, tolerance: f64) -> f64 {
         let OutlineShape::Ring(ring) = &self.shape else {
             return 0.0;

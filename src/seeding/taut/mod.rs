@@ -14,7 +14,7 @@ use search::Search;
 /// A string pulled tight from start to target.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TautString {
-    /// Metres.
+    /// Length, metres.
     pub length: f64,
     /// In order, each beginning where the one before ends; straight ones first and last.
     pub pieces: Vec<Piece>,
@@ -34,15 +34,15 @@ pub enum Piece {
     Arc {
         /// Index of the outline that is rounded.
         outline: usize,
-        /// Of the circle.
+        /// Centre of the circle.
         center: Point2,
-        /// Metres.
+        /// Radius, metres.
         radius: f64,
         /// Where it begins.
         from: Point2,
         /// Where it ends.
         to: Point2,
-        /// Radians, positive counter-clockwise.
+        /// Turn in radians, positive counter-clockwise.
         turn: f64,
     },
 }
@@ -52,16 +52,16 @@ pub enum Piece {
 pub struct TautStrings {
     /// Shortest first, of different homotopy classes.
     pub strings: Vec<TautString>,
-    /// No string that is not listed is shorter, metres; infinite when there is none.
+    /// Every string that is not listed has at least this length, metres; infinite when there is none.
     pub beyond: f64,
-    /// What the search took: ways looked at.
+    /// Effort of the search: ways examined.
     pub ways: usize,
 }
 
-/// Ways looked at before a search gives up.
+/// Number of ways examined before a search gives up.
 const MOST_WAYS: usize = 2_000_000;
 
-/// Strings nearer than this share of their length everywhere are one.
+/// Strings nearer to each other than this share of their length everywhere count as one.
 const SAME: f64 = 1e-7;
 
 /// The `k` shortest taut strings between the ends of `obstacles`.
@@ -70,7 +70,7 @@ pub fn taut_strings(obstacles: &Obstacles, k: usize) -> TautStrings {
     taut_strings_within(obstacles, k, Limits::NONE)
 }
 
-/// As [`taut_strings`]; once `stop` asks for it, with what was found so far.
+/// As [`taut_strings`]; once `stop` asks for it, returns what was found so far.
 pub fn taut_strings_until(obstacles: &Obstacles, k: usize, stop: &dyn Fn() -> bool) -> TautStrings {
     let limits = Limits {
         stop,
@@ -79,15 +79,15 @@ pub fn taut_strings_until(obstacles: &Obstacles, k: usize, stop: &dyn Fn() -> bo
     taut_strings_within(obstacles, k, limits)
 }
 
-/// When a search for strings ends before it has found what it looks for. What it has proven of those
-/// that it has not found holds all the same.
+/// When a search for strings ends before it has found what it looks for. What it has proven about the strings not found
+/// is still valid.
 #[derive(Clone, Copy)]
 pub(super) struct Limits<'s> {
-    /// Ways looked at.
+    /// Maximum number of ways examined.
     pub(super) most_ways: usize,
-    /// No string shorter than this, metres, is left to find.
+    /// The search ends once no string shorter than this, metres, is left to find.
     pub(super) enough: f64,
-    /// Asked now and then.
+    /// Checked occasionally.
     pub(super) stop: &'s dyn Fn() -> bool,
 }
 
@@ -124,7 +124,7 @@ impl TautString {
 }
 
 impl Piece {
-    /// Metres.
+    /// Length, metres.
     #[must_use]
     pub fn length(&self) -> f64 {
         match self {

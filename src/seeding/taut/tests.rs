@@ -43,7 +43,7 @@ fn lengths(outlines: &[Outline], ends: [[f64; 2]; 2], k: usize) -> Vec<f64> {
     strings.iter().map(|string| string.length).collect()
 }
 
-/// Which outline a piece rounds.
+/// The outline that a piece rounds, if any.
 fn rounded(piece: &Piece) -> Option<usize> {
     match piece {
         Piece::Arc { outline, .. } => Some(*outline),
@@ -75,13 +75,13 @@ fn worked_by_hand() {
     check(&[disc(0.0, 20.0, 5.0)], west_east, &[20.0]);
     check(&[disc(0.0, 5.0, 5.0)], west_east, &[20.0]);
     check(&[disc(0.0, 0.0, 5.0)], west_east, &[round_a_disc(); 2]);
-    // The same disc twice makes no second way of passing it.
+    // The same disc twice gives no second way of passing it.
     check(
         &[disc(0.0, 0.0, 5.0), disc(0.0, 0.0, 5.0)],
         west_east,
         &[round_a_disc(); 2],
     );
-    // One within the other, touching it from inside.
+    // One within the other, touching it from the inside.
     check(
         &[disc(0.0, 0.0, 5.0), disc(0.0, 3.0, 2.0)],
         west_east,
@@ -133,7 +133,7 @@ fn corners_of_rings() {
         [[-10.0, -10.0], [10.0, 10.0]],
         &[2.0 * (25.0_f64 + 225.0).sqrt(); 2],
     );
-    // Two squares with a side in common leave a way between them that is no wider than a line.
+    // Two squares with a side in common leave a way between them no wider than a line.
     let next = [[5.0, -5.0], [15.0, -5.0], [15.0, 5.0], [5.0, 5.0]];
     check(
         &[ring(&square, 0.0), ring(&next, 0.0)],
@@ -196,7 +196,7 @@ fn an_end_on_or_in_the_soft_zone_of_an_obstacle() {
         [[-5.0, 0.0], [5.0, 0.0]],
         &[5.0 * PI; 2],
     );
-    // Made smaller, to the distance of the nearer end.
+    // Shrunk to the distance of the nearer end.
     let tangent = 91.0_f64.sqrt();
     let arc = 3.0 * (PI - libm::acos(0.3));
     check(
@@ -204,7 +204,7 @@ fn an_end_on_or_in_the_soft_zone_of_an_obstacle() {
         [[-3.0, 0.0], [10.0, 0.0]],
         &[tangent + arc; 2],
     );
-    // In the core: above it, for all that is known here.
+    // In the core: assumed to be above it.
     check(
         std::slice::from_ref(&soft),
         [[-1.0, 0.0], [10.0, 0.0]],
@@ -233,7 +233,7 @@ fn strings_keep_to_the_area() {
     assert!(found[0].at(0.5).y > 4.9);
 }
 
-/// Of a great disc, a small one rises, and a string round both comes back to the great one.
+/// A small disc protrudes from a large one, and a string round both comes back to the large one.
 #[test]
 fn a_string_comes_back_to_a_circle() {
     let outlines = [
@@ -325,7 +325,7 @@ proptest! {
         } else {
             prop_assert!(brute.is_infinite(), "{brute}");
         }
-        // Asking for more changes nothing about the first, and every further one is longer.
+        // Asking for more does not change the first, and every further one is longer.
         let several = lengths(&outlines, ends, 5);
         if let Some(first) = found.first() {
             prop_assert!((several[0] - first).abs() < 1e-9);

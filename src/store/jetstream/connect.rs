@@ -151,7 +151,7 @@ impl Servers {
     }
 
     /// Retry idempotent work while the servers refuse it with an error that passes with an election. Like the free
-    /// [`outlast`](super::election::outlast), for work that cannot be sent between threads.
+    /// [`outlast`], for work that cannot be sent between threads.
     ///
     /// # Errors
     /// The last error of `work`.

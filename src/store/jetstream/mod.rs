@@ -4,7 +4,6 @@
 //! Any number of nodes share it. What is accepted is on the servers before it is answered; each step of a plan is
 //! written only if nobody was faster; a run belongs to this node for as long as the node renews its lease in time.
 //! Deliberately absent: any queue, election or replication of our own.
-//! so in time. Deliberately absent: any queue, election or replication of our own.
 
 mod claim;
 mod connect;

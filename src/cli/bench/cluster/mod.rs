@@ -1,6 +1,5 @@
-//! `noctule bench cluster`: what a NATS system carries, beside a client that does nothing but the same
-//! calls, and how many workers it keeps busy. Jobs take a fixed time asleep, so that a small machine
-//! can play many workers.
+//! `noctule bench cluster`: the throughput of a NATS system, compared with a client that makes only the same calls, and
+//! how many workers it keeps busy. Jobs sleep for a fixed time, so that a small machine can play many workers.
 
 mod load;
 mod raw;
@@ -58,7 +57,7 @@ impl Arguments {
         Duration::from_millis(self.job_ms.into())
     }
 
-    /// Of a measurement of its own.
+    /// Settings for one measurement.
     fn settings(&self) -> anyhow::Result<Settings> {
         let Some(address) = Address::read(&self.store) else {
             bail!("--store {}: allowed is {}", self.store, Address::ALLOWED);
@@ -127,7 +126,7 @@ async fn measure_all(arguments: &Arguments) -> anyhow::Result<Report> {
     })
 }
 
-/// 1, 2, 4, ... to the most.
+/// 1, 2, 4, ... up to the most.
 fn worker_counts(most: u16) -> Vec<u16> {
     let doubled = std::iter::successors(Some(1_u16), |count| count.checked_mul(2));
     let mut counts: Vec<_> = doubled.take_while(|count| *count < most).collect();
@@ -191,7 +190,7 @@ struct Scaled {
     plans_per_s: f64,
 }
 
-/// So many workers, each job a sleep.
+/// One step of the scale: `workers` workers, each job a sleep.
 async fn scale(arguments: &Arguments, workers: u16) -> anyhow::Result<Scaled> {
     let settings = arguments.settings()?;
     let nodes = Nodes::open(settings, workers, arguments.slots).await?;

@@ -16,7 +16,7 @@ use super::Took;
 use super::work::{CALLERS, NODES, RESULT, SCENARIO, WORKERS};
 use crate::store::jetstream::Settings;
 
-/// Bytes of a step, about as the store writes them for such plans.
+/// Bytes of a step, about as many as the store writes for such plans.
 const STEP: usize = 900;
 
 #[derive(Clone)]
@@ -28,7 +28,7 @@ struct Bare {
     documents: kv::Store,
 }
 
-/// How fast the calls of plans are answered: first those of their acceptance, then those of their runs.
+/// How fast the calls of plans are answered: first those for their acceptance, then those for their runs.
 pub(super) async fn measure(settings: Settings, plans: u32) -> anyhow::Result<Took> {
     let bare = Bare::open(&settings).await?;
     let mut readers = JoinSet::new();
@@ -151,7 +151,7 @@ impl Bare {
         Ok(())
     }
 
-    /// The first is expected behind nothing; of the others the server is asked to look all the same.
+    /// The first step expects no predecessor; for the others the server must check all the same.
     async fn step(&self, id: &str, expected: u64) -> anyhow::Result<u64> {
         let subject = format!("{}.plans.{id}", self.namespace);
         let mut step = PublishMessage::build().payload(Bytes::from(vec![b'p'; STEP]));
@@ -174,7 +174,7 @@ async fn context(settings: &Settings) -> anyhow::Result<Context> {
     Ok(jetstream::new(client))
 }
 
-/// Take away all streams and buckets of a namespace.
+/// Remove all streams and buckets of a namespace.
 pub(super) async fn remove(settings: &Settings) -> anyhow::Result<()> {
     let context = context(settings).await?;
     let own = format!("{}-", settings.address.namespace);

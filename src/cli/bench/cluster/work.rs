@@ -1,4 +1,4 @@
-//! The store under fixed-time jobs: nodes as processes would be, each with its connection and view.
+//! The store under fixed-time jobs: nodes as separate processes would be, each with its connection and view.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -36,7 +36,7 @@ pub(super) struct Nodes {
 }
 
 impl Nodes {
-    /// As many as `workers` need, `slots` each.
+    /// As many nodes as `workers` need, with `slots` each.
     pub(super) async fn open(settings: Settings, workers: u16, slots: u16) -> anyhow::Result<Self> {
         let mut all = Vec::new();
         for _ in 0..workers.div_ceil(slots) {
@@ -52,7 +52,7 @@ impl Nodes {
         })
     }
 
-    /// Accept so many plans.
+    /// Accept `plans` plans.
     pub(super) async fn accept(&self, plans: u32) -> anyhow::Result<()> {
         let store = &self.all[0];
         stream::iter((0..plans).map(Ok))
@@ -63,7 +63,7 @@ impl Nodes {
             .await
     }
 
-    /// Run so many plans, each asleep for a while.
+    /// Run `plans` plans, each by sleeping for a while.
     pub(super) async fn run(&self, plans: u32, asleep: Duration) -> anyhow::Result<Duration> {
         let left = Arc::new(AtomicU32::new(plans));
         let began = Instant::now();
@@ -83,7 +83,7 @@ impl Nodes {
         Arc::clone(&self.all[0])
     }
 
-    /// Take away all that was written.
+    /// Remove everything that was written.
     pub(super) async fn remove(self) -> anyhow::Result<()> {
         for store in &self.all {
             store.close().await;
@@ -129,7 +129,7 @@ async fn work(
     }
 }
 
-/// How fast plans are accepted, and then run, that take no time.
+/// How fast plans that take no time are accepted, and then run.
 pub(super) async fn rates(settings: Settings, plans: u32) -> anyhow::Result<Took> {
     let nodes = Nodes::open(settings, WORKERS, WORKERS / NODES).await?;
     let began = Instant::now();
@@ -144,7 +144,7 @@ pub(super) async fn rates(settings: Settings, plans: u32) -> anyhow::Result<Took
     })
 }
 
-/// As a caller would hand in.
+/// A submission as a caller would make it.
 pub(super) fn submission() -> Submission {
     let created_ms = wall_clock()();
     Submission {

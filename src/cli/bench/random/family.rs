@@ -1,4 +1,4 @@
-//! Families of scenarios drawn at random: each asks another thing of the planner.
+//! Families of scenarios drawn at random: each challenges the planner in a different way.
 
 use serde_json::Value;
 
@@ -78,7 +78,7 @@ pub(super) const FAMILIES: [Family; 12] = [
 ];
 
 impl Family {
-    /// The scenario document of `seed`, its planner as it is by default but for waypoints and seed.
+    /// The scenario document of `seed`, with the default planner except for waypoints and seed.
     pub(super) fn scenario(&self, seed: u64) -> Value {
         let mut scene = Scene::new(Random::new(seed));
         (self.draw)(&mut scene);
@@ -122,7 +122,7 @@ fn gaps(scene: &mut Scene) {
     near_to_each_other(scene, count);
 }
 
-/// Discs that leave gaps in which their soft zones overlap.
+/// Discs with gaps between them in which their soft zones overlap.
 fn near_to_each_other(scene: &mut Scene, count: usize) {
     fill(scene, count, |scene| {
         let [radius, margin, gap] = [(25.0, 80.0), (20.0, 40.0), (0.0, 40.0)]
@@ -131,7 +131,7 @@ fn near_to_each_other(scene: &mut Scene, count: usize) {
     });
 }
 
-/// Draw until there are so many threats: those asked for fit in by far, but not each that is drawn does.
+/// Draw until there are `count` threats: they easily fit, but not every one drawn does.
 fn fill(scene: &mut Scene, count: usize, draw: impl Fn(&mut Scene)) {
     for _ in 0..100 * count {
         if scene.threats.len() == count {
@@ -241,7 +241,7 @@ mod tests {
     use super::*;
     use crate::cli::bench::case::Case;
 
-    /// Whatever the seed, a document that the reader takes; and the same one each time.
+    /// Whatever the seed, the reader accepts the document; and it is the same each time.
     #[test]
     fn every_scenario_is_valid_and_its_seeds_own() {
         for family in &FAMILIES {

@@ -1,4 +1,4 @@
-//! `noctule bench random`: the planner's default settings on scenarios that nobody has tuned it to.
+//! `noctule bench random`: the planner's default settings on scenarios that it was not tuned for.
 
 mod family;
 mod scene;
@@ -22,7 +22,7 @@ use family::{FAMILIES, Family};
 /// A run that is farther from its reference than this is a miss.
 const MISS: f64 = 0.01;
 
-/// A proven gap of no more is small.
+/// A proven gap of at most this is small.
 const PROVEN: f64 = 0.02;
 
 #[derive(Args)]
@@ -201,7 +201,7 @@ fn table(families: &[&Family], all: &[Runs]) -> Table {
     }
 }
 
-/// What is not as good as it should be, each by its name.
+/// Results that are not as good as they should be, each by its name.
 fn misses(all: &[Runs]) -> Table {
     let off = |runs: &&Runs| {
         let is_off = |trial: &Trial| runs.gap(trial).is_none_or(|gap| gap > MISS);

@@ -1,10 +1,10 @@
-//! A scenario in the making: where its ends, threats and peaks are drawn, and the document that it becomes.
+//! A scenario under construction: draws its ends, threats and peaks, and makes the document.
 
 use serde_json::{Value, json};
 
 use crate::optimizer::Random;
 
-/// A scenario in the making; lengths as in one whose area is a square kilometre, until it is scaled.
+/// A scenario under construction; lengths as for an area of a square kilometre, until it is scaled.
 pub(super) struct Scene {
     pub(super) random: Random,
     pub(super) start: [f64; 2],
@@ -24,10 +24,10 @@ pub(super) struct Scene {
 
 pub(super) struct Threat {
     center: [f64; 2],
-    /// Of the circle about it.
+    /// Radius of the surrounding circle.
     radius: f64,
     margin: f64,
-    /// Bearings and distances of a polygon's corners; none of a disc.
+    /// Bearings and distances of a polygon's corners; empty for a disc.
     corners: Vec<[f64; 2]>,
     base: Option<f64>,
     top: Option<f64>,
@@ -49,7 +49,7 @@ const WEIGHTS: [[f64; 3]; 6] = [
     [0.3, 1.0, 3.0],
 ];
 
-/// Hard parts of threats are so far from start and target.
+/// Least distance of threats' hard parts from start and target.
 const CLEAR: f64 = 6.0;
 
 impl Scene {
@@ -94,7 +94,7 @@ impl Scene {
         ]
     }
 
-    /// Clear of start and target: smaller than asked for where they are near, or nowhere at all.
+    /// Clear of start and target: smaller than requested where they are near, or not placed at all.
     pub(super) fn disc(&mut self, radius: f64, margin: f64) {
         let center = self.place();
         let room = [self.start, self.target]
@@ -112,7 +112,7 @@ impl Scene {
         }
     }
 
-    /// As a disc, or nowhere where another threat is nearer than `gap`.
+    /// As a disc, or not placed where another threat is nearer than `gap`.
     pub(super) fn disc_apart(&mut self, radius: f64, margin: f64, gap: f64) {
         let before = self.threats.len();
         self.disc(radius, margin);
@@ -148,7 +148,7 @@ impl Scene {
         }
     }
 
-    /// Most threats that were placed last can be passed above or below, most of these above.
+    /// Make most of the threats placed last passable above or below, most of these above.
     pub(super) fn open_above_or_below(&mut self) {
         let (top, base) = (
             self.random.between(0.2, 0.9) * self.band[1],

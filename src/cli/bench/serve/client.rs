@@ -1,4 +1,4 @@
-//! Asking over connections that stay open.
+//! Requests over connections that stay open.
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -41,7 +41,7 @@ impl Question {
         }
     }
 
-    /// The answer may take its time.
+    /// Allow the answer to take long.
     pub(super) fn patient(self) -> Self {
         Self { wait: true, ..self }
     }
@@ -101,7 +101,7 @@ impl Connection {
     }
 }
 
-/// What came of asking the same thing again and again.
+/// The results of asking the same thing again and again.
 pub(super) struct Load {
     /// Answers a second, of all connections together.
     pub(super) rate: f64,
@@ -112,7 +112,7 @@ pub(super) struct Load {
 }
 
 impl Load {
-    /// The time within which that share of the answers came, milliseconds.
+    /// The time within which this share of the answers came, milliseconds.
     pub(super) fn within_ms(&self, share: f64) -> f64 {
         let last = self.times_ms.len() - 1;
         #[expect(
@@ -124,7 +124,7 @@ impl Load {
         self.times_ms[idx.min(last)]
     }
 
-    /// Fails unless every answer had that status.
+    /// Fails unless every answer had this status.
     pub(super) fn all(self, status: u16) -> anyhow::Result<Self> {
         let known = self.statuses.keys().eq([&status]);
         anyhow::ensure!(
@@ -136,7 +136,7 @@ impl Load {
     }
 }
 
-/// Ask `question` over `connections` connections, each as soon as it has the answer before.
+/// Ask `question` over `connections` connections, each as soon as it has the previous answer.
 pub(super) async fn load(
     address: SocketAddr,
     connections: usize,
@@ -169,7 +169,7 @@ pub(super) async fn load(
     })
 }
 
-/// Asks once at least.
+/// Asks at least once.
 async fn keep_asking(
     mut connection: Connection,
     question: Arc<Question>,

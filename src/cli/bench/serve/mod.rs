@@ -55,7 +55,7 @@ impl Arguments {
     }
 }
 
-/// Be what is measured, when this process was started to be.
+/// Play the target's part, when this process was started for that.
 pub(super) fn plays_a_role(arguments: &Arguments) -> anyhow::Result<bool> {
     arguments.role.play()
 }
@@ -194,7 +194,7 @@ async fn requests(arguments: &Arguments) -> anyhow::Result<Table> {
     })
 }
 
-/// Where an accepted plan is.
+/// The address of an accepted plan.
 fn location(answer: &Answer) -> anyhow::Result<String> {
     ensure!(
         answer.status == 202,

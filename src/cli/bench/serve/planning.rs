@@ -89,7 +89,7 @@ async fn served_s(service: &Stage, scenarios: &[Scenario]) -> anyhow::Result<f64
     for question in &questions {
         places.push(location(&connection.ask(question).await?)?);
     }
-    // The last to begin end last, but not in a certain order.
+    // The plans that begin last end last, but in no particular order.
     for place in places.into_iter().rev() {
         let question = Question::get(place).patient();
         loop {

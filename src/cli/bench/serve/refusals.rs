@@ -1,4 +1,4 @@
-//! How soon those are refused who find the queue full while every worker is busy.
+//! How soon callers are refused who find the queue full while every worker is busy.
 
 use anyhow::ensure;
 use serde_json::{Value, json};
@@ -11,7 +11,7 @@ use crate::cli::bench::table::{Cell, Table};
 /// Plans that wait.
 const QUEUE: usize = 100;
 
-/// A scenario that is still planned when all has been measured: as much work as a plan may be.
+/// A scenario whose planning outlasts the measurement: with the maximum of work allowed.
 fn endless() -> Value {
     let mut scenario = tiny();
     scenario["planner"] =
@@ -71,7 +71,7 @@ pub(super) async fn measure(arguments: &Arguments) -> anyhow::Result<Table> {
     })
 }
 
-/// Where a plan stands.
+/// The status of a plan.
 async fn status(connection: &mut Connection, plan: &Question) -> anyhow::Result<String> {
     let document: Value = serde_json::from_slice(&connection.ask(plan).await?.body)?;
     Ok(document["status"].as_str().unwrap_or_default().to_owned())

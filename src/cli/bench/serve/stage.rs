@@ -1,4 +1,4 @@
-//! What the load is put on, each in a process of its own: the service, or a handler that does nothing.
+//! The targets of the load, each in a process of its own: the service, or a handler that does nothing.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::SocketAddr;
@@ -55,7 +55,7 @@ impl Role {
     }
 }
 
-/// The least that such a server can do: a short answer to `GET`, and a body read to its end by `POST`.
+/// The least that such a server can do: a short answer to `GET`, and reading the whole body of a `POST`.
 async fn bare(listen: SocketAddr) -> anyhow::Result<()> {
     let answer = ([("content-type", "application/json")], r#"{"status":"ok"}"#);
     let router = Router::new().route(
@@ -72,7 +72,7 @@ async fn bare(listen: SocketAddr) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A running one; ended when dropped, and what it kept with it.
+/// A running target; stopped when dropped, and its data removed.
 pub(super) struct Stage {
     child: Child,
     /// Where it listens.
@@ -126,7 +126,7 @@ impl Stage {
 
 impl Drop for Stage {
     fn drop(&mut self) {
-        // Both fail when it has ended already, the last when it never began.
+        // Both fail when it has already ended, the last when it never started.
         let _ = self.child.kill();
         let _ = self.child.wait();
         if let Some(data_dir) = &self.data_dir {

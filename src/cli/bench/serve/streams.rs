@@ -10,7 +10,7 @@ use super::client::{Connection, Question};
 use super::stage::Stage;
 use super::{Arguments, location, tiny};
 
-/// What one reader was told.
+/// What one reader received.
 #[derive(Debug, Clone, Copy, Default)]
 struct Told {
     events: usize,
@@ -18,7 +18,7 @@ struct Told {
     ends: usize,
 }
 
-/// Measure one plan that runs for as long as a measurement.
+/// Measure one plan that runs throughout the measurement.
 pub(super) async fn measure(arguments: &Arguments) -> anyhow::Result<Table> {
     let mut rows = Vec::new();
     for readers in [1, arguments.readers] {

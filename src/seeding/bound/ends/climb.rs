@@ -1,4 +1,4 @@
-//! What it costs on top that a first or last leg climbs to the middle of the band, or that its waypoint is off it. The
+//! The extra cost of a first or last leg that climbs to the middle of the band, or whose waypoint is off it. The
 //! argument is section 7 of docs/BOUND.md.
 
 use super::super::toll::climb_worth;
@@ -7,12 +7,12 @@ use super::ramp::{Ramp, Rates};
 use super::slopes::Slopes;
 use crate::geometry::Point2;
 
-/// Lengths of first legs that are told apart.
+/// Number of lengths of first legs that are distinguished.
 const LENGTHS: u32 = 64;
 
 impl End<'_> {
-    /// What a leg with one of those `lengths` seen from above, `exposed` if it is the shortest, costs at least on top of
-    /// what it costs seen from above, waypoint included: it climbs, or its waypoint is off the middle.
+    /// The least extra cost of a leg with one of those `lengths` seen from above, `exposed` if it is the shortest,
+    /// beyond its cost seen from above, waypoint included: it climbs, or its waypoint is off the middle.
     pub(super) fn steepness(&self, lengths: [f64; 2], exposed: f64, slopes: Option<Slopes>) -> f64 {
         let told = slopes.map_or(0.0, |slopes| {
             slopes.steepness(lengths, self.rates(exposed), self.height)
@@ -21,7 +21,7 @@ impl End<'_> {
             .max(self.out_of_zone(lengths, exposed))
     }
 
-    /// The same, of what is flown before the zone round the other end: what is flown in there is told there.
+    /// The same for the part before the zone round the other end: the rest is counted for that end.
     pub(super) fn before_other_zone(
         &self,
         [shortest, longest]: [f64; 2],
@@ -35,7 +35,7 @@ impl End<'_> {
         }
     }
 
-    /// The same of a leg that leads out of the zone round the end; 0 where it does not, or there is none.
+    /// The same for a leg that leads out of the zone round the end; 0 where it does not, or there is no zone.
     fn out_of_zone(&self, lengths: [f64; 2], exposed: f64) -> f64 {
         let ramp = self.ramp.filter(|ramp| lengths[0] >= ramp.reach);
         ramp.map_or(0.0, |ramp| {
@@ -51,23 +51,23 @@ impl End<'_> {
         }
     }
 
-    /// The same of a leg that may climb as gently as it likes; falls with `length`.
+    /// The same for a leg that may climb as gently as it likes; falls with `length`.
     pub(super) fn gently(&self, length: f64, exposed: f64) -> f64 {
         if length.is_infinite() {
             return 0.0;
         }
-        // Climbing lengthens a leg in soft zones as it does elsewhere.
+        // Climbing lengthens a leg inside soft zones as it does outside.
         let dearer = if length > 0.0 { exposed / length } else { 0.0 };
         let (w, weight) = (self.prices.fuel + dearer, self.weight);
-        // Flown with the slope at which a metre of climb costs as much as one off the middle.
+        // Flown with the slope at which a metre of climb costs as much as a metre off the middle.
         let slope = climb_worth(weight / w).min(self.steepest);
         let climbed = (length * slope).min(self.height);
         let slant = (length * length + climbed * climbed).sqrt();
         (w * (slant - length) + weight * (self.height - climbed)).max(0.0)
     }
 
-    /// What a route costs at least on top of what it costs seen from above to come out of the zone round the end, first
-    /// waypoint included, if a potential rises on that way by no more than its fuel and `more`; 0 where there is no zone.
+    /// The least extra cost of leaving the zone round the end, first waypoint included, beyond the cost seen from
+    /// above, if a potential rises on that way by at most its fuel and `more`; 0 where there is no zone.
     pub(super) fn leaving(&self, more: f64) -> f64 {
         let Some(ramp) = self.ramp else {
             return 0.0;
@@ -82,8 +82,8 @@ impl End<'_> {
             .fold(within, f64::min)
     }
 
-    /// What the way out of the zone costs on top of that `rise`, with a first waypoint after no more than `longest` metres,
-    /// which may be beyond the zone.
+    /// The extra cost of the way out of the zone beyond that `rise`, with a first waypoint after at most `longest`
+    /// metres, which may be beyond the zone.
     pub(super) fn beginning(&self, ramp: &Ramp, longest: f64, rise: f64) -> f64 {
         let is_within = longest <= ramp.reach;
         let rates = Rates {
@@ -94,7 +94,8 @@ impl End<'_> {
         ramp.leaving(rise, rates, self.height, longest * self.steepest)
     }
 
-    /// What a leg to any of the places along a string costs more at least than that does so far, about.
+    /// The approximate least extra cost of a leg to any of the places along a string, beyond the cost of the string up
+    /// to there.
     pub(super) fn climbing_along(&self, string: impl Iterator<Item = (Point2, f64)>) -> f64 {
         let reach = self.reach();
         let near = string.filter(|(at, _)| (at - self.from).norm() <= reach);
@@ -102,7 +103,8 @@ impl End<'_> {
         more.fold(f64::INFINITY, f64::min).max(0.0)
     }
 
-    /// The length from which on a leg that is `exposed` costs at most so much for climbing gently, which is not 0.
+    /// The length from which on a leg that is `exposed` costs at most this `steepness` for climbing gently, which must
+    /// not be 0.
     pub(super) fn length_of(&self, steepness: f64, exposed: f64) -> f64 {
         let (mut low, mut high) = (0.0, (self.to - self.from).norm());
         while self.gently(high, exposed) > steepness && high < 1e12 {
@@ -139,7 +141,8 @@ mod tests {
     #[test]
     fn climbing_costs_more_in_soft_zones() {
         check(|end| {
-            // A metre costs 2 in place of 0.5: as much is climbed as a metre of climb costs one off the middle.
+            // A metre costs 2 instead of 0.5: the leg climbs until a metre of climb costs as much as a metre off the
+            // middle.
             let climbed = 100.0 / 3.0_f64.sqrt();
             let slant = (1e4 + climbed * climbed).sqrt();
             let expected = 2.0 * (slant - 100.0) + 100.0 - climbed;

@@ -1,4 +1,4 @@
-//! What first and last legs cost beyond what a potential rises by on the way.
+//! The cost of first and last legs beyond the rise of a potential along them.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -13,17 +13,18 @@ use super::{MOST_CORNERS, ends};
 use crate::geometry::{Point2, Vector2};
 use crate::scenario::Scenario;
 
-/// What a kind of leg may be off by, as a share of what is proven, before it is told apart.
+/// Possible gain from dividing a kind of leg, as a share of what is proven, below which it is not divided.
 const LEAST: f64 = 3e-4;
 
-/// Sectors of the edge of a zone that are told apart.
+/// Number of sectors into which the edge of a zone is divided.
 const SECTORS: u32 = 64;
 
-/// Kinds of legs that are looked at, for each end; fewer among more than `MOST_CORNERS`.
+/// Number of kinds of legs examined for each end; fewer with more than `MOST_CORNERS` corners.
 const EFFORT: usize = 1500;
 
-/// What no route undercuts by `proof` and by the legs from and to ends that are off the middle of the band: the potential
-/// rises by no more than the way costs seen from above, and both legs are straight and climb; 0 where that costs nothing.
+/// A lower bound for all routes from `proof` and the legs at ends that are off the middle of the band: the potential
+/// rises by no more than the cost of the way seen from above, and both legs are straight and climb; 0 where that costs
+/// nothing.
 pub(in super::super) fn over(
     mut proof: Proof,
     scenario: &Scenario,
@@ -46,7 +47,7 @@ pub(in super::super) fn over(
     proof.with(excess(0) + excess(1))
 }
 
-/// The least that a leg costs beyond the `rise`, as fine as asked for unless that takes more effort.
+/// The least cost of a leg beyond the `rise`, as accurate as requested unless that takes more effort.
 fn least(
     end: &End,
     rise: &dyn Fn(Point2, f64) -> Option<f64>,
@@ -81,8 +82,8 @@ fn least(
     0.0
 }
 
-/// The zone round an end outside the band, and the most that the potential rises by on the way to its edge; `None` where
-/// there is none.
+/// The zone round an end outside the band, and the greatest rise of the potential on the way to its edge; `None` where
+/// there is no zone.
 fn zone(end: &End, rise: &dyn Fn(Point2, f64) -> Option<f64>) -> Option<(Ramp, f64)> {
     let ramp = end.ramp?;
     let half = std::f64::consts::PI / f64::from(SECTORS);

@@ -1,4 +1,4 @@
-//! What legs that begin in one place, in a sector of headings, are exposed to at least.
+//! The least exposure of legs that begin in one place, in a sector of headings.
 
 use super::super::event::ramp;
 use super::super::wall::Wall;
@@ -6,10 +6,10 @@ use crate::geometry::{Point2, Point3, Segment};
 use crate::seeding::outline::OutlineShape;
 use crate::threat::{Cylinder, Shape, Threat};
 
-/// Pieces of a leg beside a ring of which the exposure is summed up.
+/// Number of pieces of a leg beside a ring over which the exposure is summed.
 const PIECES: u32 = 24;
 
-/// Exposure to `wall` of every leg as long as that from `from` to `at`, and within `half` radians of it.
+/// Least exposure to `wall` of all legs as long as that from `from` to `at`, within `half` radians of its heading.
 pub(super) fn least(wall: &Wall, (from, at): (Point2, Point2), half: f64) -> f64 {
     let (center, radius) = wall.circle();
     let (way, between) = (at - from, center - from);
@@ -19,7 +19,7 @@ pub(super) fn least(wall: &Wall, (from, at): (Point2, Point2), half: f64) -> f64
     }
     match wall.shape {
         OutlineShape::Disc(_) => {
-            // At every point of a leg the centre is the farther the more the leg leads past it.
+            // At every point of a leg, the farther the leg leads past the centre, the farther the centre is.
             let off = libm::atan2(way.perp(&between).abs(), way.dot(&between));
             let most = (off + half).min(std::f64::consts::PI);
             past(wall.influence, length, (between.norm(), most))
@@ -28,8 +28,8 @@ pub(super) fn least(wall: &Wall, (from, at): (Point2, Point2), half: f64) -> f64
     }
 }
 
-/// Exposure to `wall` between two places on the way of every leg that begins in `from` and leads within `half` radians of
-/// theirs.
+/// Least exposure to `wall` between two places on the way of all legs that begin in `from` and lead within `half`
+/// radians of their heading.
 pub(super) fn between(wall: &Wall, from: Point2, [near, far]: [Point2; 2], half: f64) -> f64 {
     let to = |at: Point2| least(wall, (from, at), half);
     if near == from {
@@ -42,7 +42,7 @@ pub(super) fn between(wall: &Wall, from: Point2, [near, far]: [Point2; 2], half:
     }
 }
 
-/// Exposure to a disc of a leg of `length` that begins `away` from its centre and leads `off` radians past it.
+/// Exposure to a disc of a leg of `length` that begins `away` from its centre and heads `off` radians past it.
 fn past(influence: f64, length: f64, (away, off): (f64, f64)) -> f64 {
     let leg = Segment {
         a: Point3::origin(),
@@ -61,7 +61,7 @@ fn past(influence: f64, length: f64, (away, off): (f64, f64)) -> f64 {
     disc.encounter(&leg).exposure
 }
 
-/// Exposure to a ring of every leg that is nowhere farther than `spread` from the one from `a` to `b`.
+/// Least exposure to a ring of all legs that are nowhere farther than `spread` from the one from `a` to `b`.
 fn beside(wall: &Wall, (a, b): (Point2, Point2), spread: f64) -> f64 {
     let (center, radius) = wall.circle();
     let (way, reach) = (b - a, radius + wall.influence);
@@ -79,7 +79,7 @@ fn beside(wall: &Wall, (a, b): (Point2, Point2), spread: f64) -> f64 {
     let mut before = depth(0);
     for idx in 1..=PIECES {
         let after = depth(idx);
-        // The depth beside a convex ring is concave, and changes by no more than a metre a metre beside any.
+        // The depth beside a convex ring is concave; beside any ring it changes by at most a metre per metre.
         sum += if is_convex && before > 0.0 && after > 0.0 {
             0.5 * piece * (before + after)
         } else {
@@ -97,7 +97,7 @@ mod tests {
     use super::super::super::prices::Prices;
     use super::*;
 
-    /// No leg of a sector is exposed less, summed up finely, and one to a disc hardly more where the sector is slim.
+    /// No leg of a sector has less exposure, summed finely; one to a disc has hardly more where the sector is slim.
     #[test]
     fn no_leg_of_a_sector_is_exposed_less() {
         let scenario = scenario(

@@ -1,4 +1,4 @@
-//! Kinds of first and last legs: what a route costs at least that has such a one.
+//! Kinds of first and last legs: the least cost of a route that has one.
 
 use nalgebra::Vector2;
 
@@ -11,41 +11,41 @@ use super::slopes::Slopes;
 use super::threats::Climb;
 use crate::geometry::Point2;
 
-/// No string is pulled for sectors that are wider than this share of the way.
+/// No string is computed for sectors wider than this share of the way.
 const COARSEST: f64 = 0.04;
 
-/// Sectors to begin with.
+/// Initial number of sectors.
 const SECTORS: u32 = 8;
 
 /// First legs of routes, or, seen backwards, last ones.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Kind {
-    /// The middle of their headings, and the half of their range, radians.
+    /// The middle of their headings, and half of their range, radians.
     heading: f64,
     half: f64,
     /// Lengths seen from above, metres; the second may be infinite.
     pub(super) lengths: [f64; 2],
-    /// No route with such a leg costs less seen from above.
+    /// No route with such a leg costs less than this seen from above.
     pub(super) cost: f64,
-    /// What the leg costs at least on top.
+    /// Least extra cost of the leg.
     pub(super) steepness: f64,
-    /// What the shortest of them cost at least seen from above, less the fuel from their ends to that of the one in the
+    /// The least cost of the shortest of them seen from above, less the fuel from their ends to that of the one in the
     /// middle.
     leg: f64,
-    /// What may be gained by cutting the headings.
+    /// Possible gain from dividing the headings.
     turned: f64,
-    /// Whether a string may tell that the cost is higher.
+    /// Whether a string may show that the cost is higher.
     pub(super) is_rough: bool,
-    /// What the soft zones along the shortest of them cost at least.
+    /// Least cost of the soft zones along the shortest of them.
     exposed: f64,
-    /// How they climb; `None` for all.
+    /// Their slopes; `None` for all.
     slopes: Option<Slopes>,
-    /// What may be gained by telling apart how they climb.
+    /// Possible gain from dividing the slopes.
     sloped: f64,
 }
 
 impl Kind {
-    /// All legs, of routes that cost `least` or more.
+    /// All legs, for routes that cost `least` or more.
     pub(super) fn all(least: f64) -> Vec<Self> {
         let half = std::f64::consts::PI / f64::from(SECTORS);
         let sector = |sector| Self {
@@ -71,7 +71,7 @@ impl Kind {
 
 /// Where a route begins, or, seen backwards, ends.
 pub(super) struct End<'a> {
-    /// 0 of the start, 1 of the target.
+    /// 0 for the start, 1 for the target.
     pub(super) which: usize,
     pub(super) from: Point2,
     pub(super) to: Point2,
@@ -79,11 +79,11 @@ pub(super) struct End<'a> {
     pub(super) height: f64,
     /// Whether it lies below that.
     pub(super) is_below: bool,
-    /// Of a metre between the waypoint and the middle of the band.
+    /// Cost of a metre between the waypoint and the middle of the band.
     pub(super) weight: f64,
-    /// Metres of climb in a metre seen from above, at most.
+    /// Greatest climb per metre seen from above, metres.
     pub(super) steepest: f64,
-    /// Where it lies outside the band.
+    /// Set where it lies outside the band.
     pub(super) ramp: Option<Ramp>,
     /// Metres from it to the zone round the other end.
     pub(super) apart: f64,
@@ -95,7 +95,7 @@ pub(super) struct End<'a> {
 }
 
 impl End<'_> {
-    /// What may be gained by looking at `kind` more closely.
+    /// Possible gain from examining `kind` more closely.
     pub(super) fn gain(&self, kind: &Kind) -> f64 {
         if kind.is_rough {
             f64::INFINITY
@@ -104,16 +104,16 @@ impl End<'_> {
         }
     }
 
-    /// What may be gained by cutting the lengths of `kind`.
+    /// Possible gain from dividing the lengths of `kind`.
     fn longer(&self, kind: &Kind) -> f64 {
-        // What is flown in the zone round the other end is not told apart.
+        // What is flown in the zone round the other end is not divided.
         if kind.lengths[0] >= self.apart {
             return 0.0;
         }
         self.steepness([kind.lengths[0]; 2], kind.exposed, kind.slopes) - kind.steepness
     }
 
-    /// `kind` in parts, not yet priced.
+    /// `kind` divided into parts, not yet priced.
     pub(super) fn parts(&self, kind: &Kind) -> Vec<Kind> {
         let longer = self.longer(kind);
         if kind.sloped > kind.turned.max(longer) {
@@ -140,7 +140,7 @@ impl End<'_> {
         cut.map(|lengths| Kind { lengths, ..*kind }).to_vec()
     }
 
-    /// The length at which those of `kind` are cut.
+    /// The length at which `kind` is divided.
     fn between(&self, kind: &Kind) -> f64 {
         let [shortest, longest] = kind.lengths;
         if kind.slopes.is_some() {
@@ -168,7 +168,7 @@ impl End<'_> {
         self.length_of(0.5 * (steepest + kind.steepness), kind.exposed)
     }
 
-    /// `kind`, with what its legs cost at least at the price of the straight line from there.
+    /// `kind`, with the least cost of its legs at the price of the straight line from there.
     pub(super) fn priced(&self, kind: Kind) -> Kind {
         let [length, longest] = kind.lengths;
         if length <= 0.0 {
@@ -197,8 +197,8 @@ impl End<'_> {
         }
     }
 
-    /// `kind`, with what its legs cost at least beyond the `rise` of a potential on the way to any place within so many
-    /// metres of another, before they come to the zone round the other end.
+    /// `kind`, with the least cost of its legs beyond the `rise` of a potential on the way to any place within a given
+    /// distance of another, before they enter the zone round the other end.
     pub(super) fn beyond(&self, kind: Kind, rise: &dyn Fn(Point2, f64) -> Option<f64>) -> Kind {
         let [shortest, longest] = kind.lengths;
         let kind = Kind {
@@ -228,7 +228,7 @@ impl End<'_> {
                 .cost
                 .max(fuel * length + exposed + self.later(length) - highest),
             steepness: self.before_other_zone(kind.lengths, exposed, kind.slopes),
-            // The potential is at least as steep as fuel is dear, about.
+            // The potential is at least about as steep as the fuel price.
             turned: fuel * spread + (middle - exposed),
             exposed,
             sloped: self.sloped(&kind, (at, spread), exposed),
@@ -236,8 +236,8 @@ impl End<'_> {
         }
     }
 
-    /// `kind`, with the price of the string from there, and the ways looked at; one that is proven to be `enough` is not
-    /// pulled to its end.
+    /// `kind`, with the price of the string from there, and the ways examined; a string proven to cost `enough` is not
+    /// computed to the end.
     pub(super) fn pulled(&self, kind: Kind, enough: f64) -> (Kind, usize) {
         let (at, spread) = self.reached(&kind);
         let (rest, ways) = self.rest(at, spread, enough - kind.steepness - kind.leg);
@@ -249,15 +249,16 @@ impl End<'_> {
         (kind, ways)
     }
 
-    /// Where the shortest leg in the middle of `kind` ends, and how far others are from it at most, point by point.
+    /// Where the shortest leg in the middle of `kind` ends, and the greatest distance of others from it, point by
+    /// point.
     fn reached(&self, kind: &Kind) -> (Point2, f64) {
         let length = kind.lengths[0];
         let way = Vector2::new(libm::cos(kind.heading), libm::sin(kind.heading)) * length;
         (self.from + way, length * kind.half)
     }
 
-    /// What may be gained by telling apart how legs of `kind` climb that are `exposed`: as much as threats that may be passed
-    /// cost at most.
+    /// Possible gain from dividing the slopes of legs of `kind` that are `exposed`: the greatest cost of passable
+    /// threats.
     fn sloped(&self, kind: &Kind, (at, spread): (Point2, f64), exposed: f64) -> f64 {
         if kind.slopes.is_some() || self.radii.iter().all(Option::is_some) {
             return 0.0;
@@ -268,10 +269,10 @@ impl End<'_> {
         self.exposed(at, kind.half, Climb::Along)[0] - exposed
     }
 
-    /// What no route from within `spread` of `at` to the other end undercuts, but for the fuel of `spread`, or `enough` of
-    /// it, and the ways looked at.
+    /// A lower bound for routes from within `spread` of `at` to the other end, except for the fuel of `spread`, or
+    /// `enough` of it, and the ways examined.
     fn rest(&self, at: Point2, spread: f64, enough: f64) -> (f64, usize) {
-        // Free to move to the middle of the sector first.
+        // The way may use the middle of the sector for free.
         let radii = narrowed((self.walls, self.radii), at, spread);
         let field = (self.walls, &radii[..]);
         let here = Place {
@@ -301,7 +302,7 @@ pub(super) mod tests {
     use super::*;
     use crate::seeding::arc::point_segment;
 
-    /// The start, 100 m below the middle of the band, at 1 a metre off it, for climbs of 45 degrees.
+    /// The start, 100 m below the middle of the band, at a cost of 1 per metre off it, for climbs of 45 degrees.
     pub(in super::super) fn end<'a>(
         prices: &'a Prices,
         walls: &'a [Wall],
@@ -325,7 +326,7 @@ pub(super) mod tests {
         }
     }
 
-    /// From (200, 100), 100 m below the middle of the band, at 0.5 a metre and 1 a metre off the middle.
+    /// From (200, 100), 100 m below the middle of the band, at 0.5 per metre and 1 per metre off the middle.
     pub(in super::super) fn check(examine: impl Fn(&End)) {
         let scenario = scenario(
             r#""threats": [{"kind": "cylinder", "center": {"x": 400, "y": 160}, "radius": 50, "influence": 80}]"#,
@@ -336,7 +337,7 @@ pub(super) mod tests {
         examine(&end(&prices, &walls, &radii));
     }
 
-    /// However often kinds are cut: all legs are of one, and none is told to cost more than it does.
+    /// However often kinds are divided: every leg belongs to one, and none is said to cost more than it does.
     #[test]
     fn every_leg_is_of_a_kind_that_costs_no_more() {
         check(|end| {
@@ -354,7 +355,7 @@ pub(super) mod tests {
                 );
                 let way = Vector2::new(libm::cos(heading), libm::sin(heading));
                 let at = end.from + way * length;
-                // Nothing is paid but fuel where a leg keeps away from the soft zone, and nothing is in the way from there.
+                // Only fuel is paid where a leg avoids the soft zone and nothing is in the way from there.
                 let least = end.prices.fuel * (length + (end.to - at).norm());
                 let is_free = [(end.from, at), (at, end.to)]
                     .iter()
@@ -370,8 +371,8 @@ pub(super) mod tests {
         });
     }
 
-    /// Among threats to be passed, some of whose heights hold the start and some not: no leg that keeps out of cores costs
-    /// less than it is told to, however it climbs.
+    /// Among passable threats, some of whose heights include the start: no leg that stays out of cores costs less than
+    /// stated, however it climbs.
     #[test]
     fn no_leg_costs_less_than_its_kind_by_threats_it_climbs_over() {
         let discs = [

@@ -1,4 +1,4 @@
-//! What first and last legs cost, for a potential to be shaped by.
+//! The cost of first and last legs, used to shape a potential.
 
 use super::super::potential::{FREE, Lead, Leads};
 use super::super::prices::Prices;
@@ -9,13 +9,13 @@ use super::threats::Climb;
 use crate::geometry::Point2;
 use crate::scenario::Scenario;
 
-/// How many times as far as the steepest climb to the middle of the band takes legs are looked at,
+/// Legs are considered up to this multiple of the distance of the steepest climb to the middle of the band.
 const RUNS: f64 = 3.0;
 
-/// but not farther than this share of the way.
+/// Legs are considered no farther than this share of the way.
 const FARTHEST: f64 = 0.5;
 
-/// The legs from both ends, places being measured from the start on.
+/// The legs from both ends, with the start as origin.
 pub(in super::super) fn leads<'a>(
     scenario: &Scenario,
     prices: &'a Prices,
@@ -43,7 +43,7 @@ impl End<'_> {
         (RUNS * self.height / self.steepest).min(FARTHEST * self.prices.direct())
     }
 
-    /// What a leg to `at` costs, waypoint included; infinite where it enters a core.
+    /// The cost of a leg to `at`, waypoint included; infinite where it enters a core.
     pub(super) fn leg_to(&self, at: Point2) -> f64 {
         if self.is_blocked(at, 0.0, Climb::Any) {
             return f64::INFINITY;
@@ -61,8 +61,8 @@ mod tests {
     use super::super::over;
     use super::*;
 
-    /// From 85 m below the middle of the band to 44 above it, among 36 discs whose soft zones overlap: legs lead where none
-    /// of the cheapest ways seen from above does.
+    /// From 85 m below the middle of the band to 44 above it, among 36 discs with overlapping soft zones: legs lead
+    /// where none of the cheapest ways seen from above does.
     #[test]
     fn a_potential_that_knows_of_legs_proves_more_with_them() {
         let mut scenario = among((0..36).map(|idx| {
@@ -90,7 +90,7 @@ mod tests {
         let [across_with, with] = proven(&leads(&scenario, &prices, (&walls, &radii), &|| false));
         // The best route known has 30 waypoints.
         assert!(with > 1.005 * free && with <= 1492.740, "{free} {with}");
-        // What is proven of the way seen from above hardly suffers.
+        // What is proven about the way seen from above hardly suffers.
         assert!(across_with > 0.985 * across, "{across} {across_with}");
     }
 }

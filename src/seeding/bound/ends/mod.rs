@@ -1,5 +1,6 @@
-//! What start and target at another height than the middle of the band cost on top of the string: a first leg is
-//! straight, so that where the way bends soon, it is short and steep. The argument is section 7 of docs/BOUND.md.
+//! The extra cost, on top of the string, of a start and target at another height than the middle of the band: a first
+//! leg is straight, so that where the way bends soon, it is short and steep. The argument is section 7 of
+//! docs/BOUND.md.
 
 mod climb;
 mod excess;
@@ -25,22 +26,22 @@ use crate::terrain::Terrain;
 use kind::{End, Kind};
 use ramp::Ramp;
 
-/// With more corners than this, only the difference in height of the ends is made use of.
+/// With more corners than this, only the difference in height of the ends is used.
 const MOST_CORNERS: usize = 80;
 
-/// What two kinds of legs may differ by, as a share of what a route costs, before they are told apart.
+/// Possible gain from dividing a kind of leg, as a share of a route's cost, below which it is not divided.
 const LEAST: f64 = 1e-3;
 
-/// A kind of leg that is proven to cost so much more than the bound so far is not looked at more closely for now.
+/// A kind of leg proven to cost this multiple of the bound so far is not examined further for now.
 const AHEAD: f64 = 1.03;
 
-/// Effort of a string, besides the ways that are looked at for it and the corners of rings.
+/// Effort of a string, in addition to the ways examined for it and the corners of rings.
 const STRING: usize = 20;
 
-/// So many corners of rings are as much effort as a kind of leg.
+/// This many corners of rings take as much effort as a kind of leg.
 const CORNERS: usize = 3;
 
-/// Whether there are so many corners that legs are not looked at.
+/// Whether there are too many corners to examine legs.
 pub(super) fn are_too_many(walls: &[Wall]) -> bool {
     walls.iter().map(|wall| wall.centers().len()).sum::<usize>() > MOST_CORNERS
 }
@@ -48,16 +49,16 @@ pub(super) fn are_too_many(walls: &[Wall]) -> bool {
 /// The first and the last legs of routes round widened walls.
 pub(super) struct Legs<'a> {
     prices: &'a Prices,
-    /// `None` where legs cost nothing on top.
+    /// `None` where legs cost nothing extra.
     told_apart: Option<([End<'a>; 2], [Vec<Kind>; 2])>,
-    /// Of the rings.
+    /// Number of corners of the rings.
     corners: usize,
-    /// What may still be spent on them: one for a kind of leg, more for a string. Without any, nothing more is proven.
+    /// Remaining effort: one unit for a kind of leg, more for a string. Without any, nothing more is proven.
     pub(super) effort: usize,
 }
 
 impl<'a> Legs<'a> {
-    /// Of routes that go round `walls` widened to radii, and cost `least` or more seen from above.
+    /// For routes that go round `walls` widened to radii, and cost `least` or more seen from above.
     pub(super) fn new(
         scenario: &Scenario,
         prices: &'a Prices,
@@ -77,16 +78,16 @@ impl<'a> Legs<'a> {
         }
     }
 
-    /// What no route undercuts that costs `least` or more seen from above, by what is known of legs.
+    /// A lower bound for routes that cost `least` or more seen from above, from what is known of legs.
     pub(super) fn told(&self, least: f64) -> f64 {
         let level = self.prices.climbing_at(least);
         let told_apart = self.told_apart.as_ref();
         told_apart.map_or(level, |(_, kinds)| cheapest(kinds, least).0.max(level))
     }
 
-    /// What no route undercuts that costs `least` or more seen from above: of all kinds of first and last legs, the
-    /// cheapest together. These are told apart more finely until it does not matter, until all together cost
-    /// `enough`, or until the effort is spent.
+    /// A lower bound for routes that cost `least` or more seen from above: the cheapest combination of all kinds of
+    /// first and last legs. These are divided further until it does not matter, until all combinations cost `enough`,
+    /// or until the effort is spent.
     pub(super) fn bound(&mut self, least: f64, enough: f64) -> f64 {
         let level = self.prices.climbing_at(least);
         let Some((ends, kinds)) = &mut self.told_apart else {
@@ -161,8 +162,8 @@ fn ends<'a>(
     })
 }
 
-/// What a string, told by places and what it costs up to each, costs more since its ends are off the middle of the band,
-/// about.
+/// The approximate extra cost of a string, given by places and the cost up to each, because its ends are off the middle
+/// of the band.
 pub(super) fn climbing(
     scenario: &Scenario,
     prices: &Prices,
@@ -185,13 +186,13 @@ pub(super) fn climbing(
     ends.iter().map(more).sum()
 }
 
-/// The least that a route can cost whose first leg is one of the first `kinds` and whose last leg is one of the others,
-/// and which these are. Both have the cheapest first.
+/// The least cost of a route whose first leg is one of the first `kinds` and whose last leg is one of the others, and
+/// which legs these are. Both are sorted by cost, cheapest first.
 fn cheapest(kinds: &[Vec<Kind>; 2], least: f64) -> (f64, [usize; 2]) {
     let cost = |end: usize, idx: usize| kinds[end].get(idx).map_or(f64::INFINITY, |kind| kind.cost);
     let steepness = |end: usize, idx: usize| kinds[end][idx].steepness;
     let (mut found, mut worst) = (f64::INFINITY, [0; 2]);
-    // Of those up to a cost, which rises, the ones that cost least on top.
+    // Of the kinds up to a rising cost, those with the least extra cost.
     let mut flattest: [Option<usize>; 2] = [None; 2];
     let mut next = [0; 2];
     while next[0] < kinds[0].len() || next[1] < kinds[1].len() {

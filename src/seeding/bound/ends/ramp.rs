@@ -1,5 +1,5 @@
-//! A leg that leaves the zone round an end outside the band is in the band from there on: it is as steep as that asks for,
-//! however long it is. The argument is section 7 of docs/BOUND.md.
+//! A leg that leaves the zone round an end outside the band is in the band from there on: it is as steep as that
+//! requires, however long it is. The argument is section 7 of docs/BOUND.md.
 
 use super::super::toll::climb_worth;
 use crate::cost::Tolerance;
@@ -10,25 +10,25 @@ use crate::scenario::{AltitudeBand, Scenario};
 pub(super) struct Ramp {
     /// Metres from the end within which a route may be outside the band.
     pub(super) reach: f64,
-    /// Least climb towards the band, in a metre seen from above, of a leg that leads farther.
+    /// Least climb towards the band, per metre seen from above, of a leg that leads beyond the zone.
     slope: f64,
 }
 
-/// What a metre of a leg costs, and one off the middle of the band.
+/// The cost of a metre of leg, and of a metre off the middle of the band.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rates {
     pub(super) fuel: f64,
-    /// What the soft zones along the shortest leg cost.
+    /// Cost of the soft zones along the shortest leg.
     pub(super) exposed: f64,
     pub(super) weight: f64,
 }
 
 impl Ramp {
-    /// Round both ends at so much above level ground; none where they are within the band, or where leaving one zone may
-    /// be entering the other.
+    /// For both ends at these heights above level ground; none where they are within the band, or where leaving one
+    /// zone may be entering the other.
     pub(super) fn round(heights: [f64; 2], scenario: &Scenario) -> [Option<Self>; 2] {
         let outside = heights.map(|height| beyond(scenario.altitude, height));
-        // A hair wider than the zones are.
+        // A hair wider than the real zones.
         let allowed = libm::tan(scenario.vehicle.max_climb_deg.to_radians());
         let reaches = outside.map(|outside| 2.0 * outside / allowed * (1.0 + 1e-9));
         let apart = (scenario.target.xy() - scenario.start.xy()).norm();
@@ -46,13 +46,14 @@ impl Ramp {
         })
     }
 
-    /// What the way out of the zone costs at least on top of the `rise` on it of a potential that rises by no more than
-    /// what a way costs seen from above, with the first waypoint: on that way, no more than `highest` metres above the
-    /// end, and cheapest at `height`.
+    /// The least extra cost of the way out of the zone, with the first waypoint, beyond the `rise` on it of a potential
+    /// that rises by no more than the cost of the way seen from above: at most `highest` metres above the end on that
+    /// way, and cheapest at `height`.
     pub(super) fn leaving(&self, rise: f64, rates: Rates, height: f64, highest: f64) -> f64 {
         let Rates { fuel, weight, .. } = rates;
         let across = rise.max(fuel * self.reach);
-        // Convex in the climb to the waypoint: as high as a metre of climb costs less than one off the middle.
+        // Convex in the climb to the waypoint: climb as long as a metre of climb costs less than a metre off the
+        // middle.
         let best = across / fuel * climb_worth(weight / fuel);
         let out = self.reach * self.slope;
         let waypoint = best.max(out).min(height).min(highest);
@@ -60,13 +61,13 @@ impl Ramp {
         libm::hypot(across, fuel * climbed) - rise + weight * (height - waypoint).max(0.0)
     }
 
-    /// Metres seen from above in which a leg that leaves the zone climbs so many at least.
+    /// Metres seen from above in which a leg that leaves the zone climbs at least this height.
     pub(super) fn run(&self, height: f64) -> f64 {
         self.reach.max(height / self.slope)
     }
 
-    /// What a leg that leaves the zone, with a length seen from above in `lengths`, costs at least on top of what it costs
-    /// seen from above: from `height` metres off the middle of the band, at no more than the `steepest` climb.
+    /// The least extra cost of a leg that leaves the zone, with a length seen from above in `lengths`, beyond its cost
+    /// seen from above: from `height` metres off the middle of the band, with at most the `steepest` climb.
     pub(super) fn steepness(
         &self,
         lengths: [f64; 2],
@@ -78,8 +79,8 @@ impl Ramp {
     }
 }
 
-/// What a leg with a length seen from above in `lengths`, and a slope in `slopes` towards the middle of the band, costs at
-/// least on top of what it costs seen from above: from `height` metres off the middle.
+/// The least extra cost of a leg with a length seen from above in `lengths`, and a slope in `slopes` towards the middle
+/// of the band, beyond its cost seen from above: from `height` metres off the middle.
 pub(super) fn climbing(
     [gentlest, steepest]: [f64; 2],
     [shortest, longest]: [f64; 2],

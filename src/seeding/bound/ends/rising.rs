@@ -1,5 +1,5 @@
-//! What it costs on top of a string to come out of the zones round ends outside the band, however that is flown. The
-//! argument is section 7 of docs/BOUND.md.
+//! The cost, on top of a string, of leaving the zones round ends outside the band, however that is flown. The argument
+//! is section 7 of docs/BOUND.md.
 
 use super::super::prices::Prices;
 use super::super::string::{between, departures, narrowed};
@@ -7,8 +7,8 @@ use super::super::wall::Wall;
 use super::ends;
 use crate::scenario::Scenario;
 
-/// What no route undercuts that goes round `walls` widened to `radii`, by what it takes to climb out of the zones round
-/// ends below the band, or to descend from above it; 0 where there are none.
+/// A lower bound for routes round `walls` widened to `radii`, from the climb out of the zones round ends below the
+/// band, or the descent from above it; 0 where there are no such zones.
 pub(in super::super) fn rising(
     scenario: &Scenario,
     prices: &Prices,

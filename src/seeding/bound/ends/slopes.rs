@@ -1,18 +1,18 @@
-//! How a first or last leg climbs, where that decides which threats it leads over or under: those that may be passed are
-//! in its way for as long as it is at their heights. The argument is section 7 of docs/BOUND.md.
+//! How a first or last leg climbs, where that decides which threats it leads over or under: passable threats are in its
+//! way while it is at their heights. The argument is section 7 of docs/BOUND.md.
 
 use super::ramp::{Rates, climbing};
 
-/// Parts of the slopes towards the middle of the band, and of those away from it, that are told apart.
+/// Number of parts into which slopes towards the middle of the band, and those away from it, are divided.
 const PARTS: [usize; 2] = [8, 3];
 
 /// How many times as steep one part is as the next.
 const RATIO: f64 = 1.7;
 
-/// No slopes beyond are told apart.
+/// Slopes beyond this are not distinguished.
 const STEEP: f64 = 2.0;
 
-/// Metres that legs climb in a metre seen from above.
+/// Climb of legs per metre seen from above, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Slopes {
     /// Towards the middle of the band, or away from it.
@@ -41,15 +41,16 @@ impl Slopes {
         parts
     }
 
-    /// Whether a leg that climbs so many metres towards the middle of the band in one seen from above is of them.
+    /// Whether a leg that climbs this many metres towards the middle of the band per metre seen from above is one of
+    /// them.
     #[cfg(test)]
     pub(super) fn hold(&self, slope: f64) -> bool {
         self.is_towards == (slope >= 0.0) && (self.least..=self.most).contains(&slope.abs())
     }
 
-    /// From where to where, metres seen from above, every such leg is at the heights of a threat: these end so many
-    /// metres towards the middle of the band from where the leg begins, and so many away from it, and less than nothing
-    /// where it begins beyond them.
+    /// The range, metres seen from above, in which every such leg is at the heights of a threat: these end `towards`
+    /// metres towards the middle of the band from where the leg begins, and `away` metres away from it; negative where
+    /// it begins beyond them.
     pub(super) fn at_heights(&self, [towards, away]: [f64; 2]) -> [f64; 2] {
         let (ahead, behind) = if self.is_towards {
             (towards, away)
@@ -65,7 +66,7 @@ impl Slopes {
         [from, to]
     }
 
-    /// What a leg with a length seen from above in `lengths` costs at least on top of what it costs seen from above,
+    /// The least extra cost of a leg with a length seen from above in `lengths`, beyond its cost seen from above,
     /// waypoint included, from `height` metres off the middle of the band.
     pub(super) fn steepness(&self, lengths: [f64; 2], rates: Rates, height: f64) -> f64 {
         if self.is_towards {

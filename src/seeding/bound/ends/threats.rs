@@ -1,5 +1,5 @@
-//! Which threats first and last legs meet: those to be passed only while they are at their heights. The argument is section
-//! 7 of docs/BOUND.md.
+//! Which threats first and last legs meet: passable ones only while the legs are at their heights. The argument is
+//! section 7 of docs/BOUND.md.
 
 use super::super::departure::leaving;
 use super::super::wall::Wall;
@@ -13,7 +13,7 @@ use crate::seeding::outline::OutlineShape;
 /// How legs climb.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Climb {
-    /// As they like.
+    /// In any way.
     Any,
     As(Slopes),
     /// So that no threat is ever passed.
@@ -21,10 +21,10 @@ pub(super) enum Climb {
 }
 
 impl End<'_> {
-    /// The walls that count for legs that climb so, each with the metres seen from above from which and up to which it
+    /// The walls that count for legs that climb in this way, each with the range, metres seen from above, in which it
     /// does.
     fn counting(&self, climb: Climb) -> impl Iterator<Item = (&Wall, [f64; 2])> {
-        // As much of the way belongs to the other end.
+        // The second half of the way belongs to the other end.
         let half = 0.5 * self.prices.direct();
         let both = self.walls.iter().zip(self.radii);
         let counts = both.map(move |(wall, radius)| {
@@ -48,7 +48,7 @@ impl End<'_> {
         counts.filter(|(_, [from, to])| from < to)
     }
 
-    /// How far a leg to `at` leads in so many metres.
+    /// The point of a leg to `at` after this many metres, or its end.
     fn at_most(&self, at: Point2, metres: f64) -> Point2 {
         let way = at - self.from;
         let length = way.norm();
@@ -59,7 +59,7 @@ impl End<'_> {
         }
     }
 
-    /// What is paid at least, after a leg of `length`, in the zones of walls that cannot be passed yet.
+    /// The least that is paid, after a leg of `length`, in the zones of walls that cannot be passed yet.
     pub(super) fn later(&self, length: f64) -> f64 {
         let passable = self
             .counting(Climb::Any)
@@ -71,7 +71,7 @@ impl End<'_> {
         self.prices.exposure * exposed.sum::<f64>()
     }
 
-    /// Whether every leg that climbs so to within `spread` of `at` enters a core.
+    /// Whether every leg that climbs in this way to within `spread` of `at` enters a core.
     pub(super) fn is_blocked(&self, at: Point2, spread: f64, climb: Climb) -> bool {
         let length = (at - self.from).norm();
         let counting = self.counting(climb);
@@ -92,8 +92,8 @@ impl End<'_> {
             })
     }
 
-    /// What the soft zones cost of all legs that climb so to as far as `at` and within `half` radians of it: no less
-    /// than the first, and of the one to `at` about the second.
+    /// The cost of the soft zones for all legs that climb in this way as far as `at` and within `half` radians of it:
+    /// the first is a lower bound, the second is approximately the cost of the leg to `at`.
     pub(super) fn exposed(&self, at: Point2, half: f64, climb: Climb) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for (wall, range) in self.counting(climb) {
@@ -117,8 +117,8 @@ mod tests {
     use super::super::kind::tests::end;
     use super::*;
 
-    /// Beneath the top for 60 m, a leg is as exposed, and as blocked, as one so long; a shorter one leaves something to
-    /// those after it.
+    /// Beneath the top for 60 m, a leg is as exposed, and as blocked, as one of that length; a shorter one leaves
+    /// something to the legs after it.
     #[test]
     fn a_leg_is_under_a_top_for_as_long_as_it_climbs() {
         let scenario = scenario(

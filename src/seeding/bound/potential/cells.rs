@@ -1,4 +1,4 @@
-//! A rectangle in square cells.
+//! A rectangle divided into square cells.
 
 use crate::geometry::{Point2, Rect, Vector2};
 
@@ -6,14 +6,14 @@ use crate::geometry::{Point2, Rect, Vector2};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cells {
     pub(super) rect: Rect,
-    /// Of a cell, metres.
+    /// Side of a cell, metres.
     pub(super) side: f64,
     columns: usize,
     rows: usize,
 }
 
 impl Cells {
-    /// Cells of that side.
+    /// Cells with this side.
     pub(super) fn new(rect: Rect, side: f64) -> Self {
         let count = |length: f64| floor((length / side).ceil().max(1.0));
         let extent = rect.max - rect.min;
@@ -25,11 +25,11 @@ impl Cells {
         }
     }
 
-    /// So many cells, about.
+    /// About `count` cells.
     pub(super) fn about(rect: Rect, count: usize) -> Self {
         let extent = rect.max - rect.min;
         let even = (extent.x * extent.y / count as f64).sqrt();
-        // Of a rectangle that is next to a line, a row.
+        // For a rectangle that is nearly a line, one row.
         let side = even.max((extent.x + extent.y) / count as f64);
         Self::new(rect, side)
     }
@@ -52,7 +52,7 @@ impl Cells {
         ]
     }
 
-    /// All cells that come into the rectangle round these places.
+    /// All cells that overlap the bounding rectangle of these places.
     pub(super) fn round(&self, places: [Point2; 3]) -> impl Iterator<Item = usize> + use<> {
         let rect = Rect::around(places).unwrap_or(self.rect);
         self.between([self.at(rect.min), self.at(rect.max)])
@@ -70,7 +70,7 @@ impl Cells {
             .flat_map(move |row| (low[0]..=high[0]).map(move |column| row * columns + column))
     }
 
-    /// The square that a cell is.
+    /// The square of a cell.
     pub(super) fn square(&self, cell: usize) -> Rect {
         let [column, row] = [cell % self.columns, cell / self.columns].map(|at| at as f64);
         let min = self.rect.min + Vector2::new(column, row) * self.side;
@@ -81,7 +81,7 @@ impl Cells {
     }
 }
 
-/// The whole number below `number`, 0 of one below 0.
+/// The whole number below `number`, 0 for one below 0.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

@@ -1,33 +1,33 @@
-//! Less slope where there is too much: the few places where the values that a march left are too steep for a
-//! quadratic are made to share it with those about them.
+//! Reduces slopes that are too steep: in the few places where the values left by a march are too steep for a quadratic,
+//! the excess is shared with neighbouring places.
 
 use super::mesh::Mesh;
 use super::slopes::{gradients, response};
 
-/// Times that the places are gone over, at most, where it is to be seen whether a mesh is fine enough,
+/// Maximum number of sweeps when checking whether a mesh is fine enough.
 pub(super) const FEW: usize = 20;
 
-/// and where no finer one follows.
+/// Maximum number of sweeps for the final mesh.
 pub(super) const MANY: usize = 40;
 
-/// How many times as steep as allowed is well enough.
+/// Multiple of the allowed steepness that is good enough.
 const ENOUGH: f64 = 1.002;
 
-/// Share of a step of Newton's method that is taken: the nodes about it move, too.
+/// Share of a Newton step that is taken, because the neighbouring nodes move too.
 const TAKEN: f64 = 0.8;
 
-/// How much further than well enough a place is eased that is not, so that it need not be again.
+/// How far beyond good enough a place that is too steep is eased, so that it need not be eased again.
 const BEYOND: f64 = 0.999;
 
-/// Change `values` but for those of the first `fixed` nodes so that triangles are no steeper than their `limits`, as
-/// far as it goes in so many sweeps: by Newton's method for each node alone, on the squares of what is too much.
+/// Change `values`, except those of the first `fixed` nodes, so that triangles are no steeper than their `limits`, as
+/// far as possible in this many sweeps: by Newton's method for each node alone, on the squares of the excess.
 pub(super) fn ease(
     mesh: &Mesh,
     limits: &[[f64; 6]],
     values: &mut [f64],
     (fixed, sweeps): (usize, usize),
 ) {
-    // Of slopes that are allowed.
+    // Squares of the allowed slopes.
     let squares: Vec<[f64; 6]> = limits
         .iter()
         .map(|limits| limits.map(|limit| limit * limit * (ENOUGH * ENOUGH)))
@@ -39,7 +39,7 @@ pub(super) fn ease(
         each.any(|(gradient, allowed)| gradient.norm_squared() > *allowed)
     };
     let mut asked: Vec<usize> = (0..mesh.triangles.len()).collect();
-    // In which sweep each was met last.
+    // The sweep in which each was last visited.
     let mut met = (vec![0; values.len()], vec![0; mesh.triangles.len()]);
     for sweep in 1..=sweeps {
         asked.retain(|triangle| is_steep(*triangle, values));
@@ -65,7 +65,7 @@ pub(super) fn ease(
     }
 }
 
-/// By how much the value of `node` is too high for the slopes about it, as one step of Newton's method sees it.
+/// How much too high the value of `node` is for the slopes around it, according to one step of Newton's method.
 fn excess(mesh: &Mesh, squares: &[[f64; 6]], values: &[f64], node: usize) -> f64 {
     let (mut slope, mut curvature) = (0.0, 0.0);
     for &(triangle, which) in mesh.round(node) {
@@ -78,7 +78,7 @@ fn excess(mesh: &Mesh, squares: &[[f64; 6]], values: &[f64], node: usize) -> f64
         }
         let response = response(of, which);
         for at in (0..6).filter(|at| is_too_steep(*at)) {
-            // Half of the square of c, with c how much the square of a slope exceeds what is allowed.
+            // Half the square of c, where c is how much the square of a slope exceeds the allowed one.
             let too_much = gradients[at].norm_squared() / allowed[at] - 1.0;
             let change = 2.0 * gradients[at].dot(&response[at]) / allowed[at];
             slope += too_much * change;
@@ -86,7 +86,7 @@ fn excess(mesh: &Mesh, squares: &[[f64; 6]], values: &[f64], node: usize) -> f64
                 change * change + too_much * 2.0 * response[at].norm_squared() / allowed[at];
         }
     }
-    // Neither can be told of triangles that are too slim.
+    // Neither can be determined for triangles that are too slim.
     let excess = slope / curvature;
     if excess.is_finite() { excess } else { 0.0 }
 }

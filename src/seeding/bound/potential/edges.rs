@@ -1,4 +1,4 @@
-//! The edges of soft zones, of cores and of the area, along which the price of a metre changes at once or begins to.
+//! The edges of soft zones, of cores and of the area, where the price of a metre jumps or begins to change.
 
 use std::f64::consts::TAU;
 
@@ -8,7 +8,7 @@ use crate::geometry::{Point2, Rect, Vector2, ring};
 use crate::seeding::arc::crossing;
 use crate::seeding::outline::OutlineShape;
 
-/// Corners of a ring whose edges are told, at most.
+/// Maximum number of corners of a ring whose edges are listed.
 const MOST_CORNERS: usize = 100;
 
 /// An edge.
@@ -16,11 +16,11 @@ pub(super) struct Edge<'a> {
     line: Line,
     /// A rectangle round it.
     pub(super) extent: Rect,
-    /// The wall that it belongs to and how far it is from its shape at least, unless it is one of the area.
+    /// The wall that it belongs to and its least distance from the wall's shape; `None` for an edge of the area.
     of: Option<(&'a Wall, f64)>,
 }
 
-/// All edges that come into the rectangle of `zones`.
+/// All edges that overlap the rectangle of `zones`.
 pub(super) fn all<'a>(zones: &Zones<'a>) -> Vec<Edge<'a>> {
     let (rect, tolerance) = (zones.rect(), zones.tolerance());
     let mut edges: Vec<Edge> = ring::edges(&rect.corners())
@@ -49,7 +49,7 @@ impl<'a> Edge<'a> {
         }
     }
 
-    /// Metres.
+    /// Length, metres.
     pub(super) fn length(&self) -> f64 {
         match &self.line {
             Line::Straight(a, b) => (b - a).norm(),
@@ -57,7 +57,7 @@ impl<'a> Edge<'a> {
         }
     }
 
-    /// Of the circle that it is; infinite if it is straight.
+    /// Radius of its circle; infinite if it is straight.
     pub(super) fn radius(&self) -> f64 {
         match &self.line {
             Line::Straight(..) => f64::INFINITY,
@@ -65,7 +65,7 @@ impl<'a> Edge<'a> {
         }
     }
 
-    /// The place so many metres after its beginning.
+    /// The place this many metres after its beginning.
     pub(super) fn at(&self, along: f64) -> Point2 {
         match &self.line {
             Line::Straight(a, b) => a + (b - a) * (along / (b - a).norm()),
@@ -76,7 +76,7 @@ impl<'a> Edge<'a> {
         }
     }
 
-    /// Whether it is one at that place: an edge of a soft zone within another part of the same zone is none.
+    /// Whether it is an edge at that place: an edge of a soft zone within another part of the same zone does not count.
     pub(super) fn is_there(&self, place: Point2) -> bool {
         self.of
             .is_none_or(|(wall, away)| wall.distance(place) >= away)
@@ -108,8 +108,8 @@ impl Line {
     }
 }
 
-/// Tell the lines round a wall's core and soft zone, with how far they are from its shape: by the tolerance within
-/// them, so that what is linear between their places is in them.
+/// Report the lines round a wall's core and soft zone, with their distance from its shape: inside them by the
+/// tolerance, so that what is linear between places on them lies within.
 fn round(wall: &Wall, tolerance: f64, tell: &mut dyn FnMut(Line, f64)) {
     let zone = wall.influence - 2.0 * tolerance;
     match &wall.shape {
@@ -122,7 +122,7 @@ fn round(wall: &Wall, tolerance: f64, tell: &mut dyn FnMut(Line, f64)) {
             }
         }
         OutlineShape::Ring(ring) => {
-            // Within the ring by more than a route may enter it.
+            // Inside the ring by more than a route may enter it.
             for (a, b) in ring::edges(&inset(ring, 3.0 * tolerance)) {
                 tell(Line::Straight(a, b), 0.0);
             }
@@ -140,7 +140,7 @@ fn round(wall: &Wall, tolerance: f64, tell: &mut dyn FnMut(Line, f64)) {
     }
 }
 
-/// The ring whose corners are moved inwards so that its edges are by so many metres within the given ones.
+/// The ring with its corners moved inwards so that its edges are `by` metres inside the given ones.
 fn inset(ring: &[Point2], by: f64) -> Vec<Point2> {
     let turning = ring::twice_area(ring).signum();
     let count = ring.len();
@@ -154,7 +154,7 @@ fn inset(ring: &[Point2], by: f64) -> Vec<Point2> {
             let left = |way: Vector2| Vector2::new(-way.y, way.x) * turning;
             let [one, other] = [at - before, after - at].map(|way| left(way.normalize()));
             let sum = one + other;
-            // A spike has no inside to speak of.
+            // A spike has practically no inside.
             at + sum * (2.0 * by / sum.norm_squared().max(1e-4))
         })
         .collect()

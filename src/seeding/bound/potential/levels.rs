@@ -1,33 +1,33 @@
-//! What a potential proves that is too steep here and there.
+//! What a potential proves when it is too steep in places.
 
 use super::cells::floor;
 use super::mesh::Mesh;
 use super::slopes::{range, steepness};
 use crate::geometry::Vector2;
 
-/// Levels between the ends that are told apart.
+/// Number of levels between the ends.
 const LEVELS: usize = 4096;
 
-/// Share by which a sum of a few products may be off.
+/// Rounding error of a sum of a few products, as a share.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
-/// A triangle so many times as long as it is wide is too slim for its slopes to be told.
+/// A triangle this many times as long as wide is too slim for its slopes to be determined.
 const SLIMMEST: f64 = 1e9;
 
-/// A potential made flatter, or steeper, level by level, so that no triangle that takes a level is steeper there than its
+/// A potential flattened or steepened level by level, so that no triangle that takes a level is steeper there than its
 /// limits.
 #[derive(Debug)]
 pub(super) struct Levels {
     low: f64,
-    /// Of a level.
+    /// Width of a level.
     width: f64,
-    /// What is left of the rise up to the beginning of each level, and to the end of the last.
+    /// Remaining rise up to the beginning of each level, and to the end of the last.
     heights: Vec<f64>,
 }
 
 impl Levels {
-    /// Of the potential with these `values`, from what it is in the first node to what it is in the second, which is
-    /// more; triangles that nothing leads to, where it is no number, take no levels.
+    /// For the potential with these `values`, from its value in the first node to that in the second, which is greater;
+    /// unreachable triangles, where it is not a number, take no levels.
     pub(super) fn new(mesh: &Mesh, limits: &[[f64; 6]], values: &[f64]) -> Self {
         let (low, high) = (values[0], values[1]);
         let width = (high - low) / LEVELS as f64;
@@ -42,14 +42,14 @@ impl Levels {
                 continue;
             }
             let steepness = steepness(triangle, limits, &values);
-            // What rounding can make of it: of values, and of the shape of slim triangles.
+            // Possible effect of rounding: of values, and of the shape of slim triangles.
             let rates: f64 = triangle.rates.iter().map(Vector2::norm).sum();
             let [a, b, c, ..] = mesh.places(triangle);
             let slimness = rates * ((b - a).norm() + (c - a).norm());
             let least_limit = limits.iter().copied().fold(f64::INFINITY, f64::min);
             let by_values = ROUNDING * rates * greatest / least_limit;
             let steepness = steepness * (1.0 + ROUNDING * slimness) + by_values;
-            // Too slim for anything to be told, which is no number, is as steep as can be.
+            // If the triangle is too slim to tell, which is not a number, assume the greatest steepness.
             let steepness = if slimness < SLIMMEST && steepness.is_finite() {
                 steepness
             } else {
@@ -74,12 +74,12 @@ impl Levels {
         }
     }
 
-    /// What is left of the whole rise: what is proven.
+    /// The whole remaining rise: what is proven.
     pub(super) fn total(&self) -> f64 {
         self.heights[LEVELS]
     }
 
-    /// What is left of the rise up to a value.
+    /// The remaining rise up to a value.
     pub(super) fn at(&self, value: f64) -> f64 {
         let levels = ((value - self.low) / self.width).clamp(0.0, LEVELS as f64);
         let level = floor(levels).min(LEVELS - 1);
@@ -101,7 +101,7 @@ mod tests {
         Mesh::new(&vertices, |_| false).expect("they are apart")
     }
 
-    /// A triangle of which rounding leaves no area: what it rises by is not known, and taken for nothing.
+    /// A triangle whose area is lost in rounding: its rise is not known, and counts as zero.
     #[test]
     fn a_triangle_that_is_too_slim_takes_its_levels_away() {
         let vertices = [[0.0, 0.0], [1000.0, 0.0], [500.0, 1e-8], [500.0, 400.0]];
@@ -127,7 +127,7 @@ mod tests {
             assert!(found > expected - 40.0 * limit, "{found} {expected}");
         };
         check(2.0, &|at| 2.0 * at.x, 2000.0);
-        // Not as steep as may be everywhere, and too steep on a tenth of the way.
+        // Not as steep as allowed everywhere, and too steep on a tenth of the way.
         check(2.0, &|at| at.x, 2000.0);
         check(1.0, &|at| at.x + (at.x - 500.0).clamp(0.0, 100.0), 1000.0);
         check(1.0, &|at| 4.0 * at.x.min(100.0) + 1e-3 * at.x, 1000.0);

@@ -1,5 +1,5 @@
-//! What reaching each node costs, about: fast marching over the parts of triangles, after Kimmel and Sethian (1998), with
-//! the slopes of what it costs carried along, so that it bends between two nodes as fronts do.
+//! The approximate cost of reaching each node: fast marching over the parts of triangles, after Kimmel and Sethian
+//! (1998), with the slopes of the cost carried along, so that it bends between two nodes as fronts do.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -7,17 +7,17 @@ use std::collections::BinaryHeap;
 use super::mesh::{Mesh, PARTS, Triangle};
 use crate::geometry::Vector2;
 
-/// Steps of Newton's method to the cheapest place of a side, at most.
+/// Maximum number of Newton steps to the cheapest place of a side.
 const STEPS: usize = 3;
 
-/// Share of a side that is a step to which none needs to follow.
+/// A step of less than this share of a side needs no successor.
 const SMALL: f64 = 0.01;
 
-/// How far a cubic is from its chord at most for each unit by which its slope at either end differs from that of the
-/// chord: the most of `u (1 - u)^2`.
+/// Greatest distance of a cubic from its chord for each unit by which its slope at either end differs from that of the
+/// chord: the maximum of `u (1 - u)^2`.
 const BULGE: f64 = 4.0 / 27.0;
 
-/// Of each node of a triangle, the parts that have it, and which of their corners it is.
+/// For each node of a triangle, the parts that have it, and which of their corners it is.
 const PARTS_ROUND: [&[(usize, usize)]; 6] = [
     &[(0, 0)],
     &[(1, 1)],
@@ -27,19 +27,19 @@ const PARTS_ROUND: [&[(usize, usize)]; 6] = [
     &[(0, 2), (2, 0), (3, 1)],
 ];
 
-/// Where ways begin.
+/// A beginning of ways.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seed {
     pub(super) node: usize,
-    /// What has been paid there.
+    /// Cost already paid there.
     pub(super) cost: f64,
-    /// How that changes about it, a metre.
+    /// Gradient of that cost around it, per metre.
     pub(super) slope: Vector2,
 }
 
 impl Seed {
-    /// Ways that begin in a node where so much has been paid, and go straight to all others of triangles that have it: there
-    /// fronts are bent too much to be a march's.
+    /// Ways that begin in a node at this cost, and go straight to all others of the triangles that have it: there
+    /// fronts are too strongly curved for a march.
     pub(super) fn about(mesh: &Mesh, prices: &[[f64; 6]], node: usize, cost: f64) -> Vec<Self> {
         let slope = Vector2::zeros();
         let mut seeds = vec![Self { node, cost, slope }];
@@ -61,8 +61,8 @@ impl Seed {
     }
 }
 
-/// What the cheapest ways from any of the `seeds` of each end to each node cost where a metre in the nodes of a triangle
-/// costs `prices`; infinite where none leads.
+/// The cost of the cheapest ways from any of the `seeds` of each end to each node where a metre in the nodes of a
+/// triangle costs `prices`; infinite where no way leads.
 pub(super) fn march(mesh: &Mesh, prices: &[[f64; 6]], seeds: &[Vec<Seed>; 2]) -> [Vec<f64>; 2] {
     let triangles = mesh.triangles.iter();
     let shapes: Vec<Shape> = triangles
@@ -86,19 +86,19 @@ pub(super) fn march(mesh: &Mesh, prices: &[[f64; 6]], seeds: &[Vec<Seed>; 2]) ->
     })
 }
 
-/// How far a march has come.
+/// The state of a march.
 struct Front<'a> {
     mesh: &'a Mesh,
     prices: &'a [[f64; 6]],
     shapes: &'a [Shape],
-    /// Of each node, by the cheapest way so far.
+    /// Cost of each node by the cheapest way so far.
     costs: Vec<f64>,
-    /// How these change there, a metre; nothing where ways begin and it is not known.
+    /// Gradients of these costs, per metre; zero where ways begin and they are not known.
     slopes: Vec<Vector2>,
-    /// Whether no way is cheaper.
+    /// Whether the cost is final.
     is_known: Vec<bool>,
-    /// The nodes that are reached, the cheapest first, by the bits of what they cost: those of positive numbers are ordered
-    /// as they are.
+    /// The nodes that are reached, the cheapest first, by the bits of their cost: the bits of positive numbers have the
+    /// same order.
     heap: BinaryHeap<(Reverse<u64>, usize)>,
 }
 
@@ -131,8 +131,8 @@ impl Front<'_> {
         }
     }
 
-    /// The cheapest way within a part of a triangle from the first of its corners, or from between it and the third, to the
-    /// second; `None` where that is no cheaper than what is known.
+    /// The cheapest way within a part of a triangle from the first of its corners, or from between it and the third, to
+    /// the second; `None` where that is no cheaper than the known one.
     #[inline]
     fn onward(
         &self,
@@ -196,22 +196,22 @@ impl Front<'_> {
     }
 }
 
-/// A side of a part of which both ends are reached.
+/// A side of a part, both of whose ends are reached.
 #[derive(Debug)]
 struct Side {
-    /// What reaching its ends costs.
+    /// Cost of reaching its ends.
     costs: [f64; 2],
-    /// By how much that would rise along the whole side as it does at each end.
+    /// Rise of that cost along the whole side, if it rose as it does at each end.
     rises: [f64; 2],
-    /// Of a metre at its ends.
+    /// Price of a metre at its ends.
     prices: [f64; 2],
 }
 
-/// Of the parts of a triangle.
+/// The geometry of the parts of a triangle.
 struct Shape {
     /// Lengths of the sides opposite to each corner.
     sides: [f64; 3],
-    /// Of each corner, how far along the opposite side, from the next corner on, it lies, and how far above it.
+    /// For each corner, how far along the opposite side, from the next corner on, its foot is, and its height above it.
     feet: [[f64; 2]; 3],
 }
 
@@ -235,7 +235,8 @@ impl Shape {
         }
     }
 
-    /// No more than what `over` finds, told at once: at the least price, from a side that bulges as far down as it may.
+    /// A lower bound of what `over` finds, computed at once: at the least price, from a side that bulges down as far as
+    /// possible.
     #[inline]
     fn least(&self, corner: usize, price: f64, side: &Side) -> f64 {
         let [along, above] = self.feet[corner];
@@ -252,9 +253,9 @@ impl Shape {
         straight - BULGE * (bulge[0] + bulge[1])
     }
 
-    /// What a corner costs where a metre costs `price` that is reached over the side opposite to it, which begins in the
-    /// next corner, and at which share of the side that crosses it. What reaching the side costs is a cubic along it, and
-    /// the price is linear.
+    /// The cost of a corner where a metre costs `price`, when it is reached over the opposite side, which begins in the
+    /// next corner; and at which share of the side the way crosses it. The cost of reaching the side is a cubic along
+    /// it, and the price is linear.
     #[inline]
     fn over(&self, corner: usize, price: f64, side: &Side) -> (f64, f64) {
         let length = self.sides[corner];
@@ -272,7 +273,7 @@ impl Shape {
             let aside = along - at * length;
             (aside, (aside * aside + above * above).sqrt())
         };
-        // Were all of it linear, the way would cross the side at an angle of which this is the cosine.
+        // If all of it were linear, the way would cross the side at an angle with this cosine.
         let rise = change / ((begin + 0.5 * dearer) * length);
         let mut at = if rise.abs() < 1.0 {
             (along - above * rise / (1.0 - rise * rise).sqrt()) / length
@@ -300,7 +301,7 @@ impl Shape {
         }
         let paid = side.costs[0] + at * (first + at * (square + at * cube));
         let cost = paid + way(at).1 * (begin + dearer * at);
-        // A cubic with slopes that do not fit each other may dip, a front never comes back.
+        // A cubic with slopes that do not match may dip, but a front never comes back.
         (cost.max(side.costs[0].min(side.costs[1])), at)
     }
 }
@@ -322,7 +323,7 @@ mod tests {
         Mesh::new(&vertices, |corners| left_out(middle(corners))).expect("they are apart")
     }
 
-    /// What all nodes cost from the first one on.
+    /// The cost of all nodes from the first one.
     fn from_first(mesh: &Mesh, prices: &[[f64; 6]]) -> Vec<f64> {
         let [costs, _] = march(mesh, prices, &[Seed::about(mesh, prices, 0, 0.0), vec![]]);
         costs
@@ -351,7 +352,7 @@ mod tests {
         }
     }
 
-    /// Where a metre costs the more the farther from the first node, the ways are straight, and what they cost bends.
+    /// Where a metre costs more with distance from the first node, the ways are straight, and their cost bends.
     #[test]
     fn as_dear_as_the_way_is() {
         let mesh = square(20, |_| false);
@@ -371,7 +372,7 @@ mod tests {
         }
     }
 
-    /// A front that is a straight line, ahead of which a node has been paid less for.
+    /// A front that is a straight line, ahead of which a node has been reached at less cost.
     #[test]
     fn from_the_cheapest_of_all_seeds() {
         let mesh = square(20, |_| false);

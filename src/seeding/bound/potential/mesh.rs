@@ -1,4 +1,4 @@
-//! The plane between start and target in triangles, fine where a potential has to be known well.
+//! A triangulation of the plane between start and target, fine where a potential must be accurate.
 
 use spade::{DelaunayTriangulation, Triangulation as _};
 
@@ -7,7 +7,7 @@ use crate::geometry::{Point2, Vector2};
 /// The four parts of a triangle between its nodes, each of the same shape and with corners in the same order.
 pub(super) const PARTS: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]];
 
-/// The two corners of which each of the last three nodes is the middle.
+/// The two corners whose midpoint is each of the last three nodes.
 pub(super) const SIDES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
 /// A triangle with a node in each corner and one in the middle of each side.
@@ -15,25 +15,25 @@ pub(super) const SIDES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 pub(super) struct Triangle {
     /// The corners, then the middles in the order of `SIDES`.
     pub(super) nodes: [usize; 6],
-    /// How a corner's share in a place changes with it, a metre: the gradients of the barycentric coordinates.
+    /// The gradients of the barycentric coordinates, per metre.
     pub(super) rates: [Vector2; 3],
 }
 
 /// Triangles that share nodes.
 #[derive(Debug)]
 pub(super) struct Mesh {
-    /// The vertices that it was made of in their order, then the middles of edges.
+    /// The vertices that it was made from, in their order, then the middles of edges.
     pub(super) nodes: Vec<Point2>,
     pub(super) triangles: Vec<Triangle>,
     /// Where `round` begins for each node.
     first: Vec<usize>,
-    /// Triangles round each node, and which of their nodes it is.
+    /// Triangles around each node, and which of their nodes it is.
     round: Vec<(usize, usize)>,
 }
 
 impl Mesh {
-    /// The Delaunay triangles of `vertices` but for those that are `left_out`, told by their corners; `None` where
-    /// vertices cannot be told apart.
+    /// The Delaunay triangles of `vertices` except those that are `left_out`, given their corners; `None` where
+    /// vertices cannot be distinguished.
     pub(super) fn new(
         vertices: &[Point2],
         left_out: impl Fn(&[Point2; 3]) -> bool,
@@ -87,7 +87,7 @@ impl Mesh {
 }
 
 impl Triangle {
-    /// What a function takes in the nodes.
+    /// The values of a function in the nodes.
     pub(super) fn of(&self, values: &[f64]) -> [f64; 6] {
         self.nodes.map(|node| values[node])
     }
@@ -138,7 +138,7 @@ mod tests {
             let between = nalgebra::center(&places[one], &places[other]);
             assert!((places[middle] - between).norm() < 1e-15);
         }
-        // What each corner has of a place is 1 there and 0 in the others.
+        // The barycentric coordinate of each corner is 1 there and 0 in the others.
         for (corner, rate) in triangle.rates.iter().enumerate() {
             for (other, place) in places[..3].iter().enumerate() {
                 let share = 1.0 + rate.dot(&(place - places[corner]));

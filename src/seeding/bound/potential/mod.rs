@@ -1,5 +1,5 @@
-//! A lower bound for routes that must cross soft zones: a potential that nowhere rises faster than
-//! what a metre costs. The argument is section 6 of docs/BOUND.md.
+//! A lower bound for routes that must cross soft zones: a potential that nowhere rises faster than the cost of a metre.
+//! The argument is section 6 of docs/BOUND.md.
 
 mod cells;
 mod easing;
@@ -30,48 +30,48 @@ use spacing::Spacing;
 pub use ways::{WaysSought, cheap_ways};
 use zones::Zones;
 
-/// Vertices of a mesh that tells where the cheapest routes are, about.
+/// Approximate number of vertices of a mesh that shows where the cheapest routes are.
 const FIRST: usize = 1000;
 
-/// Meshes of that kind, at most.
+/// Maximum number of meshes of that kind.
 const MOST_MESHES: usize = 4;
 
-/// Vertices that stand closest from start to target, one after the other, in the last of them at least.
+/// Least number of the smallest vertex distances between start and target in the last of them.
 const STEPS: f64 = 10.0;
 
-/// Vertices of the first mesh that proves something, about.
+/// Approximate number of vertices of the first mesh that proves something.
 const FINE: usize = 2500;
 
-/// Vertices of any mesh, at most, but for those of the first.
+/// Maximum number of vertices of any mesh, not counting those of the first.
 const MOST_VERTICES: usize = 6000;
 
-/// Times that vertices are added, at most.
+/// How often vertices are added, at most.
 const MOST_ROUNDS: usize = 3;
 
-/// Share of what a potential rises by that is worth no more vertices.
+/// At this share of a potential's rise, more vertices are not worthwhile.
 const NEARLY: f64 = 0.993;
 
-/// How many times what a string costs a route costs that is not looked at.
+/// A route that costs this multiple of a string is not considered.
 const BEYOND: f64 = 1.05;
 
-/// A string this many times as dear as what is known promises more, whatever is estimated.
+/// A string this many times as expensive as what is known promises more, whatever the estimate.
 const FAR: f64 = 1.5;
 
-/// Whether there are soft zones, at prices and between ends for which a potential can prove something.
+/// Whether there are soft zones, and prices and ends for which a potential can prove something.
 pub(super) fn applies(walls: &[Wall], prices: &Prices) -> bool {
     prices.exposure > 0.0
         && prices.direct() > 1e5 * prices.tolerance
         && whole(walls).any(|wall| wall.influence > wall.core)
 }
 
-/// Those that reach over all heights.
+/// The walls that cover all heights.
 pub(super) fn whole(walls: &[Wall]) -> impl Iterator<Item = &Wall> {
     walls.iter().filter(|wall| wall.toll.is_none())
 }
 
-/// What proves what no route undercuts at the prices of fuel and soft zones, seen from above, where it `applies`; `None`
-/// where that is not expected to exceed `known`, which no route undercuts either. A string costs what is `promised`, and
-/// routes begin and end with legs that cost what `leads` tell.
+/// A proof of a lower bound at the prices of fuel and soft zones, seen from above, where it `applies`; `None` where
+/// that is not expected to exceed `known`, another lower bound. A string costs what is `promised`, and routes begin and
+/// end with legs that cost what `leads` say.
 pub(super) fn prove(
     walls: &[Wall],
     prices: &Prices,
@@ -95,9 +95,9 @@ pub(super) fn prove(
         let costs;
         (costs, extras) = priced.costs();
         let estimate = costs[0][1] - extras[0];
-        // The first mesh is too coarse for narrow gaps, through which an estimate leaks.
+        // The first mesh is too coarse for narrow gaps, so its estimate can leak through them.
         let is_near = prices.climbing_at(estimate) < WORTHWHILE * known && promised < FAR * known;
-        // Nothing leads to the target, or nothing is to be gained.
+        // Nothing leads to the target, or there is nothing to gain.
         if !estimate.is_finite() || (level == 1 && is_near) || stop() {
             return None;
         }
@@ -113,9 +113,9 @@ pub(super) fn prove(
     Some(Proof::new(steep, cap, (plane.origin, rect)))
 }
 
-/// What is seen from above, measured from the start on, where places are rounded least.
+/// The scene seen from above, with the start as origin, where places are rounded least.
 struct Plane {
-    /// Where the start is.
+    /// Position of the start.
     origin: Vector2,
     walls: Vec<Wall>,
     ends: [Point2; 2],
@@ -137,8 +137,8 @@ impl Plane {
     }
 }
 
-/// The potential over the first two of `vertices` that rises the most, with more of them where the triangles are too
-/// large for what they must rise by.
+/// The potential over the first two of `vertices` that rises most, with more vertices where the triangles are too large
+/// for their rise.
 fn steepest(
     mut vertices: Vec<Point2>,
     (zones, spacing): (&Zones, &mut Spacing),
@@ -158,7 +158,7 @@ fn steepest(
         }
         let levels = priced.levels(&potential);
         let proven = levels.total();
-        // The first of these meshes tells whether those before it were too coarse for gaps.
+        // The first of these meshes shows whether those before it were too coarse for gaps.
         let is_held_down = round == 0 && spacing.raise(rise + extras[0] + extras[1]);
         let room = MOST_VERTICES.saturating_sub(vertices.len());
         let is_enough = room == 0 || proven >= NEARLY * rise;
@@ -190,8 +190,8 @@ fn steepest(
     })
 }
 
-/// Where routes are looked at, and what one costs at least that leaves it: all of the area, or the part of it with
-/// all ways that are not longer than what costs more in fuel alone than is `promised`.
+/// The region in which routes are considered, and the least cost of one that leaves it: all of the area, or the part
+/// with all ways whose fuel alone does not cost more than is `promised`.
 fn region(ends: [Point2; 2], area: &Rect, prices: &Prices, promised: f64) -> (Rect, f64) {
     let direct = prices.direct();
     let longest = (BEYOND * promised / prices.fuel).max(1.5 * direct);

@@ -1,4 +1,4 @@
-//! A mesh with what its triangles may rise by, and potentials over it.
+//! A mesh with the greatest allowed rise of its triangles, and potentials over it.
 
 use super::lead::Leads;
 use super::levels::Levels;
@@ -10,17 +10,17 @@ use super::zones::Zones;
 use super::{easing, marching};
 use crate::geometry::Point2;
 
-/// How many times as steep as its limits a triangle is that is cut up.
+/// A triangle this many times as steep as its limits is subdivided.
 const TOO_STEEP: f64 = 1.005;
 
-/// A mesh with what its triangles may rise by.
+/// A mesh with the greatest allowed rise of its triangles.
 pub(super) struct Priced {
     pub(super) mesh: Mesh,
-    /// In the nodes of each triangle, a metre.
+    /// In the nodes of each triangle, per metre.
     pub(super) limits: Vec<[f64; 6]>,
-    /// The same, a metre: what is made use of.
+    /// The same, per metre: the part that is used.
     prices: Vec<[f64; 6]>,
-    /// Where routes may be after first legs, and before last ones; nowhere where these cost nothing beyond their way.
+    /// Where routes may be after first legs, and before last ones; empty where these cost nothing beyond their way.
     led: [Vec<Seed>; 2],
 }
 
@@ -57,8 +57,8 @@ impl Priced {
         })
     }
 
-    /// What the cheapest ways to each node cost from either end, about, and what first legs and last ones make a way dearer
-    /// by that leads to the other end. Ways begin with such legs, or as if they had paid what these make them dearer by.
+    /// The approximate cost of the cheapest ways to each node from either end, and how much first and last legs add to
+    /// a way to the other end. Ways begin with such legs, or as if they had paid what these add.
     pub(super) fn costs(&self) -> ([Vec<f64>; 2], [f64; 2]) {
         let free = self.march(&[0, 1].map(|end| self.about(end, 0.0)));
         if self.led.iter().all(Vec::is_empty) {
@@ -85,14 +85,14 @@ impl Priced {
         marching::march(&self.mesh, &self.prices, seeds)
     }
 
-    /// What the straight way from one node of a triangle to another costs, about.
+    /// The approximate cost of the straight way from one node of a triangle to another.
     pub(super) fn straight(&self, triangle: usize, [one, other]: [usize; 2]) -> f64 {
         let (nodes, limits) = (&self.mesh.triangles[triangle].nodes, &self.limits[triangle]);
         let [from, to] = [one, other].map(|node| self.mesh.nodes[nodes[node]]);
         0.5 * (limits[one] + limits[other]) * (to - from).norm()
     }
 
-    /// The nodes at both ends of each side of the parts of triangles, and what the way from one to the other costs, about.
+    /// The nodes at both ends of each side of the parts of triangles, and the approximate cost of the way between them.
     pub(super) fn sides(&self) -> impl Iterator<Item = ([usize; 2], f64)> {
         let sides = PARTS
             .iter()
@@ -113,14 +113,14 @@ impl Priced {
         Seed::about(&self.mesh, &self.prices, end, cost)
     }
 
-    /// A potential that is in few places steeper than the limits, for the `extras` of first and last legs.
+    /// A potential that exceeds the limits in few places only, for the `extras` of first and last legs.
     pub(super) fn potential(&self, extras: [f64; 2]) -> Vec<f64> {
         let [from, to] = self.march(&[0, 1].map(|end| {
             let mut seeds = self.led[end].clone();
             seeds.extend(self.about(end, extras[end]));
             seeds
         }));
-        // Away from the cheapest way the two do not rise in the same direction: their mean is less steep there.
+        // Away from the cheapest way the two do not rise in the same direction, so their mean is less steep there.
         let mean = |(from, to): (&f64, &f64)| 0.5 * (from - to);
         let mut potential: Vec<f64> = from.iter().zip(&to).map(mean).collect();
         self.ease(&mut potential, easing::FEW);
@@ -137,7 +137,7 @@ impl Priced {
         Levels::new(&self.mesh, &self.limits, potential)
     }
 
-    /// The middles of the sides of all triangles that are too steep nevertheless.
+    /// The middles of the sides of all triangles that are nevertheless too steep.
     pub(super) fn between(&self, potential: &[f64]) -> Vec<Point2> {
         let triangles = self.mesh.triangles.iter().zip(&self.limits);
         let steep = triangles.filter(|(triangle, limits)| {

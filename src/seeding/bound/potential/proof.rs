@@ -1,4 +1,4 @@
-//! What a potential proves: of all routes, and of those that pass some place.
+//! What a potential proves: about all routes, and about those that pass some place.
 
 use super::cells::Cells;
 use super::levels::Levels;
@@ -6,23 +6,23 @@ use super::mesh::{Mesh, SIDES, Triangle};
 use super::slopes::{gradients, range};
 use crate::geometry::{Point2, Rect, Vector2};
 
-/// Cells in which triangles are looked up.
+/// Number of cells in which triangles are looked up.
 const CELLS: usize = 2000;
 
-/// Share of its terms by which a sum may be off, and more.
+/// Upper bound of the rounding error of a sum, as a share of its terms.
 const ROUNDING: f64 = 1e-9;
 
-/// A potential that is nowhere steeper than what a metre costs.
+/// A potential that is nowhere steeper than the cost of a metre.
 pub(in super::super) struct Proof {
     mesh: Mesh,
     potential: Vec<f64>,
     levels: Levels,
-    /// What a route costs at least that leaves the mesh.
+    /// Lower bound of the cost of a route that leaves the mesh.
     cap: f64,
-    /// Where the mesh has its origin.
+    /// Origin of the mesh.
     origin: Vector2,
     cells: Cells,
-    /// Of each cell, the triangles that come into it.
+    /// For each cell, the triangles that overlap it.
     near: Vec<Vec<usize>>,
 }
 
@@ -43,17 +43,17 @@ impl Proof {
         }
     }
 
-    /// What no route undercuts seen from above.
+    /// A lower bound for all routes, seen from above.
     pub(in super::super) fn total(&self) -> f64 {
         self.levels.total().min(self.cap)
     }
 
-    /// What no route undercuts seen from above that costs so much more than the potential rises by.
+    /// A lower bound, seen from above, for routes that cost `excess` more than the rise of the potential.
     pub(in super::super) fn with(&self, excess: f64) -> f64 {
         (self.levels.total() + excess).min(self.cap)
     }
 
-    /// Make it known where triangles are.
+    /// Build the index of triangles by place.
     pub(in super::super) fn look_up(&mut self) {
         self.near = vec![Vec::new(); self.cells.count()];
         for (idx, triangle) in self.mesh.triangles.iter().enumerate() {
@@ -64,8 +64,8 @@ impl Proof {
         }
     }
 
-    /// By how much the potential rises at most on the way from the start to any place within `spread` of `at` where a
-    /// route can be, or, for the other `end`, from there to the target; `None` where there is no such place.
+    /// The greatest rise of the potential on the way from the start to any place within `spread` of `at` where a route
+    /// can be, or, for the other `end`, from there to the target; `None` where there is no such place.
     pub(in super::super) fn rise(&self, end: usize, at: Point2, spread: f64) -> Option<f64> {
         let at = at - self.origin;
         let cells = self.cells.within(at, spread);
@@ -81,8 +81,8 @@ impl Proof {
         }
     }
 
-    /// The least and the most that the potential takes in those parts of `triangle` that are within `spread` of `at`, or
-    /// beyond; `None` where it has none, or nothing leads to it.
+    /// Bounds of the least and the greatest value of the potential in the parts of `triangle` within `spread` of `at`;
+    /// `None` where there are no such parts, or nothing leads there.
     fn around(&self, triangle: &Triangle, at: Point2, spread: f64) -> Option<[f64; 2]> {
         let values = triangle.of(&self.potential);
         let corners = self.mesh.places(triangle);
@@ -99,7 +99,7 @@ impl Proof {
         if !least.is_finite() {
             return None;
         }
-        // Taylor's series about `at`, which ends with the second derivatives.
+        // Taylor series about `at`, which ends with the second derivatives.
         let mut terms = [0.0; 6];
         for corner in 0..3 {
             terms[corner] = values[corner] * shares[corner] * (2.0 * shares[corner] - 1.0);

@@ -1,4 +1,4 @@
-//! On which sides ways pass walls.
+//! Determines on which sides ways pass walls.
 
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -6,8 +6,9 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use crate::geometry::Point2;
 use crate::seeding::bound::wall::Wall;
 
-/// A ray from each wall, and a number of its own. How often a way crosses each, those from its left counted against those
-/// from its right, tells on which side it passes; so does the sum of their numbers, but for chances of one in 2^64.
+/// A ray from each wall, and a number for each ray. How often a way crosses each, counting crossings from its left
+/// against those from its right, shows on which side it passes; so does the sum of their numbers, except with a
+/// probability of one in 2^64.
 #[derive(Debug)]
 pub(super) struct Rays(Vec<(Point2, u64)>);
 
@@ -27,7 +28,7 @@ impl Rays {
         let between = self.0[between..]
             .iter()
             .take_while(|(from, _)| from.x < high);
-        // Those that begin below.
+        // Rays that begin below.
         let crossed = between.filter(|(from, _)| (a - from).perp(&(b - from)) * (b.x - a.x) < 0.0);
         let sum = crossed.fold(0_u64, |sum, (_, number)| sum.wrapping_add(*number));
         if b.x > a.x { sum } else { sum.wrapping_neg() }
@@ -56,7 +57,7 @@ mod tests {
         );
         let direct = sum(&rays, &[[-4.0, 1.0], [4.0, 1.0]]);
         assert_eq!(direct, 1);
-        // However they are bent and cut up, from right to left, and with loops that come back.
+        // However they are bent and subdivided, from right to left, and with loops that come back.
         for same in [
             vec![[-4.0, 1.0], [0.0, 2.9], [0.0, 0.5], [1.0, 0.5], [4.0, 1.0]],
             vec![

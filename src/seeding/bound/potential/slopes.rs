@@ -1,4 +1,4 @@
-//! How steep a quadratic is in a triangle, given in its six nodes.
+//! The steepness of a quadratic in a triangle, given its values in the six nodes.
 
 use super::mesh::{SIDES, Triangle};
 use crate::geometry::Vector2;
@@ -16,7 +16,7 @@ pub(super) fn gradients(triangle: &Triangle, values: &[f64; 6]) -> [Vector2; 6] 
     ])
 }
 
-/// What a value in the node `which` adds to the gradients in all nodes, for each unit of it.
+/// How much a value in the node `which` changes the gradients in all nodes, per unit.
 #[inline]
 pub(super) fn response(triangle: &Triangle, which: usize) -> [Vector2; 6] {
     let rates = &triangle.rates;
@@ -37,9 +37,9 @@ fn with_middles([a, b, c]: [Vector2; 3]) -> [Vector2; 6] {
     [a, b, c, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5]
 }
 
-/// How many times as steep as its `limits` allow a triangle with these `values` is where it is steepest: limits are
-/// linear in each of its parts and gradients are, so that no place between nodes exceeds all of them. Infinite where
-/// the triangle is so slim that nothing can be told.
+/// The greatest steepness of a triangle with these `values` as a multiple of its `limits`: limits and gradients are
+/// linear in each of its parts, so no place between nodes exceeds all of them. Infinite where the triangle is too slim
+/// to tell.
 #[inline]
 pub(super) fn steepness(triangle: &Triangle, limits: &[f64; 6], values: &[f64; 6]) -> f64 {
     let gradients = gradients(triangle, values);
@@ -58,7 +58,7 @@ pub(super) fn steepness(triangle: &Triangle, limits: &[f64; 6], values: &[f64; 6
     }
 }
 
-/// The least and the most that the quadratic takes, or beyond: those of its Bezier points.
+/// Bounds of the least and the greatest value of the quadratic: those of its Bezier points.
 pub(super) fn range(values: &[f64; 6]) -> [f64; 2] {
     let mut points = *values;
     for (middle, [one, other]) in (3..).zip(SIDES) {

@@ -1,44 +1,44 @@
-//! How far apart the vertices of a mesh are: close together where cheap routes may lead.
+//! The distances between vertices of a mesh: close together where cheap routes may lead.
 
 use super::cells::Cells;
 use super::mesh::Mesh;
 use super::zones::Zones;
 use crate::geometry::{Point2, Rect};
 
-/// A route as many times as dear as the cheapest, as far as known, and by how much wider the vertices may stand that
-/// it passes; beyond the last, by twice as much.
+/// A cost as a multiple of the cheapest route's, as far as known, and how much wider the vertices on such a route may
+/// be spaced; beyond the last, by twice as much.
 const WIDER: [(f64, f64); 3] = [(1.1, 1.0), (2.0, 2.0), (4.0, 4.0)];
 
-/// How many times as dear as the cheapest a route is expected to be taken for at least where prices are lowered.
+/// Where prices are lowered, routes are assumed to cost at least this multiple of the cheapest.
 const SPARE: f64 = 1.05;
 
-/// The same once it has been told from a mesh that is finer.
+/// The same once it was estimated from a finer mesh.
 const SPARE_TOLD: f64 = 1.03;
 
-/// Share of a price that is always left.
+/// Share of a price that always remains.
 const LEAST_SHARE: f64 = 0.4;
 
-/// Cells in which routes are told apart, at most.
+/// Maximum number of cells in which routes are distinguished.
 const MOST_CELLS: usize = 200_000;
 
-/// Area of a vertex for each square of the distance to the next: half of the square root of three.
+/// Area per vertex as a share of the squared distance to the next: half of the square root of three.
 const HEXAGON: f64 = 0.866_025_403_784_438_6;
 
-/// How far apart the vertices of a mesh are.
+/// The distances between vertices of a mesh.
 pub(super) struct Spacing {
     pub(super) cells: Cells,
-    /// How many times as dear as the cheapest the routes through each cell are at least, as far as known.
+    /// For each cell, the least cost of routes through it as a multiple of the cheapest, as far as known.
     dearness: Vec<f64>,
     /// Distance between vertices where they are closest.
     pub(super) side: f64,
-    /// What the cheapest route costs, as far as known.
+    /// Cost of the cheapest route, as far as known.
     cheapest: f64,
-    /// How many times as dear as that routes are taken for at least where prices are lowered.
+    /// The least multiple of that which routes are assumed to cost where prices are lowered.
     spare: f64,
 }
 
 impl Spacing {
-    /// The same everywhere, for so many vertices in `rect`.
+    /// Equal distances, for `vertices` vertices in `rect`.
     pub(super) fn even(rect: Rect, zones: &Zones, vertices: usize) -> Self {
         let cells = Cells::about(rect, vertices);
         let mut even = Self {
@@ -52,7 +52,7 @@ impl Spacing {
         even
     }
 
-    /// For so many vertices, where the ways from both ends to the nodes of a coarser mesh cost `costs`.
+    /// For `vertices` vertices, where the ways from both ends to the nodes of a coarser mesh cost `costs`.
     pub(super) fn finer(
         &self,
         mesh: &Mesh,
@@ -67,7 +67,7 @@ impl Spacing {
         let mut dearness = vec![f64::INFINITY; cells.count()];
         for (node, place) in mesh.nodes.iter().enumerate() {
             let sum = (costs[0][node] + costs[1][node]) / cheapest;
-            // A node stands for what lies about it, as far as the next one.
+            // A node represents its surroundings, as far as the next one.
             for cell in cells.within(*place, self.at(*place)) {
                 dearness[cell] = dearness[cell].min(sum);
             }
@@ -83,7 +83,7 @@ impl Spacing {
         finer
     }
 
-    /// The least distance with which there are so many vertices.
+    /// The least distance that gives `vertices` vertices.
     fn fitting(&self, zones: &Zones, vertices: usize) -> f64 {
         let is_free = |cell: &usize| {
             let square = self.cells.square(*cell);
@@ -96,20 +96,20 @@ impl Spacing {
         (needed.max(1.0) / (HEXAGON * vertices as f64)).sqrt() * self.cells.side
     }
 
-    /// How many times the least distance vertices are apart in a cell.
+    /// The distance between vertices in a cell as a multiple of the least distance.
     pub(super) fn wider(&self, cell: usize) -> f64 {
         let dearness = self.dearness[cell];
         let class = WIDER.iter().find(|(dear, _)| dearness < *dear);
         class.map_or(2.0 * WIDER[2].1, |(_, wider)| *wider)
     }
 
-    /// Distance to the next vertex about a place.
+    /// Distance to the next vertex around a place.
     pub(super) fn at(&self, place: Point2) -> f64 {
         self.side * self.wider(self.cells.of(place))
     }
 
-    /// Ask for more where the cheapest route turned out to cost so much that what is left of prices holds it down; whether
-    /// that is so.
+    /// Raise the assumed multiple where the cheapest route turned out to cost so much that the lowered prices limit it;
+    /// returns whether that is so.
     pub(super) fn raise(&mut self, cost: f64) -> bool {
         let times = cost / self.cheapest;
         let is_held_down = times > self.spare;
@@ -119,8 +119,8 @@ impl Spacing {
         is_held_down
     }
 
-    /// Share of its price that is enough at a place to make all routes that pass it dearer than the cheapest: what is
-    /// not asked for there need not be proven by triangles that are few and large.
+    /// Share of the price at a place that is enough to make all routes through it more expensive than the cheapest:
+    /// what is not required there need not be proven by the few large triangles.
     pub(super) fn share(&self, place: Point2) -> f64 {
         (self.spare / self.dearness[self.cells.of(place)]).clamp(LEAST_SHARE, 1.0)
     }
@@ -134,8 +134,8 @@ mod tests {
     use crate::seeding::bound::prices::Prices;
     use crate::seeding::tests::scenario;
 
-    /// A coarse mesh takes the way past the middle for twice as dear as the cheapest; a finer one shows that the cheapest costs
-    /// a tenth more.
+    /// A coarse mesh estimates the way past the middle as twice as expensive as the cheapest; a finer one shows that
+    /// the cheapest costs a tenth more.
     #[test]
     fn prices_are_lowered_less_where_the_cheapest_route_turns_out_dearer() {
         let scenario = scenario(r#""threats": []"#);

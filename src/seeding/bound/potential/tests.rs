@@ -1,4 +1,4 @@
-//! Potentials against lattices of legs, and what they are made of against prices at many places.
+//! Compares potentials with lattices of legs, and their components with prices at many places.
 
 use super::super::super::tests::{disc, read};
 use super::super::around;
@@ -32,8 +32,8 @@ fn proven(scenario: &Scenario) -> f64 {
     proof.expect("there is a way").total()
 }
 
-/// The cheapest way over a lattice of `NODES` nodes a side with legs in 32 directions, each
-/// summed up in its middle parts: dearer than the cheapest way of all, but for that sum.
+/// The cheapest way over a lattice of `NODES` nodes a side with legs in 32 directions, each summed by the midpoint
+/// rule: apart from that sum, more expensive than the cheapest way of all.
 fn over_lattice(scenario: &Scenario) -> f64 {
     const NODES: i32 = 51;
     let spacing = 20.0;
@@ -114,7 +114,7 @@ fn a_little_below_the_cheapest_way() {
     check(0.5, &wall, 0.90);
 }
 
-/// A potential that is nowhere steeper than prices leaves nothing to be taken off.
+/// A potential that is nowhere steeper than prices is not reduced.
 #[test]
 fn what_a_march_finds_is_proven_but_for_little() {
     let scenario = scenario(0.2, &zones());
@@ -138,8 +138,8 @@ fn what_a_march_finds_is_proven_but_for_little() {
     }
 }
 
-/// In every triangle that is kept, what is linear between the limits of its parts is no more than what a metre
-/// costs there; and what is left out are cores.
+/// In every triangle that is kept, the linear interpolation between the limits of its parts is no more than the cost of
+/// a metre there; and what is left out is cores.
 #[test]
 fn limits_are_nowhere_more_than_a_metre_costs() {
     let scenario = scenario(0.2, &zones());
@@ -194,7 +194,7 @@ fn limits_are_nowhere_more_than_a_metre_costs() {
     );
 }
 
-/// Where edges cross the border of the area, touch it or run close to it, vertices are on it or well within it.
+/// Where edges cross the border of the area, touch it or run close to it, vertices are on it or clearly inside.
 #[test]
 fn no_triangle_along_the_border_is_slim() {
     let threats = [
@@ -236,7 +236,7 @@ fn no_triangle_along_the_border_is_slim() {
     }
 }
 
-/// However close to the border start and target are.
+/// However close start and target are to the border.
 #[test]
 fn a_mesh_begins_and_ends_where_routes_do() {
     let mut scenario = scenario(0.2, &disc(500.0, 60.0, 20.0, 60.0));
@@ -279,7 +279,7 @@ fn zones() -> String {
     .join(", ")
 }
 
-/// A straight leg into or out of any place costs no less than the potential rises by on it.
+/// A straight leg into or out of any place costs at least the rise of the potential along it.
 #[test]
 fn no_leg_costs_less_than_the_rise() {
     let scenario = scenario(0.2, &zones());
@@ -321,7 +321,7 @@ fn no_leg_costs_less_than_the_rise() {
                 "{to_there} {cost} to {to}"
             );
             tight += u32::from(to_there > 0.95 * cost);
-            // Of all places about it, one rises as much or more.
+            // Among all places around it, one has at least this rise.
             let about = rise(to + Vector2::new(3.0, -2.0), 4.0);
             assert!(about >= to_there - 1e-6, "{about} {to_there}");
         }

@@ -1,5 +1,5 @@
-//! Where the vertices of a mesh are: along the edges of soft zones, of cores and of the area, where these cross, and
-//! evenly in between. A mesh may have any vertices; those that lie well make it prove much.
+//! The positions of a mesh's vertices: along the edges of soft zones, of cores and of the area, where these cross, and
+//! evenly in between. Any vertices are valid; well-placed ones make the mesh prove more.
 
 use super::super::wall::Wall;
 use super::cells::Cells;
@@ -9,41 +9,41 @@ use super::zones::Zones;
 use crate::geometry::{Point2, Rect, Vector2};
 use crate::seeding::outline::OutlineShape;
 
-/// Share of the radius of a circle by which vertices on it are apart at most,
+/// Greatest distance between vertices on a circle, as a share of its radius.
 const BENT: f64 = 0.6;
 
-/// but not closer than this share of the distance that is asked for.
+/// Vertices on a circle are no closer than this share of the requested distance.
 const CLOSEST: f64 = 0.4;
 
-/// How near to each other vertices may come, as shares of the distance that is asked for: where edges cross,
+/// How close vertices may be where edges cross, as a share of the requested distance.
 const CROSSING: f64 = 0.3;
 
-/// along edges,
+/// The same along edges.
 const ALONG: f64 = 0.45;
 
-/// and in between.
+/// The same in between.
 const BETWEEN: f64 = 0.62;
 
-/// How near vertices in between may come to edges.
+/// How close to edges vertices in between may be, as a share of the requested distance.
 const BESIDE: f64 = 0.45;
 
-/// How near any may come to the border of the rectangle, but for those on it, as a share of how near they may come to each
-/// other: triangles between them and the border would be slim, and too steep.
+/// How close to the border of the rectangle vertices that are not on it may be, as a share of how close they may be to
+/// each other: triangles between them and the border would be slim, and too steep.
 const INNER: f64 = 0.5;
 
-/// Edges of which all crossings are looked for, at most.
+/// Maximum number of edges whose crossings are all looked for.
 const MOST_EDGES: usize = 1500;
 
-/// Vertices along edges, at most.
+/// Maximum number of vertices along edges.
 const MOST_ALONG: usize = 6000;
 
-/// Places along edges that are tried, about, at most.
+/// Approximate maximum number of places along edges that are tried.
 const MOST_TRIED: usize = 50_000;
 
-/// Cells in which the vertices laid so far are looked up, at most.
+/// Maximum number of cells in which the vertices placed so far are looked up.
 const MOST_CELLS: usize = 60_000;
 
-/// The vertices: first those of `ends`, then the corners of the rectangle that `zones` are in.
+/// The vertices: first those of `ends`, then the corners of the rectangle that contains `zones`.
 pub(super) fn lay(ends: [Point2; 2], zones: &Zones, spacing: &Spacing) -> Vec<Point2> {
     let rect = zones.rect();
     let side = (BETWEEN * spacing.side).max(Cells::about(rect, MOST_CELLS).side);
@@ -67,7 +67,7 @@ pub(super) fn lay(ends: [Point2; 2], zones: &Zones, spacing: &Spacing) -> Vec<Po
     laid.places
 }
 
-/// Where edges, the westernmost first, cross.
+/// Place vertices where edges cross, the westernmost edges first.
 fn cross(laid: &mut Laid, edges: &[Edge], spacing: &Spacing) {
     for (at, one) in edges.iter().enumerate() {
         let near = edges[at + 1..]
@@ -81,7 +81,7 @@ fn cross(laid: &mut Laid, edges: &[Edge], spacing: &Spacing) {
     }
 }
 
-/// Along the edges.
+/// Place vertices along the edges.
 fn follow(laid: &mut Laid, edges: &[Edge], spacing: &Spacing) {
     let rect = laid.zones.rect();
     let mut tried = 0;
@@ -99,13 +99,13 @@ fn follow(laid: &mut Laid, edges: &[Edge], spacing: &Spacing) {
             if outside <= 0.0 && edge.is_there(place) {
                 laid.add(place, ALONG * step);
             }
-            // No way back to the rectangle is shorter.
+            // The way back to the rectangle is no shorter than this.
             along += step.max(outside);
         }
     }
 }
 
-/// Between the edges, in equilateral triangles.
+/// Place vertices between the edges, in equilateral triangles.
 fn fill(laid: &mut Laid, spacing: &Spacing) {
     let (rect, tolerance) = (laid.zones.rect(), laid.zones.tolerance());
     for cell in 0..spacing.cells.count() {
@@ -134,13 +134,14 @@ fn fill(laid: &mut Laid, spacing: &Spacing) {
     }
 }
 
-/// How far a place is within a rectangle.
+/// How far a place is inside a rectangle.
 fn inner(rect: &Rect, place: Point2) -> f64 {
     let [low, high] = [place - rect.min, rect.max - place];
     low.x.min(low.y).min(high.x).min(high.y)
 }
 
-/// The place on the border of a rectangle that is within `near` of another in each direction; that one if there is none.
+/// The place on the border of a rectangle within `near` of another in each direction; that place itself if there is
+/// none.
 fn onto(rect: &Rect, place: Point2, near: f64) -> Point2 {
     let onto = |at: f64, borders: [f64; 2]| {
         let border = borders.into_iter().find(|to| (at - to).abs() <= near);
@@ -166,20 +167,21 @@ fn is_beside(wall: &Wall, place: Point2, side: f64, tolerance: f64) -> bool {
         || (away - wall.influence).abs() < least(wall.influence)
 }
 
-/// What has been laid.
+/// The vertices placed so far.
 struct Laid<'a> {
     zones: &'a Zones<'a>,
     places: Vec<Point2>,
     cells: Cells,
-    /// Of each cell.
+    /// Vertices in each cell.
     inhabitants: Vec<Vec<usize>>,
 }
 
 impl Laid<'_> {
-    /// One more, unless it is outside, in a core, or nearer than `least` to another, or to the border while not on it.
+    /// Add a vertex, unless it is outside, in a core, or nearer than `least` to another, or to the border without being
+    /// on it.
     fn add(&mut self, place: Point2, least: f64) {
         let rect = self.zones.rect();
-        // Start, target and corners are where they are.
+        // Start, target and corners are used as they are.
         let place = if least > 0.0 {
             onto(&rect, place, self.zones.tolerance())
         } else {

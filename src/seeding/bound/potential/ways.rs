@@ -1,5 +1,5 @@
-//! Cheap ways from start to target, seen from above: what the march that a potential begins with tells besides. No bound
-//! looks at them; searches begin with them.
+//! Cheap ways from start to target, seen from above: a by-product of the march that a potential begins with. No bound
+//! uses them; searches start from them.
 
 use std::collections::HashMap;
 
@@ -15,23 +15,23 @@ use crate::seeding::bound::prices::Prices;
 use crate::seeding::bound::toll::Heights;
 use crate::seeding::bound::wall::Wall;
 
-/// A way so many times as dear as the cheapest is not worth a look.
+/// A way this many times as expensive as the cheapest is not worth a look.
 const DEAREST: f64 = 1.25;
 
-/// How closely ways are looked for.
+/// How closely to look for ways.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WaysSought {
-    /// Vertices of the mesh that they lead over, about; where zones are many and fine, there are more.
+    /// Approximate number of vertices of the mesh that they lead over; more where zones are many and fine.
     pub vertices: usize,
-    /// Ways, at most.
+    /// Maximum number of ways.
     pub most: usize,
-    /// What a way may cost at most.
+    /// Maximum cost of a way.
     pub dearest: f64,
 }
 
 /// Ways for a route that flies at `height`, the cheapest first, at the prices of fuel and soft zones; each passes some
-/// threat on another side than all before it. None where fuel costs nothing, start and target are not apart, or nothing
-/// leads from one to the other.
+/// threat on a different side from all before it. None where fuel costs nothing, start and target are not apart, or
+/// nothing leads from one to the other.
 #[must_use]
 pub fn cheap_ways(scenario: &Scenario, height: f64, sought: WaysSought) -> Vec<Vec<Point2>> {
     let prices = Prices::of(scenario);
@@ -63,7 +63,7 @@ pub fn cheap_ways(scenario: &Scenario, height: f64, sought: WaysSought) -> Vec<V
         .collect()
 }
 
-/// A mesh, and what reaching its nodes costs from either end.
+/// A mesh, and the cost of reaching its nodes from either end.
 struct Ways {
     priced: Priced,
     costs: [Vec<f64>; 2],
@@ -77,9 +77,9 @@ struct Over {
 }
 
 impl Ways {
-    /// For each choice of sides on which walls are passed, the cheapest way over a node or a side of the mesh. Nodes alone
-    /// would not do: where it is as cheap to have passed some wall on one side as on the other, and to pass another on one
-    /// side as on the other, all four choices meet within one triangle.
+    /// For each choice of sides on which walls are passed, the cheapest way over a node or a side of the mesh. Nodes
+    /// alone are not enough: where passing one wall on either side costs the same, and passing another on either side
+    /// too, all four choices meet within one triangle.
     fn differing(&self, walls: &[&Wall], sought: &WaysSought) -> Vec<Vec<Point2>> {
         let nodes = &self.priced.mesh.nodes;
         let rays = Rays::of(walls);
@@ -124,7 +124,7 @@ impl Ways {
         all.filter(move |over| over.cost <= dearest)
     }
 
-    /// Over which node it is cheapest from `at` to an end.
+    /// The node over which it is cheapest to get from `at` to an end.
     fn next(&self, end: usize, at: usize) -> Option<usize> {
         let (mesh, costs) = (&self.priced.mesh, &self.costs[end]);
         let mut cheapest = (f64::INFINITY, None);
@@ -145,7 +145,7 @@ impl Ways {
 struct Tree<'a> {
     ways: &'a Ways,
     end: usize,
-    /// Of each node that was asked for, the one before it, and on which sides the way to it passes walls.
+    /// For each node that was asked for, the one before it, and on which sides the way to it passes walls.
     known: Vec<Option<(usize, u64)>>,
 }
 
@@ -156,7 +156,7 @@ impl<'a> Tree<'a> {
         Self { ways, end, known }
     }
 
-    /// On which sides the way to `node` passes walls, as `rays` tell; `None` where none leads there.
+    /// On which sides the way to `node` passes walls, according to `rays`; `None` where no way leads there.
     fn sides(&mut self, node: usize, rays: &Rays) -> Option<u64> {
         let nodes = &self.ways.priced.mesh.nodes;
         let (mut at, mut ahead) = (node, Vec::new());
@@ -196,7 +196,8 @@ mod tests {
         }
     }
 
-    /// Two discs in the way, one after the other, whose soft zones overlap in gaps of ten metres beside a third and a fourth.
+    /// Two discs in the way, one after the other, whose soft zones overlap with those of a third and a fourth beside
+    /// them in gaps of ten metres.
     #[test]
     fn each_way_passes_some_threat_on_another_side() {
         let discs = [
@@ -225,7 +226,7 @@ mod tests {
             lengths.iter().all(|length| *length < 1.6 * direct),
             "{lengths:?}"
         );
-        // Nothing is twice the same.
+        // No two ways are the same.
         for (idx, one) in ways.iter().enumerate() {
             assert!(ways[idx + 1..].iter().all(|other| one != other));
         }

@@ -1,4 +1,4 @@
-//! What a metre costs, and where no route can be.
+//! The cost of a metre, and where no route can be.
 
 use super::super::prices::Prices;
 use super::super::wall::Wall;
@@ -8,23 +8,23 @@ use crate::geometry::{Point2, Rect, ring};
 use crate::seeding::arc::{point_segment, segment_segment};
 use crate::seeding::outline::OutlineShape;
 
-/// Cells in which walls are looked up.
+/// Number of cells in which walls are looked up.
 const CELLS: usize = 1024;
 
-/// Discs and corners of rings in all cells, at most; walls beyond are left out.
+/// Maximum number of discs and ring corners in all cells; walls beyond are left out.
 const MOST_ENTRIES: usize = 200_000;
 
-/// Walls in a cell, at most.
+/// Maximum number of walls in a cell.
 const MOST_IN_CELL: usize = 100;
 
 /// Walls with their soft zones, by place.
 pub(super) struct Zones<'a> {
     walls: &'a [Wall],
-    /// Whether each is in any cell.
+    /// Whether each wall is in any cell.
     counts: Vec<bool>,
     prices: &'a Prices,
     cells: Cells,
-    /// Of each cell, the walls whose soft zones or cores come into it.
+    /// For each cell, the walls whose soft zones or cores overlap it.
     near: Vec<Vec<usize>>,
 }
 
@@ -58,7 +58,7 @@ impl<'a> Zones<'a> {
         }
     }
 
-    /// Where they are looked up.
+    /// The rectangle in which they are looked up.
     pub(super) fn rect(&self) -> Rect {
         self.cells.rect
     }
@@ -68,27 +68,27 @@ impl<'a> Zones<'a> {
         self.prices.tolerance
     }
 
-    /// Those that count.
+    /// The walls that count.
     pub(super) fn counted(&self) -> impl Iterator<Item = &'a Wall> {
         let walls = self.walls.iter().zip(&self.counts);
         walls.filter_map(|(wall, counts)| counts.then_some(wall))
     }
 
-    /// Those that may be felt at a place.
+    /// The walls that may have an effect at a place.
     pub(super) fn near(&self, place: Point2) -> impl Iterator<Item = &'a Wall> {
         self.near[self.cells.of(place)]
             .iter()
             .map(|wall| &self.walls[*wall])
     }
 
-    /// In each node of a triangle what a metre costs there at most, so that between the nodes of each of its parts a
-    /// metre costs no less than what is linear between them.
+    /// In each node of a triangle an upper limit of the cost of a metre, chosen so that in each part of the triangle a
+    /// metre costs no less than the linear interpolation between its nodes.
     pub(super) fn limits(&self, places: &[Point2; 6]) -> [f64; 6] {
         let middle = middle(places);
         let mut sums = [[self.prices.fuel; 3]; PARTS.len()];
         let mut cut = Vec::new();
         for wall in self.near(middle) {
-            // The depth in the zone of a disc or of an edge is concave: nowhere less than what is linear between nodes.
+            // The depth in the zone of a disc or of an edge is concave: nowhere less than its linear interpolation.
             let (a, b) = part(wall, middle);
             let depth = |place| wall.influence - point_segment(place, a, b) - self.prices.tolerance;
             let prices = places.map(|place| self.prices.exposure * depth(place));
@@ -113,7 +113,7 @@ impl<'a> Zones<'a> {
         limits
     }
 
-    /// Whether no route comes into the triangle with these corners.
+    /// Whether no route enters the triangle with these corners.
     pub(super) fn leave_out(&self, corners: &[Point2; 3]) -> bool {
         let tolerance = self.prices.tolerance;
         self.near(middle(corners)).any(|wall| match &wall.shape {
@@ -143,11 +143,11 @@ impl<'a> Zones<'a> {
     }
 }
 
-/// The limits in the nodes of a part whose edge a zone cuts, with the share of what the zone costs, less than nothing
-/// where a node lies outside, that makes the least of them the greatest: no share is more than what the zone does cost.
+/// The limits in the nodes of a part whose edge a zone cuts, including the share of the zone's cost, negative where a
+/// node lies outside, that maximises the least of them: any share is at most what the zone really costs.
 fn with_best_share(limits: &[f64; 3], zone: &[f64; 3]) -> [f64; 3] {
     let least = |limits: &[f64; 3]| limits.iter().copied().fold(f64::INFINITY, f64::min);
-    // The least is concave in the share: it is greatest with all of it, or where two nodes change places.
+    // The least is concave in the share: it is greatest with all of it, or where two nodes swap order.
     let meeting =
         |[one, other]: [usize; 2]| (limits[other] - limits[one]) / (zone[one] - zone[other]);
     let shares = [1.0].into_iter().chain(SIDES.map(meeting));
@@ -164,7 +164,7 @@ fn with(limits: &[f64; 3], zone: &[f64; 3], share: f64) -> [f64; 3] {
     std::array::from_fn(|node| limits[node] + share * zone[node])
 }
 
-/// What of `wall` is nearest to a place: a point, as both ends of an edge, or an edge.
+/// The part of `wall` nearest to a place: a point, as both ends of an edge, or an edge.
 fn part(wall: &Wall, place: Point2) -> (Point2, Point2) {
     let edges = match &wall.shape {
         OutlineShape::Disc(center) => return (*center, *center),

@@ -1,4 +1,4 @@
-//! Whether a string can go on along a way, and whether that is worth it.
+//! Whether a string can continue along a way, and whether that is worthwhile.
 
 use super::Search;
 use super::place::Place;
@@ -31,15 +31,14 @@ impl Search<'_> {
         }
     }
 
-    /// The straight part from the circle of one place to that of the next, where a string can bend so at
-    /// both.
+    /// The straight part from the circle of one place to that of the next, if a string can bend in that way at both.
     pub(super) fn straight(&self, from: Place, to: Place) -> Option<Tangent> {
         let straight = tangent(&self.rounding(from), &self.rounding(to))?;
         for place in [from, to] {
             if let (Some(corner), Place::Corner(_, left)) = (self.corner(place), place)
                 && let Some(edges) = corner.edges
             {
-                // The edges must lie on the side that the string bends to.
+                // The edges must be on the side towards which the string bends.
                 let side = if left { 1.0 } else { -1.0 };
                 if edges
                     .iter()
@@ -52,7 +51,7 @@ impl Search<'_> {
         Some(straight)
     }
 
-    /// The part along the circle of `step` up to `straight`, where a string can go on so.
+    /// The part along the circle of `step` up to `straight`, if a string can continue in that way.
     pub(super) fn arc(&self, step: &Step, straight: &Tangent) -> Option<Arc> {
         let on = self.rounding(step.place);
         let arc = match &step.before {
@@ -62,7 +61,7 @@ impl Search<'_> {
             }
             Some((_, _, before)) => Arc::new(on, outward(&on, before), outward(&on, straight)),
         };
-        // Nor does a string turn back at the corner of a ring.
+        // A string does not turn back at the corner of a ring either.
         let turns_back = self.corner(step.place).is_some_and(|c| c.edges.is_some())
             && arc.turn > std::f64::consts::PI + 1e-9;
         (!turns_back).then_some(arc)
@@ -88,12 +87,12 @@ impl Search<'_> {
         found
     }
 
-    /// Whether a string that leaves along `arc` winds round a corner for nothing, or crosses an earlier part of itself. It
-    /// may come back to a circle out of which others rise, further on.
+    /// Whether a string that leaves along `arc` winds round a corner needlessly, or crosses an earlier part of itself.
+    /// It may come back, further on, to a circle from which others protrude.
     pub(super) fn crosses_itself(&self, way: &Way, arc: &Arc, straight: &Tangent) -> bool {
         let signed = |arc: &Arc| arc.on.sense.sign() * arc.turn;
         let mut step = way.step;
-        // By so much the string has turned since it came to the step, and on its circle.
+        // How much the string has turned since it came to the step, and on the circle itself.
         let (mut turned, mut own) = (signed(arc), signed(arc));
         loop {
             if self.steps[step].place == way.to {
@@ -115,8 +114,8 @@ impl Search<'_> {
         }
     }
 
-    /// Whether `k` earlier arrivals at `place` reach this one's point along the circle without
-    /// being longer, so that whatever it becomes, they become something better.
+    /// Whether `k` earlier arrivals at `place` reach this one's point along the circle without being longer, so that
+    /// whatever this one becomes, they become something better.
     pub(super) fn is_dominated(&self, place: Place, straight: &Tangent, length: f64) -> bool {
         let Some(earlier) = self.arrivals.get(&place) else {
             return false;

@@ -1,7 +1,7 @@
 //! The search for taut strings: A* over arrivals at circles.
 //!
-//! A straight part is checked against the obstacles only when its turn comes, and far obstacles join
-//! only when one of them is found in the way.
+//! A straight part is checked against the obstacles only when its turn comes, and distant obstacles join only when one
+//! of them is found in the way.
 
 mod check;
 mod place;
@@ -18,20 +18,20 @@ use crate::seeding::obstacles::{Corner, Obstacles};
 use place::{Mix, Place};
 use way::{Step, Way};
 
-/// With so many corners or fewer, all take part from the beginning when several strings are wanted.
+/// With this many corners or fewer, all take part from the beginning when several strings are wanted.
 const FEW_CORNERS: usize = 64;
 
-/// So many corners are passed over in the time that one way takes.
+/// Number of corners that can be skipped in the time that one way takes.
 const LOOKS_PER_WAY: usize = 16;
 
-/// Strings that are longer by more than this share of the way are looked at only when no shorter
-/// one is left; the share doubles with each look.
+/// Strings longer than the way by more than this share are examined only when no shorter one is left; the share doubles
+/// each time.
 const FIRST_REACH: f64 = 0.002;
 
-/// The same with few corners, of which each look costs little.
+/// The same with few corners, when each pass costs little.
 const FIRST_REACH_OF_FEW: f64 = 0.02;
 
-/// So many ways are looked at between two questions whether to stop.
+/// Number of ways examined between two checks whether to stop.
 const WAYS_UNWATCHED: usize = 1_000;
 
 /// A search for the shortest few strings of one scene.
@@ -42,12 +42,12 @@ pub(super) struct Search<'o> {
     open: BinaryHeap<Reverse<Way>>,
     ways: usize,
     limits: Limits<'o>,
-    /// Ways at which it is next asked whether to stop.
+    /// Number of ways at which to check next whether to stop.
     next_look: usize,
-    /// Corners that take part, and by outline whether its corners do.
+    /// Corners that take part, and, by outline, whether its corners do.
     active: Vec<usize>,
     is_active: Vec<bool>,
-    /// What is in the way of the straight part between two places; looked up, never walked through.
+    /// What blocks the straight part between two places; only looked up, never iterated.
     blocked: HashMap<(Place, Place), Option<usize>, BuildHasherDefault<Mix>>,
     /// Arrivals at each place.
     arrivals: HashMap<Place, Vec<usize>, BuildHasherDefault<Mix>>,
@@ -78,7 +78,7 @@ impl<'o> Search<'o> {
         search
     }
 
-    /// Until there are enough, or a limit is met.
+    /// Run until there are enough strings, or a limit is reached.
     pub(super) fn run(mut self) -> TautStrings {
         let mut beyond = f64::INFINITY;
         while let Some(Reverse(way)) = self.open.pop() {
@@ -101,7 +101,7 @@ impl<'o> Search<'o> {
         }
     }
 
-    /// Whether too many ways were looked at, or somebody wants it to end.
+    /// Whether too many ways were examined, or the search was asked to stop.
     fn must_end(&mut self) -> bool {
         if self.ways >= self.next_look {
             self.next_look = self.ways + WAYS_UNWATCHED;
@@ -137,7 +137,7 @@ impl<'o> Search<'o> {
         self.widen(self.steps.len() - 1);
     }
 
-    /// Look further from `step`: at the ways on that strings longer than before may take.
+    /// Extend the reach of `step`: to the ways on that longer strings than before may take.
     fn widen(&mut self, step: usize) {
         let known = self.steps[step].reach;
         let here = &self.steps[step];
@@ -150,7 +150,7 @@ impl<'o> Search<'o> {
             self.push_corner(step, self.active[at], known);
         }
         self.ways += self.active.len() / LOOKS_PER_WAY;
-        // Beyond the longest way there is nothing more to widen to.
+        // Beyond the longest way there is nothing more to reach.
         if reach - self.steps[step].length <= self.obstacles.longest_way {
             self.ways += 1;
             self.open.push(Reverse(Way {
@@ -162,8 +162,8 @@ impl<'o> Search<'o> {
         }
     }
 
-    /// Note the way from `step` to `to` if it may become a string longer than `known` and no longer
-    /// than the step's reach.
+    /// Record the way from `step` to `to` if it may become a string longer than `known` and no longer than the step's
+    /// reach.
     fn push(&mut self, step: usize, to: Place, known: f64) {
         let reach = self.steps[step].reach;
         let here = &self.steps[step];
@@ -197,7 +197,7 @@ impl<'o> Search<'o> {
         if matches!(here.place, Place::Corner(at, _) if at == corner) {
             return;
         }
-        // However the corner is reached from here, the string is at least so long.
+        // However the corner is reached from here, the string is at least this long.
         let Corner { center, radius, .. } = self.obstacles.corners[corner];
         let least = here.length + (center - here.at).norm() - radius
             + (self.obstacles.ends[1] - center).norm()
@@ -210,7 +210,7 @@ impl<'o> Search<'o> {
         }
     }
 
-    /// Check a way; where it is free, go on from its end.
+    /// Check a way; if it is free, continue from its end.
     fn follow(&mut self, way: &Way) {
         self.ways += 1;
         let from = &self.steps[way.step];

@@ -1,4 +1,4 @@
-//! Where strings bend, and tables of that.
+//! Places where strings bend, and hashing for tables of them.
 
 use std::hash::Hasher;
 
@@ -10,7 +10,7 @@ pub(super) enum Place {
     Target,
 }
 
-/// Mixes the few whole numbers that a [`Place`] is made of; nobody picks them to collide.
+/// Mixes the few whole numbers that a [`Place`] consists of; nobody chooses them to collide.
 #[derive(Default)]
 pub(super) struct Mix(u64);
 

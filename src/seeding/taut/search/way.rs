@@ -1,4 +1,4 @@
-//! What a search keeps: how far strings have come, and the ways on from there.
+//! The data of a search: the strings so far, and the ways on from there.
 
 use std::cmp::Ordering;
 
@@ -9,19 +9,19 @@ use crate::seeding::arc::{Arc, Tangent};
 /// An arrival at a corner: the string so far.
 pub(super) struct Step {
     pub(super) place: Place,
-    /// From which step, along which arc of its circle, then straight.
+    /// The step before, the arc along its circle, and the straight part after that.
     pub(super) before: Option<(usize, Arc, Tangent)>,
     pub(super) length: f64,
-    /// Where it is, for a first guess at what lies ahead.
+    /// Its position, for a first guess at what lies ahead.
     pub(super) at: Point2,
-    /// Ways on are known as far as strings up to this length are concerned.
+    /// Ways on are known for strings up to this length.
     pub(super) reach: f64,
     /// By how much the reach grows next.
     pub(super) growth: f64,
 }
 
-/// A way on from a step that has not been checked yet, ordered by the length of the shortest string
-/// that it could become, then by age. Back to the start stands for all ways beyond the step's reach.
+/// A way on from a step that has not been checked yet, ordered by the length of the shortest string that it could
+/// become, then by age. A way back to the start represents all ways beyond the step's reach.
 pub(super) struct Way {
     pub(super) least: f64,
     pub(super) age: usize,

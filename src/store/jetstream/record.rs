@@ -133,18 +133,12 @@ impl Record {
     /// Keys of its documents that are, or may be, in the object store: what a superseded run, or one that ended without
     /// a result, wrote is recorded nowhere.
     pub(super) fn objects(&self) -> Vec<String> {
-        let known = [Some(&self.scenario), self.result.as_ref()];
-        let known = known.into_iter().flatten();
-        let (large, small): (Vec<_>, Vec<_>) = known.partition(|document| document.large);
+        let scenario = Some(&self.scenario).filter(|scenario| scenario.large);
+        let small = self.result.as_ref().filter(|result| !result.large);
         let results = (1..=self.attempt).map(|attempt| Document::result_key(self.id(), attempt));
-        let mut objects: Vec<_> = large
-            .into_iter()
-            .map(|document| document.key.clone())
-            .collect();
-        let is_known = |key: &String| small.iter().any(|document| document.key == *key);
-        objects.extend(results.filter(|key| !is_known(key)));
-        objects.dedup();
-        objects
+        let results = results.filter(|key| small.is_none_or(|small| small.key != *key));
+        let scenario = scenario.map(|scenario| scenario.key.clone());
+        scenario.into_iter().chain(results).collect()
     }
 
     /// Approximate bytes it takes up on the servers: documents and events.
@@ -190,7 +184,6 @@ impl Step {
         } = change;
         if let State::Kept(record) = &mut state {
             record.last_event += count(events.len(), told, &record.plan);
-            record.event_bytes += length(&events);
         }
         Self {
             mark: Uuid::new_v4(),

@@ -85,6 +85,7 @@ impl JetStream {
         number: u64,
         events: &[Event],
     ) -> Result<(), StoreError> {
+        let bytes = length(events);
         let left = self.leases.told(id, attempt, |told| told.bytes_left());
         let left = left.flatten();
         let appended = self
@@ -97,9 +98,7 @@ impl JetStream {
                 }
                 let mut record = Box::new(record.clone());
                 record.appended = number;
-                if let Some(left) = left {
-                    record.event_bytes = left;
-                }
+                record.event_bytes = left.unwrap_or(record.event_bytes) + bytes;
                 record.plan.advance(events);
                 Ok(Some(Change {
                     events: events.to_vec(),
@@ -111,7 +110,7 @@ impl JetStream {
         let step = Appended {
             sequence: standing.sequence,
             events: events.len() as u64,
-            bytes: length(events),
+            bytes,
         };
         self.leases.told(id, attempt, |told| told.push(step));
         Ok(())
@@ -145,6 +144,7 @@ impl JetStream {
                     record.result = Some(result.clone());
                 }
                 record.ended(self.options.retention);
+                record.event_bytes += length(last);
                 Ok(Some(Change {
                     events: last.to_vec(),
                     ..Change::told(record)

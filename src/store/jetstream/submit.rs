@@ -25,11 +25,11 @@ use crate::store::{IDEMPOTENCY_MS, StoreError, Submitted};
 /// How long a request waits for an earlier one with the same idempotency key.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// How long a submission with an idempotency key may take; after that, it writes nothing more.
+/// How long the writes of a submission may take; after that, it writes nothing more.
 const LONGEST: Duration = Duration::from_secs(30);
 
-/// A request older than this whose plan does not exist was interrupted. The difference from [`LONGEST`] is how far the
-/// clocks of two nodes may differ.
+/// A request older than this whose plan does not exist was interrupted. Taking the key outlasts an election, and the writes
+/// that follow take [`LONGEST`]; the rest is for the clocks of two nodes, which may differ.
 const BROKEN_OFF_MS: i64 = 60_000;
 
 /// Which submission came first with a key.
@@ -94,19 +94,6 @@ impl JetStream {
             let accepted = self.accept(submission).await;
             return accepted.map(newly).map_err(|not| not.error);
         };
-        let submitted = self.submit_once(submission, idempotency);
-        timeout(LONGEST, submitted).await.unwrap_or_else(|_| {
-            Err(StoreError::unavailable(
-                "the servers were too slow to accept a plan",
-            ))
-        })
-    }
-
-    async fn submit_once(
-        &self,
-        submission: &Submission,
-        idempotency: &Idempotency,
-    ) -> Result<Submitted, StoreError> {
         let key = key_of(submission.owner.as_ref(), idempotency);
         let revision = match self.be_first(&key, submission, idempotency).await? {
             Turn::First { revision } => revision,
@@ -141,9 +128,14 @@ impl JetStream {
         let limit = self.options.queue_limit;
         let room = self.view.known().expect(limit, submission.quota, &lane);
         let position = room.map_err(NotAccepted::certainly)?;
-        let accepted = self.write_all(submission, &lane, position).await;
+        let accepted = timeout(LONGEST, self.write_all(submission, &lane, position)).await;
         self.view.known().arrived(&lane);
-        accepted
+        accepted.unwrap_or_else(|_| {
+            Err(NotAccepted {
+                error: StoreError::unavailable("the servers were too slow to accept a plan"),
+                is_certain: false,
+            })
+        })
     }
 
     async fn write_all(

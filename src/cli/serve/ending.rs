@@ -16,6 +16,9 @@ use crate::http::webhook::Sender;
 use crate::store::Store;
 use crate::worker::{Pool, Sweeper};
 
+/// Time for the store to close even where the grace period leaves none: runs that are not given back count as lost.
+const LEAST_CLOSE: Duration = Duration::from_secs(1);
+
 /// The running parts of the service.
 pub(super) struct Running {
     pub(super) phase: watch::Sender<Phase>,
@@ -27,7 +30,7 @@ pub(super) struct Running {
 }
 
 impl Running {
-    /// Stop them in the right order once a signal requests it, within `grace`.
+    /// Stop them in the right order once a signal requests it, within `grace`; the store has a second at least.
     pub(super) async fn end_on(self, mut signals: Signals, grace: Duration) -> anyhow::Result<()> {
         let name = signals.next().await;
         let signalled = Instant::now();
@@ -45,10 +48,8 @@ impl Running {
             ended.context("the server broke")?;
         }
         drop((self.sweeper, self.sender));
-        if timeout_at(signalled + grace, self.store.close())
-            .await
-            .is_err()
-        {
+        let until = (signalled + grace).max(Instant::now() + LEAST_CLOSE);
+        if timeout_at(until, self.store.close()).await.is_err() {
             tracing::warn!(
                 "the store did not close in time; what it had yet to give back is found as after a crash"
             );

@@ -47,10 +47,13 @@ pub(super) async fn follow(
             asked: accept::asked(&headers),
             available: Wire::MEDIA_TYPES.to_vec(),
         })?;
-    caller.plan(&*state.store, id).await?;
-    let was_told = state.store.has_told(id, after).await?;
-    // Read after that query, which may have brought news of the plan.
-    let plan = state.store.get(id).await?;
+    let mut plan = caller.plan(&*state.store, id).await?;
+    let mut was_told = true;
+    if after > 0 {
+        was_told = state.store.has_told(id, after).await?;
+        // Read again, since that query may have brought news of the plan.
+        plan = state.store.get(id).await?;
+    }
     if plan.status.is_final() {
         let rest = state.store.events(id, after, 1).await?;
         if rest.events.is_empty() {

@@ -24,7 +24,6 @@ pub use error::{ExportError, OptionFault};
 pub use file_name::file_name;
 pub use options::{Altitude, Firmware, OPTIONS, OptionRule, Options};
 
-/// What a result names its scenario by.
 use crate::scenario::json::Rules;
 
 /// A format of a result.

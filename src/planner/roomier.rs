@@ -24,6 +24,10 @@ const POPULATION: usize = 200;
 /// Largest number of iterations of such a search.
 const ITERATIONS: usize = 200;
 
+/// Where more waypoints than this are requested nothing is tried: they hardly ever lack waypoints, and removing some
+/// would take long.
+const MOST: usize = 64;
+
 /// Waypoints whose removal is tried at each step.
 const TRIES: usize = 3;
 
@@ -35,6 +39,9 @@ const STEPS: Steps = Steps {
 
 /// Look for a route that keeps every limit, starting from routes with more waypoints.
 pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
+    if model.scenario.planner.waypoints > MOST {
+        return StopReason::Iterations;
+    }
     for times in TIMES {
         if let Some(reason) = why_stop(model.scenario, log.stop) {
             return reason;

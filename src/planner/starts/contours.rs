@@ -5,14 +5,12 @@
 //! ground allows, and elsewhere turns aside, always to the same side, until the ground under it is just steep enough to
 //! fly.
 
-use std::f64::consts::{PI, TAU};
-
 use super::net::Found;
 use super::thin::thin;
-use super::{lifted, steepest};
+use super::{direction, lifted, steepest};
 use crate::cost::Model;
 use crate::cost::batch::Pricer;
-use crate::geometry::{Point2, Point3, Vector2};
+use crate::geometry::{Point2, Point3, Vector2, wrap_angle};
 use crate::planner::price::PRICED_FROM;
 use crate::scenario::Scenario;
 
@@ -92,8 +90,8 @@ fn walk(scenario: &Scenario, side: f64, steep: f64) -> Option<Vec<Point2>> {
         let straight = heading_of(to - at);
         let before: f64 = heading.unwrap_or(straight);
         let rise = rise(scenario, at, step);
-        let is_too_steep = rise.dot(&towards(straight)).abs() > steep;
-        let goes_on = is_aside && wrapped(straight - before).abs() > AHEAD;
+        let is_too_steep = rise.dot(&direction(straight)).abs() > steep;
+        let goes_on = is_aside && wrap_angle(straight - before).abs() > AHEAD;
         is_aside = rise.norm() > steep && (is_too_steep || goes_on);
         was_aside |= is_aside;
         let wanted = if is_aside {
@@ -105,9 +103,9 @@ fn walk(scenario: &Scenario, side: f64, steep: f64) -> Option<Vec<Point2>> {
         } else {
             straight
         };
-        let turned = before + wrapped(wanted - before).clamp(-TURN, TURN);
+        let turned = before + wrap_angle(wanted - before).clamp(-TURN, TURN);
         heading = Some(turned);
-        at = scenario.area.nearest(at + towards(turned) * step);
+        at = scenario.area.nearest(at + direction(turned) * step);
         way.push(at);
     }
     way.push(to);
@@ -128,15 +126,6 @@ fn rise(scenario: &Scenario, at: Point2, step: f64) -> Vector2 {
 
 fn heading_of(way: Vector2) -> f64 {
     libm::atan2(way.y, way.x)
-}
-
-fn towards(heading: f64) -> Vector2 {
-    Vector2::new(libm::cos(heading), libm::sin(heading))
-}
-
-/// The same angle, within -π to π.
-fn wrapped(angle: f64) -> f64 {
-    (angle + PI).rem_euclid(TAU) - PI
 }
 
 /// At most `most` places along a way, fewer where it has few bends, in the middle of the band.

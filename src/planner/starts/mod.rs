@@ -126,7 +126,7 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
                 (shapes, low) = worth::promising(model, shapes);
             }
             let is_hilly = !model.scenario.terrain.is_flat();
-            if is_hilly && best_of(model, priced(model, &shapes)).is_none() {
+            if is_hilly && flown(model, priced(model, &shapes)).next().is_none() {
                 let round = contours::routes(model, &is_over);
                 evaluations += shapes.len() as u64;
                 legs_priced += round.legs_priced;
@@ -335,11 +335,18 @@ fn priced<'r>(model: &Model, routes: &'r [Vec<Point3>]) -> impl Iterator<Item = 
 
 /// The best of those `priced` that can be flown as it is.
 fn best_of<'r>(model: &Model, priced: impl IntoIterator<Item = Priced<'r>>) -> Option<Priced<'r>> {
+    flown(model, priced).min_by(by_rank)
+}
+
+/// Those of the `priced` that can be flown as they are.
+fn flown<'r>(
+    model: &Model,
+    priced: impl IntoIterator<Item = Priced<'r>>,
+) -> impl Iterator<Item = Priced<'r>> {
     let most = model.scenario.planner.waypoints + 2;
-    let flown = priced
+    priced
         .into_iter()
-        .filter(|(fitness, route)| fitness.is_feasible() && route.len() <= most);
-    flown.min_by(by_rank)
+        .filter(move |(fitness, route)| fitness.is_feasible() && route.len() <= most)
 }
 
 /// The route along `string`, in the middle of the band where it can be reached.
@@ -379,6 +386,11 @@ fn may_turn(corner: [Point3; 3], sharpest: f64) -> bool {
 fn may_turn_along(chain: &[Point3], sharpest: f64) -> bool {
     let mut corners = chain.windows(3);
     corners.all(|corner| may_turn([corner[0], corner[1], corner[2]], sharpest))
+}
+
+/// A vector of length 1.
+fn direction(heading: f64) -> Vector2 {
+    Vector2::new(libm::cos(heading), libm::sin(heading))
 }
 
 /// Metres that the vehicle may climb per metre seen from above, less a hair.

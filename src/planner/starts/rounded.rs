@@ -1,6 +1,7 @@
 //! Chains of a net ignore turns: where one is too sharp, it is split into several.
 
-use crate::geometry::{LEVEL, Point3, Vector2};
+use super::direction;
+use crate::geometry::{LEVEL, Point3};
 use crate::scenario::Scenario;
 
 /// Legs between the parts of a split turn are this share of the direct way, or the shortest allowed.
@@ -34,8 +35,7 @@ pub(super) fn rounded(scenario: &Scenario, chain: &[Point3]) -> Option<Vec<Point
         let mut turned = 1.0;
         while turned < count {
             let heading = heading + turn * turned / count;
-            let ahead = Vector2::new(libm::cos(heading), libm::sin(heading)) * short;
-            at = scenario.area.nearest(at + ahead);
+            at = scenario.area.nearest(at + direction(heading) * short);
             route.push(Point3::new(
                 at.x,
                 at.y,

@@ -1,6 +1,6 @@
 //! Where longer ways may lead: a few places, and the cost of each leg between two of them.
 
-use super::super::net;
+use super::super::{direction, net};
 use super::Climb;
 use crate::cost::Model;
 use crate::cost::batch::{LANES, Price, Pricer};
@@ -67,11 +67,6 @@ pub(super) fn places(scenario: &Scenario, climb: Climb, room: f64) -> Vec<Point2
 /// `count` directions, evenly spread.
 fn round(count: usize) -> impl Iterator<Item = Vector2> {
     (0..count).map(move |number| direction(std::f64::consts::TAU * number as f64 / count as f64))
-}
-
-/// A vector of length 1.
-pub(super) fn direction(heading: f64) -> Vector2 {
-    Vector2::new(libm::cos(heading), libm::sin(heading))
 }
 
 /// Every leg between `places`, at `levels` in the frame, row by row; none from a place to itself.

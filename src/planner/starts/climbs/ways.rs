@@ -3,7 +3,8 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::places::{ENDS, Leg, direction, legs, places};
+use super::super::direction;
+use super::places::{ENDS, Leg, legs, places};
 use super::{Climb, SLACK, steepest};
 use crate::cost::{Model, metre};
 use crate::geometry::{Point2, Point3, wrap_angle};

@@ -2,10 +2,10 @@
 //! that is already known.
 
 mod climbs;
-mod contours;
 mod count;
 mod exposed;
 mod few;
+mod flanks;
 mod heap;
 mod known;
 mod levels;
@@ -126,11 +126,12 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
                 (shapes, low) = worth::promising(model, shapes);
             }
             let is_hilly = !model.scenario.terrain.is_flat();
-            if is_hilly && flown(model, priced(model, &shapes)).next().is_none() {
-                let round = contours::routes(model, &is_over);
+            let none_is_flown = || flown(model, priced(model, &shapes)).next().is_none();
+            if is_hilly && (is_steep(model.scenario) || none_is_flown()) {
                 evaluations += shapes.len() as u64;
-                legs_priced += round.legs_priced;
-                shapes.extend(round.routes);
+                let along_flanks = flanks::routes(model, OVERLAND, &is_over);
+                legs_priced += along_flanks.legs_priced;
+                shapes.extend(along_flanks.routes);
             }
         }
     }
@@ -361,17 +362,36 @@ fn along(model: &Model, string: &TautString) -> Vec<Point3> {
 }
 
 /// `point` at that `share` of the band's height, or as near to it as the vehicle can climb from the
-/// start and to the target.
+/// start and to the target; from the nearer of them where no straight way joins them.
 fn lifted(scenario: &Scenario, point: Point2, share: f64) -> Point3 {
     let band = scenario.altitude;
     let point = scenario.area.nearest(point);
     let height = band.min + share * (band.max - band.min);
     let mut z = scenario.terrain.elevation(point) + height;
-    for end in [scenario.start, scenario.target] {
+    let ends = if is_steep(scenario) {
+        // How far the other end is along a way that is not straight nobody knows.
+        [nearer_end(scenario, point); 2]
+    } else {
+        [scenario.start, scenario.target]
+    };
+    for end in ends {
         let reach = (point - end.xy()).norm() * steepest(scenario);
         z = z.clamp(end.z - reach, end.z + reach);
     }
     Point3::new(point.x, point.y, z)
+}
+
+/// Of start and target the one that is nearer to `point`.
+fn nearer_end(scenario: &Scenario, point: Point2) -> Point3 {
+    let [start, target] = [scenario.start, scenario.target];
+    let is_nearer = (point - start.xy()).norm() <= (point - target.xy()).norm();
+    if is_nearer { start } else { target }
+}
+
+/// Whether one end is so far above the other that the straight way is too steep to fly.
+fn is_steep(scenario: &Scenario) -> bool {
+    let way = scenario.target - scenario.start;
+    way.z.abs() > way.xy().norm() * steepest(scenario)
 }
 
 /// Whether the turn at the middle of `corner` is no sharper than the one with cosine `sharpest`.

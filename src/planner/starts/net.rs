@@ -115,28 +115,39 @@ pub(super) fn chains(
     count: usize,
 ) -> Vec<Vec<Point3>> {
     // The cheapest chain over each place; neighbouring places of a chain give it again.
-    let mut over: Vec<(f64, usize)> = (0..places.len())
+    let over: Vec<(f64, usize)> = (0..places.len())
         .map(|place| (from_start.costs[place] + from_target.costs[place], place))
         .filter(|(cost, _)| cost.is_finite())
         .collect();
-    over.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
     let through = |place: usize| -> Vec<usize> {
         let mut chain = from_start.trace(place);
         chain.reverse();
         chain.extend(from_target.trace(place).into_iter().skip(1));
         chain
     };
+    different(model, places, over, through, count)
+}
+
+/// Up to `count` chains that differ, the cheapest first, out of those `through` certain points, given with their costs.
+pub(super) fn different<P: Copy + Ord>(
+    model: &Model,
+    places: &[Point3],
+    mut over: Vec<(f64, P)>,
+    through: impl Fn(P) -> Vec<usize>,
+    count: usize,
+) -> Vec<Vec<Point3>> {
+    over.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
     let mut chains: Vec<Vec<Point3>> = Vec::new();
     // First those that take an entirely different way.
     for (count, reach) in [(count / 2, APART), (count, NEAR)] {
         let reach = reach * (model.scenario.target - model.scenario.start).norm();
         // Most chains lead over places that others lead over.
         let mut is_near: Vec<Vec<Option<bool>>> = vec![vec![None; places.len()]; chains.len()];
-        for &(_, place) in &over {
+        for &(_, point) in &over {
             if chains.len() >= count {
                 break;
             }
-            let chain = through(place);
+            let chain = through(point);
             let is_known = chains.iter().zip(&mut is_near).any(|(other, is_near)| {
                 let mut all = chain.iter();
                 all.all(|&at| {

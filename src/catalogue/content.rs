@@ -24,7 +24,7 @@ pub struct Declaration {
 }
 
 impl Declaration {
-    /// As the file reader takes it.
+    /// The same for the file reader.
     pub(super) fn declared(&self) -> Declared<'_> {
         Declared {
             format: None,

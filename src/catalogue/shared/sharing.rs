@@ -40,7 +40,7 @@ impl Sharing {
         Self { grace, ..self }
     }
 
-    /// The same, with copies of at most so many bytes, besides those in use.
+    /// The same, with copies of at most `cache_bytes`, besides those in use.
     #[must_use]
     pub fn with_cache_bytes(self, cache_bytes: u64) -> Self {
         Self {

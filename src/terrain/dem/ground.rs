@@ -106,7 +106,7 @@ impl Dem {
         }
     }
 
-    /// The same, raised by so many metres, for another datum.
+    /// The same, raised by a number of metres, for another datum.
     #[must_use]
     #[expect(
         clippy::cast_possible_truncation,

@@ -44,7 +44,7 @@ impl Slabs {
         }
     }
 
-    /// The level at which a line over so many cells crosses a few blocks.
+    /// The level at which a line over `cells` cells crosses a few blocks.
     pub(super) fn level(&self, cells: f64) -> usize {
         let few = |level: &Level| 4.0 * level.width as f64 <= cells;
         self.levels.iter().rposition(few).unwrap_or(0)

@@ -1,5 +1,5 @@
-//! The catalogue of a service: uploads, on this machine or on a shelf that all nodes share, and the
-//! operator's files beside them, which count first.
+//! The catalogue of a service: uploads, on this machine or on a shelf shared by all nodes, and the operator's mounted
+//! files, which take precedence.
 
 use std::collections::BTreeSet;
 use std::fmt::Debug;
@@ -14,7 +14,7 @@ use super::{
 };
 use crate::terrain::{DatasetError, Datasets, Found};
 
-/// What has been uploaded. Methods as those of [`Catalogue`].
+/// Uploaded datasets. Methods are as in [`Catalogue`].
 pub(super) trait Uploads: Debug + Send + Sync {
     fn entries(&self) -> Result<Vec<Entry>, CatalogueError>;
     fn tally(&self) -> Tally;
@@ -34,35 +34,35 @@ pub(super) trait Uploads: Debug + Send + Sync {
 pub struct Directories {
     place: Place,
     mounted: Option<Mounted>,
-    /// Opened as soon as it can be: a disk that is read-only now may not be so for ever.
+    /// Opened as soon as possible: a disk that is read-only now may become writable.
     uploaded: Mutex<Option<Arc<dyn Uploads>>>,
 }
 
-/// Where uploads are.
+/// Where uploads are kept.
 #[derive(Debug)]
 enum Place {
-    /// On this machine alone.
+    /// On this machine only.
     Own { directory: PathBuf, grace: Duration },
-    /// Where every node finds them.
+    /// On a shelf that every node can reach.
     Shared(Sharing),
 }
 
 impl Directories {
-    /// Uploads in `uploads`, made if need be.
+    /// Uploads in `uploads`, which is created if necessary.
     #[must_use]
     pub fn new(uploads: PathBuf, mounted: Option<Mounted>) -> Self {
         Self::with_grace(uploads, mounted, GRACE)
     }
 
-    /// The same, with another time than [`GRACE`].
+    /// The same, with a grace period other than [`GRACE`].
     #[must_use]
     pub fn with_grace(uploads: PathBuf, mounted: Option<Mounted>, grace: Duration) -> Self {
         let directory = uploads;
         Self::at(Place::Own { directory, grace }, mounted)
     }
 
-    /// Uploads on a shelf that other nodes use, too. The mounted files are this node's own: plans over them
-    /// can only be run by nodes that mount the same.
+    /// Uploads on a shelf shared with other nodes. Mounted files belong to this node: plans over them can only be run
+    /// by nodes that mount the same files.
     #[must_use]
     pub fn shared(sharing: Sharing, mounted: Option<Mounted>) -> Self {
         Self::at(Place::Shared(sharing), mounted)
@@ -93,7 +93,7 @@ impl Directories {
         Ok(opened)
     }
 
-    /// What is mounted is not to be changed from here.
+    /// Mounted files cannot be changed through the catalogue.
     fn check_not_mounted(&self, name: &str) -> Result<(), CatalogueError> {
         match &self.mounted {
             Some(mounted) if mounted.has(name)? => Err(CatalogueError::Mounted {
@@ -125,7 +125,7 @@ impl Datasets for Directories {
                     other => other,
                 })
             }
-            // What was uploaded before a file of this name was mounted.
+            // It may have been uploaded before a file with this name was mounted.
             error if sha256.is_some() => self.uploaded()?.find(name, sha256).map_err(|_| error),
             error => Err(error),
         }

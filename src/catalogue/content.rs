@@ -1,4 +1,4 @@
-//! What stands for a dataset: its bytes, and what was declared that they do not say.
+//! Identity of a dataset: its bytes, and what was declared because the file does not say it.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -11,20 +11,20 @@ use sha2::{Digest as _, Sha256};
 use super::Staged;
 use crate::terrain::dem::{self, Dataset, Declared, DemError, Format, Metadata, Survey};
 
-/// What a file does not say of itself and somebody else did.
+/// Facts about a file that it does not contain.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Declaration {
     /// Its reference system, such as `EPSG:32616`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crs: Option<String>,
-    /// Its name, where that says which place it shows.
+    /// Its file name, if the format takes its position from that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub filename: Option<String>,
 }
 
 impl Declaration {
-    /// For the reader of files.
+    /// The same for the file reader.
     pub(super) fn declared(&self) -> Declared<'_> {
         Declared {
             format: None,
@@ -33,8 +33,8 @@ impl Declaration {
         }
     }
 
-    /// Open the file at `path` so declared, and keep of the declaration only what the file does not say
-    /// itself: then equal ground has equal sums, however it was uploaded.
+    /// Open the file at `path` with this declaration, and keep only what the file does not say itself: then equal
+    /// ground has equal checksums, however it was uploaded.
     pub(super) fn open(
         self,
         format: Option<Format>,
@@ -68,12 +68,12 @@ impl Declaration {
     }
 }
 
-/// Sums up a dataset.
+/// Computes the checksum of a dataset.
 #[derive(Debug, Clone, Default)]
 pub struct Identity(Sha256);
 
 impl Identity {
-    /// Of the file at `path`.
+    /// Hash the file at `path`.
     pub(super) fn of_file(path: &Path) -> io::Result<Self> {
         let mut identity = Self::default();
         let mut file = File::open(path)?;
@@ -90,7 +90,7 @@ impl Identity {
         self.0.update(bytes);
     }
 
-    /// That of the file alone, or of the file and a line for each thing that had to be declared.
+    /// The checksum of the file, followed by a line for each necessary declaration.
     pub(super) fn with(mut self, declaration: &Declaration) -> String {
         for (name, value) in [
             ("crs", &declaration.crs),
@@ -104,7 +104,7 @@ impl Identity {
     }
 }
 
-/// A file that has come, and has been read from its first to its last sample.
+/// An uploaded file whose samples have all been read and checked.
 #[derive(Debug)]
 pub struct Checked {
     pub(super) staged: Staged,
@@ -115,7 +115,7 @@ pub struct Checked {
 }
 
 impl Checked {
-    /// What stands for it.
+    /// Its checksum.
     #[must_use]
     pub fn sha256(&self) -> &str {
         &self.sha256

@@ -1,4 +1,4 @@
-//! Why a catalogue does not do what it is asked.
+//! Why a catalogue refuses a request or fails.
 
 use std::io;
 use std::path::Path;
@@ -6,58 +6,58 @@ use std::path::Path;
 use crate::terrain::DatasetError;
 use crate::terrain::dem::DemError;
 
-/// Why a catalogue does not do what it is asked.
+/// Why a catalogue refuses a request or fails.
 #[derive(Debug, thiserror::Error)]
 pub enum CatalogueError {
-    /// No dataset is called so.
+    /// No dataset has this name.
     #[error("no dataset is called {name:?}")]
     Unknown {
-        /// What was asked for.
+        /// The requested name.
         name: String,
     },
-    /// The operator's directory has a file of this name, which nobody can change from here.
+    /// The operator's directory has a file with this name, which cannot be changed through the catalogue.
     #[error("{name} is a mounted file of the service")]
     Mounted {
         /// The name.
         name: String,
     },
-    /// The name was to be new.
+    /// The name was expected to be new.
     #[error("{name} exists")]
     Exists {
         /// The name.
         name: String,
     },
-    /// The name was to stand for something.
+    /// The name was expected to exist.
     #[error("no dataset is called {name:?}, and one was expected")]
     Absent {
         /// The name.
         name: String,
     },
-    /// The name stands for another content than was expected.
+    /// The name refers to other content than expected.
     #[error("{name} stands for another content than expected")]
     Changed {
         /// The name.
         name: String,
     },
-    /// Somebody else uploaded it.
+    /// Another user uploaded it.
     #[error("{name} was uploaded by somebody else")]
     Owned {
         /// The name.
         name: String,
     },
-    /// The file is there and cannot be used.
+    /// The file exists but cannot be used.
     #[error(transparent)]
     Unreadable(#[from] DemError),
-    /// More bytes came than a file may have.
+    /// More bytes were sent than a file may have.
     #[error("the file is longer than {limit} bytes")]
     TooLarge {
-        /// As many as it may have.
+        /// The greatest length allowed.
         limit: u64,
     },
-    /// The files cannot be read or written now.
+    /// The files cannot be read or written at present.
     #[error("{what}: {error}")]
     Unavailable {
-        /// What was tried.
+        /// What was attempted.
         what: String,
         /// Why it failed.
         error: io::Error,
@@ -72,7 +72,7 @@ impl CatalogueError {
         }
     }
 
-    /// For a reason that no system call gave.
+    /// An error without a system call as its cause.
     pub(super) fn away(what: impl Into<String>, why: impl Into<String>) -> Self {
         Self::Unavailable {
             what: what.into(),
@@ -80,7 +80,7 @@ impl CatalogueError {
         }
     }
 
-    /// The shelf did not do what it was asked.
+    /// The shelf failed.
     pub(super) fn shelf(error: io::Error) -> Self {
         Self::Unavailable {
             what: "the datasets that all nodes share cannot be reached".to_owned(),

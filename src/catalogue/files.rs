@@ -1,4 +1,4 @@
-//! Files that are whole or not there.
+//! Atomic file operations: a file is either complete or absent.
 
 use std::fs::{self, DirBuilder, File};
 use std::io::{self, Write as _};
@@ -8,7 +8,7 @@ use uuid::Uuid;
 
 use super::CatalogueError;
 
-/// Make a directory for its owner alone, with those above it.
+/// Create a directory and its parents, accessible to the owner only.
 pub(super) fn make_directory(path: &Path) -> io::Result<()> {
     let mut builder = DirBuilder::new();
     builder.recursive(true);
@@ -17,18 +17,18 @@ pub(super) fn make_directory(path: &Path) -> io::Result<()> {
     builder.create(path)
 }
 
-/// A name in `directory` that nothing has.
+/// An unused name in `directory`.
 pub(super) fn fresh_name(directory: &Path) -> PathBuf {
     directory.join(format!("{}.part", Uuid::now_v7()))
 }
 
-/// Put `from`, which is on the disk, at `to`, durably.
+/// Move `from`, which has been synced to disk, to `to`, durably.
 pub(super) fn put(from: &Path, to: &Path) -> io::Result<()> {
     fs::rename(from, to)?;
     sync_parent(to)
 }
 
-/// Write a small file at `path` in one step, by way of `incoming`.
+/// Write a small file at `path` atomically, by way of `incoming`.
 pub(super) fn write(incoming: &Path, path: &Path, text: &str) -> io::Result<()> {
     let part = fresh_name(incoming);
     let written = File::create_new(&part)
@@ -43,7 +43,7 @@ pub(super) fn write(incoming: &Path, path: &Path, text: &str) -> io::Result<()> 
     written
 }
 
-/// Remove a file that may have gone already, durably.
+/// Remove a file, which may already be gone, durably.
 pub(super) fn remove(path: &Path) -> io::Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
@@ -51,7 +51,7 @@ pub(super) fn remove(path: &Path) -> io::Result<()> {
     }
 }
 
-/// A change is only found again after a power failure when its directory is on the disk too.
+/// A change survives a power failure only if its directory is synced too.
 fn sync_parent(path: &Path) -> io::Result<()> {
     #[cfg(unix)]
     if let Some(parent) = path.parent() {
@@ -62,7 +62,7 @@ fn sync_parent(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// What lies in a directory.
+/// The files in a directory.
 pub(super) fn listed(directory: &Path) -> Result<Vec<PathBuf>, CatalogueError> {
     let unreadable = |error| CatalogueError::unavailable("read", directory, error);
     let entries = fs::read_dir(directory).map_err(unreadable)?;
@@ -71,7 +71,7 @@ pub(super) fn listed(directory: &Path) -> Result<Vec<PathBuf>, CatalogueError> {
         .collect()
 }
 
-/// Take a directory for this process alone, for as long as what is returned lives.
+/// Lock a directory for this process, until the returned file is dropped.
 pub(super) fn lock(directory: &Path) -> Result<File, CatalogueError> {
     let path = directory.join("lock");
     let unusable = |error| CatalogueError::unavailable("locked", &path, error);

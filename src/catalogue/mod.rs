@@ -1,9 +1,9 @@
-//! The datasets of a service: which there are, what they are called, where their bytes lie.
+//! The datasets of a service: which exist, their names, and where their bytes are.
 //!
-//! What is uploaded is kept by its sum, and a name only points at it: another content under the same
-//! name changes no ground that an accepted plan was promised. All of it blocks on files, so nobody
-//! calls it from a thread that answers. Deliberately absent: what is in a file (`terrain::dem`), and
-//! which plans use it, which only the store knows.
+//! An upload is stored by its checksum, and a name only points at it: other content under the same name does not
+//! change the ground of an accepted plan. All calls block on files, so they must not be made from a thread that
+//! serves requests. Deliberately absent: what is in a file (`terrain::dem`), and which plans use it, which only the
+//! store knows.
 
 mod both;
 mod content;
@@ -34,91 +34,89 @@ use std::time::Duration;
 use crate::terrain::Datasets;
 use crate::terrain::dem::{Metadata, Survey};
 
-/// What nobody names and no plan uses is kept for so long after it was last asked for: a plan over it
-/// may be about to be accepted.
+/// How long content without a name and without a plan is kept after its last use: a plan over it may be about to be
+/// accepted.
 pub const GRACE: Duration = Duration::from_secs(600);
 
 /// Datasets that can be listed, added and removed.
 pub trait Catalogue: Datasets {
-    /// Every dataset that can be read, by name. What has not been needed yet is not known of mounted
-    /// ones.
+    /// Every readable dataset, by name. Entries of mounted files contain only what has already been needed.
     ///
     /// # Errors
     /// [`CatalogueError::Unavailable`].
     fn list(&self) -> Result<Vec<Entry>, CatalogueError>;
 
-    /// How many there are and how long they are, as far as that is known at once.
+    /// Number and total size of the datasets, as far as known without waiting.
     fn tally(&self) -> Tally;
 
-    /// One dataset, with all that can be known of it.
+    /// One dataset, with everything that can be found out about it.
     ///
     /// # Errors
     /// [`CatalogueError::Unknown`], [`CatalogueError::Unreadable`], [`CatalogueError::Unavailable`].
     fn entry(&self, name: &str) -> Result<Entry, CatalogueError>;
 
-    /// Room for a file of at most `limit` bytes that is about to come.
+    /// A place to write an incoming file of at most `limit` bytes.
     ///
     /// # Errors
     /// [`CatalogueError::Unavailable`].
     fn stage(&self, limit: u64) -> Result<Staged, CatalogueError>;
 
-    /// Whether a file may be kept so, as it stands.
+    /// Whether a file may be kept under this name at present.
     ///
     /// # Errors
     /// As [`Catalogue::keep`].
     fn permit(&self, naming: &Naming) -> Result<(), CatalogueError>;
 
-    /// Keep a file that has come under a name, durably, wholly or not at all.
+    /// Keep a received file under a name, durably and atomically.
     ///
     /// # Errors
     /// [`CatalogueError::Mounted`], [`CatalogueError::Exists`], [`CatalogueError::Changed`],
     /// [`CatalogueError::Owned`], [`CatalogueError::Unavailable`].
     fn keep(&self, file: Checked, naming: &Naming) -> Result<Kept, CatalogueError>;
 
-    /// The sum of what a name stands for that may be taken away.
+    /// The checksum of the content to which a removable name refers.
     ///
     /// # Errors
     /// As [`Catalogue::remove`].
     fn removable(&self, naming: &Naming) -> Result<String, CatalogueError>;
 
-    /// Take a name away. Its content stays until nothing needs it.
+    /// Remove a name. Its content stays until nothing needs it.
     ///
     /// # Errors
     /// [`CatalogueError::Unknown`], and as [`Catalogue::keep`].
     fn remove(&self, naming: &Naming) -> Result<(), CatalogueError>;
 
-    /// Whether there is content that no name stands for, so that [`Catalogue::sweep`] may find work.
+    /// Whether there is content without a name, so that [`Catalogue::sweep`] may have work.
     fn has_unnamed(&self) -> bool;
 
-    /// Remove content that no name stands for, that is not among `used` and that nobody has asked for
-    /// lately; returns how many.
+    /// Remove content that has no name, is not in `used` and has not been used lately; returns how many were removed.
     ///
     /// # Errors
     /// [`CatalogueError::Unavailable`].
     fn sweep(&self, used: &BTreeSet<String>) -> Result<usize, CatalogueError>;
 }
 
-/// What is known of a dataset.
+/// What is known about a dataset.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
-    /// As scenarios name it.
+    /// The name used in scenarios.
     pub name: String,
-    /// Stands for its content; `None` of a mounted file that has not been read yet.
+    /// Checksum of its content; `None` for a mounted file that has not been read yet.
     pub sha256: Option<String>,
-    /// Length of the file.
+    /// Length of the file, bytes.
     pub bytes: u64,
-    /// What its headers say.
+    /// Its headers.
     pub metadata: Metadata,
-    /// What its samples say; `None` of a mounted file that has not been read yet.
+    /// Summary of its samples; `None` for a mounted file that has not been read yet.
     pub survey: Option<Survey>,
-    /// When this content came under this name, milliseconds since 1970; `None` of a mounted file.
+    /// When this content was given this name, milliseconds since 1970; `None` for a mounted file.
     pub uploaded_ms: Option<i64>,
-    /// Who uploaded it; `None` where nobody has a name, and of a mounted file.
+    /// Who uploaded it; `None` where callers have no names, and for a mounted file.
     pub owner: Option<String>,
 }
 
 impl Entry {
-    /// Whether it lies in the operator's directory.
+    /// Whether it is in the operator's directory.
     #[must_use]
     pub fn is_mounted(&self) -> bool {
         self.uploaded_ms.is_none()
@@ -128,11 +126,11 @@ impl Entry {
 /// Counts of datasets.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Names that can be planned over.
+    /// Names that plans can use.
     pub datasets: u64,
-    /// Of their files, and of those that only plans still need.
+    /// Bytes of their files, and of those that only plans still need.
     pub bytes: u64,
-    /// Of copies on this node, where datasets are shared.
+    /// Bytes of copies on this node, where datasets are shared.
     pub cached_bytes: u64,
 }
 
@@ -146,12 +144,12 @@ impl Tally {
     }
 }
 
-/// Who wants to change what a name stands for.
+/// Who wants to change a name.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Claim {
-    /// Their name, where people have names.
+    /// Their name, where callers have names.
     pub owner: Option<String>,
-    /// Whether others' datasets are theirs to change.
+    /// Whether they may change others' datasets.
     pub over_all: bool,
 }
 
@@ -161,23 +159,23 @@ impl Claim {
     }
 }
 
-/// What is done to a name: it is given to a file, or taken away.
+/// A change of a name: assigning it to a file, or removing it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Naming {
-    /// The name, which must be one.
+    /// The name, which must be valid.
     pub name: String,
-    /// By whom.
+    /// Who makes the change.
     pub by: Claim,
-    /// When, milliseconds since 1970.
+    /// Time of the change, milliseconds since 1970.
     pub now_ms: i64,
-    /// What the name must stand for until now.
+    /// What the name must refer to before.
     pub expected: Expected,
 }
 
-/// What a name must stand for before it is given to another content, or to none.
+/// What a name must refer to before it is assigned to other content or removed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Expected {
-    /// Whatever it is.
+    /// Anything or nothing.
     Anything,
     /// Nothing.
     Nothing,
@@ -187,13 +185,13 @@ pub enum Expected {
     NoneOf(Vec<String>),
 }
 
-/// What came of keeping a file.
+/// Result of keeping a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kept {
     /// The name is new.
     Created,
-    /// The name stood for something else.
+    /// The name referred to other content.
     Replaced,
-    /// The name stood for the same content.
+    /// The name referred to the same content.
     Unchanged,
 }

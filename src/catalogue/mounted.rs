@@ -1,5 +1,5 @@
-//! The operator's own files: a directory that is only read. A file's name without its extension, in
-//! lower case, is what scenarios call it.
+//! The operator's own files: a directory that is only read. Scenarios refer to a file by its name without the
+//! extension, in lower case.
 
 use std::collections::btree_map;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -14,25 +14,25 @@ use super::{CatalogueError, Entry, Tally};
 use crate::terrain::dem::{Dataset, DemError, Survey};
 use crate::terrain::{DatasetError, Datasets, Found, is_dataset_name};
 
-/// Extensions of the files that count, in lower case.
+/// Extensions of dataset files, in lower case.
 const EXTENSIONS: [&str; 4] = ["tif", "tiff", "asc", "hgt"];
 
 /// A directory of datasets that is only read.
 #[derive(Debug)]
 pub struct Mounted {
     directory: PathBuf,
-    /// What has been found out, as long as the files stay as they were.
+    /// Cached facts, valid while the files are unchanged.
     known: Mutex<Known>,
 }
 
 #[derive(Debug, Default)]
 struct Known {
     files: HashMap<PathBuf, Look>,
-    /// Files that were complained about.
+    /// Files for which a warning has been logged.
     passed_over: BTreeSet<PathBuf>,
 }
 
-/// What is known of a file while its stamp is the same.
+/// What is known about a file while its stamp is unchanged.
 #[derive(Debug, Clone)]
 struct Look {
     stamp: Stamp,
@@ -41,7 +41,7 @@ struct Look {
 }
 
 impl Mounted {
-    /// The files of `directory`, which is looked at anew whenever something is asked for.
+    /// The files of `directory`, which is listed again for every request.
     ///
     /// # Errors
     /// [`CatalogueError::Unavailable`] when it cannot be read.
@@ -54,12 +54,12 @@ impl Mounted {
         Ok(mounted)
     }
 
-    /// Whether a file is called so.
+    /// Whether a file has this name.
     pub(super) fn has(&self, name: &str) -> Result<bool, CatalogueError> {
         Ok(self.files()?.contains_key(name))
     }
 
-    /// Those that can be read.
+    /// The readable files.
     pub(super) fn list(&self) -> Result<Vec<Entry>, CatalogueError> {
         let mut entries = Vec::new();
         for (name, path) in self.files()? {
@@ -71,7 +71,7 @@ impl Mounted {
         Ok(entries)
     }
 
-    /// How many there are, and how long their files are, also those that cannot be read.
+    /// Number and total length of all files, including unreadable ones.
     pub(super) fn tally(&self) -> Tally {
         let files = self.files().unwrap_or_default();
         let lengths = files.values().filter_map(|path| Stamp::of(path).ok());
@@ -91,7 +91,7 @@ impl Mounted {
         }
     }
 
-    /// By name, the first of several files of the same name.
+    /// Files by name; the first of several with the same name.
     fn files(&self) -> Result<BTreeMap<String, PathBuf>, CatalogueError> {
         let unreadable = |error| CatalogueError::unavailable("read", &self.directory, error);
         let mut paths = Vec::new();
@@ -126,7 +126,7 @@ impl Mounted {
         Ok(files)
     }
 
-    /// Say once that a file is not used.
+    /// Log once that a file is not used.
     fn pass_over(&self, path: &Path, why: &str) {
         if self.lock().passed_over.insert(path.to_owned()) {
             tracing::warn!(file = %path.display(), why, "a mounted file is not used");
@@ -165,16 +165,16 @@ impl Mounted {
         })
     }
 
-    /// What is known of the file as it is now.
+    /// What is known about the file in its present state.
     fn remembered(&self, path: &Path) -> Result<Option<Look>, DemError> {
         let stamp = Stamp::of(path)?;
         let known = self.lock().files.get(path).cloned();
         Ok(known.filter(|look| look.stamp == stamp))
     }
 
-    /// The same, found out if need be.
+    /// The same, found out if necessary.
     fn look(&self, path: &Path, declaration: &Declaration) -> Result<Look, DemError> {
-        // A file that is being written is read until it stays as it is, but not for ever.
+        // A file that is being written is read again until it stays unchanged, a few times at most.
         for _ in 0..3 {
             if let Some(look) = self.remembered(path)? {
                 return Ok(look);

@@ -1,4 +1,4 @@
-//! What is written down of names and of contents, and what may be done to a name.
+//! The stored records of names and contents, and the rules for changing a name.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,7 +6,7 @@ use super::content::{Checked, Declaration};
 use super::{CatalogueError, Expected, Kept, Naming};
 use crate::terrain::dem::Survey;
 
-/// What a name stands for, as it is written down.
+/// The stored record of a name.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Name {
     pub(super) sha256: String,
@@ -23,7 +23,7 @@ impl Name {
         }
     }
 
-    /// Whether a name that stands for `before` may be given to another content, or to none.
+    /// Whether a name that refers to `before` may be assigned to other content or removed.
     pub(super) fn permit(before: Option<&Self>, naming: &Naming) -> Result<(), CatalogueError> {
         let name = naming.name.clone();
         match (&naming.expected, before) {
@@ -45,7 +45,7 @@ impl Name {
         Ok(())
     }
 
-    /// What came of giving it to `file`.
+    /// The result of assigning it to `file`.
     pub(super) fn kept(before: Option<&Self>, file: &Checked) -> Kept {
         match before {
             None => Kept::Created,
@@ -54,7 +54,7 @@ impl Name {
         }
     }
 
-    /// The sum of what a name stands for, when it may be taken away.
+    /// The checksum of the content of a name, if the name may be removed.
     pub(super) fn removable<'a>(
         before: Option<&'a Self>,
         naming: &Naming,
@@ -68,13 +68,13 @@ impl Name {
     }
 }
 
-/// What is known of a content, as it is written down.
+/// The stored record of a content.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Content {
     pub(super) bytes: u64,
     #[serde(default)]
     pub(super) declared: Declaration,
-    /// `None` when no sample holds any.
+    /// `None` when no sample has data.
     min: Option<f64>,
     max: Option<f64>,
     no_data_share: f64,

@@ -1,15 +1,15 @@
-//! The dataset that comes with the program: a catalogue that is new begins with it, so that the shipped
-//! scenario over real ground can be planned at once. From then on it is a dataset like any other.
+//! The dataset shipped with the program. A new catalogue starts with it, so that the shipped scenario over real
+//! ground can be planned at once. After that it is a dataset like any other.
 
 use std::io::Write as _;
 
 use super::{Catalogue, CatalogueError, Claim, Declaration, Expected, Kept, Naming};
 
-/// A ridge in Tennessee; scenarios/terrain/README.md says where it is from.
+/// A ridge in Tennessee; scenarios/terrain/README.md gives its source.
 const NAME: &str = "jacksboro";
 const FILE: &[u8] = include_bytes!("../../scenarios/terrain/jacksboro.tif");
 
-/// Put it into `catalogue`, where its name is still free; `now_ms` since 1970.
+/// Add it to `catalogue` if its name is free; `now_ms` is milliseconds since 1970.
 ///
 /// # Errors
 /// [`CatalogueError::Unavailable`].

@@ -1,4 +1,4 @@
-//! A file on its way in: written as it comes, summed up as it is written, gone unless it is kept.
+//! An incoming file: written and hashed as it is received, deleted unless it is kept.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -8,7 +8,7 @@ use super::content::{Checked, Declaration, Identity};
 use super::{CatalogueError, files};
 use crate::terrain::dem::Format;
 
-/// A file on its way in.
+/// An incoming file.
 #[derive(Debug)]
 pub struct Staged {
     file: File,
@@ -16,12 +16,12 @@ pub struct Staged {
     limit: u64,
     bytes: u64,
     identity: Identity,
-    /// Why no more could be written.
+    /// Why writing failed.
     failure: Option<CatalogueError>,
 }
 
 impl Staged {
-    /// In `directory`, at most `limit` bytes.
+    /// A new file in `directory`, of at most `limit` bytes.
     pub(super) fn new(directory: &Path, limit: u64) -> Result<Self, CatalogueError> {
         let path = files::fresh_name(directory);
         let file = File::create_new(&path)
@@ -36,18 +36,18 @@ impl Staged {
         })
     }
 
-    /// So many bytes have come.
+    /// Bytes received so far.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Why a write failed, when one did.
+    /// Why a write failed, if one did.
     pub fn failure(&mut self) -> Option<CatalogueError> {
         self.failure.take()
     }
 
-    /// All of it has come: put it on the disk, and read it from the first to the last sample.
+    /// Everything has been received: sync the file to disk, and read all of its samples.
     ///
     /// # Errors
     /// [`CatalogueError::Unreadable`], [`CatalogueError::Unavailable`].
@@ -70,22 +70,22 @@ impl Staged {
         })
     }
 
-    /// What stands for what has come, so declared.
+    /// The checksum of the received bytes with this declaration.
     pub(super) fn sum(&self, declaration: &Declaration) -> String {
         self.identity.clone().with(declaration)
     }
 
-    /// Where it is, unless it was kept.
+    /// Path of the file, unless it was kept.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// To read what has come.
+    /// A reader of the received bytes.
     pub(super) fn reader(&self) -> io::Result<File> {
         File::open(&self.path)
     }
 
-    /// Put it at `to`.
+    /// Move the file to `to`.
     pub(super) fn put(&self, to: &Path) -> io::Result<()> {
         files::put(&self.path, to)
     }
@@ -115,7 +115,7 @@ impl Write for Staged {
 
 impl Drop for Staged {
     fn drop(&mut self) {
-        // It has another name by now when it was kept.
+        // If it was kept, it has another name now.
         let _ = fs::remove_file(&self.path);
     }
 }

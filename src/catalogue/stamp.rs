@@ -1,11 +1,11 @@
-//! Whether a file is still as it was when it was read.
+//! Detects whether a file has changed since it was read.
 
 use std::fs;
 use std::io;
 use std::path::Path;
 use std::time::SystemTime;
 
-/// Changes when a file does.
+/// Metadata that changes when the file does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Stamp {
     pub(super) bytes: u64,

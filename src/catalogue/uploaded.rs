@@ -1,9 +1,8 @@
-//! What was uploaded, in a directory of the service: contents by their sums, and names that point at
-//! them.
+//! Uploads in a directory of the service: contents by checksum, and names that point at them.
 //!
-//! `content/SUM` is a file as it came, `content/SUM.json` what was declared of it and what was found in
-//! it, `names/NAME.json` what a name stands for, and `incoming/` what is not whole yet. Each is put in
-//! its place in one step, after what it points at.
+//! `content/SUM` is a file as received, `content/SUM.json` its declaration and what was found in it,
+//! `names/NAME.json` the content of a name, and `incoming/` has incomplete files. Each is put in place atomically,
+//! after what it refers to.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs::{self, File};
@@ -26,7 +25,7 @@ pub(super) struct Uploaded {
     directory: PathBuf,
     grace: Duration,
     state: Mutex<State>,
-    /// Keeps a second process out.
+    /// Keeps other processes out.
     _lock: File,
 }
 
@@ -34,12 +33,12 @@ pub(super) struct Uploaded {
 struct State {
     names: BTreeMap<String, Name>,
     contents: BTreeMap<String, Content>,
-    /// When a content was last asked for.
+    /// When each content was last used.
     asked: HashMap<String, Instant>,
 }
 
 impl Uploaded {
-    /// Open the directory, made if need be, and remove what was on its way in when a process died.
+    /// Open the directory, creating it if necessary, and remove files left incomplete by a dead process.
     pub(super) fn open(directory: &Path, grace: Duration) -> Result<Self, CatalogueError> {
         for part in ["incoming", "content", "names"] {
             let part = directory.join(part);
@@ -71,7 +70,7 @@ impl Uploaded {
                 continue;
             };
             if !self.content(sha256).is_file() {
-                // Of an upload that did not come so far, or a removal that did not come farther.
+                // Left by an incomplete upload or an incomplete removal.
                 files::remove(&path)
                     .map_err(|error| CatalogueError::unavailable("removed", &path, error))?;
             } else if let Some(content) = read(&path) {
@@ -127,7 +126,7 @@ impl Uploads for Uploaded {
         for name in names {
             match self.entry(&name) {
                 Ok(entry) => entries.push(entry),
-                // Removed since.
+                // It was removed meanwhile.
                 Err(CatalogueError::Unknown { .. }) => {}
                 Err(error) => {
                     tracing::error!(name, %error, "an uploaded dataset cannot be read any more");
@@ -275,7 +274,7 @@ impl Uploads for Uploaded {
 }
 
 impl State {
-    /// Contents that no name stands for.
+    /// Contents without a name.
     fn unnamed(&self) -> Vec<String> {
         let named: BTreeSet<&String> = self.names.values().map(|name| &name.sha256).collect();
         let contents = self.contents.keys();
@@ -286,7 +285,7 @@ impl State {
     }
 }
 
-/// A record; one that cannot be read is passed over, and left for the operator to look at.
+/// A record; one that cannot be read is skipped, and left for the operator to inspect.
 fn read<T: DeserializeOwned>(path: &Path) -> Option<T> {
     let text = fs::read_to_string(path).map_err(|error| error.to_string());
     let record =

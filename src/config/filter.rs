@@ -1,4 +1,4 @@
-//! What is logged, and how lines are matched.
+//! The log filter, and how lines are matched.
 
 use tracing::Subscriber;
 use tracing_subscriber::EnvFilter;
@@ -8,15 +8,15 @@ use tracing_subscriber::registry::LookupSpan;
 
 use super::value::{Given, Value, quoted};
 
-/// What is logged, in the syntax of tracing's `EnvFilter`.
+/// The log filter, in the syntax of tracing's `EnvFilter`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd)]
 pub struct Filter(String);
 
 impl Filter {
     /// The filter for log lines.
     ///
-    /// An `EnvFilter` looks at each span that begins, is entered and ends, of which every request has some; a setting
-    /// with targets and levels only gets a filter that decides once for each place in the code.
+    /// An `EnvFilter` is called whenever a span begins, is entered or ends, which happens in every request. For a
+    /// setting with only targets and levels, this returns a filter that decides once per call site.
     #[must_use]
     pub fn of_lines<S>(&self) -> Box<dyn layer::Filter<S> + Send + Sync>
     where
@@ -28,7 +28,7 @@ impl Filter {
         }
     }
 
-    /// `None` where a directive asks for more, or omits what the two kinds of filter fill in differently.
+    /// `None` if a directive has more than that, or omits a part for which the kinds of filter have other defaults.
     fn targets(&self) -> Option<Targets> {
         let is_plain = |directive: &str| {
             let is_whole = !directive.is_empty() && !directive.ends_with('=');
@@ -86,7 +86,7 @@ mod tests {
         }
     }
 
-    /// The lines that `filter` lets through, out of one of each level from this crate, from another, and in a span.
+    /// The lines that `filter` passes, from one of each level from this crate, from another, and in a span.
     fn lines(filter: Box<dyn layer::Filter<Registry> + Send + Sync>) -> String {
         macro_rules! of_all_levels {
             ($target:expr) => {

@@ -64,7 +64,7 @@ fn argument(setting: &Setting, defaults: &Config) -> Arg {
     let argument = Arg::new(setting.key)
         .long(setting.flag())
         .value_name(setting.placeholder)
-        // So that the setting says what it allows, instead of clap taking the number for an unknown flag.
+        // So that the setting reports the allowed values, instead of clap reporting an unknown flag.
         .allow_negative_numbers(true)
         .help(help);
     let argument = match setting.path().0 {

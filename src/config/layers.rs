@@ -1,5 +1,5 @@
-//! Which value takes effect where several are given: the flag's, then the variable's, then the file's, then the
-//! default. All of them must be valid, including those without effect.
+//! Merges settings from several sources: flags override variables, variables override the file, the file overrides
+//! defaults. All values must be valid, including overridden ones.
 
 use std::ffi::OsString;
 use std::fmt;
@@ -126,7 +126,7 @@ impl Layers<'_> {
         }
     }
 
-    /// Values that are valid on their own may still not be valid together.
+    /// Checks values that are valid on their own but not together.
     fn together(&mut self) {
         let Config { role, store, .. } = &self.config;
         if *role != Role::All && !store.is_shared() && self.faults.is_empty() {

@@ -39,7 +39,7 @@ pub struct Config {
     pub data_dir: Option<PathBuf>,
     /// Directory of the operator's own datasets; `None` for none.
     pub terrain_dir: Option<PathBuf>,
-    /// Plans run at the same time.
+    /// Plans run concurrently.
     pub workers: usize,
     /// Plans that may wait.
     pub queue: usize,
@@ -61,7 +61,7 @@ pub struct Config {
     pub allow_anonymous: bool,
     /// Origins of pages on other sites that may use it.
     pub cors_origins: Vec<String>,
-    /// What is logged.
+    /// The log filter.
     pub log: Filter,
     /// How log lines are written.
     pub log_format: LogFormat,
@@ -71,7 +71,7 @@ pub struct Config {
     pub otlp_headers: Headers,
     /// Settings of connections and requests.
     pub http: Http,
-    /// Settings of webhooks, which tell callers of the ends of plans.
+    /// Settings of webhooks, which notify callers when plans end.
     pub webhook: Webhook,
     /// How long plans are kept.
     pub retention: Retention,
@@ -94,7 +94,7 @@ pub struct Http {
     pub streams_per_key: usize,
 }
 
-/// Settings of webhooks, which tell callers of the ends of plans.
+/// Settings of webhooks, which notify callers when plans end.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Webhook {
     /// File with the secret that is shared with receivers; `None` disables webhooks.

@@ -40,13 +40,13 @@ impl Value for Place {
         })
     }
 
-    /// An address with a password would be shown by its refusal.
+    /// A refusal would otherwise show an address with a password.
     fn is_secret(given: &Given) -> bool {
         given.text().is_none_or(|text| text.contains('@'))
     }
 }
 
-/// How many copies the servers keep of everything.
+/// Number of copies that the servers keep of everything.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd)]
 pub struct Replicas(usize);
 
@@ -83,9 +83,9 @@ pub enum Role {
     /// Everything.
     #[default]
     All,
-    /// It answers, and runs no plans.
+    /// It serves requests, and runs no plans.
     Api,
-    /// It runs plans, and answers those alone who look after it.
+    /// It runs plans, and serves only its operators' requests.
     Worker,
 }
 

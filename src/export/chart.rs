@@ -1,15 +1,15 @@
-//! Where a plan lies on the earth: local metres as degrees, and one datum's altitude as another's.
+//! Where a plan lies on the earth: converts local metres to degrees, and altitudes between datums.
 
 use std::sync::Arc;
 
 use crate::geometry::Point3;
 use crate::scenario::frame::{Frame, Wgs84};
 
-/// Of a scenario in degrees.
+/// The conversion for a scenario in degrees.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Chart(Arc<Wgs84>);
 
-/// A point on the earth as the formats want it, rounded to [`DEGREES`] and millimetres.
+/// A point on the earth as the formats write it, rounded to 1 / [`DEGREES`] degrees and millimetres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Fix {
     /// Degrees north.
@@ -22,7 +22,7 @@ pub(super) struct Fix {
     pub(super) ellipsoid_m: f64,
 }
 
-/// Parts of a degree that coordinates are rounded to: 0.1 mm.
+/// Coordinates are rounded to 1 / this degrees: 0.1 mm.
 const DEGREES: f64 = 1e9;
 
 impl Chart {
@@ -34,7 +34,7 @@ impl Chart {
         }
     }
 
-    /// Of a point of the local plane.
+    /// A point of the local plane on the earth.
     pub(super) fn fix(&self, point: Point3) -> Fix {
         let place = self.0.place(point.xy());
         Fix {
@@ -45,17 +45,17 @@ impl Chart {
         }
     }
 
-    /// A height of the scenario's frame above mean sea level, metres.
+    /// Convert a height of the scenario's frame to metres above mean sea level.
     pub(super) fn msl_m(&self, z: f64) -> f64 {
         rounded(self.0.above_sea(z), 1e3)
     }
 
-    /// A height of the scenario's frame above the ellipsoid, metres.
+    /// Convert a height of the scenario's frame to metres above the ellipsoid.
     pub(super) fn ellipsoid_m(&self, z: f64) -> f64 {
         rounded(self.0.above_ellipsoid(z), 1e3)
     }
 
-    /// Of mean sea level above the ellipsoid, metres; one figure for the whole scenario.
+    /// Height of mean sea level above the ellipsoid, metres; one value for the whole scenario.
     pub(super) fn undulation_m(&self) -> f64 {
         rounded(self.0.undulation_m, 1e3)
     }
@@ -63,6 +63,6 @@ impl Chart {
 
 /// `value` to the nearest `1 / parts`.
 pub(super) fn rounded(value: f64, parts: f64) -> f64 {
-    // Zero has no sign here.
+    // Adding 0 turns -0 into 0.
     (value * parts).round() / parts + 0.0
 }

@@ -1,10 +1,10 @@
-//! The path as a table: a line each sample, for spreadsheets and scripts.
+//! The path as a table, one row per sample, for spreadsheets and scripts.
 
 use super::delivery::Passage;
 use super::{Delivery, Options};
 use crate::geometry::Point3;
 
-/// Write the path of a plan; of one that has none, the waypoints.
+/// Write the path of a plan, or the waypoints if it has no path.
 pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
     let positions: &[&str] = if delivery.chart.is_some() {
         &["lat", "lon", "alt_msl", "alt_ellipsoid"]

@@ -1,4 +1,4 @@
-//! CZML: the vehicle on its way through time, threats as volumes; heights above the ellipsoid.
+//! CZML: the vehicle moving over time, threats as volumes; heights above the ellipsoid.
 
 use serde_json::{Value, json};
 
@@ -8,7 +8,7 @@ use super::{Delivery, Options};
 use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};
 
-/// Seconds of the plan in one of the reader's.
+/// Playback speed: seconds of the plan per second of the viewer.
 const HURRY: f64 = 10.0;
 
 /// Colours: red, green, blue and opacity.
@@ -16,7 +16,7 @@ const ROUTE: [u8; 4] = [0, 122, 255, 255];
 const BROKEN: [u8; 4] = [208, 2, 27, 255];
 const THREAT: [u8; 4] = [208, 2, 27, 90];
 
-/// Write a plan. What has no path is shown flying its waypoints.
+/// Write a plan. Without a path, the vehicle flies the waypoints.
 pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
     let course = delivery.course();
     let passages = delivery.passages(course);
@@ -87,8 +87,8 @@ fn waypoint(delivery: &Delivery, index: usize) -> Value {
     })
 }
 
-/// Where a threat without base or top is shown to begin and end, heights of the scenario's frame:
-/// from the lowest ground below the route to as far above the route as that is below.
+/// Heights between which a threat without base or top is shown, in the scenario's frame: from the lowest ground below
+/// the route to as far above its highest point, but at least 10 m.
 fn shown_heights(delivery: &Delivery) -> (f64, f64) {
     let mut lowest = f64::INFINITY;
     let mut highest = f64::NEG_INFINITY;

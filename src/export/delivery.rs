@@ -1,4 +1,4 @@
-//! The stored documents, read: what the formats are written from.
+//! The stored documents, parsed: the input of all formats.
 
 use super::chart::Chart;
 use super::document::{Position, ResultDocument};
@@ -6,36 +6,35 @@ use super::{ExportError, ResultInput};
 use crate::geometry::Point3;
 use crate::scenario::{Frame, Scenario, json};
 
-/// A plan: what was asked for and what came out.
+/// A plan: its request and its result.
 pub struct Delivery {
     pub(super) scenario: Scenario,
     pub(super) result: ResultDocument,
-    /// On the local plane.
+    /// Points of the local plane.
     pub(super) waypoints: Vec<Point3>,
     /// Samples of the smoothed path, on the local plane; `None` when infeasible.
     pub(super) path: Option<Vec<Point3>>,
-    /// Where the local plane lies on the earth; `None` in a local frame.
+    /// Mapping of the local plane to the earth; `None` in a local frame.
     pub(super) chart: Option<Chart>,
 }
 
-/// How far the vehicle has come at a point of its way.
+/// Progress of the vehicle at a point of its route.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Passage {
-    /// Flown so far, metres.
+    /// Distance flown so far, metres.
     pub(super) distance_m: f64,
-    /// Since the start, seconds, at cruise speed.
+    /// Time since the start at cruise speed, seconds.
     pub(super) time_s: f64,
-    /// Used so far, in the unit of `fuel_per_km`.
+    /// Fuel used so far, in the unit of `fuel_per_km`.
     pub(super) fuel: f64,
 }
 
 impl Delivery {
-    /// Read both documents.
+    /// Parse both documents.
     ///
     /// # Errors
-    /// [`ExportError::Damaged`] when one cannot be read, or has a route without extent,
-    /// [`ExportError::NoGround`] when the dataset is not there any more, [`ExportError::Unreachable`] when
-    /// it cannot be reached now.
+    /// [`ExportError::Damaged`] when one cannot be read or its route has no extent, [`ExportError::NoGround`] when
+    /// the dataset no longer exists, [`ExportError::Unreachable`] when it is unreachable at present.
     pub fn read(input: &ResultInput) -> Result<Self, ExportError> {
         let scenario = json::read_accepted(input.scenario, input.rules).map_err(|refusal| {
             if let Some(fault) = refusal.unreachable_ground() {
@@ -61,15 +60,15 @@ impl Delivery {
         })
     }
 
-    /// What the vehicle does, as far as is known: the path, else the waypoints.
+    /// The best known route of the vehicle: the path, else the waypoints.
     pub(super) fn course(&self) -> &[Point3] {
         self.path.as_deref().unwrap_or(&self.waypoints)
     }
 
-    /// Where the plan lies on the earth.
+    /// Mapping of the local plane to the earth.
     ///
     /// # Panics
-    /// In a local frame, which no format of degrees is asked to write.
+    /// In a local frame, for which no geodetic format is written.
     pub(super) fn chart(&self) -> &Chart {
         self.chart
             .as_ref()
@@ -85,7 +84,7 @@ impl Delivery {
         }
     }
 
-    /// What the plan is called, for people.
+    /// Name of the plan for display.
     pub(super) fn title(&self) -> &str {
         self.scenario.name.as_deref().unwrap_or("Noctule plan")
     }
@@ -95,7 +94,7 @@ impl Delivery {
         point.z - self.scenario.terrain.elevation(point.xy())
     }
 
-    /// The way along `points`, one each.
+    /// Progress along `points`, one entry per point.
     pub(super) fn passages(&self, points: &[Point3]) -> Vec<Passage> {
         let vehicle = &self.scenario.vehicle;
         let mut distance_m = 0.0;
@@ -114,7 +113,7 @@ impl Delivery {
             .collect()
     }
 
-    /// What is said of the plan in a sentence or two.
+    /// A summary of the plan in a sentence or two.
     pub(super) fn summary(&self) -> String {
         let last = self.passages(self.course());
         let last = last.last().expect("a course has points");

@@ -1,4 +1,4 @@
-//! The result document: the wire shape of an [`Outcome`], and of what a run tells on its way.
+//! The result document: the wire form of an [`Outcome`] and of the events of a run.
 
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
@@ -15,27 +15,27 @@ pub struct ResultDocument {
     pub plan_id: Option<Uuid>,
     /// Name of the algorithm.
     pub algorithm: String,
-    /// Of the run.
+    /// Seed of the run.
     pub seed: u64,
-    /// Of the engine that found the route.
+    /// Version of the engine that found the route.
     pub engine_version: String,
-    /// Of the accepted scenario document, hexadecimal.
+    /// SHA-256 of the accepted scenario document, hexadecimal.
     pub scenario_sha256: String,
     /// Whether the waypoints meet every constraint.
     pub feasible: bool,
     /// `iterations`, `converged`, `time-limit` or `cancelled`; `None` before the end.
     pub stop_reason: Option<String>,
-    /// False before the end, left out afterwards.
+    /// `false` before the end, omitted afterwards.
     #[serde(rename = "final", default, skip_serializing_if = "Option::is_none")]
     pub is_final: Option<bool>,
     /// Weighted terms and their sum.
     pub cost: Cost,
-    /// Only with the paper's quadrature: the same route by the exact integral.
+    /// Cost of the same route by the exact integral; only with the paper's quadrature.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost_integral: Option<Cost>,
     /// Proven lower bound.
     pub bound: Bound,
-    /// Left out in the local frame.
+    /// Omitted in the local frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame: Option<FrameDocument>,
     /// Start, free waypoints, target.
@@ -46,11 +46,11 @@ pub struct ResultDocument {
     pub path: Option<Path>,
     /// The certificate.
     pub checks: Checks,
-    /// The curve of the search.
+    /// The convergence curve of the search.
     pub convergence: Vec<Convergence>,
     /// Wall times.
     pub timing: Timing,
-    /// Routes priced in all.
+    /// Total number of routes evaluated.
     pub evaluations: u64,
 }
 
@@ -78,14 +78,14 @@ pub enum Position {
     },
 }
 
-/// How a geodetic request was laid onto the plane that was planned in.
+/// How a geodetic request was mapped to the plane used for planning.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameDocument {
     /// `wgs84`.
     pub kind: String,
     /// `msl` or `ellipsoid`.
     pub altitude_datum: String,
-    /// Where the plane touches; its altitude is that of all lengths.
+    /// Tangent point of the plane; lengths are true at its altitude.
     pub origin: Position,
     /// Height of mean sea level above the ellipsoid there, metres.
     pub undulation: f64,
@@ -109,7 +109,7 @@ pub struct Bound {
     pub gap: Option<f64>,
 }
 
-/// A straight piece of the route.
+/// A straight leg of the route.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "named and documented in planner::Leg")]
 pub struct Leg {
@@ -130,18 +130,18 @@ pub struct Path {
     pub duration_s: f64,
 }
 
-/// The certificate: what was measured, and what is broken.
+/// The certificate: measured values and violated constraints.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Checks {
     /// Along the waypoints.
     pub waypoints: MeasuresDocument,
-    /// Along the path; `null` without one.
+    /// Along the path; `null` if there is none.
     pub path: Option<MeasuresDocument>,
     /// Empty when feasible.
     pub violations: Vec<Violation>,
 }
 
-/// Measured along a polyline.
+/// Values measured along a polyline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "named and documented in planner::Measures")]
 pub struct MeasuresDocument {
@@ -167,16 +167,16 @@ pub struct Clearance {
 pub struct Violation {
     /// `threat`, `altitude`, `terrain`, `turn`, `climb`, `leg` or `area`.
     pub kind: String,
-    /// Such as `leg 3`.
+    /// Place of the violation, such as `leg 3`.
     #[serde(rename = "where")]
     pub place: String,
     /// Metres or degrees beyond the limit.
     pub amount: f64,
-    /// For people.
+    /// Message for the user.
     pub message: String,
 }
 
-/// A point of the curve of the search; also the data of a `convergence` event.
+/// A point of the convergence curve; also the data of a `convergence` event.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[expect(
     missing_docs,
@@ -208,27 +208,27 @@ pub struct Incumbent {
 pub struct Timing {
     /// From acceptance to the start of the run.
     pub queued_ms: f64,
-    /// Of the run.
+    /// Duration of the run.
     pub run_ms: f64,
 }
 
-/// What a result says of its origin beside the route itself.
+/// Origin of a result: everything but the route itself.
 #[derive(Debug, Clone)]
 pub struct Origin {
     /// `None` without a server.
     pub plan_id: Option<Uuid>,
     /// Name of the algorithm.
     pub algorithm: String,
-    /// Of the run.
+    /// Seed of the run.
     pub seed: u64,
-    /// Of the accepted scenario document, by [`sha256_hex`](crate::digest::sha256_hex).
+    /// SHA-256 of the accepted scenario document, by [`sha256_hex`](crate::digest::sha256_hex).
     pub scenario_sha256: String,
     /// Wall times.
     pub timing: Timing,
 }
 
 impl ResultDocument {
-    /// The wire shape of `outcome`.
+    /// The wire form of `outcome`.
     #[must_use]
     pub fn new(outcome: &Outcome, origin: Origin) -> Self {
         Self {
@@ -267,7 +267,7 @@ impl ResultDocument {
     /// As JSON text.
     ///
     /// # Panics
-    /// Never: the document has no map with other keys than strings.
+    /// Never: all map keys of the document are strings.
     #[must_use]
     pub fn to_json(&self) -> String {
         serde_json::to_string(self).expect("every map key is a string and every number is finite")
@@ -293,7 +293,7 @@ impl Position {
         }
     }
 
-    /// The point of the local plane of `frame`; `None` when it is of another frame.
+    /// The point of the local plane of `frame`; `None` if it belongs to another frame.
     #[must_use]
     pub fn within(self, frame: &Frame) -> Option<Point3> {
         match (self, frame) {

@@ -5,35 +5,35 @@ use thiserror::Error;
 /// Why a plan is not written in a format.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ExportError {
-    /// The format needs degrees, the plan has metres.
+    /// The format needs degrees, but the plan is in metres.
     #[error(
         "{format} needs degrees, and the plan is in a local frame: plan in the frame wgs84, or take json, csv or svg"
     )]
     NoGeodeticFrame {
-        /// Its name.
+        /// Name of the format.
         format: &'static str,
     },
-    /// The format is for flying, the route breaks constraints.
+    /// The format is for flying, but the route violates constraints.
     #[error(
         "the plan has no feasible route and {format} is for flying: allow_infeasible=true writes it all the same"
     )]
     Infeasible {
-        /// Its name.
+        /// Name of the format.
         format: &'static str,
     },
-    /// No mission can be made as the options ask.
+    /// No mission is possible with the given options.
     #[error("{0}")]
     Unflyable(String),
-    /// An option is unknown, unknown to the format, or has a value that it cannot have.
+    /// An option is unknown, not supported by the format, or has an invalid value.
     #[error(transparent)]
     Option(#[from] OptionFault),
-    /// The dataset that it was planned over is not there any more.
+    /// The dataset used for planning no longer exists.
     #[error("the ground that it was planned over is not there: {0}")]
     NoGround(String),
-    /// It may be there, but cannot be reached now.
+    /// The dataset is unreachable at present.
     #[error("{0}")]
     Unreachable(String),
-    /// The documents are none that this program wrote, or do not belong together.
+    /// The documents were not written by this program, or do not belong together.
     #[error("{0}")]
     Damaged(String),
 }
@@ -42,8 +42,8 @@ pub enum ExportError {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{detail}")]
 pub struct OptionFault {
-    /// Its name.
+    /// Name of the option.
     pub name: String,
-    /// What was met and what is allowed.
+    /// The value found and the values allowed.
     pub detail: String,
 }

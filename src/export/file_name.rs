@@ -1,12 +1,12 @@
-//! What a downloaded plan is called.
+//! The file name of a downloaded plan.
 
 use super::Format;
 
-/// Letters of a scenario's name in a file's.
+/// Most characters of a scenario's name used in a file name.
 const LONGEST: usize = 60;
 
-/// A name for a file of a plan: the scenario's own, as far as every system can hold it, what tells
-/// the plan from its likes, and the format's extension.
+/// The file name of a plan: the scenario's name in portable characters, a suffix that distinguishes the plan, and the
+/// format's extension.
 #[must_use]
 pub fn file_name(scenario: Option<&str>, plan: Option<&str>, format: &Format) -> String {
     let name = slug(scenario.unwrap_or_default());

@@ -11,7 +11,7 @@ use super::{Delivery, Options};
 use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};
 
-/// Write a plan; an infeasible one, too, for its violations are best seen on a map.
+/// Write a plan. An infeasible one is also written, because its violations are best seen on a map.
 pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
     let path = delivery.path.iter().map(|points| path(delivery, points));
     let waypoints = (0..delivery.waypoints.len()).map(|index| waypoint(delivery, index));
@@ -65,7 +65,7 @@ fn waypoint(delivery: &Delivery, index: usize) -> Feature {
     )
 }
 
-/// What is broken at a waypoint or on the leg that leads to it.
+/// Violations at a waypoint or on the leg that leads to it.
 fn violations(delivery: &Delivery, index: usize) -> impl Iterator<Item = &str> {
     let places = [
         format!("waypoint {index}"),
@@ -79,8 +79,7 @@ fn violations(delivery: &Delivery, index: usize) -> impl Iterator<Item = &str> {
         .map(|violation| violation.message.as_str())
 }
 
-/// A circle is a ring, and says its middle and radius as properties, by which a reader of scenarios
-/// makes it a circle again.
+/// A circle is a ring with its centre and radius as properties, from which the importer restores the circle.
 fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Feature {
     let ring = outline::ring(delivery.chart(), threat, 0.0);
     let ring: Vec<_> = ring.iter().map(|fix| vec![fix.lon, fix.lat]).collect();

@@ -1,4 +1,4 @@
-//! GPX 1.1: the path as a track with times, the waypoints as marks.
+//! GPX 1.1: the path as a track with times, the waypoints as waypoints.
 
 use geo_types::Point;
 use gpx::{Gpx, GpxVersion, Metadata, Track, TrackSegment, Waypoint};
@@ -9,7 +9,7 @@ use super::words::for_xml;
 use super::{Delivery, Options};
 use crate::geometry::Point3;
 
-/// Write the path of a plan; of one that has none, the waypoints are the track.
+/// Write the path of a plan; without a path, the waypoints form the track.
 pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
     let chart = delivery.chart();
     let course = delivery.course();
@@ -56,7 +56,7 @@ pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
 
 fn mark(chart: &Chart, point: Point3) -> Waypoint {
     let fix = chart.fix(point);
-    // To GPX, the 180th meridian is the westernmost one.
+    // GPX longitudes are less than 180, so the 180th meridian is written as -180.
     let lon = if fix.lon >= 180.0 { -180.0 } else { fix.lon };
     let mut mark = Waypoint::new(Point::new(lon, fix.lat));
     mark.elevation = Some(fix.msl_m);

@@ -1,5 +1,4 @@
-//! OGC KML 2.2: path and waypoints at their altitude above mean sea level, threats as walls that
-//! reach down to the ground.
+//! OGC KML 2.2: path and waypoints at their altitude above mean sea level, threats as walls down to the ground.
 
 use std::collections::HashMap;
 
@@ -18,13 +17,13 @@ use crate::threat::{Shape, Threat};
 
 const NAMESPACE: &str = "http://www.opengis.net/kml/2.2";
 
-/// Styles: id, line's colour and width, polygon's colour; opacity, blue, green and red.
+/// Styles: id, line colour and width, polygon colour; colours are opacity, blue, green and red.
 const STYLES: [(&str, &str, &str, &str); 2] = [
     ("path", "ffff7a00", "3", "40ff7a00"),
     ("threat", "ff1b02d0", "1", "5a1b02d0"),
 ];
 
-/// Write a plan. What has no path is drawn along its waypoints.
+/// Write a plan. Without a path, the waypoints are drawn.
 pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
     let waypoints = (0..delivery.waypoints.len()).map(|index| waypoint(delivery, index));
     let threats = delivery.scenario.threats.iter().enumerate();
@@ -91,8 +90,8 @@ fn waypoint(delivery: &Delivery, index: usize) -> Placemark {
     )
 }
 
-/// A wall from its top down to the ground: KML has no volume that floats. One without top ends as
-/// high as the route rises.
+/// A wall from the threat's top down to the ground, because KML has no floating volume. A threat without top ends at
+/// the highest point of the route.
 fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Placemark {
     let highest = delivery.course().iter().map(|point| point.z);
     let top = threat.top.unwrap_or(highest.fold(f64::MIN, f64::max));
@@ -146,8 +145,7 @@ fn folder(name: &str, placemarks: impl Iterator<Item = Placemark>) -> Kml {
     })
 }
 
-/// The library writes a style's address after the geometry, where the schema has none; among the
-/// children it comes before.
+/// The library writes `styleUrl` after the geometry, which the schema does not allow; as a child it comes before.
 fn placemark(
     name: &str,
     style: Option<&str>,
@@ -199,7 +197,7 @@ fn text(name: &str, content: &str) -> Element {
     }
 }
 
-/// One attribute: of several, the library would write the order of a hash.
+/// A single attribute: the library would write several in hash order.
 fn attribute(name: &str, value: &str) -> HashMap<String, String> {
     HashMap::from([(name.to_owned(), value.to_owned())])
 }

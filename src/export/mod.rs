@@ -1,7 +1,7 @@
-//! A delivered plan in the formats that people take away. Adding one is one file and one row.
+//! Exports a plan to various formats. A new format needs one file and one row here.
 //!
-//! docs/FORMATS.md tells what each holds, by which datum, and what is lost in it. Deliberately
-//! absent: clocks, and anything that the two stored documents do not say.
+//! docs/FORMATS.md describes what each contains, its datums, and what is lost. Deliberately absent: clocks, and
+//! anything that is not in the two stored documents.
 
 mod chart;
 mod csv;
@@ -26,46 +26,46 @@ pub use options::{Altitude, Firmware, OPTIONS, OptionRule, Options};
 
 use crate::scenario::json::Rules;
 
-/// A format of a result.
+/// An export format.
 pub struct Format {
-    /// As in `?format=` and `--format`.
+    /// As used in `?format=` and `--format`.
     pub name: &'static str,
-    /// As in `Accept` and `Content-Type`.
+    /// As used in `Accept` and `Content-Type`.
     pub media_type: &'static str,
-    /// Of a file's name, without the dot.
+    /// Extension of a file name, without the dot.
     pub extension: &'static str,
-    /// Positions in it are degrees, so that a plan in a local frame cannot be written.
+    /// Positions are in degrees, so a plan in a local frame cannot be written.
     pub geodetic: bool,
-    /// A vehicle flies it, or a map shows it as something to fly: not written of an infeasible plan
-    /// unless the caller insists.
+    /// It is flown by a vehicle, or shown on a map as something to fly. An infeasible plan is written only if the
+    /// caller insists.
     pub flown: bool,
-    /// Of [`OPTIONS`], those that it knows.
+    /// The subset of [`OPTIONS`] that it supports.
     pub options: &'static [&'static str],
     write: Write,
 }
 
 /// How a format is written.
 enum Write {
-    /// It is the stored result, byte for byte as it was finished.
+    /// The stored result, byte for byte.
     Stored,
-    /// Of any plan.
+    /// Any plan.
     Plain(fn(&Delivery, &Options) -> String),
-    /// Of a plan that can be flown as the options ask.
+    /// A plan that can be flown with the given options.
     Mission(fn(&Delivery, &Options) -> Result<String, ExportError>),
 }
 
-/// What a format is written from.
+/// The input of a format.
 #[derive(Debug, Clone, Copy)]
 pub struct ResultInput<'a> {
     /// The stored result document.
     pub result: &'a str,
     /// The accepted scenario document.
     pub scenario: &'a str,
-    /// By which it was accepted; its limits do not count any more.
+    /// The rules that accepted it; limits are not checked again.
     pub rules: &'a Rules,
 }
 
-/// Every format; the first is served to who names none.
+/// Every format; the first one is the default.
 pub const ALL: &[Format] = &[
     Format {
         name: "json",
@@ -151,20 +151,20 @@ pub const ALL: &[Format] = &[
 ];
 
 impl Format {
-    /// The one of that name.
+    /// The format with that name.
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
         ALL.iter().find(|format| format.name == name)
     }
 
-    /// The one whose files end in `extension`, in whatever case.
+    /// The format with that file extension, in any case.
     #[must_use]
     pub fn of_extension(extension: &str) -> Option<&'static Self> {
         ALL.iter()
             .find(|format| format.extension.eq_ignore_ascii_case(extension))
     }
 
-    /// Whether it is the stored result, byte for byte as it was finished.
+    /// Whether it is the stored result, byte for byte.
     #[must_use]
     pub fn is_stored(&self) -> bool {
         matches!(self.write, Write::Stored)
@@ -173,10 +173,10 @@ impl Format {
     /// Write a plan.
     ///
     /// # Errors
-    /// [`ExportError::NoGeodeticFrame`] and [`ExportError::Infeasible`] by what the format is;
-    /// [`ExportError::Unflyable`] when no mission can be made as the options ask;
-    /// [`ExportError::Option`] when they contradict each other; [`ExportError::Damaged`] when the
-    /// documents are none that this program wrote, or do not belong together.
+    /// [`ExportError::NoGeodeticFrame`] and [`ExportError::Infeasible`] depending on the format;
+    /// [`ExportError::Unflyable`] when no mission is possible with the options; [`ExportError::Option`] when they
+    /// contradict each other; [`ExportError::Damaged`] when the documents were not written by this program or do not
+    /// belong together.
     pub fn write(&self, input: &ResultInput, options: &Options) -> Result<String, ExportError> {
         match self.write {
             Write::Stored => Ok(input.result.to_owned()),
@@ -185,7 +185,7 @@ impl Format {
         }
     }
 
-    /// The plan, if it may be written so.
+    /// The plan, if this format may be written.
     fn delivery(&self, input: &ResultInput, options: &Options) -> Result<Delivery, ExportError> {
         let delivery = Delivery::read(input)?;
         if self.geodetic && delivery.chart.is_none() {

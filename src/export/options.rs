@@ -1,30 +1,30 @@
-//! What a caller may choose about a format: one table, read from a query or a command line alike.
+//! Options of the formats: one table, read from a query or a command line.
 
 use jiff::{SignedDuration, Timestamp, Unit};
 
 use super::error::OptionFault;
 use super::{ALL, Format};
 
-/// What a caller may choose about a format.
+/// The values of all options.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
-    /// Who flies a mission.
+    /// Autopilot that flies a mission.
     pub firmware: Firmware,
-    /// What altitudes of a mission are measured from.
+    /// Reference of a mission's altitudes.
     pub altitude: Altitude,
-    /// How far a mission may leave the path, metres.
+    /// Greatest distance of a mission from the path, metres.
     pub tolerance_m: f64,
-    /// Height of the take-off above the ground at the start, metres; 0 is none.
+    /// Height of the take-off above the ground at the start, metres; 0 means no take-off.
     pub takeoff_m: f64,
-    /// Whether a mission ends on the ground below the target.
+    /// Whether a mission lands on the ground below the target.
     pub landing: bool,
-    /// When the vehicle is at the start.
+    /// Time at which the vehicle is at the start.
     pub epoch: Timestamp,
-    /// Whether a route that breaks constraints is written too.
+    /// Whether a route that violates constraints may be written.
     pub allow_infeasible: bool,
 }
 
-/// Who flies a mission.
+/// Autopilot that flies a mission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Firmware {
     /// PX4.
@@ -33,7 +33,7 @@ pub enum Firmware {
     ArduPilot,
 }
 
-/// What altitudes of a mission are measured from.
+/// Reference of a mission's altitudes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Altitude {
     /// The ground below the start, where the vehicle is armed.
@@ -44,10 +44,10 @@ pub enum Altitude {
     Terrain,
 }
 
-/// Of a plan that says nothing else: no result knows when it will be flown.
+/// Default epoch: no result knows when it will be flown.
 const EPOCH: Timestamp = Timestamp::constant(946_684_800, 0);
 
-/// Instants that an epoch may be: every reader of the formats can hold them and what follows.
+/// Range of an epoch: every reader of the formats can represent it and the times that follow.
 const EPOCHS: (Timestamp, Timestamp) = (
     Timestamp::constant(0, 0),
     Timestamp::constant(7_258_118_400, 0),
@@ -69,11 +69,11 @@ impl Default for Options {
 
 /// One row of the table of options.
 pub struct OptionRule {
-    /// As in a query.
+    /// Name in a query.
     pub name: &'static str,
-    /// What its value may be, for people.
+    /// Allowed values, for display.
     pub allowed: &'static str,
-    /// What it does.
+    /// Effect of the option.
     pub meaning: &'static str,
     set: fn(&mut Options, &str) -> Option<()>,
 }
@@ -139,7 +139,7 @@ pub const OPTIONS: &[OptionRule] = &[
     },
 ];
 
-/// Known to every format: it permits, and changes nothing where there is nothing to permit.
+/// Accepted by every format: it only lifts a restriction, so it has no effect where there is none.
 const ALWAYS: &str = "allow_infeasible";
 
 fn set<T>(field: &mut T, value: Option<T>) -> Option<()> {
@@ -160,10 +160,10 @@ fn epoch(value: &str) -> Option<Timestamp> {
 }
 
 impl Options {
-    /// The options of `format` by what a caller gave; what is not given is as by default.
+    /// The options of `format` from what a caller gave; others have their default.
     ///
     /// # Errors
-    /// The first that there is not, that `format` does not know, or that cannot have its value.
+    /// The first option that does not exist, is not supported by `format`, or has an invalid value.
     pub fn read<'a>(
         format: &Format,
         given: impl IntoIterator<Item = (&'a str, &'a str)>,
@@ -189,7 +189,7 @@ impl Options {
 
     /// The instant `time_s` seconds after the epoch, to a millisecond.
     pub(super) fn instant(&self, time_s: f64) -> Timestamp {
-        // Beyond what instants there are, and far within what a duration can be.
+        // Beyond the range of instants, and well within the range of a duration.
         let millis = (time_s.min(1e12) * 1e3).round();
         let since = SignedDuration::from_secs_f64(millis / 1e3);
         let rounded = self

@@ -1,15 +1,15 @@
-//! Threats as maps show them: rings of degrees.
+//! Threats as maps show them: rings in degrees.
 
 use super::chart::{Chart, Fix};
 use crate::geometry::ring::twice_area;
 use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};
 
-/// Corners of the ring that stands for a circle.
+/// Corners of the ring that represents a circle.
 const CORNERS: u32 = 72;
 
-/// The outline of `threat`, counterclockwise seen from above, the first corner not repeated; each at
-/// the height `z` of the scenario's frame. A circle's corners lie on it.
+/// The outline of `threat`, counter-clockwise seen from above, without repeated first corner, at height `z` of the
+/// scenario's frame. A circle's corners lie on the circle.
 pub(super) fn ring(chart: &Chart, threat: &Threat, z: f64) -> Vec<Fix> {
     let corners = match &threat.shape {
         Shape::Cylinder(cylinder) => circle(cylinder.center, cylinder.radius),
@@ -19,7 +19,7 @@ pub(super) fn ring(chart: &Chart, threat: &Threat, z: f64) -> Vec<Fix> {
     corners.into_iter().map(fix).collect()
 }
 
-/// What the `index`th threat is called.
+/// Display name of the threat at `index`.
 pub(super) fn name(threat: &Threat, index: usize) -> String {
     threat
         .name

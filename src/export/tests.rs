@@ -1,4 +1,4 @@
-//! Every format of one plan, and what is refused.
+//! Every format of one plan, and refusals.
 
 use serde_json::{Value, json};
 use uuid::Uuid;
@@ -40,7 +40,7 @@ fn scenario() -> Value {
     })
 }
 
-/// The documents of a plan whose waypoints are `through`: degrees north and east and altitudes, or metres.
+/// The documents of a plan with waypoints `through`: degrees north and east and altitudes, or metres.
 fn plan(document: &Value, through: &[(f64, f64, f64)]) -> (String, String) {
     let scenario = accepted(document);
     let mut route = vec![scenario.start];
@@ -111,12 +111,12 @@ fn each_format_of_a_plan() {
         ("wpl_ardupilot_terrain", "wpl", ardupilot),
     ] {
         let text = write(&plan, format, options).expect("a plan that can be written");
-        // The version is in it, and is not what is compared.
+        // The program's version is not compared.
         let text = text.replace(
             concat!("noctule ", env!("CARGO_PKG_VERSION")),
             "noctule VERSION",
         );
-        // A line each, where the format has none of its own.
+        // One feature per line, where the format has no line breaks.
         let text = match format {
             "geojson" => text.replace("{\"type\":\"Feature\"", "\n{\"type\":\"Feature\""),
             "czml" => text.replace("{\"id\":", "\n{\"id\":"),

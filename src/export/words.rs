@@ -1,6 +1,6 @@
-//! Words of callers in files of others.
+//! Text from callers in exported files.
 
-/// Without what XML 1.0 cannot hold, even escaped.
+/// `words` without the characters that XML 1.0 cannot represent, even escaped.
 pub(super) fn for_xml(words: &str) -> String {
     let allowed = |letter: &char| !matches!(letter, '\u{0}'..='\u{8}' | '\u{b}' | '\u{c}' | '\u{e}'..='\u{1f}' | '\u{fffe}' | '\u{ffff}');
     words.chars().filter(allowed).collect()

@@ -1,7 +1,7 @@
 //! Clamped uniform B-splines in space, Eq. 26-27 of the paper.
 //!
-//! The second term of Eq. 27 as printed has lost its basis function; the Cox-de Boor recursion is
-//! what it means, and de Boor's algorithm evaluates it.
+//! The second term of Eq. 27 lacks its basis function as printed. The Cox-de Boor recursion is meant, evaluated here
+//! by de Boor's algorithm.
 
 use super::Point3;
 
@@ -17,8 +17,7 @@ pub struct BSpline {
 }
 
 impl BSpline {
-    /// The clamped uniform spline of `control_points`; its degree is lowered where there are too
-    /// few of them.
+    /// The clamped uniform spline of `control_points`; its degree is lowered if there are too few of them.
     ///
     /// # Panics
     /// With fewer than two control points.
@@ -69,8 +68,8 @@ impl BSpline {
         points[p]
     }
 
-    /// An upper bound of `|C''|` over the piece that begins with control point `first`: the second
-    /// derivative is a spline of degree p - 2 and stays within the hull of its control points.
+    /// An upper bound of `|C''|` over the piece that begins with control point `first`: the second derivative is a
+    /// spline of degree p - 2, which stays within the hull of its control points.
     #[must_use]
     pub fn curvature_bound(&self, first: usize) -> f64 {
         let p = self.degree;
@@ -90,7 +89,7 @@ impl BSpline {
     }
 }
 
-/// The largest degree that [`BSpline::at`] has room for.
+/// The largest degree that [`BSpline::at`] supports.
 pub const MAX_DEGREE: usize = 5;
 
 #[cfg(test)]
@@ -103,7 +102,7 @@ mod tests {
             .collect()
     }
 
-    /// The Cox-de Boor recursion as Eq. 27 means it, the slow and plain way.
+    /// The Cox-de Boor recursion meant by Eq. 27, evaluated directly.
     fn basis(knots: &[f64], i: usize, p: usize, u: f64) -> f64 {
         if p == 0 {
             return f64::from(u8::from(knots[i] <= u && u < knots[i + 1]));

@@ -1,7 +1,7 @@
-//! Between the WGS 84 ellipsoid and a local plane that touches it.
+//! Conversion between the WGS 84 ellipsoid and a local tangent plane.
 //!
-//! Conversions to and from the earth-centred frame are `sguaba`'s, built on `libm`, so that the same
-//! degrees make the same metres on every platform.
+//! `sguaba` converts to and from the earth-centred frame, using `libm`, so that the same degrees give the same metres
+//! on every platform.
 
 use nalgebra::{Matrix3, Vector3};
 use sguaba::Coordinate;
@@ -21,8 +21,8 @@ pub struct LatLon {
     pub lon: f64,
 }
 
-/// All between two parallels and two meridians. Its west is `min.lon` and its east `max.lon`, which
-/// is the smaller one where it lies across the antimeridian.
+/// The area between two parallels and two meridians. `min.lon` is its western and `max.lon` its eastern limit; the
+/// latter is smaller if the box crosses the antimeridian.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LatLonBox {
     /// South-west corner.
@@ -32,7 +32,7 @@ pub struct LatLonBox {
 }
 
 impl LatLon {
-    /// Metres to another place over a ball of the earth's mean radius: good to half a percent.
+    /// Metres to another place on a sphere of the earth's mean radius; accurate to half a percent.
     #[must_use]
     pub fn distance_m(self, other: Self) -> f64 {
         const MEAN_RADIUS_M: f64 = 6_371_008.8;
@@ -48,14 +48,14 @@ impl LatLon {
 }
 
 impl LatLonBox {
-    /// Degrees from west to east, above 0 and at most 360.
+    /// Width in degrees of longitude, above 0 and at most 360.
     #[must_use]
     pub fn width(&self) -> f64 {
         let width = self.max.lon - self.min.lon;
         if width > 0.0 { width } else { width + 360.0 }
     }
 
-    /// The place in its middle, by degrees.
+    /// The centre of the box, in degrees.
     #[must_use]
     pub fn middle(&self) -> LatLon {
         LatLon {
@@ -73,7 +73,7 @@ impl LatLonBox {
     }
 }
 
-/// A longitude brought into -180..=180 degrees.
+/// A longitude wrapped into -180..=180 degrees.
 #[must_use]
 pub fn wrapped(lon: f64) -> f64 {
     if (-180.0..=180.0).contains(&lon) {
@@ -83,14 +83,14 @@ pub fn wrapped(lon: f64) -> f64 {
     }
 }
 
-/// Rounds of [`TangentPlane::geodetic`]: each leaves the square of the plane's tilt, a 4000th at 100 km, of the error.
+/// Iterations of [`TangentPlane::geodetic`]; each scales the error by the plane's tilt squared, 1/4000 at 100 km.
 const ROUNDS: usize = 6;
 
-/// East and north on a plane through one point of the earth, square to the ellipsoid's normal there.
+/// An east-north plane through one point of the earth, perpendicular to the ellipsoid's normal there.
 ///
-/// A place is laid onto it from the plane's own height above the ellipsoid, whatever the height of
-/// what stands there: all that is above a place has the same `x` and `y`, and metres are true at that
-/// height, in the middle. The plane's own third axis is not used; heights stay altitudes.
+/// A place is mapped at the plane's own height above the ellipsoid, whatever its actual height: everything above a
+/// place has the same `x` and `y`, and metres are true at that height, in the middle. The plane's own third axis is
+/// not used; heights stay altitudes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TangentPlane {
     origin: LatLon,
@@ -102,7 +102,7 @@ pub struct TangentPlane {
 }
 
 impl TangentPlane {
-    /// The plane that touches at `origin`, `height_m` metres above the ellipsoid.
+    /// The plane tangent at `origin`, `height_m` metres above the ellipsoid.
     #[must_use]
     pub fn at(origin: LatLon, height_m: f64) -> Self {
         let (lat, lon) = (origin.lat.to_radians(), origin.lon.to_radians());
@@ -126,13 +126,13 @@ impl TangentPlane {
         }
     }
 
-    /// Where it touches.
+    /// The tangent point.
     #[must_use]
     pub fn origin(&self) -> LatLon {
         self.origin
     }
 
-    /// Where it touches, metres above the ellipsoid.
+    /// Height of the tangent point, metres above the ellipsoid.
     #[must_use]
     pub fn height_m(&self) -> f64 {
         self.height_m
@@ -145,8 +145,8 @@ impl TangentPlane {
         Point2::new(enu.x, enu.y)
     }
 
-    /// The place that [`TangentPlane::local`] lays onto `point`, to a micrometre within a thousand
-    /// kilometres of the origin.
+    /// The place that [`TangentPlane::local`] maps to `point`, to a micrometre within a thousand kilometres of the
+    /// origin.
     #[must_use]
     pub fn geodetic(&self, point: Point2) -> LatLon {
         let mut up = 0.0;
@@ -161,7 +161,7 @@ impl TangentPlane {
     }
 }
 
-/// Earth-centred metres of what is `height_m` above the ellipsoid.
+/// Earth-centred coordinates, metres, of a place at `height_m` above the ellipsoid.
 fn earth_centred(place: LatLon, height_m: f64) -> Vector3<f64> {
     let wgs84 = Wgs84::builder()
         .latitude(Angle::new::<degree>(place.lat.clamp(-90.0, 90.0)))
@@ -173,7 +173,7 @@ fn earth_centred(place: LatLon, height_m: f64) -> Vector3<f64> {
     Vector3::new(x.get::<meter>(), y.get::<meter>(), z.get::<meter>())
 }
 
-/// The place under earth-centred metres, and its height above the ellipsoid.
+/// The place of earth-centred coordinates, and its height above the ellipsoid.
 fn on_earth(point: Vector3<f64>) -> (LatLon, f64) {
     let ecef = Coordinate::<Ecef>::builder()
         .x(Length::new::<meter>(point.x))
@@ -188,8 +188,8 @@ fn on_earth(point: Vector3<f64>) -> (LatLon, f64) {
     (place, wgs84.altitude().get::<meter>())
 }
 
-/// Height of the EGM96 geoid (mean sea level) above the ellipsoid at `place`, metres; to a
-/// micrometre, below which its sum of harmonics depends on the platform.
+/// Height of the EGM96 geoid (mean sea level) above the ellipsoid at `place`, metres, rounded to a micrometre: below
+/// that its sum of harmonics depends on the platform.
 #[must_use]
 pub fn undulation_m(place: LatLon) -> f64 {
     let exact = egm96::egm96_compute_altitude_offset(place.lat, place.lon);
@@ -238,7 +238,7 @@ mod tests {
 
     #[test]
     fn the_geoid_is_where_it_was_surveyed() {
-        // GeographicLib's GeoidEval, egm96-5, to its error of a few centimetres.
+        // GeographicLib's GeoidEval, egm96-5, within its error of a few centimetres.
         for (lat, lon, height) in [
             (36.59, -84.25, -31.0),
             (0.0, 0.0, 17.16),

@@ -1,6 +1,6 @@
 //! Points, legs and curves in a local frame: metres, `x` east, `y` north, `z` up.
 //!
-//! Deliberately absent: anything that knows what a threat, a terrain or a vehicle is.
+//! Deliberately absent: threats, terrain and vehicles.
 
 pub mod bspline;
 pub mod geodesy;
@@ -20,10 +20,10 @@ pub type Point2 = nalgebra::Point2<f64>;
 /// A point in space, metres.
 pub type Point3 = nalgebra::Point3<f64>;
 
-/// A horizontal way, metres.
+/// A horizontal displacement, metres.
 pub type Vector2 = nalgebra::Vector2<f64>;
 
-/// `angle` brought into (-pi, pi].
+/// `angle` wrapped into (-pi, pi].
 #[must_use]
 pub fn wrap_angle(angle: f64) -> f64 {
     use std::f64::consts::{PI, TAU};

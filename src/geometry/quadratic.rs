@@ -3,9 +3,9 @@
 /// `a t^2 + b t + c`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quadratic {
-    /// Of the square.
+    /// Quadratic coefficient.
     pub a: f64,
-    /// Of the variable.
+    /// Linear coefficient.
     pub b: f64,
     /// Constant.
     pub c: f64,
@@ -31,7 +31,7 @@ impl Quadratic {
     /// The real roots in ascending order; a double root appears twice. None for a constant.
     #[must_use]
     pub fn roots(&self) -> [Option<f64>; 2] {
-        // A leading coefficient lost in rounding beside the others is a straight line.
+        // If rounding makes the leading coefficient insignificant, the polynomial is linear.
         if self.a.abs() <= 1e-14 * (self.b.abs() + self.c.abs()) {
             let root = (self.b != 0.0)
                 .then(|| -self.c / self.b)
@@ -42,7 +42,7 @@ impl Quadratic {
         if discriminant < 0.0 {
             return [None, None];
         }
-        // The sum of equal signs loses no digits; the other root follows from the product c / a.
+        // Adding terms of equal sign loses no digits; the other root follows from the product c / a.
         let sum = -0.5 * (self.b + self.b.signum() * discriminant.sqrt());
         let first = sum / self.a;
         let second = if sum == 0.0 { 0.0 } else { self.c / sum };
@@ -54,7 +54,7 @@ impl Quadratic {
     pub fn extremes(&self, t0: f64, t1: f64) -> (f64, f64) {
         let (v0, v1) = (self.at(t0), self.at(t1));
         let (mut least, mut greatest) = (v0.min(v1), v0.max(v1));
-        // Where the slope changes its sign.
+        // Where the slope changes sign.
         if (2.0 * self.a * t0 + self.b) * (2.0 * self.a * t1 + self.b) < 0.0 {
             let vertex = -self.b / (2.0 * self.a);
             let value = self.at(vertex);

@@ -12,7 +12,7 @@ pub struct Rect {
 }
 
 impl Rect {
-    /// The smallest rectangle round `points`; `None` without points.
+    /// The smallest rectangle around `points`; `None` without points.
     #[must_use]
     pub fn around(points: impl IntoIterator<Item = Point2>) -> Option<Self> {
         points.into_iter().fold(None, |rect: Option<Self>, point| {
@@ -42,7 +42,7 @@ impl Rect {
         self.excess(point) <= 0.0
     }
 
-    /// Whether the two have a point in common.
+    /// Whether the two rectangles have a point in common.
     #[must_use]
     pub fn meets(&self, other: &Self) -> bool {
         self.min.x <= other.max.x
@@ -51,7 +51,7 @@ impl Rect {
             && self.max.y >= other.min.y
     }
 
-    /// The corners, counter-clockwise from the south-west on.
+    /// The corners, counter-clockwise from the south-west.
     #[must_use]
     pub fn corners(&self) -> [Point2; 4] {
         let [low, high] = [self.min, self.max];
@@ -72,7 +72,7 @@ impl Rect {
         )
     }
 
-    /// How far `point` lies outside, metres; 0 inside.
+    /// Distance of `point` outside the rectangle, metres; 0 inside.
     #[must_use]
     pub fn excess(&self, point: Point2) -> f64 {
         let dx = (self.min.x - point.x).max(point.x - self.max.x).max(0.0);

@@ -1,23 +1,23 @@
-//! A simple ring of points: its edges, what lies inside, and how far away it is.
+//! A simple ring of points: its edges, containment, and distance.
 
 use super::{Point2, Vector2};
 
-/// The edges of `ring`, the last one back to the first point.
+/// The edges of `ring`; the last one leads back to the first point.
 pub fn edges(ring: &[Point2]) -> impl Iterator<Item = (Point2, Point2)> + '_ {
     let next = ring.iter().cycle().skip(1);
     ring.iter().copied().zip(next.copied())
 }
 
-/// Twice the area of the simple `ring`, square metres; negative where it goes round clockwise.
+/// Twice the area of the simple `ring`, square metres; negative if it is clockwise.
 #[must_use]
 pub fn twice_area(ring: &[Point2]) -> f64 {
-    // Of triangles at the first point, so that no digits are lost far from the origin.
+    // Summed over triangles at the first point, so that no digits are lost far from the origin.
     edges(ring)
         .map(|(a, b)| (a - ring[0]).perp(&(b - ring[0])))
         .sum()
 }
 
-/// Whether the simple `ring` turns to the same side at every corner, of which some may be given twice.
+/// Whether the simple `ring` turns to the same side at every corner; repeated points are allowed.
 #[must_use]
 pub fn is_convex(ring: &[Point2]) -> bool {
     let ways: Vec<Vector2> = edges(ring)
@@ -30,7 +30,7 @@ pub fn is_convex(ring: &[Point2]) -> bool {
             .zip(next.clone())
             .map(|(way, next)| way.perp(next))
     };
-    // As a simple ring goes round once, one side is enough.
+    // A simple ring has winding number 1, so one sign suffices.
     turns().all(|turn| turn >= 0.0) || turns().all(|turn| turn <= 0.0)
 }
 
@@ -41,14 +41,14 @@ pub fn contains(ring: &[Point2], point: Point2) -> bool {
     crossed.count() % 2 == 1
 }
 
-/// Whether the way from `point` straight to the right crosses an edge.
+/// Whether the ray from `point` to the right crosses an edge.
 #[must_use]
 pub fn is_crossed((a, b): (Point2, Point2), point: Point2) -> bool {
     (a.y > point.y) != (b.y > point.y)
         && point.x < a.x + (b.x - a.x) * (point.y - a.y) / (b.y - a.y)
 }
 
-/// Distance of `point` to the edges of `ring`, metres; infinite without edges.
+/// Distance of `point` from the edges of `ring`, metres; infinite without edges.
 #[must_use]
 pub fn distance(ring: &[Point2], point: Point2) -> f64 {
     edges(ring)
@@ -57,12 +57,12 @@ pub fn distance(ring: &[Point2], point: Point2) -> f64 {
         .sqrt()
 }
 
-/// Squared distance of `point` to an edge, square metres.
+/// Squared distance of `point` from an edge, square metres.
 #[must_use]
 pub fn squared_distance((a, b): (Point2, Point2), point: Point2) -> f64 {
     let along = b - a;
     let t = (point - a).dot(&along) / along.norm_squared();
-    // An edge without extent is its point.
+    // An edge of length 0 is its point.
     let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) };
     (point - (a + along * t)).norm_squared()
 }

@@ -1,16 +1,16 @@
-//! A straight leg, and how its points lie to a point of the plane.
+//! A straight leg, and its distance from points of the plane.
 
 use super::{Point2, Point3, Quadratic};
 
-/// Legs shorter than this horizontally, metres, have no heading of their own.
+/// Legs horizontally shorter than this have no heading, metres.
 pub const LEVEL: f64 = 1e-9;
 
 /// A straight leg from `a` (t = 0) to `b` (t = 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {
-    /// Where it begins.
+    /// Start of the leg.
     pub a: Point3,
-    /// Where it ends.
+    /// End of the leg.
     pub b: Point3,
 }
 
@@ -27,27 +27,27 @@ impl Segment {
         (self.b - self.a).norm()
     }
 
-    /// Length seen from above, metres.
+    /// Horizontal length, metres.
     #[must_use]
     pub fn horizontal_length(&self) -> f64 {
         let (dx, dy) = (self.b.x - self.a.x, self.b.y - self.a.y);
         (dx * dx + dy * dy).sqrt()
     }
 
-    /// Direction seen from above, radians counter-clockwise from east; `None` when it has none.
+    /// Horizontal direction, radians counter-clockwise from east; `None` if the leg is vertical.
     #[must_use]
     pub fn heading(&self) -> Option<f64> {
         (self.horizontal_length() >= LEVEL)
             .then(|| libm::atan2(self.b.y - self.a.y, self.b.x - self.a.x))
     }
 
-    /// Climb angle, radians, up positive.
+    /// Climb angle, radians, positive upwards.
     #[must_use]
     pub fn climb(&self) -> f64 {
         libm::atan2(self.b.z - self.a.z, self.horizontal_length())
     }
 
-    /// Squared horizontal distance to `point` along the leg.
+    /// Squared horizontal distance from `point`, as a function of `t`.
     #[must_use]
     pub fn squared_distance_to(&self, point: Point2) -> Quadratic {
         let (dx, dy) = (self.b.x - self.a.x, self.b.y - self.a.y);
@@ -69,7 +69,7 @@ impl Segment {
         }
         let (t0, t1) = match distance.roots() {
             [Some(t0), Some(t1)] => (t0.max(0.0), t1.min(1.0)),
-            // Of a leg that hardly moves, the square is lost beside the distance.
+            // For a leg that hardly moves, the quadratic term is insignificant.
             [Some(t), None] if distance.b > 0.0 => (0.0, t.min(1.0)),
             [Some(t), None] => (t.max(0.0), 1.0),
             _ => {
@@ -82,8 +82,8 @@ impl Segment {
 
     /// The part `[t0, t1]` of the leg with `base <= z < top`, if any.
     ///
-    /// An end that only touches `top` is left out of a climb but kept as the limit of a descent
-    /// through it, where the least distance is an infimum.
+    /// A leg that climbs from `top` is excluded. One that reaches `top` from below, or descends from it, keeps that
+    /// point as a limit, where the least distance is an infimum.
     #[must_use]
     pub fn between_heights(&self, base: Option<f64>, top: Option<f64>) -> Option<(f64, f64)> {
         let (low, high) = (self.a.z.min(self.b.z), self.a.z.max(self.b.z));
@@ -146,7 +146,7 @@ mod tests {
         assert_eq!(leg.within(Point2::new(5.0, 0.0), 2.5), Some((0.25, 0.75)));
         assert_eq!(leg.within(Point2::new(5.0, 3.0), 2.5), None);
         assert_eq!(leg.within(Point2::new(-2.0, 0.0), 1.0), None);
-        // Seven digits less than its distance from the middle, a leg is as good as vertical.
+        // A leg with a horizontal extent seven digits below its distance from the middle is treated as vertical.
         for far in [-1e-7, 1e-7] {
             let hardly = segment([100.0, 0.0, 0.0], [100.0 + far, 0.0, 9.0]);
             assert_eq!(

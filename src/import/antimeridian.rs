@@ -1,5 +1,5 @@
-//! Polygons that a file has cut along the 180th meridian, as RFC 7946 section 3.1.9 asks, made whole: halves that
-//! meet there would leave a gap without width between them, wide enough for a route.
+//! Joins polygons that a file has cut along the 180th meridian, as RFC 7946 section 3.1.9 asks. Otherwise the halves
+//! would leave a gap of zero width between them, through which a route could pass.
 
 use std::collections::HashMap;
 use std::iter::successors;
@@ -7,15 +7,15 @@ use std::iter::successors;
 /// Degrees east and north.
 type Corner = [f64; 2];
 
-/// A part of a ring off the meridian, from one place on it to another.
+/// A part of a ring between two places on the meridian.
 struct Chain {
-    /// Which ring it is of.
+    /// Index of its ring.
     ring: usize,
     corners: Vec<Corner>,
 }
 
-/// Outer rings of one geometry, each with the number of the first that it is of. Those that go on with each other
-/// beyond the meridian are one; all others are as they were.
+/// Outer rings of one geometry, each with the index of its first source ring. Rings that continue each other across
+/// the meridian are joined; all others are unchanged.
 pub(super) fn joined(rings: &[Vec<Corner>]) -> Vec<(usize, Vec<Corner>)> {
     let chains: Vec<Chain> = rings
         .iter()
@@ -34,7 +34,7 @@ pub(super) fn joined(rings: &[Vec<Corner>]) -> Vec<(usize, Vec<Corner>)> {
         let mut next = Some(first);
         while let Some(index) = next.filter(|index| !told[*index]) {
             told[index] = true;
-            // Where it begins the one before has ended.
+            // A chain begins where the one before ends.
             ring.extend(&chains[index].corners[1..]);
             next = follower[index];
         }
@@ -46,7 +46,7 @@ pub(super) fn joined(rings: &[Vec<Corner>]) -> Vec<(usize, Vec<Corner>)> {
     made
 }
 
-/// A ring that goes round to the left, its first corner not repeated.
+/// The ring in counter-clockwise order, without repeated first corner.
 fn counterclockwise(ring: &[Corner]) -> Vec<Corner> {
     let mut ring = ring.to_vec();
     if ring.len() > 1 && ring.first() == ring.last() {
@@ -64,7 +64,7 @@ fn counterclockwise(ring: &[Corner]) -> Vec<Corner> {
     ring
 }
 
-/// What is left of a ring without its edges along the meridian; nothing when there are none.
+/// A ring without its edges along the meridian; empty if it has no such edge.
 fn chains(ring: usize, corners: &[Corner]) -> Vec<Chain> {
     let n = corners.len();
     let is_cut = |index: usize| {
@@ -76,12 +76,12 @@ fn chains(ring: usize, corners: &[Corner]) -> Vec<Chain> {
     };
     let mut chains = Vec::new();
     let mut corners_so_far = Vec::new();
-    // Once round, from the end of one cut to the beginning of the last.
+    // Once around, from the end of one cut to the beginning of the last.
     for index in cut + 1..=cut + n {
         corners_so_far.push(corners[index % n]);
         if is_cut(index) {
             let corners = std::mem::take(&mut corners_so_far);
-            // Between two cuts in a row is nothing.
+            // Two cuts in a row have nothing between them.
             if corners.len() > 1 {
                 chains.push(Chain { ring, corners });
             }
@@ -90,11 +90,11 @@ fn chains(ring: usize, corners: &[Corner]) -> Vec<Chain> {
     chains
 }
 
-/// For each chain the one that begins where it ends, on the other side.
+/// For each chain, the one that begins where it ends, on the other side.
 fn followers(chains: &[Chain]) -> Vec<Option<usize>> {
     let place = |[lon, lat]: Corner, beyond: bool| {
         let is_east = lon < 0.0;
-        // Both zeros are one place.
+        // Both zeros are the same latitude.
         (is_east != beyond, (lat + 0.0).to_bits())
     };
     let mut begins = HashMap::new();
@@ -110,7 +110,7 @@ fn followers(chains: &[Chain]) -> Vec<Option<usize>> {
     chains.iter().map(follower).collect()
 }
 
-/// Of which rings every chain goes on in another, and so on in those.
+/// Which rings have a successor for every chain, in every ring of their group.
 fn whole(n_rings: usize, chains: &[Chain], follower: &[Option<usize>]) -> Vec<bool> {
     let mut group: Vec<usize> = (0..n_rings).collect();
     for (chain, next) in chains.iter().zip(follower) {
@@ -136,7 +136,7 @@ fn whole(n_rings: usize, chains: &[Chain], follower: &[Option<usize>]) -> Vec<bo
     whole
 }
 
-/// The ring by which a group is known.
+/// The representative of a ring's group.
 fn head(group: &mut [usize], ring: usize) -> usize {
     let path: Vec<usize> =
         successors(Some(ring), |at| Some(group[*at]).filter(|next| next != at)).collect();
@@ -196,7 +196,7 @@ mod tests {
         check(&[&WEST, &touching, &EAST], &[(0, &BOTH), (1, &touching)]);
     }
 
-    /// Two arms reach across; what they are cut to, our own exports give as one ring that turns back on itself.
+    /// Two arms cross the meridian; our own exports write the cut part as one ring that touches itself.
     #[test]
     fn two_arms_across_are_arms_of_one() {
         let body = [

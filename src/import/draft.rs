@@ -1,14 +1,14 @@
-//! A scenario document in the making.
+//! A scenario document under construction.
 
 use serde_json::{Value, json};
 
 use super::facts::{Facts, OF_A_THREAT};
 use super::{Assumed, Conversion, ImportError, Unused};
 
-/// Entries of a list of unused things; the last one counts the rest.
+/// Most entries in the list of unused parts; the last one counts the rest.
 const MOST_UNUSED: usize = 1000;
 
-/// The usual ceiling for unmanned aircraft, metres above ground.
+/// Usual altitude limit of unmanned aircraft, metres above ground.
 const CEILING_M: f64 = 120.0;
 
 /// A place on the earth.
@@ -18,19 +18,19 @@ pub(super) struct Place {
     pub(super) lon: f64,
 }
 
-/// What a file has said so far.
+/// What has been read from a file so far.
 #[derive(Debug)]
 pub(super) struct Draft {
-    /// Of the scenario.
+    /// Name of the scenario.
     pub(super) name: Option<String>,
     /// `msl` or `ellipsoid`.
     datum: &'static str,
     start: Option<(Place, f64)>,
     target: Option<(Place, f64)>,
     threats: Vec<Value>,
-    /// Metres a second.
+    /// Metres per second.
     pub(super) cruise_speed: Option<f64>,
-    /// Of the ground, metres, where the file knows.
+    /// Elevation of the ground, metres, if the file gives it.
     pub(super) elevation: Option<f64>,
     assumed: Vec<Assumed>,
     unused: Vec<Unused>,
@@ -38,7 +38,7 @@ pub(super) struct Draft {
 }
 
 impl Place {
-    /// Degrees east and north.
+    /// From degrees east and north.
     pub(super) fn new(lon: f64, lat: f64) -> Result<Self, String> {
         if !(-180.0..=180.0).contains(&lon) {
             return Err(format!("longitude is {lon}, must be from -180 to 180"));
@@ -70,7 +70,7 @@ impl Draft {
         }
     }
 
-    /// List a part of the file that is not used.
+    /// List a part of the file as unused.
     pub(super) fn leave(&mut self, place: impl Into<String>, reason: impl Into<String>) {
         if self.unused.len() < MOST_UNUSED {
             self.unused.push(Unused {
@@ -82,7 +82,7 @@ impl Draft {
         }
     }
 
-    /// List a part of the document that the file does not say.
+    /// List a part of the document as assumed, because the file does not give it.
     pub(super) fn assume(&mut self, pointer: &str, reason: impl Into<String>) {
         self.assumed.push(Assumed {
             pointer: pointer.to_owned(),
@@ -90,7 +90,7 @@ impl Draft {
         });
     }
 
-    /// Where the route begins or ends; the first that says so counts.
+    /// Set the start or the target; the first one found counts.
     pub(super) fn end(&mut self, end: &str, at: &str, place: Place, alt: f64) {
         let slot = if end == "start" {
             &mut self.start
@@ -104,8 +104,8 @@ impl Draft {
         }
     }
 
-    /// A point with what is said of it: an end, or the middle of a circle. `alt` is `None` where the
-    /// file gives no height.
+    /// A point with its facts: the start, the target, or the centre of a circle. `alt` is `None` if the file gives no
+    /// height.
     pub(super) fn point(&mut self, at: &str, facts: &Facts, place: Place, alt: Option<f64>) {
         if let Some(end) = facts.end() {
             self.leave_beside(at, facts, &["name"]);
@@ -131,7 +131,7 @@ impl Draft {
         }
     }
 
-    /// A circle of the radius that is said of it.
+    /// A circle with the radius in its facts.
     pub(super) fn circle(&mut self, at: &str, facts: &Facts, center: Place) {
         match circle(facts, center) {
             Ok(threat) => self.threat(at, facts, threat),
@@ -159,7 +159,7 @@ impl Draft {
         }
     }
 
-    /// The document.
+    /// Build the document.
     pub(super) fn finish(mut self) -> Result<Conversion, ImportError> {
         if self.more_unused > 0 {
             self.unused.push(Unused {

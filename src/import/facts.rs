@@ -1,14 +1,14 @@
-//! What a file says of one thing by name: properties of a feature, data of a placemark.
+//! Named values of one object in a file: properties of a feature, data of a placemark.
 
 use serde_json::{Map, Value};
 
-/// Letters of a name or a value that are kept: no name of a scenario has more, and no number.
+/// Most characters kept of a name or a value: no scenario name and no number is longer.
 const LONGEST: usize = 200;
 
-/// Names that are listed of what is not looked at.
+/// Most unused names listed.
 const MOST_NAMES: usize = 10;
 
-/// Names of facts of a threat.
+/// Names that describe a threat.
 pub(super) const OF_A_THREAT: [&str; 8] = [
     "base",
     "center",
@@ -20,7 +20,7 @@ pub(super) const OF_A_THREAT: [&str; 8] = [
     "top",
 ];
 
-/// Names that nothing is said under here, but that our own exports write.
+/// Names that are not reported as unused, because our own exports write them.
 const OURS: [&str; 6] = [
     "agl",
     "alt_msl",
@@ -30,16 +30,16 @@ const OURS: [&str; 6] = [
     "violations",
 ];
 
-/// Names and values. They are told of each of many shapes, so that all of them are short.
+/// Names and values. They are repeated for each of many shapes, so all of them are kept short.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Facts {
     known: Map<String, Value>,
-    /// The first few names of the rest.
+    /// The first few of the other names.
     others: Vec<String>,
 }
 
 impl Facts {
-    /// What is looked at, cut where it is long, and of what is not a few names.
+    /// The known values, truncated if long, and a few names of the others.
     pub(super) fn of(said: Map<String, Value>) -> Self {
         let is_known = |name: &str| OF_A_THREAT.contains(&name) || OURS.contains(&name);
         let (known, rest): (Map<_, _>, Map<_, _>) =
@@ -59,7 +59,7 @@ impl Facts {
         }
     }
 
-    /// A finite number, also one that is written as text; `None` when there is none or it is null.
+    /// A finite number, possibly written as text; `None` if it is absent or null.
     pub(super) fn number(&self, name: &str) -> Result<Option<f64>, String> {
         let value = match self.known.get(name) {
             None | Some(Value::Null) => return Ok(None),
@@ -75,7 +75,7 @@ impl Facts {
             .ok_or_else(|| format!("{name} is {value}, must be a number"))
     }
 
-    /// What the thing is called.
+    /// Name of the object.
     pub(super) fn name(&self) -> Option<&str> {
         self.known.get("name")?.as_str().map(str::trim)
     }
@@ -88,7 +88,7 @@ impl Facts {
             .find(|end| name.eq_ignore_ascii_case(end))
     }
 
-    /// Degrees east and north of a circle that is drawn as a ring.
+    /// Centre, degrees east and north, of a circle that is drawn as a ring.
     pub(super) fn center(&self) -> Option<[f64; 2]> {
         match self.known.get("center")? {
             Value::Array(pair) => {
@@ -105,12 +105,12 @@ impl Facts {
         }
     }
 
-    /// Whether the thing says that it is a part of a route, as our own exports do.
+    /// Whether the object is marked as a part of a route, as our own exports do.
     pub(super) fn is_of_a_route(&self) -> bool {
         matches!(self.known.get("role"), Some(role) if role == "path" || role == "waypoint")
     }
 
-    /// The names that are none of `used`.
+    /// The names that are not in `used`.
     pub(super) fn beside(&self, used: &[&str]) -> Vec<&str> {
         let is_used =
             |name: &&String| used.contains(&name.as_str()) || OURS.contains(&name.as_str());
@@ -119,7 +119,7 @@ impl Facts {
     }
 }
 
-/// A value whose text is longer than any that means something, as the beginning of that text.
+/// `value`, or the beginning of its text if that is longer than any useful value.
 fn short(value: Value) -> Value {
     let text = match &value {
         Value::String(text) => begin(text),

@@ -1,5 +1,5 @@
-//! RFC 7946: points named start and target, points with a radius and polygons as threats. Heights are
-//! above the ellipsoid, as it says.
+//! RFC 7946: points named start and target; points with a radius, and polygons, as threats. Heights are above the
+//! ellipsoid, as the RFC says.
 
 use geojson::{Feature, GeometryValue, JsonValue, Position};
 use serde_json::Value;
@@ -9,14 +9,14 @@ use super::draft::{Draft, Place};
 use super::facts::Facts;
 use super::{Conversion, ImportError};
 
-/// What an older GeoJSON may call the one system that the present one has.
+/// Names that older GeoJSON uses for the only reference system of RFC 7946.
 const WGS84: [&str; 3] = [
     "urn:ogc:def:crs:OGC:1.3:CRS84",
     "urn:ogc:def:crs:OGC::CRS84",
     "EPSG:4326",
 ];
 
-/// Make a scenario of a feature collection, or of a feature.
+/// Convert a feature collection, or a feature, to a scenario.
 pub(super) fn convert(mut document: Value) -> Result<Conversion, ImportError> {
     refuse_other_systems(&document)?;
     let mut draft = Draft::new("ellipsoid");
@@ -72,7 +72,7 @@ fn feature(draft: &mut Draft, at: &str, value: JsonValue) {
 }
 
 fn geometry(draft: &mut Draft, at: &str, facts: &Facts, value: &GeometryValue) {
-    // A circle that is drawn as a ring says so.
+    // A circle that is drawn as a ring has a `center` and a `radius`.
     if let (GeometryValue::Polygon { .. } | GeometryValue::MultiPolygon { .. }, Some([lon, lat])) =
         (value, facts.center())
         && let Ok(Some(_)) = facts.number("radius")
@@ -129,7 +129,7 @@ fn polygons(draft: &mut Draft, at: &str, facts: &Facts, polygons: &[Vec<Vec<Posi
     }
 }
 
-/// The ring that bounds a polygon.
+/// The outer ring of a polygon.
 fn outer(draft: &mut Draft, at: &str, rings: &[Vec<Position>]) -> Option<Vec<[f64; 2]>> {
     let Some((outer, holes)) = rings.split_first() else {
         draft.leave(at, "a polygon without a ring");
@@ -146,7 +146,7 @@ fn outer(draft: &mut Draft, at: &str, rings: &[Vec<Position>]) -> Option<Vec<[f6
     ring
 }
 
-/// East and north; of what lies in a ring, the library does not ask that it has both.
+/// East and north; the library does not check that positions within a ring have both.
 fn degrees(position: &Position) -> Option<[f64; 2]> {
     let [lon, lat, ..] = position.as_slice() else {
         return None;

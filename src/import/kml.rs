@@ -1,7 +1,7 @@
-//! KML: placemarks named start and target, polygons and points with a radius as threats. Heights are
-//! above mean sea level.
+//! KML: placemarks named start and target; polygons, and points with a radius, as threats. Heights are above mean sea
+//! level.
 //!
-//! A document type, by which XML grows without bound, is refused; nothing that is linked is fetched.
+//! A document type is refused, because its entities can expand without bound; links are not followed.
 
 use roxmltree::{Document, Node, ParsingOptions};
 use serde_json::{Map, Value};
@@ -10,13 +10,13 @@ use super::draft::{Draft, Place};
 use super::facts::Facts;
 use super::{Conversion, ImportError};
 
-/// Elements, texts and comments; a text of the greatest size has no more than its letters allow.
+/// Most XML nodes: elements, texts and comments. The limit on the file's size bounds them too.
 const MOST_NODES: u32 = 2_000_000;
 
-/// Levels of geometries within geometries.
+/// Deepest nesting of geometries.
 const DEEPEST: usize = 16;
 
-/// What a document may hold beside placemarks, and no scenario has.
+/// Elements beside placemarks that a scenario cannot represent.
 const NOT_READ: [&str; 6] = [
     "GroundOverlay",
     "Model",
@@ -26,7 +26,7 @@ const NOT_READ: [&str; 6] = [
     "Tour",
 ];
 
-/// Make a scenario of a KML document.
+/// Convert a KML document to a scenario.
 pub(super) fn convert(text: &[u8]) -> Result<Conversion, ImportError> {
     let text = std::str::from_utf8(text)
         .map_err(|error| ImportError::NotXml(format!("the file is not UTF-8: {error}")))?;
@@ -65,7 +65,7 @@ pub(super) fn convert(text: &[u8]) -> Result<Conversion, ImportError> {
     draft.finish()
 }
 
-/// Lines of nodes in the order of the document, each counted on from the one before.
+/// Line numbers of nodes in document order, each counted on from the one before.
 struct Rows<'t> {
     text: &'t str,
     pos: usize,
@@ -175,7 +175,7 @@ fn polygon(draft: &mut Draft, at: &str, facts: &Facts, node: &Node) {
     }
 }
 
-/// Longitude, latitude and altitude, 0 when left out.
+/// Longitude, latitude and altitude; the altitude is 0 if omitted.
 fn coordinates(node: &Node) -> Result<Vec<[f64; 3]>, String> {
     let text = text_of(node, "coordinates").ok_or("no coordinates")?;
     let tuple = |tuple: &str| {
@@ -197,8 +197,8 @@ fn coordinates(node: &Node) -> Result<Vec<[f64; 3]>, String> {
 
 /// Name and extended data.
 ///
-/// What lies deeper than data may is not looked at: of placemarks within each other's data, the innermost
-/// would be looked at once for each.
+/// Elements nested deeper than data can be are skipped: with placemarks nested in each other's data, the innermost
+/// would otherwise be read once per level.
 fn facts(placemark: &Node) -> Facts {
     let mut said = Map::new();
     let mut say = |node: &Node, value: Option<String>| {

@@ -1,9 +1,8 @@
-//! Files of other programs as scenarios: GeoJSON, KML, plans of QGroundControl.
+//! Converts files of other programs to scenarios: GeoJSON, KML, QGroundControl plans.
 //!
-//! What a file says and a scenario has no place for is listed as unused, and what a scenario needs
-//! and a file does not say as assumed. Nothing here plans or judges a scenario: who hands it in is
-//! told what is wrong with it. Deliberately absent: the size of the file, which is checked before
-//! its text is here, and anything that a file refers to.
+//! Parts of a file that a scenario cannot represent are listed as unused; parts of a scenario that the file does not
+//! give are listed as assumed. Scenarios are not validated here; that happens when they are submitted. Deliberately
+//! absent: the size limit of the file, which is checked before, and anything that the file links to.
 
 mod antimeridian;
 mod draft;
@@ -16,67 +15,67 @@ use serde::Serialize;
 use serde_json::Value;
 use thiserror::Error;
 
-/// What became of a file.
+/// The result of a conversion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Conversion {
     /// A scenario document in the frame `wgs84`.
     pub scenario: Value,
-    /// What the document needs and the file does not say.
+    /// What the document needs but the file does not give.
     pub assumed: Vec<Assumed>,
-    /// What the file says and the document cannot.
+    /// What the file gives but the document cannot represent.
     pub unused: Vec<Unused>,
 }
 
-/// A part of the document that the file does not say.
+/// A part of the document that the file does not give.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Assumed {
-    /// Into the document, RFC 6901.
+    /// JSON pointer into the document (RFC 6901).
     pub pointer: String,
-    /// What was taken, and why.
+    /// The value used, and why.
     pub reason: String,
 }
 
 /// A part of the file that was not used.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Unused {
-    /// A JSON pointer into the file; of KML the line and the name.
+    /// JSON pointer into the file; for KML, the line and the name.
     #[serde(rename = "where")]
     pub place: String,
     /// Why.
     pub reason: String,
 }
 
-/// How a file is written.
+/// Syntax of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Syntax {
-    /// GeoJSON, or a plan of QGroundControl.
+    /// GeoJSON, or a QGroundControl plan.
     Json,
     /// KML.
     Xml,
 }
 
-/// Why a file is no scenario.
+/// Why a file cannot be converted to a scenario.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ImportError {
     /// It is not JSON.
     #[error("line {line}, column {column}: {detail}")]
     NotJson {
-        /// From 1.
+        /// Starts at 1.
         line: usize,
-        /// From 1.
+        /// Starts at 1.
         column: usize,
-        /// What was met.
+        /// What the parser found.
         detail: String,
     },
-    /// It is not XML, or of a kind that is not read.
+    /// It is not XML, or of an unsupported kind.
     #[error("{0}")]
     NotXml(String),
-    /// It is well-formed, but holds no scenario.
+    /// It is well-formed, but contains no scenario.
     #[error("{detail}")]
     NoScenario {
         /// What is missing.
         detail: String,
-        /// What it holds instead.
+        /// What it contains instead.
         unused: Vec<Unused>,
     },
 }
@@ -91,7 +90,7 @@ impl ImportError {
 }
 
 impl Syntax {
-    /// By how a text begins.
+    /// Detect the syntax from the beginning of a text.
     #[must_use]
     pub fn of(text: &[u8]) -> Self {
         let begin = without_mark(text).trim_ascii_start();
@@ -103,11 +102,11 @@ impl Syntax {
     }
 }
 
-/// Make a scenario document of a file.
+/// Convert a file to a scenario document.
 ///
 /// # Errors
-/// [`ImportError::NotJson`] and [`ImportError::NotXml`] when `text` is not of that syntax,
-/// [`ImportError::NoScenario`] when it is and has no start or no target.
+/// [`ImportError::NotJson`] and [`ImportError::NotXml`] when `text` does not have that syntax,
+/// [`ImportError::NoScenario`] when it does but has no start or no target.
 pub fn convert(text: &[u8], syntax: Syntax) -> Result<Conversion, ImportError> {
     let text = without_mark(text);
     if text.starts_with(b"PK\x03\x04") {
@@ -127,7 +126,7 @@ pub fn convert(text: &[u8], syntax: Syntax) -> Result<Conversion, ImportError> {
     }
 }
 
-/// Nested no deeper than the library reads, 127 levels.
+/// Nesting is limited by the library to 127 levels.
 fn json(text: &[u8]) -> Result<Value, ImportError> {
     serde_json::from_slice(text).map_err(|error| ImportError::NotJson {
         line: error.line().max(1),
@@ -136,14 +135,14 @@ fn json(text: &[u8]) -> Result<Value, ImportError> {
     })
 }
 
-/// Without the place, which is told beside.
+/// The message without its position, which is reported separately.
 fn detail(error: &serde_json::Error) -> String {
     let whole = error.to_string();
     let place = format!(" at line {} column {}", error.line(), error.column());
     whole.strip_suffix(&place).unwrap_or(&whole).to_owned()
 }
 
-/// Without the mark that some programs begin UTF-8 with.
+/// `text` without a UTF-8 byte order mark.
 fn without_mark(text: &[u8]) -> &[u8] {
     text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
 }

@@ -1,5 +1,5 @@
-//! Plans of QGroundControl: the mission's ends as start and target, exclusion fences as threats.
-//! Altitudes are above mean sea level.
+//! QGroundControl plans: the mission's ends as start and target, exclusion fences as threats. Altitudes are above
+//! mean sea level.
 
 use serde_json::{Map, Value};
 
@@ -7,31 +7,30 @@ use super::draft::{Draft, Place};
 use super::facts::Facts;
 use super::{Conversion, ImportError};
 
-/// Commands of MAVLink's `MAV_CMD` that are somewhere: waypoints and their kin, then those that
-/// leave the ground and those that come back to it.
+/// MAVLink commands (`MAV_CMD`) that have a position: waypoints and similar, then take-offs and landings.
 const WAYPOINTS: [u64; 6] = [16, 17, 18, 19, 31, 82];
 const TAKEOFFS: [u64; 2] = [22, 84];
 const LANDINGS: [u64; 2] = [21, 85];
 const CHANGE_SPEED: u64 = 178;
 
-/// Of MAVLink's `SPEED_TYPE`: through the air and over ground, which are one without wind. The others are of
+/// MAVLink speed types (`SPEED_TYPE`): airspeed and ground speed, which are equal without wind. The others are for
 /// climbs and descents.
 const ALONG: [f64; 2] = [0.0, 1.0];
 
-/// Of MAVLink's `MAV_TYPE`: it flies at its cruise speed, all else at its hover speed.
+/// A fixed wing in MAVLink's `MAV_TYPE`: it flies at its cruise speed, all others at their hover speed.
 const FIXED_WING: u64 = 1;
 
-/// An item that is somewhere.
+/// An item that has a position.
 #[derive(Debug, Clone)]
 struct Stop {
     at: String,
     place: Place,
     alt: f64,
-    /// On the ground, at its start or its end.
+    /// On the ground, at the start or the end of the mission.
     on_ground: bool,
 }
 
-/// Make a scenario of a plan.
+/// Convert a plan to a scenario.
 pub(super) fn convert(document: &Value) -> Result<Conversion, ImportError> {
     let mission = &document["mission"];
     let Some(items) = mission["items"].as_array() else {
@@ -104,7 +103,7 @@ fn moves(command: u64) -> bool {
     moves.iter().any(|commands| commands.contains(&command))
 }
 
-/// Metres a second along the way.
+/// Speed along the route, metres per second.
 fn changed_speed(item: &Value) -> Result<f64, String> {
     let [kind, speed] = [0, 1].map(|index| &item["params"][index]);
     if !kind.as_f64().is_some_and(|kind| ALONG.contains(&kind)) {
@@ -123,7 +122,7 @@ fn stop(at: &str, item: &Value, command: u64, home: Option<(Place, f64)>) -> Res
     let somewhere = param(4).zip(param(5)).filter(|place| *place != (0.0, 0.0));
     let place = match (somewhere, home) {
         (Some((lat, lon)), _) => Place::new(lon, lat)?,
-        // An autopilot takes off and lands where it is when the item does not say.
+        // Without a position, an autopilot takes off and lands where it is.
         (None, Some((place, _))) if on_ground => place,
         (None, _) => return Err("an item without a place".to_owned()),
     };
@@ -146,7 +145,7 @@ fn stop(at: &str, item: &Value, command: u64, home: Option<(Place, f64)>) -> Res
     })
 }
 
-/// The mission's first and last stop; with one alone, the way leads there from home.
+/// The mission's first and last stop; a single stop is the target, reached from home.
 fn ends(draft: &mut Draft, home: Option<(Place, f64)>, stops: &[Stop]) {
     let set = |draft: &mut Draft, end: &str, stop: &Stop| {
         if stop.on_ground && home.is_some() {
@@ -205,7 +204,7 @@ fn fences(draft: &mut Draft, fence: &Value) {
     }
 }
 
-/// Whether a fence keeps the vehicle out; one that keeps it in is listed.
+/// Whether a fence is an exclusion fence; an inclusion fence is listed as unused.
 fn excludes(draft: &mut Draft, at: &str, fence: &Value) -> bool {
     let excludes = fence["inclusion"] == false;
     if !excludes {

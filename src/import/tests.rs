@@ -1,4 +1,4 @@
-//! Files as they come, right and wrong.
+//! Valid and invalid files.
 
 use serde_json::{Value, json};
 
@@ -35,7 +35,7 @@ fn ends() -> Vec<Value> {
     ]
 }
 
-/// The reasons, each after its place.
+/// The reasons, each with its place.
 fn unused(conversion: &Conversion) -> Vec<String> {
     let line = |unused: &Unused| format!("{}: {}", unused.place, unused.reason);
     conversion.unused.iter().map(line).collect()
@@ -412,7 +412,7 @@ fn hostile_files_are_refused_and_soon() {
     ] {
         assert!(convert(text.as_bytes(), syntax).is_err());
     }
-    // Deep and well-formed: nobody recurses.
+    // Deep but well-formed: nothing recurses.
     let deep = format!(
         "<kml>{}{}</kml>",
         "<Folder>".repeat(300_000),
@@ -434,7 +434,7 @@ fn hostile_files_are_refused_and_soon() {
     };
     assert_eq!(unused[0].reason, "geometries nested deeper than 16 levels");
     assert!(convert(b"\xff\xfe<kml/>", Syntax::Xml).is_err());
-    // A long list of what is not used is cut.
+    // A long list of unused parts is truncated.
     let many = vec![point("hut", json!([1, 2])); 3000];
     let refused = geojson(&many.into()).expect_err("no ends");
     let ImportError::NoScenario { unused, .. } = refused else {

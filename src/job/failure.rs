@@ -15,7 +15,7 @@ pub struct Failure {
 /// Every reason for which a plan can fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FailureKind {
-    /// The planner hit a bug of its own.
+    /// The planner panicked because of a bug.
     PlannerPanic,
     /// One worker after another was lost while running the plan.
     WorkerLost,

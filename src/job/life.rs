@@ -82,7 +82,7 @@ impl Plan {
         Ok(())
     }
 
-    /// Its end has been requested, and a worker will see to it.
+    /// Its end has been requested, and a worker will carry it out.
     pub fn request_cancel(&mut self) {
         self.cancel_requested = true;
         self.revision += 1;
@@ -125,7 +125,7 @@ impl Plan {
         Ok(())
     }
 
-    /// Its run has told these events: progress moves to the last convergence point among them, if any.
+    /// Its run has reported these events: progress moves to the last convergence point among them, if any.
     pub fn advance(&mut self, told: &[Event]) {
         let point = told.iter().rev().find_map(|event| match event {
             Event::Convergence(point) => Some(point),

@@ -31,9 +31,9 @@ pub struct Submission {
     pub owner: Option<Owner>,
     /// Active plans that its owner may have, including this one; `None` for any number.
     pub quota: Option<u64>,
-    /// Where to send word of its end.
+    /// Webhook that is notified when it ends.
     pub webhook: Option<String>,
-    /// Tells a repeated request from a new one.
+    /// Distinguishes a repeated request from a new one.
     pub idempotency: Option<Idempotency>,
     /// Identifies the dataset that it is planned over.
     pub dataset: Option<String>,
@@ -75,7 +75,7 @@ pub struct Plan {
     pub iteration: u64,
     /// Iterations asked for.
     pub iterations: u64,
-    /// Routes priced so far.
+    /// Routes evaluated so far.
     pub evaluations: u64,
     /// 1 for the next to run; `None` when not queued.
     pub queue_position: Option<u64>,

@@ -1,24 +1,23 @@
-//! ABC: the artificial bee colony of Karaboga.
+//! ABC: Karaboga's artificial bee colony.
 //!
-//! D. Karaboga and B. Basturk, *A powerful and efficient algorithm for numerical function optimization:
-//! artificial bee colony (ABC) algorithm*, Journal of Global Optimization 39, 2007. The modification
-//! rate, and which sources onlookers choose where some are infeasible, are of D. Karaboga and B. Akay,
-//! *A modified artificial bee colony (ABC) algorithm for constrained optimization problems*, Applied Soft
-//! Computing 11, 2011.
+//! D. Karaboga and B. Basturk, *A powerful and efficient algorithm for numerical function optimization: artificial
+//! bee colony (ABC) algorithm*, Journal of Global Optimization 39, 2007. The modification rate, and the choice of
+//! sources by onlookers where some are infeasible, follow D. Karaboga and B. Akay, *A modified artificial bee colony
+//! (ABC) algorithm for constrained optimization problems*, Applied Soft Computing 11, 2011.
 //!
-//! The population is the colony: half of it is employed, one bee a food source, and half looks on, so
-//! that an iteration prices as many positions as one of the other algorithms, and a scout's now and
-//! then. At least two bees are employed where there are two: a source is searched towards another.
+//! The population is the colony: half of it are employed bees, one per food source, and half are onlookers, so that
+//! an iteration evaluates as many positions as in the other algorithms, plus an occasional scout. At least two bees
+//! are employed if there are two, because a source is searched relative to another.
 //!
-//! Deviations: the bees of a phase set out from the same sources and are priced together. The chances
-//! of sources are scaled by the best nectar and the greatest violation, as nectar is in Karaboga's own
-//! program, not by their sums: a hundred sources would be chosen nearly alike.
+//! Deviations: the bees of a phase start from the same sources and are evaluated together. The probabilities of
+//! sources are scaled by the best nectar and the greatest violation, as nectar is in Karaboga's own program, not by
+//! their sums, with which a hundred sources would be chosen nearly equally.
 
 use super::{
     Algorithm, Fitness, Objective, Optimizer, Parameter, Random, Settings, Swarm, parameter,
 };
 
-/// The row of the table.
+/// The entry in the table of algorithms.
 pub(super) const ALGORITHM: Algorithm = Algorithm {
     name: "abc",
     title: "Artificial bee colony, over Cartesian waypoints",
@@ -35,7 +34,7 @@ const PARAMETERS: [Parameter; 2] = [
         100.0,
         "failures after which a source is abandoned, as a multiple of sources times dimensions",
     ),
-    // 0 is the colony of 2007; about three numbers of a route of ten waypoints find feasible ones far
+    // 0 gives the colony of 2007; changing about three numbers of a route of ten waypoints finds feasible ones far
     // more often.
     parameter(
         "modification_rate",
@@ -52,9 +51,9 @@ struct Abc {
     limit: f64,
     modification_rate: f64,
     onlookers: usize,
-    /// Failures of each source since it last improved.
+    /// Failures of each source since its last improvement.
     failures: Vec<u32>,
-    /// The source that each candidate was searched from.
+    /// The source of each candidate.
     origins: Vec<usize>,
     candidates: Vec<f64>,
     outcome: Vec<Fitness>,
@@ -82,7 +81,7 @@ impl Abc {
         }
     }
 
-    /// Eq. 2.2: send a bee to every one of `origins`, and keep what is better.
+    /// Eq. 2.2: search around each of `origins`, and keep improvements.
     fn search(&mut self, objective: &mut dyn Objective) {
         let dimension = objective.bounds().dimension();
         self.candidates.resize(self.origins.len() * dimension, 0.0);
@@ -92,7 +91,7 @@ impl Abc {
             let here = self.swarm.position(origin);
             candidate.copy_from_slice(here);
             if self.swarm.len() > 1 {
-                // Any source but its own.
+                // Any source but the own one.
                 let other = self.random.below(self.swarm.len() - 1);
                 let other = self.swarm.position(other + usize::from(other >= origin));
                 let chosen = self.random.below(dimension);
@@ -117,7 +116,7 @@ impl Abc {
         }
     }
 
-    /// Every onlooker goes round the sources until one attracts it.
+    /// Every onlooker visits the sources in turn until one attracts it.
     fn choose(&mut self) {
         let appeal = appeal(self.swarm.fitness());
         self.origins.clear();
@@ -130,7 +129,7 @@ impl Abc {
         }
     }
 
-    /// The source that failed most often, and too often, is left for one drawn anew.
+    /// Replace the source with the most failures, if they exceed the limit, by a new random one.
     fn scout(&mut self, objective: &mut dyn Objective) {
         let (source, failures) = self
             .failures
@@ -150,8 +149,8 @@ impl Abc {
     }
 }
 
-/// The chance that each source attracts an onlooker that looks at it: feasible ones from one half
-/// upwards by their cost, infeasible ones from there downwards by their violation (Karaboga and Akay).
+/// The probability that each source attracts an onlooker that visits it: from one half upwards by cost for feasible
+/// ones, from one half downwards by violation for infeasible ones (Karaboga and Akay).
 fn appeal(sources: &[Fitness]) -> Vec<f64> {
     let nectar = |source: &Fitness| {
         if source.cost >= 0.0 {
@@ -174,7 +173,7 @@ fn appeal(sources: &[Fitness]) -> Vec<f64> {
         } else if most_violation < f64::INFINITY {
             0.5 - 0.45 * source.violation / most_violation
         } else {
-            // The run was stopped within this iteration.
+            // The run was stopped during this iteration.
             0.5
         }
     };
@@ -218,13 +217,13 @@ mod tests {
             "{appeal:?}"
         );
         assert!(appeal[1] > 0.5 && appeal[2] < 0.5 && appeal[3] > 0.0);
-        // A cost below zero is more nectar yet.
+        // A cost below zero means even more nectar.
         assert!(super::appeal(&[fitness(0.0, -5.0), fitness(0.0, 0.0)])[1] < 0.7);
-        // Where nothing could be priced, onlookers still choose.
+        // If nothing could be evaluated, onlookers still choose.
         assert!(super::appeal(&[Fitness::WORST])[0] > 0.0);
     }
 
-    /// A flat floor: nothing improves, so every source is abandoned in its turn, one an iteration.
+    /// A flat objective: nothing improves, so all sources are abandoned in turn, one per iteration.
     #[test]
     fn a_source_that_fails_too_often_is_abandoned() {
         struct Floor(crate::optimizer::Bounds);
@@ -249,7 +248,7 @@ mod tests {
             parameters: vec![1.0, 0.0],
         };
         let mut colony = Abc::start(&settings, &mut floor);
-        // The limit is 4 sources * 3 dimensions; a source fails about twice an iteration.
+        // The limit is 4 sources * 3 dimensions; a source fails about twice per iteration.
         let before: Vec<f64> = colony.swarm.position(0).to_vec();
         for _ in 0..5 {
             colony.iterate(&mut floor, 0.5);

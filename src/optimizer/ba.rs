@@ -1,22 +1,21 @@
-//! BA: the bat algorithm of Yang.
+//! BA: Yang's bat algorithm.
 //!
-//! X.-S. Yang, *A new metaheuristic bat-inspired algorithm*, Nature Inspired Cooperative Strategies for
-//! Optimization (NICSO 2010), Studies in Computational Intelligence 284; equation numbers are of that
-//! paper. Where it leaves a choice, and in its constants, this follows the program that Yang published
-//! later (MATLAB Central, *The standard bat algorithm*): loudness and pulse rate are those of all bats
-//! and change every iteration, a bat walks about the best when it calls, and accepts what is better
-//! than its own place unless it is loud. All bats of an iteration move by the same best position and are
-//! priced together.
+//! X.-S. Yang, *A new metaheuristic bat-inspired algorithm*, Nature Inspired Cooperative Strategies for Optimization
+//! (NICSO 2010), Studies in Computational Intelligence 284; equation numbers refer to that paper. Where it leaves a
+//! choice, and for the constants, this follows Yang's later program (MATLAB Central, *The standard bat algorithm*):
+//! loudness and pulse rate are common to all bats and change every iteration; a bat that calls walks around the best;
+//! a bat accepts an improvement on its own position unless it is loud. All bats of an iteration use the same best
+//! position and are evaluated together.
 //!
-//! Deviations: the velocity attracts, for Eq. 3 as printed flies away from the best unless frequencies are
-//! negative, as they are in the program of 2010; the walk of Eq. 5 is scaled by each range, for metres of
-//! way and metres of height do not share a step.
+//! Deviations: the velocity attracts, because Eq. 3 as printed flies away from the best unless frequencies are
+//! negative, as they are in the program of 2010. The walk of Eq. 5 is scaled by each range, because horizontal and
+//! vertical metres need different steps.
 
 use super::{
     Algorithm, Fitness, Objective, Optimizer, Parameter, Random, Settings, Swarm, parameter,
 };
 
-/// The row of the table.
+/// The entry in the table of algorithms.
 pub(super) const ALGORITHM: Algorithm = Algorithm {
     name: "ba",
     title: "Bat algorithm, over Cartesian waypoints",
@@ -109,7 +108,7 @@ impl Ba {
         }
     }
 
-    /// Eq. 2-5: every bat flies towards the best, or walks about it.
+    /// Eq. 2-5: every bat flies towards the best, or walks around it.
     fn move_bats(&mut self, objective: &dyn Objective) {
         let bounds = objective.bounds();
         let dimension = bounds.dimension();
@@ -136,7 +135,7 @@ impl Ba {
         }
     }
 
-    /// A bat goes where it is better, unless it is loud.
+    /// A bat accepts an improvement, unless it is loud.
     fn accept(&mut self, dimension: usize) {
         for (bat_idx, position) in self.candidates.chunks_exact(dimension).enumerate() {
             let quiet = self.random.unit() >= self.loudness;
@@ -167,7 +166,7 @@ mod tests {
     use super::*;
     use crate::optimizer::tests::Line;
 
-    /// Two bats at 0.5 and at 0.8, the best; frequency 0.5, no walk, and `loudness` throughout.
+    /// Two bats at 0.5 and 0.8, the latter being the best; frequency 0.5, no walk, constant `loudness`.
     fn two_bats(loudness: f64) -> (Line, Ba) {
         let mut line = Line::new();
         let settings = Settings {
@@ -199,7 +198,7 @@ mod tests {
         assert!((bats.velocities[0] - velocity).abs() < 1e-12);
     }
 
-    /// A loud bat flies and stays where it was; the best that it came by is kept all the same.
+    /// A loud bat stays where it was, but the best position that it visited is kept.
     #[test]
     fn a_loud_bat_accepts_nothing() {
         let (mut line, mut bats) = two_bats(1.0);

@@ -1,7 +1,7 @@
-//! Population searches over a box of real numbers. They know an [`Objective`], not an aircraft.
+//! Population-based searches over a box of real numbers. They use an [`Objective`] and know nothing of aircraft.
 //!
-//! Adding an algorithm is one file beside `tms_sba.rs` and one row of [`ALL`]; the planner says by the
-//! algorithm's name what its positions mean.
+//! A new algorithm needs one file beside `tms_sba.rs` and one row in [`ALL`]; the planner chooses the meaning of its
+//! positions by its name.
 
 mod abc;
 mod ba;
@@ -19,23 +19,23 @@ pub use swarm::Swarm;
 
 use std::cmp::Ordering;
 
-/// How good a position is, by Deb's rule: less violation first, then less cost.
+/// Quality of a position by Deb's rule: less violation first, then less cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fitness {
-    /// Total violation of the constraints, 0 when feasible.
+    /// Total constraint violation, 0 when feasible.
     pub violation: f64,
     /// To be minimised.
     pub cost: f64,
 }
 
 impl Fitness {
-    /// Worse than everything.
+    /// Worse than any other.
     pub const WORST: Self = Self {
         violation: f64::INFINITY,
         cost: f64::INFINITY,
     };
 
-    /// The total order of Deb's rule; better is less.
+    /// The total order of Deb's rule; better is `Less`.
     #[must_use]
     pub fn rank(&self, other: &Self) -> Ordering {
         self.violation
@@ -49,14 +49,14 @@ impl Fitness {
         self.rank(other) == Ordering::Less
     }
 
-    /// Whether every constraint is kept.
+    /// Whether all constraints are satisfied.
     #[must_use]
     pub fn is_feasible(&self) -> bool {
         self.violation <= 0.0
     }
 }
 
-/// The box that positions are kept in, one interval a dimension.
+/// The box of allowed positions, one interval per dimension.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bounds {
     /// Least value of each dimension.
@@ -78,48 +78,48 @@ impl Bounds {
         self.upper[dim] - self.lower[dim]
     }
 
-    /// Write a position uniform within the box.
+    /// Write a uniformly random position within the box.
     pub fn draw(&self, random: &mut Random, position: &mut [f64]) {
         for (value, (lower, upper)) in position.iter_mut().zip(self.lower.iter().zip(&self.upper)) {
             *value = random.between(*lower, *upper);
         }
     }
 
-    /// Bring `position` into the box.
+    /// Clamp `position` to the box.
     pub fn clamp(&self, position: &mut [f64]) {
         for (value, (lower, upper)) in position.iter_mut().zip(self.lower.iter().zip(&self.upper)) {
-            // As `f64::clamp`, which first asks whether the bounds are in order: this runs in lanes.
+            // Equal to `f64::clamp` without its check that the bounds are in order, so that it vectorises.
             let raised = if *value < *lower { *lower } else { *value };
             *value = if raised > *upper { *upper } else { raised };
         }
     }
 }
 
-/// What is searched.
+/// The function to minimise.
 pub trait Objective {
-    /// Where positions may lie.
+    /// The box of allowed positions.
     fn bounds(&self) -> &Bounds;
 
-    /// Write a start position, by default uniform within the bounds.
+    /// Write an initial position, by default uniform within the bounds.
     fn draw(&mut self, random: &mut Random, position: &mut [f64]) {
         self.bounds().draw(random, position);
     }
 
-    /// Whether it knows neighbours of a position, see [`Objective::walk`].
+    /// Whether it can generate neighbours of a position; see [`Objective::walk`].
     fn walks(&self) -> bool {
         false
     }
 
-    /// Write a neighbour of `base` into `candidate`; `size`, 0 to 1, tells how far it may be.
+    /// Write a neighbour of `base` into `candidate`; `size`, 0 to 1, limits its distance.
     fn walk(&mut self, _random: &mut Random, base: &[f64], _size: f64, candidate: &mut [f64]) {
         candidate.copy_from_slice(base);
     }
 
-    /// Price `fitness.len()` positions, laid end to end.
+    /// Evaluate `fitness.len()` positions, stored consecutively.
     fn evaluate(&mut self, positions: &[f64], fitness: &mut [Fitness]);
 
-    /// As [`Objective::evaluate`], of positions that matter only where they beat their `rivals`, one
-    /// for each: of one that does not, any fitness that does not beat its rival either may be told.
+    /// As [`Objective::evaluate`], for positions that matter only if they beat their `rivals`, one for each. A
+    /// position that does not beat its rival may get any fitness that does not, either.
     fn evaluate_against(
         &mut self,
         positions: &[f64],
@@ -132,29 +132,29 @@ pub trait Objective {
 
 /// A running search.
 pub trait Optimizer {
-    /// Do one iteration; `progress` is the share of the run that is done, 0 to 1.
+    /// Do one iteration; `progress` is the completed fraction of the run, 0 to 1.
     fn iterate(&mut self, objective: &mut dyn Objective, progress: f64);
 
-    /// The population and the best position so far.
+    /// The population and the best position found so far.
     fn swarm(&self) -> &Swarm;
 }
 
 /// One constant of an algorithm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameter {
-    /// As in `planner.parameters`.
+    /// As used in `planner.parameters`.
     pub name: &'static str,
-    /// Used when the caller sets none.
+    /// Value if the caller sets none.
     pub default: f64,
     /// Smallest value allowed.
     pub min: f64,
     /// Largest value allowed.
     pub max: f64,
-    /// For people.
+    /// Description for the user.
     pub meaning: &'static str,
 }
 
-/// A row of an algorithm's constants.
+/// An entry in a table of constants.
 const fn parameter(
     name: &'static str,
     default: f64,
@@ -174,15 +174,15 @@ const fn parameter(
 /// An algorithm by name.
 #[derive(Debug, Clone, Copy)]
 pub struct Algorithm {
-    /// As in `planner.algorithm`.
+    /// As used in `planner.algorithm`.
     pub name: &'static str,
-    /// For people.
+    /// Display name.
     pub title: &'static str,
-    /// Where it was published.
+    /// Publication.
     pub source: &'static str,
     /// Its constants.
     pub parameters: &'static [Parameter],
-    /// Draw and price the first population.
+    /// Draw and evaluate the initial population.
     pub start: fn(&Settings, &mut dyn Objective) -> Box<dyn Optimizer>,
 }
 
@@ -191,14 +191,14 @@ pub struct Algorithm {
 pub struct Settings {
     /// Number of bats, particles or bees, >= 1.
     pub population: usize,
-    /// Of all its random numbers.
+    /// Seed of all its random numbers.
     pub seed: u64,
     /// Value of each parameter, in the order of the algorithm's table.
     pub parameters: Vec<f64>,
 }
 
 impl Algorithm {
-    /// The values of all parameters, `chosen` where it names one, defaults elsewhere.
+    /// The values of all parameters: those given by `chosen`, otherwise the defaults.
     #[must_use]
     pub fn parameters_with(&self, chosen: impl Fn(&str) -> Option<f64>) -> Vec<f64> {
         self.parameters
@@ -218,7 +218,7 @@ pub const ALL: &[Algorithm] = &[
     abc::ALGORITHM,
 ];
 
-/// The algorithm of that name.
+/// The algorithm with that name.
 #[must_use]
 pub fn by_name(name: &str) -> Option<&'static Algorithm> {
     ALL.iter().find(|algorithm| algorithm.name == name)

@@ -1,21 +1,21 @@
-//! The flight that particle swarms share: velocities, personal bests, one best for all.
+//! The motion shared by the particle swarms: velocities, personal bests, one global best.
 
 use super::{Fitness, Objective, Optimizer, Random, Swarm};
 
-/// How particles fly. A particle swarm is a choice of these.
+/// Constants of the motion; they distinguish the particle swarms.
 #[derive(Debug, Clone)]
 pub(super) struct Flight {
     /// Factor on the velocity.
     pub(super) inertia: f64,
     /// Factor on the inertia after each iteration.
     pub(super) damping: f64,
-    /// Most of the pull towards a particle's own best.
+    /// Greatest factor of the attraction to a particle's own best.
     pub(super) cognitive: f64,
-    /// Most of the pull towards the best of all.
+    /// Greatest factor of the attraction to the global best.
     pub(super) social: f64,
-    /// Greatest velocity in a dimension, as a share of its range.
+    /// Greatest velocity in a dimension, as a fraction of its range.
     pub(super) v_max: f64,
-    /// Factor on the velocity in a dimension whose bound stops the particle, -1 to 0.
+    /// Factor on the velocity in a dimension in which a bound stops the particle, -1 to 0.
     pub(super) rebound: f64,
 }
 
@@ -33,7 +33,7 @@ pub(super) struct Particles {
 }
 
 impl Particles {
-    /// Draw and price the first particles; they start at rest.
+    /// Draw and evaluate the initial particles; they start at rest.
     pub(super) fn start(
         population: usize,
         seed: u64,
@@ -57,7 +57,7 @@ impl Particles {
         }
     }
 
-    /// Every particle flies on, drawn to its own best and to that of all.
+    /// Move every particle, attracted by its own best and the global best.
     fn fly(&mut self, objective: &dyn Objective) {
         let bounds = objective.bounds();
         let dimension = bounds.dimension();
@@ -86,7 +86,7 @@ impl Particles {
         }
     }
 
-    /// Every particle is where it flew; it remembers what was better than all before.
+    /// Update positions, and the personal bests that improved.
     fn settle(&mut self, dimension: usize) {
         for (idx, position) in self.candidates.chunks_exact(dimension).enumerate() {
             let fitness = self.outcome[idx];
@@ -118,8 +118,8 @@ mod tests {
     use super::*;
     use crate::optimizer::tests::Line;
 
-    /// Without pulls, a velocity is kept from iteration to iteration, shrinks by the inertia alone, and
-    /// turns round at a wall.
+    /// Without attraction, a velocity persists between iterations, decreases only by the inertia, and reverses at a
+    /// bound.
     #[test]
     fn a_velocity_is_kept_and_rebounds() {
         let flight = Flight {
@@ -133,7 +133,7 @@ mod tests {
         let mut particles = Particles::start(1, 3, flight, &mut Line::new());
         particles.candidates[0] = 0.95;
         particles.velocities[0] = 1.0;
-        // 0.5 after the inertia, 0.2 at most, and the wall is 0.05 away.
+        // 0.5 after the inertia, limited to 0.2, and the bound is 0.05 away.
         particles.iterate(&mut Line::new(), 0.1);
         assert!((particles.velocities[0] + 0.2).abs() < 1e-12);
         assert!((particles.swarm.position(0)[0] - 1.0).abs() < 1e-12);
@@ -143,7 +143,7 @@ mod tests {
         assert!((particles.swarm.position(0)[0] - 0.95).abs() < 1e-12);
     }
 
-    /// A particle flies on from a worse place, and remembers the better one.
+    /// A particle moves on from a worse position, and remembers the better one.
     #[test]
     fn a_memory_outlives_the_place() {
         let flight = Flight {

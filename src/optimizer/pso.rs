@@ -1,13 +1,13 @@
-//! PSO: the particle swarm of Kennedy and Eberhart with the constriction of Clerc and Kennedy.
+//! PSO: the particle swarm of Kennedy and Eberhart with Clerc and Kennedy's constriction.
 //!
-//! J. Kennedy and R. Eberhart, *Particle swarm optimization*, ICNN 1995; M. Clerc and J. Kennedy, *The
-//! particle swarm: explosion, stability, and convergence in a multidimensional complex space*, IEEE
-//! Transactions on Evolutionary Computation 6(1), 2002. A particle learns from the best of all.
+//! J. Kennedy and R. Eberhart, *Particle swarm optimization*, ICNN 1995; M. Clerc and J. Kennedy, *The particle
+//! swarm: explosion, stability, and convergence in a multidimensional complex space*, IEEE Transactions on
+//! Evolutionary Computation 6(1), 2002. Particles learn from the global best.
 
 use super::particles::{Flight, Particles};
 use super::{Algorithm, Objective, Optimizer, Parameter, Settings, parameter};
 
-/// The row of the table.
+/// The entry in the table of algorithms.
 pub(super) const ALGORITHM: Algorithm = Algorithm {
     name: "pso",
     title: "Particle swarm with constriction, over Cartesian waypoints",
@@ -39,8 +39,8 @@ const PARAMETERS: [Parameter; 4] = [
         4.0,
         "most of the pull phi2 towards the best of all",
     ),
-    // Half the range is the X_max of a box about the origin, which Eberhart and Shi advise beside a
-    // constriction (Comparing inertia weights and constriction factors, CEC 2000).
+    // Half the range is the X_max of a box centred at the origin, recommended by Eberhart and Shi with a constriction
+    // (Comparing inertia weights and constriction factors, CEC 2000).
     parameter(
         "v_max",
         0.5,
@@ -50,8 +50,8 @@ const PARAMETERS: [Parameter; 4] = [
     ),
 ];
 
-/// At a bound a particle turns round at half its velocity, as in M. Clerc, Standard particle swarm
-/// optimisation, 2012; left as it is, it would press on against the bound.
+/// At a bound the velocity reverses and halves, as in M. Clerc, Standard particle swarm optimisation, 2012;
+/// unchanged, it would keep pressing against the bound.
 const REBOUND: f64 = -0.5;
 
 fn start(settings: &Settings, objective: &mut dyn Objective) -> Box<dyn Optimizer> {

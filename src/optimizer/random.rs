@@ -1,7 +1,7 @@
-//! Seeded random numbers, the same on every machine.
+//! Seeded random numbers, identical on every machine.
 //!
-//! xoshiro256++ seeded through `SplitMix64`; floats are made here, by arithmetic that IEEE 754 fixes
-//! to the bit and `libm`'s own functions, so that no platform library has a say.
+//! xoshiro256++ seeded through `SplitMix64`. Floats are computed with arithmetic that IEEE 754 defines exactly and
+//! with `libm`, independent of the platform's libraries.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -31,13 +31,13 @@ impl Random {
         low + (high - low) * self.unit()
     }
 
-    /// Normal with mean 0 and deviation 1 (Box and Muller).
+    /// Normal with mean 0 and standard deviation 1 (Box-Muller).
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * libm::log(1.0 - self.unit())).sqrt();
         radius * libm::cos(std::f64::consts::TAU * self.unit())
     }
 
-    /// Two independent ones, for little more than the price of one.
+    /// Two independent normal numbers, for little more than the cost of one.
     pub fn normals(&mut self) -> [f64; 2] {
         let radius = (-2.0 * libm::log(1.0 - self.unit())).sqrt();
         let (sin, cos) = libm::sincos(std::f64::consts::TAU * self.unit());
@@ -59,7 +59,7 @@ impl Random {
 mod tests {
     use super::*;
 
-    /// These bits may never change: a seed is part of a request.
+    /// These bits must never change: a seed is part of a request.
     #[test]
     fn the_stream_of_a_seed_is_fixed() {
         let mut random = Random::new(7);

@@ -1,26 +1,26 @@
-//! Who is better than whom, kept from one iteration to the next.
+//! The ranking of a swarm, updated between iterations.
 
 use std::cmp::Ordering;
 
 use super::Fitness;
 
-/// The members of a swarm in order, the best first; those that are as good go by their index.
+/// The members of a swarm from best to worst; ties are ordered by index.
 ///
-/// Between two iterations few members change. They are taken out, sorted among themselves and merged
-/// with the others, whose order stands.
+/// Few members change between two iterations. They are removed, sorted among themselves and merged with the others,
+/// whose order is unchanged.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Ranking {
     order: Vec<usize>,
-    /// What the order was made of.
+    /// The fitness that the order is based on.
     fitness: Vec<Fitness>,
     changed: Vec<usize>,
-    /// Of each member, whether it is among them.
+    /// Whether each member is in `changed`.
     is_changed: Vec<bool>,
     merged: Vec<usize>,
 }
 
 impl Ranking {
-    /// The order of members of such `fitness`. It depends on that alone, not on what came before.
+    /// The order of members with this `fitness`. It does not depend on earlier calls.
     pub(super) fn of(&mut self, fitness: &[Fitness]) -> &[usize] {
         let known = self.fitness.len().min(fitness.len());
         self.fitness.truncate(known);
@@ -62,7 +62,7 @@ impl Ranking {
     }
 }
 
-/// To the bit, as the order is one of bits.
+/// Bitwise equality, like the order.
 fn is_same(one: &Fitness, other: &Fitness) -> bool {
     one.violation.to_bits() == other.violation.to_bits()
         && one.cost.to_bits() == other.cost.to_bits()
@@ -74,8 +74,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// However the members changed, and whether they became more or fewer: the order is that of
-        /// a stable sort.
+        /// However members change, and whether there are more or fewer, the order equals that of a stable sort.
         #[test]
         fn the_order_is_that_of_a_sort(
             rounds in prop::collection::vec(

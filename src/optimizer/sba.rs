@@ -1,9 +1,9 @@
-//! SBA: the bats of TMS-SBA without the truncated mean, for telling what that adds.
+//! SBA: TMS-SBA without the truncated mean, to show what that contributes.
 
 use super::tms_sba::{PARAMETERS, TmsSba};
 use super::{Algorithm, Objective, Optimizer, Parameter, Settings, Swarm};
 
-/// The row of the table.
+/// The entry in the table of algorithms.
 pub(super) const ALGORITHM: Algorithm = Algorithm {
     name: "sba",
     title: "Spherical-vector bat algorithm, without the truncated mean",
@@ -12,7 +12,7 @@ pub(super) const ALGORITHM: Algorithm = Algorithm {
     start: |settings, objective| Box::new(Sba(TmsSba::start(&completed(settings), objective))),
 };
 
-/// The constants of the bats, and those that only the truncated mean reads.
+/// The constants of the bats, and those that only the truncated mean uses.
 const SPLIT: (&[Parameter], &[Parameter]) = PARAMETERS.as_slice().split_at(PARAMETERS.len() - 2);
 const SHARED: &[Parameter] = SPLIT.0;
 const UNREAD: &[Parameter] = SPLIT.1;

@@ -1,16 +1,16 @@
-//! SPSO: the particle swarm of Phung and Ha over spherical vectors.
+//! SPSO: Phung and Ha's particle swarm over spherical vectors.
 //!
-//! M. D. Phung and Q. P. Ha, *Safety-enhanced UAV path planning with spherical vector-based particle
-//! swarm optimization*, Applied Soft Computing 107, 2021; constants as in the code they published.
-//! The coding is the objective's affair.
+//! M. D. Phung and Q. P. Ha, *Safety-enhanced UAV path planning with spherical vector-based particle swarm
+//! optimization*, Applied Soft Computing 107, 2021; constants as in their published code. The coding is part of the
+//! objective.
 //!
-//! Deviation: their first population is drawn again and again until one path is free of collisions, since
-//! an infinite cost gives no direction. Here violations are measured, so it is drawn once.
+//! Deviation: they redraw the initial population until one path is free of collisions, because an infinite cost gives
+//! no direction. Here violations are measured, so it is drawn once.
 
 use super::particles::{Flight, Particles};
 use super::{Algorithm, Objective, Optimizer, Parameter, Settings, parameter};
 
-/// The row of the table.
+/// The entry in the table of algorithms.
 pub(super) const ALGORITHM: Algorithm = Algorithm {
     name: "spso",
     title: "Spherical-vector particle swarm",

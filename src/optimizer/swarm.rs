@@ -1,8 +1,8 @@
-//! A population, its fitness, and the best position ever priced.
+//! A population, its fitness, and the best position ever evaluated.
 
 use super::{Fitness, Objective, Random};
 
-/// Positions laid end to end, with their fitness.
+/// Positions, stored consecutively, with their fitness.
 #[derive(Debug, Clone)]
 pub struct Swarm {
     dimension: usize,
@@ -14,7 +14,7 @@ pub struct Swarm {
 }
 
 impl Swarm {
-    /// Draw and price `population` members.
+    /// Draw and evaluate `population` members.
     pub fn draw(population: usize, objective: &mut dyn Objective, random: &mut Random) -> Self {
         let dimension = objective.bounds().dimension();
         let mut positions = vec![0.0; population * dimension];
@@ -48,7 +48,7 @@ impl Swarm {
         self.fitness.is_empty()
     }
 
-    /// Where member `idx` is.
+    /// Position of member `idx`.
     #[must_use]
     pub fn position(&self, idx: usize) -> &[f64] {
         &self.positions[idx * self.dimension..(idx + 1) * self.dimension]
@@ -60,19 +60,19 @@ impl Swarm {
         &self.fitness
     }
 
-    /// The best position priced so far.
+    /// The best position evaluated so far.
     #[must_use]
     pub fn best_position(&self) -> &[f64] {
         &self.best_position
     }
 
-    /// Its fitness.
+    /// Fitness of the best position.
     #[must_use]
     pub fn best_fitness(&self) -> Fitness {
         self.best_fitness
     }
 
-    /// Positions priced so far.
+    /// Number of positions evaluated so far.
     #[must_use]
     pub fn evaluations(&self) -> u64 {
         self.evaluations
@@ -84,7 +84,7 @@ impl Swarm {
         self.fitness[idx] = fitness;
     }
 
-    /// Price `positions`, count them and remember the best.
+    /// Evaluate and count `positions`, and remember the best.
     pub fn price(
         &mut self,
         objective: &mut dyn Objective,
@@ -95,8 +95,8 @@ impl Swarm {
         self.note(positions, fitness);
     }
 
-    /// As [`Swarm::price`], of `positions` that each matter only where it beats the member of the same
-    /// index: the fitness of another is whatever does not beat it either.
+    /// As [`Swarm::price`], for `positions` that each matter only if they beat the member of the same index. The
+    /// fitness of others may be any that does not beat it, either.
     pub fn challenge(
         &mut self,
         objective: &mut dyn Objective,
@@ -117,7 +117,7 @@ impl Swarm {
         }
     }
 
-    /// Indices of all members, the best first.
+    /// Indices of all members, best first.
     #[must_use]
     pub fn ranking(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.len()).collect();

@@ -1,10 +1,10 @@
-//! What every row of the table must do.
+//! Tests that every algorithm in the table must pass.
 
 use super::*;
 
 type Function = fn(&[f64]) -> f64;
 
-/// A standard function, shifted so that its minimum is nowhere special.
+/// A standard test function, shifted so that its minimum is not at the centre.
 struct Standard {
     bounds: Bounds,
     of: Function,
@@ -68,7 +68,7 @@ impl Objective for Line {
     }
 }
 
-/// The position seen from the minimum of the function, which lies off the middle of the box.
+/// The position relative to the function's minimum, which is off the centre of the box.
 fn shifted(position: &[f64]) -> impl Iterator<Item = f64> + '_ {
     let shift = |(dim, x): (usize, &f64)| x - dim as f64 * 0.3;
     position.iter().enumerate().map(shift)
@@ -117,7 +117,7 @@ fn run(algorithm: &Algorithm, objective: &mut Standard, seed: u64, iterations: u
     curve
 }
 
-/// The standard functions over eight dimensions, and how far the box reaches.
+/// The standard functions in eight dimensions, and the extent of the box.
 const FUNCTIONS: [(Function, f64); 4] = [
     (sphere, 10.0),
     (rosenbrock, 10.0),
@@ -125,10 +125,10 @@ const FUNCTIONS: [(Function, f64); 4] = [
     (ackley, 30.0),
 ];
 
-/// What each algorithm reaches on [`FUNCTIONS`], in the middle one of five runs of 30 members and 400
-/// iterations: two to ten times what it does. The best of as many blind draws is about 26, 15 000, 90
-/// and 14; a swarm that drops its velocities ends at 3, 400, 24 and 7, a colony that accepts whatever it finds
-/// no better than blind draws.
+/// Bounds for the median result of five runs of each algorithm on [`FUNCTIONS`], with 30 members and 400 iterations:
+/// two to ten times the actual result. The best of as many random draws is about 26, 15 000, 90 and 14. A swarm that
+/// drops its velocities ends at 3, 400, 24 and 7; a colony that accepts everything it finds is no better than random
+/// draws.
 const REACHED: [(&str, [f64; 4]); 6] = [
     ("tms-sba", [1e-5, 10.0, 6.0, 0.02]),
     ("sba", [5e-5, 10.0, 8.0, 0.04]),
@@ -169,8 +169,8 @@ fn standard_functions_are_solved_as_far_as_stated() {
     }
 }
 
-/// Each iteration prices as many positions as the population has members; a stagnant swarm that is drawn
-/// anew, as many again.
+/// An iteration evaluates as many positions as the population has members, or one more (truncated mean, scout); twice
+/// as many if a stagnant swarm is redrawn.
 #[test]
 fn an_iteration_costs_its_population() {
     for algorithm in ALL {

@@ -1,14 +1,14 @@
 //! TMS-SBA: the bat algorithm with truncated-mean stabilisation, Algorithm 2 of the paper.
 //!
-//! The spherical coding is the objective's affair; here a bat is a point in a box. All bats of an
-//! iteration move by the same best position and are priced together.
+//! The spherical coding is part of the objective; here a bat is a point in a box. All bats of an iteration use the
+//! same best position and are evaluated together.
 
 use super::ranking::Ranking;
 use super::{
     Algorithm, Fitness, Objective, Optimizer, Parameter, Random, Settings, Swarm, parameter,
 };
 
-/// The row of the table.
+/// The entry in the table of algorithms.
 pub(super) const ALGORITHM: Algorithm = Algorithm {
     name: "tms-sba",
     title: "Spherical-vector bat algorithm with truncated-mean stabilisation",
@@ -79,11 +79,11 @@ pub(super) const PARAMETERS: [Parameter; 10] = [
     ),
 ];
 
-/// A worst bat nearer to the truncated mean than this share of the range, in every dimension,
-/// means that the swarm has stagnated; the paper compares floats for equality.
+/// The swarm has stagnated if the worst bat is nearer to the truncated mean than this fraction of the range in every
+/// dimension; the paper compares floats for equality.
 const STAGNATION: f64 = 1e-3;
 
-/// Share of the swarm that a walk may start from, at first.
+/// Initial fraction of the swarm from which a walk may start.
 const ELITE: f64 = 0.2;
 
 #[expect(
@@ -118,7 +118,7 @@ pub(super) struct TmsSba {
 }
 
 impl TmsSba {
-    /// Draw and price the first bats.
+    /// Draw and evaluate the initial bats.
     pub(super) fn start(settings: &Settings, objective: &mut dyn Objective) -> Self {
         let [
             f_min,
@@ -160,7 +160,7 @@ impl TmsSba {
         }
     }
 
-    /// Eq. 10-15: one iteration of the bats, before their stabilisation.
+    /// Eq. 10-15: one iteration of the bats, before stabilisation.
     pub(super) fn fly(&mut self, objective: &mut dyn Objective, progress: f64) {
         self.iteration += 1;
         self.move_bats(objective, progress);
@@ -169,15 +169,15 @@ impl TmsSba {
         self.accept(objective.bounds().dimension());
     }
 
-    /// Eq. 10-13: every bat flies towards the best, or walks about it.
+    /// Eq. 10-13: every bat flies towards the best, or walks around it.
     fn move_bats(&mut self, objective: &mut dyn Objective, progress: f64) {
         let dimension = objective.bounds().dimension();
         let mean_loudness = self.loudness.iter().sum::<f64>() / self.loudness.len() as f64;
-        // The walk shrinks over the run to a thousandth of its first size.
+        // During the run the walk shrinks to a thousandth of its initial size.
         let size = self.walk * libm::pow(1e-3, progress) * mean_loudness;
         let share = self.walk_numbers / dimension as f64;
         let best = self.swarm.best_position();
-        // A walk of the objective's own starts from any of the best few, ever fewer.
+        // The objective's own walk starts from one of the best few bats; their number decreases.
         let elite = if objective.walks() {
             self.ranking.of(self.swarm.fitness())
         } else {
@@ -197,7 +197,7 @@ impl TmsSba {
                 let base = self.swarm.position(elite[self.random.below(n_elite)]);
                 objective.walk(&mut self.random, base, size, candidate);
             } else if walks {
-                // In a few dimensions: a step in all of them at once hardly ever improves.
+                // Change only a few dimensions: a step in all of them at once rarely improves.
                 let chosen = self.random.below(dimension);
                 candidate.copy_from_slice(best);
                 for (dim, value) in candidate.iter_mut().enumerate() {
@@ -215,7 +215,7 @@ impl TmsSba {
         }
     }
 
-    /// Eq. 14-15: a bat that improves goes there, grows quieter and calls more often.
+    /// Eq. 14-15: a bat that improves moves there, becomes quieter and calls more often.
     fn accept(&mut self, dimension: usize) {
         let pulse_rate =
             self.pulse_rate * (1.0 - libm::exp(-self.pulse_growth * self.iteration as f64));
@@ -228,12 +228,12 @@ impl TmsSba {
         }
     }
 
-    /// Eq. 24: the worst bat is replaced by the mean of the middle ones; where they already agree,
-    /// the swarm is drawn anew from a wider range.
+    /// Eq. 24: the worst bat is replaced by the mean of the middle ones; if they already agree, the swarm is redrawn
+    /// from a wider range.
     fn stabilise(&mut self, objective: &mut dyn Objective) {
         let dimension = objective.bounds().dimension();
         let ranking = self.ranking.of(self.swarm.fitness());
-        // As truncation < 1, fewer than half are left out at each end.
+        // As truncation < 1, less than half is removed at each end.
         let left_out = share_of(ranking.len(), self.truncation / 2.0);
         let middle = &ranking[left_out..ranking.len() - left_out];
         let mut mean = vec![0.0; dimension];
@@ -248,8 +248,8 @@ impl TmsSba {
             (self.swarm.position(worst)[dim] - mean[dim]).abs() <= STAGNATION * bounds.range(dim)
         });
         if stagnant {
-            // An objective's own walks lead out of where the swarm has settled, to routes that can be flown; few of
-            // those drawn about the mean could.
+            // The objective's own walks lead out of a stagnated swarm to feasible routes; few routes drawn around the
+            // mean would be feasible.
             if !objective.walks() {
                 self.reinitialise(objective, &mean);
             }

@@ -1,4 +1,4 @@
-//! The frame that a request speaks in, and how its places lie in the local plane that is planned in.
+//! The coordinate frame of a request, and the mapping of its places to the local plane used for planning.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -6,38 +6,36 @@ use std::sync::Arc;
 use crate::geometry::geodesy::{LatLon, LatLonBox, TangentPlane};
 use crate::geometry::{Point2, Point3};
 
-/// What coordinates of the request and of its result mean.
+/// Meaning of the coordinates in a request and its result.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Frame {
     /// Metres of a plane: x east, y north, z up.
     Local,
-    /// Degrees on the WGS 84 ellipsoid and an altitude, planned on a plane that touches the earth.
+    /// Degrees on the WGS 84 ellipsoid and an altitude; planning uses a plane tangent to the earth.
     Wgs84(Arc<Wgs84>),
 }
 
-/// The local plane of a scenario in degrees. Its `x` and `y` are east and north, metres; `z` is the
-/// altitude above the datum, not the plane's own third axis.
+/// The local plane of a scenario in degrees. Its `x` and `y` are east and north, metres; `z` is the altitude above
+/// the datum, not the plane's own third axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wgs84 {
-    /// What altitudes are above.
+    /// The datum of altitudes.
     pub datum: Datum,
-    /// East and north of the middle of `area`.
+    /// Tangent plane at the middle of `area`.
     pub plane: TangentPlane,
-    /// Height of mean sea level (EGM96) above the ellipsoid in the middle of `area`, metres; one
-    /// figure for the whole scenario.
+    /// Height of mean sea level (EGM96) above the ellipsoid at the middle of `area`, metres; one value for the whole
+    /// scenario.
     pub undulation_m: f64,
-    /// What the request asks free waypoints to stay in. `Scenario::area` is the greatest rectangle
-    /// of the plane in it.
+    /// Where the request keeps free waypoints. `Scenario::area` is the largest rectangle of the plane inside it.
     pub area: LatLonBox,
-    /// The degrees that the request gave for places on the plane: computed back, they would come out
-    /// a rounding apart.
+    /// The degrees that the request gave for points on the plane; computed back, they would differ by rounding.
     written: BTreeMap<[u64; 2], LatLon>,
 }
 
-/// Places farther than this from the middle of an area in degrees are not laid onto its plane, metres.
+/// Largest distance of a place from the middle of an area in degrees, metres; the plane is not used beyond.
 pub(super) const MAX_REACH_M: f64 = 500e3;
 
-/// What an altitude is above.
+/// The reference surface of altitudes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Datum {
     /// Mean sea level, by the EGM96 geoid.
@@ -47,7 +45,7 @@ pub enum Datum {
 }
 
 impl Datum {
-    /// As in `altitude_datum`.
+    /// The name used in `altitude_datum`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -60,14 +58,14 @@ impl Datum {
 /// A place and an altitude, in degrees and metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Geodetic {
-    /// The place under it.
+    /// Latitude and longitude.
     pub place: LatLon,
-    /// Above the datum.
+    /// Metres above the datum.
     pub alt: f64,
 }
 
 impl Frame {
-    /// The geodetic half of it, where there is one.
+    /// The geodetic part; `None` for a local frame.
     #[must_use]
     pub fn wgs84(&self) -> Option<&Wgs84> {
         match self {
@@ -94,7 +92,7 @@ impl Wgs84 {
         }
     }
 
-    /// The place that lies at `point` of the plane: as the request wrote it, else to a few nanometres.
+    /// The place at `point` of the plane: as the request wrote it, otherwise accurate to a few nanometres.
     #[must_use]
     pub fn place(&self, point: Point2) -> LatLon {
         let written = self.written.get(&key(point)).copied();
@@ -110,20 +108,20 @@ impl Wgs84 {
         }
     }
 
-    /// Where `geodetic` lies in the plane.
+    /// `geodetic` as a point of the plane.
     #[must_use]
     pub fn local(&self, geodetic: Geodetic) -> Point3 {
         let point = self.plane.local(geodetic.place);
         Point3::new(point.x, point.y, geodetic.alt)
     }
 
-    /// Whether `place` is near enough for a document of this frame to name it.
+    /// Whether `place` is near enough to be used in a document of this frame.
     #[must_use]
     pub fn reaches(&self, place: LatLon) -> bool {
         self.plane.origin().distance_m(place) <= MAX_REACH_M
     }
 
-    /// An altitude of the request as metres above mean sea level.
+    /// Convert an altitude of the request to metres above mean sea level.
     #[must_use]
     pub fn above_sea(&self, alt: f64) -> f64 {
         match self.datum {
@@ -132,7 +130,7 @@ impl Wgs84 {
         }
     }
 
-    /// An altitude of the request as metres above the ellipsoid.
+    /// Convert an altitude of the request to metres above the ellipsoid.
     #[must_use]
     pub fn above_ellipsoid(&self, alt: f64) -> f64 {
         match self.datum {
@@ -142,7 +140,7 @@ impl Wgs84 {
     }
 }
 
-/// To find again what was written for a point.
+/// Key of a point in the map of written places.
 pub(super) fn key(point: Point2) -> [u64; 2] {
     [point.x.to_bits(), point.y.to_bits()]
 }

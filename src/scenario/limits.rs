@@ -1,38 +1,38 @@
-//! What the operator allows, with the defaults that `GET /limits` shows.
+//! The operator's limits, with the defaults that `GET /limits` shows.
 //!
-//! A refusal names the limit by its field here and the value that exceeds it. What a number may be
-//! whoever runs the server (a turn of at most 180 degrees) is not here but in `json`.
+//! A refusal names the limit by its field here and the value that exceeds it. Ranges that do not depend on the
+//! operator (such as a turn of at most 180 degrees) are in `json`.
 
 /// Upper limits on a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Bytes of a request body; checked before the body is read.
+    /// Size of a request body, bytes; checked before the body is read.
     pub body_bytes: usize,
-    /// Threats of a scenario.
+    /// Threats in a scenario.
     pub threats: usize,
     /// Vertices of all polygons together.
     pub polygon_vertices: usize,
     /// Nodes of a terrain grid, or of a dataset under an area.
     pub terrain_nodes: usize,
-    /// Bytes of an uploaded dataset; checked as it comes.
+    /// Size of an uploaded dataset, bytes; checked while it is received.
     pub terrain_bytes: u64,
     /// Peaks of an analytic terrain.
     pub peaks: usize,
     /// Free waypoints, N.
     pub waypoints: usize,
-    /// Bats.
+    /// Population: number of bats.
     pub population: usize,
     /// Iterations.
     pub iterations: usize,
-    /// population * iterations * waypoints; bounds the time that one plan can take.
+    /// population * iterations * waypoints; bounds the time of one plan.
     pub work: u64,
-    /// Samples of the delivered path: a document is refused when the straight way from start to
-    /// target already makes more at its `smoothing.spacing`.
+    /// Samples of the delivered path: a document is refused if the straight line from start to target already exceeds
+    /// this at its `smoothing.spacing`.
     pub path_samples: usize,
 }
 
 impl Limits {
-    /// For a document that was accepted before: what is allowed now does not take that back.
+    /// For a document that was accepted before: present limits do not invalidate it.
     pub const NONE: Self = Self {
         body_bytes: usize::MAX,
         threats: usize::MAX,

@@ -1,7 +1,7 @@
-//! What a caller asks for: a [`Scenario`] that has been checked once and cannot be wrong afterwards.
+//! A planning request: a [`Scenario`], which is validated once and always valid afterwards.
 //!
-//! [`json`] reads the wire document and reports every fault at once; [`limits`] holds what the
-//! operator allows. Deliberately absent: HTTP, defaults that depend on a clock or a machine.
+//! [`json`] reads the wire document and reports all faults at once; [`limits`] holds the operator's limits.
+//! Deliberately absent: HTTP, and defaults that depend on a clock or a machine.
 
 pub mod frame;
 pub mod json;
@@ -14,19 +14,19 @@ use crate::terrain::Terrain;
 use crate::threat::Threat;
 pub use frame::Frame;
 
-/// A planning request, validated: every field is finite and within its range, the start and the
-/// target are clear of threats, above ground and inside the area.
+/// A validated planning request: every field is finite and within its range; the start and the target are outside all
+/// threats, on or above ground and inside the area.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
-    /// The caller's own name for it.
+    /// The caller's name for it.
     pub name: Option<String>,
-    /// What the coordinates of the request mean; all below are in the local plane.
+    /// Meaning of the coordinates in the request; all coordinates below are in the local plane.
     pub frame: Frame,
-    /// Where the route begins; `z` is the height in the frame, not above ground.
+    /// Start of the route; `z` is the height in the frame, not above ground.
     pub start: Point3,
-    /// Where the route ends.
+    /// End of the route.
     pub target: Point3,
-    /// Free waypoints stay inside.
+    /// Bounds of the free waypoints.
     pub area: Rect,
     /// In the order of the request.
     pub threats: Vec<Threat>,
@@ -34,7 +34,7 @@ pub struct Scenario {
     pub terrain: Terrain,
     /// Allowed heights above ground, Eq. 6.
     pub altitude: AltitudeBand,
-    /// What the aircraft can do.
+    /// The aircraft's capabilities.
     pub vehicle: Vehicle,
     /// Weights of Eq. 1.
     pub weights: Weights,
@@ -60,39 +60,39 @@ pub struct Vehicle {
     pub max_climb_deg: f64,
     /// Shortest leg, metres (3-D).
     pub min_leg: f64,
-    /// Metres a second.
+    /// Metres per second.
     pub cruise_speed: f64,
-    /// Fuel used in a kilometre; 1000 makes a metre cost 1, Eq. 2.
+    /// Fuel used per kilometre; with 1000 a metre costs 1, Eq. 2.
     pub fuel_per_km: f64,
 }
 
 /// Weights of the three cost terms, Eq. 1; each >= 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weights {
-    /// Of the fuel, F1.
+    /// Of the fuel cost, F1.
     pub fuel: f64,
-    /// Of the exposure to threats, F2.
+    /// Of the threat exposure, F2.
     pub threat: f64,
-    /// Of the distance from the middle of the band, F3.
+    /// Of the distance from the middle of the altitude band, F3.
     pub altitude: f64,
 }
 
 /// How to search for the route.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannerSettings {
-    /// A name out of the table of algorithms.
+    /// A name from the table of algorithms.
     pub algorithm: String,
     /// Free waypoints, N.
     pub waypoints: usize,
-    /// Bats.
+    /// Number of bats.
     pub population: usize,
     /// Iterations after the first evaluation.
     pub iterations: usize,
-    /// Below 2^53, so that every JSON reader keeps it.
+    /// Below 2^53, which every JSON parser represents exactly.
     pub seed: u64,
-    /// A cap on the run, milliseconds; without it the result depends on the request alone.
+    /// Time limit of the run, milliseconds; without it the result depends on the request alone.
     pub time_limit_ms: Option<u64>,
-    /// Where the first bats come from.
+    /// How the initial population is generated.
     pub seeding: Seeding,
     /// Whether the best route is polished at the end.
     pub polish: bool,
@@ -100,26 +100,25 @@ pub struct PlannerSettings {
     pub warm_start: Option<WarmStart>,
     /// How the route is smoothed, Eq. 26-27.
     pub smoothing: Smoothing,
-    /// How the threat integral of Eq. 4 is taken.
+    /// How the threat integral of Eq. 4 is evaluated.
     pub quadrature: Quadrature,
-    /// The search ends once its cost is proven to be no farther above the optimum than this share
-    /// of it; 0 lets it go on.
+    /// The search ends once its cost is proven to exceed the optimum by at most this fraction of it; 0 disables this.
     pub gap: f64,
-    /// Threads that may price routes; the result does not depend on it.
+    /// Threads that may evaluate routes; the result does not depend on it.
     pub threads: usize,
-    /// The algorithm's own constants that the caller set, by name.
+    /// Constants of the algorithm set by the caller, by name.
     pub parameters: BTreeMap<String, f64>,
 }
 
 impl PlannerSettings {
-    /// population * iterations * waypoints, as [`limits::Limits::work`] bounds it.
+    /// population * iterations * waypoints, limited by [`limits::Limits::work`].
     #[must_use]
     pub fn work(&self) -> u64 {
         work([self.population, self.iterations, self.waypoints])
     }
 }
 
-/// The product of what makes a search long.
+/// The product of the factors that make a search long.
 fn work(factors: [usize; 3]) -> u64 {
     let grow = |work: u64, factor: usize| work.saturating_mul(factor as u64);
     factors.into_iter().fold(1, grow)
@@ -127,7 +126,7 @@ fn work(factors: [usize; 3]) -> u64 {
 
 #[cfg(test)]
 impl PlannerSettings {
-    /// The algorithm alone, as in the paper, at its least size.
+    /// The algorithm as in the paper, without additions, at its smallest size.
     pub(crate) fn plain() -> Self {
         Self {
             algorithm: "tms-sba".to_owned(),
@@ -151,10 +150,10 @@ impl PlannerSettings {
     }
 }
 
-/// Where the first bats come from.
+/// How the initial population is generated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seeding {
-    /// Routes along the common tangents of the threats, the best few ways round them.
+    /// Routes along common tangents of the threats: the best few ways around them.
     Tangent,
     /// Uniformly within the bounds of the coding, as in the paper.
     Random,
@@ -163,10 +162,9 @@ pub enum Seeding {
 /// A known route to start from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum WarmStart {
-    /// That of a stored plan. Who keeps the plans puts its waypoints here instead before anything
-    /// is planned.
+    /// The route of a stored plan. The plan store replaces this by its waypoints before planning.
     Plan(String),
-    /// In order; start and target may be among them.
+    /// In order, with or without start and target.
     Waypoints(Vec<Point3>),
 }
 
@@ -179,11 +177,11 @@ pub struct Smoothing {
     pub spacing: f64,
 }
 
-/// How the threat integral of Eq. 4 is taken.
+/// How the threat integral of Eq. 4 is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quadrature {
     /// Exactly, along the whole leg.
     Integral,
-    /// By five samples a leg, as printed; kept to reproduce the paper's tables.
+    /// By five samples per leg, as printed; kept to reproduce the paper's tables.
     Paper,
 }

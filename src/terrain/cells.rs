@@ -1,7 +1,7 @@
-//! The ground between nodes: one bilinear patch a cell, crossed cell by cell.
+//! The ground between nodes: one bilinear patch per cell. A leg is followed cell by cell.
 //!
-//! Places are in columns and rows from the first node. Along a straight way the ground of one cell is a
-//! quadratic, so that least and greatest height above it are exact.
+//! Positions are in columns and rows from the first node. Along a straight line the ground within one cell is
+//! quadratic, so the least and greatest heights above it are exact.
 
 use super::HeightRange;
 use crate::geometry::Quadratic;
@@ -31,7 +31,7 @@ struct Patch {
 }
 
 impl<Z: Copy + Into<f64>> Cells<'_, Z> {
-    /// Of the ground at a place; beyond an edge, that of the edge.
+    /// Elevation of the ground at `place`; beyond an edge, the elevation at the edge.
     pub(super) fn elevation(&self, place: [f64; 2]) -> f64 {
         let [x, y] = self.nearest(place);
         let patch = self.patch(x, y);
@@ -39,15 +39,15 @@ impl<Z: Copy + Into<f64>> Cells<'_, Z> {
         patch.z00 + x * patch.zx + y * (patch.zy + x * patch.zxy)
     }
 
-    /// Least and greatest height above ground on the straight way `from` .. `to`, which must not cross
-    /// an edge of the lattice: what lies beyond is taken to its nearest place.
+    /// Least and greatest height above ground on the straight line `from` .. `to`, which must not cross an edge of
+    /// the lattice: positions outside are moved to the nearest position on it.
     pub(super) fn height_range(&self, from: Place, to: Place) -> HeightRange {
         let ends = [from, to].map(|place| self.nearest([place[0], place[1]]));
         let mut column = Walk::new(ends[0][0], ends[1][0], self.columns);
         let mut row = Walk::new(ends[0][1], ends[1][1], self.rows);
         let mut range = HeightRange::EMPTY;
         let mut u = 0.0;
-        // u runs from 0 to 1 over the way; each cell ends at the next line in either direction.
+        // `u` runs from 0 to 1 along the line; each cell ends at the next grid line in either direction.
         loop {
             let next = column.leave.min(row.leave).min(1.0);
             if next > u || (next >= 1.0 && range == HeightRange::EMPTY) {
@@ -68,7 +68,7 @@ impl<Z: Copy + Into<f64>> Cells<'_, Z> {
         }
     }
 
-    /// The place on the lattice nearest to a place.
+    /// The position on the lattice nearest to the given one.
     fn nearest(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let onto = |value: f64, nodes: usize| value.clamp(0.0, (nodes - 1) as f64);
         [onto(x, self.columns), onto(y, self.rows)]
@@ -107,26 +107,26 @@ impl<Z: Copy + Into<f64>> Cells<'_, Z> {
     }
 }
 
-/// The `t` at which `a + (b - a) t` is `value`; infinite when nowhere.
+/// The `t` at which `a + (b - a) t` equals `value`; infinite if there is none.
 pub(super) fn share_of_way(a: f64, b: f64, value: f64) -> f64 {
     let t = (value - a) / (b - a);
     if t.is_nan() { f64::INFINITY } else { t }
 }
 
-/// The columns, or the rows, that a way from `a` to `b` crosses.
+/// Steps through the columns, or the rows, that a line from `a` to `b` crosses.
 pub(super) struct Walk {
-    /// The one where it is.
+    /// The current cell.
     pub(super) cell: usize,
-    /// The share of the way at which it leaves this for the next; infinite when never.
+    /// The fraction of the line at which it leaves this cell for the next; infinite if it never does.
     pub(super) leave: f64,
     a: f64,
-    /// 1 over the way.
+    /// `1 / (b - a)`.
     inverse: f64,
     last: usize,
 }
 
 impl Walk {
-    /// Over so many nodes, both ends among them.
+    /// `nodes` counts both ends.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -136,7 +136,7 @@ impl Walk {
     pub(super) fn new(a: f64, b: f64, nodes: usize) -> Self {
         let last = nodes - 2;
         let cell = (a as usize).min(last);
-        // On a line, a way down begins in the cell before it.
+        // On a grid line, a decreasing walk starts in the cell before it.
         let before = b < a && cell > 0 && a <= cell as f64;
         let mut walk = Self {
             cell: if before { cell - 1 } else { cell },
@@ -149,7 +149,7 @@ impl Walk {
         walk
     }
 
-    /// Into the next.
+    /// Move to the next cell.
     #[inline]
     pub(super) fn step(&mut self) {
         if self.inverse > 0.0 {
@@ -160,7 +160,7 @@ impl Walk {
         self.look();
     }
 
-    /// Where the cell ends; the first and the last have no end.
+    /// Find where the line leaves the cell; it never leaves the outermost one.
     #[inline]
     fn look(&mut self) {
         let line = if self.inverse > 0.0 {
@@ -178,7 +178,7 @@ impl Walk {
 }
 
 impl Patch {
-    /// Height above this patch's ground on the way between `ends`, which are at the heights `z0` and `z1`.
+    /// Height above this patch's ground on the line between `ends`, whose altitudes are `z0` and `z1`.
     fn height_below(&self, [[x0, y0], [x1, y1]]: [[f64; 2]; 2], [z0, z1]: [f64; 2]) -> Quadratic {
         let (x, y) = (x0 - self.column, y0 - self.row);
         let (dx, dy) = (x1 - x0, y1 - y0);

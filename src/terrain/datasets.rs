@@ -1,56 +1,56 @@
-//! Where a scenario finds the datasets that it names. Deliberately absent: files; who keeps them
-//! implements [`Datasets`].
+//! Where a scenario finds the datasets that it names. Deliberately contains no files: whoever stores them implements
+//! [`Datasets`].
 
 use std::fmt;
 
 use super::dem::{self, DemError};
 
-/// Names of datasets have at most so many characters.
+/// Longest name of a dataset, characters.
 const MAX_DATASET_NAME: usize = 64;
 
-/// Datasets by name, and by what they hold.
+/// Datasets by name and by content.
 pub trait Datasets: fmt::Debug + Send + Sync {
-    /// The dataset called `name`. With `sha256`, the one with that sum, whatever the name stands for
-    /// by now: what was accepted is planned over the same ground.
+    /// The dataset called `name`. With `sha256`, the one with that checksum even if the name now refers to another:
+    /// an accepted job is planned over the ground it was accepted with.
     ///
     /// # Errors
-    /// Why there is none.
+    /// Why it was not found.
     fn find(&self, name: &str, sha256: Option<&str>) -> Result<Found, DatasetError>;
 }
 
 /// A dataset that was found.
 #[derive(Debug, Clone)]
 pub struct Found {
-    /// Stands for its content and all that was declared of it: 64 hexadecimal digits in lower case.
+    /// Checksum of its content and of everything declared about it: 64 lower-case hexadecimal digits.
     pub sha256: String,
-    /// To read it.
+    /// A reader for it.
     pub dataset: dem::Dataset,
 }
 
-/// Why a dataset is not found.
+/// Why a dataset was not found.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// No dataset is called so.
+    /// No dataset has this name.
     #[error("no dataset has this name")]
     Unknown {
-        /// What there is, in order.
+        /// The names that exist, in order.
         names: Vec<String>,
     },
-    /// The name stands for another content by now, and the one that was asked for is no longer kept.
+    /// The name now refers to other content, and the requested content is no longer kept.
     #[error("this content is no longer kept; the name now stands for {sha256}")]
     Replaced {
-        /// That of the present content.
+        /// Checksum of the present content.
         sha256: String,
     },
-    /// It is there and cannot be used.
+    /// It exists but cannot be used.
     #[error("it cannot be read: {0}")]
     Unreadable(#[from] DemError),
-    /// Whether it is there cannot be told.
+    /// Whether it exists cannot be determined.
     #[error("the datasets cannot be reached: {0}")]
     Unavailable(String),
 }
 
-/// None at all.
+/// An empty collection.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NoDatasets;
 
@@ -60,7 +60,7 @@ impl Datasets for NoDatasets {
     }
 }
 
-/// Whether a dataset may be called so: lower-case letters, digits, and after the first of them `-` and `_`.
+/// Whether a dataset may have this name: lower-case letters, digits, and after the first character `-` and `_`.
 #[must_use]
 pub fn is_dataset_name(name: &str) -> bool {
     let plain = |c: u8| c.is_ascii_lowercase() || c.is_ascii_digit();

@@ -1,6 +1,6 @@
 //! Elevations at the nodes of a grid, bilinear between them.
 //!
-//! A leg's least and greatest height above it is exact.
+//! The least and greatest heights of a leg above it are exact.
 
 use super::HeightRange;
 use super::cells::{Cells, share_of_way};
@@ -46,7 +46,7 @@ impl Grid {
         if inside(x0, y0) && inside(x1, y1) {
             return self.height_range_straight(leg, (t0, t1));
         }
-        // Beyond an edge its elevation goes on, so that the way over the ground bends there.
+        // Beyond an edge the elevation at the edge applies, so the ground track bends there.
         let mut bends = [
             share_of_way(x0, x1, 0.0),
             share_of_way(x0, x1, columns),
@@ -66,7 +66,7 @@ impl Grid {
         range
     }
 
-    /// As [`Grid::height_range`], of a part that crosses no edge of the grid.
+    /// As [`Grid::height_range`], for a part that crosses no edge of the grid.
     fn height_range_straight(&self, leg: &Segment, (t0, t1): (f64, f64)) -> HeightRange {
         let place = |t: f64| {
             let point = leg.at(t);
@@ -138,7 +138,7 @@ mod tests {
     proptest! {
         #[test]
         fn the_range_holds_every_sample_and_is_reached(
-            // The grid reaches from (-10, 5) to (50, 45).
+            // The grid covers (-10, 5) to (50, 45).
             x0 in -25.0..65.0f64, y0 in -10.0..60.0f64, x1 in -25.0..65.0f64, y1 in -10.0..60.0f64,
             z0 in 0.0..40.0f64, z1 in 0.0..40.0f64, t0 in 0.0..0.5f64, t1 in 0.5..1.0f64,
         ) {

@@ -1,6 +1,6 @@
-//! The ground: its elevation anywhere, and the least and greatest height of a leg above it.
+//! The ground: its elevation at any point, and the least and greatest height of a leg above it.
 //!
-//! Adding a kind is one file beside `flat.rs` and one variant of [`Terrain`].
+//! To add a kind, add one file beside `flat.rs` and one variant of [`Terrain`].
 
 mod cells;
 mod datasets;
@@ -29,7 +29,7 @@ pub enum Terrain {
     Peaks(Peaks),
     /// Elevations at the nodes of a grid, bilinear between.
     Grid(Grid),
-    /// Elevations out of a file.
+    /// Elevations from a file.
     Dem(Arc<Dem>),
 }
 
@@ -43,13 +43,13 @@ pub struct HeightRange {
 }
 
 impl HeightRange {
-    /// Of nothing: every range that is joined to it replaces it.
+    /// The empty range: joining it with another gives the other.
     pub const EMPTY: Self = Self {
         min: f64::INFINITY,
         max: f64::NEG_INFINITY,
     };
 
-    /// Of one height alone.
+    /// The range of a single height.
     #[must_use]
     pub fn of(height: f64) -> Self {
         Self {
@@ -58,7 +58,7 @@ impl HeightRange {
         }
     }
 
-    /// The range of both.
+    /// The smallest range that contains both.
     #[must_use]
     pub fn join(self, other: Self) -> Self {
         Self {
@@ -69,14 +69,14 @@ impl HeightRange {
 }
 
 impl Terrain {
-    /// Whether the ground is level everywhere, so that heights above it need no measuring.
+    /// Whether the ground is level everywhere, so that heights above it need no search.
     #[must_use]
     pub fn is_flat(&self) -> bool {
         matches!(self, Self::Flat(_))
     }
 
-    /// Elevation of the ground at `point`, metres in the frame. Beyond the edge of a grid or a file, that of the
-    /// edge; no waypoint may lie there.
+    /// Elevation of the ground at `point`, metres in the frame. Beyond the edge of a grid or a file, the elevation at
+    /// the edge; no waypoint may lie there.
     #[must_use]
     pub fn elevation(&self, point: Point2) -> f64 {
         match self {
@@ -87,8 +87,8 @@ impl Terrain {
         }
     }
 
-    /// Least and greatest height above ground over the part `window` of `leg`: exact on flat
-    /// ground and grids, to a nanometre over peaks, to half a millimetre over files.
+    /// Least and greatest height above ground over the part `window` of `leg`: exact on flat ground and grids, to a
+    /// nanometre over peaks, to half a millimetre over files.
     #[must_use]
     pub fn height_range(&self, leg: &Segment, window: (f64, f64)) -> HeightRange {
         match self {
@@ -99,9 +99,9 @@ impl Terrain {
         }
     }
 
-    /// How far the part `window` of `leg` dips below `floor` and rises above `ceiling` (heights
-    /// above ground), metres, each >= 0. The same as by [`Terrain::height_range`], but cheap where
-    /// the leg keeps well within them.
+    /// How far the part `window` of `leg` dips below `floor` and rises above `ceiling` (heights above ground),
+    /// metres, each >= 0. Gives the same result as [`Terrain::height_range`], but is cheap where the leg keeps well
+    /// within them.
     #[must_use]
     pub fn excess(
         &self,
@@ -122,7 +122,7 @@ impl Terrain {
         ((floor - range.min).max(0.0), (range.max - ceiling).max(0.0))
     }
 
-    /// Where the ground is known; `None` is everywhere.
+    /// Where the ground is known; `None` means everywhere.
     #[must_use]
     pub fn extent(&self) -> Option<Rect> {
         match self {
@@ -132,11 +132,11 @@ impl Terrain {
         }
     }
 
-    /// How exactly heights above this ground are known, metres: what a constraint may be missed by.
+    /// Accuracy of heights above this ground, metres: the tolerance for constraints on them.
     #[must_use]
     pub fn tolerance(&self) -> f64 {
         match self {
-            // Of a file: a quarter of it for chords, the rest for what maps cells onto the plane.
+            // For a file, a quarter of it is for chords, the rest for the mapping between cells and plane.
             Self::Peaks(_) | Self::Dem(_) => 1e-3,
             Self::Flat(_) | Self::Grid(_) => 0.0,
         }

@@ -1,7 +1,7 @@
 //! Analytic mountains.
 //!
-//! Along a leg each peak is a Gaussian of the way flown. Bounds of its second derivative tell which
-//! parts of a leg may be its lowest or highest; they are halved until they bend one way only, and there
+//! Along a leg each peak is a Gaussian of the distance flown. Bounds of the second derivative show which parts of a
+//! leg may contain its lowest or highest point. Those parts are halved until their curvature has one sign; there
 //! Newton's method finds the extreme, to a nanometre.
 
 use super::HeightRange;
@@ -19,25 +19,24 @@ pub struct Peaks {
 /// One mountain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
-    /// Of the summit.
+    /// Position of the summit.
     pub center: Point2,
-    /// Above the base, metres.
+    /// Height above the base, metres.
     pub height: f64,
     /// `(sx, sy)`, metres, each > 0.
     pub spread: Point2,
 }
 
-/// Extremes are found to this many metres.
+/// Accuracy of extremes, metres.
 const ACCURACY: f64 = 1e-9;
 
-/// Beyond this exponent a peak no longer lifts the ground: e^-36 of it is lost in the rounding of its
-/// height.
+/// Beyond this exponent a peak no longer raises the ground: e^-36 of its height is below rounding.
 pub(crate) const NEGLIGIBLE: f64 = 36.0;
 
-/// The slope of `exp(-x^2)` where it is steepest, sqrt(2 / e), rounded up.
+/// Steepest slope of `exp(-x^2)`, sqrt(2 / e), rounded up.
 const STEEPEST: f64 = 0.857_763_885;
 
-/// Newton's steps after which an extreme is taken as it is; six do nearly always.
+/// Most Newton steps for an extreme; six nearly always suffice.
 const MOST_STEPS: usize = 60;
 
 /// One peak along a leg: `height * exp(-sharpness * (t - summit)^2)`.
@@ -63,8 +62,8 @@ impl Peaks {
         self.height_range_beyond(leg, window, HeightRange::EMPTY)
     }
 
-    /// As `height_range`, but only where it reaches beyond `band`: branch and bound until a part
-    /// bends one way only, then Newton's method.
+    /// As `height_range`, but exact only where it exceeds `band`: branch and bound until the curvature of a part has
+    /// one sign, then Newton's method.
     pub(super) fn height_range_beyond(
         &self,
         leg: &Segment,
@@ -103,13 +102,13 @@ impl Peaks {
         range
     }
 
-    /// Above ground at `t` of `leg`.
+    /// Height above ground at `t` of `leg`.
     fn height(&self, leg: &Segment, t: f64) -> f64 {
         let point = leg.a + (leg.b - leg.a) * t;
         point.z - self.elevation(point.xy())
     }
 
-    /// By how much the height above ground can change along `leg`, metres.
+    /// Bound on the change of the height above ground along `leg`, metres.
     fn most_change(&self, leg: &Segment) -> f64 {
         let slopes = self.peaks.iter().map(|peak| {
             let narrow = peak.spread.x.min(peak.spread.y);
@@ -190,8 +189,8 @@ impl Profile {
         sum
     }
 
-    /// The height where the profile is level within `[t0, t1]`, over which its second derivative
-    /// does not change its sign; that of an end where it is not.
+    /// The height of the extreme within `[t0, t1]`, over which the second derivative keeps its sign; without an
+    /// extreme inside, the height at the flatter end.
     fn extreme(&self, mut t0: f64, mut t1: f64) -> f64 {
         let (slope0, slope1) = (self.slope(t0).0, self.slope(t1).0);
         if slope0 * slope1 >= 0.0 {
@@ -219,8 +218,8 @@ impl Profile {
     }
 }
 
-/// How far a curve may lie below the lower of its ends, of which one is `way` above the other, when
-/// its second derivative times half the square of its width is at most `bend`.
+/// How far a curve may dip below the lower of its ends, whose heights differ by `way`, when its second derivative
+/// times half the square of its width is at most `bend`.
 fn sag(way: f64, bend: f64) -> f64 {
     let spare = bend - way.abs();
     if spare > 0.0 {
@@ -241,8 +240,8 @@ impl Bump {
         }
     }
 
-    /// Bounds of the second derivative of the height above it. With x = sharpness * away^2 that is
-    /// 2 sharpness height (1 - 2x) e^-x, which falls from x = 0 to x = 3/2 and rises to 0 beyond.
+    /// Bounds of the second derivative of the height above it. With x = sharpness * away^2 that is 2 sharpness height
+    /// (1 - 2x) e^-x, which falls from x = 0 to x = 3/2 and rises to 0 beyond.
     fn bend(&self, t0: f64, t1: f64) -> HeightRange {
         let exponent = |t: f64| self.sharpness * (t - self.summit) * (t - self.summit);
         let nearest = exponent(self.summit.clamp(t0, t1));
@@ -292,7 +291,7 @@ mod tests {
         assert!((one_spread - (10.0 + 220.0 / std::f64::consts::E)).abs() < 1e-9);
     }
 
-    /// Needles, table mountains and pits; legs that stand still, only climb, or cross a summit.
+    /// Needles, mesas and pits; legs of zero length, vertical legs, and legs across a summit.
     #[test]
     fn extremes_are_found_over_peaks_of_every_size() {
         let check = |spread: f64, height: f64, a: [f64; 3], b: [f64; 3]| {

@@ -3,10 +3,10 @@
 use super::{hover_exposure, intensity};
 use crate::geometry::{LEVEL, Point2, Rect, Segment};
 
-/// Where a leg keeps beyond this share of the influence, its exposure is summed up.
+/// Where a leg stays beyond this fraction of the influence, its exposure is integrated numerically.
 const NEAR_EDGE: f64 = 0.99;
 
-/// Gauss and Legendre's five places in -1..1 and their weights: Abramowitz and Stegun, table 25.4.
+/// The five Gauss-Legendre nodes in -1..1 and their weights: Abramowitz and Stegun, table 25.4.
 const GAUSS: [(f64, f64); 5] = [
     (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
     (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
@@ -15,12 +15,12 @@ const GAUSS: [(f64, f64); 5] = [
     (0.906_179_845_938_664, 0.236_926_885_056_189_1),
 ];
 
-/// A disc that is never entered, and a soft zone that costs, Eq. 5.
+/// A disc that must not be entered, and a soft zone that costs, Eq. 5.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cylinder {
-    /// Of the axis.
+    /// Position of the axis.
     pub center: Point2,
-    /// Never entered, metres; `d_min` of the paper.
+    /// Radius of the disc, metres; `d_min` of the paper.
     pub radius: f64,
     /// End of the soft zone, metres from the axis, >= `radius`; `d_max` of the paper.
     pub influence: f64,
@@ -43,7 +43,7 @@ impl Cylinder {
         .grown(self.influence)
     }
 
-    /// Whether any point of `leg`, whatever its height, lies within the soft zone.
+    /// Whether any point of `leg`, at any height, lies within the soft zone.
     pub(super) fn may_reach(&self, leg: &Segment) -> bool {
         let distance = leg.squared_distance_to(self.center);
         let nearest = (-0.5 * distance.b / distance.a).clamp(0.0, 1.0);
@@ -51,7 +51,7 @@ impl Cylinder {
         distance.at(nearest) <= self.influence * self.influence
     }
 
-    /// Least distance of the part `window` of `leg` to the circle, metres, negative inside.
+    /// Least distance of the part `window` of `leg` from the circle, metres, negative inside.
     pub(super) fn clearance(&self, leg: &Segment, window: (f64, f64)) -> f64 {
         let direction = leg.b.xy() - leg.a.xy();
         let squared = direction.norm_squared();
@@ -65,10 +65,10 @@ impl Cylinder {
 
     /// Integral of `T` over the part `window` of `leg`, Eq. 4-5, in closed form.
     ///
-    /// With `p` the distance of the axis from the leg's line and `s` the way from the foot of the
-    /// perpendicular, `T = influence - sqrt(p^2 + s^2)` over the chord inside the disc, so that an
-    /// antiderivative is `influence s - (s d + p^2 asinh(s / p)) / 2`, `d = sqrt(p^2 + s^2)`. Near the
-    /// edge of the soft zone that is a small difference of large numbers, but `T` is smooth.
+    /// With `p` the distance of the axis from the leg's line and `s` the distance from the foot of the perpendicular,
+    /// `T = influence - sqrt(p^2 + s^2)` over the chord inside the disc, so an antiderivative is `influence s - (s d
+    /// + p^2 asinh(s / p)) / 2` with `d = sqrt(p^2 + s^2)`. Near the edge of the soft zone this is a small difference
+    /// of large numbers, but there `T` is smooth and is integrated numerically.
     pub(super) fn exposure(&self, leg: &Segment, window: (f64, f64)) -> f64 {
         let length = leg.horizontal_length();
         if length < LEVEL {
@@ -93,14 +93,14 @@ impl Cylinder {
             let (middle, half) = (0.5 * (s0 + s1), 0.5 * (s1 - s0));
             let sum = GAUSS.iter().map(|(at, weight)| {
                 let s = middle + half * at;
-                // influence - d, without the loss of digits.
+                // influence - d, without cancellation.
                 weight * (half_chord - s) * (half_chord + s) / (self.influence + distance(s))
             });
             return half * sum.sum::<f64>() * slope;
         }
         let primitive = |s: f64| {
             let d = distance(s);
-            // p^2 asinh(s / p) vanishes with p.
+            // p^2 asinh(s / p) goes to 0 with p.
             let logarithm = if p < LEVEL {
                 0.0
             } else {
@@ -142,7 +142,7 @@ mod tests {
         assert!((exposure - 100.0).abs() < 1e-9, "{exposure}");
     }
 
-    /// Beside a disc of 100 km, where the closed form would lose all digits.
+    /// At the edge of a disc of 100 km, where the closed form would lose all digits.
     #[test]
     fn a_leg_that_grazes_the_soft_zone() {
         let check = |depth: f64, t0: f64| {

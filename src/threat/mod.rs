@@ -1,7 +1,7 @@
-//! What a route must keep clear of: the shapes, how far a leg stays from them, and how much of
-//! their soft zone it crosses.
+//! What a route must avoid: the shapes of threats, the distance of a leg from them, and its exposure in their soft
+//! zones.
 //!
-//! Adding a shape is one file beside `cylinder.rs` and one variant of [`Shape`].
+//! A new shape needs one file beside `cylinder.rs` and one variant of [`Shape`].
 
 mod cylinder;
 mod polygon;
@@ -15,36 +15,36 @@ use crate::geometry::{Point2, Point3, Rect, Segment};
 /// A threat of the scenario: a horizontal shape between two optional heights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Threat {
-    /// The caller's own name for it.
+    /// The caller's name for it.
     pub name: Option<String>,
     /// Outline seen from above.
     pub shape: Shape,
-    /// Below this height (frame `z`) the threat does not reach; `None` is unbounded.
+    /// Lower limit (frame `z`), included; `None` means unbounded.
     pub base: Option<f64>,
-    /// From this height up the threat does not reach; `None` is unbounded.
+    /// Upper limit (frame `z`), excluded; `None` means unbounded.
     pub top: Option<f64>,
 }
 
 /// The outline of a threat.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
-    /// A disc with a soft zone round it, Eq. 5.
+    /// A disc with a soft zone around it, Eq. 5.
     Cylinder(Cylinder),
     /// A simple ring with a soft zone outside it.
     Polygon(Polygon),
 }
 
-/// How one leg fares with one threat.
+/// One leg against one threat.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Encounter {
-    /// How far the leg goes beyond the boundary, horizontally, metres; not above 0 where it does not.
+    /// Horizontal depth of the leg inside the boundary, metres; not above 0 if it does not enter.
     pub depth: f64,
     /// Integral of `T(d)` along the leg, Eq. 4-5, square metres.
     pub exposure: f64,
 }
 
 impl Encounter {
-    /// With a threat whose soft zone the leg never reaches.
+    /// The leg does not reach the soft zone.
     const FAR: Self = Self {
         depth: 0.0,
         exposure: 0.0,
@@ -52,7 +52,7 @@ impl Encounter {
 }
 
 impl Threat {
-    /// Whether `point` is strictly inside, between base and top.
+    /// Whether `point` is strictly inside the boundary, and between base and top.
     #[must_use]
     pub fn contains(&self, point: Point3) -> bool {
         self.reaches(point.z)
@@ -62,7 +62,7 @@ impl Threat {
             }
     }
 
-    /// Horizontal distance of `point` to the boundary, metres, negative inside, whatever its height.
+    /// Horizontal distance of `point` from the boundary, metres, negative inside, at any height.
     #[must_use]
     pub fn distance(&self, point: Point2) -> f64 {
         match &self.shape {
@@ -83,8 +83,8 @@ impl Threat {
         }
     }
 
-    /// Least horizontal distance of `leg` to the boundary, metres, negative inside; `None` when the
-    /// leg is never between base and top.
+    /// Least horizontal distance of `leg` from the boundary, metres, negative inside; `None` if the leg is never
+    /// between base and top.
     #[must_use]
     pub fn clearance(&self, leg: &Segment) -> Option<f64> {
         let window = leg.between_heights(self.base, self.top)?;
@@ -94,7 +94,7 @@ impl Threat {
         })
     }
 
-    /// Depth and exposure at once, cheaply nothing when `leg` is beyond the soft zone.
+    /// Depth and exposure together; returns zeros quickly if `leg` is outside the soft zone.
     #[must_use]
     pub fn encounter(&self, leg: &Segment) -> Encounter {
         let reached = match &self.shape {
@@ -119,7 +119,7 @@ impl Threat {
         }
     }
 
-    /// The box round the shape and its soft zone.
+    /// The box around the shape and its soft zone.
     #[must_use]
     pub fn extent(&self) -> Rect {
         match &self.shape {
@@ -128,19 +128,19 @@ impl Threat {
         }
     }
 
-    /// Whether it is there at that height.
+    /// Whether the threat extends to height `z`.
     #[must_use]
     pub fn reaches(&self, z: f64) -> bool {
         self.base.is_none_or(|base| z >= base) && self.top.is_none_or(|top| z < top)
     }
 }
 
-/// `distance` from a shape's own edge of the soft zone inwards: `T(d)` of Eq. 5.
+/// `T(d)` of Eq. 5; `distance` and `influence` have the same origin, a cylinder's axis or a polygon's ring.
 fn intensity(influence: f64, distance: f64) -> f64 {
     (influence - distance).max(0.0)
 }
 
-/// Exposure of a leg that has no horizontal extent: `T` is the same all along.
+/// Exposure of a leg without horizontal extent: `T` is constant along it.
 fn hover_exposure(
     leg: &Segment,
     (t0, t1): (f64, f64),

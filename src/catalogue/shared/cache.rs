@@ -1,5 +1,5 @@
-//! Files of the shelf on the node's own disk: each by its sum, and only trusted once it has been summed up
-//! since the process began or the file was changed.
+//! Copies of the shelf's files on the node's own disk, by checksum. A copy is trusted only if its checksum was
+//! verified since the process started and the file last changed.
 
 use std::array;
 use std::collections::HashMap;
@@ -13,39 +13,39 @@ use crate::catalogue::content::{Checked, Declaration, Identity};
 use crate::catalogue::stamp::Stamp;
 use crate::catalogue::{CatalogueError, Staged, files};
 
-/// Files that are fetched or summed up at the same time.
+/// Files that are fetched or hashed concurrently.
 const LANES: usize = 16;
 
-/// Nodes of one machine that may share a data directory.
+/// Most nodes on one machine that may share a data directory.
 const MOST_NODES: usize = 64;
 
 /// The directory of files.
 #[derive(Debug)]
 pub(super) struct Cache {
     directory: PathBuf,
-    /// Files together may be so long; what was asked for lately stays all the same.
+    /// Greatest total length of the files, bytes; recently used ones are kept even beyond.
     limit: u64,
-    /// What has been asked for so lately is being read, or soon will be.
+    /// Files used within this time are kept: they are being read, or soon will be.
     grace: Duration,
     files: Mutex<HashMap<String, Held>>,
-    /// Nobody fetches what somebody else is fetching.
+    /// Locks by checksum, so that a file is fetched only once at a time.
     lanes: [Mutex<()>; LANES],
-    /// Keeps a second process out.
+    /// Keeps other processes out.
     _lock: File,
 }
 
-/// A file that is there.
+/// A file in the cache.
 #[derive(Debug, Clone, Copy)]
 struct Held {
     bytes: u64,
-    /// As it was when it was summed up.
+    /// Its stamp when its checksum was verified.
     stamp: Option<Stamp>,
     asked: Option<Instant>,
 }
 
 impl Cache {
-    /// Open the directory, made if need be, and remove what was on its way when a process died. Where
-    /// another node has it, one beside it.
+    /// Open the directory, creating it if necessary, and remove files left incomplete by a dead process. If another
+    /// node has locked it, open one beside it.
     pub(super) fn open(
         directory: &Path,
         limit: u64,
@@ -101,12 +101,12 @@ impl Cache {
         Staged::new(&self.directory.join("incoming"), limit)
     }
 
-    /// Bytes of all files.
+    /// Total length of all files, bytes.
     pub(super) fn bytes(&self) -> u64 {
         self.lock().values().map(|held| held.bytes).sum()
     }
 
-    /// Where the file with this sum lies, if it is there and has not been changed.
+    /// Path of the file with this checksum, if it is cached and intact.
     pub(super) fn find(
         &self,
         sha256: &str,
@@ -142,7 +142,7 @@ impl Cache {
         }
     }
 
-    /// The same, and otherwise what `fetch` writes.
+    /// The same, or else the file that `fetch` writes.
     pub(super) fn find_or_fetch(
         &self,
         sha256: &str,
@@ -156,7 +156,7 @@ impl Cache {
             }
             let lane = self.lane(sha256);
             if self.path(sha256).exists() {
-                // Somebody else has fetched it meanwhile.
+                // Another thread has fetched it meanwhile.
                 drop(lane);
                 continue;
             }
@@ -175,7 +175,7 @@ impl Cache {
         }
     }
 
-    /// Keep a file that is on the shelf by now.
+    /// Keep a file that is already on the shelf.
     pub(super) fn adopt(&self, file: &Checked) -> Result<(), CatalogueError> {
         {
             let _lane = self.lane(&file.sha256);
@@ -206,7 +206,7 @@ impl Cache {
         self.make_room()
     }
 
-    /// Remove the files that have not been asked for the longest, until all fit.
+    /// Remove the least recently used files until the others fit.
     fn make_room(&self) -> Result<(), CatalogueError> {
         let mut oldest: Vec<(Option<Instant>, String, u64)> = {
             let files = self.lock();
@@ -235,7 +235,7 @@ impl Cache {
         asked.is_some_and(|asked| asked.elapsed() < self.grace)
     }
 
-    /// Whether the file is as it was when it was summed up; it has been asked for now.
+    /// Whether the file is unchanged since its checksum was verified; also marks it as used.
     fn is_known(&self, sha256: &str, stamp: Stamp) -> bool {
         let mut files = self.lock();
         let held = files.get_mut(sha256);

@@ -1,4 +1,4 @@
-//! How a content is had: put on the shelf for all nodes, found there, fetched to this one.
+//! Access to contents: putting them on the shelf, finding them there, and fetching them to this node.
 
 use std::path::PathBuf;
 use std::thread;
@@ -11,14 +11,14 @@ use crate::catalogue::records::Content;
 use crate::catalogue::{CatalogueError, Checked, Staged};
 use crate::terrain::DatasetError;
 
-/// A file that was put a moment ago may not have come to every server.
+/// Most attempts to fetch a file: one put a moment ago may not have reached every server.
 const TRIES: u32 = 4;
 
-/// Between the first two of them; twice as long each time.
+/// Half the pause after the first attempt; the pause doubles with each attempt.
 const PAUSE: Duration = Duration::from_millis(50);
 
 impl Shared {
-    /// Take the mark off a content that is needed; false when it has gone or changed meanwhile.
+    /// Remove the mark from a needed content; `false` if it was removed or changed meanwhile.
     pub(super) fn need(&self, view: &View, sha256: &str) -> Result<bool, CatalogueError> {
         let Some(content) = view.contents.get(sha256) else {
             return Ok(false);
@@ -35,7 +35,7 @@ impl Shared {
         Ok(written.is_some())
     }
 
-    /// Have a content on the shelf that is not about to go.
+    /// Make sure that a content is on the shelf and not about to be removed.
     pub(super) fn shelve(&self, file: &Checked) -> Result<(), CatalogueError> {
         let sha256 = &file.sha256;
         loop {
@@ -57,7 +57,7 @@ impl Shared {
                 file: put.clone(),
                 unneeded: false,
             };
-            // When this fails it may have been written all the same: the file stays until that is seen.
+            // After an error it may still have been written, so the file stays until that is known.
             let key = content_key(sha256);
             let written = self.write(&key, &content, view.written(&key))?;
             if written.is_some() {
@@ -67,14 +67,14 @@ impl Shared {
         }
     }
 
-    /// Remove a file, or leave that to a sweep.
+    /// Remove a file, or leave it to a later sweep.
     pub(super) fn discard(&self, file: &str) {
         if let Err(error) = self.shelf.discard(file) {
             tracing::warn!(file, %error, "a file that nothing refers to is left for a later sweep");
         }
     }
 
-    /// The content that is meant, with no mark on it.
+    /// The requested content, with no mark on it.
     pub(super) fn meant(
         &self,
         name: &str,
@@ -83,7 +83,7 @@ impl Shared {
         loop {
             let view = match self.view() {
                 Ok(view) => view,
-                // What has a sum never changes: a copy is as good as the original.
+                // Content with a given checksum never changes, so a copy is as good as the original.
                 Err(away) => return self.copied(sha256).ok_or_else(|| away.into()),
             };
             let unknown = || DatasetError::Unknown {
@@ -113,7 +113,7 @@ impl Shared {
         }
     }
 
-    /// What was known of a content whose bytes are on this node.
+    /// The last known record of a content whose bytes are on this node.
     fn copied(&self, sha256: Option<&str>) -> Option<(String, Shelved)> {
         let (sha256, view) = (sha256?, self.last_view());
         let content = view.contents.get(sha256)?;
@@ -122,7 +122,7 @@ impl Shared {
         Some((sha256.to_owned(), content.clone()))
     }
 
-    /// Where the bytes of a content lie on this node.
+    /// Path of the content's bytes on this node.
     pub(super) fn fetched(
         &self,
         sha256: &str,

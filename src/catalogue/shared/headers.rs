@@ -1,11 +1,10 @@
-//! What a file's headers say, as it is written down: so that a node can tell of a dataset whose bytes it
-//! does not have.
+//! The stored headers of a file, so that a node can describe a dataset whose bytes it does not have.
 
 use serde::{Deserialize, Serialize};
 
 use crate::terrain::dem::{Crs, Degrees, DemError, Format, Lattice, Metadata, SampleType};
 
-/// What a file's headers say.
+/// The headers of a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Headers {
     #[serde(with = "FormatName")]
@@ -19,7 +18,7 @@ pub(super) struct Headers {
     step: [f64; 2],
     #[serde(with = "Corners")]
     degrees: Degrees,
-    /// As text: it may be no number.
+    /// As text, because it may be NaN.
     no_data: Option<String>,
 }
 

@@ -1,4 +1,4 @@
-//! A shelf in memory, that fails or is interrupted at any step.
+//! A shelf in memory that can fail or be interrupted at any step.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -15,7 +15,7 @@ pub(super) struct Memory(Mutex<State>);
 struct State {
     revision: u64,
     keys: BTreeMap<String, (Option<String>, u64)>,
-    /// With whether they are whole.
+    /// Bytes, and whether the file is complete.
     files: BTreeMap<String, (Vec<u8>, bool)>,
     /// Calls so far.
     calls: usize,
@@ -23,41 +23,41 @@ struct State {
     away: bool,
 }
 
-/// What happens at a call.
+/// What goes wrong at a call.
 pub(super) enum Trouble {
     /// It fails and has done nothing, or half of it.
     FailsBefore,
-    /// It fails and has done everything.
+    /// It fails after doing everything.
     FailsAfter,
-    /// Somebody else does something first.
+    /// Something else happens first.
     Interrupted(Box<dyn FnOnce() + Send>),
 }
 
 impl Memory {
-    /// The call after `calls` more meets with trouble.
+    /// Cause trouble at the call after `calls` more.
     pub(super) fn trouble_in(&self, calls: usize, trouble: Trouble) {
         let mut state = self.lock();
         state.trouble = Some((state.calls + calls, trouble));
     }
 
-    /// Whether that has not come about yet; from now on it never will.
+    /// Cancel the trouble; returns whether it had not happened yet.
     pub(super) fn calm(&self) -> bool {
         self.lock().trouble.take().is_some()
     }
 
-    /// Nothing can be reached, or everything again.
+    /// Make the shelf unreachable, or reachable again.
     pub(super) fn be_away(&self, away: bool) {
         self.lock().away = away;
     }
 
-    /// Files, whole ones and others.
+    /// Number of complete and of incomplete files.
     pub(super) fn counts(&self) -> [usize; 2] {
         let state = self.lock();
         let whole = state.files.values().filter(|(_, whole)| *whole).count();
         [whole, state.files.len() - whole]
     }
 
-    /// Write something that no catalogue would.
+    /// Write a value that no catalogue would write.
     pub(super) fn scribble(&self, key: &str, value: &str) {
         let expected = self.lock().keys.get(key).map_or(0, |written| written.1);
         let written = self.write(key, value, expected);

@@ -1,11 +1,11 @@
-//! What was uploaded, where every node finds it: names and contents on a shelf, files cached by their sums.
+//! Uploads shared by all nodes: names and contents on a shelf, files cached by their checksums.
 //!
-//! On the shelf, `name.NAME` says which content a name stands for, and `content.SUM` what is known of a
-//! content and which file holds it. A file is put there before the content that refers to it, and a content
-//! before the name. A content that nothing refers to is marked first, and taken away when the mark has
-//! stood for [`GRACE`](super::GRACE) by the clock of the node that takes it away; who needs it meanwhile
-//! takes the mark off, and a write after the last one that the other side saw is refused. So of a removal
-//! and a use that race, one sees the other, whatever the clocks of the nodes say.
+//! On the shelf, `name.NAME` says to which content a name refers, and `content.SUM` what is known about a content and
+//! which file holds it. A file is put there before the content that refers to it, and a content before its name. A
+//! content that nothing refers to is marked first, and removed when the mark is older than [`GRACE`](super::GRACE) by
+//! the clock of the removing node. A node that needs the content meanwhile removes the mark, and a write based on an
+//! outdated revision is refused. So if a removal and a use race, one of them sees the other, whatever the clocks of
+//! the nodes say.
 
 mod cache;
 mod contents;
@@ -63,7 +63,7 @@ impl Shared {
         })
     }
 
-    /// All that any node had written when this was called.
+    /// The state including everything that any node had written before this call.
     fn view(&self) -> Result<Arc<View>, CatalogueError> {
         let known = self.last_view();
         let mut changes = self.changes(known.revision)?;
@@ -91,8 +91,7 @@ impl Shared {
         self.shelf.changes(after).map_err(CatalogueError::shelf)
     }
 
-    /// Write a record over the one of the revision `expected`; the new revision, or `None` when somebody
-    /// else was faster.
+    /// Replace the record at revision `expected`; returns the new revision, or `None` if another write came first.
     fn write(
         &self,
         key: &str,
@@ -104,7 +103,7 @@ impl Shared {
         written.map_err(CatalogueError::shelf)
     }
 
-    /// The same, with nothing.
+    /// The same, but removes the record.
     fn erase(&self, key: &str, expected: u64) -> Result<bool, CatalogueError> {
         let erased = self.shelf.erase(key, expected);
         erased.map_err(CatalogueError::shelf)
@@ -175,7 +174,7 @@ impl Uploads for Shared {
     }
 
     fn keep(&self, file: &Checked, naming: &Naming) -> Result<Kept, CatalogueError> {
-        // Before bytes are sent for nothing.
+        // Before sending bytes in vain.
         self.permit(naming)?;
         self.shelve(file)?;
         let key = name_key(&naming.name);
@@ -191,7 +190,7 @@ impl Uploads for Shared {
                 break kept;
             }
         };
-        // Who was taking the content away before it had the name has done so by now, or sees the name.
+        // A removal of the content that began before it had the name is either complete now or will see the name.
         self.shelve(file)?;
         if let Err(error) = self.cache.adopt(file) {
             tracing::warn!(%error, "an uploaded dataset is not kept on this node; it will be fetched");

@@ -1,4 +1,4 @@
-//! Two nodes over one shelf that fails now and then, against two maps.
+//! Two nodes over one shelf that sometimes fails, compared with two maps.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -24,7 +24,7 @@ enum Step {
     Find {
         name: usize,
     },
-    /// A plan is accepted over what a name stands for.
+    /// A plan is accepted over the content of a name.
     Use {
         name: usize,
     },
@@ -53,10 +53,10 @@ fn step() -> impl Strategy<Value = Step> {
     ]
 }
 
-/// At which call something fails, before or after it was done.
+/// The call that fails, and whether before or after its effect.
 type Failing = Option<(usize, bool)>;
 
-/// At which node, and what.
+/// The node, its step, and the failure.
 fn steps() -> impl Strategy<Value = Vec<(usize, Step, Failing)>> {
     let trouble = prop::option::weighted(0.3, (0..6_usize, any::<bool>()));
     prop::collection::vec((0..2_usize, step(), trouble), 1..30)
@@ -80,7 +80,7 @@ proptest! {
                 shelf.trouble_in(calls, trouble);
             }
             let here = nodes[at].as_ref().expect("it runs");
-            // What a name may stand for afterwards.
+            // What a name may refer to afterwards.
             let mut either: Option<(&str, [Option<u32>; 2])> = None;
             match step {
                 Step::Keep { name, height } => {

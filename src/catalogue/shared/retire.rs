@@ -1,5 +1,5 @@
-//! What nothing needs any more: contents are marked, and go when the mark has stood; files of uploads that
-//! broke go when nothing has come to refer to them.
+//! Removal of what is no longer needed: contents are marked, and removed when the mark is old enough; files of broken
+//! uploads are removed when nothing refers to them for long enough.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::time::Instant;
@@ -8,27 +8,26 @@ use super::Shared;
 use super::view::{Shelved, View, content_key};
 use crate::catalogue::CatalogueError;
 
-/// Files that no content refers to may belong to uploads that go on: they are kept for so many times the
-/// grace of contents.
+/// Files without a content may belong to uploads in progress: they are kept for this many grace periods.
 const GRACES_OF_FILES: u32 = 6;
 
-/// Files are looked for so often in the grace of contents.
+/// Searches for such files per grace period.
 const LOOKS_PER_GRACE: u32 = 10;
 
-/// What this node has seen that may have to go.
+/// Candidates for removal that this node has seen.
 #[derive(Debug, Default)]
 pub(super) struct Watched {
-    /// Contents with a mark: at which revision, and since when.
+    /// Marked contents: the revision of the mark, and since when it was seen.
     contents: HashMap<String, (u64, Instant)>,
-    /// Files that no content refers to.
+    /// Files without a content.
     files: BTreeMap<String, Instant>,
-    /// When files were looked for.
+    /// When files were last searched for.
     looked: Option<Instant>,
 }
 
 impl Shared {
-    /// Mark the contents that no name and none of `used` needs, and take those away whose marks have stood
-    /// for long enough; returns how many.
+    /// Mark the contents that neither a name nor `used` refers to, and remove those whose mark is old enough; returns
+    /// how many were removed.
     pub(super) fn retire_all(
         &self,
         used: &BTreeSet<String>,
@@ -50,7 +49,7 @@ impl Shared {
         Ok(removed)
     }
 
-    /// Mark a content that nothing refers to, or take it away when its mark has stood for long enough.
+    /// Mark a content that nothing refers to, or remove it if its mark is old enough.
     fn retire(
         &self,
         view: &View,
@@ -88,7 +87,7 @@ impl Shared {
         Ok(removed)
     }
 
-    /// Remove files of uploads that never came to their end, and of removals that did not.
+    /// Remove the files of incomplete uploads and incomplete removals.
     pub(super) fn tidy(&self, watched: &mut Watched) -> Result<(), CatalogueError> {
         if !self.is_time_to_look(watched) {
             return Ok(());

@@ -1,4 +1,4 @@
-//! How nodes share what is uploaded.
+//! How nodes share uploads.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -7,10 +7,10 @@ use std::time::Duration;
 use crate::catalogue::{CatalogueError, GRACE, Shelf};
 use crate::telemetry::Instruments;
 
-/// Files kept on a node, bytes, unless they are asked for all the time.
+/// Greatest total length of files cached on a node, bytes, except for recently used ones.
 const CACHE_BYTES: u64 = 8 << 30;
 
-/// How nodes share what is uploaded.
+/// How nodes share uploads.
 #[derive(Debug, Clone)]
 pub struct Sharing {
     pub(super) shelf: Arc<dyn Shelf>,
@@ -21,8 +21,8 @@ pub struct Sharing {
 }
 
 impl Sharing {
-    /// On `shelf`, with a directory of this process alone for copies, made if need be. Fetches are counted
-    /// in `instruments`.
+    /// Sharing through `shelf`, with a cache directory for this process alone, created if necessary. Fetches are
+    /// counted in `instruments`.
     #[must_use]
     pub fn new(shelf: Arc<dyn Shelf>, cache: PathBuf, instruments: Arc<Instruments>) -> Self {
         Self {
@@ -34,13 +34,13 @@ impl Sharing {
         }
     }
 
-    /// With another time than [`GRACE`].
+    /// The same, with a grace period other than [`GRACE`].
     #[must_use]
     pub fn with_grace(self, grace: Duration) -> Self {
         Self { grace, ..self }
     }
 
-    /// With copies of at most so many bytes, besides those in use.
+    /// The same, with copies of at most `cache_bytes`, besides those in use.
     #[must_use]
     pub fn with_cache_bytes(self, cache_bytes: u64) -> Self {
         Self {
@@ -49,7 +49,7 @@ impl Sharing {
         }
     }
 
-    /// Whether nothing has ever been uploaded there.
+    /// Whether nothing has ever been uploaded to the shelf.
     ///
     /// # Errors
     /// [`CatalogueError::Unavailable`].

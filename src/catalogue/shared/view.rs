@@ -1,4 +1,4 @@
-//! What a node knows of the shared names and contents: every write up to a revision, taken in once.
+//! A node's view of the shared names and contents: every write up to a revision, applied once.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -9,15 +9,15 @@ use super::headers::Headers;
 use crate::catalogue::records::{Content, Name};
 use crate::catalogue::shelf::{Change, Changes};
 
-/// A content on the shelf, as it is written down.
+/// The stored record of a content on the shelf.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Shelved {
     #[serde(flatten)]
     pub(super) content: Content,
     pub(super) headers: Headers,
-    /// Where its bytes lie on the shelf.
+    /// The file on the shelf that holds its bytes.
     pub(super) file: String,
-    /// Nothing refers to it, as far as a node could see: it goes after a while, unless somebody asks for it.
+    /// The mark: a node found that nothing refers to it. It is removed after a while, unless it is used.
     #[serde(default)]
     pub(super) unneeded: bool,
 }
@@ -28,7 +28,7 @@ pub(super) struct View {
     pub(super) revision: u64,
     pub(super) names: BTreeMap<String, Name>,
     pub(super) contents: BTreeMap<String, Shelved>,
-    /// When each key was last written.
+    /// Revision of each key's last write.
     written: HashMap<String, u64>,
     /// Keys whose values this version of the program cannot read.
     unread: BTreeSet<String>,
@@ -45,7 +45,7 @@ pub(super) fn content_key(sha256: &str) -> String {
 }
 
 impl View {
-    /// Take in what has been written since; what is known already changes nothing.
+    /// Apply later changes; those already known have no effect.
     pub(super) fn learn(&mut self, changes: Changes) {
         for change in changes.changes {
             if change.revision > self.written(&change.key) {
@@ -81,12 +81,12 @@ impl View {
         self.written.insert(key, revision);
     }
 
-    /// When `key` was last written; 0 for never.
+    /// Revision of the last write of `key`; 0 if never written.
     pub(super) fn written(&self, key: &str) -> u64 {
         self.written.get(key).copied().unwrap_or(0)
     }
 
-    /// Contents that no name stands for.
+    /// Contents without a name.
     pub(super) fn unnamed(&self) -> BTreeSet<&String> {
         let named: BTreeSet<&String> = self.names.values().map(|name| &name.sha256).collect();
         let contents = self.contents.keys();
@@ -95,7 +95,7 @@ impl View {
             .collect()
     }
 
-    /// Whether something is not known, so that nothing can be said to be needless.
+    /// Whether some records cannot be read, so that nothing can be considered unneeded.
     pub(super) fn has_unread(&self) -> bool {
         !self.unread.is_empty()
     }
@@ -106,7 +106,7 @@ impl View {
     }
 }
 
-/// Put a record into its place; false when it cannot be read.
+/// Store a record; `false` when it cannot be read.
 fn put<T: DeserializeOwned>(
     records: &mut BTreeMap<String, T>,
     key: &str,

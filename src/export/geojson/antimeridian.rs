@@ -1,13 +1,13 @@
-//! Geometries that cross the 180th meridian, cut there as RFC 7946 section 3.1.9 asks.
+//! Cuts geometries that cross the 180th meridian, as RFC 7946 section 3.1.9 asks.
 //!
-//! Positions are degrees east, north and perhaps a height. Two in a row are less than half a turn
-//! apart, so that a longer step is one across the meridian.
+//! Positions are degrees east, north and optionally a height. Consecutive positions are less than 180 degrees of
+//! longitude apart, so a larger step crosses the meridian.
 
 use geojson::{GeometryValue, Position};
 
 type Place = Vec<f64>;
 
-/// A line; in pieces when it crosses.
+/// A line; in several pieces if it crosses.
 pub(super) fn line(places: &[Place]) -> GeometryValue {
     let places = on_one_side(places);
     let mut pieces: Vec<Vec<Position>> = vec![Vec::new()];
@@ -16,7 +16,7 @@ pub(super) fn line(places: &[Place]) -> GeometryValue {
             && crosses(before, place)
         {
             let side = 180.0_f64.copysign(before[0]);
-            // The step as if there were no meridian, and the share of it on the near side.
+            // The step without wrapping, and the fraction of it on the near side.
             let step = place[0] + 2.0 * side - before[0];
             let at = between(before, place, (side - before[0]) / step);
             push(&mut pieces, at.clone(), side);
@@ -33,8 +33,8 @@ pub(super) fn line(places: &[Place]) -> GeometryValue {
     }
 }
 
-/// The same line, its places on the meridian itself on the side where the one before is: to the other and
-/// back would be a step of nothing.
+/// The same line, with positions exactly on the meridian moved to the side of their predecessor: crossing to the
+/// other side and back would be a step of length zero.
 fn on_one_side(places: &[Place]) -> Vec<Place> {
     let mut places = places.to_vec();
     for index in 1..places.len() {
@@ -46,13 +46,13 @@ fn on_one_side(places: &[Place]) -> Vec<Place> {
     places
 }
 
-/// A ring, the first corner not repeated; in two halves when it crosses.
+/// A ring, without repeated first corner; in two halves if it crosses.
 pub(super) fn ring(corners: &[Place]) -> GeometryValue {
     let around = corners.iter().zip(corners.iter().cycle().skip(1));
     if !around.clone().any(|(here, next)| crosses(here, next)) {
         return GeometryValue::new_polygon([closed(corners.to_vec())]);
     }
-    // Degrees east that go on beyond 180.
+    // Degrees east, continued beyond 180.
     let unrolled: Vec<Place> = corners
         .iter()
         .map(|corner| {
@@ -70,8 +70,7 @@ pub(super) fn ring(corners: &[Place]) -> GeometryValue {
     GeometryValue::new_multi_polygon(halves.map(|half| [closed(half)]))
 }
 
-/// The part of a ring where `inside` of its degrees east is not negative: Sutherland and Hodgman's
-/// clipping at one line.
+/// The part of a ring where `inside` of its degrees east is not negative: Sutherland-Hodgman clipping at one line.
 fn half(corners: &[Place], inside: impl Fn(f64) -> f64) -> Vec<Place> {
     let mut kept = Vec::new();
     for (here, next) in corners.iter().zip(corners.iter().cycle().skip(1)) {
@@ -93,7 +92,7 @@ fn crosses(one: &Place, other: &Place) -> bool {
     (one[0] - other[0]).abs() > 180.0
 }
 
-/// All but the degrees east, at a share of the way.
+/// Interpolates all coordinates but the longitude, at a fraction of the step.
 fn between(from: &Place, to: &Place, share: f64) -> Place {
     from.iter()
         .zip(to)

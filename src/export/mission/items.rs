@@ -1,4 +1,4 @@
-//! What an autopilot is told to do, one command an item.
+//! Commands for an autopilot, one per item.
 
 use super::reduce::{Shape, reduce};
 use crate::cost::{Model, Tolerance};
@@ -7,32 +7,32 @@ use crate::export::{Altitude, Delivery, ExportError, Firmware, Options};
 use crate::geometry::{Point3, Segment};
 use crate::planner::keeps_limits;
 
-/// Commands of MAVLink's `MAV_CMD`.
+/// MAVLink commands (`MAV_CMD`).
 const NAV_WAYPOINT: u16 = 16;
 const NAV_LAND: u16 = 21;
 const NAV_TAKEOFF: u16 = 22;
 const DO_CHANGE_SPEED: u16 = 178;
 
-/// Frames of MAVLink's `MAV_FRAME`.
+/// MAVLink frames (`MAV_FRAME`).
 pub(super) const FRAME_GLOBAL: u8 = 0;
 const FRAME_MISSION: u8 = 2;
 const FRAME_RELATIVE: u8 = 3;
 const FRAME_TERRAIN: u8 = 10;
 
-/// Parts of a degree that MAVLink's integers hold: a centimetre.
+/// MAVLink's integer coordinates are in 1 / this degrees: a centimetre.
 const DEGREES: f64 = 1e7;
 
-/// Items are numbered by 16 bits.
+/// Most items; item numbers have 16 bits.
 const MOST: usize = 65_535;
 
-/// A mission: where the vehicle is armed, and what it does from there.
+/// A mission: where the vehicle is armed, and its commands.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Mission {
     /// On the ground below the start.
     pub(super) home: Place,
     /// In order.
     pub(super) items: Vec<Item>,
-    /// Corners of what is flown, local metres.
+    /// Corners of the flown route, local metres.
     pub(super) route: Vec<Point3>,
 }
 
@@ -43,24 +43,24 @@ pub(super) struct Item {
     pub(super) frame: u8,
     /// The first four parameters; `None` leaves one to the autopilot.
     pub(super) params: [Option<f64>; 4],
-    /// `None` of a command that is obeyed wherever the vehicle is.
+    /// `None` for a command without a position.
     pub(super) place: Option<Place>,
 }
 
-/// Where an item is.
+/// Position of an item.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Place {
     pub(super) lat: f64,
     pub(super) lon: f64,
-    /// In the item's frame.
+    /// In the item's frame, metres.
     pub(super) altitude_m: f64,
-    /// Above mean sea level.
+    /// Above mean sea level, metres.
     pub(super) msl_m: f64,
-    /// Above the ground.
+    /// Above ground, metres.
     pub(super) agl_m: f64,
 }
 
-/// The mission of a plan, as few items as the tolerance allows.
+/// The mission of a plan, with as few items as the tolerance allows.
 pub(super) fn mission(delivery: &Delivery, options: &Options) -> Result<Mission, ExportError> {
     let chart = delivery.chart();
     let route = route(delivery, options)?;
@@ -82,7 +82,7 @@ pub(super) fn mission(delivery: &Delivery, options: &Options) -> Result<Mission,
     items.push(Item {
         command: DO_CHANGE_SPEED,
         frame: FRAME_MISSION,
-        // Of the ground speed; the throttle is left as it is.
+        // Ground speed; the throttle stays as it is.
         params: [
             Some(1.0),
             Some(delivery.scenario.vehicle.cruise_speed),
@@ -128,7 +128,7 @@ impl Scribe<'_> {
         let frame = match (self.options.altitude, self.options.firmware) {
             (Altitude::Relative, _) => FRAME_RELATIVE,
             (Altitude::Terrain, Firmware::ArduPilot) => FRAME_TERRAIN,
-            // PX4 has no such frame; its ground station keeps the height beside the altitude.
+            // PX4 has no such frame; its ground station stores the height beside the altitude.
             (Altitude::Absolute, _) | (Altitude::Terrain, Firmware::Px4) => FRAME_GLOBAL,
         };
         Item {
@@ -162,11 +162,11 @@ fn on_ground(delivery: &Delivery, point: Point3) -> Point3 {
     Point3::new(point.x, point.y, elevation)
 }
 
-/// The corners that are flown, the first one in the air above the start.
+/// The corners of the flown route; the first one is in the air above the start.
 fn route(delivery: &Delivery, options: &Options) -> Result<Vec<Point3>, ExportError> {
     let course = raised(delivery, options);
     if !delivery.result.feasible {
-        // The caller insists; there is nothing to keep.
+        // The caller insists on an infeasible route, so there are no constraints to keep.
         return Ok(course);
     }
     let model = Model::new(&delivery.scenario);
@@ -194,8 +194,8 @@ fn route(delivery: &Delivery, options: &Options) -> Result<Vec<Point3>, ExportEr
     Ok(reduce(&delivery.scenario, &course, shape))
 }
 
-/// What is to be flown, from where the take-off ends: level above the route until the route has
-/// risen as high, and never higher than it rises.
+/// The flown course from the end of the take-off: at take-off height until the route has climbed to it, but not above
+/// the highest point of the route.
 fn raised(delivery: &Delivery, options: &Options) -> Vec<Point3> {
     let mut course = delivery.course().to_vec();
     let highest = course.iter().map(|point| point.z).fold(f64::MIN, f64::max);
@@ -208,7 +208,7 @@ fn raised(delivery: &Delivery, options: &Options) -> Vec<Point3> {
     course
 }
 
-/// Whether nothing lies between `point` and the ground.
+/// Whether no threat lies between `point` and the ground.
 fn is_open(delivery: &Delivery, point: Point3) -> bool {
     let down = Segment {
         a: on_ground(delivery, point),

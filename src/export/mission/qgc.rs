@@ -1,4 +1,4 @@
-//! A plan of QGroundControl: mission, fences and rally points in one JSON document.
+//! A QGroundControl plan: mission, fences and rally points in one JSON document.
 
 use serde_json::{Value, json};
 
@@ -9,14 +9,14 @@ use crate::export::{Altitude, Delivery, ExportError, Firmware, Options, outline}
 use crate::geometry::{Point3, Segment};
 use crate::threat::{Shape, Threat};
 
-/// Of MAVLink's `MAV_AUTOPILOT`.
+/// MAVLink autopilots (`MAV_AUTOPILOT`).
 const PX4: u8 = 12;
 const ARDUPILOT: u8 = 3;
 
-/// A rotorcraft of four, of MAVLink's `MAV_TYPE`: it can fly all that is planned here.
+/// A quadrotor in MAVLink's `MAV_TYPE`: it can fly every route planned here.
 const QUADROTOR: u8 = 2;
 
-/// Write the mission of a plan, and its threats as fences.
+/// Write the mission of a plan, with its threats as fences.
 pub(in crate::export) fn write(
     delivery: &Delivery,
     options: &Options,
@@ -62,7 +62,7 @@ pub(in crate::export) fn write(
     Ok(format!("{document:#}\n"))
 }
 
-/// As the ground station counts them.
+/// The ground station's number for the altitude mode.
 fn altitude_mode(options: &Options) -> u8 {
     match (options.altitude, options.firmware) {
         (Altitude::Relative, _) => 1,
@@ -92,7 +92,7 @@ fn simple(index: usize, item: &Item, mode: u8) -> Value {
             place.lon,
             place.altitude_m
         ]);
-        // What a person would type in this mode, and what it comes to.
+        // The altitude as a user would enter it in this mode, and the resulting one.
         let typed = if mode == 3 {
             place.agl_m
         } else {
@@ -105,8 +105,8 @@ fn simple(index: usize, item: &Item, mode: u8) -> Value {
     document
 }
 
-/// The threats as fences, and those that cannot be: a fence has no height, so that one above or
-/// below which the mission passes would stop it.
+/// The threats as fences, and those left out: a fence has no height, so one for a threat that the mission passes
+/// above or below would stop it.
 fn fence(delivery: &Delivery, chart: &Chart, mission: &Mission) -> (Value, Vec<Value>) {
     let tolerance_m = Tolerance::of(&delivery.scenario).length_m;
     let (mut circles, mut polygons, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
@@ -135,7 +135,7 @@ fn fence(delivery: &Delivery, chart: &Chart, mission: &Mission) -> (Value, Vec<V
     (fence, left_out)
 }
 
-/// Whether `route` would enter a threat that had neither base nor top, by more than a feasible one may.
+/// Whether `route` would enter the threat if it had neither base nor top, by more than a feasible route may.
 fn is_passed_at_another_height(threat: &Threat, route: &[Point3], tolerance_m: f64) -> bool {
     if threat.base.is_none() && threat.top.is_none() {
         return false;
@@ -183,7 +183,7 @@ mod tests {
             assert_eq!(passed, expected, "{radius} {top:?}");
         };
         check(99.0, Some(40.0), false);
-        // As near as a feasible route may come.
+        // As close as a feasible route may come.
         check(100.0 + 5e-7, Some(40.0), false);
         check(100.1, Some(40.0), true);
         check(100.1, None, false);

@@ -1,4 +1,4 @@
-//! `QGC WPL 110`: a mission as lines of text, read by nearly every ground station. It holds no fences.
+//! `QGC WPL 110`: a mission as lines of text, which nearly every ground station reads. It has no fences.
 
 use std::fmt::Write as _;
 
@@ -24,7 +24,7 @@ pub(in crate::export) fn write(
         params: [Some(0.0); 4],
         place: Some(mission.home),
     };
-    // ArduPilot keeps home as the first item, PX4 elsewhere.
+    // ArduPilot has home as the first item, PX4 does not.
     let home = (options.firmware == Firmware::ArduPilot).then_some(home);
     let mut text = "QGC WPL 110\n".to_owned();
     for (index, item) in home.iter().chain(&mission.items).enumerate() {
@@ -33,10 +33,10 @@ pub(in crate::export) fn write(
     Ok(text)
 }
 
-/// What leaves a parameter to the autopilot: a yaw of 0 orders PX4 to face north, and ArduPilot nothing.
+/// The value that leaves a parameter to the autopilot: a yaw of 0 makes PX4 face north, and is ignored by ArduPilot.
 fn left(firmware: Firmware) -> &'static str {
     match firmware {
-        // In the case that QGroundControl writes and reads it in.
+        // In the letter case that QGroundControl reads and writes.
         Firmware::Px4 => "nan",
         Firmware::ArduPilot => "0",
     }

@@ -1,4 +1,4 @@
-//! The edges of the plan view: ticks, what they count, the scale bar and north.
+//! The edges of the plan view: ticks, their numbers, the scale bar and the north arrow.
 
 use super::canvas::{Canvas, Font, Spot, polyline, ring};
 use super::palette::{INK, MUTED};
@@ -7,7 +7,7 @@ use crate::export::Delivery;
 use crate::geometry::Point2;
 use crate::scenario::Frame;
 
-/// Ticks, their labels, the scale bar and north.
+/// Ticks, their labels, the scale bar and the north arrow.
 pub(super) fn draw(canvas: &mut Canvas, delivery: &Delivery, map: &MapScale) {
     let (frame, view) = (&map.frame, &map.view);
     let steps = Steps::of((view.max.x - view.min.x).max(view.max.y - view.min.y), 9.0);
@@ -65,7 +65,7 @@ fn north(canvas: &mut Canvas, (x, y): Spot) {
     canvas.text((x + 9.0, y + 4.0), &Font::new(11.0, MUTED).bold(), "N");
 }
 
-/// What is counted along the two axes; in degrees they begin where the plane touches the earth.
+/// Titles of the two axes; for a plan in degrees they are relative to the tangent point.
 fn titles(frame: &Frame) -> (String, String) {
     let Some(wgs84) = frame.wgs84() else {
         return ("east, m".to_owned(), "north, m".to_owned());

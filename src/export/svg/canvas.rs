@@ -1,4 +1,4 @@
-//! The text of a drawing: elements, numbers and escaped words, nothing that knows of routes.
+//! The text of a drawing: elements, numbers and escaped strings, without knowledge of routes.
 
 use std::fmt::Write as _;
 
@@ -23,7 +23,7 @@ impl Area {
         self.top + self.height
     }
 
-    /// The rectangle of `size` with its middle at `at`.
+    /// The rectangle of `size` centred at `at`.
     pub(super) fn about(at: Spot, (width, height): (f64, f64)) -> Self {
         Self {
             left: at.0 - width / 2.0,
@@ -48,7 +48,7 @@ impl Area {
     }
 }
 
-/// How a piece of text looks.
+/// Appearance of a piece of text.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Font {
     pub(super) size: f64,
@@ -56,7 +56,7 @@ pub(super) struct Font {
     /// `start`, `middle` or `end`.
     pub(super) anchor: &'static str,
     pub(super) bold: bool,
-    /// Drawn in white round the letters, so that they can be read on anything.
+    /// Outlined in white, so that it is readable on any background.
     pub(super) halo: bool,
 }
 
@@ -86,14 +86,14 @@ impl Font {
         self
     }
 
-    /// Estimated size of `text`, pixels; a little more than common sans-serif fonts need.
+    /// Estimated size of `text`, pixels; slightly more than common sans-serif fonts need.
     pub(super) fn measure(&self, text: &str) -> (f64, f64) {
         let ems: f64 = text.chars().map(ems).sum();
         let weight = if self.bold { 1.07 } else { 1.0 };
         (ems * self.size * weight, self.size * 1.15)
     }
 
-    /// `text`, or as much of its beginning as fits `width` pixels.
+    /// `text`, or as much of its beginning as fits into `width` pixels.
     pub(super) fn fit(&self, text: &str, width: f64) -> String {
         let text = printable(text);
         if self.measure(&text).0 <= width {
@@ -111,7 +111,7 @@ impl Font {
     }
 }
 
-/// Width of a letter over the size of the font.
+/// Width of a character relative to the font size.
 fn ems(letter: char) -> f64 {
     match letter {
         'i' | 'j' | 'l' | 'I' | '.' | ',' | ':' | ';' | '!' | '|' | '\'' => 0.32,
@@ -151,7 +151,7 @@ impl Canvas {
         self.line(&format!("<{name} {attributes}/>"));
     }
 
-    /// An element whose content is put on by `fill`.
+    /// An element whose content is written by `fill`.
     pub(super) fn group(&mut self, name: &str, attributes: &str, fill: impl FnOnce(&mut Self)) {
         let space = if attributes.is_empty() { "" } else { " " };
         self.line(&format!("<{name}{space}{attributes}>"));
@@ -159,17 +159,17 @@ impl Canvas {
         self.line(&format!("</{name}>"));
     }
 
-    /// Title of the document or of the group that it is in: what a viewer shows under the pointer.
+    /// Title of the document or of the enclosing group; viewers show it as a tooltip.
     pub(super) fn title(&mut self, words: &str) {
         self.line(&format!("<title>{}</title>", escaped(words)));
     }
 
-    /// One line of words, `at` its baseline.
+    /// One line of text with its baseline at `at`.
     pub(super) fn text(&mut self, at: Spot, font: &Font, words: &str) {
         self.turned_text(at, 0.0, font, words);
     }
 
-    /// One line of words, turned clockwise by `degrees` about `at`.
+    /// One line of text, rotated clockwise by `degrees` about `at`.
     pub(super) fn turned_text(&mut self, at: Spot, degrees: f64, font: &Font, words: &str) {
         let (x, y) = (num(at.0), num(at.1));
         let mut style = format!("x=\"{x}\" y=\"{y}\" font-size=\"{}\"", num(font.size));
@@ -225,10 +225,10 @@ impl Canvas {
     }
 }
 
-/// Path data of an open line; points that round to the same place are one.
+/// Path data of an open line; points that round to the same position are merged.
 pub(super) fn polyline(points: &[Spot]) -> String {
     let mut data = String::new();
-    // In tenths of a pixel, relative to the last written point, so that roundings do not add up.
+    // In tenths of a pixel, relative to the last written point, so that rounding errors do not accumulate.
     let mut last: Option<(f64, f64)> = None;
     for point in points {
         let here = (tenths(point.0), tenths(point.1));
@@ -250,7 +250,7 @@ pub(super) fn polyline(points: &[Spot]) -> String {
         last = Some(here);
     }
     if data.ends_with('l') {
-        // A single place: a dot, when drawn with round caps.
+        // A single position: a dot, if drawn with round caps.
         data.push_str("0 0");
     }
     data
@@ -262,11 +262,11 @@ pub(super) fn ring(points: &[Spot]) -> String {
 }
 
 fn tenths(pixels: f64) -> f64 {
-    // Far off the sheet nothing is seen; readers of SVG keep only single precision.
+    // Far off the sheet nothing is visible, and SVG viewers keep only single precision.
     (pixels.clamp(-1e6, 1e6) * 10.0).round()
 }
 
-/// Rounded to a tenth, in as few letters as possible.
+/// Rounded to a tenth, in as few characters as possible.
 pub(super) fn num(value: f64) -> String {
     let text = format!("{:.1}", tenths(value) / 10.0);
     let text = text.strip_suffix(".0").unwrap_or(&text);
@@ -277,7 +277,7 @@ pub(super) fn num(value: f64) -> String {
     }
 }
 
-/// `words` without what XML 1.0 forbids and what would reorder the words round it.
+/// `words` without characters that XML 1.0 forbids or that would reorder the text around it.
 fn printable(words: &str) -> String {
     let kept = |letter: &char| {
         !letter.is_control()

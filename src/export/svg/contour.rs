@@ -1,18 +1,18 @@
-//! Where a sampled field rises above a level: closed rings by marching squares.
+//! The regions where a sampled field exceeds a level: closed rings by marching squares.
 
-/// Samples of a field at the nodes of a square lattice, row-major, with one row of nothing all
-/// round so that every ring closes beyond the sampled part.
+/// Samples of a field at the nodes of a square lattice, row-major, surrounded by one row without a value so that
+/// every ring closes beyond the sampled part.
 pub(super) struct Field {
     columns: usize,
     rows: usize,
     values: Vec<f64>,
 }
 
-/// A crossing of the level with an edge of the lattice has no next one.
+/// Marks a crossing of the level with a lattice edge that has no successor.
 const NONE: usize = usize::MAX;
 
 impl Field {
-    /// `at` is asked for each of `columns` x `rows` nodes.
+    /// Calls `at` for each of `columns` x `rows` nodes.
     pub(super) fn sample(columns: usize, rows: usize, at: impl Fn(usize, usize) -> f64) -> Self {
         let (outer_columns, outer_rows) = (columns + 2, rows + 2);
         let mut values = vec![f64::NEG_INFINITY; outer_columns * outer_rows];
@@ -28,7 +28,7 @@ impl Field {
         }
     }
 
-    /// Nodes each way.
+    /// Nodes in each direction.
     pub(super) fn size(&self) -> (usize, usize) {
         (self.columns - 2, self.rows - 2)
     }
@@ -45,8 +45,8 @@ impl Field {
         })
     }
 
-    /// The rings round all that is at least `level`, in nodes from the first one; where a ring
-    /// leaves the sampled part it runs half a node beyond it.
+    /// The rings around everything at or above `level`, in nodes from the first one. Where a ring leaves the sampled
+    /// part it runs half a node beyond it.
     pub(super) fn rings(&self, level: f64) -> Vec<Vec<(f64, f64)>> {
         let mut next = vec![NONE; 2 * self.columns * self.rows];
         for row in 0..self.rows - 1 {
@@ -69,7 +69,7 @@ impl Field {
         rings
     }
 
-    /// Put the one or two pieces of one cell into `next`, the high ground on their left.
+    /// Add the one or two pieces in one cell to `next`, with the high ground on their left.
     fn link(&self, column: usize, row: usize, level: f64, next: &mut [usize]) {
         let corner = row * self.columns + column;
         let [sw, se] = [self.values[corner], self.values[corner + 1]];
@@ -78,8 +78,7 @@ impl Field {
             self.values[corner + self.columns + 1],
         ];
         let high = |value: f64, bit: u8| if value >= level { bit } else { 0 };
-        // Horizontal edges are numbered by their western node, vertical ones after all of them by
-        // their southern node.
+        // Horizontal edges are numbered by their western node, vertical ones after them by their southern node.
         let vertical = self.columns * self.rows;
         let (s, n) = (corner, corner + self.columns);
         let (w, e) = (vertical + corner, vertical + corner + 1);
@@ -136,7 +135,7 @@ impl Field {
 mod tests {
     use super::*;
 
-    /// Twice the enclosed area, counter-clockwise positive.
+    /// Twice the enclosed area, positive counter-clockwise.
     fn doubled_area(ring: &[(f64, f64)]) -> f64 {
         let next = ring.iter().cycle().skip(1);
         ring.iter()
@@ -201,7 +200,7 @@ mod tests {
         );
         for level in [0.2, 0.5, 0.8] {
             let points: usize = field.rings(level).iter().map(Vec::len).sum();
-            // Every edge inside is crossed, and those that lead out of high nodes at the rim.
+            // Every edge inside is crossed, and so are those that lead outwards from high nodes at the rim.
             assert_eq!(points, 2 * 20 * 19 + 40);
         }
     }

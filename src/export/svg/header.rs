@@ -1,11 +1,11 @@
-//! The lines above the plan: what was asked for and how it went.
+//! The lines above the plan view: the request and the result.
 
 use super::canvas::{Area, Canvas, Font};
 use super::palette::{BROKEN, INK, MUTED};
 use super::{LEFT, RIGHT, WIDTH, figure, metres, name};
 use crate::export::Delivery;
 
-/// Pixels from the top of the sheet to the plan's frame.
+/// Pixels from the top of the sheet to the plan view's frame.
 pub(super) fn height(delivery: &Delivery) -> f64 {
     if delivery.result.feasible {
         78.0
@@ -76,7 +76,7 @@ fn clearance(delivery: &Delivery) -> String {
     }
 }
 
-/// What is wrong with an infeasible route.
+/// Why a route is infeasible.
 fn verdict(delivery: &Delivery) -> String {
     let violations = &delivery.result.checks.violations;
     let Some(first) = violations.first() else {

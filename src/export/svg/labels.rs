@@ -1,8 +1,8 @@
-//! Where words may stand: inside the frame, and on nothing that stands already.
+//! Placement of labels: inside the frame, without overlap.
 
 use super::canvas::{Area, Spot};
 
-/// What is taken of a frame.
+/// The occupied areas of a frame.
 pub(super) struct Labels {
     frame: Area,
     taken: Vec<Area>,
@@ -16,17 +16,17 @@ impl Labels {
         }
     }
 
-    /// Keep words off `area`.
+    /// Keep labels off `area`.
     pub(super) fn reserve(&mut self, area: Area) {
         self.taken.push(area);
     }
 
-    /// Keep words off a line.
+    /// Keep labels off a line.
     pub(super) fn reserve_line(&mut self, line: &[Spot]) {
         const SIDE: f64 = 6.0;
         for ends in line.windows(2) {
             let (dx, dy) = (ends[1].0 - ends[0].0, ends[1].1 - ends[0].1);
-            // However long a line runs beyond the frame, this many boxes cover what is seen of it.
+            // However far a line runs beyond the frame, this many boxes cover its visible part.
             let steps = ((dx * dx + dy * dy).sqrt() / SIDE)
                 .ceil()
                 .clamp(1.0, 1000.0);
@@ -47,7 +47,7 @@ impl Labels {
         self.frame.encloses(area) && !self.taken.iter().any(|taken| taken.overlaps(area))
     }
 
-    /// Take the first place that is free.
+    /// Occupy the first candidate that is free.
     pub(super) fn place(&mut self, candidates: impl IntoIterator<Item = Area>) -> Option<Area> {
         let found = candidates.into_iter().find(|area| self.is_free(area))?;
         self.taken.push(found);

@@ -1,7 +1,7 @@
-//! A drawing of a plan: the route seen from above, its profile below, on one sheet of SVG 1.1.
+//! A drawing of a plan: the route seen from above with its profile below, on one sheet of SVG 1.1.
 //!
-//! The same documents give the same bytes. Deliberately absent: scripts, styles and anything that
-//! would have to be fetched, so that the file can be opened, printed and mailed as it is.
+//! Equal documents give the same bytes. Deliberately absent: scripts, styles and external resources, so that the file
+//! can be opened, printed and mailed as it is.
 
 mod axes;
 mod canvas;
@@ -22,22 +22,22 @@ use scale::MapScale;
 use super::{Delivery, Options};
 use crate::geometry::{Point3, Rect};
 
-/// Of the sheet, pixels.
+/// Width of the sheet, pixels.
 const WIDTH: f64 = 900.0;
-/// Left of the frames: labels of the axes.
+/// Left of the frames: axis labels.
 const LEFT: f64 = 70.0;
 /// Right of everything.
 const RIGHT: f64 = 18.0;
-/// Of the plan's frame.
+/// Width of the plan view's frame.
 const PLAN_WIDTH: f64 = 620.0;
-/// Below the plan's frame: labels, scale bar.
+/// Below the plan view's frame: labels and scale bar.
 const PLAN_FOOT: f64 = 62.0;
-/// Of the profile's frame.
+/// Height of the profile's frame.
 const PROFILE_HEIGHT: f64 = 170.0;
 /// Below the profile's frame.
 const PROFILE_FOOT: f64 = 44.0;
-/// Height of the plan's frame over its width; a longer or flatter area is shown with what lies
-/// beside it.
+/// Range of the height of the plan view's frame over its width; a longer or flatter area is shown with its
+/// surroundings.
 const ASPECT: (f64, f64) = (0.66, 1.05);
 
 /// Draw a plan.
@@ -66,13 +66,13 @@ pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
     canvas.finish()
 }
 
-/// What the sheet is titled.
+/// Title of the sheet.
 fn name(delivery: &Delivery) -> &str {
     let name = delivery.scenario.name.as_deref();
     name.unwrap_or("unnamed scenario")
 }
 
-/// Of legs that can be flown, or of a route that breaks something.
+/// Colour of a feasible or an infeasible route.
 fn route_color(delivery: &Delivery) -> &'static str {
     if delivery.result.feasible {
         palette::ROUTE
@@ -81,7 +81,7 @@ fn route_color(delivery: &Delivery) -> &'static str {
     }
 }
 
-/// Indices of what breaks a constraint: of each `leg` or of each `waypoint`.
+/// Indices of each `leg` or each `waypoint` that violates a constraint.
 fn broken(delivery: &Delivery, place: &str) -> Vec<usize> {
     let places = delivery.result.checks.violations.iter();
     let mut indices: Vec<usize> = places
@@ -91,7 +91,7 @@ fn broken(delivery: &Delivery, place: &str) -> Vec<usize> {
     indices
 }
 
-/// The area and the route with a little room, in a frame of a pleasant shape.
+/// The area and the route with some room around, within the range of aspect ratios.
 fn map(delivery: &Delivery, top: f64) -> MapScale {
     let ends = [delivery.scenario.area.min, delivery.scenario.area.max];
     let route = delivery.waypoints.iter().map(Point3::xy);
@@ -116,7 +116,7 @@ fn map(delivery: &Delivery, top: f64) -> MapScale {
     }
 }
 
-/// A number for people: three or four figures of it.
+/// A number for display, with three or four significant digits.
 fn figure(value: f64) -> String {
     let decimals = match value.abs() {
         size if size >= 1000.0 => 0,
@@ -127,7 +127,7 @@ fn figure(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-/// Metres for people.
+/// Metres for display.
 fn metres(value: f64) -> String {
     let decimals = usize::from(value.abs() < 100.0);
     format!("{value:.decimals$} m")

@@ -1,16 +1,16 @@
-//! The colours of the drawing, for white paper and for eyes that do not tell red from green.
+//! The colours of the drawing, for white paper and for red-green colour blindness.
 
-/// Words and axes.
+/// Text and axes.
 pub(super) const INK: &str = "#1c2630";
-/// Words of second rank.
+/// Secondary text.
 pub(super) const MUTED: &str = "#5b6671";
 /// Thin lines of the axes.
 pub(super) const RULE: &str = "#d5dade";
 /// The route of a feasible plan.
 pub(super) const ROUTE: &str = "#0a4da3";
-/// The route of a plan that breaks a constraint, and nothing else.
+/// The route of an infeasible plan; used for nothing else.
 pub(super) const BROKEN: &str = "#d0021b";
-/// Threats, solid and soft.
+/// Solid parts and soft zones of threats.
 pub(super) const THREAT: &str = "#6a2c70";
 /// The ground in the profile, and contour lines.
 pub(super) const SOIL: &str = "#8d7757";
@@ -25,7 +25,7 @@ const TINTS: [[f64; 3]; 6] = [
     [205.0, 178.0, 151.0],
 ];
 
-/// Tint of the ground at `share` (0 to 1) of the way from the lowest to the highest.
+/// Tint of the ground at `share` (0 to 1) between the lowest and the highest.
 pub(super) fn tint(share: f64) -> String {
     let mut place = share.clamp(0.0, 1.0) * (TINTS.len() - 1) as f64;
     let mut idx = 0;

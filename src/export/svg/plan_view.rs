@@ -1,4 +1,4 @@
-//! The route seen from above, north up, among ground and threats.
+//! The route seen from above, north up, with ground and threats.
 
 use super::axes;
 use super::canvas::{Area, Canvas, Font, Spot, polyline, ring};
@@ -11,7 +11,7 @@ use crate::export::Delivery;
 use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};
 
-/// Style of a line that is drawn under another one to set it off.
+/// Style of a line drawn below another one for contrast.
 const CASING: &str =
     "fill=\"none\" stroke=\"#fff\" stroke-opacity=\"0.75\" stroke-linejoin=\"round\"";
 /// Style of every line of the route.
@@ -48,7 +48,7 @@ fn spots(points: &[Point3], map: &MapScale) -> Vec<Spot> {
     points.iter().map(|point| map.spot(point.xy())).collect()
 }
 
-/// The area's edge, and a veil over what waypoints may not reach.
+/// The area's edge, and a veil over what is outside of it.
 fn outside(canvas: &mut Canvas, delivery: &Delivery, map: &MapScale) {
     let frame = &map.frame;
     let sheet = [
@@ -76,7 +76,7 @@ fn area_corners(delivery: &Delivery, map: &MapScale) -> [Spot; 4] {
 pub(super) const AREA_EDGE: &str =
     "fill=\"none\" stroke=\"#5b6671\" stroke-width=\"1\" stroke-dasharray=\"7 3 1.5 3\"";
 
-/// Soft zones under all solid ones.
+/// All soft zones are drawn below all solid parts.
 fn threats(canvas: &mut Canvas, threats: &[Threat], map: &MapScale) {
     let seen: Vec<&Threat> = threats
         .iter()
@@ -120,7 +120,7 @@ fn soft_zone(canvas: &mut Canvas, threat: &Threat, map: &MapScale) {
         }
         Shape::Polygon(polygon) => {
             if polygon.margin() > 0.0 {
-                // A stroke of twice the margin with round joins reaches as far as the margin.
+                // A stroke of twice the margin with round joins extends exactly by the margin.
                 let width = super::canvas::num(2.0 * polygon.margin() * scale);
                 let data = outline(polygon.vertices(), map);
                 canvas.path(&data, &format!("stroke-width=\"{width}\""));
@@ -202,7 +202,7 @@ fn route(canvas: &mut Canvas, delivery: &Delivery, map: &MapScale) {
 /// Style of the straight legs of a feasible plan.
 pub(super) const STRAIGHT: &str =
     "fill=\"none\" stroke=\"#1c2630\" stroke-width=\"1\" stroke-dasharray=\"4 3\"";
-/// Style of a leg that breaks a constraint.
+/// Style of a leg that violates a constraint.
 pub(super) const BROKEN_LEG: &str = "fill=\"none\" stroke=\"#d0021b\" stroke-width=\"6\" \
                                      stroke-opacity=\"0.55\" stroke-linecap=\"round\"";
 
@@ -231,7 +231,7 @@ pub(super) fn target(canvas: &mut Canvas, at: Spot) {
     canvas.circle(at, 3.0, &format!("fill=\"{INK}\""));
 }
 
-/// A line without the points that lie within two thirds of a pixel of the one before.
+/// A line without the points that are within two thirds of a pixel of their predecessor.
 pub(super) fn thinned(line: &[Spot]) -> Vec<Spot> {
     let mut kept: Vec<Spot> = Vec::new();
     for (idx, spot) in line.iter().enumerate() {
@@ -313,7 +313,7 @@ fn threat_names(canvas: &mut Canvas, threats: &[Threat], map: &MapScale, labels:
         let candidates = if inside {
             vec![within]
         } else {
-            // Over a limited core there is enough contrast for dark words.
+            // The core of a threat limited in height has enough contrast for dark text.
             let own = (fits || reach.0 >= size.0).then_some(within);
             own.into_iter().chain(beside).collect()
         };
@@ -340,7 +340,7 @@ fn is_disc(threat: &Threat) -> bool {
     matches!(threat.shape, Shape::Cylinder(_))
 }
 
-/// Middle and size of the box round the solid part.
+/// Centre and size of the box around the solid part.
 fn core_box(threat: &Threat, map: &MapScale) -> (Spot, (f64, f64)) {
     let extent = match &threat.shape {
         Shape::Cylinder(disc) => threat.extent().grown(disc.radius - disc.influence),
@@ -361,7 +361,7 @@ fn heights(threat: &Threat) -> String {
     }
 }
 
-/// Places for words of `size` round `at`, `gap` away from it.
+/// Positions for text of `size` around `at`, at distance `gap`.
 fn around(at: Spot, size: (f64, f64), gap: f64) -> [Area; 8] {
     let (dx, dy) = (gap + size.0 / 2.0, gap + size.1 / 2.0);
     let near = 0.75;

@@ -1,4 +1,4 @@
-//! Heights along the route: ground, allowed band, threats on the way, and what is flown.
+//! Heights along the route: ground, altitude band, threats on the way, and the flown path.
 
 use super::canvas::{Area, Canvas, Font, Spot, num, polyline, ring};
 use super::palette::{INK, MUTED, SOIL};
@@ -9,19 +9,19 @@ use crate::export::Delivery;
 use crate::geometry::{Point2, Point3};
 use crate::threat::Threat;
 
-/// Places along the route where ground and threats are looked at.
+/// Number of places along the route at which ground and threats are sampled.
 const STATIONS: usize = 400;
 
 /// A place along the route.
 struct Station {
-    /// Horizontal way from the start, metres.
+    /// Horizontal distance along the route from the start, metres.
     way: f64,
     at: Point2,
-    /// Metres in the frame.
+    /// Elevation of the ground, metres in the frame.
     ground: f64,
 }
 
-/// From way and height to the sheet.
+/// Maps distance and height to the sheet.
 struct Scale {
     frame: Area,
     way: f64,
@@ -38,7 +38,7 @@ impl Scale {
         )
     }
 
-    /// How many times steeper slopes look.
+    /// Vertical exaggeration.
     fn exaggeration(&self) -> f64 {
         let across = self.frame.width / self.way;
         self.frame.height / (self.heights.1 - self.heights.0) / across
@@ -77,7 +77,7 @@ pub(super) fn draw(canvas: &mut Canvas, delivery: &Delivery, frame: Area) {
     canvas.rect(&frame, &format!("fill=\"none\" stroke=\"{INK}\""));
 }
 
-/// Horizontal way from the start to each point, metres.
+/// Horizontal distance along the route from the start to each point, metres.
 fn ways(course: &[Point3]) -> Vec<f64> {
     let mut way = 0.0;
     let mut ways = vec![0.0];
@@ -112,7 +112,7 @@ fn stations(delivery: &Delivery, course: &[Point3], ways: &[f64]) -> Vec<Station
     (0..STATIONS).map(station).collect()
 }
 
-/// Room for ground and route, and for the band unless it would flatten both.
+/// Range of heights for ground and route, and for the altitude band unless it would flatten both.
 fn heights(delivery: &Delivery, stations: &[Station]) -> (f64, f64) {
     let band = delivery.scenario.altitude;
     let ground = stations.iter().map(|station| station.ground);
@@ -170,11 +170,11 @@ fn axes(canvas: &mut Canvas, scale: &Scale, delivery: &Delivery) {
     canvas.text(foot, &title, &words);
 }
 
-/// Style of a soft zone on the way.
+/// Style of a soft zone crossed by the route.
 const CROSSED: &str = "fill=\"#6a2c70\" fill-opacity=\"0.18\"";
-/// Style of the allowed heights.
+/// Style of the altitude band.
 pub(super) const ALLOWED: &str = "fill=\"#8fb8d8\" fill-opacity=\"0.28\"";
-/// Style of their edges.
+/// Style of the band's edges.
 pub(super) const ALLOWED_EDGE: &str = "fill=\"none\" stroke=\"#8fb8d8\" stroke-dasharray=\"5 3\"";
 
 fn band(canvas: &mut Canvas, delivery: &Delivery, stations: &[Station], scale: &Scale) {
@@ -197,7 +197,7 @@ fn ground(canvas: &mut Canvas, stations: &[Station], scale: &Scale) {
     );
 }
 
-/// The line that runs `above` metres over the ground.
+/// The line `above` metres over the ground.
 fn over_ground(stations: &[Station], above: f64, scale: &Scale) -> Vec<Spot> {
     let stations = stations.iter();
     stations
@@ -205,7 +205,7 @@ fn over_ground(stations: &[Station], above: f64, scale: &Scale) -> Vec<Spot> {
         .collect()
 }
 
-/// Where the route passes through the soft zone, seen from above, from the threat's base to its top.
+/// Where the route passes through the soft zone, seen from above, drawn from the threat's base to its top.
 fn crossings(canvas: &mut Canvas, threat: &Threat, stations: &[Station], scale: &Scale) {
     let unlimited = Threat {
         base: None,
@@ -276,14 +276,14 @@ fn flown(
     }
 }
 
-/// Way along the path at which each waypoint is passed: stations in order whose summed squared
-/// distances to the waypoints are least, by dynamic programming.
+/// Distance along the path at which each waypoint is passed: the stations, in order, with the least sum of squared
+/// distances to the waypoints, by dynamic programming.
 fn abreast(waypoints: &[Point3], stations: &[Station]) -> Vec<f64> {
     let count = stations.len();
     let mut best = vec![0.0; count];
     let mut choices = Vec::with_capacity(waypoints.len());
     for waypoint in waypoints {
-        // Least sum so far with this waypoint passed at each station or before, and where.
+        // Least sum with this waypoint passed at or before each station, and that station.
         let mut chosen = vec![0; count];
         let mut least = (f64::INFINITY, 0);
         for (idx, station) in stations.iter().enumerate() {

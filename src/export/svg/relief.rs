@@ -8,21 +8,21 @@ use super::scale::{MapScale, Steps};
 use crate::geometry::Point2;
 use crate::terrain::Terrain;
 
-/// Samples from west to east, the finest first; a coarser lattice is taken where the ground is so
-/// rough that the drawing would grow beyond [`MOST_POINTS`].
+/// Samples from west to east, finest first. A coarser lattice is used if the ground is so rough that the drawing
+/// would exceed [`MOST_POINTS`].
 const LATTICES: [usize; 5] = [141, 101, 71, 51, 31];
-/// Of all rings together.
+/// Most points of all rings together.
 const MOST_POINTS: usize = 16_000;
-/// Contour lines at most.
+/// Most contour lines.
 const MOST_LEVELS: f64 = 14.0;
-/// Ground that varies less than this is drawn level, metres.
+/// Ground with less variation is drawn level, metres.
 const LEVEL_M: f64 = 1e-3;
 
 /// The ground under a plan.
 pub(super) struct Relief {
-    /// Lowest and highest ground seen, metres.
+    /// Lowest and highest ground shown, metres.
     pub(super) range: (f64, f64),
-    /// Between contour lines.
+    /// Interval of the contour lines.
     pub(super) interval: Steps,
     contours: Vec<Layer>,
     shades: Vec<Layer>,
@@ -30,7 +30,7 @@ pub(super) struct Relief {
 
 /// One filled outline.
 struct Layer {
-    /// Metres; of a shade, its darkness.
+    /// Metres; for shading, its darkness.
     level: f64,
     style: String,
     rings: Vec<Vec<Spot>>,
@@ -135,7 +135,7 @@ impl Relief {
         canvas.group("g", "", |canvas| draw(canvas, &self.shades));
     }
 
-    /// A height on each contour line, or on every other one of many, where there is room for it.
+    /// Label each contour line, or every other one if there are many, where there is room.
     pub(super) fn label(&self, canvas: &mut Canvas, labels: &mut Labels) {
         let font = Font::new(9.0, "#6b583c").anchor("middle").halo();
         let many = self.contours.len() > 8;
@@ -173,7 +173,7 @@ fn draw(canvas: &mut Canvas, layers: &[Layer]) {
     }
 }
 
-/// Half the circumference of the box round a ring, pixels.
+/// Half the perimeter of the box around a ring, pixels.
 fn extent(ring: &[Spot]) -> f64 {
     let span = |of: fn(&Spot) -> f64| {
         let (min, max) = ring
@@ -187,9 +187,8 @@ fn extent(ring: &[Spot]) -> f64 {
     span(|spot| spot.0) + span(|spot| spot.1)
 }
 
-/// How much brighter and how much darker than level ground each node is, lit from the north-west,
-/// half way up. Slopes are raised or flattened to a common steepness, so that hills and ranges of
-/// mountains look alike.
+/// How much brighter and how much darker than level ground each node is, with light from the north-west at 45
+/// degrees. Slopes are scaled to a common steepness, so that hills and mountain ranges look alike.
 fn shading(field: &Field, metres: f64) -> (Field, Field) {
     const STEEPNESS: f64 = 0.5;
     const LIGHT: [f64; 3] = [-0.5, 0.5, std::f64::consts::FRAC_1_SQRT_2];
@@ -225,16 +224,16 @@ fn shading(field: &Field, metres: f64) -> (Field, Field) {
     )
 }
 
-/// A place on a contour line for its height.
+/// A position on a contour line for its label.
 struct Place {
     at: Spot,
-    /// Of the line, from left to right, of length 1.
+    /// Unit vector along the line, from left to right.
     direction: (f64, f64),
     /// 1 where the line is straight.
     straightness: f64,
 }
 
-/// Places along `ring` where it runs on for `width` pixels.
+/// Positions along `ring` that leave `width` pixels for text.
 fn straight_places(ring: &[Spot], width: f64) -> Vec<Place> {
     let mut places = Vec::new();
     for middle in (0..ring.len()).step_by(4) {

@@ -1,14 +1,14 @@
-//! From metres to pixels, and which round numbers to print along an axis.
+//! Maps metres to pixels, and chooses round numbers along an axis.
 
 use super::canvas::{Area, Spot};
 use crate::geometry::{Point2, Rect};
 
-/// A plan at the same scale either way, north up.
+/// A map with the same scale in both directions, north up.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MapScale {
-    /// What is shown, metres.
+    /// The part of the plane shown, metres.
     pub(super) view: Rect,
-    /// Where on the sheet.
+    /// Position on the sheet.
     pub(super) frame: Area,
 }
 
@@ -26,7 +26,7 @@ impl MapScale {
     }
 }
 
-/// A number of steps of 1, 2 or 5 times a power of ten.
+/// Steps of 1, 2 or 5 times a power of ten.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Steps {
     pub(super) step: f64,
@@ -37,7 +37,7 @@ impl Steps {
     /// At most `count` steps in `span` > 0.
     pub(super) fn of(span: f64, count: f64) -> Self {
         let rough = (span / count).max(1e-6);
-        // By products, not by logarithms: these round alike everywhere.
+        // By products, not logarithms: these round the same on every platform.
         let mut decade: f64 = 1e-6;
         while decade * 10.0 <= rough {
             decade *= 10.0;

@@ -1,4 +1,4 @@
-//! Beside the plan: what the marks mean, the tints of heights, and the figures of the result.
+//! The column beside the plan view: the legend, the tints of heights, and key figures of the result.
 
 use super::canvas::{Area, Canvas, Font, Spot};
 use super::palette::{BROKEN, INK, MUTED, ROUTE, RULE, SOIL, tint};
@@ -10,9 +10,9 @@ use super::relief::Relief;
 use super::{RIGHT, WIDTH, figure, metres};
 use crate::export::Delivery;
 
-/// Between the plan's frame and this.
+/// Between the plan view's frame and the sidebar.
 const GAP: f64 = 22.0;
-/// Between lines of the legend and of the figures.
+/// Line height of the legend and of the figures.
 const LEGEND_LINE: f64 = 19.0;
 const FIGURE_LINE: f64 = 17.0;
 
@@ -35,7 +35,7 @@ pub(super) fn draw(canvas: &mut Canvas, delivery: &Delivery, relief: &Relief, pl
 
 type Mark = fn(&mut Canvas, Spot);
 
-/// What occurs in the drawing.
+/// The marks that occur in the drawing.
 fn legend(delivery: &Delivery) -> Vec<(&'static str, Mark)> {
     let threats = &delivery.scenario.threats;
     let feasible = delivery.result.feasible;
@@ -104,7 +104,7 @@ fn across(canvas: &mut Canvas, (x, y): Spot, style: &str) {
     canvas.line_between((x - 13.0, y), (x + 13.0, y), style);
 }
 
-/// A bar of tints; the `y` below it.
+/// A bar of tints; returns the `y` below it.
 fn heights(canvas: &mut Canvas, relief: &Relief, column: &Area, y: f64) -> f64 {
     let font = Font::new(11.0, MUTED);
     let (min, max) = relief.range;
@@ -119,7 +119,7 @@ fn heights(canvas: &mut Canvas, relief: &Relief, column: &Area, y: f64) -> f64 {
     edges.extend(levels);
     edges.push(max);
     for (idx, ends) in edges.windows(2).enumerate() {
-        // The ground below every contour line has the lowest tint.
+        // The ground below all contour lines has the lowest tint.
         let fill = if idx == 0 {
             tint(0.0)
         } else {

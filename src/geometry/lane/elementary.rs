@@ -1,6 +1,6 @@
 //! Sine, cosine, arc tangent, exponential and logarithm in lanes, by polynomials.
 //!
-//! Each states the range it is good for and how far it may lie from the true value there.
+//! Each function states its valid range and its greatest error there.
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI, SQRT_2};
 
@@ -8,11 +8,11 @@ use pulp::Simd;
 
 use super::Lane;
 
-/// Added and taken off again, it rounds what is below 2^51 to a whole number, ties to even.
+/// Adding and subtracting this rounds values below 2^51 to whole numbers, ties to even.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
-/// Pi / 2 in three parts; those before the last end in zeros, so that their products with whole
-/// numbers up to 2^20 are exact.
+/// Pi / 2 in three parts; all but the last end in zeros, so that their products with whole numbers up to 2^20 are
+/// exact.
 const HALF_PI: [f64; 3] = [
     1.570_796_326_734_125_6,
     6.077_100_506_303_966e-11,
@@ -22,7 +22,7 @@ const HALF_PI: [f64; 3] = [
 /// Ln 2 in two parts, the first ending in zeros.
 const LN_2_PARTS: [f64; 2] = [0.693_147_180_485_539_1, 7.440_617_110_012_397e-11];
 
-/// Of (atan x) / x in powers of x^2, for |x| <= tan(pi / 8): a Chebyshev fit, off by 1.3e-18.
+/// Coefficients of (atan x) / x in powers of x^2, for |x| <= tan(pi / 8): a Chebyshev fit, error 1.3e-18.
 const ATAN: [f64; 12] = [
     1.0,
     -0.333_333_333_333_331_2,
@@ -38,7 +38,7 @@ const ATAN: [f64; 12] = [
     -0.017_803_896_394_812_564,
 ];
 
-/// Taylor's coefficients of (sin x) / x and cos x, in powers of x^2.
+/// Taylor coefficients of (sin x) / x and cos x, in powers of x^2.
 const SIN: [f64; 8] = [
     1.0,
     -1.0 / 6.0,
@@ -61,7 +61,7 @@ const COS: [f64; 9] = [
     1.0 / 20_922_789_888_000.0,
 ];
 
-/// Of e^x in powers of x, for |x| <= ln 2 / 2: a Chebyshev fit, off by 3.2e-18.
+/// Coefficients of e^x in powers of x, for |x| <= ln 2 / 2: a Chebyshev fit, error 3.2e-18.
 const EXP: [f64; 12] = [
     1.0,
     1.0,
@@ -77,7 +77,7 @@ const EXP: [f64; 12] = [
     2.511_004_920_481_865_8e-8,
 ];
 
-/// Of (artanh x) / x in powers of x^2, for |x| <= 1/3: a Chebyshev fit, off by 1.3e-18.
+/// Coefficients of (artanh x) / x in powers of x^2, for |x| <= 1/3: a Chebyshev fit, error 1.3e-18.
 const ARTANH: [f64; 11] = [
     1.0,
     0.333_333_333_333_330_76,
@@ -92,22 +92,22 @@ const ARTANH: [f64; 11] = [
     0.085_225_996_322_789,
 ];
 
-/// 2^52: its last bits count units.
+/// 2^52: its lowest bit is 1.
 const COUNTER: f64 = 4_503_599_627_370_496.0;
 
-/// The bits of an exponent, and of 1.
+/// The exponent bits, and those of 1.
 const EXPONENT: u64 = 0x7ff << 52;
 const ONE: u64 = 0x3ff << 52;
 
 impl<S: Simd> Lane<S> {
-    /// Sine and cosine; to 2 units in the last place of 1 for |x| <= 10^5.
+    /// Sine and cosine, to 2 units in the last place of 1 for |x| <= 10^5.
     #[inline(always)]
     pub(crate) fn sin_cos(self) -> (Self, Self) {
         let quarters = self.rounded_product(FRAC_2_PI);
         let x = self - quarters * HALF_PI[0] - quarters * HALF_PI[1] - quarters * HALF_PI[2];
         let square = x * x;
         let (sin, cos) = (x * square.polynomial(&SIN), square.polynomial(&COS));
-        // -2 to 2: how far round, modulo 4.
+        // -2 to 2: the quadrant, modulo 4.
         let quarter = quarters - quarters.rounded_product(0.25) * 4.0;
         let odd = (quarter.abs() - 1.0).abs().lt(self.with(0.5));
         let sin_falls = quarter.lt(self.with(-0.5)) | self.with(1.5).lt(quarter);
@@ -116,15 +116,15 @@ impl<S: Simd> Lane<S> {
         (sin_falls.select(-sin, sin), cos_falls.select(-cos, cos))
     }
 
-    /// The angle in `[0, pi]` of the direction `(x, self)`, `self` >= 0; to 3 units in the last
-    /// place. 0 where both are 0.
+    /// The angle in `[0, pi]` of the direction `(x, self)`, `self` >= 0, to 3 units in the last place; 0 if both are
+    /// 0.
     #[inline(always)]
     pub(crate) fn atan2(self, x: Self) -> Self {
         let (y, zero) = (self, self.with(0.0));
         let away = x.abs();
         let steep = away.lt(y);
         let (least, greatest) = (y.min(away), y.max(away));
-        // Beyond an eighth turn's half, atan q = pi / 4 + atan((q - 1) / (q + 1)).
+        // Beyond pi / 8, atan q = pi / 4 + atan((q - 1) / (q + 1)).
         let wide = (greatest * (SQRT_2 - 1.0)).lt(least);
         let over = wide.select(least - greatest, least);
         let under = wide.select(least + greatest, greatest);
@@ -134,18 +134,18 @@ impl<S: Simd> Lane<S> {
         x.lt(zero).select(self.with(PI) - angle, angle)
     }
 
-    /// e^x; to 2 units in the last place for |x| <= 700.
+    /// e^x, to 2 units in the last place for |x| <= 700.
     #[inline(always)]
     pub(crate) fn exp(self) -> Self {
         let doublings = self.rounded_product(LOG2_E);
         let x = self - doublings * LN_2_PARTS[0] - doublings * LN_2_PARTS[1];
-        // The whole number stands in the last bits of its sum with the rounder.
+        // The whole number is in the last bits of its sum with the rounder.
         let scale = (doublings + ROUNDER)
             .map(|_, sum| f64::from_bits((sum.to_bits() << 52).wrapping_add(ONE)));
         x.polynomial(&EXP) * scale
     }
 
-    /// e^x for -36 <= x <= 0, to 1.2e-8: a power of that of a small part of it.
+    /// e^x for -36 <= x <= 0, to 1.2e-8: e^(x / 64), squared six times.
     #[inline(always)]
     pub(crate) fn exp_roughly(self) -> Self {
         let part = self * (1.0 / 64.0);
@@ -161,13 +161,13 @@ impl<S: Simd> Lane<S> {
         power
     }
 
-    /// The logarithm of `self / divisor`, both > 0 and the quotient >= 1 and finite; to 3 units in
-    /// the last place of it or of 1, whichever is greater. Of others, any number or none.
+    /// The logarithm of `self / divisor`, both > 0 and the quotient >= 1 and finite, to 3 units in the last place of
+    /// the result or of 1, whichever is greater. For other operands the result is undefined.
     #[inline(always)]
     pub(crate) fn ln_over(self, divisor: Self) -> Self {
-        // The quotient of the powers of two in both; what is left lies between 1/2 and 2.
+        // The quotient of both powers of two; the rest lies between 1/2 and 2.
         let power = self.zip(divisor, |over, under| {
-            // In a lane that does not count, the quotient may be anything.
+            // In an unused lane the quotient may be anything.
             let power = (over.to_bits() & EXPONENT).wrapping_add(ONE);
             f64::from_bits(power.wrapping_sub(under.to_bits() & EXPONENT))
         });
@@ -185,8 +185,8 @@ impl<S: Simd> Lane<S> {
         self * factor + ROUNDER - ROUNDER
     }
 
-    /// The polynomial of `self` with `coefficients`, constant first: even and odd powers apart, so
-    /// that the processor works on both at once.
+    /// The polynomial of `self` with `coefficients`, constant first. Even and odd powers are summed separately, so
+    /// that the processor evaluates them in parallel.
     #[inline(always)]
     fn polynomial<const N: usize>(self, coefficients: &[f64; N]) -> Self {
         let square = self * self;
@@ -217,7 +217,7 @@ mod tests {
     }
     use Function::{Atan2, Cos, Exp, ExpRoughly, LnOver, Sin};
 
-    /// `function` of each number of two rows.
+    /// `function` applied to each pair of numbers of two rows.
     struct Apply(Function, Row, Row);
 
     impl WithSimd for Apply {
@@ -243,7 +243,7 @@ mod tests {
         }
     }
 
-    /// The values, the same in every width.
+    /// The values, which are the same at every vector width.
     fn apply(function: Function, x: Row, y: Row) -> Row {
         let wide = Arch::new().dispatch(Apply(function, x, y));
         let scalar = Apply(function, x, y).with_simd(Scalar::new());

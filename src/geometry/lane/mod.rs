@@ -1,8 +1,8 @@
-//! Numbers side by side: the same arithmetic on as many as the processor takes at once.
+//! SIMD lanes: the same arithmetic on as many numbers as the processor handles at once.
 //!
-//! Every operation is one that IEEE 754 defines to the last bit (`+ - * /`, square root, comparison,
-//! selection), so that a lane holds the same bits whatever the width. Deliberately absent: fused
-//! multiplication, approximate reciprocals, anything that mixes lanes.
+//! Every operation is exactly defined by IEEE 754 (`+ - * /`, square root, comparison, selection), so that a lane has
+//! the same bits at any vector width. Deliberately absent: fused multiplication, approximate reciprocals, and
+//! operations that mix lanes.
 
 mod elementary;
 
@@ -10,27 +10,27 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 use pulp::Simd;
 
-/// Numbers in a [`Row`]; every width of the processor divides it.
+/// Numbers in a [`Row`]; every vector width divides it.
 pub const LANES: usize = 8;
 
-/// The same figure of [`LANES`] things, in memory.
+/// The same quantity of [`LANES`] items, in memory.
 pub type Row = [f64; LANES];
 
-/// So many numbers as `S` takes at once: a part of a [`Row`], in registers.
+/// As many numbers as `S` handles at once: a part of a [`Row`], in registers.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lane<S: Simd> {
     simd: S,
     values: S::f64s,
 }
 
-/// A condition on each number of a [`Lane`].
+/// A condition for each number of a [`Lane`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Mask<S: Simd> {
     simd: S,
     values: S::m64s,
 }
 
-/// How many parts `S` takes a [`Row`] in.
+/// Number of parts into which `S` divides a [`Row`].
 #[inline(always)]
 pub(crate) fn parts<S: Simd>() -> usize {
     LANES / S::F64_LANES
@@ -55,13 +55,13 @@ impl<S: Simd> Lane<S> {
         }
     }
 
-    /// Write it to part `part` of `row`.
+    /// Write the lane to part `part` of `row`.
     #[inline(always)]
     pub(crate) fn store(self, row: &mut Row, part: usize) {
         S::as_mut_simd_f64s(row).0[part] = self.values;
     }
 
-    /// In memory; 0 beyond the lanes that this has.
+    /// The lane in memory, padded with 0.
     #[inline(always)]
     pub(crate) fn row(self) -> Row {
         let mut row = [0.0; LANES];
@@ -69,13 +69,13 @@ impl<S: Simd> Lane<S> {
         row
     }
 
-    /// `value` in as many lanes as this has.
+    /// `value` in every lane of the same width.
     #[inline(always)]
     pub(crate) fn with(self, value: f64) -> Self {
         Self::splat(self.simd, value)
     }
 
-    /// One number at a time, where there is no better way.
+    /// Apply `each` to one number at a time; for operations without a vector form.
     #[inline(always)]
     pub(crate) fn map(self, mut each: impl FnMut(usize, f64) -> f64) -> Self {
         let mut row = self.row();
@@ -85,14 +85,14 @@ impl<S: Simd> Lane<S> {
         Self::load(self.simd, &row, 0)
     }
 
-    /// As `map`, of both.
+    /// As `map`, for two operands.
     #[inline(always)]
     pub(crate) fn zip(self, other: Self, mut each: impl FnMut(f64, f64) -> f64) -> Self {
         let others = other.row();
         self.map(|lane, value| each(value, others[lane]))
     }
 
-    /// With `value` in one lane.
+    /// The same with `value` in one lane.
     #[inline(always)]
     pub(crate) fn set(self, lane: usize, value: f64) -> Self {
         self.map(|own, old| if own == lane { value } else { old })
@@ -130,19 +130,19 @@ impl<S: Simd> Lane<S> {
         }
     }
 
-    /// The lesser; `other` where either is not a number.
+    /// The lesser; `other` if either is NaN.
     #[inline(always)]
     pub(crate) fn min(self, other: Self) -> Self {
         self.lt(other).select(self, other)
     }
 
-    /// The greater; `other` where either is not a number.
+    /// The greater; `other` if either is NaN.
     #[inline(always)]
     pub(crate) fn max(self, other: Self) -> Self {
         other.lt(self).select(self, other)
     }
 
-    /// Brought into `[low, high]`; `low` where it is not a number.
+    /// Clamped to `[low, high]`; `low` for NaN.
     #[inline(always)]
     pub(crate) fn clamp(self, low: Self, high: Self) -> Self {
         self.max(low).min(high)
@@ -150,7 +150,7 @@ impl<S: Simd> Lane<S> {
 }
 
 impl<S: Simd> Mask<S> {
-    /// `yes` where it holds, elsewhere `no`.
+    /// `yes` where the condition holds, elsewhere `no`.
     #[inline(always)]
     pub(crate) fn select(self, yes: Lane<S>, no: Lane<S>) -> Lane<S> {
         Lane {
@@ -159,32 +159,32 @@ impl<S: Simd> Mask<S> {
         }
     }
 
-    /// `yes` where it holds, elsewhere 0.
+    /// `yes` where the condition holds, elsewhere 0.
     #[inline(always)]
     pub(crate) fn keep(self, yes: Lane<S>) -> Lane<S> {
         self.select(yes, yes.with(0.0))
     }
 
-    /// Whether it holds in any lane.
+    /// Whether the condition holds in any lane.
     #[inline(always)]
     pub(crate) fn any(self) -> bool {
         self.simd.first_true_m64s(self.values) < S::F64_LANES
     }
 
-    /// Whether it holds in every lane.
+    /// Whether the condition holds in every lane.
     #[inline(always)]
     pub(crate) fn all(self) -> bool {
         !(!self).any()
     }
 
-    /// In memory; false beyond the lanes that this has.
+    /// The mask in memory, padded with false.
     #[inline(always)]
     pub(crate) fn row(self) -> [bool; LANES] {
         let one = Lane::splat(self.simd, 1.0);
         self.keep(one).row().map(|holds| holds > 0.0)
     }
 
-    /// Look at the lanes in which it holds.
+    /// Call `each` for the lanes in which the condition holds.
     #[inline(always)]
     pub(crate) fn each(self, mut each: impl FnMut(usize)) {
         let _ = self.map(|lane| {
@@ -193,7 +193,7 @@ impl<S: Simd> Mask<S> {
         });
     }
 
-    /// `each` of the lanes in which it holds, elsewhere 0.
+    /// `each` for the lanes in which the condition holds, elsewhere 0.
     #[inline(always)]
     pub(crate) fn map(self, mut each: impl FnMut(usize) -> f64) -> Lane<S> {
         let one = Lane::splat(self.simd, 1.0);

@@ -1,4 +1,4 @@
-//! How a document writes places: metres of the local frame, or degrees that are laid onto a plane.
+//! How a document writes places: in metres of the local frame, or in degrees that are mapped to a plane.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -16,18 +16,18 @@ use super::ranges::{COORDINATE, LATITUDE, LONGITUDE};
 use super::sketch;
 use super::value::{At, figure};
 
-/// Reads places of one document.
+/// Reads the places of one document.
 #[derive(Debug)]
 pub(super) enum Chart {
     Local,
     Wgs84(Box<Earth>),
-    /// Degrees that no plane was found for: the area or the datum is at fault.
+    /// Degrees without a plane, because the area or the datum is invalid.
     Degrees,
     /// The frame is unknown, so places cannot be read; everything else still can.
     Unknown,
 }
 
-/// The plane of a document in degrees, and the degrees that its places were given in.
+/// The plane of a document in degrees, and the degrees in which its places were given.
 #[derive(Debug)]
 pub(super) struct Earth {
     datum: Datum,
@@ -38,7 +38,7 @@ pub(super) struct Earth {
 }
 
 impl Chart {
-    /// The chart that a document asks for.
+    /// The chart for the document's `frame`.
     pub(super) fn of(
         fields: &Fields<'_>,
         dataset: Option<&Named<'_>>,
@@ -68,7 +68,7 @@ impl Chart {
         }
     }
 
-    /// The frame, with all that was written in it; `None` where none could be told.
+    /// The frame, with all places written in it; `None` where it is unknown or has no plane.
     pub(super) fn finish(self) -> Option<Frame> {
         match self {
             Self::Local => Some(Frame::Local),
@@ -83,7 +83,7 @@ impl Chart {
         }
     }
 
-    /// `{"x", "y", "z"}` or `{"lat", "lon", "alt"}`; passed over where the frame is unknown.
+    /// `{"x", "y", "z"}` or `{"lat", "lon", "alt"}`; skipped where the frame is unknown.
     pub(super) fn point3(&self, at: At<'_>, faults: &mut Faults) -> Option<Point3> {
         match self {
             Self::Local => {
@@ -125,7 +125,7 @@ impl Chart {
         }
     }
 
-    /// Where free waypoints are kept, if the document or its frame says so: the outer `None` has left a fault.
+    /// The area for free waypoints, if the document or its frame gives one; an outer `None` has added a fault.
     #[expect(
         clippy::option_option,
         reason = "the outer one tells whether it could be read"
@@ -145,7 +145,7 @@ impl Chart {
         }
     }
 
-    /// The name of a height in this frame.
+    /// Name of the height field in this frame.
     pub(super) fn height(&self) -> &'static str {
         match self {
             Self::Local | Self::Unknown => "z",
@@ -153,7 +153,7 @@ impl Chart {
         }
     }
 
-    /// `point` for people, as the document would write it.
+    /// `point` in messages, in the coordinates of the document.
     pub(super) fn say(&self, point: Point2) -> String {
         match self {
             Self::Wgs84(earth) => {
@@ -164,8 +164,8 @@ impl Chart {
         }
     }
 
-    /// Whether the start or the target lies in the area that was asked for, which the plane's
-    /// rectangle is only the greatest part of.
+    /// Whether the start or the target lies in the requested area; the plane's rectangle covers only the largest part
+    /// of it.
     pub(super) fn is_in_area(&self, end: Point2, area: Rect) -> bool {
         match self {
             Self::Wgs84(earth) => earth.area.contains(earth.place(end)),
@@ -175,7 +175,7 @@ impl Chart {
 }
 
 impl Earth {
-    /// The earth of a document in degrees; `None` has left a fault.
+    /// The earth of a document in degrees; `None` has added a fault.
     fn of(fields: &Fields<'_>, dataset: Option<&Named<'_>>, faults: &mut Faults) -> Option<Self> {
         let datum = datum(fields, faults);
         let given = fields.or("area", None, faults, |at, faults| {
@@ -192,7 +192,7 @@ impl Earth {
         earth.check(fields, faults).then_some(earth)
     }
 
-    /// The plane in the middle of `area`.
+    /// The earth with its plane at the middle of `area`.
     fn over(area: LatLonBox, datum: Datum, mean_alt: f64) -> Self {
         let middle = area.middle();
         let undulation_m = undulation_m(middle);
@@ -209,7 +209,7 @@ impl Earth {
         }
     }
 
-    /// That the plane fits the earth all over the area; whether it does.
+    /// Check that the plane fits the earth over the whole area; returns whether it does.
     fn check(&self, fields: &Fields<'_>, faults: &mut Faults) -> bool {
         let area = self.area;
         let what = if fields.has("area") {
@@ -240,7 +240,7 @@ impl Earth {
             let size = if has_inside {
                 format!("{what} is {width:.0} m by {height:.0} m")
             } else {
-                // Parallels over much of a hemisphere bend past each other.
+                // Over much of a hemisphere the curved parallels overlap on the plane.
                 format!(
                     "{what} reaches over {:.6} degrees of longitude",
                     area.width()
@@ -256,12 +256,12 @@ impl Earth {
         true
     }
 
-    /// The plane that is planned on.
+    /// The plane used for planning.
     pub(super) fn plane(&self) -> &TangentPlane {
         &self.plane
     }
 
-    /// Altitude of mean sea level, metres: what elevations of a dataset are above.
+    /// Altitude of mean sea level, metres; dataset elevations are relative to it.
     pub(super) fn sea_level_m(&self) -> f64 {
         match self.datum {
             Datum::Msl => 0.0,
@@ -269,7 +269,7 @@ impl Earth {
         }
     }
 
-    /// The greatest rectangle of the plane in the area: parallels and meridians bend in it.
+    /// The largest rectangle of the plane inside the area, whose parallels and meridians are curved on the plane.
     pub(super) fn rect(&self) -> Rect {
         let LatLonBox { min, max } = self.area;
         let middle = self.plane.origin().lon;
@@ -288,8 +288,8 @@ impl Earth {
         }
     }
 
-    /// Where free waypoints are kept: the greatest rectangle of the plane in the area, and the `ends`, which
-    /// may lie where the area bends beyond that.
+    /// The area for free waypoints: the largest rectangle of the plane inside the area, extended to `ends`, which may
+    /// lie in the curved parts of the area beyond that.
     fn area_with(&self, ends: [Option<Point3>; 2]) -> Option<Rect> {
         let rect = self.rect();
         let ends = ends.into_iter().flatten().map(|end| end.xy());
@@ -297,13 +297,13 @@ impl Earth {
         Rect::around(ends.chain([rect.min, rect.max]))
     }
 
-    /// The place that was written for `point`.
+    /// The place as written for `point`.
     pub(super) fn place(&self, point: Point2) -> LatLon {
         let written = self.written.borrow().get(&frame::key(point)).copied();
         written.unwrap_or_else(|| self.plane.geodetic(point))
     }
 
-    /// `place` on the plane, which must be near enough for the plane to mean something.
+    /// `place` on the plane; a fault if it is too far away for the plane to fit.
     fn laid(&self, place: LatLon, path: &Path<'_>, faults: &mut Faults) -> Option<Point2> {
         let point = self.plane.local(place);
         let away = self.plane.origin().distance_m(place);
@@ -323,7 +323,7 @@ impl Earth {
     }
 }
 
-/// An area that no plane fits is at fault itself; for a default one, the `part` of the document that it had to reach is.
+/// Report an area that no plane fits: at `area` if given, otherwise at the `part` that the default area had to reach.
 fn blame(
     fields: &Fields<'_>,
     part: impl FnOnce(&Fields<'_>) -> Option<sketch::Part>,
@@ -344,7 +344,7 @@ fn blame(
     }
 }
 
-/// What altitudes are above.
+/// The datum of altitudes.
 fn datum(fields: &Fields<'_>, faults: &mut Faults) -> Option<Datum> {
     fields.or("altitude_datum", Datum::Msl, faults, |at, faults| {
         let choice = at.choice(&["msl", "ellipsoid"], faults)?;
@@ -365,7 +365,7 @@ fn lat_lon(fields: &Fields<'_>, faults: &mut Faults) -> Option<LatLon> {
     })
 }
 
-/// `{"min", "max"}` in degrees. West of it is `min`, also across the antimeridian.
+/// `{"min", "max"}` in degrees. `min` is the western corner, also across the antimeridian.
 fn area(at: At<'_>, faults: &mut Faults) -> Option<LatLonBox> {
     let fields = at.fields(&["min", "max"], faults)?;
     let corner = |at: At<'_>, faults: &mut Faults| {

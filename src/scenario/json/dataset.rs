@@ -1,5 +1,5 @@
-//! `terrain` of kind `dataset`: which one it is, the default area over it, and the ground cut out of it.
-//! The default area over a grid, which lies in the plane, is fitted in the same way.
+//! `terrain` of kind `dataset`: which dataset it is, the default area over it, and the ground cut out of it. Also
+//! fits the default area over a grid, which lies in the plane.
 
 use crate::geometry::geodesy::{LatLon, LatLonBox, TangentPlane};
 use crate::geometry::{Point2, Point3, Rect, Vector2};
@@ -17,31 +17,30 @@ use super::value::{At, quote};
 
 pub(super) const FIELDS: &[&str] = &["kind", "name", "sha256"];
 
-/// Ground beyond the area that is kept where there is any, as a share of the longer side: what a drawing
-/// shows round the area.
+/// Ground kept beyond the area where available, as a fraction of its longer side; drawings show it around the area.
 const MARGIN: f64 = 0.02;
-/// An area that sticks out of the data by no more is cut, metres: somebody copied the data's own extent.
+/// An area that extends beyond the data by at most this is trimmed, metres: it is probably the data's own extent.
 const OVERHANG_M: f64 = 1.0;
-/// Places looked at along each axis to tell which share of an area has no elevation.
+/// Points sampled along each axis to estimate the share of an area without elevation.
 const LOOKS: usize = 24;
-/// Rounds of fitting a box of degrees into the data.
+/// Most rounds of fitting a box of degrees into the data.
 const ROUNDS: usize = 8;
-/// Corners of a fitted area are rounded inwards to this many to a degree.
+/// Corners of a fitted area are rounded inwards to 1 / this degrees.
 const GRAIN: f64 = 1e6;
-/// Names listed to who asks for one that there is not.
+/// Most names listed when the requested name does not exist.
 const LISTED: usize = 8;
 
-/// The dataset that a document names, before anything else of its terrain is read.
+/// The dataset named by a document, found before the rest of its terrain is read.
 pub(super) struct Named<'a> {
     name: &'a str,
     found: Result<Found, DatasetError>,
 }
 
-/// The ground, and the area as far as it has one.
+/// The ground, and the part of the area that it covers.
 pub(super) type Ground = (Terrain, Rect);
 
 impl<'a> Named<'a> {
-    /// `None` where the terrain is none or cannot be read; its reader says so.
+    /// `None` when the terrain is of another kind or cannot be read; the terrain reader reports that.
     pub(super) fn of(fields: &Fields<'a>, datasets: &dyn Datasets) -> Option<Self> {
         let terrain = fields.find("terrain")?;
         let text = |name: &str| match terrain.get(name) {
@@ -56,7 +55,7 @@ impl<'a> Named<'a> {
         Some(Self { name, found })
     }
 
-    /// `wanted` as far as there are data, as the default area; all of it where `ends` would be cut off.
+    /// The part of `wanted` that has data, as the default area; all of it where that would cut off one of `ends`.
     pub(super) fn within(
         &self,
         wanted: LatLonBox,
@@ -84,8 +83,8 @@ impl<'a> Named<'a> {
     }
 }
 
-/// The default area over a terrain grid: the box of degrees in it. `None` where the terrain is no grid or
-/// cannot be read, is wider than a plane fits, or ends before one of `ends`; its reader says so.
+/// The default area over a terrain grid: the box of degrees inside it. `None` when the terrain is no grid or cannot
+/// be read, is too wide for a plane, or does not contain all `ends`; other readers report that.
 pub(super) fn over_grid(
     fields: &Fields<'_>,
     ends: &[LatLon],
@@ -105,7 +104,7 @@ pub(super) fn over_grid(
     if !(size.min() > 0.0 && size.max() <= sketch::MAX_WIDTH_M) {
         return None;
     }
-    // A plane near the grid first, and the box that its extent has there.
+    // Start with a plane near the grid and the box of the grid's extent on it.
     let mut fitted = boxed(
         [origin.lat, origin.lon],
         [origin.lat + 1.0 / GRAIN, origin.lon + 1.0 / GRAIN],
@@ -129,21 +128,21 @@ pub(super) fn over_grid(
     None
 }
 
-/// What `terrain` says, beside the rest of the document.
+/// What reading `terrain` needs from the rest of the document.
 pub(super) struct Site<'a> {
     pub(super) named: Option<&'a Named<'a>>,
     pub(super) datasets: &'a dyn Datasets,
     pub(super) chart: &'a Chart,
     pub(super) limits: &'a Limits,
-    /// Where waypoints may be, once that can be told.
+    /// Where waypoints may be, if already known.
     pub(super) area: Option<Rect>,
-    /// Whether the document names the area.
+    /// Whether the document gives the area.
     pub(super) area_is_given: bool,
-    /// The start and the target, by their fields.
+    /// The start and the target, with their field names.
     pub(super) ends: [(&'static str, Option<Point3>); 2],
 }
 
-/// The ground under the area out of a dataset.
+/// The ground under the area, from a dataset.
 pub(super) fn ground(fields: &Fields<'_>, site: &Site<'_>, faults: &mut Faults) -> Option<Ground> {
     let name = fields.required("name", faults, |at, faults| {
         at.text(faults).map(str::to_owned)
@@ -193,7 +192,7 @@ pub(super) fn ground(fields: &Fields<'_>, site: &Site<'_>, faults: &mut Faults) 
             return None;
         }
     };
-    // A mounted file may have been changed while it was read.
+    // A mounted file may have changed while it was read.
     if let Err(error) = site.datasets.find(&name, Some(&found.sha256)) {
         refuse(&error, fields, &name, Some(&found.sha256), faults);
         return None;
@@ -220,7 +219,7 @@ fn sum(at: At<'_>, faults: &mut Faults) -> Option<String> {
     None
 }
 
-/// Say why a dataset is not found.
+/// Report why a dataset was not found.
 fn refuse(
     error: &DatasetError,
     fields: &Fields<'_>,
@@ -246,7 +245,7 @@ fn refuse(
     });
 }
 
-/// Which names there are.
+/// The names that exist, for a message.
 fn known(name: &str, names: &[String]) -> String {
     if names.is_empty() {
         return "there are no datasets; PUT /terrains/{name} makes one, --terrain-dir names a directory of them"
@@ -264,7 +263,7 @@ fn known(name: &str, names: &[String]) -> String {
     format!("must be one of {}{more}{hint}", listed.join(", "))
 }
 
-/// Say where and how much of what is needed has no elevation.
+/// Report where elevations are missing, and for how much of the area.
 fn gaps(
     error: &DemError,
     named: &Named<'_>,
@@ -302,7 +301,7 @@ fn gaps(
             ends_are_known = false;
         }
     }
-    // The box round the ends holds them; that it has gaps, too, is no news.
+    // A default area contains the ends, so gaps below them are not reported twice.
     if site.area_is_given || ends_are_known {
         let code = match error {
             DemError::Outside { .. } => "area-outside-terrain",
@@ -327,7 +326,7 @@ fn gaps(
     }
 }
 
-/// Say that there is no elevation below the start or the target.
+/// Report that there is no elevation below the start or the target.
 pub(super) fn missing(end: &str, at: LatLon, name: &str, dataset: &Dataset, faults: &mut Faults) {
     let path = Path::Key(&Path::Root, end);
     let place = format!("lat {:.6}, lon {:.6}", at.lat, at.lon);
@@ -349,7 +348,7 @@ pub(super) fn missing(end: &str, at: LatLon, name: &str, dataset: &Dataset, faul
     });
 }
 
-/// `area` without what sticks out of the data by a hair.
+/// `area` trimmed to the data, where it extends beyond by at most [`OVERHANG_M`].
 fn trimmed(area: Rect, dataset: &Dataset, plane: &TangentPlane) -> Rect {
     let near = |a: Point2, b: Point2| (a - b).amax() <= OVERHANG_M;
     match dataset.covered(plane, area) {
@@ -358,10 +357,10 @@ fn trimmed(area: Rect, dataset: &Dataset, plane: &TangentPlane) -> Rect {
     }
 }
 
-/// What `wanted` and the data have in common; `None` when nothing.
+/// The intersection of `wanted` and the data; `None` if it is empty.
 fn cut(wanted: LatLonBox, data: Degrees) -> Option<LatLonBox> {
     let (west, width) = (wanted.min.lon, wanted.width());
-    // As many turns as bring it nearest to the data.
+    // Whole turns that bring it nearest to the data.
     let away = f64::midpoint(data.west, data.east) - (west + width / 2.0);
     let turns = 360.0 * (away / 360.0).round();
     let (west, east) = (west + turns, west + width + turns);
@@ -377,7 +376,7 @@ fn cut(wanted: LatLonBox, data: Degrees) -> Option<LatLonBox> {
     )
 }
 
-/// A box of degrees in a rectangle of the plane.
+/// A box of degrees inside a rectangle of the plane.
 fn inside(rect: Rect, plane: &TangentPlane) -> Option<LatLonBox> {
     let middle = plane.geodetic(nalgebra::center(&rect.min, &rect.max)).lon;
     let size = rect.max - rect.min;
@@ -387,7 +386,7 @@ fn inside(rect: Rect, plane: &TangentPlane) -> Option<LatLonBox> {
             rect.min.x + x * size.x,
             rect.min.y + y * size.y,
         ));
-        // Degrees east of the middle, so that the antimeridian is nothing special.
+        // Degrees east of the middle, so that the antimeridian needs no special case.
         [
             place.lat,
             crate::geometry::geodesy::wrapped(place.lon - middle),
@@ -413,7 +412,7 @@ fn down(degrees: f64) -> f64 {
     (degrees * GRAIN).floor() / GRAIN
 }
 
-/// From the south-west to the north-east corner, `[lat, lon]`; `None` when nothing is between.
+/// The box from the south-west to the north-east corner, `[lat, lon]`; `None` if it is empty.
 fn boxed([south, west]: [f64; 2], [north, east]: [f64; 2]) -> Option<LatLonBox> {
     let corner = |lat: f64, lon: f64| LatLon {
         lat,

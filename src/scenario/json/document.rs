@@ -1,4 +1,4 @@
-//! The whole document: its sections, and what they must be to each other.
+//! The whole document: its sections, and the checks between them.
 
 use crate::geometry::{Point3, Rect};
 use crate::scenario::{AltitudeBand, Scenario};
@@ -34,12 +34,12 @@ const FIELDS: &[&str] = &[
     "planner",
 ];
 
-/// An area may stick out of the terrain grid by rounding, metres; so much is cut off.
+/// An area may extend beyond the terrain grid by this much, for rounding, metres; it is then trimmed.
 const OVERHANG_M: f64 = 1e-6;
-/// The default area reaches at least this far beyond everything, metres.
+/// Least padding of the default area on each side, metres.
 const MIN_PADDING_M: f64 = 10.0;
 
-/// Read the document; `None` has left at least one fault.
+/// Read the document; `None` has added at least one fault.
 pub(super) fn document(
     node: &Node,
     rules: &Rules,
@@ -81,7 +81,7 @@ pub(super) fn document(
     if names_spacing(&fields) {
         check_samples(distance, planner.smoothing.spacing, limit, faults);
     } else if samples(distance, planner.smoothing.spacing) > limit as f64 {
-        // Nobody is refused for what nobody asked: the straight way then makes half of the limit.
+        // A default spacing must not lead to a refusal: widen it so that the straight line takes half of the limit.
         planner.smoothing.spacing = 2.0 * distance / limit as f64;
     }
     Some(Scenario {
@@ -99,7 +99,7 @@ pub(super) fn document(
     })
 }
 
-/// A section that reads the same whether it is absent or `empty`.
+/// A section for which absent means the same as `empty`.
 fn section<T>(
     fields: &Fields<'_>,
     name: &str,
@@ -217,9 +217,9 @@ fn covered(area: Rect, terrain: &Terrain, chart: &Chart, faults: &mut Faults) ->
     })
 }
 
-/// The area of a document that names none: a terrain grid's extent, else the box round the start,
-/// the target and every threat with its soft zone, wider on every side by a quarter of its
-/// diagonal and at least by 10 m, or by what the climb to the middle of the band takes.
+/// The area of a document that gives none: a terrain grid's extent, else the box around the start, the target and
+/// every threat with its soft zone. The box is padded on every side by the greatest of a quarter of its diagonal, 10
+/// m, and the room to climb to the middle of the band.
 fn default_area(
     [start, target]: [Point3; 2],
     altitude: Option<AltitudeBand>,
@@ -255,12 +255,12 @@ fn names_spacing(fields: &Fields<'_>) -> bool {
     smoothing.is_some_and(|smoothing| smoothing.get("spacing").is_some())
 }
 
-/// Of the straight way from start to target.
+/// Samples on the straight line from start to target.
 fn samples(distance: f64, spacing: f64) -> f64 {
     (distance / spacing).ceil() + 1.0
 }
 
-/// The straight way from start to target must not already make more samples than the server takes.
+/// The straight line from start to target must not exceed the server's limit of samples.
 fn check_samples(distance: f64, spacing: f64, limit: usize, faults: &mut Faults) {
     let samples = samples(distance, spacing);
     if samples > limit as f64 {

@@ -1,5 +1,5 @@
-//! Whether a route can begin at the start and end at the target: apart from each other, on the
-//! ground or above it, inside the area and the terrain, outside every threat.
+//! Whether a route can begin at the start and end at the target: they must be apart, on or above ground, inside the
+//! area and the terrain, and outside every threat.
 
 use crate::geometry::{Point3, Rect};
 use crate::terrain::Terrain;
@@ -10,16 +10,15 @@ use super::fault::Faults;
 use super::path::Path;
 use super::value::{figure, metres, quote};
 
-/// So much below ground still counts as standing on it, metres; more than digits of a decimal
-/// can blur.
+/// A point at most this far below ground still counts as standing on it, metres; more than rounding to one decimal
+/// can cause.
 const SUNK_M: f64 = 0.1 + 1e-9;
-/// Start and target closer than this, in space, are the same, metres.
+/// Start and target closer than this in 3-D are the same, metres.
 const SAME_M: f64 = 1e-6;
-/// Start and target closer than this, seen from above, give the route no direction, metres.
+/// Start and target horizontally closer than this give the route no direction, metres.
 const ABOVE_M: f64 = 1e-3;
 
-/// Start and target must be apart, and apart seen from above: the coding of a route turns about
-/// the line between them.
+/// Start and target must be apart, also horizontally: the route coding is relative to the line between them.
 pub(super) fn check_apart(start: Point3, target: Point3, faults: &mut Faults) {
     let path = Path::Key(&Path::Root, "target");
     let (distance, horizontal) = ((target - start).norm(), (target.xy() - start.xy()).norm());
@@ -40,7 +39,7 @@ pub(super) fn check_apart(start: Point3, target: Point3, faults: &mut Faults) {
     }
 }
 
-/// The start or the target beside the ground: `name` is its field.
+/// Check the start or the target against the ground; `name` is its field.
 pub(super) fn check_ground(
     name: &str,
     end: Point3,
@@ -69,7 +68,7 @@ pub(super) fn check_ground(
     }
 }
 
-/// The start or the target must lie in the area; whether it does.
+/// The start or the target must lie in the area; returns whether it does.
 pub(super) fn check_area(
     name: &str,
     end: Point3,
@@ -85,7 +84,7 @@ pub(super) fn check_area(
     contained
 }
 
-/// The start or the target must lie in no threat; touching one is clear.
+/// The start or the target must be outside every threat; touching one is allowed.
 pub(super) fn check_threats(
     name: &str,
     end: Point3,

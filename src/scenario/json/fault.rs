@@ -1,4 +1,4 @@
-//! What is wrong with a document: the faults, their codes, and the collector that the readers fill.
+//! What is wrong with a document: faults, their codes, and the collector that readers add to.
 
 use std::fmt::{self, Display};
 
@@ -8,10 +8,10 @@ use super::path::Path;
 use super::tree::Node;
 use super::value::quote;
 
-/// Most faults listed in one refusal; a last fault counts the rest.
+/// Most faults listed in one refusal; one more fault then counts the rest.
 pub const MAX_LISTED: usize = 100;
 
-/// Every code a [`Fault`] can carry, with what it says; `docs/PROBLEMS.md` has an example of each.
+/// Every code that a [`Fault`] can have, with its meaning; `docs/PROBLEMS.md` has an example of each.
 pub const CODES: &[(&str, &str)] = &[
     ("missing-field", "a required field is absent"),
     ("unknown-field", "the object has no such field"),
@@ -120,16 +120,16 @@ pub const CODES: &[(&str, &str)] = &[
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{}: {detail} [{code}]", if pointer.is_empty() { "document" } else { pointer })]
 pub struct Fault {
-    /// JSON pointer (RFC 6901) of the place; a missing field is pointed at where it would stand.
+    /// JSON pointer (RFC 6901) of the place; for a missing field, where it would be.
     pub pointer: String,
-    /// Stable code out of [`CODES`], such as `out-of-range`.
+    /// Stable code from [`CODES`], such as `out-of-range`.
     pub code: &'static str,
-    /// The offending value and what is allowed, a lowercase fragment.
+    /// The offending value and what is allowed, as a lowercase fragment.
     pub detail: String,
 }
 
 impl Fault {
-    /// Of `/planner/warm_start/plan_id`; who keeps the plans finds out `why`.
+    /// The fault of `/planner/warm_start/plan_id`; `why` comes from the plan store.
     #[must_use]
     pub fn unknown_plan(id: &str, why: &str) -> Self {
         Self {
@@ -146,30 +146,30 @@ pub enum Refusal {
     /// It is not JSON.
     #[error("line {line}, column {column}: {detail}")]
     Syntax {
-        /// From 1.
+        /// Starts at 1.
         line: usize,
-        /// From 1, counted in bytes.
+        /// Starts at 1, counted in bytes.
         column: usize,
-        /// Where the reader was, as far as it got.
+        /// JSON pointer that the parser had reached.
         pointer: String,
-        /// What the reader met.
+        /// What the parser found.
         detail: String,
     },
-    /// It is JSON, but no scenario; the faults in document order, at most [`MAX_LISTED`] and one
-    /// more that counts the rest.
+    /// It is JSON, but not a valid scenario; faults in document order, at most [`MAX_LISTED`] and one more that
+    /// counts the rest.
     #[error("{}", Lines(.0))]
     Invalid(Vec<Fault>),
 }
 
 impl Refusal {
-    /// The fault of a dataset that is not there or cannot be used, when there is one: a document that was
-    /// accepted before can have no other, but one of a dataset that cannot be reached now.
+    /// The fault of a dataset that is missing or unusable, if there is one. For a document that was accepted before,
+    /// the only other possible fault is a dataset that is unreachable at present.
     #[must_use]
     pub fn lost_ground(&self) -> Option<&Fault> {
         self.fault_of(&["unknown-dataset", "replaced-dataset", "unreadable-dataset"])
     }
 
-    /// The fault of a dataset that cannot be reached now, and may be a little later.
+    /// The fault of a dataset that is unreachable at present; a retry may succeed.
     #[must_use]
     pub fn unreachable_ground(&self) -> Option<&Fault> {
         self.fault_of(&["unreachable-datasets"])
@@ -183,7 +183,7 @@ impl Refusal {
     }
 }
 
-/// The faults, one a line.
+/// The faults, one per line.
 struct Lines<'a>(&'a [Fault]);
 
 impl Display for Lines<'_> {
@@ -196,8 +196,8 @@ impl Display for Lines<'_> {
     }
 }
 
-/// Collects faults while the readers walk on; keeps the first [`MAX_LISTED`] and counts the rest,
-/// so that a hostile document costs neither memory nor a huge answer.
+/// Collects faults while reading continues. Keeps the first [`MAX_LISTED`] and counts the rest, so that a hostile
+/// document causes neither high memory use nor a huge response.
 #[derive(Debug, Default)]
 pub(super) struct Faults {
     listed: Vec<Fault>,
@@ -205,7 +205,7 @@ pub(super) struct Faults {
 }
 
 impl Faults {
-    /// Note a fault; `detail` is only called when the fault will be listed.
+    /// Add a fault; `detail` is called only if the fault will be listed.
     pub(super) fn add<D: Into<String>>(
         &mut self,
         path: &Path<'_>,
@@ -227,7 +227,7 @@ impl Faults {
         }
     }
 
-    /// The faults in document order; empty when there was none.
+    /// The faults in document order; empty if there were none.
     pub(super) fn finish(mut self, document: &Node) -> Vec<Fault> {
         self.listed
             .sort_by_cached_key(|fault| rank(document, &fault.pointer));
@@ -245,7 +245,7 @@ impl Faults {
     }
 }
 
-/// Where a pointer stands in the document: the position at every level, last where nothing stands.
+/// Position of a pointer in the document, as an index at every level; missing fields sort last.
 fn rank(document: &Node, pointer: &str) -> Vec<usize> {
     let mut node = Some(document);
     let mut ranks = Vec::new();

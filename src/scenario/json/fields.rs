@@ -1,4 +1,4 @@
-//! The fields of an object: required ones, ones with a default, and those that have no business there.
+//! The fields of an object: required, with a default, and unknown ones.
 
 use super::fault::Faults;
 use super::path::Path;
@@ -7,7 +7,7 @@ use super::tree::Node;
 use super::value::{At, quote};
 
 impl<'a> At<'a> {
-    /// The fields of an object; unknown ones and repeated ones leave faults.
+    /// The fields of an object; unknown and repeated ones add faults.
     pub(super) fn fields(
         self,
         allowed: &'static [&'static str],
@@ -43,7 +43,7 @@ impl<'a> At<'a> {
         })
     }
 
-    /// An object whose `kind` decides its fields: the kind and the fields.
+    /// An object whose `kind` decides its fields: returns the kind and the fields.
     pub(super) fn variant<'k>(
         self,
         kinds: &[(&'k str, &'static [&'static str])],
@@ -86,7 +86,7 @@ impl<'a> Fields<'a> {
         self.find(name).is_some()
     }
 
-    /// A field that must be there.
+    /// A required field.
     pub(super) fn required<T>(
         &self,
         name: &str,
@@ -152,7 +152,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// A key that is none of `allowed`; the nearest spelling is suggested.
+/// Report a key that is not in `allowed`, and suggest the nearest spelling.
 pub(super) fn unknown_key(
     parent: &Path<'_>,
     key: &str,
@@ -162,7 +162,7 @@ pub(super) fn unknown_key(
     faults: &mut Faults,
 ) {
     let own = Path::Key(parent, key);
-    // A pointer to a key of a megabyte helps nobody; then the object is pointed at.
+    // For a very long key, point to the object instead.
     let path = if key.len() <= MAX_NAME_CHARS {
         &own
     } else {
@@ -181,8 +181,7 @@ pub(super) fn unknown_key(
     });
 }
 
-/// The allowed spelling that `key` was probably meant to be: case and separators aside, at most
-/// two letters away.
+/// The allowed name that `key` probably stands for: ignoring case and separators, at most two edits away.
 pub(super) fn nearest<'n>(key: &str, allowed: &[&'n str]) -> Option<&'n str> {
     const MAX_CHARS: usize = 40;
     if key.len() > MAX_CHARS {
@@ -203,7 +202,7 @@ pub(super) fn nearest<'n>(key: &str, allowed: &[&'n str]) -> Option<&'n str> {
         .map(|(_, name)| name)
 }
 
-/// Letters to insert, delete or replace to make one word the other (Levenshtein).
+/// Levenshtein distance: characters to insert, delete or replace to turn one word into the other.
 fn edits(a: &[char], b: &[char]) -> usize {
     let mut row: Vec<usize> = (0..=b.len()).collect();
     for (i, from) in a.iter().enumerate() {

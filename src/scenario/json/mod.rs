@@ -1,11 +1,10 @@
-//! The wire document: read into a [`Scenario`] with every fault at once, and written back with
-//! its defaults filled in.
+//! The wire document: read into a [`Scenario`], reporting all faults at once, and written back with its defaults
+//! filled in.
 //!
-//! Text becomes a tree (`tree`), the sections of the tree become the parts of a scenario (one file
-//! each), and whatever does not fit becomes a [`Fault`] while reading goes on. Null stands for an
-//! absent value only in `name`, `base`, `top`, `time_limit_ms` and `warm_start`: elsewhere it is
-//! what a careless client makes of NaN. Deliberately absent: the size of the body, which is
-//! checked before the text is here.
+//! Text becomes a tree (`tree`), the sections of the tree become the parts of a scenario (one file each), and
+//! whatever is invalid becomes a [`Fault`] while reading continues. Null means absent only in `name`, `base`, `top`,
+//! `time_limit_ms` and `warm_start`: elsewhere it is what a careless client writes for NaN. Deliberately absent: the
+//! size limit of the body, which is checked before.
 
 mod chart;
 mod dataset;
@@ -39,16 +38,16 @@ use crate::terrain::{Datasets, NoDatasets};
 /// A search algorithm that a document may name.
 #[derive(Debug, Clone)]
 pub struct AlgorithmRule {
-    /// As in `planner.algorithm`.
+    /// As used in `planner.algorithm`.
     pub name: &'static str,
-    /// What `planner.parameters` may set, besides what is [`COMMON`].
+    /// What `planner.parameters` may set, besides [`COMMON`].
     pub parameters: Vec<ParameterRule>,
 }
 
-/// One constant of an algorithm; both ends of its range are allowed.
+/// One constant of an algorithm; its range includes both ends.
 #[derive(Debug, Clone, Copy)]
 pub struct ParameterRule {
-    /// As in `planner.parameters`.
+    /// As used in `planner.parameters`.
     pub name: &'static str,
     /// Smallest value allowed.
     pub min: f64,
@@ -56,7 +55,7 @@ pub struct ParameterRule {
     pub max: f64,
 }
 
-/// What a document is held to.
+/// The rules that a document is checked against.
 #[derive(Debug, Clone)]
 pub struct Rules {
     /// The operator's limits.
@@ -68,7 +67,7 @@ pub struct Rules {
 }
 
 impl Rules {
-    /// Where there are no datasets.
+    /// Rules without datasets.
     #[must_use]
     pub fn new(limits: Limits, algorithms: Vec<AlgorithmRule>) -> Self {
         Self {
@@ -78,14 +77,14 @@ impl Rules {
         }
     }
 
-    /// The same with `datasets`.
+    /// The same rules with `datasets`.
     #[must_use]
     pub fn with_datasets(self, datasets: Arc<dyn Datasets>) -> Self {
         Self { datasets, ..self }
     }
 }
 
-/// Read a scenario document; `drawn_seed` (modulo 2^53) is used where it names none.
+/// Read a scenario document; `drawn_seed` (modulo 2^53) is used if it gives no seed.
 ///
 /// # Errors
 /// [`Refusal::Syntax`] when `text` is not JSON, else [`Refusal::Invalid`] with every fault.
@@ -99,22 +98,22 @@ pub fn read(text: &[u8], rules: &Rules, drawn_seed: u64) -> Result<Scenario, Ref
     }
 }
 
-/// Read a document that was accepted before: limits are for those who hand in, and what holds now
-/// does not take back what once was allowed.
+/// Read a document that was accepted before. Limits do not apply: they are for new submissions, and lowering one must
+/// not invalidate an accepted document.
 ///
 /// # Errors
-/// As [`read`]; only where the document comes from another version of this program.
+/// As [`read`], but only if the document comes from another version of this program or a dataset is not available.
 pub fn read_accepted(document: &str, rules: &Rules) -> Result<Scenario, Refusal> {
     let rules = Rules {
         limits: Limits::NONE,
         ..rules.clone()
     };
-    // It names its seed; none is drawn.
+    // The document has a seed, so none is drawn.
     read(document.as_bytes(), &rules, 0)
 }
 
-/// Write the accepted document, defaults filled in, as one line of JSON. Reading it again gives an
-/// equal scenario; equal scenarios give the same bytes.
+/// Write the accepted document, defaults filled in, as one line of JSON. Reading it again gives an equal scenario;
+/// equal scenarios give the same bytes.
 #[must_use]
 pub fn write(scenario: &Scenario) -> String {
     writer::write(scenario)

@@ -1,4 +1,4 @@
-//! `planner.parameters`: the algorithm's constants, and what every algorithm has besides.
+//! `planner.parameters`: the algorithm's constants, and those common to all algorithms.
 
 use std::collections::BTreeMap;
 
@@ -12,14 +12,14 @@ use super::ranges::{GAP, Range, THREADS};
 use super::tree::Node;
 use super::value::At;
 
-/// A parameter that stands among the algorithm's constants, but is every algorithm's.
+/// A parameter listed among the algorithm's constants that every algorithm has.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CommonParameter {
     /// Its key in `planner.parameters`.
     pub name: &'static str,
-    /// What it takes, and what it is when absent.
+    /// Allowed values and the default.
     pub takes: Takes,
-    /// One sentence, for people.
+    /// One sentence for the user.
     pub meaning: &'static str,
 }
 
@@ -28,14 +28,14 @@ pub struct CommonParameter {
 pub enum Takes {
     /// One of some words.
     Choice {
-        /// Taken when absent.
+        /// Used when absent.
         default: &'static str,
-        /// All of them.
+        /// All choices.
         choices: &'static [&'static str],
     },
     /// A number.
     Number {
-        /// Taken when absent.
+        /// Used when absent.
         default: f64,
         /// Least allowed value.
         min: f64,
@@ -78,7 +78,7 @@ pub const COMMON: [CommonParameter; 3] = [
     },
 ];
 
-/// What `parameters` may hold.
+/// The parameters read from a document.
 pub(super) struct Parameters {
     pub(super) quadrature: Quadrature,
     pub(super) gap: f64,
@@ -97,8 +97,8 @@ impl Default for Parameters {
     }
 }
 
-/// What every algorithm has, and the constants that `rule` allows; without a rule, nobody can tell what else
-/// there may be, so it is passed over.
+/// Reads the common parameters and the constants that `rule` allows. Without a rule the other keys cannot be checked,
+/// so they are skipped.
 pub(super) fn parameters(
     at: At<'_>,
     rule: Option<&AlgorithmRule>,

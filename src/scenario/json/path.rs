@@ -1,4 +1,4 @@
-//! The way from the root of a document to the value being read, kept on the stack of the readers.
+//! The path from the root of a document to the value being read, kept on the stack of the readers.
 
 use std::fmt::{self, Display};
 
@@ -7,14 +7,14 @@ use std::fmt::{self, Display};
 pub(super) enum Path<'a> {
     /// The whole document.
     Root,
-    /// A field of the object at the first place.
+    /// A field of the given object.
     Key(&'a Path<'a>, &'a str),
-    /// An item of the array at the first place.
+    /// An item of the given array.
     Index(&'a Path<'a>, usize),
 }
 
 impl Path<'_> {
-    /// What a detail calls the value: `radius`, `vertices[2]`, `the document`.
+    /// The value's name in a fault's detail: `radius`, `vertices[2]`, `the document`.
     pub(super) fn label(&self) -> String {
         match self {
             Path::Root => "the document".to_owned(),
@@ -34,7 +34,7 @@ impl Display for Path<'_> {
     }
 }
 
-/// A reference token of RFC 6901.
+/// Escape a reference token (RFC 6901).
 pub(super) fn escape(key: &str) -> String {
     key.replace('~', "~0").replace('/', "~1")
 }

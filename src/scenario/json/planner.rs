@@ -17,7 +17,7 @@ use super::{AlgorithmRule, Rules};
 const DEFAULT_WAYPOINTS: usize = 10;
 const DEFAULT_POPULATION: usize = 200;
 const DEFAULT_ITERATIONS: usize = 200;
-/// Cubic, and a sample every five metres.
+/// Cubic, with a sample every five metres.
 const DEFAULT_SMOOTHING: Smoothing = Smoothing {
     degree: 3,
     spacing: 5.0,
@@ -37,7 +37,7 @@ const FIELDS: &[&str] = &[
     "parameters",
 ];
 
-/// How to search; an absent `planner` is an empty one.
+/// The planner settings; an absent `planner` counts as an empty one.
 pub(super) fn planner(
     at: At<'_>,
     chart: &Chart,
@@ -56,7 +56,7 @@ pub(super) fn planner(
         }),
     };
     let sizes = sizes(&fields, limits, faults);
-    // The modulus holds whatever is drawn to the range of a seed.
+    // The modulus keeps the drawn seed within the allowed range.
     let seed = fields.or("seed", drawn_seed % (1 << 53), faults, |at, faults| {
         at.whole(SEED, faults)
     });
@@ -141,7 +141,7 @@ fn algorithm<'r>(at: At<'_>, rules: &'r Rules, faults: &mut Faults) -> Option<&'
     found
 }
 
-/// `{"plan_id"}` or `{"waypoints"}`, one of the two.
+/// `{"plan_id"}` or `{"waypoints"}`, exactly one of them.
 #[expect(
     clippy::option_option,
     reason = "the outer one tells whether it could be read"
@@ -184,10 +184,10 @@ fn warm_start(
     }
 }
 
-/// Points of a route; start and target may be among them.
+/// Points of a route, with or without start and target.
 fn waypoints(at: At<'_>, chart: &Chart, limit: usize, faults: &mut Faults) -> Option<Vec<Point3>> {
     let count = at.len(faults)?;
-    // With start and target.
+    // Start and target included.
     let most = limit.saturating_add(2);
     if count > most {
         faults.add(at.path, "too-many", || {
@@ -215,7 +215,7 @@ fn smoothing(at: At<'_>, faults: &mut Faults) -> Option<Smoothing> {
     })
 }
 
-/// population * iterations * waypoints against the operator's limit, once all of them could be read.
+/// Checks population * iterations * waypoints against the operator's limit, if all of them could be read.
 fn check_work(path: &Path<'_>, sizes: [Option<usize>; 3], limit: u64, faults: &mut Faults) {
     let [Some(population), Some(iterations), Some(waypoints)] = sizes else {
         return;

@@ -14,7 +14,7 @@ pub(super) fn pair(at: At<'_>, range: Range, faults: &mut Faults) -> Option<Poin
     Some(Point2::new(x?, y?))
 }
 
-/// `{"min", "max"}`, wider than nothing both ways.
+/// `{"min", "max"}`, with a width and a height > 0.
 pub(super) fn area(at: At<'_>, faults: &mut Faults) -> Option<Rect> {
     let fields = at.fields(&["min", "max"], faults)?;
     let min = fields.required("min", faults, |at, faults| pair(at, AREA, faults));

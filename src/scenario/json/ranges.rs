@@ -1,4 +1,4 @@
-//! What every number of a document must lie within; the operator's upper limits are in
+//! The range of every number in a document; the operator's upper limits are in
 //! [`Limits`](crate::scenario::limits::Limits).
 
 use std::fmt::{self, Display};
@@ -49,8 +49,8 @@ impl Range {
         above && below
     }
 
-    /// What `value` should have been. An upper end of 1e6 and more only keeps numbers sane: a
-    /// negative radius need not hear of it.
+    /// The allowed range, for a message about `value`. An upper end of 1e6 or more is only a sanity limit, so it is
+    /// left out for a value that is too small.
     pub(super) fn advice(&self, value: f64) -> String {
         let sane_max = self.max >= 1e6;
         if sane_max && self.min >= 0.0 && value <= self.min {
@@ -77,19 +77,19 @@ impl Display for Range {
     }
 }
 
-/// Coordinates and heights, metres: ten thousand kilometres either way.
+/// Coordinates and heights, metres: ten thousand kilometres in either direction.
 pub(super) const COORDINATE: Range = Range::closed(-1e7, 1e7);
 /// Degrees.
 pub(super) const LATITUDE: Range = Range::closed(-90.0, 90.0);
 /// Degrees.
 pub(super) const LONGITUDE: Range = Range::closed(-180.0, 180.0);
-/// Corners of the area, metres; wider, so that the default area round the largest threat fits.
+/// Corners of the area, metres; wider, so that the default area around the largest threat fits.
 pub(super) const AREA: Range = Range::closed(-1e8, 1e8);
 /// `radius` and `influence`, metres.
 pub(super) const RADIUS: Range = Range::positive(1e7);
 /// `margin`, metres.
 pub(super) const MARGIN: Range = Range::closed(0.0, 1e7);
-/// `spread` of a peak, metres; narrower ones would need steps too fine to check a leg by.
+/// `spread` of a peak, metres; a narrower peak would need too fine steps to check a leg.
 pub(super) const SPREAD: Range = Range::closed(1.0, 1e7);
 /// `cell`, metres between nodes.
 pub(super) const CELL: Range = Range::closed(0.01, 1e6);
@@ -97,16 +97,16 @@ pub(super) const CELL: Range = Range::closed(0.01, 1e6);
 pub(super) const ALTITUDE: Range = Range::closed(0.0, 1e6);
 /// `max_turn_deg`, degrees; 180 allows any turn.
 pub(super) const TURN: Range = Range::positive(180.0);
-/// `max_climb_deg`, degrees; below 90, whose tangent has no end.
+/// `max_climb_deg`, degrees; below 90, where the tangent is infinite.
 pub(super) const CLIMB: Range = Range {
     min: 0.0,
     max: 90.0,
     closed_min: false,
     closed_max: false,
 };
-/// `min_leg`, metres; 0 asks for none.
+/// `min_leg`, metres; 0 means no minimum.
 pub(super) const MIN_LEG: Range = Range::closed(0.0, 1e7);
-/// `cruise_speed`, metres a second.
+/// `cruise_speed`, metres per second.
 pub(super) const SPEED: Range = Range::closed(0.01, 1e4);
 /// `fuel_per_km`.
 pub(super) const FUEL: Range = Range::closed(0.0, 1e6);
@@ -116,20 +116,20 @@ pub(super) const WEIGHT: Range = Range::closed(0.0, 1e6);
 pub(super) const SPACING: Range = Range::closed(0.01, 1e6);
 /// `smoothing.degree`, a whole number.
 pub(super) const DEGREE: Range = Range::closed(1.0, 5.0);
-/// `time_limit_ms`, a whole number: up to an hour.
+/// `time_limit_ms`, a whole number, up to an hour.
 pub(super) const TIME_LIMIT_MS: Range = Range::closed(1.0, 3_600_000.0);
-/// `seed`, a whole number below 2^53, so that every JSON reader keeps it.
+/// `seed`, a whole number below 2^53, which every JSON parser represents exactly.
 pub(super) const SEED: Range = Range::closed(0.0, 9_007_199_254_740_991.0);
-/// `parameters.gap`, a share of the proven bound; 0 never ends the search.
+/// `parameters.gap`, a fraction of the proven bound; 0 never ends the search.
 pub(super) const GAP: Range = Range::closed(0.0, 10.0);
 /// `parameters.threads`, a whole number.
 pub(super) const THREADS: Range = Range::closed(1.0, 256.0);
 
-/// Fewest nodes of a grid either way.
+/// Fewest nodes of a grid in either direction.
 pub(super) const MIN_NODES: usize = 2;
-/// Fewest bats: one to move and one to learn from.
+/// Smallest population: one bat to move and one to learn from.
 pub(super) const MIN_POPULATION: usize = 2;
-/// Most characters of a name.
+/// Longest name, characters.
 pub(super) const MAX_NAME_CHARS: usize = 200;
 
 #[cfg(test)]

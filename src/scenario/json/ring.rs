@@ -1,7 +1,7 @@
-//! Whether a polygon's vertices make a simple ring.
+//! Whether a polygon's vertices form a simple ring.
 //!
-//! A sweep over the vertices (Shamos and Hoey, "Geometric intersection problems", FOCS 1976) with
-//! exact orientation predicates: n log n comparisons, whatever the shape.
+//! A sweep over the vertices (Shamos and Hoey, "Geometric intersection problems", FOCS 1976) with exact orientation
+//! predicates: O(n log n) comparisons for any shape.
 
 use std::cmp::Ordering;
 
@@ -9,7 +9,7 @@ use robust::{Coord, orient2d};
 
 use crate::geometry::Point2;
 
-/// Why vertices make no simple ring; places are indices of vertices, an edge has that of its first.
+/// Why vertices form no simple ring. Numbers are vertex indices; an edge has the index of its first vertex.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum RingFault {
     /// Fewer than three.
@@ -18,14 +18,14 @@ pub(super) enum RingFault {
     Flat,
     /// Two vertices at the same place.
     Repeated(usize, usize),
-    /// Two edges with more in common than the vertex between neighbours.
+    /// Two edges that share more than the vertex between neighbours.
     Crossing(usize, usize),
 }
 
-/// Check that the closed ring has an area and touches itself nowhere.
+/// Check that the closed ring has an area and does not touch itself.
 ///
 /// # Errors
-/// The first [`RingFault`] met; places are in ascending order.
+/// The first [`RingFault`] found; indices are in ascending order.
 pub(super) fn check(vertices: &[Point2]) -> Result<(), RingFault> {
     if vertices.len() < 3 {
         return Err(RingFault::TooFew);
@@ -62,7 +62,7 @@ fn along(a: Point2, b: Point2) -> Ordering {
         .unwrap_or(Ordering::Equal)
 }
 
-/// Where `c` lies seen along a to b: `Greater` left, `Less` right, `Equal` on the line; exact.
+/// The side of `c` seen along a to b: `Greater` left, `Less` right, `Equal` on the line; exact.
 pub(super) fn turn(a: Point2, b: Point2, c: Point2) -> Ordering {
     let coord = |point: Point2| Coord {
         x: point.x,
@@ -73,14 +73,14 @@ pub(super) fn turn(a: Point2, b: Point2, c: Point2) -> Ordering {
         .unwrap_or(Ordering::Equal)
 }
 
-/// The edges that cross the sweep line, from the lowest to the highest.
+/// The edges that cross the sweep line, from lowest to highest.
 struct Sweep<'a> {
     vertices: &'a [Point2],
     status: Vec<usize>,
 }
 
 impl Sweep<'_> {
-    /// Move the line over one vertex.
+    /// Move the sweep line over one vertex.
     fn pass(&mut self, vertex: usize) -> Result<(), RingFault> {
         let n = self.vertices.len();
         let (incoming, outgoing) = ((vertex + n - 1) % n, vertex);
@@ -128,7 +128,7 @@ impl Sweep<'_> {
         self.neighbours(at.wrapping_sub(1), at)
     }
 
-    /// One edge ends at `here` and the next begins.
+    /// One edge ends at `here` and the next one begins.
     fn replace(
         &mut self,
         at: usize,
@@ -151,7 +151,7 @@ impl Sweep<'_> {
         self.neighbours(at, at + 1)
     }
 
-    /// Two edges that have become neighbours on the line must not meet.
+    /// Two edges that have become neighbours on the sweep line must not meet.
     fn neighbours(&self, lower: usize, upper: usize) -> Result<(), RingFault> {
         match (self.status.get(lower), self.status.get(upper)) {
             (Some(a), Some(b)) if self.meet(*a, *b) => Err(crossing(*a, *b)),
@@ -159,7 +159,7 @@ impl Sweep<'_> {
         }
     }
 
-    /// The ends of an edge, the one that the sweep passes first before the other.
+    /// The ends of an edge, in the order in which the sweep passes them.
     fn ends(&self, edge: usize) -> (Point2, Point2) {
         let (a, b) = (
             self.vertices[edge],
@@ -168,13 +168,13 @@ impl Sweep<'_> {
         if along(a, b).is_le() { (a, b) } else { (b, a) }
     }
 
-    /// `Greater` where the point is above the edge.
+    /// `Greater` if the point is above the edge.
     fn side(&self, edge: usize, point: Point2) -> Ordering {
         let (left, right) = self.ends(edge);
         turn(left, right, point)
     }
 
-    /// Whether two edges have a point in common, other than the vertex between neighbours.
+    /// Whether two edges share a point other than the vertex between neighbours.
     fn meet(&self, a: usize, b: usize) -> bool {
         let n = self.vertices.len();
         if (a + 1) % n == b || (b + 1) % n == a {
@@ -184,7 +184,7 @@ impl Sweep<'_> {
                 self.vertices[after],
                 self.vertices[(after + 1) % n],
             );
-            // Neighbours meet again only where the second runs back over the first.
+            // Neighbours meet again only if the second runs back over the first.
             return turn(p, shared, q).is_eq() && along(p, shared) == along(q, shared);
         }
         let ((a0, a1), (b0, b1)) = (self.ends(a), self.ends(b));
@@ -245,7 +245,7 @@ mod tests {
             &[(0.0, 0.0), (4.0, 4.0), (4.0, 0.0), (0.0, 4.0)],
             Err(Crossing(0, 2)),
         );
-        // A vertex on an edge that is not its own.
+        // A vertex on an edge that it does not belong to.
         check_ring(
             &[(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (2.0, 0.0), (0.0, 4.0)],
             Err(Crossing(0, 3)),
@@ -272,7 +272,7 @@ mod tests {
         assert!(check(&ring(&comb)).is_err());
     }
 
-    /// Every pair of edges, as the plain definition has it.
+    /// Checks every pair of edges, directly by the definition.
     fn simple_by_definition(vertices: &[Point2]) -> bool {
         let all = Sweep {
             vertices,
@@ -284,7 +284,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases * 8, ..ProptestConfig::default() })]
 
-        /// Coordinates on a small lattice, where touching, overlap and repetition are frequent.
+        /// Coordinates on a small lattice, where contact, overlap and repetition are frequent.
         #[test]
         fn the_sweep_agrees_with_the_definition(points in prop::collection::vec((0i8..6, 0i8..6), 3..9)) {
             let points: Vec<_> = points.into_iter().map(|(x, y)| (f64::from(x), f64::from(y))).collect();

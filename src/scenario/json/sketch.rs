@@ -1,7 +1,7 @@
-//! A first look over a document in degrees: about where all of it lies, which is what the plane and the
-//! default area come from before any place can be laid onto the plane.
+//! A first pass over a document in degrees that finds roughly where everything lies. The plane and the default area
+//! follow from it, before any place can be mapped to the plane.
 //!
-//! Whatever cannot be read is passed over here; the readers that follow say so.
+//! Whatever cannot be read is skipped here; later readers report it.
 
 use crate::geometry::geodesy::{LatLon, LatLonBox, wrapped};
 
@@ -10,34 +10,34 @@ use super::ranges::{ALTITUDE, CLIMB, COORDINATE, LATITUDE, LONGITUDE};
 use super::tree::{Node, float};
 use super::vehicle::{climb_through, climbing_room};
 
-/// Latitudes beyond are refused, degrees.
+/// Greatest latitude accepted, north or south, degrees.
 pub(super) const MAX_LATITUDE: f64 = 89.0;
-/// Areas wider are refused, metres.
+/// Greatest width and height of an area, metres.
 pub(super) const MAX_WIDTH_M: f64 = 200e3;
 
-/// A default area keeps clear of [`MAX_WIDTH_M`] by this share of it.
+/// A default area takes at most this fraction of [`MAX_WIDTH_M`].
 const FITTING: f64 = 0.99;
-/// The default area reaches at least this far beyond everything, metres.
+/// Least padding of the default area on each side, metres.
 const MIN_PADDING_M: f64 = 10.0;
-/// Metres of a degree of latitude, about.
+/// Metres per degree of latitude, approximately.
 const DEGREE_M: f64 = 111_320.0;
-/// The default area ends on round figures of this many to a degree, so that it reads well.
+/// The default area is rounded outwards to 1 / this degrees, for readability.
 const GRAIN: f64 = 1e6;
 
-/// Where everything is, about.
+/// Approximate location of everything in a document.
 #[derive(Debug, Clone)]
 pub(super) struct Sketch {
-    /// The start and the target, as far as they can be read.
+    /// The start and the target, if they can be read.
     pub(super) ends: Vec<LatLon>,
-    /// Between start and target, metres above the datum; 0 where neither can be read.
+    /// Mean altitude of start and target, metres above the datum; 0 if neither can be read.
     pub(super) mean_alt: f64,
-    /// How far a route that climbs to the middle of the band must reach beyond start and target, metres.
+    /// Room beyond start and target to climb to the middle of the band, metres.
     climb_m: f64,
-    /// Longitudes are counted from here, so that the antimeridian is nothing special.
+    /// Origin of longitudes, so that the antimeridian needs no special case.
     reference: f64,
     south: f64,
     north: f64,
-    /// Degrees east of the reference.
+    /// Degrees east of `reference`.
     west: f64,
     east: f64,
 }
@@ -81,9 +81,9 @@ impl Sketch {
         self.east = self.east.max(lon + lon_reach);
     }
 
-    /// The area of a document that names none: the box round the start, the target and every threat
-    /// with its soft zone, wider on every side by a quarter of its diagonal and at least by 10 m,
-    /// or by what the climb takes, as far as the widest area allows.
+    /// The area of a document that gives none: the box around the start, the target and every threat with its soft
+    /// zone, padded on every side by a quarter of its diagonal or the room to climb, whichever is greater, within the
+    /// widest area allowed but by at least 10 m.
     pub(super) fn area(&self) -> LatLonBox {
         let shrink = shrink(f64::midpoint(self.south, self.north));
         let height = (self.north - self.south) * DEGREE_M;
@@ -107,14 +107,14 @@ impl Sketch {
     }
 }
 
-/// A place that has to be in a default area, with what is round it.
+/// A place that a default area must contain, with its reach around it.
 struct Spot {
     part: Part,
     place: LatLon,
     reach_m: f64,
 }
 
-/// A field of the document, and the number of the item in it.
+/// A field of the document, and the index of the item in it.
 pub(super) type Part = (&'static str, Option<usize>);
 
 /// The start, the target, and every center and vertex of a threat.
@@ -145,13 +145,13 @@ fn spots<'a>(fields: &'a Fields<'_>) -> impl Iterator<Item = Spot> + 'a {
     }))
 }
 
-/// What reaches farthest from the start.
+/// The part that reaches farthest from the start.
 pub(super) fn farthest(fields: &Fields<'_>) -> Option<Part> {
     let start = spots(fields).next()?.place;
     outermost(fields, |spot| start.distance_m(spot.place) + spot.reach_m)
 }
 
-/// What reaches nearest to a pole.
+/// The part that reaches nearest to a pole.
 pub(super) fn nearest_to_a_pole(fields: &Fields<'_>) -> Option<Part> {
     outermost(fields, |spot| {
         spot.place.lat.abs() + spot.reach_m / DEGREE_M
@@ -164,7 +164,7 @@ fn outermost(fields: &Fields<'_>, how_far: impl Fn(&Spot) -> f64) -> Option<Part
         .map(|spot| spot.part)
 }
 
-/// [`climbing_room`] between `ends` at `alts`; nothing where one of them cannot be read.
+/// [`climbing_room`] between `ends` at `alts`; 0 if one of them cannot be read.
 fn climb(fields: &Fields<'_>, ends: &[LatLon], alts: &[f64]) -> f64 {
     let (&[start, target], &[from, to]) = (ends, alts) else {
         return 0.0;
@@ -182,7 +182,7 @@ fn climb(fields: &Fields<'_>, ends: &[LatLon], alts: &[f64]) -> f64 {
     climbing_room(climb_m, libm::hypot(north, east) * DEGREE_M, max_climb_deg)
 }
 
-/// The middle of the altitude band in the frame, over ground that is level.
+/// The middle of the altitude band in the frame, if the ground is level.
 fn level_middle(fields: &Fields<'_>) -> Option<f64> {
     let band = fields.find("altitude")?;
     let end = |name: &str| number(band.get(name)?).filter(|end| ALTITUDE.contains(*end));
@@ -199,7 +199,7 @@ fn level_middle(fields: &Fields<'_>) -> Option<f64> {
     Some(ground + f64::midpoint(end("min")?, end("max")?))
 }
 
-/// Metres of a degree of longitude over those of a degree of latitude, about; never nothing.
+/// Ratio of a degree of longitude to a degree of latitude, approximately; never 0.
 fn shrink(lat: f64) -> f64 {
     libm::cos(lat.to_radians()).max(0.01)
 }
@@ -218,7 +218,7 @@ pub(super) fn place(node: &Node) -> Option<LatLon> {
     (LATITUDE.contains(lat) && LONGITUDE.contains(lon)).then_some(LatLon { lat, lon })
 }
 
-/// The figure, of any size.
+/// The number, of any size.
 pub(super) fn number(node: &Node) -> Option<f64> {
     match node {
         Node::Number(number) => Some(float(number)),

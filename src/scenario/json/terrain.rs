@@ -17,10 +17,10 @@ const FLAT: &[&str] = &["kind", "elevation"];
 const PEAKS: &[&str] = &["kind", "base", "peaks"];
 const GRID: &[&str] = &["kind", "origin", "cell", "columns", "rows", "elevations"];
 
-/// The terrain of a document that names none.
+/// The terrain of a document that gives none.
 pub(super) const DEFAULT: Terrain = Terrain::Flat(Flat { elevation: 0.0 });
 
-/// Terrain of any kind, and the area as far as a dataset cuts it.
+/// Terrain of any kind, and the area, trimmed to a dataset.
 pub(super) fn terrain(
     at: At<'_>,
     site: &Site<'_>,
@@ -126,7 +126,7 @@ fn grid(fields: &Fields<'_>, chart: &Chart, limits: &Limits, faults: &mut Faults
     Some(grid)
 }
 
-/// Elevations, as many as the grid has nodes and no more than the server takes.
+/// Elevations: as many as the grid has nodes, within the server's limit.
 fn elevations(
     at: At<'_>,
     expected: Option<usize>,

@@ -24,7 +24,7 @@ const CYLINDER: &[&str] = &[
 ];
 const POLYGON: &[&str] = &["kind", "name", "vertices", "margin", "base", "top"];
 
-/// The threats in the order of the document; those that cannot be read are `None`.
+/// The threats in document order; those that cannot be read are `None`.
 pub(super) fn threats(
     at: At<'_>,
     chart: &Chart,
@@ -54,7 +54,7 @@ pub(super) fn threats(
     Some(at.items(faults, |at, faults| threat(at, chart, within, faults)))
 }
 
-/// The vertices of all polygons together, before any is read.
+/// The number of vertices of all polygons, before any is read.
 fn vertex_count(at: At<'_>) -> usize {
     let Node::Array(threats) = at.node else {
         return 0;
@@ -67,7 +67,7 @@ fn vertex_count(at: At<'_>) -> usize {
     threats.iter().map(count).sum()
 }
 
-/// One threat; with `read_vertices` false there are too many to look at.
+/// One threat; vertices are skipped if `read_vertices` is false because there are too many.
 fn threat(at: At<'_>, chart: &Chart, read_vertices: bool, faults: &mut Faults) -> Option<Threat> {
     let (kind, fields) = at.variant(&[("cylinder", CYLINDER), ("polygon", POLYGON)], faults)?;
     let name = fields.or("name", None, faults, name);
@@ -145,7 +145,7 @@ fn polygon(
     Some(Polygon::new(vertices?, margin?))
 }
 
-/// A simple ring without its closing vertex.
+/// The vertices of a simple ring, without the closing one.
 fn vertices(at: At<'_>, chart: &Chart, faults: &mut Faults) -> Option<Vec<Point2>> {
     let mut vertices: Vec<Point2> = at
         .items(faults, |at, faults| chart.point2(at, faults))

@@ -1,7 +1,7 @@
-//! JSON text to a tree that forgets nothing a fault may be about: object entries stay in order,
-//! duplicates included, and a syntax error knows its line, its column and its pointer.
+//! JSON text to a tree that keeps everything a fault may refer to: object entries stay in order, duplicates included,
+//! and a syntax error has its line, column and pointer.
 //!
-//! Deliberately absent: what any field means.
+//! Deliberately absent: the meaning of fields.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -12,8 +12,8 @@ use serde_json::Number;
 use super::fault::Refusal;
 use super::path::escape;
 
-/// A JSON value, 24 bytes; arrays of numbers take 8 bytes an item, so that a grid stays small. Keys stay
-/// in the text where they can: they are most of the texts in a document.
+/// A JSON value, 24 bytes. Arrays of numbers take 8 bytes per item, to keep grids small. Keys, which are most of the
+/// strings in a document, borrow from the text where possible.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Node<'t> {
     Null,
@@ -21,7 +21,7 @@ pub(super) enum Node<'t> {
     /// Finite.
     Number(Number),
     Text(Box<str>),
-    /// An array of numbers only, or an empty one.
+    /// An array of numbers only; also the empty array.
     Numbers(Box<[f64]>),
     /// Any other array.
     Array(Box<[Node<'t>]>),
@@ -30,7 +30,7 @@ pub(super) enum Node<'t> {
 }
 
 impl<'t> Node<'t> {
-    /// The first entry of this name, when this is an object that has one.
+    /// The first entry with this name, if this is an object that has one.
     pub(super) fn get(&self, key: &str) -> Option<&Node<'t>> {
         match self {
             Node::Object(entries) => entries
@@ -42,11 +42,11 @@ impl<'t> Node<'t> {
     }
 }
 
-/// Parse JSON text (RFC 8259, UTF-8, nothing after the value).
+/// Parse JSON text (RFC 8259, UTF-8, with nothing after the value).
 ///
 /// # Errors
-/// [`Refusal::Syntax`] for anything that is not JSON, nesting deeper than 127, and numbers that
-/// no 64-bit float can hold.
+/// [`Refusal::Syntax`] for anything that is not JSON, nesting deeper than 127, and numbers outside the range of a
+/// 64-bit float.
 pub(super) fn parse(text: &[u8]) -> Result<Node<'_>, Refusal> {
     let mut trail = Vec::new();
     let mut reader = serde_json::Deserializer::from_slice(text);
@@ -62,8 +62,8 @@ enum Step<'t> {
     Index(usize),
 }
 
-/// Parses one value; steps are taken off the trail on success only, so that after an error the
-/// trail still leads to its place.
+/// Parses one value. Steps are removed from the trail only on success, so that after an error the trail still leads
+/// to the place.
 struct Element<'a, 't> {
     trail: &'a mut Vec<Step<'t>>,
 }
@@ -153,7 +153,7 @@ impl<'de> Visitor<'de> for Element<'_, 'de> {
     }
 }
 
-/// A key, taken as text whatever else it may look like.
+/// A key, always read as a string.
 struct Key<'t>(Cow<'t, str>);
 
 impl<'de> Deserialize<'de> for Key<'de> {
@@ -175,7 +175,7 @@ impl<'de> Visitor<'de> for KeyVisitor {
         Ok(Cow::Borrowed(key))
     }
 
-    /// With escapes in it.
+    /// With escapes.
     fn visit_str<E>(self, key: &str) -> Result<Cow<'de, str>, E> {
         Ok(Cow::Owned(key.to_owned()))
     }
@@ -183,11 +183,11 @@ impl<'de> Visitor<'de> for KeyVisitor {
 
 /// The nearest 64-bit float.
 pub(super) fn float(number: &Number) -> f64 {
-    // Adding 0 turns -0 into 0, so that equal documents make bit-equal scenarios.
+    // Adding 0 turns -0 into 0, so that equal documents give bit-equal scenarios.
     number.as_f64().expect("numbers of the tree are finite") + 0.0
 }
 
-/// A number as a caller would have written it: `3`, not `3.0`.
+/// A number as a person would write it: `3`, not `3.0`.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "whole and below 2^53, so exact"
@@ -210,7 +210,7 @@ fn refuse(text: &[u8], trail: &[Step<'_>], error: &serde_json::Error) -> Refusal
     }
 }
 
-/// The trail as a JSON pointer, cut where a hostile key would make it long.
+/// The trail as a JSON pointer, truncated if a hostile key makes it long.
 fn pointer(trail: &[Step<'_>]) -> String {
     const MAX_CHARS: usize = 500;
     let mut pointer = String::new();
@@ -229,7 +229,7 @@ fn pointer(trail: &[Step<'_>]) -> String {
     }
 }
 
-/// What the reader met, in words; frequent mistakes are named.
+/// What the parser found, in words, with hints for frequent mistakes.
 fn explain(text: &[u8], line: usize, column: usize, error: &serde_json::Error) -> String {
     if text.iter().all(u8::is_ascii_whitespace) {
         return "the document is empty, must be a JSON object".to_owned();
@@ -256,7 +256,7 @@ fn explain(text: &[u8], line: usize, column: usize, error: &serde_json::Error) -
     }
 }
 
-/// The number or bare word at a place, a long one cut.
+/// The number or bare word at a position, truncated if long.
 fn word_at(text: &[u8], line: usize, column: usize) -> String {
     const MAX_BYTES: usize = 40;
     let part_of_word = |byte: &u8| byte.is_ascii_alphanumeric() || b"+-._".contains(byte);

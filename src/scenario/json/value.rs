@@ -1,4 +1,5 @@
-//! Values of a document: numbers in a range, texts out of a list, the items of an array. Whatever does not fit leaves a fault and gives `None`, and reading goes on.
+//! Values of a document: numbers in a range, strings from a list, items of an array. An invalid value adds a fault
+//! and gives `None`, and reading continues.
 
 use std::borrow::Cow;
 
@@ -7,7 +8,7 @@ use super::path::Path;
 use super::ranges::{MAX_NAME_CHARS, Range};
 use super::tree::{Node, float, whole_or_float};
 
-/// A value and where it stands.
+/// A value and its path.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct At<'a> {
     pub(super) node: &'a Node<'a>,
@@ -147,7 +148,7 @@ impl<'a> At<'a> {
         }
     }
 
-    /// Every item of the array; those that cannot be read are `None` and have left a fault.
+    /// Every item of the array; those that cannot be read are `None` and have added a fault.
     pub(super) fn items<T>(
         self,
         faults: &mut Faults,
@@ -176,7 +177,7 @@ impl<'a> At<'a> {
         }
     }
 
-    /// Numbers within `range`; quick, because a grid has a million.
+    /// Numbers within `range`; fast, because a grid may have a million.
     pub(super) fn numbers(self, range: Range, faults: &mut Faults) -> Option<Vec<f64>> {
         self.len(faults)?;
         if let Node::Numbers(numbers) = self.node
@@ -201,7 +202,7 @@ impl<'a> At<'a> {
     }
 }
 
-/// A name; null is none.
+/// A name; null means none.
 #[expect(
     clippy::option_option,
     reason = "the outer one tells whether it could be read"
@@ -237,7 +238,7 @@ fn show(node: &Node) -> Cow<'static, str> {
     }
 }
 
-/// A text in quotes, control characters escaped, long ones cut.
+/// A string in quotes, with control characters escaped, truncated if long.
 pub(super) fn quote(text: &str) -> String {
     const MAX_CHARS: usize = 40;
     match text.char_indices().nth(MAX_CHARS) {
@@ -246,12 +247,12 @@ pub(super) fn quote(text: &str) -> String {
     }
 }
 
-/// A number as a caller would have written it.
+/// A number as a person would write it.
 pub(super) fn figure(value: f64) -> String {
     whole_or_float(value).to_string()
 }
 
-/// A measured length, to the millimetre.
+/// A length in metres, rounded to the millimetre.
 pub(super) fn metres(value: f64) -> String {
     figure((value * 1000.0).round() / 1000.0)
 }

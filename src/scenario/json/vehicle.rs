@@ -9,7 +9,7 @@ use super::value::{At, figure};
 const DEFAULT_MAX_TURN_DEG: f64 = 60.0;
 const DEFAULT_MAX_CLIMB_DEG: f64 = 45.0;
 const DEFAULT_CRUISE_SPEED: f64 = 15.0;
-/// A metre then costs 1.
+/// With this a metre costs 1.
 const DEFAULT_FUEL_PER_KM: f64 = 1000.0;
 const DEFAULT_WEIGHTS: Weights = Weights {
     fuel: 1.0,
@@ -17,7 +17,7 @@ const DEFAULT_WEIGHTS: Weights = Weights {
     altitude: 1.0,
 };
 
-/// Room for climbing makes no area wider than coordinates may be, metres.
+/// Greatest room for climbing, metres, so that the area stays within the range of coordinates.
 const MOST_ROOM_M: f64 = 1e7;
 
 /// A vehicle whose shortest leg may still depend on the rest of the document.
@@ -30,7 +30,7 @@ pub(super) struct VehicleDraft {
     fuel_per_km: f64,
 }
 
-/// The vehicle of a document that names none.
+/// The vehicle of a document that gives none.
 pub(super) const DEFAULT: VehicleDraft = VehicleDraft {
     max_turn_deg: DEFAULT_MAX_TURN_DEG,
     max_climb_deg: DEFAULT_MAX_CLIMB_DEG,
@@ -40,8 +40,8 @@ pub(super) const DEFAULT: VehicleDraft = VehicleDraft {
 };
 
 impl VehicleDraft {
-    /// Fill in the shortest leg: `distance / (10 (N + 1))`, `distance` from the start to the target
-    /// in metres (3-D), `waypoints` N.
+    /// Fill in the default shortest leg: `distance / (10 (N + 1))`, with `distance` from start to target in metres
+    /// (3-D) and `waypoints` N.
     pub(super) fn finish(self, distance: f64, waypoints: usize) -> Vehicle {
         Vehicle {
             max_turn_deg: self.max_turn_deg,
@@ -55,10 +55,9 @@ impl VehicleDraft {
     }
 }
 
-/// How far a default area must reach beyond everything, in metres, for a route over so great a
-/// distance to climb and descend by `climb_m` in all, no steeper than `max_climb_deg` (left out, the
-/// default): none where the straight way is long enough, else half of the way over ground that
-/// it takes, for going out and coming back.
+/// Padding of a default area, metres, that lets a route over `distance_m` climb and descend by `climb_m` in total at
+/// no more than `max_climb_deg` (default if `None`): 0 if the straight line is long enough, else half of the ground
+/// distance needed, to fly out and back.
 pub(super) fn climbing_room(climb_m: f64, distance_m: f64, max_climb_deg: Option<f64>) -> f64 {
     let max_climb_deg = max_climb_deg.unwrap_or(DEFAULT_MAX_CLIMB_DEG);
     let over_ground = climb_m / libm::tan(max_climb_deg.to_radians());
@@ -69,8 +68,8 @@ pub(super) fn climbing_room(climb_m: f64, distance_m: f64, max_climb_deg: Option
     }
 }
 
-/// Metres to climb and descend from one height to another, by way of the `middle` of the altitude
-/// band over each, all in one frame.
+/// Total metres climbed and descended from one height to another by way of the `middle` of the altitude band over
+/// each, all in one frame.
 pub(super) fn climb_through(ends: [f64; 2], middle: [f64; 2]) -> f64 {
     let by_the_middle = (middle[0] - ends[0]).abs() + (middle[1] - ends[1]).abs();
     by_the_middle.max((ends[1] - ends[0]).abs())
@@ -136,7 +135,7 @@ pub(super) fn weights(at: At<'_>, faults: &mut Faults) -> Option<Weights> {
     })
 }
 
-/// The weights of a document that names none.
+/// The weights of a document that gives none.
 pub(super) fn default_weights() -> Weights {
     DEFAULT_WEIGHTS
 }

@@ -1,4 +1,4 @@
-//! A scenario to its document: every default filled in, the same bytes for equal scenarios.
+//! Writes a scenario as a document: every default filled in, the same bytes for equal scenarios.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use crate::threat::{Shape, Threat};
 
 use super::tree::whole_or_float;
 
-/// Most documents have room in so many bytes.
+/// Initial capacity, bytes; enough for most documents.
 const ROOM: usize = 2_048;
 
 /// The accepted document as compact JSON; reading it gives an equal scenario.
@@ -50,7 +50,7 @@ struct Document<'a> {
     planner: WirePlanner<'a>,
 }
 
-/// A point, as its frame has it.
+/// A point in its frame's coordinates.
 #[derive(Serialize)]
 #[serde(untagged)]
 #[expect(clippy::upper_case_acronyms, reason = "named for its fields")]
@@ -67,7 +67,7 @@ enum XYZ {
     },
 }
 
-/// A place, as its frame has it.
+/// A place in its frame's coordinates.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum XY {

@@ -1,8 +1,8 @@
-//! ESRI ASCII grids: a header of names and numbers, then one number for each sample, from the top.
+//! ESRI ASCII grids: a header of names and numbers, then one number per sample, from the top row down.
 //!
-//! `xllcorner` is the edge of the first cell, `xllcenter` its middle: a sample holds at the middle. `dx` and
-//! `dy`, which GDAL writes where cells are not square, are read, too. A file is read as a stream of words,
-//! whatever its lines.
+//! `xllcorner` is the edge of the first cell, `xllcenter` its centre; a sample is the elevation at the centre. `dx`
+//! and `dy`, which GDAL writes when cells are not square, are accepted. A file is read as a stream of words; line
+//! breaks do not matter.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
@@ -11,16 +11,16 @@ use std::path::Path;
 use super::raster::{NoData, Span, Visit};
 use super::{Crs, DemError, Format, Lattice};
 
-/// What a sample holds where nothing is known, unless the header says otherwise.
+/// Value of a sample without data, unless the header states another.
 const DEFAULT_NO_DATA: f64 = -9999.0;
 
-/// A header is shorter than this, bytes.
+/// Longest header, bytes.
 const LONGEST_HEADER: u64 = 4096;
 
-/// A number is shorter than this, bytes.
+/// Longest number, bytes.
 const LONGEST_WORD: usize = 64;
 
-/// What a header may say.
+/// Keywords of a header.
 const KEYS: [&str; 10] = [
     "ncols",
     "nrows",
@@ -39,16 +39,16 @@ const KEYS: [&str; 10] = [
 pub(super) struct Layout {
     pub(super) columns: usize,
     pub(super) rows: usize,
-    /// The node at the bottom left, east and north.
+    /// The bottom-left node, east and north.
     pub(super) south_west: [f64; 2],
-    /// Between columns, and between rows, each > 0.
+    /// Distance between columns, and between rows, each > 0.
     pub(super) cell: [f64; 2],
     pub(super) no_data: f64,
-    /// Where the numbers begin, bytes.
+    /// Offset of the first number, bytes.
     start: u64,
 }
 
-/// Whether a file that begins so may be one.
+/// Whether a file that begins like this may be an ASCII grid.
 pub(super) fn is_grid(beginning: &[u8]) -> bool {
     let mut words = beginning
         .split(u8::is_ascii_whitespace)
@@ -95,7 +95,7 @@ fn not_a_number(key: &str, word: &str) -> DemError {
     malformed(format!("{key} is {:?}, must be a number", shown(word)))
 }
 
-/// At most the length of a number of what a file holds.
+/// `word`, cut off after the greatest length of a number.
 fn shown(word: &str) -> String {
     word.chars().take(LONGEST_WORD).collect()
 }
@@ -119,7 +119,7 @@ impl<'a> Words<'a> {
     }
 }
 
-/// The header that says `values`, before a first number `word`.
+/// The layout from the header's `values`; `word` is the first number after them.
 fn finish(
     values: &[Option<f64>; KEYS.len()],
     start: u64,
@@ -189,7 +189,7 @@ fn finish(
         place(0, ["xllcorner", "xllcenter"])?,
         place(1, ["yllcorner", "yllcenter"])?,
     ];
-    // A digit and what parts it from the next.
+    // Each number takes at least one digit and a separator.
     let least = 2 * (columns as u64).saturating_mul(rows as u64) - 1;
     if len - start < least {
         return Err(malformed(format!(
@@ -207,7 +207,7 @@ fn finish(
 }
 
 impl Layout {
-    /// Where the numbers stand, in `crs`.
+    /// Where the samples lie, in `crs`.
     pub(super) fn lattice(&self, crs: Crs) -> Lattice {
         let [width, height] = self.cell;
         let [west, south] = self.south_west;
@@ -234,7 +234,7 @@ impl Layout {
         };
         let no_data = NoData::new(Some(self.no_data));
         let mut samples = Vec::with_capacity(span.columns.len());
-        // What comes after the last row is looked at when that is read.
+        // Numbers after the last row are detected only when that row is read.
         for row in 0..span.rows.end {
             samples.clear();
             for column in 0..self.columns {
@@ -266,7 +266,7 @@ struct Numbers {
 }
 
 impl Numbers {
-    /// To the next word, if there is one; of a long one, only the beginning is kept.
+    /// Move to the next word, if there is one; only the beginning of a long one is kept.
     fn advance(&mut self) -> Result<bool, DemError> {
         self.word.clear();
         loop {
@@ -285,7 +285,7 @@ impl Numbers {
             let rest = &buffer[skipped..];
             let end = rest.iter().position(u8::is_ascii_whitespace);
             let part = &rest[..end.unwrap_or(rest.len())];
-            // One more than allowed, so that it is seen to be too long.
+            // One byte more than allowed, so that the word is recognised as too long.
             let room = (LONGEST_WORD + 1).saturating_sub(self.word.len());
             self.word.extend_from_slice(&part[..part.len().min(room)]);
             let used = skipped + part.len();

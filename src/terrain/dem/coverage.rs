@@ -1,4 +1,4 @@
-//! Which samples lie under a rectangle of the plane, and whether they are all there.
+//! Which samples lie under a rectangle of the plane, and whether all of them exist.
 
 use super::DemError;
 use super::fit::Fit;
@@ -7,13 +7,13 @@ use super::raster::{Raster, Span};
 use crate::geometry::geodesy::TangentPlane;
 use crate::geometry::{Point2, Rect};
 
-/// Samples read beyond the outermost that are seen to be needed: an edge bends between the points looked at.
+/// Extra samples read beyond the outermost needed: the edge is curved between the points checked.
 const SPARE: f64 = 2.0;
 
-/// Rounds of drawing the sides of a rectangle in.
+/// Most rounds of shrinking a rectangle.
 const ROUNDS: usize = 200;
 
-/// A rectangle just within the data is drawn in by so many cells more.
+/// Cells by which a rectangle is shrunk further, to lie just within the data.
 const HAIR: f64 = 1e-3;
 
 /// Points along the edge of `rect`, all the way round, the first not repeated.
@@ -42,7 +42,7 @@ fn is_inside(lattice: &Lattice, cells: [f64; 2]) -> bool {
     overhang(lattice, cells).into_iter().all(|over| over <= 0.0)
 }
 
-/// The largest part of `wanted` over the nodes of `lattice`, as [`super::Dataset::covered`].
+/// The largest part of `wanted` over the nodes of `lattice`; see [`super::Dataset::covered`].
 pub(super) fn covered(lattice: &Lattice, plane: &TangentPlane, wanted: Rect) -> Option<Rect> {
     let mut rect = wanted;
     for _ in 0..ROUNDS {
@@ -50,20 +50,19 @@ pub(super) fn covered(lattice: &Lattice, plane: &TangentPlane, wanted: Rect) -> 
         if size.x <= 0.0 || size.y <= 0.0 {
             return None;
         }
-        // How far each side reaches out where it lies, in shares of the rectangle: west, east, south, north.
+        // How far each side sticks out, as a fraction of the rectangle: west, east, south, north.
         let mut out = [0.0_f64; 4];
         let cells: Vec<[f64; 2]> = edge(rect)
             .map(|point| lattice.below(plane, point))
             .collect::<Option<_>>()?;
         let at = |side: usize, look: usize| cells[(side * LOOKS + look) % (4 * LOOKS)];
-        // South, east, north and west follow one another; a way across the rectangle leads from one side to the
-        // one opposite.
+        // Sides 0 to 3 are south, east, north and west; each is compared with the opposite side.
         for (side, [from, to]) in [[3, 1], [1, 3], [0, 2], [2, 0]].into_iter().enumerate() {
             for look in 0..=LOOKS {
                 let (here, there) = (at(from, look), at(to, LOOKS - look));
                 let (x, y) = (there[0] - here[0], there[1] - here[1]);
                 let over = overhang(lattice, here);
-                // In by what lies along the way across.
+                // Shrink by the fraction of the distance across that sticks out.
                 let along = if x.abs() > y.abs() {
                     (if x > 0.0 { over[0] } else { over[2] }) / x.abs()
                 } else {
@@ -88,10 +87,10 @@ pub(super) fn covered(lattice: &Lattice, plane: &TangentPlane, wanted: Rect) -> 
     None
 }
 
-/// The rows and columns under `area` and, where there are any, `margin` metres round it.
+/// The rows and columns under `area` and, where they exist, within `margin` metres around it.
 ///
 /// # Errors
-/// [`DemError::Outside`] when `area` reaches out of the nodes.
+/// [`DemError::Outside`] when `area` extends beyond the nodes.
 pub(super) fn span(
     lattice: &Lattice,
     plane: &TangentPlane,
@@ -130,15 +129,15 @@ pub(super) fn span(
     })
 }
 
-/// What keeps `rect` from having an elevation everywhere.
+/// Why `rect` does not have an elevation everywhere.
 pub(super) enum Gap {
-    /// It reaches out of the nodes there.
+    /// It extends beyond the nodes at this point.
     Outside(Point2),
     /// A node without data, by column and row.
     NoData([usize; 2]),
 }
 
-/// The first gap under `rect`, which `fit` takes to columns and rows; `bend` is the fit's.
+/// The first gap under `rect`. `fit` maps the plane to columns and rows; `bend` is that of `fit`.
 pub(super) fn gap(raster: &Raster, fit: &Fit, bend: f64, rect: Rect) -> Option<Gap> {
     let lattice = &raster.lattice;
     let points: Vec<Point2> = edge(rect).collect();
@@ -151,7 +150,7 @@ pub(super) fn gap(raster: &Raster, fit: &Fit, bend: f64, rect: Rect) -> Option<G
     if let Some(idx) = cells.iter().position(outside) {
         return Some(Gap::Outside(points[idx]));
     }
-    // Between two points of it, the edge keeps within this of the straight way.
+    // Between two consecutive points, the edge deviates from the straight line by no more than this.
     let longest = (rect.max - rect.min).max() / LOOKS as f64;
     let bulge = bend * longest * longest / 8.0 + super::fit::EXACTNESS;
     let mut rows = vec![[f64::INFINITY, f64::NEG_INFINITY]; lattice.rows - 1];
@@ -174,13 +173,14 @@ pub(super) fn gap(raster: &Raster, fit: &Fit, bend: f64, rect: Rect) -> Option<G
     None
 }
 
-/// Take the way from `a` to `b`, `bulge` cells wide on either side, into the columns that each row of cells spans.
+/// Extend the columns spanned in each row of cells by the line from `a` to `b`, widened by `bulge` cells on either
+/// side.
 fn widen(rows: &mut [[f64; 2]], a: [f64; 2], b: [f64; 2], bulge: f64) {
     let (low, high) = (a[1].min(b[1]) - bulge, a[1].max(b[1]) + bulge);
     let last = rows.len() - 1;
     let (first, last) = (node(low, last), node(high, last));
     for (row, reach) in rows.iter_mut().enumerate().take(last + 1).skip(first) {
-        // The part of the way within this row, a bulge farther at both ends.
+        // The part of the line within this row, extended by `bulge` at both ends.
         let share = |line: f64| {
             let share = (line - a[1]) / (b[1] - a[1]);
             if share.is_finite() {

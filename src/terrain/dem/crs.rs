@@ -1,7 +1,7 @@
-//! Coordinate reference systems: by EPSG code, to and from degrees of WGS 84.
+//! Coordinate reference systems by EPSG code, converted to and from WGS 84 degrees.
 //!
-//! Degrees of WGS 84, and of the datums that are taken for the same, need no library at all. Deliberately
-//! absent: shifts by grid files, which would be files to carry.
+//! Degrees of WGS 84, and of datums treated as equal to it, need no projection library. Deliberately unsupported:
+//! datum shifts by grid files, which would have to be shipped.
 
 use std::fmt;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use proj4rs::Proj;
 use super::DemError;
 use crate::geometry::geodesy::LatLon;
 
-/// WGS 84 in PROJ's words.
+/// WGS 84 as a PROJ string.
 const WGS84: &str = "+proj=longlat +datum=WGS84 +no_defs";
 
 /// A coordinate reference system.
@@ -21,11 +21,11 @@ pub struct Crs {
     plane: Option<Arc<Plane>>,
 }
 
-/// Not plainly degrees of WGS 84.
+/// A system other than plain WGS 84 degrees.
 struct Plane {
     own: Proj,
     wgs84: Proj,
-    /// Its coordinates are degrees all the same.
+    /// Whether its coordinates are degrees.
     degrees: bool,
 }
 
@@ -42,8 +42,8 @@ impl Crs {
     /// By name, such as `EPSG:32616`.
     ///
     /// # Errors
-    /// [`DemError::UnusableCrs`] when the name is not an EPSG code, is not known, is no map of the
-    /// ground or has no known relation to WGS 84.
+    /// [`DemError::UnusableCrs`] when the name is not an EPSG code, is unknown, is neither geographic nor projected,
+    /// or has no known relation to WGS 84.
     pub fn parse(name: &str) -> Result<Self, DemError> {
         let code = name.trim().split_once(':').and_then(|(authority, code)| {
             authority
@@ -112,7 +112,7 @@ impl Crs {
         self.plane.as_ref().is_none_or(|plane| plane.degrees)
     }
 
-    /// East and north of `place`, in the system's unit; `None` where it does not reach.
+    /// East and north of `place`, in the system's unit; `None` outside its domain.
     pub(super) fn east_north(&self, place: LatLon) -> Option<[f64; 2]> {
         let Some(plane) = &self.plane else {
             return Some([place.lon, place.lat]);
@@ -129,7 +129,7 @@ impl Crs {
         finite([scale(point.0), scale(point.1)])
     }
 
-    /// The place at `[east, north]`; `None` where there is none.
+    /// The place at `[east, north]`; `None` outside the system's domain.
     pub(super) fn geodetic(&self, [east, north]: [f64; 2]) -> Option<LatLon> {
         let Some(plane) = &self.plane else {
             return finite([east, north]).map(|[lon, lat]| LatLon { lat, lon });
@@ -151,8 +151,7 @@ fn finite(pair: [f64; 2]) -> Option<[f64; 2]> {
     pair.iter().all(|value| value.is_finite()).then_some(pair)
 }
 
-/// Whether a word of a definition leaves WGS 84 where it is: GRS 80 and it differ by a tenth of a
-/// millimetre.
+/// Whether a word of a definition implies no shift from WGS 84. GRS 80 and WGS 84 differ by a tenth of a millimetre.
 fn is_null_shift(word: &str) -> bool {
     word.strip_prefix("+towgs84=")
         .is_none_or(|shift| shift.split(',').all(|part| part.parse() == Ok(0.0)))

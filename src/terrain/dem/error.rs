@@ -1,54 +1,54 @@
-//! What is wrong with a file of elevations, or with asking it for some.
+//! What can be wrong with an elevation file or with a request for its elevations.
 
 use super::Format;
 use crate::geometry::geodesy::LatLon;
 
-/// Why a dataset cannot be used, or not there.
+/// Why a dataset cannot be used, or not at some place.
 #[derive(Debug, thiserror::Error)]
 pub enum DemError {
-    /// The operating system's reason.
+    /// The operating system's error.
     #[error("the file cannot be read: {0}")]
     Io(#[from] std::io::Error),
-    /// No reader knows the file.
+    /// The format is not recognised.
     #[error(
         "the file is none of GeoTIFF, ESRI ASCII grid and SRTM .hgt (1201 x 1201 or 3601 x 3601 samples)"
     )]
     UnknownFormat,
-    /// The caller says it is one format, the content another.
+    /// The caller declares one format, but the content is another.
     #[error("the file is said to be {said}, but it is {found}")]
     OtherFormat {
-        /// By the caller.
+        /// Declared by the caller.
         said: Format,
-        /// In the content.
+        /// Found in the content.
         found: Format,
     },
-    /// Damaged, cut off, or not what its format allows.
+    /// Damaged, truncated, or not allowed by its format.
     #[error("the file is not a valid {format}: {reason}")]
     Malformed {
-        /// The format that it claims.
+        /// The format of the file.
         format: Format,
         /// What is wrong, and where.
         reason: String,
     },
-    /// Allowed by its format, but not here.
+    /// Allowed by its format, but not supported here.
     #[error("{found}; must be {allowed}")]
     Unsupported {
         /// What the file holds.
         found: String,
-        /// What could be read.
+        /// What is supported.
         allowed: &'static str,
     },
-    /// More than is taken.
+    /// Above a limit.
     #[error("{what} is {value}, must be at most {limit}")]
     TooLarge {
-        /// The measure.
+        /// The quantity.
         what: &'static str,
-        /// In the file, or asked for.
+        /// Its value in the file or in the request.
         value: u64,
-        /// Most allowed.
+        /// The greatest value allowed.
         limit: u64,
     },
-    /// Neither the file nor the caller says where the elevations belong.
+    /// Neither the file nor the caller states the coordinate reference system.
     #[error(
         "the file names no coordinate reference system, and its extent does not fit into degrees; state `crs`, such as EPSG:32616"
     )]
@@ -58,47 +58,47 @@ pub enum DemError {
     UnusableCrs {
         /// As given.
         crs: String,
-        /// Why not.
+        /// Why it cannot be used.
         reason: String,
     },
-    /// The caller names another reference system than the file.
+    /// The caller declares another reference system than the file.
     #[error("the file is in {found}, but `crs` says {said}")]
     OtherCrs {
-        /// By the caller.
+        /// Declared by the caller.
         said: String,
-        /// In the file.
+        /// Found in the file.
         found: String,
     },
-    /// An elevation that no ground has: most often an undeclared no-data value.
+    /// An impossible elevation: most often an undeclared no-data value.
     #[error(
         "row {row}, column {column} holds {value} m, must be within -12000 to 12000 m; is it a no-data value that the file does not declare?"
     )]
     Elevation {
-        /// From the top, 0 the first.
+        /// From the top, starting at 0.
         row: usize,
-        /// From the left, 0 the first.
+        /// From the left, starting at 0.
         column: usize,
         /// Metres.
         value: f64,
     },
-    /// No elevation is known there: beyond the outermost samples.
+    /// No elevation is known there: it is beyond the outermost samples.
     #[error("latitude {:.6}, longitude {:.6} lies outside the elevations, which reach from latitude {:.6} to {:.6} and from longitude {:.6} to {:.6}", .at.lat, .at.lon, .south_west.lat, .north_east.lat, .south_west.lon, .north_east.lon)]
     Outside {
-        /// A place of those asked for.
+        /// One of the places requested.
         at: LatLon,
         /// Least latitude and longitude of the elevations.
         south_west: LatLon,
-        /// Greatest; a longitude beyond 180 where they cross the antimeridian.
+        /// Greatest latitude and longitude; the longitude exceeds 180 where they cross the antimeridian.
         north_east: LatLon,
     },
     /// A hole in the data.
     #[error("there is no elevation at latitude {:.6}, longitude {:.6}: row {row}, column {column} holds no data", .at.lat, .at.lon)]
     NoData {
-        /// Where the sample stands.
+        /// Position of the sample.
         at: LatLon,
-        /// From the top of the file, 0 the first.
+        /// From the top of the file, starting at 0.
         row: usize,
-        /// From its left.
+        /// From the left, starting at 0.
         column: usize,
     },
 }

@@ -1,22 +1,22 @@
-//! The way from metres on the plane to columns and rows of a raster, as a polynomial: every leg asks for it, and the
-//! exact way leads over the ellipsoid and through a map projection.
+//! Polynomial from metres on the plane to columns and rows of a raster. Every leg needs this mapping, and the exact
+//! one goes over the ellipsoid and through a map projection.
 
 use std::f64::consts::PI;
 
 use crate::geometry::{Point2, Rect};
 
-/// Terms along each axis that are tried, the first that are exact enough are kept.
+/// Numbers of terms tried along each axis; the first that is exact enough is kept.
 const TERMS: [usize; 6] = [3, 4, 6, 8, 11, 15];
 
-/// How far the polynomial may be from the exact way, cells.
+/// Largest allowed error of the polynomial, cells.
 pub(super) const EXACTNESS: f64 = 2e-6;
 
-/// Values are rounded to this share of a cell. Projections use the platform's maths library, whose last
-/// bits differ from one to the next; rounded so, its results are the same on all of them but where a value
-/// lies next to the middle between two, which may happen in one projected scenario of some hundreds.
+/// Values are rounded to this fraction of a cell. Projections use the platform's maths library, whose last bits
+/// differ between platforms. Rounding makes the results equal everywhere, except where a value lies close to the
+/// midpoint between two multiples; that may happen in one of some hundreds of projected scenarios.
 const ROUNDING: f64 = 1.0 / 1_048_576.0;
 
-/// Rows of factors by powers of `u`, each by a power of `v`.
+/// Evaluates the polynomial: each row holds coefficients by powers of `u`, and rows go by powers of `v`.
 #[inline]
 fn sum<'f, R: AsRef<[[f64; 2]]> + ?Sized + 'f>(
     rows: impl IntoIterator<Item = &'f R, IntoIter: DoubleEndedIterator>,
@@ -34,19 +34,19 @@ fn sum<'f, R: AsRef<[[f64; 2]]> + ?Sized + 'f>(
     sum
 }
 
-/// A polynomial in the metres of a rectangle, brought to -1 to 1 along each axis.
+/// A polynomial over a rectangle, with metres scaled to -1 to 1 along each axis.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Fit {
     center: Point2,
-    /// 1 over half the sides.
+    /// 1 / half the length of each side.
     scale: [f64; 2],
     terms: usize,
-    /// Of column and row, by powers of y, then x.
+    /// Coefficients for column and row, by powers of y, then x.
     factors: Vec<[f64; 2]>,
 }
 
 impl Fit {
-    /// Of `exact` over `region`; `None` where that has no value or is too uneven for so many terms.
+    /// Fit `exact` over `region`; `None` where it has no value or even the most terms are not exact enough.
     pub(super) fn of(region: Rect, exact: impl Fn(Point2) -> Option<[f64; 2]>) -> Option<Self> {
         TERMS.into_iter().find_map(|terms| {
             let fit = Self::with_terms(region, &exact, terms)?;
@@ -54,7 +54,7 @@ impl Fit {
         })
     }
 
-    /// Through the values at Chebyshev's points.
+    /// Interpolates at the Chebyshev nodes.
     fn with_terms(
         region: Rect,
         exact: &impl Fn(Point2) -> Option<[f64; 2]>,
@@ -91,7 +91,7 @@ impl Fit {
         })
     }
 
-    /// Whether it is right between the points that it was made from, and at the edge.
+    /// Whether the fit is exact enough between the interpolation points and at the edge.
     fn is_exact(&self, region: Rect, exact: &impl Fn(Point2) -> Option<[f64; 2]>) -> bool {
         let count = 2 * self.terms;
         let size = region.max - region.min;
@@ -112,7 +112,7 @@ impl Fit {
     pub(super) fn at(&self, point: Point2) -> [f64; 2] {
         let u = (point.x - self.center.x) * self.scale[0];
         let v = (point.y - self.center.y) * self.scale[1];
-        // All but the most uneven take few terms; known beforehand, they cost half as much.
+        // Most fits have few terms; a length known at compile time halves the cost.
         match self.terms {
             3 => sum(self.factors.as_chunks::<3>().0, u, v),
             4 => sum(self.factors.as_chunks::<4>().0, u, v),
@@ -120,13 +120,13 @@ impl Fit {
         }
     }
 
-    /// How many cells a straight way of so many metres squared bends, at most: its second derivatives
-    /// along any heading, in cells a square metre.
+    /// Largest second derivative along any heading, cells per square metre. Times the square of a line's length in
+    /// metres, it bounds how many cells the line bends.
     pub(super) fn bend(&self) -> f64 {
         let [x, y] = self.scale;
         let mut most = 0.0_f64;
         for axis in 0..2 {
-            // A power is never more than 1 where the polynomial holds.
+            // No power exceeds 1 within the rectangle.
             let mut parts = [0.0; 3];
             for l in 0..self.terms {
                 for m in 0..self.terms {
@@ -143,10 +143,10 @@ impl Fit {
     }
 }
 
-/// By power, then by knot: what a value at a knot adds to the factor of a power.
+/// By power, then by knot: what a unit value at a knot adds to the coefficient of a power.
 fn to_powers(knots: &[f64]) -> Vec<Vec<f64>> {
     let terms = knots.len();
-    // Chebyshev's polynomials by their factors.
+    // Coefficients of the Chebyshev polynomials.
     let mut polynomials: Vec<Vec<f64>> = Vec::with_capacity(terms);
     for degree in 0..terms {
         let mut factors = vec![0.0; terms];

@@ -1,9 +1,9 @@
-//! A raster seen from a local plane.
+//! A raster mapped onto a local plane.
 //!
-//! The ground is the bilinear surface between the samples in their own reference system, which is what
-//! everybody else samples, too. A straight leg is not quite straight there: it is cut into pieces so short that
-//! each is within a quarter of a millimetre of height of its chord, and along chords least and greatest heights
-//! are exact. Most of a leg is proven by planes over blocks of cells to be nowhere least or greatest.
+//! The ground is the bilinear surface between the samples in their own reference system, as other software samples
+//! it. A leg that is straight on the plane is slightly curved there, so it is cut into chords whose heights are
+//! within a quarter of a millimetre; along a chord the least and greatest heights are exact. Planes over blocks of
+//! cells rule out most of a leg first.
 
 use super::coverage::{self, Gap};
 use super::fit::Fit;
@@ -15,39 +15,39 @@ use crate::geometry::{Point2, Point3, Rect, Segment};
 use crate::terrain::HeightRange;
 use crate::terrain::cells::{Cells, Place, share_of_way};
 
-/// What a chord may add to or take from a height, metres.
+/// Largest height error of a chord, metres.
 const CHORD_M: f64 = 2.5e-4;
 
-/// A way is taken for straight while blocks are looked at if it bends by no more cells than this.
+/// While blocks are searched, a line counts as straight if it bends by at most this many cells.
 const BEND_CELLS: f64 = 0.02;
 
-/// Shares of the margin that are tried on each side.
+/// Fractions of the margin tried on each side.
 const MARGINS: [f64; 3] = [1.0, 0.5, 0.25];
 
-/// The ground of a scenario, out of a file of elevations.
+/// The ground of a scenario, from an elevation file.
 #[derive(Clone, PartialEq)]
 pub struct Dem {
     name: String,
     sha256: String,
     raster: Raster,
     fit: Fit,
-    /// Elevations are known all over it.
+    /// Every point of it has an elevation.
     extent: Rect,
     slabs: Slabs,
-    /// Of the fit, cells a square metre.
+    /// Of `fit`, cells per square metre.
     bend: f64,
-    /// Most that the ground rises over one cell along a row, and along a column, together, metres.
+    /// Greatest rise over one cell along a row plus the greatest along a column, metres.
     steepest: f64,
     /// Longest chord, metres.
     chord_m: f64,
 }
 
 impl Dem {
-    /// The ground under `area` (metres on `plane`), and `margin` metres round it where `raster` reaches.
+    /// The ground under `area` (metres on `plane`), and within `margin` metres around it where `raster` has data.
     ///
     /// # Errors
     /// [`DemError::Outside`] or [`DemError::NoData`] when not every point of `area` has an elevation,
-    /// [`DemError::UnusableCrs`] when a polynomial does not follow the reference system over it.
+    /// [`DemError::UnusableCrs`] when no polynomial fits the reference system over it.
     pub fn new(
         raster: Raster,
         plane: &TangentPlane,
@@ -80,7 +80,7 @@ impl Dem {
             coverage::gap(&raster, &fit, bend, rect).is_none()
         });
         let slabs = Slabs::of(&raster);
-        // Over d cells of deviation the ground rises by no more than this times d.
+        // Over a deviation of d cells the ground rises by at most d times this.
         let steepest = steepest(&raster);
         let chord_m = (8.0 * CHORD_M / (bend * steepest).max(1e-30)).sqrt();
         Ok(Self {
@@ -96,7 +96,7 @@ impl Dem {
         })
     }
 
-    /// The same, out of the dataset called `name`, which `sha256` stands for whatever it is called.
+    /// The same, labelled with the name and checksum of its dataset.
     #[must_use]
     pub fn named(self, name: impl Into<String>, sha256: impl Into<String>) -> Self {
         Self {
@@ -106,7 +106,7 @@ impl Dem {
         }
     }
 
-    /// The same, higher by so many metres: above another datum.
+    /// The same, raised by a number of metres, for another datum.
     #[must_use]
     #[expect(
         clippy::cast_possible_truncation,
@@ -123,25 +123,25 @@ impl Dem {
         self
     }
 
-    /// What the dataset is called; empty unless it was [`Dem::named`].
+    /// The dataset's name; empty unless set by [`Dem::named`].
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What stands for the dataset; empty likewise.
+    /// The dataset's checksum; empty unless set by [`Dem::named`].
     #[must_use]
     pub fn sha256(&self) -> &str {
         &self.sha256
     }
 
-    /// The rectangle that has an elevation everywhere; beyond it, that of its edge goes on.
+    /// The rectangle that has an elevation everywhere; beyond it, the elevation at the edge applies.
     #[must_use]
     pub fn extent(&self) -> Rect {
         self.extent
     }
 
-    /// The samples that the ground lies between.
+    /// The samples that define the ground.
     #[must_use]
     pub fn raster(&self) -> &Raster {
         &self.raster
@@ -174,7 +174,7 @@ impl Dem {
         self.height_range_beyond(leg, window, HeightRange::EMPTY)
     }
 
-    /// As `height_range`, but only where it reaches beyond `band`.
+    /// As `height_range`, but exact only where it exceeds `band`.
     pub(in crate::terrain) fn height_range_beyond(
         &self,
         leg: &Segment,
@@ -187,7 +187,7 @@ impl Dem {
             self.widen(leg.at(t0), leg.at(t1), band, &mut range);
             return range;
         }
-        // Beyond the extent its edge goes on, so that the way over the ground bends there.
+        // Beyond the extent the elevation at the edge applies, so the ground track bends there.
         let (a, b) = (leg.a, leg.b);
         let mut bends = [
             share_of_way(a.x, b.x, min.x),
@@ -207,7 +207,7 @@ impl Dem {
         range
     }
 
-    /// Widen `range` by the heights on the straight way `from` .. `to`, as far as they are beyond `band`.
+    /// Widen `range` by the heights on the straight line `from` .. `to` that exceed `band`.
     fn widen(&self, from: Point3, to: Point3, band: HeightRange, range: &mut HeightRange) {
         let ends = [from, to].map(|point| {
             let nearest = self.extent.nearest(point.xy());
@@ -215,7 +215,7 @@ impl Dem {
         });
         let places = ends.map(|point| self.place(point));
         if band == HeightRange::EMPTY {
-            // So that there is something to be beyond.
+            // Start from the heights at the ends, so that `range` is not empty.
             for [column, row, height] in places {
                 let height = height - self.cells().elevation([column, row]);
                 *range = range.join(HeightRange::of(height));
@@ -224,7 +224,7 @@ impl Dem {
         self.search(ends, places, band, range);
     }
 
-    /// Halve the way until it is all but straight over the cells, then look at blocks.
+    /// Halve the line until it is nearly straight over the cells, then search blocks.
     fn search(
         &self,
         ends: [Point3; 2],
@@ -245,14 +245,14 @@ impl Dem {
         let way = Way {
             ends,
             places,
-            // The ground's rise over what it bends, and that of the plane of a block.
+            // The rise over the deviation, once for the ground and once for a block's plane.
             slack: 2.0 * bend * self.steepest,
         };
         self.descend(&way, self.slabs.level(cells), [0.0, 1.0], band, range);
     }
 
-    /// Look at the blocks of a level under the part `[s0, s1]` of `way`, and more closely at what may
-    /// widen `range` beyond `band`: where it may do so most first, as little else may then be left.
+    /// Search the blocks of a level under the part `[s0, s1]` of `way`. Descend into those that may widen `range`
+    /// beyond `band`, the one with the largest bound first, as that may rule out the others.
     fn descend(
         &self,
         way: &Way,
@@ -301,8 +301,8 @@ impl Dem {
         });
     }
 
-    /// What least and greatest height over the part `[s0, s1]` of `way` may be, at the utmost, by the cells
-    /// under the straight way between its places.
+    /// Bounds of the heights over the part `[s0, s1]` of `way`, from the cells under the straight line between its
+    /// places.
     fn roughly(&self, way: &Way, [s0, s1]: [f64; 2]) -> HeightRange {
         let HeightRange { min, max } = self.cells().height_range(way.at(s0), way.at(s1));
         HeightRange {
@@ -311,7 +311,7 @@ impl Dem {
         }
     }
 
-    /// Least and greatest height over the part `[s0, s1]` of `way`, by chords.
+    /// Least and greatest height over the part `[s0, s1]` of `way`, computed along chords.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -349,7 +349,7 @@ impl Dem {
     }
 }
 
-/// `area` with as much of `margin` on each side as is `known` all over.
+/// `area` grown on each side by as much of `margin` as is `known` everywhere.
 fn widened(area: Rect, margin: f64, known: impl Fn(Rect) -> bool) -> Rect {
     let mut rect = area;
     for side in 0..4 {
@@ -370,7 +370,7 @@ fn widened(area: Rect, margin: f64, known: impl Fn(Rect) -> bool) -> Rect {
     rect
 }
 
-/// Most that the ground rises over one cell along a row, and along a column, together, metres.
+/// Greatest rise over one cell along a row plus the greatest along a column, metres.
 fn steepest(raster: &Raster) -> f64 {
     let columns = raster.lattice.columns;
     let mut most = [0.0_f32; 2];
@@ -385,7 +385,7 @@ fn steepest(raster: &Raster) -> f64 {
     f64::from(most[0]) + f64::from(most[1])
 }
 
-/// Without its samples.
+/// Omits the samples.
 impl std::fmt::Debug for Dem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Dem")

@@ -1,8 +1,8 @@
-//! SRTM tiles: a square of big-endian 16-bit elevations and nothing else.
+//! SRTM tiles: a square of big-endian 16-bit elevations without a header.
 //!
-//! The name says where it belongs: `N36W085.hgt` reaches from 36 to 37 degrees north and from 85 to 84
-//! degrees west, with samples on the very edges. What lies in a tile is south and west of the equator and
-//! Greenwich for `S` and `W`, named after its south-west corner.
+//! The file name gives the position of the south-west corner: `N36W085.hgt` covers 36 to 37 degrees north and 85 to
+//! 84 degrees west, with samples exactly on the edges. `S` and `W` stand for south of the equator and west of
+//! Greenwich.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
@@ -11,10 +11,10 @@ use std::path::Path;
 use super::raster::{NoData, Span, Visit};
 use super::{Crs, DemError, Format, Lattice};
 
-/// Samples along a side: of 3 and of 1 arc second.
+/// Samples along a side, for 3 and 1 arc seconds.
 const SIDES: [usize; 2] = [1201, 3601];
 
-/// What a sample holds where nothing is known.
+/// Value of a sample without data.
 pub(super) const NO_DATA: f64 = -32768.0;
 
 /// Samples along a side.
@@ -23,7 +23,7 @@ pub(super) struct Layout {
     side: usize,
 }
 
-/// Whether so many bytes may be a tile.
+/// Whether a file of `len` bytes may be a tile.
 pub(super) fn is_tile(len: u64) -> bool {
     side(len).is_some()
 }
@@ -58,7 +58,7 @@ pub(super) fn open(len: u64, name: &str) -> Result<(Layout, Lattice), DemError> 
     Ok((Layout { side }, lattice))
 }
 
-/// Latitude and longitude of the south-west corner, by the first seven letters of a name.
+/// Latitude and longitude of the south-west corner, from the first seven characters of a name.
 fn corner(name: &str) -> Option<[f64; 2]> {
     let name = name.get(..7)?.as_bytes();
     let part = |sign: u8, digits: &[u8], [plus, minus]: [u8; 2], most: u32| {

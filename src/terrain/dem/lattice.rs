@@ -1,31 +1,31 @@
-//! Where the samples of a dataset stand: on a lattice in its reference system.
+//! Where the samples of a dataset lie: on a lattice in its reference system.
 
 use super::raster::Span;
 use super::{Crs, DemError};
 use crate::geometry::Point2;
 use crate::geometry::geodesy::{LatLon, TangentPlane};
 
-/// Points looked at along each edge of a region.
+/// Points checked along each edge of a region.
 pub(super) const LOOKS: usize = 32;
 
-/// What lies outside by no more than this, cells, does so by rounding.
+/// Rounding tolerance: positions outside by at most this count as inside, cells.
 const HAIR: f64 = 1e-9;
 
 /// Nodes, one for each sample, at `first + [column * step[0], row * step[1]]`.
 ///
-/// A node is where its sample holds: the middle of a pixel where pixels are areas, the pixel itself where
-/// they are points. Between nodes the ground is bilinear, beyond the outermost it is unknown.
+/// A node is where its sample applies: the centre of a pixel where pixels are areas, the pixel itself where they are
+/// points. Between nodes the ground is bilinear; beyond the outermost it is unknown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lattice {
-    /// Of `first` and `step`.
+    /// Reference system of `first` and `step`.
     pub crs: Crs,
-    /// From the left.
+    /// Counted from the left.
     pub columns: usize,
-    /// From the top.
+    /// Counted from the top.
     pub rows: usize,
     /// The first node of the first row, east and north.
     pub first: [f64; 2],
-    /// From a column to the next, > 0, and from a row to the next, nearly always < 0.
+    /// To the next column, > 0, and to the next row, nearly always < 0.
     pub step: [f64; 2],
 }
 
@@ -43,7 +43,7 @@ pub struct Degrees {
 }
 
 impl Lattice {
-    /// The outermost nodes: least and greatest east, then north, in the reference system's unit.
+    /// Bounds of the outermost nodes: least and greatest east, then north, in the reference system's unit.
     #[must_use]
     pub fn extent(&self) -> [[f64; 2]; 2] {
         let last = self.east_north([(self.columns - 1) as f64, (self.rows - 1) as f64]);
@@ -53,7 +53,7 @@ impl Lattice {
         })
     }
 
-    /// The same in degrees; `None` where the reference system does not reach.
+    /// The same in degrees; `None` outside the domain of the reference system.
     #[must_use]
     pub fn degrees(&self) -> Option<Degrees> {
         let mut found: Option<Degrees> = None;
@@ -62,7 +62,7 @@ impl Lattice {
             if !(-90.0..=90.0).contains(&at.lat) {
                 return None;
             }
-            // Neighbours along the edge are near each other, so that the way round tells the side.
+            // Neighbours on the edge are close, so each longitude is unwrapped towards those found so far.
             let lon = found.map_or(at.lon, |found| {
                 near(at.lon, 0.5 * (found.west + found.east))
             });
@@ -82,7 +82,7 @@ impl Lattice {
         found
     }
 
-    /// `place` in columns and rows; `None` where the reference system does not reach.
+    /// `place` in columns and rows; `None` outside the domain of the reference system.
     pub(super) fn cells(&self, place: LatLon) -> Option<[f64; 2]> {
         let mut at = self.crs.east_north(place)?;
         if self.crs.is_geographic() {
@@ -92,7 +92,7 @@ impl Lattice {
         Some([0, 1].map(|axis| (at[axis] - self.first[axis]) / self.step[axis]))
     }
 
-    /// The cell round `[column, row]`, by its first node, and where in it; `None` outside the nodes.
+    /// The first node of the cell around `[column, row]` and the position within; `None` outside the nodes.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -111,7 +111,7 @@ impl Lattice {
         })
     }
 
-    /// All of it.
+    /// All rows and columns.
     pub(super) fn span(&self) -> Span {
         Span {
             rows: 0..self.rows,
@@ -119,7 +119,7 @@ impl Lattice {
         }
     }
 
-    /// The place at so many columns and rows.
+    /// The place at the given column and row.
     pub(super) fn geodetic(&self, cells: [f64; 2]) -> Option<LatLon> {
         self.crs.geodetic(self.east_north(cells))
     }
@@ -128,7 +128,7 @@ impl Lattice {
         [0, 1].map(|axis| self.first[axis] + cells[axis] * self.step[axis])
     }
 
-    /// Points along the outermost nodes, in columns and rows, all the way round.
+    /// Points along the outermost nodes, in columns and rows, all the way around.
     fn edge(&self) -> impl Iterator<Item = [f64; 2]> {
         let (right, bottom) = ((self.columns - 1) as f64, (self.rows - 1) as f64);
         let corners = [[0.0, 0.0], [right, 0.0], [right, bottom], [0.0, bottom]];
@@ -139,7 +139,7 @@ impl Lattice {
         })
     }
 
-    /// That `place` is not among the elevations.
+    /// The error for a place that is not among the elevations.
     pub(super) fn outside(&self, at: LatLon) -> DemError {
         let reach = self.degrees().unwrap_or(Degrees {
             west: -180.0,
@@ -166,7 +166,7 @@ impl Lattice {
     }
 }
 
-/// `lon` plus as many turns as bring it nearest to `middle`.
+/// `lon` plus the whole turns that bring it nearest to `middle`.
 fn near(lon: f64, middle: f64) -> f64 {
     lon + 360.0 * ((middle - lon) / 360.0).round()
 }

@@ -1,9 +1,8 @@
-//! Digital elevation models: files of elevations, and the ground of a scenario cut out of one.
+//! Digital elevation models: elevation files, and the ground of a scenario cut out of one.
 //!
-//! A [`Dataset`] is a file that has been looked at: its headers, no samples. [`Dataset::survey`] reads
-//! all of it once, strip by strip, as an upload is checked; [`Dataset::ground`] reads the samples under
-//! one scenario. Deliberately absent: names, catalogues, uploads, and guesses: where a file holds no
-//! elevation, there is no ground.
+//! A [`Dataset`] is a file whose headers have been read, but no samples. [`Dataset::survey`] reads all samples once,
+//! block by block, to check an upload; [`Dataset::ground`] reads the samples under one scenario. Deliberately absent:
+//! names, catalogues, uploads, and interpolation of holes: where a file has no elevation, there is no ground.
 
 mod ascii_grid;
 mod coverage;
@@ -35,16 +34,16 @@ use raster::{Span, Visit};
 use crate::geometry::Rect;
 use crate::geometry::geodesy::{LatLon, TangentPlane};
 
-/// Most samples of a file, so that what is read of it ends.
+/// Most samples in a file, so that reading it ends.
 pub const MOST_SAMPLES: u64 = 1 << 30;
 
-/// Most columns, and most rows, so that a row is never large.
+/// Most columns, and most rows, so that a row stays small.
 pub const MOST_ALONG: u64 = 1 << 18;
 
 /// A file format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// `GeoTIFF`, cloud-optimised ones among them.
+    /// `GeoTIFF`, including cloud-optimised ones.
     GeoTiff,
     /// ESRI ASCII grid, `.asc`.
     AsciiGrid,
@@ -52,15 +51,15 @@ pub enum Format {
     Hgt,
 }
 
-/// What is known of a file besides its content.
+/// What is known about a file besides its content.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Declared<'a> {
-    /// Its format; `None` lets the content tell.
+    /// Its format; `None` means to detect it from the content.
     pub format: Option<Format>,
-    /// Its reference system, such as `EPSG:32616`, for files that name none.
+    /// Its reference system, such as `EPSG:32616`, for files that state none.
     pub crs: Option<&'a str>,
-    /// The name to go by where the path is not the file's own; that of an SRTM tile is where it
-    /// belongs, such as `N36W085.hgt`.
+    /// The file's own name, where the path does not end in it; that of an SRTM tile is its position, such as
+    /// `N36W085.hgt`.
     pub name: Option<&'a str>,
 }
 
@@ -81,7 +80,7 @@ pub enum SampleType {
     I32,
     /// Single precision.
     F32,
-    /// Double precision; read as single, 0.06 mm at 1000 m.
+    /// Double precision; read as single, with a resolution of 0.06 mm at 1000 m.
     F64,
     /// Decimal text; read as single precision.
     Text,
@@ -90,30 +89,30 @@ pub enum SampleType {
 /// What a file's headers say.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Metadata {
-    /// The file's.
+    /// Format of the file.
     pub format: Format,
-    /// Where the samples stand.
+    /// Where the samples lie.
     pub lattice: Lattice,
-    /// The outermost samples, degrees.
+    /// Bounds of the outermost samples, degrees.
     pub degrees: Degrees,
-    /// Of a sample.
+    /// Type of the samples.
     pub sample_type: SampleType,
-    /// What a sample holds where nothing is known.
+    /// Value of a sample without data.
     pub no_data: Option<f64>,
 }
 
-/// What all samples of a file say together.
+/// Summary of all samples of a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Survey {
-    /// Lowest elevation, metres; infinite when no sample holds any.
+    /// Lowest elevation, metres; infinite when no sample has data.
     pub min: f64,
-    /// Highest, metres; infinite likewise.
+    /// Highest elevation, metres; negative infinity when no sample has data.
     pub max: f64,
-    /// Samples without data, as a share of all.
+    /// Samples without data, as a fraction of all.
     pub no_data_share: f64,
 }
 
-/// A file whose headers have been read and found right.
+/// A file whose headers have been read and checked.
 #[derive(Debug, Clone)]
 pub struct Dataset {
     path: PathBuf,
@@ -121,7 +120,7 @@ pub struct Dataset {
     reader: Reader,
 }
 
-/// How to find the samples.
+/// How to read the samples.
 #[derive(Debug, Clone)]
 enum Reader {
     GeoTiff(Arc<geotiff::Layout>),
@@ -130,7 +129,7 @@ enum Reader {
 }
 
 impl SampleType {
-    /// Length of a binary sample.
+    /// Size of a binary sample, bytes.
     fn bytes(self) -> usize {
         match self {
             Self::U8 | Self::I8 => 1,
@@ -141,7 +140,7 @@ impl SampleType {
     }
 }
 
-/// Look at the headers of the file at `path`.
+/// Read the headers of the file at `path`.
 ///
 /// An ESRI ASCII grid without `crs` is taken to be in EPSG:4326 when its extent fits into degrees.
 ///
@@ -210,7 +209,7 @@ pub fn open(path: &Path, declared: Declared<'_>) -> Result<Dataset, DemError> {
     })
 }
 
-/// What the content of a file says that it is.
+/// Detect the format of a file from its content.
 fn format(path: &Path, len: u64, said: Option<Format>) -> Result<Format, DemError> {
     let mut beginning = Vec::new();
     File::open(path)?.take(256).read_to_end(&mut beginning)?;
@@ -229,7 +228,7 @@ fn format(path: &Path, len: u64, said: Option<Format>) -> Result<Format, DemErro
     }
 }
 
-/// The reference system of a file, when its own and the one that is said do not differ.
+/// The reference system of a file, provided that the file's own and the declared one do not differ.
 fn agreed(said: Option<Crs>, found: Option<Crs>) -> Result<Option<Crs>, DemError> {
     match (said, found) {
         (Some(said), Some(found)) if said != found => Err(DemError::OtherCrs {
@@ -240,7 +239,7 @@ fn agreed(said: Option<Crs>, found: Option<Crs>) -> Result<Option<Crs>, DemError
     }
 }
 
-/// That a lattice is of a size that can be read and on the earth; its extent in degrees.
+/// Check that a lattice is small enough to read and lies on the earth; returns its extent in degrees.
 fn check(format: Format, lattice: &Lattice) -> Result<Degrees, DemError> {
     let [columns, rows] = [lattice.columns, lattice.rows].map(|count| count as u64);
     for (what, value, limit) in [
@@ -279,7 +278,7 @@ impl Dataset {
         &self.metadata
     }
 
-    /// Read every sample once, in bounded memory; this finds what is cut off or damaged.
+    /// Read every sample once, in bounded memory; this detects truncated and damaged files.
     ///
     /// # Errors
     /// [`DemError::Malformed`], [`DemError::Io`], [`DemError::Elevation`].
@@ -300,7 +299,7 @@ impl Dataset {
         })
     }
 
-    /// Whether `place` lies among the samples, be they elevations or no data.
+    /// Whether `place` lies among the samples, with or without data.
     #[must_use]
     pub fn covers(&self, place: LatLon) -> bool {
         let lattice = &self.metadata.lattice;
@@ -308,8 +307,8 @@ impl Dataset {
         cells.is_some_and(|cells| lattice.cell(cells).is_some())
     }
 
-    /// The elevations at `places`, metres, bilinear; `None` outside the data and beside no-data. Reads the
-    /// part of the file that they lie in, once.
+    /// The elevations at `places`, metres, bilinear; `None` outside the samples and next to one without data. Reads
+    /// the part of the file that contains them once.
     ///
     /// # Errors
     /// As [`Dataset::survey`].
@@ -352,15 +351,15 @@ impl Dataset {
             .collect())
     }
 
-    /// The largest part of `wanted` (metres on `plane`) that lies over the file's samples, no-data or not;
-    /// `None` where there is none. What an area defaults to.
+    /// The largest part of `wanted` (metres on `plane`) over the file's samples, with or without data; `None` if
+    /// there is none. Used as the default area.
     #[must_use]
     pub fn covered(&self, plane: &TangentPlane, wanted: Rect) -> Option<Rect> {
         coverage::covered(&self.metadata.lattice, plane, wanted)
     }
 
-    /// The ground under `area`, metres on `plane`, read from the file; `margin` metres more are taken on each side
-    /// where there are data, for what may leave the area. At most `most_nodes` samples are kept.
+    /// Read the ground under `area` (metres on `plane`) from the file, with `margin` metres more on each side where
+    /// there are data, for legs that leave the area. At most `most_nodes` samples are kept.
     ///
     /// # Errors
     /// [`DemError::Outside`] and [`DemError::NoData`] when not every point of `area` has an elevation,
@@ -390,7 +389,7 @@ impl Dataset {
         Dem::new(raster, plane, area, margin)
     }
 
-    /// Read the samples of `span`, and maybe others.
+    /// Read the samples of `span`, and possibly others.
     fn read(&self, span: &Span, visit: &mut Visit<'_>) -> Result<(), DemError> {
         let mut checked = |row: usize, column: usize, samples: &[f32]| {
             raster::check_elevations(row, column, samples)?;
@@ -404,7 +403,7 @@ impl Dataset {
     }
 }
 
-/// The rows and columns that hold all of `nodes`, each a row and a column; `None` without any.
+/// The rows and columns that contain all `nodes`, each given as row and column; `None` if there are none.
 fn span<'a>(nodes: impl Iterator<Item = &'a [usize; 2]>) -> Option<Span> {
     nodes.fold(None, |span, [row, column]| {
         let Span { rows, columns } = span.unwrap_or(Span {

@@ -1,10 +1,10 @@
-//! Samples in memory: the window of a file that somebody needs.
+//! Samples in memory: a window of a file.
 
 use std::ops::Range;
 
 use super::{DemError, Lattice};
 
-/// Lowest and highest elevation that is believed, metres: the sea's and the land's greatest are within.
+/// Lowest and highest elevation accepted, metres; the deepest sea and the highest land are within.
 const BELIEVED: [f64; 2] = [-12_000.0, 12_000.0];
 
 /// Rows and columns of a file.
@@ -14,23 +14,23 @@ pub(super) struct Span {
     pub(super) columns: Range<usize>,
 }
 
-/// What is done with samples: `(row, column of the first, samples)`; not a number is no data. Samples
-/// outside the span asked for may come, too, and no order is promised.
+/// Receives samples as `(row, column of the first, samples)`; NaN means no data. Samples outside the requested span
+/// may be included, in any order.
 pub(super) type Visit<'a> = dyn FnMut(usize, usize, &[f32]) -> Result<(), DemError> + 'a;
 
 /// The samples of some rows and columns of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Raster {
-    /// Where they stand.
+    /// Where they lie.
     pub lattice: Lattice,
-    /// Row and column of the first in the file.
+    /// Row and column of the first sample in the file.
     pub offset: [usize; 2],
-    /// Metres, row by row; not a number where nothing is known.
+    /// Metres, row by row; NaN means no data.
     pub elevations: Vec<f32>,
 }
 
 impl Raster {
-    /// Room for `span` of `whole`.
+    /// An empty raster for `span` of `whole`.
     pub(super) fn new(whole: &Lattice, span: &Span) -> Self {
         let first = [span.columns.start, span.rows.start];
         Self {
@@ -46,7 +46,7 @@ impl Raster {
         }
     }
 
-    /// Keep what belongs here of `samples`, which begin at `(row, column)` of the file.
+    /// Keep the part of `samples` that lies in this raster; they begin at `(row, column)` of the file.
     pub(super) fn keep(&mut self, row: usize, column: usize, samples: &[f32]) {
         let Lattice { columns, rows, .. } = self.lattice;
         let Some(row) = row.checked_sub(self.offset[0]).filter(|row| *row < rows) else {
@@ -62,7 +62,7 @@ impl Raster {
     }
 }
 
-/// What a sample holds where nothing is known.
+/// Value of a sample without data.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct NoData {
     value: f64,
@@ -78,8 +78,8 @@ impl NoData {
         }
     }
 
-    /// The elevation that a sample holds; not a number where it holds none. A value that single precision
-    /// cannot tell from that of no data is none, either.
+    /// The elevation of a sample; NaN if it has none. A value equal to the no-data value in single precision also
+    /// counts as none.
     #[expect(clippy::float_cmp, reason = "no data is that very value")]
     pub(super) fn elevation(self, sample: f64) -> f32 {
         let single = narrow(sample);
@@ -91,7 +91,7 @@ impl NoData {
     }
 }
 
-/// To the nearest of single precision, infinite beyond.
+/// Round to the nearest single-precision value, infinite beyond the range.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "rounding is what is wanted"
@@ -100,7 +100,7 @@ fn narrow(value: f64) -> f32 {
     value as f32
 }
 
-/// Refuse what no ground is at.
+/// Refuse impossible elevations.
 pub(super) fn check_elevations(row: usize, column: usize, samples: &[f32]) -> Result<(), DemError> {
     let doubtful =
         |value: f32| !(value.is_nan() || (BELIEVED[0]..=BELIEVED[1]).contains(&f64::from(value)));

@@ -1,15 +1,15 @@
-//! A raster by blocks, each a plane and how far the ground is above and below it: a leg well above or below the
-//! planes under it is so everywhere, hills and slopes notwithstanding.
+//! A raster in blocks, each a plane and how far the ground is above and below it. A leg that is well above or below
+//! these planes is so everywhere, whatever the hills and slopes within a block.
 
 use super::Raster;
 
 /// Cells along the sides of the blocks of each level.
 const WIDTHS: [usize; 3] = [4, 16, 64];
 
-/// What single precision may lose of a height below 12 km, metres.
+/// Allowance for single-precision rounding of a height below 12 km, metres.
 const ROUNDING: f64 = 4e-3;
 
-/// All levels, the finest first.
+/// All levels, finest first.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Slabs {
     pub(super) levels: Vec<Level>,
@@ -25,8 +25,8 @@ pub(super) struct Level {
     slabs: Vec<Slab>,
 }
 
-/// One block: `base + slope . (cells from its first node)`, and how far the ground is from that, at
-/// least and at most, metres.
+/// One block: the plane `base + slope . (cells from its first node)`, and the least and greatest height of the ground
+/// above it, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Slab {
     base: f32,
@@ -44,7 +44,7 @@ impl Slabs {
         }
     }
 
-    /// The level at which a way over so many cells crosses a few blocks.
+    /// The level at which a line over `cells` cells crosses a few blocks.
     pub(super) fn level(&self, cells: f64) -> usize {
         let few = |level: &Level| 4.0 * level.width as f64 <= cells;
         self.levels.iter().rposition(few).unwrap_or(0)
@@ -74,7 +74,7 @@ impl Level {
 }
 
 impl Slab {
-    /// Of the nodes from `first` to `last`, both among them.
+    /// The slab over the nodes from `first` to `last`, both included.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "what rounding to single precision takes is added again"
@@ -94,7 +94,7 @@ impl Slab {
             slope: [0.0; 2],
             reach: [0.0; 2],
         };
-        // Any plane will do; this one follows the corners. Beside holes it is level.
+        // Any plane is valid; this one follows the corners. Next to holes it is level.
         if corners.iter().all(|corner| !corner.is_nan()) {
             let [a, b, c, d] = corners;
             slab.slope = [
@@ -115,19 +115,19 @@ impl Slab {
         slab
     }
 
-    /// The plane so many cells from the first node.
+    /// Height of the plane at `place`, in cells from the first node.
     #[inline]
     pub(super) fn at(&self, place: [f64; 2]) -> f64 {
         f64::from(self.base) + self.rise(place)
     }
 
-    /// How much the plane rises over so many cells.
+    /// Rise of the plane over `[x, y]` cells.
     #[inline]
     pub(super) fn rise(&self, [x, y]: [f64; 2]) -> f64 {
         f64::from(self.slope[0]) * x + f64::from(self.slope[1]) * y
     }
 
-    /// How far the ground is above the plane, at least and at most, metres.
+    /// Least and greatest height of the ground above the plane, metres.
     #[inline]
     pub(super) fn reach(&self) -> [f64; 2] {
         self.reach.map(f64::from)

@@ -1,23 +1,23 @@
-//! How deep a leg goes into a ring.
+//! Greatest depth of a leg inside a ring.
 
 use super::Polygon;
 use super::nearest::{Edge, cut};
 use crate::geometry::Segment;
 
 impl Polygon {
-    /// The greatest distance to the ring of the part `(from, to)` of `leg`, metres, which lies inside.
+    /// Greatest distance from the ring along the part `(from, to)` of `leg`, which lies inside, metres.
     pub(super) fn depth(&self, leg: &Segment, (from, to): (f64, f64)) -> f64 {
         let middle = self.ring_distance(leg.at(0.5 * (from + to)).xy());
         if self.is_convex {
             return self.highest(leg, (from, to)).max(middle);
         }
-        // The ring is nowhere farther than it would be were the leg to lead straight away from it.
+        // Upper bound of the distance from the ring: the leg would have to lead straight away from it.
         let length = leg.horizontal_length();
         let reach = middle + 0.5 * (to - from) * length;
         let features = self.features_near(leg, (from, to), reach);
         let mut depth = middle;
         if !features.is_empty() {
-            // Distance grows convexly on each piece, so that its ends hold the greatest depth.
+            // Distance is convex on each piece, so its maximum is at an end.
             cut(&features, (from, to), length, &mut |piece| {
                 let (d0, d1) = piece.end_distances(leg);
                 depth = depth.max(d0).max(d1);
@@ -26,8 +26,8 @@ impl Polygon {
         depth
     }
 
-    /// As `depth`, of a convex ring: the nearest of the edges' lines is as far, so that the way goes up to
-    /// where one that the leg leaves and one that it nears are as far as each other, and no other nearer.
+    /// As `depth`, for a convex ring: the depth is the least distance from the edges' lines. Its maximum lies where a
+    /// line that the leg leaves and one that it approaches are equally far, and no other is nearer.
     fn highest(&self, leg: &Segment, (from, to): (f64, f64)) -> f64 {
         let way = leg.b.xy() - leg.a.xy();
         let line = |edge: &Edge| Line {
@@ -35,11 +35,11 @@ impl Polygon {
             gain: edge.along.perp(&way),
         };
         let (mut t, mut highest) = (0.5 * (from + to), 0.0_f64);
-        // All of them see the middle on the same side.
+        // The middle is on the same side of all lines.
         let side: f64 = self.edges.iter().map(|edge| line(edge).at(t)).sum();
         let line = |edge: &Edge| line(edge).times(side.signum());
         let (mut leaves, mut nears): (Option<Line>, Option<Line>) = (None, None);
-        // Each look but the last finds another line.
+        // Every iteration but the last finds another line.
         for _ in 0..self.edges.len() + 2 {
             let lines = self.edges.iter().map(line);
             let Some(line) = lines.min_by(|one, other| one.at(t).total_cmp(&other.at(t))) else {
@@ -56,7 +56,7 @@ impl Polygon {
                 (Some(_), None) => to,
                 _ => from,
             };
-            // There already: it is the highest, or the end of the part is.
+            // Converged: this is the maximum, or the end of the part is.
             if (next - t).abs() <= 1e-15 || !next.is_finite() {
                 break;
             }

@@ -1,26 +1,26 @@
-//! Where the edges of a ring of many corners are, so that not all of them are asked.
+//! Spatial index of the edges of a ring with many vertices, so that a query does not visit all of them.
 //!
-//! The answers are those of asking all of them: only edges are left out that have no part in one.
+//! Results are the same as without it: only edges that cannot affect a result are skipped.
 
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
 use crate::geometry::{Point2, ring};
 
-/// Rings of fewer corners are looked through one by one.
+/// Rings with fewer vertices are searched linearly.
 const MANY: usize = 64;
 
-/// Added to what a tree is asked for, metres, so that rounding hides nothing.
+/// Added to the extent of a tree query, metres, as a margin for rounding.
 const HAIR: f64 = 1e-6;
 
-/// The boxes round the edges of a ring.
+/// The boxes around the edges of a ring.
 #[derive(Debug, Clone)]
 pub(super) struct Index(RTree<Entry>);
 
-/// The box round an edge, and which it is.
+/// The box around an edge, and the index of the edge.
 type Entry = GeomWithData<Rectangle<[f64; 2]>, usize>;
 
-/// It follows from the ring that it belongs to.
+/// Two indexes compare equal: they are derived from the ring, which is compared itself.
 impl PartialEq for Index {
     fn eq(&self, _: &Self) -> bool {
         true
@@ -28,7 +28,7 @@ impl PartialEq for Index {
 }
 
 impl Index {
-    /// Of the ring through `vertices`; `None` where it has so few that it takes longer to ask.
+    /// The index of the ring through `vertices`; `None` if they are too few for it to pay off.
     pub(super) fn of(vertices: &[Point2]) -> Option<Self> {
         if vertices.len() < MANY {
             return None;
@@ -39,7 +39,7 @@ impl Index {
         Some(Self(RTree::bulk_load(entries.collect())))
     }
 
-    /// The edges, in order, that come within `reach` metres of the box round `a` and `b`, and maybe some more.
+    /// The edges, in order, that come within `reach` metres of the box around `a` and `b`, and possibly others.
     pub(super) fn near(&self, a: Point2, b: Point2, reach: f64) -> Vec<usize> {
         let reach = reach + HAIR;
         let (low, high) = (a.inf(&b), a.sup(&b));
@@ -51,7 +51,7 @@ impl Index {
         edges
     }
 
-    /// As [`ring::contains`]: the edges that lie nowhere beside `point` to its right are not crossed.
+    /// As [`ring::contains`]: only edges at the height of `point` and to its right can be crossed.
     pub(super) fn contains(&self, vertices: &[Point2], point: Point2) -> bool {
         let right = self.0.root().envelope().upper()[0].max(point.x);
         let edges = self.between([point.x - HAIR, point.y], [right + HAIR, point.y]);
@@ -61,7 +61,7 @@ impl Index {
         crossed.count() % 2 == 1
     }
 
-    /// As [`ring::distance`]: edges whose boxes are farther away than an edge is are not the nearest.
+    /// As [`ring::distance`]: edges whose boxes are farther away than a known edge cannot be nearest.
     pub(super) fn distance(&self, vertices: &[Point2], point: Point2) -> f64 {
         let mut least = f64::INFINITY;
         for (entry, away) in self
@@ -76,7 +76,7 @@ impl Index {
         least.sqrt()
     }
 
-    /// The edges whose boxes meet a box.
+    /// The edges whose boxes intersect a box.
     fn between(&self, low: [f64; 2], high: [f64; 2]) -> Vec<usize> {
         self.0
             .locate_in_envelope_intersecting(AABB::from_corners(low, high))
@@ -95,7 +95,7 @@ mod tests {
 
     use super::*;
 
-    /// A star, far from the origin in part, whose corners lie on a lattice, so that points beside them are common.
+    /// A star, partly far from the origin, whose vertices lie on a lattice, so that points beside them are common.
     fn star(corners: &[f64], offset: f64) -> Vec<Point2> {
         let step = std::f64::consts::TAU / corners.len() as f64;
         let corner = |(idx, away): (usize, &f64)| {

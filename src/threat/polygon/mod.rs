@@ -1,6 +1,6 @@
 //! A simple ring: exact distance along a leg, and the integral of its soft zone.
 //!
-//! Deliberately absent: which feature of the ring is nearest along a leg, see [`nearest`].
+//! Deliberately absent: which feature of the ring is nearest along a leg; see [`nearest`].
 
 mod depth;
 mod index;
@@ -14,26 +14,26 @@ pub(crate) use zones::Zone;
 use index::Index;
 use nearest::{Edge, Feature, Kind, Piece, cut};
 
-/// A simple ring that is never entered, and a soft zone outside it.
+/// A simple ring that must not be entered, and a soft zone outside it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polygon {
     vertices: Vec<Point2>,
     edges: Vec<Edge>,
-    /// Where they are; `None` where they are few.
+    /// Spatial index; `None` if there are few vertices.
     index: Option<Index>,
     is_convex: bool,
-    /// `None` where no part of the soft zone is known to belong to one edge or corner.
+    /// `None` if no part of the soft zone is known to belong to a single edge or corner.
     zones: Option<Vec<Zone>>,
     margin: f64,
-    /// Round the ring itself.
+    /// Box around the ring itself.
     bounds: Rect,
-    /// Round the soft zone.
+    /// Box around the soft zone.
     extent: Rect,
 }
 
 impl Polygon {
-    /// The ring through `vertices` (three or more, simple, the first not repeated), with a soft
-    /// zone of width `margin` outside.
+    /// The ring through `vertices` (three or more, simple, the first not repeated), with a soft zone of width
+    /// `margin` outside.
     ///
     /// # Panics
     /// Without vertices.
@@ -54,7 +54,7 @@ impl Polygon {
         }
     }
 
-    /// Corners in the order of the request.
+    /// Vertices in the order of the request.
     #[must_use]
     pub fn vertices(&self) -> &[Point2] {
         &self.vertices
@@ -66,12 +66,12 @@ impl Polygon {
         self.margin
     }
 
-    /// Which part of the soft zone belongs to which edge and corner, where that is known.
+    /// Which part of the soft zone belongs to which edge and corner, where known.
     pub(crate) fn zones(&self) -> Option<&[Zone]> {
         self.zones.as_deref()
     }
 
-    /// The box round the ring without its soft zone.
+    /// The box around the ring without its soft zone.
     pub(crate) fn bounds(&self) -> Rect {
         self.bounds
     }
@@ -101,7 +101,7 @@ impl Polygon {
         intensity(self.margin, distance)
     }
 
-    /// Whether the box round `leg` meets the box round the soft zone.
+    /// Whether the box around `leg` intersects the box around the soft zone.
     pub(super) fn may_reach(&self, leg: &Segment) -> bool {
         let box_of = |low: f64, high: f64, min: f64, max: f64| low <= max && high >= min;
         box_of(
@@ -117,7 +117,7 @@ impl Polygon {
         )
     }
 
-    /// Distance to the ring, metres, negative inside.
+    /// Distance from the ring, metres, negative inside.
     pub(super) fn distance(&self, point: Point2) -> f64 {
         let distance = self.ring_distance(point);
         if self.contains(point) {
@@ -127,8 +127,8 @@ impl Polygon {
         }
     }
 
-    /// Least distance of the part `window` of `leg` to the ring, metres; where the leg enters, the
-    /// greatest depth that it reaches, negative.
+    /// Least distance of the part `window` of `leg` from the ring, metres; if the leg enters, minus the greatest
+    /// depth.
     pub(super) fn clearance(&self, leg: &Segment, window: (f64, f64)) -> f64 {
         let (depth, _) = self.encounter(leg, window);
         if depth > 0.0 {
@@ -147,17 +147,17 @@ impl Polygon {
         self.encounter(leg, window).1
     }
 
-    /// How deep the part `window` of `leg` goes into the ring, 0 where it does not, and its exposure. Features
-    /// farther away than the soft zone is wide are not looked at.
+    /// Depth of the part `window` of `leg` inside the ring, 0 if it does not enter, and its exposure. Features
+    /// farther away than the width of the soft zone are skipped.
     pub(super) fn encounter(&self, leg: &Segment, window: (f64, f64)) -> (f64, f64) {
         if window.0 >= window.1 {
-            // A single point, as of a leg that only just rises to the base.
+            // A single point, for example of a leg that just reaches the base.
             let depth = -self.distance(leg.at(window.0).xy());
             return (depth.max(0.0), 0.0);
         }
         let near = self.features_near(leg, window, self.margin);
-        // Sides are not told by the nearest features: where edges are nearly in line, rounding may
-        // take one for another beside a vertex, and with it the crossing.
+        // Inside and outside are not decided by the nearest feature: where edges are nearly in line, rounding may
+        // pick the wrong one beside a vertex, and miss the crossing.
         let crossings = nearest::crossings(&near, window);
         let length = leg.horizontal_length();
         let is_exposed = self.margin > 0.0 && length >= LEVEL && !near.is_empty();
@@ -179,7 +179,7 @@ impl Polygon {
         (depth, exposure)
     }
 
-    /// Exposure of the part `part` of `leg`, outside of the ring, wherever one of `features`, those near to `window`,
+    /// Exposure of the part `part` of `leg`, which is outside the ring, where one of `features` (those near `window`)
     /// is the nearest.
     fn exposure_among(
         &self,
@@ -204,7 +204,7 @@ impl Polygon {
         exposure
     }
 
-    /// The vertices and edges that come within `reach` metres of the part `window` of `leg`, and maybe some more.
+    /// The vertices and edges that come within `reach` metres of the part `window` of `leg`, and possibly others.
     fn features_near(&self, leg: &Segment, window: (f64, f64), reach: f64) -> Vec<Feature> {
         let Some(index) = &self.index else {
             return nearest::features_near(&self.edges, leg, window, reach);
@@ -215,18 +215,18 @@ impl Polygon {
         nearest::features_near(edges, leg, window, reach)
     }
 
-    /// Those that may be the nearest somewhere on the part `window` of `leg`.
+    /// The features that may be nearest somewhere on the part `window` of `leg`.
     fn features(&self, leg: &Segment, window: (f64, f64)) -> Vec<Feature> {
         if self.index.is_none() {
             return nearest::features(&self.edges, leg);
         }
-        // The ring is nowhere farther than it would be were the leg to lead straight away from it.
+        // Upper bound of the distance from the ring: the leg would have to lead straight away from it.
         let (from, to) = (leg.at(window.0).xy(), leg.at(window.1).xy());
         let middle = self.ring_distance(nalgebra::center(&from, &to));
         self.features_near(leg, window, middle + 0.5 * (to - from).norm())
     }
 
-    /// Of a piece outside of the ring.
+    /// Exposure of a piece outside the ring.
     fn piece_exposure(&self, leg: &Segment, piece: &Piece) -> f64 {
         if let Kind::Vertex(center) = piece.nearest.kind {
             let corner = Cylinder {
@@ -236,12 +236,12 @@ impl Polygon {
             };
             return corner.exposure(leg, (piece.t0, piece.t1));
         }
-        // The distance to an edge's line is linear.
+        // The distance from an edge's line is linear.
         let (d0, d1) = piece.end_distances(leg);
         self.mean_intensity(d0, d1) * (piece.t1 - piece.t0) * leg.length()
     }
 
-    /// Mean of `T` along a way whose distance goes evenly from `d0` to `d1`: a trapezium, cut where it reaches the
+    /// Mean of `T` along a line on which the distance changes linearly from `d0` to `d1`: a trapezium, cut off at the
     /// margin.
     fn mean_intensity(&self, d0: f64, d1: f64) -> f64 {
         let (near, far) = (d0.min(d1), d0.max(d1));
@@ -263,8 +263,8 @@ impl Polygon {
         }
     }
 
-    /// The part `window` of `leg` in order, cut where the nearest feature of the ring changes and
-    /// where the leg crosses the ring.
+    /// The part `window` of `leg`, cut into pieces in order where the nearest feature of the ring changes and where
+    /// the leg crosses the ring.
     fn pieces(&self, leg: &Segment, window: (f64, f64)) -> Vec<Piece> {
         let features = self.features(leg, window);
         let mut pieces = Vec::new();
@@ -272,7 +272,7 @@ impl Polygon {
             pieces.push(piece);
         });
         if window.0 >= window.1 {
-            // A single point, as of a leg that only just rises to the base.
+            // A single point, for example of a leg that just reaches the base.
             let inside = self.contains(leg.at(window.0).xy());
             for piece in &mut pieces {
                 piece.inside = inside;

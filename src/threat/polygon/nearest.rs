@@ -1,20 +1,20 @@
 //! The nearest feature of a ring along a leg.
 //!
-//! Seen from a moving point, the distance to a ring is the lower envelope of the distances to its
-//! vertices and edges, whose squares are quadratics of the leg's parameter. [`cut`] cuts a leg where
-//! the nearest feature changes; on each piece everything has a closed form.
+//! From a moving point, the distance to a ring is the lower envelope of the distances to its vertices and edges,
+//! whose squares are quadratics of the leg's parameter. [`cut`] cuts a leg where the nearest feature changes; on each
+//! piece everything has a closed form.
 
 use nalgebra::Vector2;
 
 use crate::geometry::{LEVEL, Point2, Quadratic, Segment, ring};
 use crate::threat::Cylinder;
 
-/// An edge of a ring, as it is asked for again and again.
+/// An edge of a ring, with its direction and length precomputed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Edge {
-    /// The vertex where it begins.
+    /// Its first vertex.
     pub(super) a: Point2,
-    /// Unit vector from there along it.
+    /// Unit vector along the edge.
     pub(super) along: Vector2<f64>,
     pub(super) length: f64,
 }
@@ -41,45 +41,45 @@ pub(super) struct Piece {
     pub(super) t0: f64,
     pub(super) t1: f64,
     pub(super) nearest: Feature,
-    /// Whether this part of the leg lies within the ring.
+    /// Whether this part of the leg lies inside the ring.
     pub(super) inside: bool,
 }
 
-/// A vertex or an edge seen from a leg.
+/// A vertex or an edge relative to a leg.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Feature {
     pub(super) kind: Kind,
-    /// Squared distance. It tells which feature is nearer; along a leg of 100 km it is off by a
-    /// square millimetre, so that no figure is taken from it.
+    /// Squared distance. Used only to compare features: along a leg of 100 km its error is a square millimetre, so no
+    /// result is computed from it.
     squared: Quadratic,
-    /// Where the leg's points project onto the feature.
+    /// Range of `t` in which the leg's points project onto the feature.
     valid: (f64, f64),
 }
 
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Kind {
     Vertex(Point2),
-    /// Signed distance from the edge's line: `at_start + gain * t`.
+    /// Signed distance from the edge's line, `at_start + gain * t`.
     Edge {
         at_start: f64,
         gain: f64,
     },
 }
 
-/// Shares of a leg nearer than this are one.
+/// Leg parameters closer than this are treated as equal.
 const NO_TIME: f64 = 1e-9;
 
-/// With so many features or fewer, leaving some out costs more than it saves.
+/// With at most this many features, filtering them costs more than it saves.
 const FEW_FEATURES: usize = 24;
 
-/// Parts of a leg shorter than this share of it are not cut further.
+/// Parts shorter than this fraction of a leg are not cut further.
 const SHORTEST_PIECE: f64 = 1e-12;
 
-/// Added to a distance in metres and, times 1e-8, to it for each metre of a leg, so that neither rounding nor
-/// [`NO_TIME`] hides what is as near.
+/// Added to a search distance, metres, plus 1e-8 per metre of the leg, so that neither rounding nor [`NO_TIME`] hides
+/// an equally near feature.
 const HAIR: f64 = 1e-6;
 
-/// The vertices and edges of a ring, as seen from `leg`.
+/// The vertices and edges of a ring, relative to `leg`.
 pub(super) fn features(edges: &[Edge], leg: &Segment) -> Vec<Feature> {
     let mut features = Vec::with_capacity(2 * edges.len());
     for edge in edges {
@@ -88,12 +88,12 @@ pub(super) fn features(edges: &[Edge], leg: &Segment) -> Vec<Feature> {
     features
 }
 
-/// How near what must not be missed is looked for that lies within `reach` of a way of `length`, metres.
+/// Search distance, metres, that finds everything within `reach` of a line of `length`.
 pub(super) fn reach(reach: f64, length: f64) -> f64 {
     reach + HAIR + 1e-8 * length
 }
 
-/// Those that come within `reach` metres of the part `window` of `leg`, and maybe some more.
+/// The features that come within `reach` metres of the part `window` of `leg`, and possibly others.
 pub(super) fn features_near<'e>(
     edges: impl IntoIterator<Item = &'e Edge>,
     leg: &Segment,
@@ -110,7 +110,7 @@ pub(super) fn features_near<'e>(
         let (u, v) = (from - edge.a, to - edge.a);
         let (across0, across1) = (edge.along.perp(&u), edge.along.perp(&v));
         let (along0, along1) = (edge.along.dot(&u), edge.along.dot(&v));
-        // Beside either line, or before or behind the edge.
+        // Off to one side of the line or the edge, or before or behind the edge.
         let off = u.perp(&way);
         let off_end = off - edge.length * edge.along.perp(&way);
         let far = beyond(across0, across1, -reach, reach)
@@ -124,7 +124,7 @@ pub(super) fn features_near<'e>(
 }
 
 impl Edge {
-    /// Add its first vertex and itself, as seen from `leg`.
+    /// Add the edge's first vertex and the edge itself, relative to `leg`.
     fn add_to(&self, features: &mut Vec<Feature>, leg: &Segment) {
         features.push(Feature {
             kind: Kind::Vertex(self.a),
@@ -135,11 +135,11 @@ impl Edge {
     }
 }
 
-/// The line of `edge` as seen from `leg`, valid where the leg projects onto the edge.
+/// The line of `edge` relative to `leg`, valid where the leg projects onto the edge.
 fn edge_feature(leg: &Segment, edge: &Edge) -> Option<Feature> {
     let Edge { a, along, length } = *edge;
     let (origin, way) = (leg.a.xy() - a, leg.b.xy() - leg.a.xy());
-    // Distance from the line and way along it, both linear in t.
+    // Distance from the line and position along it, both linear in t.
     let (across0, across1) = (origin.perp(&along), way.perp(&along));
     let (along0, along1) = (origin.dot(&along), way.dot(&along));
     let valid = if along1.abs() < LEVEL {
@@ -200,7 +200,7 @@ impl Piece {
     }
 }
 
-/// Where in `window` the leg crosses edges, in order; an edge counts as a hair longer than it is.
+/// Where in `window` the leg crosses edges, in order; an edge counts as slightly longer than it is.
 pub(super) fn crossings(features: &[Feature], window: (f64, f64)) -> Vec<f64> {
     let mut crossings: Vec<f64> = features
         .iter()
@@ -217,7 +217,7 @@ pub(super) fn crossings(features: &[Feature], window: (f64, f64)) -> Vec<f64> {
     crossings
 }
 
-/// The part `(from, to)` of the leg lies within the ring.
+/// Mark the part `(from, to)` of the leg as inside the ring.
 pub(super) fn mark_inside(pieces: &mut Vec<Piece>, (from, to): (f64, f64)) {
     let mut cut_at = |t: f64| {
         let within = |piece: &Piece| piece.t0 + SHORTEST_PIECE < t && t < piece.t1 - SHORTEST_PIECE;
@@ -238,8 +238,8 @@ pub(super) fn mark_inside(pieces: &mut Vec<Piece>, (from, to): (f64, f64)) {
     }
 }
 
-/// The pieces of `window` of a leg of horizontal `length`, in order: the nearest feature at its middle
-/// reigns over a part of it, the rest is cut in turn.
+/// The pieces of `window` of a leg of horizontal `length`, in order: the feature nearest to its middle is nearest on
+/// a part of it; the rest is cut recursively.
 pub(super) fn cut(
     features: &[Feature],
     (t0, t1): (f64, f64),
@@ -250,8 +250,8 @@ pub(super) fn cut(
     let nearest = nearest_at(features, middle);
     let kept;
     let features = if features.len() > FEW_FEATURES {
-        // At either end the nearest feature is half the window farther at most, and every other
-        // half the window nearer.
+        // At either end the nearest feature is at most half the window farther away, and any other at most half the
+        // window nearer.
         let reach = nearest.squared.at(middle).max(0.0).sqrt() + (t1 - t0) * length;
         let reach = reach * reach * (1.0 + 1e-9) + 1e-9 * (1.0 + length * length);
         let may_reign = |feature: &&Feature| {
@@ -299,7 +299,7 @@ fn nearest_at(features: &[Feature], t: f64) -> &Feature {
         .expect("vertices are valid everywhere")
 }
 
-/// The largest part of `window` round `middle` in which `nearest` stays the nearest.
+/// The largest part of `window` around `middle` in which `nearest` stays the nearest.
 fn reign(features: &[Feature], nearest: &Feature, middle: f64, window: (f64, f64)) -> (f64, f64) {
     let (mut from, mut to) = (window.0.max(nearest.valid.0), window.1.min(nearest.valid.1));
     let mut shrink_to = |t: f64| {
@@ -323,13 +323,12 @@ fn reign(features: &[Feature], nearest: &Feature, middle: f64, window: (f64, f64
                 shrink_to(root);
                 continue;
             }
-            // Both are as near at the middle: the slope tells on which side the rival is nearer.
+            // Equally near at the middle: the slope shows on which side the rival is nearer.
             let slope = 2.0 * ahead.a * root + ahead.b;
             ends_here |= slope < 0.0 || (slope == 0.0 && ahead.a < 0.0);
             begins_here |= slope > 0.0 || (slope == 0.0 && ahead.a < 0.0);
         }
-        // An edge takes over from its own end exactly where it becomes valid: a double root, which
-        // rounding may hide.
+        // An edge takes over from its own end exactly where it becomes valid: a double root, which rounding may hide.
         for t in [rival.valid.0, rival.valid.1] {
             if t.is_finite() && ahead.at(t) <= 1e-9 * (1.0 + nearest.squared.at(t)) {
                 shrink_to(t);

@@ -1,4 +1,4 @@
-//! Distances and integrals worked by hand, and against fine sums.
+//! Distances and integrals computed by hand, and compared with fine sums.
 
 use super::*;
 use crate::geometry::Point3;
@@ -41,7 +41,7 @@ fn clearance_is_exact_and_signed() {
     check([4.0, 4.0, 0.0], [4.0, 4.0, 9.0], -4.0);
 }
 
-/// A leg that rises to the base of a threat, and no further, enters it all the same.
+/// A leg that rises just to the base of a threat still enters it.
 #[test]
 fn a_single_point_may_lie_inside() {
     let check = |at: f64, expected: f64| {
@@ -53,7 +53,7 @@ fn a_single_point_may_lie_inside() {
     check(0.2, 3.0);
 }
 
-/// The deepest place along a leg lies where two edges are as near as each other, after a third was looked at.
+/// The deepest point of a leg is where two edges are equally near, found after visiting a third.
 #[test]
 fn a_triangle_is_entered_as_deep_as_it_is() {
     let corners = [0.0, 120.0, 240.0_f64].map(|degrees| {
@@ -76,7 +76,7 @@ fn exposure_across() {
     assert!((exposure - (2.0 + 2.0 + 20.0)).abs() < 1e-9, "{exposure}");
 }
 
-/// The middle of the leg is as far from both walls of a bay; beyond it the other wall is nearer.
+/// The middle of the leg is equally far from both walls of a bay; beyond it the other wall is nearer.
 #[test]
 fn a_tie_at_the_middle_is_seen() {
     let bay = ring(
@@ -101,8 +101,8 @@ fn a_tie_at_the_middle_is_seen() {
     assert!((exposure - 16.0).abs() < 1e-9, "{exposure}");
 }
 
-/// A box in degrees with vertices in the middle of its sides, as the plane has it: all but straight
-/// there. A leg that goes in beside a vertex and out is seen however it lies.
+/// A box in degrees with vertices in the middle of its sides, mapped to the plane: nearly straight there. A leg that
+/// enters and leaves beside a vertex is detected in any position.
 #[test]
 fn sides_that_are_nearly_straight_are_not_entered_unseen() {
     const CORNERS: [[f64; 2]; 7] = [
@@ -170,7 +170,7 @@ fn star() -> Polygon {
     )
 }
 
-/// 100 km along an edge, half a millimetre within and without.
+/// 100 km along an edge, half a millimetre inside and outside.
 #[test]
 fn a_long_leg_is_measured_as_exactly_as_a_short_one() {
     let strip = ring(&[[-1e5, 0.0], [2e5, 0.0], [2e5, 1e4], [-1e5, 1e4]], 0.0);
@@ -188,7 +188,7 @@ fn a_long_leg_is_measured_as_exactly_as_a_short_one() {
     assert!((clearance - 1e-4).abs() < 1e-9, "{clearance}");
 }
 
-/// A ring of 20 000 vertices along a leg took minutes once.
+/// A ring of 20 000 vertices along a leg once took minutes.
 #[test]
 fn a_ring_of_many_vertices_agrees_with_sums() {
     let vertices = (0..20_000).map(|corner| {
@@ -223,7 +223,7 @@ fn a_ring_of_many_vertices_agrees_with_sums() {
     }
 }
 
-/// Each of its teeth is entered and left; none of that asks all of them.
+/// A leg enters and leaves each tooth, without visiting all edges each time.
 #[test]
 fn a_leg_through_five_thousand_teeth_is_quick() {
     let teeth = 5_000;
@@ -240,7 +240,7 @@ fn a_leg_through_five_thousand_teeth_is_quick() {
     let clearance = comb.clearance(&leg, (0.0, 1.0));
     assert!((depth - 0.5).abs() < 1e-6, "{depth}");
     assert!((clearance + 0.5).abs() < 1e-6, "{clearance}");
-    // A metre within each tooth, three quarters in each gap, a half at either end.
+    // 1 m in each tooth, 0.75 m in each gap, 0.5 m at either end.
     let expected = f64::from(teeth) + 0.75 * f64::from(teeth - 1) + 1.0;
     assert!(
         (exposure - expected).abs() < 1e-6 * expected,
@@ -275,7 +275,7 @@ proptest! {
         }
     }
 
-    /// A leg that cuts off micrometres of a corner goes as deep as that, however long it is.
+    /// A leg that cuts micrometres off a corner has that depth, however long it is.
     #[test]
     fn a_corner_that_is_only_just_cut_off_is_cut_as_deep_as_it_is(
         depth in 1e-6..1e-3f64, turn in 0.0..std::f64::consts::TAU, reach in 1e3..1e4f64,
@@ -286,13 +286,13 @@ proptest! {
         let ring = Polygon::new(corners.map(turned).to_vec(), 0.0);
         let [from, to] = [[-reach, -depth], [0.3 * reach, -depth]].map(turned);
         let leg = leg([from.x, from.y, 0.0], [to.x, to.y, 0.0]);
-        // In the middle of what is cut off, from either edge of the corner, whose sides are as 3 to 4.
+        // In the middle of the cut, measured from either edge of the corner, whose sides are in the ratio 3 to 4.
         let clearance = ring.clearance(&leg, (0.0, 1.0));
         prop_assert!((clearance + 0.6 * depth).abs() < 1e-9, "{clearance} {depth}");
     }
 
-    /// What is left out for being far away has no part in it: against every piece of the leg, of rings that are
-    /// convex and rings that are not, the leg in the ring, beside it, through it and along its edges.
+    /// Skipping far features does not change the result: compared with all pieces of the leg, for convex and
+    /// non-convex rings, and legs inside, beside, through and along the edges of the ring.
     #[test]
     fn an_encounter_is_that_of_all_pieces(
         corners in prop::collection::vec(0.4..1.0f64, 3..30), round in 0..2_usize, margin in 0.0..40.0f64,
@@ -319,8 +319,8 @@ proptest! {
             let (depth, exposure) = ring.encounter(&leg, window);
             let pieces = ring.pieces(&leg, window);
             let within = || pieces.iter().filter(|piece| piece.inside);
-            // Inside, distance grows convexly on each piece, so that its ends hold the greatest depth; from edge to edge
-            // of a ring so sharp or so small that no piece ends between, the middle tells.
+            // Inside, distance is convex on each piece, so its maximum is at an end; for a leg from edge to edge of a
+            // ring so sharp or so small that no piece ends between, it is at the middle.
             let at_ends = within().map(|piece| piece.end_distances(&leg));
             let mut deepest = at_ends.fold(0.0, |depth: f64, (d0, d1)| depth.max(d0).max(d1));
             if deepest <= 0.0 {
@@ -334,7 +334,7 @@ proptest! {
                     ring.piece_exposure(&leg, piece)
                 }
             }).sum();
-            // Along an edge, pieces tell sides to a share of the leg.
+            // Along an edge, pieces tell the sides apart to a fraction of the leg.
             prop_assert!((depth - deepest).abs() < 1e-6, "{depth} {deepest}");
             prop_assert!((exposure - sum).abs() <= 1e-8 * (1.0 + sum), "{exposure} {sum}");
         }

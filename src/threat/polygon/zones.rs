@@ -1,7 +1,7 @@
-//! Which parts of a ring's soft zone belong to one edge or one corner alone.
+//! Parts of a ring's soft zone that belong to a single edge or corner.
 //!
-//! There the distance to the ring is that to the one feature, so that exposure is a sum over features.
-//! Round a corner that points inwards, and where a part of the ring is close to another, it is not.
+//! There the distance from the ring is the distance from that feature, so exposure is a sum over features. This does
+//! not hold near a reflex corner or where a part of the ring is close to another.
 
 use nalgebra::Vector2;
 
@@ -9,32 +9,32 @@ use super::{Polygon, nearest};
 use crate::geometry::{LEVEL, Point2, Segment, ring};
 use crate::threat::Cylinder;
 
-/// Of rings that are not convex and have more vertices than this, no part is looked at alone.
+/// Non-convex rings with more vertices than this have no zones.
 const MOST_VERTICES: usize = 256;
 
-/// What is as near to an edge's line, metres, lies on it: beside the edge the other side is the ring's inside.
+/// A point this near to an edge's line, metres, counts as on it: beyond the line is the inside of the ring.
 const HAIR: f64 = 1e-6;
 
-/// Part of an edge, all of it in most cases, and what of the soft zone it is the nearest to.
+/// A part of an edge, usually all of it, and the part of the soft zone to which it is nearest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Zone {
-    /// Where the part begins.
+    /// Start of the part.
     pub(crate) a: Point2,
     /// Unit vector along it.
     pub(crate) along: Vector2<f64>,
     pub(crate) length: f64,
     /// Unit vector out of the ring.
     pub(crate) outward: Vector2<f64>,
-    /// Along the edge before, where a corner at `a` is the nearest to a part of its own.
+    /// Direction of the previous edge, if the corner at `a` is nearest to a part of its own.
     pub(crate) before: Option<Vector2<f64>>,
     /// Whether something else may be as near as this part or its corner.
     pub(crate) is_shared: bool,
-    /// Of a circle round the part.
+    /// Circle around the part.
     pub(crate) center: Point2,
     pub(crate) radius: f64,
 }
 
-/// The edges of a ring, each with what it looks like from there.
+/// The edges of a ring, with the direction outwards.
 struct Sides<'r> {
     vertices: &'r [Point2],
     edges: Vec<Side>,
@@ -50,7 +50,7 @@ struct Side {
     length: f64,
 }
 
-/// Of the simple ring through `vertices` with a soft zone of width `margin`; `None` where no part is alone.
+/// The zones of the simple ring through `vertices`, `margin` wide; `None` if no part belongs to one feature.
 pub(super) fn zones(vertices: &[Point2], is_convex: bool, margin: f64) -> Option<Vec<Zone>> {
     let sides = Sides::of(vertices, is_convex, margin);
     if !sides.is_convex && vertices.len() > MOST_VERTICES {
@@ -93,7 +93,7 @@ impl<'r> Sides<'r> {
         &self.edges[(idx + 1) % self.edges.len()]
     }
 
-    /// Whether the corner at the beginning of edge `idx` does.
+    /// Whether the corner at the beginning of edge `idx` is convex.
     fn points_outwards(&self, idx: usize) -> bool {
         self.is_convex || self.before(idx).outward.dot(&self.edges[idx].along) <= 0.0
     }
@@ -101,10 +101,10 @@ impl<'r> Sides<'r> {
     fn add_zones(&self, idx: usize, zones: &mut Vec<Zone>) {
         let edge = &self.edges[idx];
         let next = (idx + 1) % self.edges.len();
-        // Beside a corner that points inwards, the other edge is as near from some way off.
+        // Beside a reflex corner, the other edge is equally near from some distance on.
         let off = |inwards: bool, other: &Side| {
             if inwards {
-                // tan of half the angle between the edges, outside.
+                // Tangent of half the angle between the edges, outside.
                 let (cos, sin) = (
                     edge.along.dot(&other.along),
                     edge.along.perp(&other.along).abs(),
@@ -147,7 +147,7 @@ impl<'r> Sides<'r> {
         }
     }
 
-    /// Whether nothing but its neighbours can be as near as edge `idx` to what lies beside it.
+    /// Whether, beside edge `idx`, nothing but its neighbours can be as near as the edge.
     fn is_alone(&self, idx: usize) -> bool {
         let edge = &self.edges[idx];
         let neighbours = [
@@ -164,7 +164,7 @@ impl<'r> Sides<'r> {
                 })
     }
 
-    /// Whether nothing can be as near as the corner at the beginning of edge `idx` to what lies before it.
+    /// Whether, before the corner at the beginning of edge `idx`, nothing can be as near as the corner.
     fn is_corner_alone(&self, idx: usize) -> bool {
         let (before, edge) = (self.before(idx), &self.edges[idx]);
         let corner = self.vertices[idx];
@@ -177,7 +177,7 @@ impl<'r> Sides<'r> {
     }
 
     fn is_far(&self, one: &Side, other: &Side) -> bool {
-        // Edges of a simple ring do not cross, so that an end of either is nearest.
+        // Edges of a simple ring do not cross, so the nearest point is at an end of one of them.
         let (ends, others) = ([one.a, one.b], [other.a, other.b]);
         others
             .iter()
@@ -186,7 +186,7 @@ impl<'r> Sides<'r> {
             .all(|distance| distance > self.widest())
     }
 
-    /// What is farther apart has no part of the soft zone in common.
+    /// Features farther apart than this have no part of the soft zone in common.
     fn widest(&self) -> f64 {
         2.0 * self.margin * (1.0 + 1e-9) + 1e-6
     }
@@ -200,8 +200,8 @@ fn is_behind(edge: &Side, other: &Side) -> bool {
 }
 
 impl Polygon {
-    /// Exposure of the part `(from, to)` of `leg`, which moves and lies outside of the ring, as a sum over edges and
-    /// corners; `None` where it may come to what they share.
+    /// Exposure of the part `(from, to)` of `leg`, which is not vertical and lies outside the ring, as a sum over
+    /// edges and corners; `None` if it may reach a shared zone.
     pub(super) fn exposure_outside(&self, leg: &Segment, (from, to): (f64, f64)) -> Option<f64> {
         let ends = [leg.at(from).xy(), leg.at(to).xy()];
         let way = ends[1] - ends[0];
@@ -218,7 +218,7 @@ impl Polygon {
             if zone.is_shared {
                 return None;
             }
-            // Shares of the part, from 0 to 1.
+            // Fractions of the part, from 0 to 1.
             let beside = clip(along, [0.0, zone.length]);
             exposure += self.beside_edge(outward, beside) * (to - from) * leg.length();
             if let Some(before) = zone.before {
@@ -239,8 +239,7 @@ impl Polygon {
         Some(exposure)
     }
 
-    /// Of a way whose distance from an edge goes from one value to another, the mean of `T` between two shares of
-    /// it times their difference.
+    /// Integral of `T` between two fractions of a line along which the distance from an edge changes linearly.
     fn beside_edge(&self, [start, end]: [f64; 2], [enters, leaves]: [f64; 2]) -> f64 {
         let [d0, d1] = [enters, leaves].map(|share| start + (end - start) * share);
         if enters >= leaves || d0.min(d1) < -HAIR {
@@ -250,8 +249,8 @@ impl Polygon {
     }
 }
 
-/// Between which shares, 0 to 1, what goes evenly from `start` to `end` lies within `[low, high]`; none where the
-/// first is not the lesser.
+/// The fractions, 0 to 1, between which a value going linearly from `start` to `end` lies within `[low, high]`; an
+/// empty range if the first is not less than the second.
 fn clip([start, end]: [f64; 2], [low, high]: [f64; 2]) -> [f64; 2] {
     let gain = end - start;
     if gain.abs() < LEVEL {

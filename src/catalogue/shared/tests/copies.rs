@@ -1,4 +1,4 @@
-//! The copies that a node has of what is on the shelf.
+//! A node's copies of files on the shelf.
 
 use std::fs;
 use std::io::Write as _;
@@ -27,7 +27,7 @@ fn a_damaged_copy_is_fetched_again() {
     }
     fs::remove_file(&copy).expect("removed");
     assert_eq!(height(&b.find("hill").expect("found")), 100);
-    // Also when it was damaged while nobody looked.
+    // Also if it was damaged while the node was down.
     fs::write(&copy, hill(200)).expect("written");
     let b = b.restarted(&shelf, AGES, u64::MAX);
     assert_eq!(height(&b.find("hill").expect("found")), 100);
@@ -40,7 +40,7 @@ fn copies_are_counted() {
     b.find("hill").expect("found");
     b.find("hill").expect("found");
     a.keep("hill", 50).expect("kept");
-    // Of the three calls of a find the second is the fetch.
+    // The second of the three calls of a find is the fetch.
     shelf.trouble_in(1, Trouble::FailsBefore);
     b.find("hill").expect("found at the second try");
     let queue = Queue {
@@ -90,7 +90,7 @@ fn copies_serve_what_is_pinned_while_the_shelf_is_away() {
     assert_eq!(height(&b.find("other").expect("found")), 50);
 }
 
-/// Two workers of one machine and user.
+/// Two workers of the same machine and user.
 #[test]
 fn nodes_with_one_directory_have_a_cache_each() {
     let shelf = Arc::new(Memory::default());
@@ -124,7 +124,7 @@ fn copies_go_when_there_are_too_many() {
         assert_eq!(height(&node.find(name).expect("found")), expected);
         assert_eq!(node.copies().len(), 2);
     }
-    // What has just been asked for stays, however many there are.
+    // Recently used files are kept, however many there are.
     let node = node.restarted(&shelf, AGES, length);
     for name in names {
         node.find(name).expect("found");

@@ -1,4 +1,4 @@
-//! What is kept under a name, whoever asks and whatever breaks.
+//! Keeping files under names, with concurrent nodes and failures.
 
 use std::collections::BTreeSet;
 use std::sync::mpsc;
@@ -18,7 +18,7 @@ fn what_one_node_keeps_every_node_finds() {
     assert_eq!(height(&found), 100);
     assert_eq!(b.keep("hill", 50).expect("kept"), Kept::Replaced);
     assert_eq!(height(&a.find("hill").expect("found")), 50);
-    // What was accepted is planned over the ground that it was accepted over.
+    // An accepted plan keeps the ground that it was accepted with.
     for node in [&a, &b] {
         let pinned = node.shared.find("hill", Some(&found.sha256));
         assert_eq!(height(&pinned.expect("found")), 100);
@@ -82,7 +82,7 @@ fn who_expects_something_else_or_owns_nothing_is_refused_on_every_node() {
     assert_eq!(height(&a.find("hill").expect("found")), 2);
 }
 
-/// Of two who both expect what is there, one is refused, at whatever step the other comes.
+/// If two nodes expect the present content, one is refused, at whatever step the other interferes.
 #[test]
 fn of_two_replacements_one_is_refused() {
     for step in 0..8 {
@@ -133,7 +133,7 @@ fn what_broke_midway_leaves_nothing_that_is_seen_and_is_removed() {
             a.sweep();
             b.sweep();
             assert_eq!(shelf.counts(), [1, 0], "step {step}");
-            // Who asks again gets what was wanted.
+            // A second attempt succeeds.
             a.keep("hill", 2).expect("kept");
             assert_eq!(height(&b.find("hill").expect("found")), 2);
         }

@@ -44,7 +44,7 @@ impl Node {
         Self { shared, directory }
     }
 
-    /// Files of the cache.
+    /// Files in the cache.
     pub(super) fn copies(&self) -> Vec<std::path::PathBuf> {
         let content = self.directory.path().join("cache/content");
         let entries = fs::read_dir(content).expect("it is there");
@@ -81,7 +81,7 @@ fn sharing(shelf: &Arc<Memory>, directory: &Path, grace: Duration) -> Sharing {
     Sharing::new(shelf.clone(), directory.join("cache"), instruments).with_grace(grace)
 }
 
-/// Ground of one height, on one degree.
+/// Level ground at one height, over one degree.
 fn hill(height: u32) -> String {
     let head = "ncols 2\nnrows 2\nxllcenter 7\nyllcenter 47\ncellsize 1\n";
     format!("{head}{height} {height}\n{height} {height}\n")
@@ -109,7 +109,7 @@ pub(super) fn naming(name: &str) -> Naming {
     }
 }
 
-/// Two nodes, whose contents go as soon as nothing refers to them.
+/// Two nodes that remove contents as soon as nothing refers to them.
 fn two() -> (Arc<Memory>, Node, Node) {
     two_with(Duration::ZERO)
 }

@@ -1,4 +1,4 @@
-//! What is swept, and what never is.
+//! What is swept, and what is kept.
 
 use std::collections::BTreeSet;
 use std::io::Cursor;
@@ -9,14 +9,14 @@ use crate::catalogue::both::Uploads as _;
 use crate::catalogue::shared::memory::Trouble;
 use crate::catalogue::{Kept, Shelf as _};
 
-/// A node that sweeps with no grace at all, at any step of an upload on another.
+/// Another node sweeps without grace period at any step of an upload.
 #[test]
 fn a_sweep_amid_an_upload_takes_nothing_that_has_a_name() {
     for step in 0..12 {
         let (shelf, a, b) = two();
         a.keep("other", 1).expect("kept");
         a.keep("other", 2).expect("kept");
-        // The first content has no name now, and is about to go.
+        // The first content has no name any more, and is about to be removed.
         let swept = move || {
             b.sweep();
             drop(b);
@@ -31,7 +31,7 @@ fn a_sweep_amid_an_upload_takes_nothing_that_has_a_name() {
     }
 }
 
-/// The mark is seen by everybody, and who asks takes it off.
+/// All nodes see the mark, and using the content removes it.
 #[test]
 fn what_was_asked_for_lately_on_any_node_is_kept() {
     let grace = Duration::from_millis(300);
@@ -69,7 +69,7 @@ fn a_sweep_that_breaks_at_any_step_is_finished_by_the_next() {
     }
 }
 
-/// What a newer version has written is neither understood nor taken for needless.
+/// A record of a newer version is not understood, but not treated as absent.
 #[test]
 fn nothing_is_swept_while_a_record_cannot_be_read() {
     let (shelf, a, b) = two();

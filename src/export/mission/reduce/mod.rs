@@ -1,44 +1,44 @@
-//! A path as few straight legs: no sample of it farther from them than a tolerance, and no leg that
-//! breaks what the path keeps.
+//! Reduces a path to few straight legs: no sample of the path is farther from them than a tolerance, and no leg
+//! violates the path's constraints.
 //!
-//! The corners are samples of the path, or lie beside one on the outside of its bend, where a leg
-//! past a threat has room. Of all chains of legs over a thinned choice of corners the one with the
-//! fewest is taken. Where none holds, the path itself is the answer.
+//! The corners are samples of the path, or lie beside one on the outside of its bend, where a leg past a threat has
+//! room. Among all chains of legs over a thinned selection of corners, the one with the fewest legs is taken. If
+//! there is none, the result is the path itself.
 
 use crate::cost::{Model, turns};
 use crate::geometry::{Point3, Rect};
 use crate::planner::keeps_limits;
 use crate::scenario::Scenario;
 
-/// Share of the tolerance by which corners on the path are chosen, and by which others lie beside it.
+/// Fractions of the tolerance: for thinning the samples, and for the offset of corners beside the path.
 const THINNING: f64 = 0.125;
 const OFFSET: f64 = 0.95;
 
-/// A corner is given up after so many corners in a row that no leg from it reaches.
+/// Legs from a corner are no longer tried after this many unreachable corners in a row.
 const HOPELESS: usize = 16;
 
-/// What is kept while reducing.
+/// What the reduction must keep.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shape {
-    /// Metres from the path, in space.
+    /// Greatest 3-D distance from the path, metres.
     pub(super) tolerance_m: f64,
-    /// Legs follow the ground: heights above it, too, keep within the tolerance between corners.
+    /// Legs follow the ground: between corners, heights above ground also stay within the tolerance.
     pub(super) follows_ground: bool,
 }
 
-/// A place where a leg may end.
+/// A possible end of a leg.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Corner {
-    /// Of the sample on or beside which it lies.
+    /// Index of the sample on or beside which it lies.
     index: usize,
     point: Point3,
-    /// Height above ground, metres; 0 where nobody asks.
+    /// Height above ground, metres; 0 unless legs follow the ground.
     agl: f64,
 }
 
-/// The fewest corners that stand for `path`, its ends among them.
+/// The fewest corners that represent `path`, including its ends.
 ///
-/// `path` must keep the constraints of `scenario` that a path is held to; the legs do, too.
+/// `path` must satisfy the path constraints of `scenario`; the legs then do, too.
 pub(super) fn reduce(scenario: &Scenario, path: &[Point3], shape: Shape) -> Vec<Point3> {
     let near = Scenario {
         threats: Vec::new(),
@@ -98,23 +98,23 @@ fn agl(scenario: &Scenario, point: Point3, shape: Shape) -> f64 {
 struct Reduction<'s> {
     model: Model<'s>,
     shape: Shape,
-    /// Every one of the path.
+    /// All samples of the path.
     samples: Vec<Corner>,
 }
 
-/// A leg of the graph, with what it takes to fly it last.
+/// A leg of the graph, with the best chain that ends in it.
 #[derive(Debug, Clone, Copy)]
 struct Leg {
     to: usize,
-    /// Legs up to its end, itself among them, and the misses of all, for choosing among equals.
+    /// Legs in the chain, including this one, and the sum of their misses, which breaks ties.
     legs: usize,
     misses: f64,
-    /// The leg before, as corner and position among that corner's legs.
+    /// The previous leg, as a corner and the position among that corner's legs.
     before: Option<(usize, usize)>,
 }
 
 impl Reduction<'_> {
-    /// The corners to choose from, in the order of the path.
+    /// The candidate corners, in the order of the path.
     fn choice(&self) -> Vec<Corner> {
         let on_path = self.thinned();
         let mut choice = Vec::new();
@@ -130,7 +130,7 @@ impl Reduction<'_> {
         choice
     }
 
-    /// Some of the samples, any two in a row a leg that holds to a share of the tolerance.
+    /// A selection of samples; each two in a row form a leg within a fraction of the tolerance.
     fn thinned(&self) -> Vec<Corner> {
         let last = self.samples.len() - 1;
         let tolerance = THINNING * self.shape.tolerance_m;
@@ -141,7 +141,7 @@ impl Reduction<'_> {
         let mut kept = vec![self.samples[0]];
         let mut at = 0;
         while at < last {
-            // The next sample is always reached: that is a leg of the path itself.
+            // The next sample is always reachable, by a leg of the path itself.
             let (mut reached, mut step) = (at + 1, 2);
             while at + step <= last && holds(at, at + step) {
                 reached = at + step;
@@ -162,7 +162,7 @@ impl Reduction<'_> {
         kept
     }
 
-    /// The corner on the outside of the bend at `corner`; none on a straight.
+    /// The corner on the outside of the bend at `corner`; `None` on a straight part.
     fn beside(&self, (before, after): (Corner, Corner), corner: Corner) -> Option<Corner> {
         let (arriving, leaving) = (
             (corner.point - before.point).xy(),
@@ -180,7 +180,7 @@ impl Reduction<'_> {
         })
     }
 
-    /// The chain of fewest legs over `choice`, its first and last corner the ends.
+    /// The chain with the fewest legs over `choice`, from its first corner to its last.
     fn fewest(&self, choice: &[Corner]) -> Option<Vec<Point3>> {
         let goal = choice.len() - 1;
         // The legs that end at each corner.
@@ -222,7 +222,7 @@ impl Reduction<'_> {
         Some(route)
     }
 
-    /// The leg between two corners, after the best leg to the first from which it can be turned into.
+    /// The leg between two corners, after the best leg to the first one that allows the turn.
     fn leg(&self, choice: &[Corner], arriving: &[Vec<Leg>], from: usize, to: usize) -> Option<Leg> {
         let (a, b) = (&choice[from], &choice[to]);
         let miss = self.miss(a, b, self.shape.tolerance_m)?;
@@ -256,13 +256,12 @@ impl Reduction<'_> {
         turn.abs().to_degrees() <= vehicle.max_turn_deg + self.model.tolerance.angle_deg
     }
 
-    /// Whether the leg by itself keeps what a path is held to.
+    /// Whether the leg on its own satisfies the path constraints.
     fn is_free(&self, from: &Corner, to: &Corner) -> bool {
         keeps_limits(&self.model, &[from.point, to.point])
     }
 
-    /// How far the samples between two corners are from the leg at most; `None` when that is more
-    /// than `tolerance`.
+    /// Greatest distance of the samples between two corners from the leg; `None` if it exceeds `tolerance`.
     fn miss(&self, from: &Corner, to: &Corner, tolerance: f64) -> Option<f64> {
         let lifted = |corner: &Corner| Point3::new(corner.point.x, corner.point.y, corner.agl);
         let mut most: f64 = 0.0;
@@ -287,7 +286,7 @@ fn better(one: &Leg, other: &Leg) -> std::cmp::Ordering {
     one.legs.cmp(&other.legs).then(misses)
 }
 
-/// From a point to a leg, metres.
+/// Distance from a point to a leg, metres.
 fn distance(point: Point3, (a, b): (Point3, Point3)) -> f64 {
     let (along, offset) = (b - a, point - a);
     let squared = along.norm_squared();

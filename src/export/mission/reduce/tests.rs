@@ -1,4 +1,4 @@
-//! Random paths along threats, and a few by hand.
+//! Random paths along threats, and a few handmade ones.
 
 use super::*;
 use crate::export::tests::accepted;
@@ -8,7 +8,7 @@ use crate::threat::{Cylinder, Threat};
 use proptest::prelude::*;
 use serde_json::json;
 
-/// Open ground under 500 m of room, no limit that matters.
+/// Open ground with 500 m of altitude band, and no limit that matters.
 fn open(max_turn_deg: f64) -> Scenario {
     accepted(&json!({
         "start": {"x": 0, "y": 0, "z": 100},
@@ -59,7 +59,7 @@ fn hugging(
     Some((scenario, path))
 }
 
-/// Samples of a B-spline, no matter what it cuts.
+/// Samples of a B-spline, whatever it crosses.
 fn smoothed(corners: Vec<Point3>) -> Vec<Point3> {
     let spline = BSpline::clamped_uniform(corners, 3);
     let mut samples = vec![spline.control_points[0]];
@@ -110,8 +110,8 @@ proptest! {
         }
     }
 
-    /// Of all chains over the thinned samples of a short path, tried one by one, none has fewer legs; over all samples
-    /// there may be shorter ones still.
+    /// Of all chains over the thinned samples of a short path, tried one by one, none has fewer legs; over all
+    /// samples there may be shorter ones.
     #[test]
     fn the_legs_are_few(offsets in prop::collection::vec(-3.0..3.0_f64, 9)) {
         let scenario = open(90.0);
@@ -146,7 +146,7 @@ proptest! {
     }
 }
 
-/// Round a disc at its very edge, legs between samples would all cut it: beside it they do not.
+/// Around a disc, exactly at its edge, all legs between samples would cut it; legs beside the path do not.
 #[test]
 fn an_arc_along_a_threat_takes_few_legs() {
     let mut scenario = open(90.0);
@@ -179,8 +179,7 @@ fn an_arc_along_a_threat_takes_few_legs() {
     assert!((16..=23).contains(&corners.len()), "{}", corners.len());
 }
 
-/// A bend that legs of the tolerance would make in one corner is made in as many as the vehicle
-/// can turn.
+/// A bend that the tolerance would allow in one corner is split into as many as the vehicle's turn limit needs.
 #[test]
 fn no_corner_is_sharper_than_the_vehicle_can_turn() {
     let bend = |step: i32| {

@@ -1,7 +1,7 @@
-//! `GeoTIFF`: one band in strips or tiles, plain or packed, read block by block.
+//! `GeoTIFF`: one band in strips or tiles, compressed or not, read block by block.
 //!
-//! The bytes are unpacked by `tiff-reader`, within limits on what its headers and its blocks may take.
-//! Strips that are not packed are read a few rows at a time: some writers make the whole file one strip.
+//! `tiff-reader` decodes the bytes, with limits on the size of headers and blocks. Uncompressed strips are read a few
+//! rows at a time, because some writers make the whole file one strip.
 
 mod place;
 mod samples;
@@ -18,13 +18,13 @@ use place::{check_heights, crs, keys, no_data, nodes};
 pub(super) use samples::Layout;
 use samples::layout;
 
-/// Largest strip or tile that is unpacked, bytes: while it is, it is in memory three times.
+/// Largest strip or tile that is decoded, bytes; while being decoded it is in memory three times.
 const LARGEST_BLOCK: usize = 8 << 20;
 
 /// Largest single read of a file, bytes.
 const LARGEST_READ: usize = 8 << 20;
 
-/// What headers may take. Overviews are images of their own.
+/// Limits for headers. Overviews count as images of their own.
 const BUDGETS: ParseBudgets = ParseBudgets {
     max_ifds: 64,
     max_ifd_entries: 512,
@@ -32,12 +32,12 @@ const BUDGETS: ParseBudgets = ParseBudgets {
     max_metadata_value_bytes: 8 << 20,
 };
 
-/// What the headers of a file say.
+/// The headers of a file.
 pub(super) struct Headers {
     pub(super) layout: Layout,
     pub(super) sample: SampleType,
     pub(super) no_data: Option<f64>,
-    /// `None` when the file names none.
+    /// `None` when the file states none.
     pub(super) crs: Option<Crs>,
     /// First node and step.
     pub(super) first: [f64; 2],
@@ -46,7 +46,7 @@ pub(super) struct Headers {
     pub(super) rows: usize,
 }
 
-/// A file that is not read in large parts.
+/// A file source that refuses large reads.
 struct Guarded(FileSource);
 
 impl TiffSource for Guarded {
@@ -75,7 +75,7 @@ fn unsupported(found: impl Into<String>, allowed: &'static str) -> DemError {
     }
 }
 
-/// Whether a file that begins so is a TIFF.
+/// Whether a file that begins like this is a TIFF.
 pub(super) fn is_tiff(beginning: &[u8]) -> bool {
     [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"]
         .iter()
@@ -137,7 +137,7 @@ fn tiff(path: &Path) -> Result<TiffFile, DemError> {
         .map_err(|error| refusal(&error))
 }
 
-/// In our words, without the path.
+/// The error as a [`DemError`], without the path.
 fn refusal(error: &TiffError) -> DemError {
     match error {
         TiffError::Io(error, _) => malformed(format!("it cannot be read: {error}")),
@@ -145,7 +145,7 @@ fn refusal(error: &TiffError) -> DemError {
     }
 }
 
-/// The full image: the first that is georeferenced and no overview.
+/// The full-resolution image: the first that is georeferenced and not an overview.
 fn base_image(images: &[Ifd]) -> Option<usize> {
     let reduced = |ifd: &Ifd| {
         let flags = ifd

@@ -1,4 +1,4 @@
-//! What the tags of an image say of its place, its unit and its holes.
+//! What the tags of an image say about its position, its unit and its no-data value.
 
 use geotiff_core::geokeys::{self, GeoKeyDirectory};
 use geotiff_core::tags;
@@ -7,10 +7,10 @@ use tiff_reader::{Ifd, TagValue};
 use super::{malformed, unsupported};
 use crate::terrain::dem::{Crs, DemError};
 
-/// Tags that no library names.
+/// A tag that no library defines.
 const GDAL_METADATA: u16 = 42112;
 
-/// The geo keys of an image; none is as good as an empty directory.
+/// The geo keys of an image; a missing directory counts as an empty one.
 pub(super) fn keys(ifd: &Ifd) -> Result<GeoKeyDirectory, DemError> {
     let Some(directory) = ifd.tag(tags::TAG_GEO_KEY_DIRECTORY) else {
         return Ok(GeoKeyDirectory::new());
@@ -30,7 +30,7 @@ pub(super) fn keys(ifd: &Ifd) -> Result<GeoKeyDirectory, DemError> {
         .ok_or_else(|| malformed("its directory of geo keys cannot be read"))
 }
 
-/// Refuse elevations in other units than metres.
+/// Refuse elevations in units other than metres.
 pub(super) fn check_heights(ifd: &Ifd, keys: &GeoKeyDirectory) -> Result<(), DemError> {
     const METRE: u16 = 9001;
     if let Some(unit) = keys.get_short(geokeys::VERTICAL_UNITS)
@@ -63,14 +63,14 @@ pub(super) fn check_heights(ifd: &Ifd, keys: &GeoKeyDirectory) -> Result<(), Dem
     Ok(())
 }
 
-/// Where the first node is, and how far it is to the next column and row.
+/// Position of the first node, and the steps to the next column and row.
 pub(super) fn nodes(ifd: &Ifd, keys: &GeoKeyDirectory) -> Result<([f64; 2], [f64; 2]), DemError> {
     const POINT: u16 = 2;
     let doubles = |tag| match ifd.tag(tag).map(|tag| &tag.value) {
         Some(TagValue::Double(values)) => Some(values.as_slice()),
         _ => None,
     };
-    // From the corner of a pixel, where its coordinates are those of an area, to its middle.
+    // Offset from the corner of a pixel to its centre, when pixels are areas.
     let middle = if keys.get_short(geokeys::GT_RASTER_TYPE) == Some(POINT) {
         0.0
     } else {
@@ -111,7 +111,7 @@ pub(super) fn nodes(ifd: &Ifd, keys: &GeoKeyDirectory) -> Result<([f64; 2], [f64
     Ok((first, step))
 }
 
-/// The reference system that the keys name.
+/// The reference system stated by the keys.
 pub(super) fn crs(keys: &GeoKeyDirectory) -> Result<Option<Crs>, DemError> {
     const DEGREE: u16 = 9102;
     const OWN: u16 = 32767;

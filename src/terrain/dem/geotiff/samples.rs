@@ -1,4 +1,4 @@
-//! How the samples of an image are stored, and reading them.
+//! How the samples of an image are stored, and how they are read.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -11,24 +11,24 @@ use super::{LARGEST_BLOCK, malformed, refusal, tiff, unsupported};
 use crate::terrain::dem::raster::{NoData, Span, Visit};
 use crate::terrain::dem::{DemError, SampleType};
 
-/// Rows of a plain strip are read by about so many bytes.
+/// Approximate size of one read from an uncompressed strip, bytes.
 const PLAIN_READ: usize = 1 << 18;
 
-/// Of a whole TIFF, one that has been found right.
+/// The layout of a TIFF that has been checked.
 #[derive(Debug, Clone)]
 pub(in crate::terrain::dem) struct Layout {
     columns: usize,
     rows: usize,
-    /// Which image of the file.
+    /// Index of the image in the file.
     image: usize,
     pub(super) sample: SampleType,
     no_data: Option<f64>,
     big_endian: bool,
     /// Columns and rows of a block.
     block: [usize; 2],
-    /// Where each block begins and how long it is, bytes; 0 of one that is left out.
+    /// Offset and length of each block, bytes; 0 for a block that is not stored.
     blocks: Arc<[[u64; 2]]>,
-    /// Strips, not packed.
+    /// Uncompressed strips.
     plain: bool,
 }
 
@@ -174,7 +174,7 @@ impl Layout {
         Ok(())
     }
 
-    /// Of strips that are not packed, the rows asked for.
+    /// Read the rows of `span` from uncompressed strips.
     fn read_plain(&self, path: &Path, span: &Span, visit: &mut Visit<'_>) -> Result<(), DemError> {
         let mut file = File::open(path)?;
         let row_bytes = self.columns * self.sample.bytes();
@@ -214,13 +214,13 @@ impl Layout {
         Ok(())
     }
 
-    /// Whether a block is not stored, as sparse files do: there are no data.
+    /// Whether a block is not stored, as in sparse files: it has no data.
     fn is_left_out(&self, block_idx: usize) -> bool {
         self.blocks[block_idx].contains(&0)
     }
 
     fn convert(&self, bytes: &[u8], big_endian: bool, samples: &mut Vec<f32>) {
-        /// Values of one type, by its constructors out of bytes.
+        /// Decode values of one type from bytes.
         macro_rules! values {
             ($type:ty) => {{
                 let no_data = NoData::new(self.no_data);

@@ -4,7 +4,7 @@ use super::*;
 use crate::geometry::geodesy::LatLon;
 use crate::terrain::dem::{Crs, Lattice};
 
-/// A raster of 80 x 60 nodes about 100 m apart, and the plane at its middle.
+/// A raster of 80 x 60 nodes about 100 m apart, and the plane at its centre.
 fn hills(epsg: u16, lat: f64) -> (Raster, TangentPlane) {
     let crs = Crs::epsg(epsg).expect("it is known");
     let middle = LatLon { lat, lon: -84.3 };
@@ -40,7 +40,7 @@ fn area() -> Rect {
     }
 }
 
-/// Bilinear, by the book, of the exact place below `point`.
+/// Textbook bilinear interpolation at the exact place below `point`.
 fn expected(raster: &Raster, plane: &TangentPlane, point: Point2) -> f64 {
     let cells = raster
         .lattice
@@ -63,7 +63,7 @@ fn elevations_are_those_of_the_file() {
         (3857, 60.0),
     ] {
         let (raster, plane) = hills(epsg, lat);
-        // A metre of the web's map is half a metre at 60 degrees.
+        // A metre of web Mercator is half a metre at 60 degrees.
         let scale = if epsg == 3857 { 0.4 } else { 1.0 };
         let area = Rect {
             min: area().min * scale,
@@ -83,7 +83,7 @@ fn elevations_are_those_of_the_file() {
                 );
                 let point = area.min + share;
                 let off = dem.elevation(point) - expected(&raster, &plane, point);
-                // A millionth of a cell or two of 300 m up and down.
+                // One or two millionths of a cell, with 300 m of relief.
                 assert!(
                     off.abs() < 1e-3,
                     "EPSG:{epsg} at {lat}: {off} m off at {point}"
@@ -111,7 +111,7 @@ fn an_area_that_sticks_out_is_refused_where_it_does() {
 fn a_hole_is_refused_under_the_area_and_avoided_beside_it() {
     let (mut raster, plane) = hills(32616, 36.6);
     let whole = raster.clone();
-    // 950 m west and 450 m north of the middle.
+    // 950 m west and 450 m north of the centre.
     raster.elevations[25 * 80 + 30] = f32::NAN;
     let Err(DemError::NoData { at, row, column }) = Dem::new(raster, &plane, area(), 0.0) else {
         panic!("there is a hole");
@@ -119,7 +119,7 @@ fn a_hole_is_refused_under_the_area_and_avoided_beside_it() {
     assert_eq!([row, column], [32, 35]);
     let away = plane.local(at) - Point2::new(-950.0, 450.0);
     assert!(away.norm() < 40.0, "{away}");
-    // At the west side, 2850 m from the middle: so far the margin may not reach.
+    // On the west side, 2850 m from the centre: the margin must stop short of it.
     let mut raster = whole;
     raster.elevations[25 * 80 + 11] = f32::NAN;
     let dem = Dem::new(raster, &plane, area(), 600.0).expect("the hole is outside");
@@ -171,9 +171,9 @@ proptest! {
             seen = seen.join(HeightRange::of(point.z - dem.elevation(point.xy())));
         }
         prop_assert!(range.min <= seen.min + CHORD_M && range.max >= seen.max - CHORD_M, "{range:?} {seen:?}");
-        // Between two samples there is at most a metre, and at most 3 m up or down.
+        // Samples are about a metre apart, and the height changes by at most 3 m between them.
         prop_assert!(seen.min - range.min < 3.0 && range.max - seen.max < 3.0, "{range:?} {seen:?}");
-        // Beyond a band it is the same as without one.
+        // Beyond a band the result is the same as without one.
         let band = HeightRange { min: 10.0, max: 60.0 };
         let beyond = dem.height_range_beyond(&leg, (t0, t1), band);
         let below = (band.min - beyond.min).max(0.0) - (band.min - range.min).max(0.0);

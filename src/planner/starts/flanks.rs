@@ -10,15 +10,18 @@ use std::ops::Range;
 
 use super::net::{self, Found, Spots};
 use super::thin::thin;
-use super::{nearer_end, steepest};
+use super::{is_steep, nearer_end, steepest};
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::cost::{Model, metre};
 use crate::geometry::{LEVEL, Point2, Point3, Vector2};
 use crate::planner::price::PRICED_FROM;
 use crate::scenario::Scenario;
 
-/// Spots of the net, apart from both ends, and of a finer one where that has no way.
-const SPOTS: [usize; 2] = [2000, 4000];
+/// Spots of the net, apart from both ends.
+const SPOTS: usize = 2000;
+
+/// Spots of a finer net, where the first has no way though no straight one joins the ends.
+const SPOTS_IF_STEEP: usize = 4000;
 
 /// Heights of each spot, as shares of the band.
 const HEIGHTS: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
@@ -39,7 +42,8 @@ const WORTHWHILE: f64 = 1.1;
 /// Up to `count` routes that differ; none once `is_over`.
 pub(super) fn routes(model: &Model, count: usize, is_over: &dyn Fn() -> bool) -> Found {
     let mut found = Found::default();
-    for spots in SPOTS {
+    let finer = is_steep(model.scenario).then_some(SPOTS_IF_STEEP);
+    for spots in std::iter::once(SPOTS).chain(finer) {
         let mut net = Net::new(model, spots);
         if let Some(trees) = net.trees(is_over) {
             for chain in net.chains(model, &trees, count) {
@@ -415,7 +419,7 @@ mod tests {
             let scenario = mountain(is_down);
             let model = Model::new(&scenario);
             let sharpest = libm::cos(scenario.vehicle.max_turn_deg.to_radians()) - 1e-6;
-            let mut net = Net::new(&model, SPOTS[0]);
+            let mut net = Net::new(&model, SPOTS);
             let trees = net.trees(&|| false).expect("a way is found");
             let chains = net.chains(&model, &trees, 8);
             assert!(chains.len() > 2, "{}", chains.len());

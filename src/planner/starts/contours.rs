@@ -159,7 +159,7 @@ mod tests {
     use crate::scenario::Seeding;
     use crate::terrain::{Peak, Peaks, Terrain};
 
-    /// From the top of a mountain to the plain before it, or up.
+    /// From the top of a mountain down to the plain, or up.
     fn mountain(height: f64, is_down: bool) -> Scenario {
         let mut scenario = scenario();
         scenario.threats.clear();
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mountain_that_is_too_steep_is_left_along_its_flanks_on_either_side() {
+    fn a_mountain_that_is_too_steep_is_left_along_its_flanks_on_both_sides() {
         for is_down in [true, false] {
             let scenario = mountain(250.0, is_down);
             let steep = 0.85 * steepest(&scenario);
@@ -195,7 +195,7 @@ mod tests {
                 let way = walk(&scenario, side, steep).expect("it arrives");
                 assert_eq!(way[0], scenario.start.xy());
                 assert_eq!(way[way.len() - 1], scenario.target.xy());
-                // Once it has turned as it wants, the ground under it is as steep as allowed.
+                // After its initial turns, the way follows ground of nearly the allowed steepness.
                 let slopes = way.windows(2).skip(20).map(|step| {
                     let heights = [step[0], step[1]].map(|at| scenario.terrain.elevation(at));
                     (heights[1] - heights[0]).abs() / (step[1] - step[0]).norm()
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hill_that_is_not_too_steep_has_no_ways_round() {
+    fn a_hill_that_is_not_too_steep_gets_no_ways_around_it() {
         let scenario = mountain(30.0, true);
         let found = routes(&Model::new(&scenario), &|| false);
         assert!(found.routes.is_empty() && found.legs_priced == 0);

@@ -196,10 +196,10 @@ mod tests {
         }
     }
 
-    /// Two discs in the way, one after the other, whose soft zones overlap with those of a third and a fourth beside
-    /// them in gaps of ten metres.
+    /// Two discs in the way, one after the other, whose soft zones overlap with those of a third and a fourth
+    /// beside them in gaps of ten metres.
     #[test]
-    fn each_way_passes_some_threat_on_another_side() {
+    fn one_way_is_found_for_each_combination_of_sides() {
         let discs = [
             (400.0, 333.0),
             (330.0, 420.0),
@@ -208,7 +208,7 @@ mod tests {
         ];
         let scenario = among(discs.map(|(x, y)| [x, y, 50.0, 80.0]));
         let ways = cheap_ways(&scenario, 100.0, sought(12));
-        // Either pair on either side.
+        // Each of the two pairs can be passed on either side.
         assert_eq!(ways.len(), 4);
         let (start, target) = (scenario.start.xy(), scenario.target.xy());
         let mut lengths = Vec::new();
@@ -226,7 +226,7 @@ mod tests {
             lengths.iter().all(|length| *length < 1.6 * direct),
             "{lengths:?}"
         );
-        // No two ways are the same.
+        // No two ways are identical.
         for (idx, one) in ways.iter().enumerate() {
             assert!(ways[idx + 1..].iter().all(|other| one != other));
         }

@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_lists_the_files_that_are_there() {
+    fn the_table_lists_exactly_the_existing_files() {
         let mut there = BTreeSet::new();
         for (below, prefix) in [("", ""), ("vendor", "vendor/")] {
             for entry in fs::read_dir(directory().join(below)).expect("it is there") {
@@ -258,9 +258,9 @@ mod tests {
         assert_eq!(there, listed);
     }
 
-    /// What is served is what was bundled: nobody has edited it since.
+    /// The served files are exactly those that were bundled.
     #[test]
-    fn what_is_vendored_has_the_hashes_that_were_recorded() {
+    fn vendored_files_match_their_recorded_hashes() {
         let sums = fs::read_to_string(directory().join("vendor/SHA256SUMS")).expect("it is there");
         let sums: BTreeMap<&str, &str> = sums
             .lines()
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn every_script_that_is_imported_is_served() {
+    fn every_imported_script_is_served() {
         for file in FILES
             .iter()
             .filter(|file| !file.name.starts_with("vendor/"))

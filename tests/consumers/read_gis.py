@@ -10,7 +10,7 @@ from exports import assert_same, routes
 
 
 def features(file, *arguments):
-    """What GDAL makes of a file, as GeoJSON that keeps every digit."""
+    """The features that GDAL reads from a file, as GeoJSON with all digits."""
     command = ["ogr2ogr", "-f", "GeoJSON", "-lco", "COORDINATE_PRECISION=12", "/vsistdout/", str(file), *arguments]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     if done.stderr.strip():
@@ -19,7 +19,7 @@ def features(file, *arguments):
 
 
 def lines(features):
-    """All positions of the lines among them; of pieces, without the cuts."""
+    """All positions of the lines among the features; pieces are joined without their cuts."""
     found = []
     for feature in features:
         geometry = feature["geometry"]
@@ -41,7 +41,7 @@ def ring_of(geometry):
 
 
 class Maps(unittest.TestCase):
-    def test_files_are_told_without_a_warning(self):
+    def test_files_are_read_without_a_warning(self):
         for route in routes():
             for extension in ("geojson", "kml", "gpx"):
                 with self.subTest(f"{route.name}.{extension}"):
@@ -93,7 +93,7 @@ class Maps(unittest.TestCase):
                 self.assertEqual(times, sorted(times))
 
     def threats(self, route, found):
-        """Corners of polygons are the scenario's, those of circles lie on them."""
+        """Polygon corners match the scenario's; circles are approximated by 73 positions or more."""
         polygons = [f for f in found if f["geometry"]["type"] in ("Polygon", "MultiPolygon")]
         self.assertEqual(len(polygons), len(route.scenario["threats"]))
         for feature, threat in zip(polygons, route.scenario["threats"]):

@@ -1,6 +1,7 @@
 """GeoJSON, KML and GPX, read by GDAL; GPX also by gpxpy."""
 
 import json
+import math
 import subprocess
 import unittest
 
@@ -38,6 +39,17 @@ def ring_of(geometry):
     if geometry["type"] == "Polygon":
         return geometry["coordinates"][0]
     return [corner for polygon in geometry["coordinates"] for corner in polygon[0]]
+
+
+def distance(center, position):
+    """Metres on the WGS 84 ellipsoid between a centre and a position at most some kilometres away."""
+    radius, squared_eccentricity = 6378137, 0.00669437999014
+    latitude = math.radians((center["lat"] + position[1]) / 2)
+    w = math.sqrt(1 - squared_eccentricity * math.sin(latitude) ** 2)
+    turn = (position[0] - center["lon"] + 180) % 360 - 180
+    east = radius / w * math.cos(latitude) * math.radians(turn)
+    north = radius * (1 - squared_eccentricity) / w**3 * math.radians(position[1] - center["lat"])
+    return math.hypot(east, north)
 
 
 class Maps(unittest.TestCase):
@@ -93,7 +105,7 @@ class Maps(unittest.TestCase):
                 self.assertEqual(times, sorted(times))
 
     def threats(self, route, found):
-        """Polygon corners match the scenario's; circles are approximated by 73 positions or more."""
+        """Polygon corners match the scenario's; circles have 73 positions or more, all of them on the circle."""
         polygons = [f for f in found if f["geometry"]["type"] in ("Polygon", "MultiPolygon")]
         self.assertEqual(len(polygons), len(route.scenario["threats"]))
         for feature, threat in zip(polygons, route.scenario["threats"]):
@@ -105,4 +117,7 @@ class Maps(unittest.TestCase):
                     self.assertTrue(any(near(corner, r) for r in ring), (corner, ring))
             else:
                 self.assertGreaterEqual(len(ring), 73)
+                for position in ring:
+                    apart = distance(threat["center"], position)
+                    self.assertAlmostEqual(apart / threat["radius"], 1, delta=1e-3)
                 self.assertEqual(float(feature["properties"]["radius"]), threat["radius"])

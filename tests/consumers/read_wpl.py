@@ -58,10 +58,11 @@ class Waypoints(unittest.TestCase):
                     self.assertEqual(other.frame, MAV.MAV_FRAME_GLOBAL_RELATIVE_ALT)
                     self.assertAlmostEqual(one.z - home, other.z, delta=2e-3)
 
-    def test_terrain_items_are_below_the_top_of_the_band(self):
+    def test_terrain_items_are_within_the_band(self):
         for route in routes():
             band = route.scenario["altitude"]
             with self.subTest(route.name):
                 for item in load(route.file("terrain.wpl"))[4:-1]:
                     self.assertEqual(item.frame, MAV.MAV_FRAME_GLOBAL_TERRAIN_ALT)
                     self.assertLessEqual(item.z, band["max"] + 1e-2)
+                    self.assertGreaterEqual(item.z, band["min"] - 1e-2)

@@ -254,10 +254,9 @@ class Kubernetes(unittest.TestCase):
                     self.assertEqual(metric["external"]["metric"]["name"], rule["name"]["as"])
 
     def test_a_worker_runs_as_many_plans_as_it_has_cpus(self):
-        for workload, pod in pods():
-            [container, *_] = pod["spec"]["containers"]
-            if workload["metadata"]["name"] == "noctule-worker":
-                self.assertIn(f"--workers={container['resources']['limits']['cpu']}", container["args"])
+        [pod] = [pod for workload, pod in pods() if workload["metadata"]["name"] == "noctule-worker"]
+        [container, *_] = pod["spec"]["containers"]
+        self.assertIn(f"--workers={container['resources']['limits']['cpu']}", container["args"])
 
     def test_no_container_is_root_or_writes_to_its_image(self):
         for workload, pod in pods():

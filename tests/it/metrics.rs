@@ -91,12 +91,8 @@ async fn a_finished_run_is_counted() {
     assert_eq!(status["status"], "succeeded");
     // Callers may learn of the end before the worker has counted it.
     let ended = "noctule_plans_ended_total{status=\"succeeded\"}";
-    let reading = loop {
-        let reading = read_from(&service).await;
-        if reading.value(ended) > 0.5 {
-            break reading;
-        }
-    };
+    eventually(async || read_from(&service).await.value(ended) > 0.5).await;
+    let reading = read_from(&service).await;
     let count = |series: &str| reading.value(series);
     for series in [
         ended,
@@ -253,5 +249,5 @@ async fn streams_are_counted_while_they_are_open() {
     let open = |reading: &Reading| reading.value("noctule_http_event_streams");
     assert!((open(&read_from(&service).await) - 1.0).abs() < 0.5);
     drop(stream);
-    while open(&read_from(&service).await) > 0.5 {}
+    eventually(async || open(&read_from(&service).await) < 0.5).await;
 }

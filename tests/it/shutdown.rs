@@ -45,16 +45,8 @@ async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
 
         let begun = Instant::now();
         service.signal("TERM");
-        let refused = loop {
-            let ready = service
-                .get("/readyz")
-                .send()
-                .await
-                .expect("it still answers");
-            if ready.status() == 503 {
-                break service.post(&a_run_of(10)).await;
-            }
-        };
+        service.until_ready(503).await;
+        let refused = service.post(&a_run_of(10)).await;
         assert_eq!(refused.status(), 503);
         assert!(refused.headers().contains_key("retry-after"));
         let problem: Value = refused.json().await.expect("JSON");
@@ -126,14 +118,7 @@ async fn a_second_signal_exits_without_waiting() {
     let address = service.submit(&a_run_of(AN_HOUR_MS)).await;
     let _stream = running(&service, &address).await;
     service.signal("TERM");
-    while service
-        .get("/readyz")
-        .send()
-        .await
-        .expect("it still answers")
-        .status()
-        != 503
-    {}
+    service.until_ready(503).await;
     service.signal("TERM");
     assert_eq!(service.exit().await.code(), Some(1));
 }
@@ -147,8 +132,7 @@ async fn open_streams_do_not_delay_the_exit() {
     let streams = join_all((0..500).map(|_| running_at(&service, &address, 0.01))).await;
     let begun = Instant::now();
     service.signal("TERM");
-    let ready = async || service.get("/readyz").send().await.expect("an answer");
-    while ready().await.status() != 503 {}
+    service.until_ready(503).await;
     for stream in streams {
         let rest = stream.rest().await;
         assert!(

@@ -4,6 +4,8 @@ use noctule::export::document::Convergence;
 use noctule::job::{Event, Failure, Plan, PlanId, Status, Submission};
 use noctule::store::{Ending, Store, StoreError};
 
+use super::patience::in_time;
+
 /// A submission of ten iterations.
 pub(crate) fn submission() -> Submission {
     let id = PlanId::now_v7();
@@ -80,13 +82,16 @@ pub(crate) fn statuses(events: &[Event]) -> Vec<Status> {
 /// Waits until the record is as `wanted`.
 pub(crate) async fn until(store: &dyn Store, id: PlanId, wanted: impl Fn(&Plan) -> bool) -> Plan {
     let mut changes = store.changes(id);
-    loop {
-        let plan = store.get(id).await.expect("the plan is there");
-        if wanted(&plan) {
-            return plan;
+    let plan = async {
+        loop {
+            let plan = store.get(id).await.expect("the plan is there");
+            if wanted(&plan) {
+                return plan;
+            }
+            changes.changed().await.expect("the store is open");
         }
-        changes.changed().await.expect("the store is open");
-    }
+    };
+    in_time(plan).await
 }
 
 /// The kind of error, without its details.

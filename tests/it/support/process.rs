@@ -227,21 +227,24 @@ impl Service {
 
     /// Waits for the plan's end; its status document.
     pub(crate) async fn ended(&self, address: &str) -> Value {
-        loop {
-            let request = self.get(address).header("prefer", "wait=30");
-            let status: Value = request
-                .send()
-                .await
-                .expect("an answer")
-                .json()
-                .await
-                .expect("JSON");
-            if ["succeeded", "failed", "cancelled"]
-                .contains(&status["status"].as_str().expect("text"))
-            {
-                return status;
+        let ended = async {
+            loop {
+                let request = self.get(address).header("prefer", "wait=30");
+                let status: Value = request
+                    .send()
+                    .await
+                    .expect("an answer")
+                    .json()
+                    .await
+                    .expect("JSON");
+                if ["succeeded", "failed", "cancelled"]
+                    .contains(&status["status"].as_str().expect("text"))
+                {
+                    return status;
+                }
             }
-        }
+        };
+        in_time(ended).await
     }
 
     /// The body of `path`, which must exist.

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use futures_util::stream::{self, StreamExt as _};
 use serde_json::Value;
 
-use super::{Node, is_whole, turn};
+use super::{Node, is_whole};
 use crate::support::lives::a_plan;
 use crate::support::nats::Cluster;
 use crate::support::process::Service;
@@ -57,9 +57,8 @@ async fn follow(api: &Service, address: &str) -> Vec<(u64, String)> {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn every_plan_ends_once_while_leaders_and_workers_are_killed() {
-    let _turn = turn().await;
     let (n_plans, n_kills) = size((60, 2), (2_000, usize::MAX));
-    let mut cluster = Cluster::start();
+    let mut cluster = Cluster::start().await;
     let address = cluster.address();
     let api = Arc::new(Node::api(&address, &["--store-replicas", "3"]));
     let teller = Arc::new(Node::api(&address, &["--store-replicas", "3"]));

@@ -14,17 +14,10 @@ use std::sync::Arc;
 use noctule::store::jetstream::{JetStreamStore, Settings};
 use noctule::store::{Options, Store};
 use tempfile::TempDir;
-use tokio::sync::{Mutex, MutexGuard};
 
 use crate::support::process::Service;
 use crate::support::sse::{Stream, events};
 use crate::support::stores::node;
-
-/// Tests with a cluster of servers run one at a time: two at once would take up the whole machine.
-async fn turn() -> MutexGuard<'static, ()> {
-    static TURN: Mutex<()> = Mutex::const_new(());
-    TURN.lock().await
-}
 
 /// A node that is only a store.
 async fn open(address: &str) -> Arc<dyn Store> {

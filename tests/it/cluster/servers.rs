@@ -6,6 +6,7 @@ use async_nats::jetstream;
 use async_nats::jetstream::context::CreateStreamErrorKind;
 
 use crate::support::nats::{self, Cluster, NatsServer};
+use crate::support::patience::eventually;
 
 async fn client(address: &str) -> jetstream::Context {
     let (hosts, _) = address
@@ -72,7 +73,7 @@ async fn namespaces_on_the_shared_server_are_isolated() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_cluster_survives_the_loss_of_its_leader() {
-    let mut cluster = Cluster::start();
+    let mut cluster = Cluster::start().await;
     let address = cluster.address();
     let context = client(&address).await;
     let mut stream = created(&context, stream(&address, 3)).await;
@@ -85,10 +86,9 @@ async fn a_cluster_survives_the_loss_of_its_leader() {
         .find(|server| server.name() == leader)
         .unwrap()
         .kill();
-    loop {
+    eventually(async || {
         let sent = context.publish(subject.clone(), "x".into()).await.unwrap();
-        if sent.await.is_ok() {
-            break;
-        }
-    }
+        sent.await.is_ok()
+    })
+    .await;
 }

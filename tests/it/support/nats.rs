@@ -13,9 +13,10 @@ use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
+use tokio::sync::{Mutex, MutexGuard};
 use uuid::Uuid;
 
-use super::patience::PATIENCE;
+use super::patience::{PATIENCE, in_time};
 
 /// Prints the server's process id, waits for a line, and kills the server. If the pipe closes without a line,
 /// the tests' process is gone, and the server's files are removed too.
@@ -66,7 +67,7 @@ impl NatsServer {
         server
     }
 
-    /// A server without JetStream, which stores nothing.
+    /// A server without `JetStream`, which stores nothing.
     pub(crate) fn without_jetstream() -> Self {
         let mut server = Self::new("", "enabled: false");
         server.launch();
@@ -186,13 +187,19 @@ impl Drop for NatsServer {
 }
 
 /// Three servers that keep three replicas of everything.
+///
+/// One cluster runs at a time: two at once would take up the whole machine.
 pub(crate) struct Cluster {
     pub(crate) servers: Vec<NatsServer>,
+    /// Dropped last: the next cluster starts when these servers are gone.
+    _turn: MutexGuard<'static, ()>,
 }
 
 impl Cluster {
-    /// Returns when the servers are connected to one another.
-    pub(crate) fn start() -> Self {
+    /// Waits until no other test has a cluster; returns when the servers are connected to one another.
+    pub(crate) async fn start() -> Self {
+        static TURN: Mutex<()> = Mutex::const_new(());
+        let turn = TURN.lock().await;
         let ports = [free_port(), free_port(), free_port()];
         let routes = ports.map(|port| format!("\"nats-route://127.0.0.1:{port}\""));
         let routes = routes.join(", ");
@@ -207,7 +214,10 @@ impl Cluster {
         for server in &servers {
             server.wait("/healthz");
         }
-        Self { servers }
+        Self {
+            servers,
+            _turn: turn,
+        }
     }
 
     /// The server that leads the plans of an address.
@@ -221,17 +231,20 @@ impl Cluster {
         let hosts: Vec<_> = self.servers.iter().map(NatsServer::host).collect();
         let client = async_nats::connect(hosts).await.expect("connected");
         let context = async_nats::jetstream::new(client);
-        loop {
-            if let Ok(mut stream) = context.get_stream(stream).await
-                && let Ok(info) = stream.info().await
-                && let Some(leader) = info.cluster.as_ref().and_then(|one| one.leader.clone())
-                && let Some(found) = self.servers.iter().position(|one| one.name() == leader)
-                && self.servers[found].running.is_some()
-            {
-                return found;
+        let elected = async {
+            loop {
+                if let Ok(mut stream) = context.get_stream(stream).await
+                    && let Ok(info) = stream.info().await
+                    && let Some(leader) = info.cluster.as_ref().and_then(|one| one.leader.clone())
+                    && let Some(found) = self.servers.iter().position(|one| one.name() == leader)
+                    && self.servers[found].running.is_some()
+                {
+                    return found;
+                }
+                tokio::time::sleep(Duration::from_millis(50)).await;
             }
-            tokio::time::sleep(Duration::from_millis(50)).await;
-        }
+        };
+        in_time(elected).await
     }
 
     /// The address of an unused namespace, reachable through any of the servers.

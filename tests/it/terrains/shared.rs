@@ -468,7 +468,7 @@ async fn a_node_killed_during_an_upload_leaves_nothing_visible() {
 /// With three replicas of everything, a change acknowledged by one server is visible through all.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_changed_name_is_visible_at_once_on_every_node() {
-    let cluster = Cluster::start();
+    let cluster = Cluster::start().await;
     let address = cluster.address();
     let mut nodes = Vec::new();
     for _ in 0..3 {
@@ -492,7 +492,7 @@ async fn a_changed_name_is_visible_at_once_on_every_node() {
 /// Refused requests are retried, as any caller would; every answer must be correct.
 #[tokio::test(flavor = "multi_thread")]
 async fn names_stay_consistent_when_servers_are_lost() {
-    let mut cluster = Cluster::start();
+    let mut cluster = Cluster::start().await;
     let address = cluster.address();
     let nodes = [(); 2].map(|()| {
         let shelf = Arc::new(JetStreamShelf::new(settings(&address, 3)));

@@ -153,7 +153,11 @@ fn the_default_area_has_room_for_the_climb() {
             r#"{{"start":{{"x":0,"y":0,"z":0}},"target":{target},"altitude":{{"min":400,"max":700}},
             "terrain":{{"kind":"flat","elevation":-500}},"vehicle":{{"max_climb_deg":{climb}}}}}"#
         );
-        let area = read(&text).expect("no fault").area;
+        let scenario = read(&text).expect("no fault");
+        // What is written is accepted again, with the same area.
+        let again = read(&json::write(&scenario)).expect("no fault");
+        assert_eq!(again.area, scenario.area, "{text}");
+        let area = scenario.area;
         [area.min.x, area.min.y, area.max.x, area.max.y]
     };
     let check = |target, climb, expected: [f64; 4]| {

@@ -121,7 +121,8 @@ async fn a_warm_start_from_another_owners_plan_is_refused() {
 
 #[tokio::test]
 async fn lists_and_idempotency_keys_are_scoped_by_owner() {
-    let api = Api::with_keys(&house());
+    let anna = entry("anna", "of anna", "plan", "owner = \"alice\"");
+    let api = Api::with_keys(&(house() + &anna));
     let of_alice = submit(&api, "of alice").await;
     let of_bob = submit(&api, "of bob").await;
     for (secret, expected) in [
@@ -139,7 +140,7 @@ async fn lists_and_idempotency_keys_are_scoped_by_owner() {
             .collect();
         assert_eq!(found, expected, "{secret}");
     }
-    // Idempotency keys are scoped by owner: the same key of two owners names two requests.
+    // The same idempotency key of two owners names two requests; two keys of one owner share it.
     let once = async |secret: &str| {
         let bearer = bearer(secret);
         let headers = [
@@ -152,6 +153,7 @@ async fn lists_and_idempotency_keys_are_scoped_by_owner() {
         answer.header("location").to_owned()
     };
     assert_ne!(once("of alice").await, once("of bob").await);
+    assert_eq!(once("of alice").await, once("of anna").await);
 }
 
 #[tokio::test]

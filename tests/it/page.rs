@@ -6,8 +6,8 @@ use axum::http::{Method, StatusCode};
 use flate2::read::GzDecoder;
 use serde_json::{Value, json};
 
-use crate::support::api::{Answer, Api};
-use crate::support::keys::entry;
+use crate::support::api::Api;
+use crate::support::keys::{bearer, entry};
 
 /// Ground that rises by 1 m every 200 m to the east, and by 10 m to the north.
 fn sloping() -> Value {
@@ -193,15 +193,24 @@ async fn ground_in_degrees_is_sampled_in_degrees() {
 }
 
 #[tokio::test]
-async fn sampling_ground_needs_a_key() {
-    let api = Api::with_keys(&entry("alice", "of alice", "plan", ""));
-    let refused: Answer = api
-        .send(
-            Method::POST,
-            "/scenarios:ground",
-            &[("content-type", "application/json")],
-            "{}",
-        )
-        .await;
-    assert_eq!(refused.status, StatusCode::UNAUTHORIZED);
+async fn sampling_ground_needs_a_key_that_may_plan() {
+    let keys = [
+        entry("alice", "of alice", "plan", ""),
+        entry("rita", "of rita", "read", ""),
+    ];
+    let api = Api::with_keys(&keys.concat());
+    let ask = async |more: &[(&str, &str)]| {
+        let headers = [&[("content-type", "application/json")], more].concat();
+        let body = sloping().to_string();
+        api.send(Method::POST, "/scenarios:ground", &headers, body)
+            .await
+    };
+    assert_eq!(ask(&[]).await.status, StatusCode::UNAUTHORIZED);
+    for (secret, expected) in [
+        ("of rita", StatusCode::FORBIDDEN),
+        ("of alice", StatusCode::OK),
+    ] {
+        let answer = ask(&[("authorization", &bearer(secret))]).await;
+        assert_eq!(answer.status, expected, "{secret}");
+    }
 }

@@ -130,10 +130,9 @@ async fn a_wrong_content_length_never_accepts_a_plan() {
     assert!(matches!(statuses(&answer)[..], [] | ["400"]), "{answer}");
     // A length that is too small: the rest is not a request.
     let answer = exchange(&server, &post("content-length: 10", &body)).await;
-    assert!(
-        statuses(&answer).iter().all(|status| *status == "400"),
-        "{answer}"
-    );
+    let found = statuses(&answer);
+    assert!(!found.is_empty(), "no answer");
+    assert!(found.iter().all(|status| *status == "400"), "{answer}");
     // Two lengths, or something that is not a length.
     for headers in [
         "content-length: 1000\r\ncontent-length: 10",
@@ -143,11 +142,10 @@ async fn a_wrong_content_length_never_accepts_a_plan() {
         "transfer-encoding: chunked\r\ncontent-length: 10",
     ] {
         let answer = exchange(&server, &post(headers, &body)).await;
-        let known = ["400", "413"];
+        let (found, known) = (statuses(&answer), ["400", "413"]);
+        assert!(!found.is_empty(), "{headers}: no answer");
         assert!(
-            statuses(&answer)
-                .iter()
-                .all(|status| known.contains(status)),
+            found.iter().all(|status| known.contains(status)),
             "{headers}: {answer}"
         );
     }

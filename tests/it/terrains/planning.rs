@@ -86,11 +86,29 @@ async fn the_service_and_the_command_line_plan_the_same_route() {
     let planned: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(route(&planned), route(&served));
 
-    // Without its ground the scenario is refused.
-    let output = run(&["plan", "-"], &scenario.to_string());
+    // With its ground the result can be exported.
+    let file = directory.path().join("scenario.json");
+    std::fs::write(&file, scenario.to_string()).expect("written");
+    let file = file.to_str().expect("UTF-8");
+    let export = ["export", "-", "--scenario", file, "--format", "svg"];
+    let result = planned.to_string();
+    let output = run(
+        &[&export[..], &["--terrain-dir", terrains]].concat(),
+        &result,
+    );
     let errors = String::from_utf8(output.stderr).expect("UTF-8");
-    assert_eq!(output.status.code(), Some(2), "{errors}");
-    assert!(errors.contains("unknown-dataset"), "{errors}");
+    assert_eq!(output.status.code(), Some(0), "{errors}");
+
+    // Without its ground the scenario is refused, and so is the export.
+    for (arguments, input) in [
+        (&["plan", "-"][..], scenario.to_string()),
+        (&export, result),
+    ] {
+        let output = run(arguments, &input);
+        let errors = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(2), "{errors}");
+        assert!(errors.contains("unknown-dataset"), "{errors}");
+    }
 }
 
 #[tokio::test]

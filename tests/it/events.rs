@@ -321,7 +321,7 @@ async fn the_end_event_of_a_plan_without_a_route_names_no_result() {
         let plan = Followed::on(backend).await;
         plan.api
             .store
-            .request_cancel(lease_id(&plan.address), 0)
+            .request_cancel(id_of(&plan.address), 0)
             .await
             .expect("queued");
         let Some(Block::Event { data, .. }) = plan.read("").await.pop() else {
@@ -335,7 +335,7 @@ async fn the_end_event_of_a_plan_without_a_route_names_no_result() {
     .await;
 }
 
-fn lease_id(address: &str) -> noctule::job::PlanId {
+fn id_of(address: &str) -> noctule::job::PlanId {
     address
         .trim_start_matches("/plans/")
         .parse()

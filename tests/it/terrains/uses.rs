@@ -46,8 +46,8 @@ async fn a_dataset_in_use_by_queued_plans_cannot_be_deleted() {
     assert_eq!(kept(&api.uploads()), [4, 1, 0]);
     assert_eq!(api.delete("/terrains/hill").await.status, 204);
     for plan in &plans {
-        let svg = api.get(&format!("{plan}/scenario")).await;
-        assert_eq!(svg.status, 200);
+        let scenario = api.get(&format!("{plan}/scenario")).await;
+        assert_eq!(scenario.status, 200);
         assert_eq!(api.delete(plan).await.status, 204);
     }
 }

@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn leaving_out_waypoints_keeps_the_route_feasible() {
+    fn the_waypoints_left_out_are_those_missed_least() {
         let mut scenario = slalom();
         scenario.threats.truncate(1);
         scenario.planner.waypoints = 3;
@@ -190,10 +190,20 @@ mod tests {
         ];
         let free = corners.map(|(x, y)| Point3::new(x, y, 100.0));
         let mut route = [&[scenario.start], &free[..], &[scenario.target]].concat();
+        let whole = route.clone();
         let mut nobody = Nobody;
         let mut log = Log::new(&model, &mut nobody, &Nobody);
         let fitness = leave_out(&model, &mut route, &mut log);
         assert!(fitness.is_feasible() && route.len() == 5, "{fitness:?}");
         assert!(log.evaluations > 0);
+        // Leaving out any two others, and moving nothing, gives no better route.
+        for first in 1..6 {
+            for second in first..5 {
+                let mut rest = whole.clone();
+                rest.remove(first);
+                rest.remove(second);
+                assert!(!price(&model, &rest).beats(&fitness), "{rest:?}");
+            }
+        }
     }
 }

@@ -377,6 +377,7 @@ mod tests {
         ]
         .map(best);
         assert!(!coarse.is_feasible());
+        assert!(fine.is_feasible(), "{fine:?}");
         assert!(fine.beats(&coarse), "{coarse:?} {fine:?}");
     }
 }

@@ -185,7 +185,10 @@ impl<'a> Tree<'a> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
+    use crate::geometry::wrap_angle;
     use crate::seeding::tests::among;
 
     fn sought(most: usize) -> WaysSought {
@@ -226,10 +229,19 @@ mod tests {
             lengths.iter().all(|length| *length < 1.6 * direct),
             "{lengths:?}"
         );
-        // No two ways are identical.
-        for (idx, one) in ways.iter().enumerate() {
-            assert!(ways[idx + 1..].iter().all(|other| one != other));
-        }
+        // No two ways pass all discs on the same sides.
+        let passed = |way: &Vec<Point2>| {
+            discs.map(|(x, y)| {
+                let heading = |at: &Point2| libm::atan2(at.y - y, at.x - x);
+                let turns = way.windows(2);
+                let turned: f64 = turns
+                    .map(|ends| wrap_angle(heading(&ends[1]) - heading(&ends[0])))
+                    .sum();
+                turned > 0.0
+            })
+        };
+        let sides: BTreeSet<[bool; 4]> = ways.iter().map(passed).collect();
+        assert_eq!(sides.len(), ways.len(), "{sides:?}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Micro benchmarks of the engine: `cargo bench`.
 //!
-//! One core; read ratios between rows of one run, not times across machines.
+//! Single core; compare rows of one run, not times across machines.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -35,7 +35,7 @@ fn scenario(name: &str) -> Scenario {
     json::read(&document(name), &rules(), 1).expect("a shipped scenario has no fault")
 }
 
-/// Pricing one good route; the counter makes it evaluations a second.
+/// Prices one good route; the counter gives evaluations per second.
 #[divan::bench(args = SCENARIOS)]
 fn evaluate(bencher: divan::Bencher, name: &str) {
     let scenario = scenario(name);
@@ -81,21 +81,21 @@ fn bench_lanes(bencher: divan::Bencher, scenario: &Scenario, rows: &[PointRow]) 
         .bench(|| pricer.routes(divan::black_box(rows)));
 }
 
-/// As `evaluate`, of eight routes side by side.
+/// As `evaluate`, for eight routes side by side.
 #[divan::bench(args = SCENARIOS)]
 fn evaluate_lanes(bencher: divan::Bencher, name: &str) {
     let scenario = scenario(name);
     bench_lanes(bencher, &scenario, &swarm(&scenario));
 }
 
-/// As `evaluate_lanes`, beside so many small threats far from the route.
+/// As `evaluate_lanes`, with many small threats far from the route.
 #[divan::bench(args = [10, 100, 1000])]
 fn evaluate_lanes_by_threats(bencher: divan::Bencher, threats: usize) {
     let mut scenario = scenario("paper-2");
     let rows = swarm(&scenario);
     for idx in scenario.threats.len()..threats {
         let mut far = scenario.threats[0].clone();
-        // Along the diagonal on which the route does not lie, in both its halves.
+        // In two strips parallel to the diagonal that the route follows, one on either side.
         let along = (idx * 37 % 1000) as f64 / 1000.0;
         let across = 400.0 + 90.0 * ((idx * 61 % 100) as f64 / 100.0);
         let side = if idx % 2 == 0 { across } else { -across };
@@ -109,7 +109,7 @@ fn evaluate_lanes_by_threats(bencher: divan::Bencher, threats: usize) {
     bench_lanes(bencher, &scenario, &rows);
 }
 
-/// As `evaluate_lanes`, with so many waypoints.
+/// As `evaluate_lanes`, with different numbers of waypoints.
 #[divan::bench(args = [5, 10, 20, 40, 80])]
 fn evaluate_lanes_by_waypoints(bencher: divan::Bencher, waypoints: usize) {
     let mut scenario = scenario("paper-2");
@@ -118,7 +118,7 @@ fn evaluate_lanes_by_waypoints(bencher: divan::Bencher, waypoints: usize) {
     bench_lanes(bencher, &scenario, &swarm(&scenario));
 }
 
-/// A position of the search as a route, Eq. 22.
+/// Decodes a position of the search into a route, Eq. 22.
 #[divan::bench(args = SCENARIOS)]
 fn decode(bencher: divan::Bencher, name: &str) {
     let scenario = scenario(name);
@@ -131,7 +131,7 @@ fn decode(bencher: divan::Bencher, name: &str) {
         .bench(|| decode(divan::black_box(&position)));
 }
 
-/// One iteration of the plain algorithm with the document's own population.
+/// One iteration of the plain algorithm with the document's population.
 #[divan::bench(args = SCENARIOS)]
 fn iteration(bencher: divan::Bencher, name: &str) {
     let scenario = scenario(name);
@@ -148,7 +148,7 @@ fn iteration(bencher: divan::Bencher, name: &str) {
         .bench_local(|| search.iterate(&mut objective, 0.5));
 }
 
-/// From waypoints to the path that is flown, Eq. 26 and 27.
+/// From waypoints to the path flown, Eq. 26 and 27.
 #[divan::bench(args = SCENARIOS)]
 fn smoothing(bencher: divan::Bencher, name: &str) {
     let scenario = scenario(name);
@@ -156,7 +156,8 @@ fn smoothing(bencher: divan::Bencher, name: &str) {
     bencher.bench(|| planner::smoothed(&scenario, &route));
 }
 
-/// A whole plan with the document's own settings (200 x 200 for the paper's scenarios), smoothing and certificate included.
+/// A whole plan with the document's settings (200 x 200 for the paper's scenarios), including smoothing and
+/// certificate.
 #[divan::bench(args = SCENARIOS, sample_count = 5, sample_size = 1)]
 fn plan(bencher: divan::Bencher, name: &str) {
     let scenario = scenario(name);
@@ -170,7 +171,7 @@ fn read_scenario(bencher: divan::Bencher, name: &str) {
     bencher.bench(|| json::write(&json::read(&document, &rules, 1).expect("no fault")).len());
 }
 
-/// How the price of a route grows with the number of its waypoints.
+/// How the cost of pricing a route grows with the number of waypoints.
 #[divan::bench(args = [5, 10, 20, 40, 80])]
 fn search_by_waypoints(bencher: divan::Bencher, waypoints: usize) {
     let mut scenario = scenario("paper-2");
@@ -183,11 +184,11 @@ fn search_by_waypoints(bencher: divan::Bencher, waypoints: usize) {
         .bench(|| planner::plan(&scenario, &mut Nobody, &Nobody));
 }
 
-/// Discs spread evenly over the square of the paper's scenarios; the more, the smaller.
+/// Discs spread evenly over the square of the paper's scenarios; the more there are, the smaller they are.
 fn discs(count: u32) -> Scenario {
     let mut scenario = scenario("paper-1");
     let radius = 300.0 / f64::from(count).sqrt();
-    // The golden ratio's powers and those of its cousin fill a square without clusters.
+    // Powers of the plastic number's inverse fill a square without clusters.
     let disc = |idx: u32| Cylinder {
         center: Point2::new(
             1000.0 * (0.754_877_666 * f64::from(idx + 1)).fract(),
@@ -211,21 +212,21 @@ fn discs(count: u32) -> Scenario {
     scenario
 }
 
-/// The shortest ways of passing so many discs.
+/// The shortest ways past a number of discs.
 #[divan::bench(args = [10, 100, 1000], consts = [1, 6])]
 fn taut_strings<const K: usize>(bencher: divan::Bencher, discs_count: u32) {
     let scenario = discs(discs_count);
     bencher.bench(|| seeding::taut_strings(&Obstacles::hard(&scenario, |_, _| true), K));
 }
 
-/// The proven lower bound, on the paper's scenarios.
+/// The proven lower bound on the paper's scenarios.
 #[divan::bench(args = SCENARIOS)]
 fn bound(bencher: divan::Bencher, name: &str) {
     let scenario = scenario(name);
     bencher.bench(|| seeding::lower_bound(&scenario));
 }
 
-/// The proven lower bound among so many discs.
+/// The proven lower bound among a number of discs.
 #[divan::bench(args = [10, 100, 1000])]
 fn bound_by_discs(bencher: divan::Bencher, discs_count: u32) {
     let scenario = discs(discs_count);

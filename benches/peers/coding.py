@@ -1,8 +1,8 @@
-"""Positions of a search as routes: heights above ground, start and target left out.
+"""Routes as positions of a search: heights are above ground, start and target are left out.
 
-Both codings as noctule has them: spherical vectors (docs/EQUATIONS.md, Eq. 16-22) and plain
-waypoints. Only the standard library: the peers' own time is spent in their searches, a position has
-some thirty numbers.
+Both codings match noctule's: spherical vectors (docs/EQUATIONS.md, Eq. 16-22) and plain
+waypoints. Standard library only: the peers spend their time in their own searches, and a position
+has only about thirty numbers.
 """
 
 import math
@@ -25,7 +25,7 @@ class Spherical:
         level = math.pi / 2
         self.lower = [0.0, -turn, level - climb] * legs
         self.upper = [2.0 * straight, turn, level + climb] * legs
-        # Straight ahead; the glide to the middle of the band is part of the coding.
+        # Straight ahead; gliding to the middle of the band is part of the coding.
         self.straight = [straight, 0.0, level] * legs
 
     def decode(self, position):
@@ -42,7 +42,7 @@ class Spherical:
             glide = min(max((low + high) / 2 - height, -steepest), steepest)
             height = min(max(height + glide + amplitude * math.cos(polar), low), high)
             chain.append((x, y, height))
-        # Turned and stretched until the end lies on the target.
+        # Rotated and scaled so that the end lies on the target.
         reach = math.hypot(x, y)
         scale, rotation = 1.0, self.course
         if reach >= 1e-9:
@@ -63,7 +63,7 @@ class Cartesian:
         self.lower = [area["min"]["x"], area["min"]["y"], band["min"]] * waypoints
         self.upper = [area["max"]["x"], area["max"]["y"], band["max"]] * waypoints
         shares = [(idx + 1) / (waypoints + 1) for idx in range(waypoints)]
-        # As high as the climb allows up to the middle of the band.
+        # As high as the climb angle allows, up to the middle of the band.
         leg = math.hypot(target["x"] - start["x"], target["y"] - start["y"]) / (waypoints + 1)
         climb = leg * math.tan(math.radians(scenario["vehicle"]["max_climb_deg"]))
         height = start["z"] - elevation(scenario, start["x"], start["y"])
@@ -83,7 +83,7 @@ CODINGS = [Spherical, Cartesian]
 
 
 def elevation(scenario, x, y):
-    """Of the ground, for the kinds that the shipped paper scenarios have."""
+    """The ground's elevation, for the terrain kinds of the shipped paper scenarios."""
     ground = scenario.get("terrain", {"kind": "flat", "elevation": 0})
     if ground["kind"] == "flat":
         return ground["elevation"]

@@ -1,4 +1,4 @@
-"""Noctule and its peers on the same scenarios in one run; see `run` beside this file."""
+"""Noctule and its peers on the same scenarios in one run; see `run` in this directory."""
 
 import argparse
 import csv
@@ -24,7 +24,7 @@ SCENARIOS = sorted(pathlib.Path(__file__).parents[2].glob("scenarios/paper-*.jso
 
 
 def cpu_s():
-    """Of this process and its ended children."""
+    """CPU seconds of this process and its finished children."""
     usages = map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return sum(usage.ru_utime + usage.ru_stime for usage in usages)
 
@@ -46,7 +46,7 @@ def search(job):
 
 
 def plan(document, seed):
-    """One plan of noctule with its defaults: (feasible, cost, CPU seconds, evaluations)."""
+    """One plan by noctule with its defaults: (feasible, cost, CPU seconds, evaluations)."""
     document = {**document, "planner": {"waypoints": WAYPOINTS, "seed": seed}}
     begun = cpu_s()
     done = subprocess.run(
@@ -84,7 +84,7 @@ def row(scenario, name, coding, runs):
 
 
 def costs(pool, peers, seeds, budget):
-    """A row for noctule and each peer's better coding, of each scenario."""
+    """For each scenario, a row for noctule and one for each peer's better coding."""
     rows = []
     for file in SCENARIOS:
         document = json.loads(file.read_text())
@@ -106,7 +106,7 @@ def costs(pool, peers, seeds, budget):
 
 
 def lengths(pool, planners, seeds, seconds):
-    """Length alone, on flat ground, against the exact shortest way."""
+    """Length only, on flat ground, against the exact shortest way."""
     rows = []
     for file in SCENARIOS:
         scenario = json.loads(file.read_text())
@@ -123,7 +123,7 @@ def lengths(pool, planners, seeds, seconds):
         for name in planners:
             jobs = [(name, scenario, discs, seconds, seed) for seed in seeds]
             runs = pool.map(ompl_length, jobs, chunksize=1)
-            # The discs reach all the way up, so the climb is spread along the way.
+            # The discs have no top, so the climb is spread along the way.
             runs = [(ok, ok and math.hypot(way, rise), *rest) for ok, way, *rest in runs]
             part.append(row(file.stem, name, "", runs))
         for entry in part:

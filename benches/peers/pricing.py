@@ -4,7 +4,7 @@ import json
 import os
 import subprocess
 
-# One metre or degree of violation weighs more than any cost that a search could save by it.
+# One metre or degree of violation outweighs any cost that a search could save by it.
 PENALTY = 1e4
 
 
@@ -13,7 +13,7 @@ def binary():
 
 
 class Pricer:
-    """Prices positions of a coding; counts them, stops after `budget`, keeps the best."""
+    """Prices positions of a coding, counts them, stops after `budget`, and keeps the best."""
 
     def __init__(self, scenario, coding, budget):
         command = [binary(), "bench", "price", str(scenario), "--above-ground"]
@@ -32,7 +32,7 @@ class Pricer:
         self.process.wait()
 
     def prices(self, positions):
-        """(violation, cost) of each; ends the search once the budget is spent."""
+        """(violation, cost) of each position; ends the search once the budget is spent."""
         if self.evaluations >= self.budget:
             raise Spent
         self.evaluations += len(positions)
@@ -52,4 +52,4 @@ class Pricer:
 
 
 class Spent(Exception):
-    """All evaluations are used up."""
+    """All evaluations have been used."""

@@ -1,16 +1,16 @@
-"""OMPL's asymptotically optimal planners on the plane of a scenario, for length alone."""
+"""OMPL's asymptotically optimal planners on the plane of a scenario, for length only."""
 
 import math
 
 PLANNERS = {"OMPL Informed RRT*": "InformedRRTstar", "OMPL BIT*": "BITstar"}
 
-# Share of the area's diagonal between two checked states: under 3 m here, so a disc of 40 m is
-# entered by 3 cm at most. Finer costs OMPL much of its second.
+# Share of the area's diagonal between two checked states: under 3 m here, so a disc of 40 m is entered by 3 cm
+# at most. A finer step costs OMPL much of its second.
 RESOLUTION = 0.002
 
 
 def length(planner, scenario, discs, seconds, seed):
-    """Of the best way found; none without one."""
+    """The length of the best way found, or None."""
     from ompl import base, geometric, util
 
     util.setLogLevel(util.LOG_NONE)

@@ -1,4 +1,4 @@
-"""The peers: each spends a pricer's evaluations, beginning at the straight line."""
+"""The peers: each spends a pricer's evaluations, starting from the straight line."""
 
 import random
 
@@ -12,7 +12,7 @@ def mealpy_search(make):
         coding, population = pricer.coding, 50
         bounds = FloatVar(lb=coding.lower, ub=coding.upper)
         problem = {"bounds": bounds, "obj_func": pricer.objective, "minmax": "min", "log_to": None}
-        # A little more than enough: the pricer ends the search when the budget is spent.
+        # Slightly more than enough: the pricer ends the search when the budget is spent.
         model = make(budget // population + 2, population)
         first = numpy.array(beginning(coding, population, seed))
         model.solve(problem, seed=seed, starting_solutions=first)
@@ -30,14 +30,14 @@ def pso(epochs, population):
 def ba(epochs, population):
     from mealpy import BA
 
-    # Yang's frequencies; mealpy's 0..10 throws every bat onto the bounds.
+    # Yang's frequencies; mealpy's default 0..10 throws every bat onto the bounds.
     return BA.DevBA(epoch=epochs, pop_size=population, pulse_rate=0.9, pf_min=0.0, pf_max=2.0)
 
 
 def abc(epochs, population):
     from mealpy import ABC
 
-    # Karaboga's limit is half of population times dimensions, far more than mealpy's 25.
+    # Karaboga's limit is half of population times dimensions, far above mealpy's 25.
     return ABC.OriginalABC(epoch=epochs, pop_size=population, n_limits=500)
 
 
@@ -56,7 +56,7 @@ def differential_evolution(pricer, seed, budget):
     seen = {}
 
     def priced(positions):
-        """Violations and costs of columns; scipy asks for the two in turn."""
+        """Violations and costs of columns; scipy requests the two in turn."""
         columns = [numpy.array(column) for column in numpy.reshape(positions.T, (-1, len(positions)))]
         if any(column.tobytes() not in seen for column in columns):
             seen.clear()
@@ -79,7 +79,7 @@ def differential_evolution(pricer, seed, budget):
 
 
 def beginning(coding, population, seed):
-    """The straight line, and others strewn around it by up to all of the range."""
+    """The straight line, and others scattered around it by up to the full range."""
     draw = random.Random(seed)
     members = [list(coding.straight)]
     while len(members) < population:

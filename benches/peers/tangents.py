@@ -8,7 +8,7 @@ SLACK = 1e-7
 
 
 def shortest(start, target, discs):
-    """Its length; `discs` are (x, y, radius), which may overlap. None when there is no way."""
+    """Its length; `discs` are (x, y, radius) and may overlap. None when there is no way."""
     ends = [(*start, 0.0), (*target, 0.0)]
     circles = ends + list(discs)
     graph, on_circle = {}, {idx: [] for idx in range(len(circles))}
@@ -45,11 +45,11 @@ def shortest(start, target, discs):
 
 
 def tangents(one, other):
-    """Angles of the points where a common tangent touches both circles, and its length."""
+    """The angles at which a common tangent touches both circles, and its length."""
     dx, dy = other[0] - one[0], other[1] - one[1]
     distance, along = math.hypot(dx, dy), math.atan2(dy, dx)
     found = set()
-    # Radii on the same side of the tangent, and on either side.
+    # Both circles on the same side of the tangent, or on opposite sides.
     for side in (1, -1):
         share = (one[2] - side * other[2]) / distance if distance > 0 else 2.0
         if abs(share) < 1:
@@ -74,7 +74,7 @@ def away(disc, a, b):
 
 
 def arc_is_free(circle, begin, span, discs):
-    """Whether no other disc covers a part of the arc: no end in one, no crossing within."""
+    """Whether no other disc covers part of the arc: neither end inside one, no crossing in between."""
     for disc in discs:
         if disc == circle:
             continue
@@ -82,7 +82,7 @@ def arc_is_free(circle, begin, span, discs):
         distance = math.hypot(dx, dy)
         if distance >= disc[2] + circle[2] or distance + disc[2] <= circle[2]:
             continue
-        # The disc covers the angles within `half` of its direction.
+        # The disc covers the angles within `half` of its own direction.
         cosine = (distance**2 + circle[2] ** 2 - disc[2] ** 2) / (2 * distance * circle[2])
         half = math.acos(min(max(cosine, -1.0), 1.0))
         into = (math.atan2(dy, dx) - half - begin) % math.tau

@@ -1,4 +1,4 @@
-"""Needs no package: python3 -m unittest discover benches/peers"""
+"""Needs no packages: python3 -m unittest discover benches/peers"""
 
 import json
 import math
@@ -13,7 +13,7 @@ FILE = pathlib.Path(__file__).parents[2] / "scenarios/paper-2.json"
 
 
 class Coding(unittest.TestCase):
-    def test_any_spherical_position_keeps_turns_and_ends(self):
+    def test_every_spherical_position_keeps_the_turn_limit(self):
         scenario = json.loads(FILE.read_text())
         coding = Spherical(scenario, 10)
         draw = random.Random(1)
@@ -29,7 +29,7 @@ class Coding(unittest.TestCase):
                 dot = one[0] * other[0] + one[1] * other[1]
                 self.assertLess(abs(math.degrees(math.atan2(cross, dot))), 60 + 1e-6)
 
-    def test_the_straight_position_is_straight_in_both(self):
+    def test_the_straight_position_is_straight_in_both_codings(self):
         scenario = json.loads(FILE.read_text())
         for kind in (Spherical, Cartesian):
             coding = kind(scenario, 10)
@@ -41,15 +41,15 @@ class Coding(unittest.TestCase):
 
 class Tangents(unittest.TestCase):
     def test_around_one_disc(self):
-        # Two tangents of 5-3-4 triangles and the arc between.
+        # Two tangents of 5-3-4 triangles and the arc between them.
         expected = 8 + 3 * (math.pi - 2 * math.acos(3 / 5))
         self.assertAlmostEqual(tangents.shortest((-5, 0), (5, 0), [(0, 0, 3)]), expected)
 
-    def test_nothing_in_the_way_and_a_wall(self):
+    def test_a_clear_way_is_straight(self):
         self.assertAlmostEqual(tangents.shortest((0, 0), (3, 4), []), 5)
         self.assertAlmostEqual(tangents.shortest((0, 0), (3, 4), [(9, 9, 1)]), 5)
 
-    def test_overlapping_discs_are_not_passed_between(self):
+    def test_no_way_leads_between_overlapping_discs(self):
         discs = [(0, -2, 2.5), (0, 2, 2.5)]
         around = tangents.shortest((-8, 0), (8, 0), discs)
         self.assertGreater(around, 16 + 1)

@@ -11,7 +11,7 @@ const version = (name) => JSON.parse(readFileSync(here(`node_modules/${name}/pac
 
 const sums = [];
 
-/** Writes the file, what brotli makes of it, and takes down the hashes of both. */
+/** Writes the file and its brotli form, and records the hashes of both. */
 function keep(name, bytes) {
   const compressed = brotliCompressSync(bytes, {
     params: { [constants.BROTLI_PARAM_QUALITY]: 11, [constants.BROTLI_PARAM_LGWIN]: 24, [constants.BROTLI_PARAM_SIZE_HINT]: bytes.length },

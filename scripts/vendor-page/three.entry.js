@@ -1,4 +1,4 @@
-// What the page draws with; nothing else of three.js is taken along.
+// What the page draws with; nothing else of three.js is bundled.
 export {
   BufferAttribute, BufferGeometry, CanvasTexture, Color, DepthTexture, DoubleSide, FramebufferTexture, Group,
   InstancedMesh, Line, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial,

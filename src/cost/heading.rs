@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn turns_are_signed_and_level_legs_keep_the_heading() {
+    fn turns_are_signed_and_vertical_legs_keep_the_heading() {
         let check = |route: &[[f64; 3]], expected: &[f64]| {
             let route: Vec<Point3> = route.iter().map(|&p| Point3::from(p)).collect();
             for (turn, degrees) in turns(&route).zip(expected) {

@@ -4,7 +4,7 @@ use crate::scenario::{AltitudeBand, Frame, PlannerSettings, Vehicle, Weights};
 use crate::terrain::{Flat, Terrain};
 use crate::threat::{Cylinder, Shape, Threat};
 
-/// A disc of 10 m with a soft zone of 10 m more at (50, 0), between 0 and 80 m.
+/// A disc of 10 m at (50, 0) with a soft zone of another 10 m, below 80 m.
 fn scenario() -> Scenario {
     Scenario {
         frame: Frame::Local,
@@ -76,11 +76,11 @@ fn check(points: &[[f64; 3]], expected: &[(Constraint, usize, f64)]) {
     }
 }
 
-/// Worked by hand: 100 m straight through the axis, at 10 m above ground, 45 m below the middle
-/// of the band. Fuel 0.5 * 2 * 100. Exposure: a triangle of base 40 and height 20, a fifth of
-/// it, three times. Altitude: one waypoint, twice 45.
+/// Worked by hand: 100 m straight through the axis, 10 m above ground, 45 m below the middle of the band. Fuel:
+/// 0.5 * 2 * 100. Exposure: three times a fifth of a triangle with base 40 and height 20. Altitude: one
+/// waypoint, twice 45.
 #[test]
-fn the_three_terms_of_a_straight_route() {
+fn the_three_cost_terms_of_a_straight_route_are_as_worked_by_hand() {
     let scenario = scenario();
     let straight = route(&[[0.0, 0.0, 20.0], [40.0, 0.0, 20.0], [100.0, 0.0, 20.0]]);
     let figures = Model::new(&scenario).figures(&straight, Quadrature::Integral);
@@ -92,7 +92,7 @@ fn the_three_terms_of_a_straight_route() {
 
 /// A long route past many threats costs the sum over its legs and threats.
 #[test]
-fn threats_out_of_reach_are_left_out_without_a_trace() {
+fn skipping_distant_threats_changes_no_result() {
     let mut scenario = scenario();
     for idx in 0..60 {
         let mut threat = scenario.threats[0].clone();
@@ -142,7 +142,7 @@ fn threats_out_of_reach_are_left_out_without_a_trace() {
 
 /// Legs of 50 m that meet at the axis: T is 0, 0, 0, 7.5, 20 at the five samples of each.
 #[test]
-fn five_samples_a_leg() {
+fn the_papers_quadrature_takes_five_samples_per_leg() {
     let scenario = scenario();
     let straight = route(&[[0.0, 0.0, 20.0], [50.0, 0.0, 20.0], [100.0, 0.0, 20.0]]);
     let figures = Model::new(&scenario).figures(&straight, Quadrature::Paper);
@@ -154,16 +154,17 @@ fn five_samples_a_leg() {
     );
 }
 
-/// A leg that ends at a base is in the threat there, one that ends at a top is not, however its middle is rounded.
+/// A leg that ends at a base is in the threat there, and one that ends at a top is not, whatever the rounding in
+/// between.
 #[test]
-fn a_sample_at_the_end_of_a_leg_is_where_it_ends() {
+fn a_sample_at_the_end_of_a_leg_has_exactly_its_height() {
     let mut scenario = scenario();
     let heights = (0..200).map(|nth| 20.0 + 0.37 * f64::from(nth));
     for (from, to) in heights.clone().zip(heights.rev()) {
         for (base, top, share) in [(Some(to), None, 0.2), (None, Some(to), 0.0)] {
             let threat = &mut scenario.threats[0];
             (threat.base, threat.top) = (base, top);
-            // Nearer than the soft zone only at the end.
+            // Within the soft zone only at its end.
             let leg = route(&[[0.0, 0.0, from], [35.0, 0.0, to]]);
             let climbs_to_base = base.is_some() && from < to;
             let descends_to_top = top.is_some() && from > to;
@@ -183,7 +184,7 @@ fn a_sample_at_the_end_of_a_leg_is_where_it_ends() {
 #[test]
 fn each_constraint_is_measured() {
     use Constraint::{Altitude, Area, Climb, Leg, Terrain, Threat, Turn};
-    // Round the disc with room to spare.
+    // Around the disc with room to spare.
     check(
         &[[0.0, 0.0, 20.0], [50.0, 25.0, 30.0], [100.0, 0.0, 20.0]],
         &[],
@@ -192,7 +193,7 @@ fn each_constraint_is_measured() {
         &[[0.0, 0.0, 20.0], [50.0, 0.0, 20.0], [100.0, 0.0, 20.0]],
         &[(Threat, 0, 10.0), (Threat, 1, 10.0)],
     );
-    // Above the top it may pass.
+    // It may pass above the top.
     check(
         &[[0.0, 0.0, 80.0], [50.0, 0.0, 80.0], [100.0, 0.0, 80.0]],
         &[],
@@ -245,8 +246,8 @@ fn each_constraint_is_measured() {
     assert_eq!(found, [(Area, 1, 3.0)]);
 }
 
-/// The start stands on the ground, 5 m below the band: within 2 * 5 / tan 45 = 10 m of it only
-/// the ground counts.
+/// The start stands on the ground, 5 m below the band: within 2 * 5 / tan 45 = 10 m of it only the ground
+/// counts.
 #[test]
 fn a_terminal_zone_lets_a_vehicle_take_off() {
     let mut scenario = scenario();
@@ -263,7 +264,7 @@ fn a_terminal_zone_lets_a_vehicle_take_off() {
         );
         assert_eq!(found.len(), expected, "{found:?}");
     };
-    // At its edge the route is 5 m above ground, neither more nor less.
+    // At the edge of the zone the route is exactly 5 m above ground.
     check([10.0, 5.0, 15.0 + 10.0 * (1.25_f64.sqrt() - 1.0) / 2.0], 0);
     // Two metres lower where the zone ends.
     check([12.0, 6.0, 13.0], 2);

@@ -96,7 +96,7 @@ mod tests {
     use axum::http::HeaderValue;
 
     #[test]
-    fn the_most_exact_range_decides_and_order_breaks_ties() {
+    fn the_most_specific_range_decides_and_order_breaks_ties() {
         const OFFERS: [&str; 2] = ["text/event-stream", "application/x-ndjson"];
         for (accept, expected) in [
             ("*/*", Some("text/event-stream")),
@@ -114,7 +114,7 @@ mod tests {
             ("text/html", None),
             ("text/html, */*; Q = 0.1", Some("text/event-stream")),
             ("text/html;level=\"1, text/event-stream\"", None),
-            // An entry with an invalid weight is left out.
+            // An entry with an invalid weight is ignored.
             (
                 "text/event-stream;q=nan, application/x-ndjson;q=0.1",
                 Some("application/x-ndjson"),
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_coding_is_taken_when_it_is_offered() {
+    fn a_coding_is_accepted_only_when_the_caller_offers_it() {
         for (offer, br, gz) in [
             ("gzip, deflate, br, zstd", true, true),
             ("gzip;q=0.5, br;q=0", false, true),

@@ -203,7 +203,7 @@ mod tests {
     use axum::http::HeaderValue;
 
     #[test]
-    fn tells_a_coded_body() {
+    fn the_content_coding_of_a_body_is_recognised() {
         for (values, expected) in [
             (&["gzip"][..], Ok(Coding::Gzip)),
             (&["X-Gzip"], Ok(Coding::Gzip)),
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn unpacks_as_much_as_a_body_may_have() {
+    fn a_body_is_unpacked_up_to_the_limit() {
         let check = |packed: &[u8], expected: Result<&[u8], &str>| {
             let unpacked = unpack(packed, 1000).map_err(|problem| match problem {
                 Problem::BodyTooLarge(1000) => "too large",
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn tells_json_from_the_rest() {
+    fn json_media_types_are_recognised() {
         for (value, expected) in [
             ("application/json", true),
             ("Application/JSON; charset=UTF-8", true),

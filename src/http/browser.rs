@@ -144,7 +144,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_exact_origins_are_taken() {
+    fn only_exact_origins_are_accepted() {
         for (text, taken) in [
             ("https://plans.example", true),
             ("http://localhost:5173", true),
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_keeps_a_policy_of_its_own() {
+    fn a_page_keeps_its_own_policy() {
         let mut headers = HeaderMap::new();
         let own = HeaderValue::from_static("default-src 'self'");
         headers.insert(header::CONTENT_SECURITY_POLICY, own.clone());

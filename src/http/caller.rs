@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_plan_is_its_owners_and_the_overseers() {
+    fn a_plan_is_visible_to_its_owner_and_to_callers_who_see_all() {
         let named = |name: &str| Caller {
             owner: Some(name.to_owned()),
             sees_all: false,

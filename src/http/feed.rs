@@ -240,9 +240,9 @@ enum Woken {
 mod tests {
     use super::*;
 
-    /// A proxy cuts silent connections, however much the reader's own rate holds back.
+    /// Proxies cut silent connections, even when the reader's own rate holds events back.
     #[test]
-    fn a_comment_is_due_however_long_the_throttle_holds() {
+    fn a_comment_is_due_while_the_throttle_holds_events_back() {
         let told = Instant::now();
         let after = |seconds| told + Duration::from_secs(seconds);
         let silence = (after(15), Woken::Silence);

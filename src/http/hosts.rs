@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_that_others_can_give_this_machine_are_not_its_own() {
+    fn host_names_that_others_control_are_rejected() {
         let known = ["plans.example".to_owned()];
         for (host, expected) in [
             ("localhost", true),
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_host_is_named_once_and_can_be_read() {
+    fn a_request_must_name_one_valid_host() {
         #[track_caller]
         fn check(version: Version, uri: &str, values: &[&[u8]], expected: Option<u16>) {
             let mut headers = HeaderMap::new();

@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn reads_a_key_bare_or_quoted() {
+    fn a_key_may_be_bare_or_quoted() {
         let long = "k".repeat(256);
         for (text, expected) in [
             ("8e03978e-40d5", Some("8e03978e-40d5")),
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn one_request_at_a_time_has_a_key() {
+    fn a_key_is_held_by_one_request_at_a_time() {
         let keys = InFlight::default();
         let begin = |owner: Option<&str>| {
             let caller = Caller {

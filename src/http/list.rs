@@ -21,7 +21,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_quoted_is_not_split() {
+    fn quoted_parts_are_not_split() {
         for (text, expected) in [
             ("a, b ,c", &["a", "b", "c"][..]),
             ("", &[""]),

@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_panic_is_a_problem_that_does_not_tell_why() {
+    async fn a_panic_becomes_a_problem_without_its_message() {
         let broken = Router::new().route("/", routing::get(breaks));
         let request = Request::get("/")
             .header("host", "localhost")

@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn reads_what_it_knows_and_refuses_the_rest() {
+    fn known_parameters_are_read_and_others_refused() {
         for (query, expected) in [
             ("/", None),
             ("/?limit=3&status=running", None),

@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn finds_the_wait_among_preferences() {
+    fn the_wait_is_found_among_the_preferences() {
         for (value, expected) in [
             ("wait=10", Some(10)),
             ("respond-async, wait=10", Some(10)),

@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[tokio::test(start_paused = true)]
-    async fn all_who_come_at_a_time_are_told_the_same() {
+    async fn concurrent_callers_share_one_answer() {
         let (readiness, asked) = (Readiness::default(), AtomicUsize::new(0));
         let ask = |answer: Result<(), StoreError>| {
             readiness.told(async {
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn who_goes_away_while_it_is_asked_holds_up_nobody() {
+    async fn a_caller_that_disconnects_blocks_nobody() {
         let readiness = Readiness::default();
         assert!(readiness.told(pending()).now_or_never().is_none());
         assert!(readiness.told(async { Ok(()) }).await.is_ok());

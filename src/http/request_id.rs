@@ -134,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn takes_only_ids_that_are_safe_everywhere() {
+    fn only_safe_request_ids_are_accepted() {
         let long = "x".repeat(129);
         for (given, taken) in [
             ("a", true),

@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn grows_with_the_queue_and_shrinks_with_the_workers() {
+    fn retry_after_grows_with_the_queue_and_shrinks_with_the_workers() {
         let room_of = |queued, mean_run_ms, workers, slots| {
             let stats = Stats {
                 queued,

@@ -133,9 +133,9 @@ fn json(data: impl Serialize) -> String {
 mod tests {
     use super::*;
 
-    /// Without this, a reader that is gone is never noticed, and a proxy cuts those still there.
+    /// Without these keep-alives a lost reader is never noticed, and proxies cut the remaining ones.
     #[test]
-    fn silence_is_written_and_tells_nothing() {
+    fn a_keep_alive_is_written_and_carries_no_event() {
         for wire in [Wire::Sse, Wire::Lines] {
             let mut lines = wire.silence().lines().peekable();
             assert!(lines.peek().is_some(), "{wire:?}");

@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn keeps_the_latest_of_each_kind_in_a_window() {
+    fn the_latest_event_of_each_kind_in_a_window_is_kept() {
         let events = [
             convergence(1, 0.0),
             incumbent(2, 10.0),
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn resuming_anywhere_meets_the_same_windows() {
+    fn resuming_after_any_event_gives_the_same_windows() {
         let events: Vec<_> = (1..200)
             .map(|id| {
                 let elapsed_ms = id as f64 * 7.3;
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_that_starts_over_starts_over() {
+    fn a_restarted_run_restarts_the_windows() {
         check(
             10.0,
             &[

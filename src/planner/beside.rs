@@ -53,9 +53,9 @@ mod tests {
     use super::*;
     use crate::planner::tests::scenario;
 
-    /// Beside a search that takes no time, and beside one that takes longer than the bound.
+    /// With a search that takes no time, and with one that takes longer than the bound.
     #[test]
-    fn the_bound_beside_a_search_is_that_alone() {
+    fn the_bound_computed_beside_a_search_is_the_same_as_alone() {
         let scenario = scenario();
         let alone = seeding::lower_bound(&scenario);
         assert!(alone > 0.0);
@@ -72,9 +72,9 @@ mod tests {
         assert_eq!(lower.to_bits(), alone.to_bits());
     }
 
-    /// A bound that was given up is lower, and proven all the same.
+    /// A bound that is given up early is lower, but still proven.
     #[test]
-    fn a_bound_given_up_holds() {
+    fn a_bound_that_is_given_up_is_still_a_lower_bound() {
         let scenario = scenario();
         let alone = seeding::lower_bound(&scenario);
         let straight = seeding::lower_bound_until(&scenario, &|| true);
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn a_search_that_panics_is_heard() {
+    fn a_panic_of_the_search_is_propagated() {
         let scenario = scenario();
         let panics = std::panic::AssertUnwindSafe(|| bounded(&scenario, || panic!("on purpose")));
         assert!(std::panic::catch_unwind(panics).is_err());

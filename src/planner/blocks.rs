@@ -304,10 +304,10 @@ mod tests {
     use crate::planner::{Nobody, plan};
     use crate::scenario::Scenario;
 
-    /// Whatever is known of legs, and whatever the rivals: a position that beats its rival has, to the bit, the fitness
-    /// that it has when priced alone in full; no other beats its rival.
+    /// Whatever is known about legs, and whatever the rivals: a position that beats its rival has exactly the
+    /// fitness it has when priced alone in full, and no other position beats its rival.
     #[test]
-    fn a_position_that_beats_its_rival_is_priced_as_alone() {
+    fn a_position_that_beats_its_rival_is_priced_exactly() {
         for scenario in [hilly_scenario(), scenario()] {
             hold_to_prices_alone(&scenario);
         }

@@ -163,7 +163,7 @@ mod tests {
     use crate::planner::tests::scenario;
 
     #[test]
-    fn the_least_clearance_is_that_of_all_legs() {
+    fn the_clearance_is_the_least_over_all_legs() {
         let mut scenario = scenario();
         scenario.threats[1].top = Some(60.0);
         scenario.threats[2].base = Some(1e4);

@@ -187,8 +187,8 @@ mod tests {
     use crate::planner::tests::{radar, scenario};
     use crate::scenario::Scenario;
 
-    /// Start and target on one level, an obstacle off to one side, and a route round it on either side: a smooth one on
-    /// the long side, and one that is more expensive until it is improved.
+    /// Start and target on one level, an obstacle off to one side, and a route around it on each side: a smooth
+    /// one on the long side, and one on the short side that is more expensive until it is improved.
     fn one_in_the_way() -> (Scenario, [Vec<Point3>; 2]) {
         let mut scenario = scenario();
         scenario.planner.waypoints = 3;
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_way_that_is_cheaper_once_it_is_polished_wins() {
+    fn a_route_that_is_cheaper_after_polishing_wins() {
         let (scenario, others) = one_in_the_way();
         let model = Model::new(&scenario);
         let [long, short] = others.each_ref().map(|route| price(&model, route).cost);
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn a_search_of_few_routes_polishes_no_others() {
+    fn a_small_search_polishes_no_other_routes() {
         let (mut scenario, others) = one_in_the_way();
         (scenario.planner.population, scenario.planner.iterations) = (10, 20);
         let model = Model::new(&scenario);

@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_leg_is_known_by_every_bit_of_both_ends() {
+    fn a_leg_is_found_only_by_the_exact_bits_of_both_ends() {
         let mut kept = Kept::of(100);
         let point = |x: f64| Point3::new(x, 2.0 * x, 3.0);
         let violation = |kept: &Kept, a, b| kept.violation(End::at(a), End::at(b));

@@ -153,7 +153,7 @@ mod tests {
     use crate::planner::coding::Cartesian;
     use crate::planner::tests::scenario;
 
-    /// Every move stays in the box, and over many moves every waypoint takes part in some.
+    /// Every move stays in the box, and over many moves every coordinate is changed.
     #[test]
     fn moves_stay_in_the_box_and_reach_every_waypoint() {
         let scenario = scenario();

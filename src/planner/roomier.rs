@@ -129,7 +129,7 @@ mod tests {
     use crate::scenario::{Scenario, Seeding};
     use crate::threat::{Polygon, Shape, Threat};
 
-    /// Walls across the area with gates at alternate sides, and few waypoints to get through.
+    /// Walls across the area with gates at alternating ends, and few waypoints to get through them.
     fn slalom() -> Scenario {
         let mut scenario = scenario();
         let at = |x| Point3::new(x, 500.0, 100.0);
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn a_route_is_found_by_way_of_more_waypoints_and_has_as_many_as_were_asked_for() {
+    fn searching_with_more_waypoints_finds_a_route_with_the_requested_number() {
         let scenario = slalom();
         let model = Model::new(&scenario);
         let mut nobody = Nobody;
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_is_what_is_least_missed() {
+    fn the_waypoints_left_out_are_those_missed_least() {
         let mut scenario = slalom();
         scenario.threats.truncate(1);
         scenario.planner.waypoints = 3;
@@ -190,10 +190,20 @@ mod tests {
         ];
         let free = corners.map(|(x, y)| Point3::new(x, y, 100.0));
         let mut route = [&[scenario.start], &free[..], &[scenario.target]].concat();
+        let whole = route.clone();
         let mut nobody = Nobody;
         let mut log = Log::new(&model, &mut nobody, &Nobody);
         let fitness = leave_out(&model, &mut route, &mut log);
         assert!(fitness.is_feasible() && route.len() == 5, "{fitness:?}");
         assert!(log.evaluations > 0);
+        // Leaving out any two others, and moving nothing, gives no better route.
+        for first in 1..6 {
+            for second in first..5 {
+                let mut rest = whole.clone();
+                rest.remove(first);
+                rest.remove(second);
+                assert!(!price(&model, &rest).beats(&fitness), "{rest:?}");
+            }
+        }
     }
 }

@@ -312,10 +312,9 @@ mod tests {
         assert!((path.duration_s * scenario.vehicle.cruise_speed - path.length).abs() < 1e-9);
     }
 
-    /// Both legs at the corner (555, 425) graze the disc (500, 480, 70); the bare spline would cut
-    /// across it.
+    /// Both legs at the corner (555, 425) graze the disc (500, 480, 70); the plain spline would cut across it.
     #[test]
-    fn a_corner_round_a_threat_is_drawn_tighter() {
+    fn a_corner_around_a_threat_is_drawn_tighter() {
         let mut scenario = scenario();
         scenario.threats.swap_remove(2);
         scenario.threats.swap_remove(0);
@@ -348,7 +347,7 @@ mod tests {
         }
     }
 
-    /// Round a corner within some nanometres, and back: turns that no samples show.
+    /// Around a corner within some nanometres, and back: turns too small to show in samples.
     #[test]
     fn a_route_that_turns_within_nanometres_has_a_path() {
         let mut scenario = scenario();
@@ -375,9 +374,9 @@ mod tests {
         assert!(route.iter().all(|corner| path.points.contains(corner)));
     }
 
-    /// A pile of waypoints nanometres apart gives samples whose corner lies in another's piece.
+    /// A cluster of waypoints nanometres apart gives samples whose corner lies in another sample's piece.
     #[test]
-    fn a_route_with_waypoints_all_but_in_one_place_has_a_path() {
+    fn a_route_with_nearly_coinciding_waypoints_has_a_path() {
         let mut scenario = scenario();
         scenario.threats.clear();
         scenario.vehicle.max_climb_deg = 10.0;

@@ -6,7 +6,7 @@ use crate::scenario::{AltitudeBand, Frame, PlannerSettings, Seeding, Vehicle, Wa
 use crate::terrain::{Flat, Peak, Peaks, Terrain};
 use crate::threat::{Cylinder, Shape, Threat};
 
-/// Mountains, each given by its centre, height, width and depth.
+/// Mountains, each given as centre x and y, height, width and depth.
 pub(super) fn peaks(base: f64, peaks: &[[f64; 5]]) -> Terrain {
     let peak = |&[x, y, height, wide, deep]: &[f64; 5]| Peak {
         center: Point2::new(x, y),
@@ -17,7 +17,7 @@ pub(super) fn peaks(base: f64, peaks: &[[f64; 5]]) -> Terrain {
     Terrain::Peaks(Peaks { base, peaks })
 }
 
-/// The same among hills, over which a route must stay between 30 and 150 m.
+/// The same scenario among hills, with a band of 30 to 150 m above ground.
 pub(super) fn hilly_scenario() -> Scenario {
     let mut scenario = scenario();
     let round = |x, y, height, spread| [x, y, height, spread, 0.8 * spread];
@@ -35,12 +35,12 @@ pub(super) fn hilly_scenario() -> Scenario {
     scenario
 }
 
-/// With a soft zone of 30 m.
+/// A disc with a soft zone of 30 m.
 pub(super) fn radar(x: f64, y: f64, radius: f64) -> Threat {
     disc([x, y, radius, radius + 30.0])
 }
 
-/// Given by its centre, radius and influence.
+/// A disc given as centre x and y, radius and influence.
 pub(super) fn disc([x, y, radius, influence]: [f64; 4]) -> Threat {
     Threat {
         name: Some(format!("radar at {x}, {y}")),
@@ -54,7 +54,7 @@ pub(super) fn disc([x, y, radius, influence]: [f64; 4]) -> Threat {
     }
 }
 
-/// Start, free waypoints, target of the scenario with three radars; the free ones are given.
+/// The start of the scenario with three radars, the given free waypoints, and its target.
 pub(super) fn route(free: &[[f64; 3]]) -> Vec<Point3> {
     let scenario = scenario();
     let free = free.iter().map(|&point| Point3::from(point));
@@ -122,7 +122,7 @@ impl Observer for Diary {
     }
 }
 
-/// A clock that only moves when looked at, and a stop after a number of looks.
+/// A clock that advances only when it is read, and a stop after a number of reads.
 struct Looks {
     count: std::cell::Cell<u32>,
     stop_after: u32,
@@ -148,7 +148,7 @@ impl Stop for Looks {
 }
 
 #[test]
-fn a_run_delivers_a_feasible_route_and_tells_its_story() {
+fn a_run_delivers_a_feasible_route_and_reports_its_progress() {
     let mut diary = Diary::default();
     let outcome = plan(&scenario(), &mut diary, &Looks::until(u32::MAX));
     assert!(outcome.feasible && outcome.violations.is_empty());
@@ -189,7 +189,7 @@ fn the_same_seed_gives_the_same_bits_and_another_does_not() {
     assert_ne!(run(1).waypoints, run(2).waypoints);
 }
 
-/// A radar pops up beside the route: starting from the known route, a tenth of the work does as well.
+/// A radar appears beside the route: starting from the known route, a tenth of the evaluations give as good a result.
 #[test]
 fn a_warm_start_needs_a_tenth_of_the_evaluations() {
     let mut scenario = scenario();
@@ -237,7 +237,7 @@ fn a_stop_keeps_the_best_so_far() {
 }
 
 #[test]
-fn a_time_limit_ends_the_run() {
+fn a_time_limit_stops_the_run() {
     let mut scenario = scenario();
     scenario.planner.time_limit_ms = Some(10);
     let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(u32::MAX));
@@ -245,13 +245,13 @@ fn a_time_limit_ends_the_run() {
     assert_eq!(outcome.convergence.len(), 10);
 }
 
-/// Routes that each take long to price: a stop does not wait for the whole population.
+/// Each route takes long to price: a stop does not wait for the whole population.
 #[test]
-fn a_stop_within_an_iteration_is_heard() {
+fn a_stop_within_an_iteration_is_noticed() {
     let mut scenario = scenario();
     let far = scenario.threats[0].clone();
     scenario.threats.extend((0..20_000).map(|_| far.clone()));
-    // Every block of routes is a look; a population takes eight, and an iteration one more.
+    // The stop is checked once per block of routes: a population has eight, and an iteration one more check.
     let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(5));
     assert_eq!(outcome.stop_reason, StopReason::Cancelled);
     assert_eq!(outcome.convergence.len(), 1);
@@ -272,10 +272,10 @@ fn a_stop_within_an_iteration_is_heard() {
     );
 }
 
-/// Over one disc and round another: waypoints are high over the first alone. With all of them there, the route costs
-/// 901.
+/// Over one disc and around another: only the waypoints over the first are high. With all of them high, the
+/// route costs 901.
 #[test]
-fn a_threat_is_flown_over_by_no_more_waypoints_than_it_takes() {
+fn a_threat_is_flown_over_by_no_more_waypoints_than_necessary() {
     let mut scenario = scenario();
     scenario.start = Point3::new(125.0, 524.0, 88.0);
     scenario.target = Point3::new(856.0, 323.0, 93.0);
@@ -293,10 +293,10 @@ fn a_threat_is_flown_over_by_no_more_waypoints_than_it_takes() {
     assert!(outcome.cost.total < 812.0, "{}", outcome.cost.total);
 }
 
-/// Where spare waypoints are expensive, coarse routes that stay low look cheap: the start of a search may be better
-/// than anything its bats find, and must not be lost.
+/// Where spare waypoints are expensive, coarse routes that stay low look cheap: a start of the search may be
+/// better than anything its bats find, and must not be lost.
 #[test]
-fn a_longer_run_is_no_dearer_than_its_starts() {
+fn a_longer_run_is_no_more_expensive_than_its_starts() {
     let mut scenario = scenario();
     scenario.planner.seeding = Seeding::Tangent;
     scenario.planner.polish = true;
@@ -326,7 +326,7 @@ fn a_longer_run_is_no_dearer_than_its_starts() {
     assert!(longer < 1.001 * starts, "{longer} {starts}");
 }
 
-/// Where waypoints cost only the way up and down hills, moving them one by one leaves some of that cost.
+/// Where waypoints cost only the climb over hills, moving them one by one leaves some of that cost.
 #[test]
 fn many_waypoints_over_hills_are_moved_together() {
     let mut scenario = scenario();

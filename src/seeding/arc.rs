@@ -249,9 +249,9 @@ mod tests {
         }
     }
 
-    /// Also where an arc is empty, nearly a circle, or half of one, and begins or ends in the requested direction.
+    /// Including arcs that are empty, a half circle or nearly a full one, and directions exactly at their ends.
     #[test]
-    fn an_arc_passes_what_it_turns_by() {
+    fn an_arc_passes_exactly_the_directions_it_turns_through() {
         let unit = |degrees: i32| {
             let (sin, cos) = libm::sincos(f64::from(degrees).to_radians());
             Vector2::new(cos, sin)
@@ -265,7 +265,7 @@ mod tests {
                 let arc = Arc::new(rounding(3.0, 4.0, 5.0, sense), unit(start), to);
                 for degrees in 0..360 {
                     let passes = arc.passes(unit(start + sign * degrees) * 7.0);
-                    // At its end the result is a matter of rounding.
+                    // At the arc's end the result depends on rounding.
                     assert!(
                         passes == (degrees <= turned) || degrees == turned,
                         "{arc:?} {degrees}"
@@ -305,7 +305,7 @@ mod tests {
         };
         check(Sense::Left, Sense::Left, Some(([0.0, -3.0], [10.0, -3.0])));
         check(Sense::Right, Sense::Right, Some(([0.0, 3.0], [10.0, 3.0])));
-        // Crossing between them: sin of the slope is 6 / 10.
+        // The inner tangent: the sine of its slope is 6 / 10.
         check(Sense::Left, Sense::Right, Some(([1.8, -2.4], [8.2, 2.4])));
         let overlapping = tangent(
             &rounding(0.0, 0.0, 6.0, Sense::Left),
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn turns_count_in_their_sense() {
+    fn turns_are_measured_in_their_sense() {
         let (east, north) = (Vector2::new(1.0, 0.0), Vector2::new(0.0, 1.0));
         assert!((turn(east, north, Sense::Left) - FRAC_PI_2).abs() < 1e-12);
         assert!((turn(east, north, Sense::Right) - 3.0 * FRAC_PI_2).abs() < 1e-12);
@@ -331,7 +331,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn an_arc_is_as_near_as_its_nearest_sample(
+        fn the_distance_of_an_arc_matches_its_nearest_sample(
             angles in prop::array::uniform2(-3.0..3.0f64), left in any::<bool>(),
             a in prop::array::uniform2(-9.0..9.0f64), b in prop::array::uniform2(-9.0..9.0f64),
         ) {

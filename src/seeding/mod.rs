@@ -44,14 +44,14 @@ mod tests {
         ))
     }
 
-    /// The same among cylinders of all heights, each given by its centre, radius and influence.
+    /// The same among cylinders of unlimited height, each given as centre x and y, radius and influence.
     pub(super) fn among(discs: impl IntoIterator<Item = [f64; 4]>) -> Scenario {
         let discs = discs.into_iter();
         let threats: Vec<String> = discs.map(|[x, y, r, i]| disc(x, y, r, i)).collect();
         scenario(&format!(r#""threats": [{}]"#, threats.join(", ")))
     }
 
-    /// A cylinder of all heights, as a member of `threats`.
+    /// A cylinder of unlimited height, as a member of `threats`.
     pub(super) fn disc(x: f64, y: f64, radius: f64, influence: f64) -> String {
         format!(
             r#"{{"kind": "cylinder", "center": {{"x": {x}, "y": {y}}}, "radius": {radius}, "influence": {influence}}}"#

@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_string_goes_round_a_mountain_that_is_too_steep() {
+    fn a_string_goes_around_a_mountain_that_is_too_steep() {
         assert!(steep_ground(&mountain(150.0)).is_empty());
         let steep = mountain(2000.0);
         let outlines = steep_ground(&steep);

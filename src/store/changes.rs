@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn followers_that_are_gone_are_forgotten() {
+    fn dropped_followers_are_forgotten() {
         let changes = Changes::default();
         let kept = changes.subscribe(PlanId::from_u128(0));
         for id in 1..10_000 {

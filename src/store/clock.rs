@@ -152,7 +152,7 @@ mod tests {
 
     const YEAR_MS: i64 = 365 * 24 * 60 * 60 * 1_000;
 
-    /// The judge's verdict `minutes` after the start on a clock that is ahead.
+    /// The judge's verdict `minutes` after the start, on a clock that is ahead by `ahead_ms`.
     fn judged(judge: &mut Judge, minutes: u64, ahead_ms: i64) -> Option<i64> {
         let passed = Duration::from_secs(60 * minutes);
         judge.jump_ms(
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_jumps_is_believed_after_an_hour() {
+    fn a_clock_that_jumped_is_trusted_after_an_hour() {
         for jump_ms in [YEAR_MS, -YEAR_MS, 61_000] {
             let mut judge = Judge::new(1_000_000);
             assert_eq!(judged(&mut judge, 1, 59_000), None, "slewed");
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_comes_back_is_believed_at_once() {
+    fn a_clock_that_returns_is_trusted_at_once() {
         let mut judge = Judge::new(1_000_000);
         assert_eq!(judged(&mut judge, 1, YEAR_MS), Some(YEAR_MS));
         assert_eq!(judged(&mut judge, 2, 2 * YEAR_MS), Some(2 * YEAR_MS));

@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_oldest_are_forgotten_first() {
+    fn the_oldest_origins_are_forgotten_first() {
         let origins = Origins::default();
         let origin = Origin {
             request_id: "r".to_owned(),

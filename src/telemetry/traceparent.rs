@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reads_what_the_recommendation_allows() {
+    fn a_traceparent_is_parsed_as_the_recommendation_allows() {
         const TRACE: &str = "4bf92f3577b34da6a3ce929d0e0e4736";
         const SPAN: &str = "00f067aa0ba902b7";
         for (text, expected) in [
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn is_written_as_it_is_read() {
+    fn a_traceparent_is_written_as_it_was_read() {
         let text = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01";
         let parent: TraceParent = text.parse().expect("right");
         assert_eq!(parent.to_string(), text);

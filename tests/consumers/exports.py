@@ -1,4 +1,4 @@
-"""The exported routes, and what the result of each says."""
+"""The exported routes, and their results."""
 
 import json
 import os
@@ -10,7 +10,7 @@ assert len(NAMES) == 5, NAMES
 
 
 class Route:
-    """A result, its altitudes above both datums."""
+    """A result with its altitudes above both datums."""
 
     def __init__(self, name):
         self.name = name
@@ -46,7 +46,7 @@ def routes():
 
 
 def off(one, other):
-    """How far apart two positions are: degrees, metres."""
+    """The distance between two positions: degrees, metres."""
     turn = abs(one[0] - other[0]) % 360
     degrees = max(min(turn, 360 - turn), abs(one[1] - other[1]))
     return degrees, abs(one[2] - other[2])

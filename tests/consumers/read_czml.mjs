@@ -1,7 +1,7 @@
-// Loads CZML files with Cesium and tells what it made of them, as JSON.
+// Loads CZML files with Cesium and prints what it read, as JSON.
 import fs from 'node:fs';
 
-// Cesium asks whether a value is one of these before it reads it as a number; nothing here is.
+// Cesium tests whether a value is one of these before it reads it as a number; here none is.
 for (const name of ['Image', 'HTMLImageElement', 'HTMLCanvasElement', 'HTMLVideoElement', 'ImageBitmap', 'OffscreenCanvas']) {
   globalThis[name] ??= class {};
 }

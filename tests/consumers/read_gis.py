@@ -1,6 +1,7 @@
 """GeoJSON, KML and GPX, read by GDAL; GPX also by gpxpy."""
 
 import json
+import math
 import subprocess
 import unittest
 
@@ -10,7 +11,7 @@ from exports import assert_same, routes
 
 
 def features(file, *arguments):
-    """What GDAL makes of a file, as GeoJSON that keeps every digit."""
+    """The features that GDAL reads from a file, as GeoJSON with all digits."""
     command = ["ogr2ogr", "-f", "GeoJSON", "-lco", "COORDINATE_PRECISION=12", "/vsistdout/", str(file), *arguments]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     if done.stderr.strip():
@@ -19,7 +20,7 @@ def features(file, *arguments):
 
 
 def lines(features):
-    """All positions of the lines among them; of pieces, without the cuts."""
+    """All positions of the lines among the features; pieces are joined without their cuts."""
     found = []
     for feature in features:
         geometry = feature["geometry"]
@@ -40,8 +41,19 @@ def ring_of(geometry):
     return [corner for polygon in geometry["coordinates"] for corner in polygon[0]]
 
 
+def distance(center, position):
+    """Metres on the WGS 84 ellipsoid between a centre and a position at most some kilometres away."""
+    radius, squared_eccentricity = 6378137, 0.00669437999014
+    latitude = math.radians((center["lat"] + position[1]) / 2)
+    w = math.sqrt(1 - squared_eccentricity * math.sin(latitude) ** 2)
+    turn = (position[0] - center["lon"] + 180) % 360 - 180
+    east = radius / w * math.cos(latitude) * math.radians(turn)
+    north = radius * (1 - squared_eccentricity) / w**3 * math.radians(position[1] - center["lat"])
+    return math.hypot(east, north)
+
+
 class Maps(unittest.TestCase):
-    def test_files_are_told_without_a_warning(self):
+    def test_files_are_read_without_a_warning(self):
         for route in routes():
             for extension in ("geojson", "kml", "gpx"):
                 with self.subTest(f"{route.name}.{extension}"):
@@ -93,7 +105,7 @@ class Maps(unittest.TestCase):
                 self.assertEqual(times, sorted(times))
 
     def threats(self, route, found):
-        """Corners of polygons are the scenario's, those of circles lie on them."""
+        """Polygon corners match the scenario's; circles have 73 positions or more, all of them on the circle."""
         polygons = [f for f in found if f["geometry"]["type"] in ("Polygon", "MultiPolygon")]
         self.assertEqual(len(polygons), len(route.scenario["threats"]))
         for feature, threat in zip(polygons, route.scenario["threats"]):
@@ -105,4 +117,7 @@ class Maps(unittest.TestCase):
                     self.assertTrue(any(near(corner, r) for r in ring), (corner, ring))
             else:
                 self.assertGreaterEqual(len(ring), 73)
+                for position in ring:
+                    apart = distance(threat["center"], position)
+                    self.assertAlmostEqual(apart / threat["radius"], 1, delta=1e-3)
                 self.assertEqual(float(feature["properties"]["radius"]), threat["radius"])

@@ -1,4 +1,4 @@
-"""Plans of QGroundControl, read by MAVSDK, which wants an autopilot's heartbeat before."""
+"""Plans of QGroundControl, read by MAVSDK, which first needs an autopilot's heartbeat."""
 
 import json
 import socket
@@ -85,19 +85,19 @@ class Plans(unittest.TestCase):
                     frames = {item.frame for item in read.mission_items if item.command != 178}
                     self.assertEqual(frames, {frame})
 
-    def test_missions_for_ardupilot_are_read_by_its_planners_reader(self):
+    def test_missions_for_ardupilot_are_read_by_the_mission_planner_reader(self):
         for route in routes():
             with self.subTest(route.name):
                 read = self.reader.import_mission_planner_mission(str(route.file("absolute.wpl")))
                 plan = self.reader.import_qgroundcontrol_mission(str(route.file("absolute.qgc")))
                 where = lambda items: [(item.x, item.y) for item in items if item.command == 16]
-                # The first line is home.
+                # The first line is the home position.
                 ways = where(read.mission_items)[-len(where(plan.mission_items)):]
                 for one, other in zip(ways, where(plan.mission_items)):
                     self.assertLessEqual(abs(one[0] - other[0]), 1)
                     self.assertLessEqual(abs(one[1] - other[1]), 1)
 
-    def test_the_reader_refuses_what_is_no_plan(self):
+    def test_the_reader_refuses_an_incomplete_plan(self):
         plan = json.loads(routes()[0].file("plan").read_text())
         del plan["geoFence"]
         with self.assertRaises(MissionRawError):
@@ -105,7 +105,7 @@ class Plans(unittest.TestCase):
 
 
 def fenced(route):
-    """Threats that a fence without height can stand for."""
+    """Threats that a fence without height can represent."""
     plan = json.loads(route.file("plan").read_text())
     without = {left["threat"] for left in plan["noctule"]["threats_without_fence"]}
     threats = enumerate(route.scenario["threats"])
@@ -113,7 +113,7 @@ def fenced(route):
 
 
 def fence_items(route):
-    """One of a circle, one a corner of a polygon."""
+    """One item per circle, one per corner of a polygon."""
     return sum(len(threat.get("vertices", [None])) for threat in fenced(route))
 
 

@@ -1,4 +1,4 @@
-"""KML by the schema of the OGC; GPX, whose schema no package brings, by the order that it asks for."""
+"""KML against the OGC's schema; GPX, whose schema no package has, against the element order that it requires."""
 
 import pathlib
 import unittest
@@ -11,7 +11,7 @@ from exports import routes
 SCHEMA = pathlib.Path(pykml.__file__).parent / "schemas" / "ogckml22.xsd"
 GPX = "{http://www.topografix.com/GPX/1/1}"
 
-# Children of each element in their order, GPX 1.1.
+# The children of each element in order, GPX 1.1.
 POINT = ["ele", "time", "magvar", "geoidheight", "name", "cmt", "desc", "src", "link", "sym", "type", "fix"]
 ORDER = {
     "gpx": ["metadata", "wpt", "rte", "trk", "extensions"],

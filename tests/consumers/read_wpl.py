@@ -17,7 +17,7 @@ def load(file):
 
 
 class Waypoints(unittest.TestCase):
-    def test_px4_mission_begins_on_the_ground_and_ends_there(self):
+    def test_px4_mission_starts_with_a_takeoff_and_ends_with_a_landing(self):
         for route in routes():
             with self.subTest(route.name):
                 items = load(route.file("waypoints"))
@@ -44,7 +44,7 @@ class Waypoints(unittest.TestCase):
                 for item in waypoints:
                     self.assertEqual(item.frame, MAV.MAV_FRAME_GLOBAL)
                     apart = [off((item.y, item.x, item.z), point) for point in path]
-                    # A metre beside the path, in degrees of longitude at 70 degrees north.
+                    # A metre to the side of the path, in degrees of longitude at 70 degrees north.
                     self.assertTrue(any(d <= 3e-5 and m <= 1.1 or d < 1e-3 and m < 10 for d, m in apart))
                 self.assertLessEqual(abs(waypoints[-1].z - path[-1][2]), 2e-3)
 
@@ -65,3 +65,4 @@ class Waypoints(unittest.TestCase):
                 for item in load(route.file("terrain.wpl"))[4:-1]:
                     self.assertEqual(item.frame, MAV.MAV_FRAME_GLOBAL_TERRAIN_ALT)
                     self.assertLessEqual(item.z, band["max"] + 1e-2)
+                    self.assertGreaterEqual(item.z, band["min"] - 1e-2)

@@ -1,8 +1,8 @@
-"""Routes over a shipped file, planned through the service, re-checked from outside at every metre.
+"""Routes over a shipped file, planned through the service and re-checked independently at every metre.
 
-The file is uploaded, a scenario that names it is planned, and each delivered point of the path (latitude, longitude,
-altitude, a metre apart) is held to the elevations that GDAL reads out of the file, bilinear between four samples:
-inside the altitude band, above the ground, and as high as the certificate says.
+The file is uploaded, a scenario that names it is planned, and each point of the path (latitude, longitude,
+altitude, a metre apart) is compared with the elevations that GDAL reads from the file, bilinear between four samples:
+it must be inside the altitude band, above the ground, and as high as the certificate says.
 """
 
 import array
@@ -13,7 +13,7 @@ import sys
 import urllib.request
 
 SEEDS = (1, 2, 3)
-# Metres: what the certificate promises over files, and digits of the documents.
+# Metres: the certificate's accuracy over files, and the digits of the documents.
 TOLERANCE = 1.5e-3
 
 PROGRAM, SOURCE, SCENARIO, SCRATCH = (
@@ -29,12 +29,12 @@ class Ground:
         info = json.loads(subprocess.run(["gdalinfo", "-json", file], check=True, capture_output=True).stdout)
         self.columns, self.rows = info["size"]
         west, self.width, _, north, _, self.height = info["geoTransform"]
-        # Samples hold in the middles of pixels.
+        # Samples hold at pixel centres.
         self.west, self.north = west + self.width / 2.0, north + self.height / 2.0
         self.samples = array.array("d", raw.read_bytes())
 
     def at(self, lat, lon):
-        """Elevation, bilinear."""
+        """The elevation, interpolated bilinearly."""
         x, y = (lon - self.west) / self.width, (lat - self.north) / self.height
         column, row = min(int(x), self.columns - 2), min(int(y), self.rows - 2)
         x, y = x - column, y - row
@@ -46,7 +46,7 @@ class Ground:
 
 
 def ask(method, address, body=None, **headers):
-    """The answer of the service, as JSON."""
+    """The service's response, as JSON."""
     headers = {name.replace("_", "-"): value for name, value in headers.items()}
     request = urllib.request.Request(address, data=body, method=method, headers=headers)
     with urllib.request.urlopen(request, timeout=120) as answer:
@@ -54,7 +54,7 @@ def ask(method, address, body=None, **headers):
 
 
 def planned(service, scenario):
-    """The result of a scenario."""
+    """The result of planning a scenario."""
     status = ask("POST", f"{service}/plans", json.dumps(scenario).encode(), content_type="application/json")
     address = service + status["links"]["self"]
     while status["status"] in ("queued", "running"):
@@ -63,7 +63,7 @@ def planned(service, scenario):
 
 
 def check(ground, scenario, result):
-    """How many points there are, and what is wrong with them."""
+    """The number of points, and what is wrong with them."""
     points, claimed = result["path"]["points"], result["checks"]["path"]
     band = scenario["altitude"]
     heights = [point["alt"] - ground.at(point["lat"], point["lon"]) for point in points]
@@ -80,7 +80,7 @@ def check(ground, scenario, result):
 
 
 def main():
-    """Runs the service, and the checks over it."""
+    """Runs the service and the checks."""
     ground = Ground(SOURCE)
     scenario = json.loads(SCENARIO.read_text())
     name = scenario["terrain"]["name"]

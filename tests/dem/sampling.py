@@ -1,8 +1,8 @@
-"""Elevations at random points of many files, by the program and by GDAL's samples.
+"""Elevations at random points of many files: the program's against those computed from GDAL's samples.
 
-GDAL makes the files, says where their samples stand, and hands the samples out as plain numbers; PROJ takes
-degrees to the files' reference systems. Bilinear interpolation between four samples is done here: gdallocationinfo
-has it only since GDAL 3.10.
+GDAL makes the files, says where their samples lie, and prints the samples as plain numbers; PROJ converts
+degrees to the files' reference systems. The bilinear interpolation between four samples is done here, because
+gdallocationinfo has it only since GDAL 3.10.
 """
 
 import array
@@ -13,14 +13,14 @@ import subprocess
 import sys
 
 POINTS = 1000
-# Of the range of the four samples round a point, and of a metre; the program keeps single precision.
+# Shares of the range of the four samples around a point, and of a metre; the program stores single precision.
 SHARE, FLOOR, ROUNDING = 1e-6, 1e-9, 2.0**-15
 
 PROGRAM, SOURCE, SCRATCH = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
 
 
 def run(*command, text=None):
-    """Standard output of a program that must succeed."""
+    """The standard output of a program that must succeed."""
     done = subprocess.run([str(part) for part in command], input=text, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         sys.exit(f"{' '.join(map(str, command))} failed:\n{done.stderr}")
@@ -28,7 +28,7 @@ def run(*command, text=None):
 
 
 def make():
-    """The files, each with its reference system and what is peculiar about it."""
+    """The files, each with its reference system and its peculiarity."""
 
     def translated(name, *options):
         run("gdal_translate", "-q", *options, SOURCE, SCRATCH / name)
@@ -71,7 +71,7 @@ def make():
 
 
 class Samples:
-    """What GDAL reads of a file."""
+    """What GDAL reads from a file."""
 
     def __init__(self, path):
         info = json.loads(run("gdalinfo", "-json", path))
@@ -87,7 +87,7 @@ class Samples:
         return self.values[row * self.columns + column]
 
     def elevation(self, x, y):
-        """Bilinear, and the range of the four samples; a pixel's value holds at its middle."""
+        """Bilinear elevation, and the range of the four samples; a pixel's value holds at its middle."""
         west, width, _, north, _, height = self.transform
         across, down = (x - west) / width - 0.5, (y - north) / height - 0.5
         if not (0 <= across <= self.columns - 1 and 0 <= down <= self.rows - 1):
@@ -103,7 +103,7 @@ class Samples:
 
 
 def projected(places, crs):
-    """Degrees to a reference system, by PROJ."""
+    """Degrees converted to a reference system by PROJ."""
     if crs == "EPSG:4326":
         return [(lon, lat) for lat, lon in places]
     text = "".join(f"{lon!r} {lat!r}\n" for lat, lon in places)
@@ -112,13 +112,13 @@ def projected(places, crs):
 
 
 def compare(path, crs, draw):
-    """How many points have an elevation, and how far off they are at most: metres, and shares of what is allowed."""
+    """The number of points with an elevation, and the largest deviations: metres, and shares of the tolerance."""
     samples = Samples(path)
     info = json.loads(run(PROGRAM, "terrain", "info", path))
     assert info["crs"] == crs, info
     assert (info["columns"], info["rows"]) == (samples.columns, samples.rows), info
     reach = info["degrees"]
-    # A hundredth of them beyond the edge, or near it.
+    # A hundredth of the points lie beyond the edge or near it.
     wide = 0.005
     places = [
         (

@@ -1,4 +1,4 @@
-"""The files of deploy/, read: which containers there are, and how each runs the program."""
+"""The files of deploy/: which containers there are, and how each runs the program."""
 
 import json
 import os
@@ -33,7 +33,7 @@ def of_kind(kind):
 
 
 def instruction(name):
-    """The last of its kind in the Dockerfile, as it stands there."""
+    """The arguments of the last such instruction in the Dockerfile."""
     return re.findall(rf"^{name} +(.*)$", DOCKERFILE, re.MULTILINE)[-1]
 
 
@@ -50,17 +50,17 @@ class Node:
     name: str
     arguments: list
     variables: dict
-    # From the request to end until the process is killed, and what of it is gone before the process hears of it.
+    # Seconds from the stop request to the kill, and how many of them pass before the process is notified.
     patience_s: float
     before_s: float
 
     def call(self, *arguments, **variables):
-        """The program with these arguments, in the container's environment."""
+        """Runs the program with these arguments in the container's environment."""
         environment = {"PATH": os.environ["PATH"], "HOME": "/nowhere"} | self.variables | variables
         return subprocess.run([NOCTULE, *arguments], env=environment, capture_output=True, text=True, check=False)
 
     def settings(self):
-        """What `--print-config` says of it, each with where it comes from."""
+        """The settings that `--print-config` shows, each with its source."""
         printed = self.call(*self.arguments, "--print-config")
         if printed.returncode != 0:
             raise AssertionError(f"{self.name}: {printed.stderr}")
@@ -86,7 +86,7 @@ def compose_nodes():
 
 
 def pods():
-    """Workloads with the templates of their pods."""
+    """Workloads with their pod templates."""
     for resource in of_kind("Deployment") + of_kind("StatefulSet"):
         yield resource, resource["spec"]["template"]
 
@@ -101,7 +101,7 @@ def pod_nodes():
             for source in container.get("envFrom", []):
                 variables |= maps[source["configMapRef"]["name"]]
             for variable in container.get("env", []):
-                # A secret that nobody has made.
+                # From a secret that need not exist.
                 if "value" in variable:
                     variables[variable["name"]] = variable["value"]
                 else:

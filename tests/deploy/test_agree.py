@@ -1,4 +1,4 @@
-"""What the files say agrees with the program, the Dockerfile and one another."""
+"""The files agree with the program, the Dockerfile and one another."""
 
 import json
 import re
@@ -27,10 +27,9 @@ from files import (
 
 HELP = subprocess.run([NOCTULE, "serve", "--help"], capture_output=True, text=True, check=True).stdout
 FLAGS = set(re.findall(r"--[a-z][a-z-]*", HELP))
-# Keys are no setting: they may stand in a file of their own.
+# Keys are not a setting: they may be in a file of their own.
 VARIABLES = set(re.findall(r"NOCTULE_[A-Z_]+", HELP)) | {"NOCTULE_KEYS"}
 ROUTES = set(yaml.safe_load((ROOT / "openapi.yaml").read_text())["paths"])
-# Of the name that a Service, a disruption budget and a network policy give.
 SERVICES = COMPOSE["services"]
 
 
@@ -47,7 +46,7 @@ def ports_of(pod):
 
 
 class Nodes(unittest.TestCase):
-    def test_there_are_nodes_of_each_role_in_both(self):
+    def test_both_deployments_have_nodes_of_each_role(self):
         self.assertEqual(len(NODES), 4, NODES)
         roles = sorted(node.settings()["role"][0] for node in NODES)
         self.assertEqual(roles, ["api", "api", "worker", "worker"])
@@ -62,7 +61,7 @@ class Nodes(unittest.TestCase):
         named = set(re.findall(r"NOCTULE_[A-Z_]+", (DEPLOY / "kubernetes/api.yaml").read_text()))
         self.assertLessEqual(named, VARIABLES)
 
-    def test_each_setting_is_what_the_file_says_and_nothing_else_counts(self):
+    def test_each_setting_comes_from_the_file(self):
         for node in NODES:
             settings = node.settings()
             for name, value in node.variables.items():
@@ -75,25 +74,25 @@ class Nodes(unittest.TestCase):
                     key = flag.removeprefix("--").replace("-", "_")
                     self.assertEqual(settings[key], (value, flag), node.name)
 
-    def test_those_who_share_a_store_agree_on_it(self):
+    def test_nodes_that_share_a_store_agree_on_its_settings(self):
         for prefix in ("compose ", "noctule-"):
             nodes = [node.settings() for node in NODES if node.name.startswith(prefix)]
             self.assertEqual(len(nodes), 2)
             for key in ("store", "store_replicas", "store_lease", "queue"):
                 self.assertEqual(nodes[0][key], nodes[1][key])
 
-    def test_they_listen_where_they_are_looked_for(self):
+    def test_nodes_listen_on_the_expected_port(self):
         for node in NODES:
             settings = node.settings()
             self.assertEqual(settings["listen"][0], f"0.0.0.0:{IMAGE_PORT}", node.name)
             self.assertEqual(settings["data_dir"][0], "/data", node.name)
 
-    def test_they_have_the_time_that_they_take_to_end(self):
+    def test_nodes_have_enough_time_to_stop(self):
         for node in NODES:
             grace_s = float(node.settings()["grace"][0])
             self.assertGreaterEqual(node.patience_s, node.before_s + grace_s + 5, node.name)
 
-    def test_a_store_has_as_many_copies_as_servers_can_keep(self):
+    def test_a_store_has_one_replica_per_server(self):
         servers = {"compose ": 1, "noctule-": of_kind("StatefulSet")[0]["spec"]["replicas"]}
         for node in NODES:
             most = servers[node.name[:8]]
@@ -104,7 +103,7 @@ class Nodes(unittest.TestCase):
 
 
 class Compose(unittest.TestCase):
-    def test_what_is_named_is_there(self):
+    def test_everything_named_exists(self):
         volumes = set(COMPOSE["volumes"])
         for name, service in SERVICES.items():
             for other in service.get("depends_on", {}):
@@ -117,29 +116,29 @@ class Compose(unittest.TestCase):
                     self.assertIn(source, volumes)
         self.assertTrue((DEPLOY / SERVICES["api"]["build"]["context"] / "Dockerfile").exists())
 
-    def test_who_waits_for_health_waits_for_one_who_tells(self):
+    def test_health_dependencies_have_a_healthcheck(self):
         for service in SERVICES.values():
             for other, how in service.get("depends_on", {}).items():
                 if how["condition"] == "service_healthy":
                     self.assertIn("healthcheck", SERVICES[other])
 
-    def test_nobody_can_write_to_an_image_or_gain_rights(self):
+    def test_no_service_can_write_to_its_image_or_gain_rights(self):
         for name, service in SERVICES.items():
             self.assertTrue(service["read_only"], name)
             self.assertEqual(service["cap_drop"], ["ALL"], name)
             self.assertIn("no-new-privileges:true", service["security_opt"], name)
 
-    def test_nothing_is_published_but_to_this_machine(self):
+    def test_ports_are_published_on_loopback_only(self):
         for service in SERVICES.values():
             for port in service.get("ports", []):
                 self.assertTrue(port.startswith("127.0.0.1:"), port)
         self.assertTrue(SERVICES["api"]["ports"][0].endswith(f":{IMAGE_PORT}"))
 
-    def test_the_healthcheck_is_the_images(self):
+    def test_the_healthcheck_is_that_of_the_image(self):
         for name in ("api", "worker"):
             self.assertEqual(SERVICES[name]["healthcheck"]["test"], ["CMD", *IMAGE_HEALTHCHECK])
 
-    def test_the_servers_are_reached_where_they_listen(self):
+    def test_the_servers_are_addressed_where_they_listen(self):
         config = (DEPLOY / "nats/nats.conf").read_text()
         port = re.search(r'listen: "0.0.0.0:(\d+)"', config)[1]
         monitor = re.search(r'http: "0.0.0.0:(\d+)"', config)[1]
@@ -150,7 +149,7 @@ class Compose(unittest.TestCase):
 
 
 class Prometheus(unittest.TestCase):
-    def test_it_reads_services_that_there_are(self):
+    def test_every_scrape_target_exists(self):
         [config] = read("prometheus/compose.yml")
         looked_for = {}
         for job in config["scrape_configs"]:
@@ -163,14 +162,14 @@ class Prometheus(unittest.TestCase):
         exporter_port = int(exporter[0].removeprefix("-port="))
         self.assertEqual(looked_for, {"api": IMAGE_PORT, "worker": IMAGE_PORT, "nats-exporter": exporter_port})
 
-    def test_its_files_are_mounted_where_it_reads_them(self):
+    def test_configuration_files_are_mounted_where_they_are_read(self):
         mounted = {volume.split(":")[1]: volume.split(":")[0] for volume in SERVICES["prometheus"]["volumes"]}
         config = SERVICES["prometheus"]["command"][0].removeprefix("--config.file=")
         self.assertEqual(mounted[config], "./prometheus/compose.yml")
         for rules in read("prometheus/compose.yml")[0]["rule_files"]:
             self.assertIn(f"/etc/prometheus/{rules}", mounted)
 
-    def test_what_it_is_asked_can_be_read(self):
+    def test_every_query_parses(self):
         asked = [rule["expr"] for group in read("prometheus/alerts.yml")[0]["groups"] for rule in group["rules"]]
         dashboard = json.loads((DEPLOY / "grafana/noctule.json").read_text())
         for panel in dashboard["panels"]:
@@ -182,7 +181,7 @@ class Prometheus(unittest.TestCase):
             known = expression.replace("$__rate_interval", "1m").replace("$__range", "1h")
             promql_parser.parse(known)
 
-    def test_grafana_finds_source_and_dashboard(self):
+    def test_grafana_finds_its_data_source_and_dashboard(self):
         [source] = read("grafana/provisioning/datasources/prometheus.yml")[0]["datasources"]
         host, port = source["url"].removeprefix("http://").split(":")
         self.assertIn(f":{port}/", SERVICES[host]["healthcheck"]["test"][-1])
@@ -193,7 +192,7 @@ class Prometheus(unittest.TestCase):
 
 
 class Kubernetes(unittest.TestCase):
-    def test_all_files_are_put_together(self):
+    def test_the_kustomization_lists_every_file(self):
         [kustomization] = read("kubernetes/kustomization.yaml")
         files = {path.name for path in (DEPLOY / "kubernetes").glob("*.yaml")}
         self.assertEqual(files - set(kustomization["resources"]), {"kustomization.yaml", "queue-metric.yaml"})
@@ -203,7 +202,7 @@ class Kubernetes(unittest.TestCase):
         version = re.search(r'^version = "(.*)"', (ROOT / "Cargo.toml").read_text(), re.MULTILINE)[1]
         self.assertEqual(image["newTag"], version)
 
-    def test_probes_ask_for_what_there_is(self):
+    def test_probes_use_existing_routes_and_ports(self):
         for workload, pod in pods():
             for container in pod["spec"]["containers"]:
                 for kind in ("startupProbe", "livenessProbe", "readinessProbe"):
@@ -229,7 +228,7 @@ class Kubernetes(unittest.TestCase):
             for port in service["spec"]["ports"]:
                 self.assertIn(port["targetPort"], ports_of(selected[0]))
 
-    def test_selectors_select(self):
+    def test_every_selector_selects_something(self):
         for workload, pod in pods():
             self.assertTrue(selects(workload["spec"]["selector"]["matchLabels"], pod["metadata"]["labels"]))
         for budget in of_kind("PodDisruptionBudget"):
@@ -244,7 +243,7 @@ class Kubernetes(unittest.TestCase):
                 for port in rule["ports"]:
                     self.assertIn(port["port"], ports_of(selected[0]), policy["metadata"]["name"])
 
-    def test_autoscalers_scale_what_there_is_by_what_is_made(self):
+    def test_autoscalers_name_existing_workloads_and_metrics(self):
         [rule] = read("kubernetes/queue-metric.yaml")[0]["rules"]["external"]
         workloads = {workload["metadata"]["name"]: workload for workload, _ in pods()}
         for autoscaler in of_kind("HorizontalPodAutoscaler"):
@@ -255,12 +254,11 @@ class Kubernetes(unittest.TestCase):
                     self.assertEqual(metric["external"]["metric"]["name"], rule["name"]["as"])
 
     def test_a_worker_runs_as_many_plans_as_it_has_cpus(self):
-        for workload, pod in pods():
-            [container, *_] = pod["spec"]["containers"]
-            if workload["metadata"]["name"] == "noctule-worker":
-                self.assertIn(f"--workers={container['resources']['limits']['cpu']}", container["args"])
+        [pod] = [pod for workload, pod in pods() if workload["metadata"]["name"] == "noctule-worker"]
+        [container, *_] = pod["spec"]["containers"]
+        self.assertIn(f"--workers={container['resources']['limits']['cpu']}", container["args"])
 
-    def test_nobody_is_root_or_writes_to_an_image(self):
+    def test_no_container_is_root_or_writes_to_its_image(self):
         for workload, pod in pods():
             name = workload["metadata"]["name"]
             self.assertTrue(pod["spec"]["securityContext"]["runAsNonRoot"], name)
@@ -274,7 +272,7 @@ class Kubernetes(unittest.TestCase):
                 if container["image"] == "noctule":
                     self.assertEqual(pod["spec"]["securityContext"]["runAsUser"], IMAGE_USER)
 
-    def test_servers_find_each_other_and_nodes_find_them(self):
+    def test_servers_and_nodes_address_the_servers_correctly(self):
         [servers] = of_kind("StatefulSet")
         name, service = servers["metadata"]["name"], servers["spec"]["serviceName"]
         self.assertIn(service, [resource["metadata"]["name"] for resource in of_kind("Service")])
@@ -288,18 +286,18 @@ class Kubernetes(unittest.TestCase):
             self.assertTrue(node.variables["NOCTULE_STORE"].startswith(f"nats://{hosts}/"))
         for port in ("client", "cluster", "monitor"):
             self.assertIn(f'"0.0.0.0:{ports[port]}"', config)
-        # What a bucket of files may hold, and the room of a volume.
+        # The size limit of the stored files, and the size of a volume.
         kept = int(re.search(r"max_file_store: (\d+)GB", config)[1])
         claimed = servers["spec"]["volumeClaimTemplates"][0]["spec"]["resources"]["requests"]["storage"]
         self.assertLess(kept, int(claimed.removesuffix("Gi")))
 
-    def test_resources_have_names_of_their_own(self):
+    def test_resource_names_are_unique(self):
         names = [(resource["kind"], resource["metadata"]["name"]) for resource in RESOURCES]
         self.assertEqual(len(names), len(set(names)))
 
 
 class NatsServer(unittest.TestCase):
-    def test_it_takes_its_configuration(self):
+    def test_the_configuration_is_valid(self):
         [of_pods] = [r["data"]["nats.conf"] for r in of_kind("ConfigMap") if "nats.conf" in r["data"]]
         for config in (of_pods, (DEPLOY / "nats/nats.conf").read_text()):
             self.assertIn("sync_interval: always", config)

@@ -1,4 +1,4 @@
-"""The commands of the files, run: a NATS server by its file, the nodes of Compose and of the pods over it."""
+"""The commands of the files, run: a NATS server with its file, and the nodes of Compose and Kubernetes on it."""
 
 import json
 import re
@@ -24,7 +24,7 @@ def free_port():
 
 
 def ask(url, document=None):
-    """Status and body."""
+    """The status and body of the response."""
     body = None if document is None else json.dumps(document).encode()
     request = urllib.request.Request(url, body, {"content-type": "application/json"})
     try:
@@ -50,7 +50,7 @@ class Running(unittest.TestCase):
     def setUp(self):
         self.scratch = Path(self.enterContext(tempfile.TemporaryDirectory()))
         self.port, self.monitor = free_port(), free_port()
-        # As the file says, but on ports and in a directory of the test's own.
+        # As in the file, but with the test's own ports and directory.
         config = (DEPLOY / "nats/nats.conf").read_text()
         for there, here in (
             ('"0.0.0.0:4222"', f'"127.0.0.1:{self.port}"'),
@@ -75,7 +75,7 @@ class Running(unittest.TestCase):
         return process
 
     def node(self, node, namespace):
-        """Start it with its own command, elsewhere; its process and address."""
+        """Starts the node with its own command, but local paths and ports; its process and URL."""
         directory = self.scratch / f"{node.name} {time.monotonic()}"
         here = {
             "listen": "127.0.0.1:0",
@@ -91,7 +91,7 @@ class Running(unittest.TestCase):
                 continue
             arguments.append(word)
         arguments += [f"--{flag}={value}" for flag, value in here.items()]
-        # Three copies need three servers.
+        # Three replicas would need three servers.
         variables = node.variables | {
             "NOCTULE_STORE": f"nats://127.0.0.1:{self.port}/{namespace}",
             "NOCTULE_STORE_REPLICAS": "1",
@@ -101,11 +101,11 @@ class Running(unittest.TestCase):
         until(f"ready: {node.name}", lambda: ask(f"{url}/readyz")[0] == 200)
         return process, url
 
-    def test_what_is_acknowledged_is_on_the_disk(self):
+    def test_the_server_syncs_every_write(self):
         _, told = ask(f"http://127.0.0.1:{self.monitor}/varz")
         self.assertTrue(json.loads(told)["jetstream"]["config"]["sync_always"])
 
-    def test_plans_that_one_node_takes_others_run(self):
+    def test_plans_accepted_by_one_node_run_on_another(self):
         scenario = json.loads((ROOT / "scenarios/paper-1.json").read_text())
         for namespace, prefix in (("compose", "compose "), ("pods", "noctule-")):
             nodes = [node for node in NODES if node.name.startswith(prefix)]

@@ -1,4 +1,4 @@
-//! Keys of the real service: made, read, read again; and no service for strangers by accident.
+//! Keys of the real service: creating, reading and reloading them; and no accidental service for strangers.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use crate::support::patience::{eventually, in_time};
 use crate::support::process::{Service, run, run_with};
 use crate::support::scenario;
 
-/// A new key, and its entry.
+/// A new key and its key file entry.
 fn new_key(arguments: &[&str]) -> (String, String) {
     let made = run(&[&["key", "new"], arguments].concat(), "");
     let told = String::from_utf8(made.stderr).expect("UTF-8");
@@ -20,7 +20,7 @@ fn new_key(arguments: &[&str]) -> (String, String) {
     (key, String::from_utf8(made.stdout).expect("UTF-8"))
 }
 
-/// What listing plans with a key is answered with.
+/// The status of listing plans with a key.
 async fn lists(service: &Service, key: &str) -> StatusCode {
     let request = service.get("/plans").bearer_auth(key);
     request.send().await.expect("an answer").status()
@@ -49,13 +49,13 @@ impl Guarded {
         Self { directory, service }
     }
 
-    /// Write other keys, and have them read.
+    /// Replaces the key file and makes the service reload it.
     fn exchange_keys(&self, entries: &str) {
         fs::write(self.directory.path().join("keys.toml"), entries).expect("written");
         self.service.signal("HUP");
     }
 
-    /// The address of a plan that was handed in with `key`.
+    /// Submits a plan with `key`; the plan's address.
     async fn submit(&self, key: &str) -> String {
         let request = self.service.client().post(self.service.url("/plans"));
         let request = request.json(&scenario()).bearer_auth(key);
@@ -67,13 +67,13 @@ impl Guarded {
             .to_owned()
     }
 
-    /// The log, once it has `part` in it.
+    /// Waits until the log contains `part`; the log.
     async fn log_with(&self, part: &str) -> String {
         log_with(&self.directory.path().join("log"), part).await
     }
 }
 
-/// The log, once it has `part` in it.
+/// Waits until the log contains `part`; the log.
 async fn log_with(path: &Path, part: &str) -> String {
     let log = || fs::read_to_string(path).expect("a log");
     eventually(async || log().contains(part)).await;
@@ -81,7 +81,7 @@ async fn log_with(path: &Path, part: &str) -> String {
 }
 
 #[test]
-fn a_new_key_is_told_once_and_its_entry_can_be_appended() {
+fn a_new_key_is_printed_once_and_its_entry_can_be_appended() {
     let (key, entry) = new_key(&[
         "--name",
         "a \"b\"",
@@ -124,7 +124,7 @@ fn a_new_key_is_told_once_and_its_entry_can_be_appended() {
 }
 
 #[test]
-fn a_service_without_keys_does_not_listen_to_strangers() {
+fn a_service_with_no_or_broken_keys_refuses_to_listen_on_every_address() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let data_dir = directory.path().join("data");
     let data_dir = data_dir.to_str().expect("UTF-8");
@@ -165,9 +165,9 @@ fn a_service_without_keys_does_not_listen_to_strangers() {
     );
 }
 
-/// Or a page whose name leads here uses it through a browser on this machine.
+/// Otherwise a page whose host name resolves here could use the service through a browser on this machine.
 #[tokio::test]
-async fn a_service_without_keys_answers_to_no_name_that_others_can_give_it() {
+async fn a_service_without_keys_rejects_host_names_that_others_control() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let path = |name: &str| directory.path().join(name);
     let (_, entry) = new_key(&["--name", "a"]);
@@ -199,7 +199,7 @@ async fn a_service_without_keys_answers_to_no_name_that_others_can_give_it() {
 }
 
 #[tokio::test]
-async fn a_request_of_http_1_1_names_its_host() {
+async fn an_http_1_1_request_must_name_exactly_one_host() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &["--allow-anonymous"]);
     for (head, status) in [
@@ -224,7 +224,7 @@ async fn a_request_of_http_1_1_names_its_host() {
 }
 
 #[tokio::test]
-async fn with_leave_or_keys_it_listens_everywhere() {
+async fn with_keys_or_allow_anonymous_it_listens_on_every_address() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let path = |name: &str| directory.path().join(name);
     let (key, entry) = new_key(&["--name", "a"]);
@@ -253,7 +253,7 @@ async fn with_leave_or_keys_it_listens_everywhere() {
 }
 
 #[tokio::test]
-async fn a_hangup_reads_the_keys_again_and_a_fault_changes_nothing() {
+async fn sighup_reloads_the_keys_and_a_faulty_file_changes_nothing() {
     let (old, old_entry) = new_key(&["--name", "old", "--owner", "alice"]);
     let (new, new_entry) = new_key(&["--name", "new", "--owner", "alice"]);
     let guarded = Guarded::new(&old_entry, &["--workers", "1"]);
@@ -272,7 +272,7 @@ async fn a_hangup_reads_the_keys_again_and_a_fault_changes_nothing() {
     guarded.exchange_keys(&new_entry);
     guarded.log_with("the keys have been read again").await;
     assert_eq!(lists(service, &old).await, StatusCode::UNAUTHORIZED);
-    // The new key is of the same owner.
+    // The new key has the same owner.
     let status = service
         .get(&plan)
         .bearer_auth(&new)
@@ -295,15 +295,21 @@ async fn neither_keys_nor_tickets_are_logged() {
     let ticket: serde_json::Value = issued.json().await.expect("JSON");
     let events = ticket["events"].as_str().expect("text");
     service.bytes(events).await;
-    for uri in [
+    let with_key = [
         format!("/plans?key={key}"),
         format!("/plans/{key}"),
         format!("/plans/%20{key}?x"),
-    ] {
-        let refused = service.get(&uri).header("x-request-id", &key).send().await;
+    ];
+    for uri in &with_key {
+        let refused = service.get(uri).header("x-request-id", &key).send().await;
         assert_eq!(refused.expect("an answer").status(), 400);
     }
-    let log = guarded.log_with("a key came in a URL").await;
+    let path = guarded.directory.path().join("log");
+    let log = || fs::read_to_string(&path).expect("a log");
+    // Each of the requests has been logged.
+    let refused = || log().matches("a key came in a URL").count();
+    eventually(async || refused() == with_key.len()).await;
+    let log = log();
     assert!(log.contains("alice"), "the key's name is there: {log}");
     let ticket = ticket["ticket"].as_str().expect("text");
     let sum = noctule::digest::sha256_hex(key.as_bytes());

@@ -1,4 +1,4 @@
-//! The search algorithms that a request may name: listed everywhere, and planning as they should.
+//! The search algorithms that a request may name: each is listed everywhere and plans correctly.
 
 use noctule::optimizer;
 use noctule::planner::{self, Nobody, Outcome};
@@ -14,7 +14,7 @@ fn names() -> Vec<&'static str> {
     algorithms.map(|algorithm| algorithm.name).collect()
 }
 
-/// Plan the shipped `paper-1`, plainly: from a random start, without polishing.
+/// Plans the shipped `paper-1` without seeding or polishing: from a random start.
 fn plan(algorithm: &str, seed: u64, [waypoints, population, iterations]: [u64; 3]) -> Outcome {
     let text = include_str!("../../scenarios/paper-1.json");
     let mut document: Value = serde_json::from_str(text).expect("JSON");
@@ -32,7 +32,7 @@ fn plan(algorithm: &str, seed: u64, [waypoints, population, iterations]: [u64; 3
 }
 
 #[test]
-fn every_algorithm_plans_alike_with_the_same_seed() {
+fn the_same_seed_gives_the_same_plan_with_every_algorithm() {
     for name in names() {
         let size = [10, 30, 60];
         let outcome = plan(name, 7, size);
@@ -51,9 +51,9 @@ fn every_algorithm_plans_alike_with_the_same_seed() {
     }
 }
 
-/// The spherical codings find a route from every seed; the Cartesian ones come nearer to one.
+/// The spherical codings find a feasible route from every seed; the Cartesian ones get closer to one.
 #[test]
-fn spherical_vectors_are_feasible() {
+fn spherical_codings_find_routes_and_cartesian_ones_reduce_violations() {
     for name in ["tms-sba", "sba", "spso"] {
         for seed in 1..=3 {
             let outcome = plan(name, seed, [10, 60, 100]);
@@ -77,13 +77,13 @@ fn spherical_vectors_are_feasible() {
 }
 
 #[test]
-fn the_smallest_population_and_a_single_waypoint_will_do() {
+fn every_algorithm_plans_with_the_smallest_population_and_one_waypoint() {
     for name in names() {
         for population in [2, 3] {
             assert_eq!(plan(name, 3, [1, population, 20]).waypoints.len(), 3);
             assert_eq!(plan(name, 3, [10, population, 20]).waypoints.len(), 12);
         }
-        // Between the radars there is room for one corner.
+        // A single corner fits between the radars.
         let outcome = plan(name, 3, [1, 40, 100]);
         assert!(outcome.feasible, "{name}: {:?}", outcome.violations);
     }
@@ -122,10 +122,10 @@ async fn every_algorithm_is_listed_with_its_source() {
     }
 }
 
-/// Whatever is listed as common is taken by each algorithm, to the ends of its range and no farther,
-/// and is its default when absent.
+/// Each algorithm accepts every common parameter over exactly its listed range, and uses the listed default
+/// when it is absent.
 #[test]
-fn every_algorithm_takes_the_common_parameters() {
+fn every_algorithm_accepts_the_common_parameters() {
     let rules = planner::rules(Limits::default());
     let accepted = |parameters: Value, algorithm: &str| {
         let text = include_str!("../../scenarios/paper-1.json");

@@ -1,4 +1,4 @@
-//! The service's answers, one by one; `support::api` holds each of them to `openapi.yaml`.
+//! The service's responses, one by one; `support::api` checks each of them against `openapi.yaml`.
 
 use std::io::Read as _;
 use std::time::Duration;
@@ -48,7 +48,7 @@ async fn a_plan_is_accepted_run_and_delivered() {
 }
 
 #[tokio::test]
-async fn the_accepted_scenario_has_its_defaults_and_can_be_posted_again() {
+async fn an_accepted_scenario_has_its_drawn_seed_and_can_be_posted_again() {
     let api = Api::new();
     let mut document = scenario();
     document["planner"]["seed"].take();
@@ -73,7 +73,7 @@ async fn the_accepted_scenario_has_its_defaults_and_can_be_posted_again() {
 }
 
 #[tokio::test]
-async fn validation_alone_keeps_nothing() {
+async fn validate_only_stores_no_plan() {
     let api = Api::new();
     let answer = api.post("/plans?validate_only=true", &scenario()).await;
     assert_eq!(answer.status, StatusCode::OK);
@@ -88,7 +88,7 @@ async fn validation_alone_keeps_nothing() {
 }
 
 #[tokio::test]
-async fn a_caller_who_prefers_to_wait_gets_the_end() {
+async fn prefer_wait_returns_the_ended_plan() {
     let api = Api::new();
     let worker = tokio::spawn({
         let store = api.store.clone();
@@ -117,7 +117,7 @@ async fn a_caller_who_prefers_to_wait_gets_the_end() {
 }
 
 #[tokio::test]
-async fn a_plan_that_is_deleted_while_its_caller_waits_was_accepted() {
+async fn a_plan_deleted_while_its_caller_waits_is_reported_as_accepted() {
     let api = Api::new();
     let headers = [("content-type", "application/json"), ("prefer", "wait=30")];
     let waiting = api.send(Method::POST, "/plans", &headers, scenario().to_string());
@@ -158,7 +158,7 @@ async fn a_status_document_is_sent_only_when_it_has_changed() {
         .await;
     assert_eq!(answer.status, StatusCode::OK);
 
-    // Waiting with a known version ends at the next change, not only at the end.
+    // A wait that names the known version ends at the next change, not only at the end.
     let known = [("if-none-match", tag.as_str()), ("prefer", "wait=30")];
     let (answer, lease) = tokio::join!(api.get_with(&address, &known), async {
         api.store.claim().await.expect("a queued plan")
@@ -167,7 +167,7 @@ async fn a_status_document_is_sent_only_when_it_has_changed() {
     assert_eq!(answer.json()["status"], "running");
     assert_eq!(answer.header("preference-applied"), "wait=30");
 
-    // Waiting without one ends at the end.
+    // A wait without a version ends when the plan ends.
     let wait = [("prefer", "wait=30")];
     let (answer, ()) = tokio::join!(api.get_with(&address, &wait), async {
         let events = vec![run::convergence(0, 0.1)];
@@ -261,7 +261,7 @@ async fn a_cancelled_plan_keeps_its_best_route() {
 }
 
 #[tokio::test]
-async fn a_plan_is_cancelled_or_deleted_only_as_its_caller_expects_it() {
+async fn cancel_and_delete_honour_if_match_and_if_none_match() {
     let api = Api::new();
     let address = api.submit().await;
     let queued = api.get(&address).await.header("etag").to_owned();
@@ -293,7 +293,7 @@ async fn a_plan_is_cancelled_or_deleted_only_as_its_caller_expects_it() {
     for (header, value, status) in [
         ("if-match", &*running, 412),
         ("if-match", "*", 204),
-        // Nothing of what was removed is as it was.
+        // A removed plan matches no version.
         ("if-match", "*", 412),
         ("if-none-match", "*", 204),
     ] {
@@ -323,7 +323,7 @@ async fn a_deleted_plan_is_gone() {
 }
 
 #[tokio::test]
-async fn results_that_are_not_there_say_why() {
+async fn a_missing_result_says_why_it_is_missing() {
     let api = Api::new();
     let mut problems = Vec::new();
 
@@ -367,7 +367,7 @@ async fn results_that_are_not_there_say_why() {
 }
 
 #[tokio::test]
-async fn a_full_queue_refuses_and_says_when_to_come_back() {
+async fn a_full_queue_refuses_and_says_when_to_retry() {
     let api = Api::with_queue(2);
     for _ in 0..2 {
         api.submit().await;
@@ -383,7 +383,7 @@ async fn a_full_queue_refuses_and_says_when_to_come_back() {
         problem["detail"],
         "2 plans wait, the limit; try again in 1 s"
     );
-    // Room is made by a claim.
+    // A claim makes room.
     let _lease = api.store.claim().await.expect("a queued plan");
     assert_eq!(
         api.post("/plans", &scenario()).await.status,
@@ -392,7 +392,7 @@ async fn a_full_queue_refuses_and_says_when_to_come_back() {
 }
 
 #[tokio::test]
-async fn a_draining_service_answers_but_takes_no_plans() {
+async fn a_draining_service_answers_but_accepts_no_plans() {
     let api = Api::new();
     let address = api.submit().await;
     assert_eq!(api.get("/readyz").await.status, StatusCode::OK);
@@ -415,7 +415,7 @@ async fn a_draining_service_answers_but_takes_no_plans() {
 }
 
 #[tokio::test]
-async fn where_a_plan_came_from_is_forgotten_with_it() {
+async fn the_origin_of_a_plan_is_forgotten_when_it_is_cancelled_or_deleted() {
     let api = Api::new();
     for (method, step) in [(Method::POST, "/cancel"), (Method::DELETE, "")] {
         let address = api.submit().await;
@@ -429,7 +429,7 @@ async fn where_a_plan_came_from_is_forgotten_with_it() {
 }
 
 #[tokio::test]
-async fn a_closed_store_is_unavailable_not_broken() {
+async fn a_closed_store_is_reported_as_unavailable() {
     let api = Api::new();
     let address = api.submit().await;
     api.store.close().await;
@@ -468,7 +468,7 @@ async fn head_is_get_without_its_body() {
 }
 
 #[tokio::test]
-async fn every_answer_has_its_request_id() {
+async fn a_response_has_the_callers_request_id_or_a_generated_one() {
     let api = Api::new();
     let answer = api
         .get_with("/nothing", &[("x-request-id", "caller-1")])
@@ -488,7 +488,7 @@ async fn every_answer_has_its_request_id() {
 }
 
 #[tokio::test]
-async fn the_service_tells_about_itself() {
+async fn the_service_describes_its_version_limits_and_algorithms() {
     let api = Api::new();
     assert_eq!(api.get("/version").await.json()["name"], "noctule");
     let limits = api.get("/limits").await.json();
@@ -500,7 +500,7 @@ async fn the_service_tells_about_itself() {
 }
 
 #[tokio::test]
-async fn a_body_that_never_ends_is_cut_off() {
+async fn a_body_that_stalls_or_breaks_off_is_refused() {
     let mut api = Api::new();
     api.state.body_timeout = Duration::from_millis(10);
     api.router = noctule::http::router(api.state.clone());
@@ -524,7 +524,7 @@ async fn a_body_that_never_ends_is_cut_off() {
 }
 
 #[tokio::test]
-async fn a_plan_past_its_time_is_gone_and_says_so() {
+async fn an_expired_plan_is_gone_and_says_so() {
     let retention = Retention {
         age_ms: Some(1),
         ..Retention::default()
@@ -552,7 +552,7 @@ fn gzip(plain: &[u8]) -> Vec<u8> {
 }
 
 #[tokio::test]
-async fn bodies_may_come_and_go_as_gzip() {
+async fn request_and_response_bodies_may_be_gzipped() {
     let api = Api::new();
     let headers = [
         ("content-type", "application/json"),
@@ -581,21 +581,21 @@ async fn bodies_may_come_and_go_as_gzip() {
         .expect("gzip");
     assert_eq!(unpacked, plain.body);
 
-    // What has been done is told, and refused, in no coding where none is taken.
+    // Where no coding is acceptable, the response is sent uncompressed, whether success or refusal.
     let none = [("accept-encoding", "identity;q=0")];
     let answer = api.get_with(&result, &none).await;
     assert_eq!((answer.status, answer.body), (StatusCode::OK, plain.body));
     let nowhere = api.get_with("/nothing", &none).await;
     nowhere.expect_problem(404, "not-found");
 
-    // Nothing comes between a stream and its reader.
+    // Event streams are never compressed.
     let events = format!("{}/events", accepted.header("location"));
     let told = api.get_with(&events, &[("accept-encoding", "gzip")]).await;
     assert!(!told.headers.contains_key("content-encoding"));
 }
 
 #[tokio::test]
-async fn the_best_route_so_far_is_measured_like_a_result() {
+async fn a_partial_result_is_measured_like_a_final_one() {
     let api = Api::new();
     let address = api.submit().await;
     let partial = format!("{address}/result?partial=true");
@@ -620,7 +620,7 @@ async fn the_best_route_so_far_is_measured_like_a_result() {
     assert!(so_far["bound"]["lower"].as_f64().expect("a figure") > 0.0);
     let drawing = api.get(&format!("{partial}&format=svg")).await;
     assert_eq!(drawing.header("content-type"), "image/svg+xml");
-    // Who does not ask for it waits.
+    // Without `partial=true` the result is not ready yet.
     let whole = api.get(&format!("{address}/result")).await;
     whole.expect_problem(409, "not-ready");
     let query = format!("{address}/result?partial=maybe");
@@ -635,7 +635,7 @@ async fn the_best_route_so_far_is_measured_like_a_result() {
 }
 
 #[tokio::test]
-async fn the_curve_of_the_best_so_far_has_its_newest_points() {
+async fn a_partial_result_keeps_the_newest_points_of_a_long_convergence_curve() {
     for_every_backend(async |backend| {
         let options = Options {
             events_kept: 20_000,

@@ -1,4 +1,4 @@
-//! Who may do what: keys, scopes, whose plan is whose, tickets, rates, streams.
+//! Authorization: keys, scopes, plan ownership, tickets, rate limits, streams.
 
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode};
@@ -14,7 +14,7 @@ use crate::support::description::DESCRIPTION;
 use crate::support::keys::{bearer, entry, post, send};
 use crate::support::{run, scenario};
 
-/// Alice and Bob may plan, Rita may read Alice's, Max may see the metrics, Ada may do everything.
+/// Alice and Bob may plan, Rita may read Alice's plans, Max may read the metrics, Ada may do everything.
 fn house() -> String {
     [
         entry("alice", "of alice", "plan", ""),
@@ -27,7 +27,7 @@ fn house() -> String {
     .concat()
 }
 
-/// The address of a plan that is the key's.
+/// Submits a plan with the key; the plan's address.
 async fn submit(api: &Api, secret: &str) -> String {
     let answer = post(api, secret).await;
     assert_eq!(answer.status, 202, "{answer:?}");
@@ -36,7 +36,7 @@ async fn submit(api: &Api, secret: &str) -> String {
 
 const NOBODY: &str = "01936f2c-7d1a-7c55-9a53-27b1b44c1a10";
 
-/// Everything that can be asked of a plan.
+/// Every request that can be made about a plan.
 const OF_A_PLAN: [&str; 9] = [
     "GET {plan}",
     "HEAD {plan}",
@@ -49,7 +49,7 @@ const OF_A_PLAN: [&str; 9] = [
     "DELETE {plan}",
 ];
 
-/// What an answer says, but for what differs from request to request.
+/// The contents of a response, without what differs between requests.
 fn said(answer: &Answer, id: &str) -> (StatusCode, String, Vec<String>) {
     let request_id = answer.header("x-request-id");
     let text = String::from_utf8(answer.body.to_vec()).expect("UTF-8");
@@ -60,7 +60,7 @@ fn said(answer: &Answer, id: &str) -> (StatusCode, String, Vec<String>) {
 }
 
 #[tokio::test]
-async fn the_plan_of_another_is_as_one_that_never_was() {
+async fn another_owners_plan_looks_like_one_that_never_existed() {
     let api = Api::with_keys(&house());
     for ended in [false, true] {
         let plan = submit(&api, "of alice").await;
@@ -78,7 +78,7 @@ async fn the_plan_of_another_is_as_one_that_never_was() {
         let status = send(&api, "of alice", &format!("GET {plan}")).await.json();
         assert_eq!(status["cancel_requested"], false, "nothing was done to it");
 
-        // A deleted one is gone for its owner, and was never there for others.
+        // A deleted plan is gone for its owner and unknown to others.
         assert_eq!(
             send(&api, "of alice", &format!("DELETE {plan}"))
                 .await
@@ -95,7 +95,7 @@ async fn the_plan_of_another_is_as_one_that_never_was() {
 }
 
 #[tokio::test]
-async fn nobody_starts_from_the_plan_of_another() {
+async fn a_warm_start_from_another_owners_plan_is_refused() {
     let api = Api::with_keys(&house());
     let plan = submit(&api, "of alice").await;
     run::complete(&*api.store, Vec::new()).await;
@@ -120,8 +120,9 @@ async fn nobody_starts_from_the_plan_of_another() {
 }
 
 #[tokio::test]
-async fn lists_show_what_is_ones_own() {
-    let api = Api::with_keys(&house());
+async fn lists_and_idempotency_keys_are_scoped_by_owner() {
+    let anna = entry("anna", "of anna", "plan", "owner = \"alice\"");
+    let api = Api::with_keys(&(house() + &anna));
     let of_alice = submit(&api, "of alice").await;
     let of_bob = submit(&api, "of bob").await;
     for (secret, expected) in [
@@ -152,10 +153,11 @@ async fn lists_show_what_is_ones_own() {
         answer.header("location").to_owned()
     };
     assert_ne!(once("of alice").await, once("of bob").await);
+    assert_eq!(once("of alice").await, once("of anna").await);
 }
 
 #[tokio::test]
-async fn without_a_good_key_there_is_no_way_in() {
+async fn requests_without_a_valid_key_are_refused() {
     const NONE: &str = "Bearer realm=\"noctule\"";
     const WRONG: &str = "Bearer realm=\"noctule\", error=\"invalid_token\"";
     let api = Api::with_keys(&house());
@@ -168,7 +170,7 @@ async fn without_a_good_key_there_is_no_way_in() {
     };
 
     refuse(&api.get(&plan).await, NONE);
-    // Unknown and malformed ones are told the same.
+    // Unknown and malformed keys get the same response.
     let unknown = refuse(&send(&api, "of nobody", &asked).await, WRONG);
     for value in [
         "Bearer",
@@ -186,10 +188,10 @@ async fn without_a_good_key_there_is_no_way_in() {
         ("authorization", "Bearer of alice"),
     ];
     assert_eq!(refuse(&api.get_with(&plan, &twice).await, WRONG), unknown);
-    // Who held a key once may know that it is over.
+    // The holder of an expired key may learn that it has expired.
     let expired = refuse(&send(&api, "of eve", &asked).await, WRONG);
     assert!(expired.contains("expired"), "{expired}");
-    // The scheme's name has no case.
+    // The scheme's name is case-insensitive.
     let lower = api
         .get_with(&plan, &[("authorization", "bearer of alice")])
         .await;
@@ -197,7 +199,7 @@ async fn without_a_good_key_there_is_no_way_in() {
 }
 
 #[tokio::test]
-async fn every_route_asks_for_what_the_description_says() {
+async fn every_route_requires_the_scope_that_the_description_states() {
     let api = Api::with_keys(&house());
     for route in noctule::http::routes() {
         let place = format!("{} {}", route.method, route.path);
@@ -246,7 +248,7 @@ async fn every_route_asks_for_what_the_description_says() {
 }
 
 #[tokio::test]
-async fn a_key_in_a_url_is_refused_wherever_it_stands() {
+async fn a_key_anywhere_in_a_url_is_refused() {
     let key = noctule::http::auth::fresh_key().expect("random");
     let api = Api::with_keys(&entry("alice", &key, "plan", ""));
     for uri in [
@@ -272,7 +274,7 @@ async fn a_key_in_a_url_is_refused_wherever_it_stands() {
 }
 
 #[tokio::test]
-async fn a_ticket_follows_one_plan_and_nothing_else() {
+async fn a_ticket_opens_the_events_of_one_plan_and_nothing_else() {
     let api = Api::with_keys(&house());
     let plan = submit(&api, "of alice").await;
     let other = submit(&api, "of alice").await;
@@ -307,7 +309,7 @@ async fn a_ticket_follows_one_plan_and_nothing_else() {
     ] {
         api.get(&uri).await.expect_problem(401, "unauthorized");
     }
-    // It is worth no more than the key that it came from.
+    // A ticket is valid only as long as the key that issued it.
     let house = house();
     let without_rita: Vec<&str> = house
         .split("[[key]]")
@@ -320,9 +322,9 @@ async fn a_ticket_follows_one_plan_and_nothing_else() {
     dead.expect_problem(401, "unauthorized");
 }
 
-/// A page's stream is opened at whichever node it is sent to; one that was restarted is another.
+/// A page may open its stream on any node, and a restarted node counts as another one.
 #[tokio::test]
-async fn a_ticket_of_one_node_is_one_on_all() {
+async fn a_ticket_is_valid_on_every_node_with_the_same_keys() {
     let mut api = Api::with_keys(&house());
     let plan = submit(&api, "of alice").await;
     let issued = send(&api, "of rita", &format!("POST {plan}/tickets")).await;
@@ -338,7 +340,7 @@ async fn a_ticket_of_one_node_is_one_on_all() {
 }
 
 #[tokio::test]
-async fn a_ticket_runs_out() {
+async fn a_ticket_expires() {
     let settings = Settings {
         ticket_life: std::time::Duration::ZERO,
         ..Settings::default()
@@ -354,7 +356,7 @@ async fn a_ticket_runs_out() {
 }
 
 #[tokio::test]
-async fn where_there_are_no_keys_tickets_work_the_same() {
+async fn tickets_also_work_without_keys() {
     let api = Api::new();
     let plan = api.submit().await;
     let ticket = api
@@ -369,7 +371,7 @@ async fn where_there_are_no_keys_tickets_work_the_same() {
 }
 
 #[tokio::test]
-async fn a_key_has_so_many_active_plans_and_no_more() {
+async fn an_owner_cannot_exceed_its_limit_of_active_plans() {
     let keys = entry("alice", "of alice", "plan", "active_plans = 2")
         + &entry(
             "alice new",
@@ -395,7 +397,7 @@ async fn a_key_has_so_many_active_plans_and_no_more() {
 }
 
 #[tokio::test]
-async fn a_key_asks_no_faster_than_it_may() {
+async fn a_key_cannot_exceed_its_request_rate() {
     let slow = "requests_per_second = 0.01\nburst = 3";
     let keys = entry("alice", "of alice", "read", slow) + &entry("bob", "of bob", "plan", "");
     let api = Api::with_keys(&keys);
@@ -426,7 +428,7 @@ async fn a_key_asks_no_faster_than_it_may() {
             .header("ratelimit")
             .starts_with("\"requests\";r=0;t=")
     );
-    // A reload forgives nothing.
+    // A reload does not reset the rate limit.
     api.state.access.replace(Keys::read(&keys).expect("keys"));
     send(&api, "of alice", "GET /plans")
         .await
@@ -436,9 +438,9 @@ async fn a_key_asks_no_faster_than_it_may() {
     assert!(!free.headers.contains_key("ratelimit"));
 }
 
-/// Longer than for anything else, as it is described.
+/// Longer than any other `Retry-After`, as documented.
 #[tokio::test]
-async fn a_slow_key_is_told_how_long_it_takes() {
+async fn retry_after_covers_the_full_wait_of_a_slow_key() {
     let slow = "requests_per_second = 0.001\nburst = 1";
     let api = Api::with_keys(&entry("alice", "of alice", "read", slow));
     assert_eq!(send(&api, "of alice", "GET /plans").await.status, 200);
@@ -448,7 +450,7 @@ async fn a_slow_key_is_told_how_long_it_takes() {
     assert!((900..=1000).contains(&seconds), "{seconds}");
 }
 
-/// A stream that is open; its head has come.
+/// An open stream whose head has arrived.
 async fn open(api: &Api, plan: &str, secret: Option<&str>) -> axum::http::Response<Body> {
     let request = Request::get(format!("{plan}/events")).header("host", "localhost");
     let request = match secret {
@@ -498,7 +500,7 @@ async fn a_stream_counts_until_its_body_is_dropped() {
         (StatusCode::OK, StatusCode::OK)
     );
     assert_eq!(refused("of rita").await, "streams_per_key");
-    // Reading makes no difference, dropping does.
+    // Reading does not free a place, dropping does.
     first
         .body_mut()
         .frame()
@@ -513,7 +515,7 @@ async fn a_stream_counts_until_its_body_is_dropped() {
     assert_eq!(again.status(), StatusCode::OK);
     assert_eq!(refused("of ada").await, "streams");
     drop((second, third, again));
-    // One that reaches its end gives its place back as well.
+    // A stream that reaches its end frees its place as well.
     for _ in 0..4 {
         let followed = open(&api, &plan, Some("of alice")).await;
         assert_eq!(followed.status(), StatusCode::OK);
@@ -521,7 +523,7 @@ async fn a_stream_counts_until_its_body_is_dropped() {
 }
 
 #[tokio::test]
-async fn a_key_that_is_taken_away_takes_its_streams_along() {
+async fn removing_a_key_ends_its_streams() {
     let api = Api::with_keys(&house());
     let plan = submit(&api, "of alice").await;
     let of_rita = open(&api, &plan, Some("of rita")).await.into_body();

@@ -1,4 +1,4 @@
-//! `noctule bench`: what it writes, and that everything but times is the same each time.
+//! `noctule bench`: what it writes, and that everything except times is reproducible.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::support::process::run;
 use crate::support::scenario;
 
-/// The rows of a CSV file, by its columns.
+/// The column names and rows of a CSV file.
 fn rows(file: &Path) -> (Vec<String>, Vec<Vec<String>>) {
     let text = fs::read_to_string(file).expect("written");
     let mut lines = text.lines().map(fields);
@@ -20,7 +20,7 @@ fn rows(file: &Path) -> (Vec<String>, Vec<Vec<String>>) {
     (columns, rows)
 }
 
-/// The fields of a line, as RFC 4180 has them.
+/// The fields of a line, as in RFC 4180.
 fn fields(line: &str) -> Vec<String> {
     let mut fields = vec![String::new()];
     let mut quoted = false;
@@ -46,7 +46,7 @@ fn column(file: &Path, name: &str) -> Vec<String> {
         .collect()
 }
 
-/// All but times.
+/// All columns except times.
 fn essence(file: &Path) -> Vec<Vec<String>> {
     let (columns, rows) = rows(file);
     rows.into_iter()
@@ -68,7 +68,7 @@ fn numbers(column: &[String]) -> Vec<f64> {
 }
 
 #[test]
-fn the_paper_is_repeated() {
+fn bench_paper_is_reproducible_and_its_tables_follow_from_its_runs() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let own = directory.path().join("two-radars.json");
     fs::write(&own, scenario().to_string()).expect("written");
@@ -96,7 +96,7 @@ fn the_paper_is_repeated() {
     measure(&first, &["paper-1", own.to_str().expect("UTF-8")]);
     measure(&second, &["paper-1"]);
 
-    // The second run has the first scenario alone.
+    // The second run has only the first scenario.
     let assert_same = |file: &str| {
         let again = essence(&second.join(file));
         assert_eq!(essence(&first.join(file))[..again.len()], again, "{file}");
@@ -112,7 +112,7 @@ fn the_paper_is_repeated() {
     for (table, sizes) in tables.into_iter().zip([1, 4, 4, 4, 1]) {
         let file = format!("paper-{table}.csv");
         let algorithms = column(&first.join(&file), "algorithm");
-        // Six algorithms, or the reference with its five variants, in two scenarios.
+        // Six algorithms, or the reference and its five variants, over two scenarios.
         assert_eq!(algorithms.len(), 2 * 6 * sizes, "{file}");
         assert_same(&file);
         let wins = column(&first.join(&file), "wins");
@@ -134,7 +134,7 @@ fn the_paper_is_repeated() {
     assert_eq!(page.matches("\n## ").count(), 5);
     assert_same("paper-runs.csv");
 
-    // The figures of a table are those of the runs.
+    // The figures of a table follow from the runs.
     let runs = first.join("paper-runs.csv");
     let (_, all) = rows(&runs);
     let costs: Vec<f64> = all
@@ -167,7 +167,7 @@ fn the_paper_is_repeated() {
 }
 
 #[test]
-fn quality_is_measured_against_the_best_known() {
+fn bench_quality_measures_against_the_best_known_cost() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let arguments = [
         "bench",
@@ -220,7 +220,7 @@ fn quality_is_measured_against_the_best_known() {
 }
 
 #[test]
-fn random_scenarios_are_measured_against_the_best_of_their_runs() {
+fn bench_random_measures_against_the_best_of_its_runs() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let path = |name: &str| directory.path().join(name);
     let measure = |out: &str, first: &str, scenarios: &str| {
@@ -247,7 +247,7 @@ fn random_scenarios_are_measured_against_the_best_of_their_runs() {
     let runs = path("both").join("random-runs.csv");
     let names = ["discs-3", "discs-4", "agility-3", "agility-4"];
     assert_eq!(column(&runs, "scenario"), names);
-    // A scenario is its seed's own, whichever come before it.
+    // A scenario depends only on its seed, not on the scenarios before it.
     let (all, alone) = (
         essence(&runs),
         essence(&path("second").join("random-runs.csv")),
@@ -271,7 +271,7 @@ fn random_scenarios_are_measured_against_the_best_of_their_runs() {
         );
     }
 
-    // What was kept can be planned, with the same outcome.
+    // A kept scenario can be planned again, with the same outcome.
     let plan = run(
         &[
             "plan",
@@ -294,7 +294,7 @@ fn random_scenarios_are_measured_against_the_best_of_their_runs() {
 }
 
 #[test]
-fn speed_has_its_tables() {
+fn bench_speed_writes_its_tables() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let out = directory.path().to_str().expect("UTF-8");
     let done = run(
@@ -338,7 +338,7 @@ fn speed_has_its_tables() {
 }
 
 #[test]
-fn faults_of_a_scenario_are_told() {
+fn bench_reports_faults_of_scenarios_and_arguments() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let file = directory.path().join("wrong.json");
     let mut wrong = scenario();
@@ -360,7 +360,7 @@ fn faults_of_a_scenario_are_told() {
         assert_eq!(failed.status.code(), Some(1), "{arguments:?}");
         assert!(!failed.stderr.is_empty() && failed.stdout.is_empty());
     }
-    // A size that no planner takes is a fault of the document it makes.
+    // A size that the planner rejects is reported as a fault of the generated document.
     let refused = run(
         &["bench", "quality", "--seeds", "1", "--waypoints", "0"],
         "",
@@ -369,7 +369,7 @@ fn faults_of_a_scenario_are_told() {
 }
 
 #[test]
-fn routes_are_priced_as_the_planner_prices_them() {
+fn bench_price_agrees_with_the_planner() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let file = directory.path().join("scenario.json");
     let mut hilly = scenario();
@@ -391,7 +391,7 @@ fn routes_are_priced_as_the_planner_prices_them() {
         };
         all[1..all.len() - 1].iter().map(point).collect()
     };
-    // More than fit side by side, of several lengths; the last goes under the ground.
+    // More than one batch of lanes, of several lengths; the last route goes below ground.
     let mut routes = vec![free(0.0); 9];
     routes.push(vec![]);
     routes.push(free(500.0));
@@ -422,7 +422,7 @@ fn routes_are_priced_as_the_planner_prices_them() {
 }
 
 #[test]
-fn a_line_without_routes_is_refused() {
+fn bench_price_refuses_lines_that_are_not_routes() {
     for (line, why) in [
         ("nope", "an array of routes"),
         ("", "an array of routes"),
@@ -445,7 +445,7 @@ fn a_line_without_routes_is_refused() {
 }
 
 #[test]
-fn serve_measures_requests_refusals_streams_and_planning() {
+fn bench_serve_measures_requests_refusals_streams_and_planning() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let out = directory.path().to_str().expect("UTF-8");
     let least = [

@@ -1,4 +1,5 @@
-//! What pages may do with the service: those from elsewhere by exact origin, and every answer safe to open.
+//! What pages may do with the service: cross-origin access for exact origins only, and every response is safe to
+//! open.
 
 use axum::body::Body;
 use axum::http::{Method, Request, Response};
@@ -9,7 +10,7 @@ use crate::support::run;
 
 const PAGE: &str = "https://plans.example";
 
-/// What a browser asks before a request of a page.
+/// A browser's preflight request.
 async fn preflight(api: &Api, origin: &str) -> Response<Body> {
     let request = Request::builder()
         .method(Method::OPTIONS)
@@ -36,7 +37,7 @@ fn list<'a>(response: &'a Response<Body>, name: &str) -> Vec<&'a str> {
 }
 
 #[tokio::test]
-async fn a_page_of_a_listed_origin_may_ask_and_read() {
+async fn a_page_of_a_listed_origin_may_send_requests_and_read_responses() {
     let api = Api::with_origins(&[PAGE, "http://localhost:5173"]);
     let told = preflight(&api, PAGE).await;
     assert!(told.status().is_success(), "and without credentials");
@@ -66,7 +67,7 @@ async fn a_page_of_a_listed_origin_may_ask_and_read() {
             "{name}"
         );
     }
-    // A refusal can be read as well.
+    // Refusals are readable as well.
     for uri in ["/livez", "/nowhere"] {
         let answer = api.get_with(uri, &[("origin", PAGE)]).await;
         assert_eq!(answer.header("access-control-allow-origin"), PAGE);
@@ -95,7 +96,7 @@ async fn a_page_of_a_listed_origin_may_ask_and_read() {
 }
 
 #[tokio::test]
-async fn a_page_of_another_origin_may_not() {
+async fn a_page_of_any_other_origin_gets_no_access() {
     for api in [Api::new(), Api::with_origins(&[PAGE])] {
         for origin in [
             "https://evil.example",
@@ -119,7 +120,7 @@ async fn a_page_of_another_origin_may_not() {
 }
 
 #[tokio::test]
-async fn every_answer_is_safe_to_open() {
+async fn every_response_is_safe_to_open_in_a_browser() {
     let api = Api::new();
     let plan = api.submit().await;
     run::complete(&*api.store, Vec::new()).await;

@@ -1,4 +1,4 @@
-//! The command line: exit codes, faults, where results go.
+//! The command line: exit codes, faults, and where results are written.
 
 use std::fs;
 
@@ -92,10 +92,10 @@ fn no_feasible_route_exits_3_with_the_least_bad_one() {
     assert_ne!(result["checks"]["violations"], json!([]));
 }
 
-/// A search ends as soon as its route is proven to be good enough, and no sooner; guided, and by the
-/// plain algorithm, which takes longer to get there.
+/// A search ends as soon as its route is proven good enough, and no sooner; both with seeding and polishing and
+/// without, where it takes longer.
 #[test]
-fn a_gap_that_is_asked_for_ends_the_search() {
+fn reaching_the_requested_gap_ends_the_search() {
     let text = include_str!("../../scenarios/paper-2.json");
     let document: Value = serde_json::from_str(text).expect("JSON");
     for (seeding, polish, gap) in [("tangent", true, 0.05), ("random", false, 0.2)] {
@@ -120,7 +120,7 @@ fn a_gap_that_is_asked_for_ends_the_search() {
         assert_eq!(early["stop_reason"], "converged", "{seeding}");
         let proven = early["bound"]["gap"].as_f64().expect("a feasible route");
         assert!((0.0..=gap).contains(&proven), "{seeding}: {proven}");
-        // One iteration before, it was not good enough.
+        // No earlier iteration was good enough.
         let lower = early["bound"]["lower"].as_f64().expect("a figure");
         let curve = early["convergence"].as_array().expect("a curve");
         for before in &curve[..curve.len() - 1] {
@@ -136,13 +136,13 @@ fn a_gap_that_is_asked_for_ends_the_search() {
         let evaluations = |result: &Value| result["evaluations"].as_u64().expect("a count");
         assert!(evaluations(&early) < evaluations(&whole), "{seeding}");
         assert!(curve.len() < 60, "{seeding}: {} points", curve.len());
-        // Nobody proves that much.
+        // A gap of 1e-9 is never proven.
         assert_eq!(planned(1e-9)["stop_reason"], "iterations", "{seeding}");
     }
 }
 
 #[test]
-fn anything_else_exits_1() {
+fn any_other_failure_exits_1() {
     for arguments in [
         &["plan", "/nowhere/scenario.json"][..],
         &["plan", "-", "--colour"],
@@ -174,7 +174,7 @@ fn help_and_version_exit_0() {
 }
 
 #[tokio::test]
-async fn a_ready_service_is_healthy() {
+async fn healthcheck_exits_0_when_the_service_is_ready() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &[]);
     assert_eq!(
@@ -189,9 +189,9 @@ async fn a_ready_service_is_healthy() {
     assert!(reason.contains("answers 404"), "{reason}");
 }
 
-/// As `| head -1` leaves it.
+/// Such as after `| head -1`.
 #[test]
-fn a_reader_who_has_read_enough_is_no_failure() {
+fn a_closed_standard_output_is_not_a_failure() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     drop(Service::start(directory.path(), &[]));
     let data_dir = directory.path().to_str().expect("UTF-8");
@@ -224,9 +224,9 @@ fn a_reader_who_has_read_enough_is_no_failure() {
     }
 }
 
-/// As deployments leave those that they have no value for.
+/// Deployments leave variables empty that they have no value for.
 #[test]
-fn an_empty_variable_is_as_none() {
+fn an_empty_environment_variable_counts_as_unset() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &[]);
     let data_dir = directory.path().to_str().expect("UTF-8");

@@ -1,4 +1,4 @@
-//! A wall clock that jumps: nothing is forgotten and nothing expires for it, and `/readyz` says so.
+//! A jumping wall clock: nothing is forgotten or expires because of it, and `/readyz` reports it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -15,7 +15,7 @@ use crate::support::stores::{Backend, for_every_backend};
 
 const DAY_MS: i64 = 24 * 60 * 60 * 1_000;
 
-/// A service whose clock on the wall the test sets, and the time that passes.
+/// A service whose wall clock and elapsed time are set by the test.
 struct Service {
     api: Api,
     set_by_ms: Arc<AtomicI64>,
@@ -23,7 +23,7 @@ struct Service {
 }
 
 impl Service {
-    /// Which keeps plans for a week.
+    /// Keeps plans for a week.
     async fn on(backend: Backend) -> Self {
         let (set_by_ms, passed_ms) = (Arc::new(AtomicI64::new(0)), Arc::new(AtomicI64::new(0)));
         let (set_by, passing) = (set_by_ms.clone(), passed_ms.clone());
@@ -49,7 +49,7 @@ impl Service {
         }
     }
 
-    /// Somebody sets the clock.
+    /// Moves the wall clock by `ms`, as an operator would.
     fn set_by(&self, ms: i64) {
         self.set_by_ms.store(ms, Ordering::SeqCst);
     }
@@ -67,7 +67,7 @@ impl Service {
         self.api.send(Method::POST, "/plans", &headers, body).await
     }
 
-    /// What the sweeper does now and then.
+    /// One pass of the sweeper.
     async fn sweep(&self) {
         let now_ms = self.api.state.clock.now_ms();
         self.api.store.sweep(now_ms).await.expect("open");
@@ -75,7 +75,7 @@ impl Service {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_jump_makes_nothing_forgotten_and_nothing_expire() {
+async fn a_clock_jump_neither_forgets_nor_expires_anything() {
     for_every_backend(async |backend| {
         let service = Service::on(backend).await;
         let api = &service.api;
@@ -88,7 +88,7 @@ async fn a_jump_makes_nothing_forgotten_and_nothing_expire() {
             service.sweep().await;
             assert_eq!(api.get(&first).await.status, 200, "by {jump_ms} ms");
             assert_eq!(service.post("first").await.header("location"), first);
-            // What is deleted meanwhile buries nothing for good.
+            // A deletion during the jump must not evict older tombstones.
             api.delete(&api.submit().await).await;
             api.get(&deleted).await.expect_problem(410, "gone");
 
@@ -99,7 +99,7 @@ async fn a_jump_makes_nothing_forgotten_and_nothing_expire() {
             service.sweep().await;
             assert_eq!(api.get(&meanwhile).await.status, 200, "by {jump_ms} ms");
         }
-        // What its time has come for goes all the same, wherever the clock stands.
+        // What is due expires all the same, wherever the wall clock stands.
         service.set_by(-30 * DAY_MS);
         service.pass(60_000);
         service.sweep().await;
@@ -113,7 +113,7 @@ async fn a_jump_makes_nothing_forgotten_and_nothing_expire() {
 }
 
 #[tokio::test]
-async fn a_jump_is_told_and_keeps_nobody_out() {
+async fn a_clock_jump_is_reported_and_the_service_stays_ready() {
     let service = Service::on(Backend::Sqlite).await;
     let sound = service.api.get("/readyz").await.json();
     assert_eq!(sound, json!({"status": "ok"}));
@@ -122,7 +122,7 @@ async fn a_jump_is_told_and_keeps_nobody_out() {
     assert_eq!(answer.status, 200);
     let warning = answer.json()["warnings"][0].to_string();
     assert!(warning.contains("-7200000 ms"), "{warning}");
-    // Steady for an hour, it is believed.
+    // After an hour without another jump the new time is accepted.
     service.pass(60 * 60 * 1_000);
     assert_eq!(service.api.get("/readyz").await.json(), sound);
 }

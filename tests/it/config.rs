@@ -1,4 +1,4 @@
-//! The configuration as the operator meets it: `--print-config`, and refusals at the start.
+//! The configuration as an operator sees it: `--print-config`, and refusals at startup.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::support::process::{Service, run, run_with};
 
-/// What `--print-config` prints.
+/// The output of `--print-config`.
 fn printed(variables: &[(&str, &str)], arguments: &[&str]) -> String {
     let arguments = [&["serve", "--print-config"], arguments].concat();
     let output = run_with(variables, &arguments, "");
@@ -21,7 +21,7 @@ fn values(text: &str) -> toml::Table {
 }
 
 #[test]
-fn what_is_printed_says_where_it_comes_from_and_reads_back_the_same() {
+fn the_printed_configuration_names_its_sources_and_reads_back_unchanged() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let path = |name: &str| {
         let path = directory.path().join(name);
@@ -53,9 +53,9 @@ fn what_is_printed_says_where_it_comes_from_and_reads_back_the_same() {
     assert!(!again.contains("# default"), "{again}");
 }
 
-/// Also beyond the 64 bits with a sign that every reader of TOML has.
+/// Even beyond the signed 64 bits that every TOML reader supports.
 #[test]
-fn the_greatest_count_that_a_flag_may_have_is_read_from_a_file_too() {
+fn the_greatest_count_of_a_flag_is_accepted_in_a_file_too() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let file = directory.path().join("printed.toml");
     let file = file.to_str().expect("UTF-8");
@@ -68,7 +68,7 @@ fn the_greatest_count_that_a_flag_may_have_is_read_from_a_file_too() {
 }
 
 #[test]
-fn what_is_wrong_is_refused_before_anything_is_opened() {
+fn wrong_settings_are_refused_before_the_store_is_opened() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let file = directory.path().join("noctule.toml");
     fs::write(&file, "quue = 5\n\n[limits]\nthreats = \"many\"\n").expect("written");
@@ -114,9 +114,9 @@ fn what_is_wrong_is_refused_before_anything_is_opened() {
     );
 }
 
-/// Whichever way it is written, the setting says what it allows.
+/// In either spelling, the message says what the setting allows.
 #[test]
-fn a_negative_number_is_no_flag() {
+fn a_negative_number_is_read_as_a_value() {
     for (arguments, expected) in [
         (
             &["--queue", "-1"][..],
@@ -143,7 +143,7 @@ fn a_negative_number_is_no_flag() {
 }
 
 #[test]
-fn a_shared_store_is_printed_and_a_password_is_not() {
+fn a_shared_store_is_printed_and_credentials_in_its_address_are_never_echoed() {
     let text = printed(
         &[("NOCTULE_STORE", "nats://a:4222,b:4222/fleet")],
         &["--role=worker", "--store-replicas=3", "--store-lease=10"],
@@ -173,7 +173,7 @@ fn a_shared_store_is_printed_and_a_password_is_not() {
 }
 
 #[test]
-fn the_help_tells_flag_variable_and_default() {
+fn the_help_states_flag_variable_and_default() {
     let help = run(&["serve", "--help"], "");
     let text = String::from_utf8(help.stdout).expect("UTF-8");
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -186,9 +186,9 @@ fn the_help_tells_flag_variable_and_default() {
     }
 }
 
-/// The limits that are set are those that hold, and those that are shown.
+/// The configured limits are enforced and shown.
 #[tokio::test]
-async fn a_limit_that_is_set_holds() {
+async fn a_configured_limit_is_shown_and_enforced() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &["--limits-population", "10"]);
     let shown = service.bytes("/limits").await;

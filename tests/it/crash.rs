@@ -1,4 +1,4 @@
-//! kill -9 in the middle of work: what was accepted is done, once, and what was done stays.
+//! kill -9 during work: every accepted plan is done, once, and finished plans keep their results.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ async fn no_accepted_plan_is_lost_or_done_twice() {
         }))
         .await;
 
-        // The queue is worked off in order, so about a third is done now.
+        // The queue runs in order, so about a third is done by now.
         service.ended(&oldest(&addresses, 17)).await;
         let mut finished = BTreeMap::new();
         for address in &addresses {

@@ -1,4 +1,4 @@
-//! The same document and seed give the same route: on one worker, on four, and without a server.
+//! The same document and seed give the same route: with one worker, with four, and without a server.
 
 use futures_util::future::join_all;
 use serde_json::Value;
@@ -6,8 +6,8 @@ use serde_json::Value;
 use crate::support::process::run;
 use crate::support::stores::{BACKENDS, Backend, Place};
 
-/// The shipped scenarios, small enough for a test: with the defaults, and by the plain algorithm with
-/// two seeds.
+/// The shipped scenarios, reduced to test size: with two seeds without seeding and polishing, and with the
+/// defaults.
 fn documents() -> Vec<Value> {
     let shipped = [
         include_str!("../../scenarios/paper-1.json"),
@@ -35,7 +35,7 @@ fn documents() -> Vec<Value> {
         .collect()
 }
 
-/// The bytes of a result but for its id and its times.
+/// The bytes of a result without its id and its times.
 fn essence(result: &[u8]) -> String {
     let mut result: Value = serde_json::from_slice(result).expect("JSON");
     let members = result.as_object_mut().expect("an object");
@@ -63,7 +63,7 @@ fn alone(document: &Value) -> String {
 }
 
 #[tokio::test]
-async fn the_route_depends_on_the_request_alone() {
+async fn the_result_depends_on_the_request_alone() {
     let documents = documents();
     let alone: Vec<String> = documents.iter().map(alone).collect();
     let waypoints = |essence: &str| {
@@ -84,15 +84,15 @@ async fn the_route_depends_on_the_request_alone() {
 }
 
 #[test]
-fn any_number_of_threads_gives_the_same_bits() {
+fn every_thread_count_gives_the_same_bits() {
     for mut document in documents() {
-        // Enough for every thread to have some.
+        // Large enough to give every thread a share.
         document["planner"]["population"] = 100.into();
         document["planner"]["iterations"] = 10.into();
         let mut with_threads = |threads: u64| {
             document["planner"]["parameters"]["threads"] = threads.into();
             let mut result: Value = serde_json::from_str(&alone(&document)).expect("JSON");
-            // Of a document that names the threads.
+            // It hashes the document, which names the thread count.
             result
                 .as_object_mut()
                 .expect("an object")

@@ -66,7 +66,7 @@ impl Followed {
 }
 
 #[tokio::test]
-async fn a_stream_tells_the_whole_plan_and_ends_once() {
+async fn a_stream_delivers_the_whole_plan_and_ends_once() {
     for_every_backend(async |backend| {
         let plan = Followed::on(backend).await;
         let mut live = Stream::open(plan.events("?rate=0")).await;
@@ -106,7 +106,7 @@ async fn a_stream_tells_the_whole_plan_and_ends_once() {
 }
 
 #[tokio::test]
-async fn a_cut_stream_resumes_at_every_event_with_neither_loss_nor_repeat() {
+async fn a_cut_stream_resumes_at_every_event_without_loss_or_repeat() {
     for_every_backend(async |backend| {
         let plan = Followed::on(backend).await;
         run::complete(&*plan.api.store, a_run()).await;
@@ -144,11 +144,11 @@ async fn a_cut_stream_resumes_at_every_event_with_neither_loss_nor_repeat() {
             .await
             .expect("an answer");
         assert_eq!(beyond.status(), StatusCode::NO_CONTENT);
-        // Empty, as before the first event, the header asks for nothing.
+        // An empty header, as sent before the first event, is ignored.
         let fresh = plan.events("?rate=0").header("last-event-id", "");
         let fresh = Stream::open(fresh).await.rest().await;
         assert_eq!(fresh, plan.read("?rate=0").await);
-        // The header is heard, and yet the query has to be one.
+        // The header takes precedence, but the query must still be valid.
         let mistaken = plan
             .events("?last_event_id=1.5")
             .header("last-event-id", "1")
@@ -161,14 +161,14 @@ async fn a_cut_stream_resumes_at_every_event_with_neither_loss_nor_repeat() {
 }
 
 #[tokio::test]
-async fn a_live_stream_that_is_cut_resumes() {
+async fn a_live_stream_that_is_cut_resumes_without_loss() {
     for_every_backend(async |backend| {
         let plan = Followed::on(backend).await;
         let store = &plan.api.store;
         let lease = store.claim().await.expect("a queued plan");
         let mut read = Vec::new();
         let mut last = 0;
-        // Each connection reads one event and is dropped; what comes meanwhile is not lost.
+        // Each connection reads one event and is dropped; events in between are not lost.
         for event in a_run() {
             store
                 .append(&lease, vec![event])
@@ -198,9 +198,9 @@ async fn a_live_stream_that_is_cut_resumes() {
     .await;
 }
 
-/// As after a restore from an older copy: nobody waits for what will never come.
+/// As after a restore from an older backup: no reader waits for events that will never come.
 #[tokio::test]
-async fn a_reader_who_names_an_event_that_never_was_comes_fresh() {
+async fn an_unknown_last_event_id_starts_from_the_beginning() {
     for_every_backend(async |backend| {
         let plan = Followed::on(backend).await;
         let store = &plan.api.store;
@@ -214,7 +214,7 @@ async fn a_reader_who_names_an_event_that_never_was_comes_fresh() {
             assert_eq!(events(&[first]), [(1, "status".to_owned())], "after {id}");
             streams.push(ahead);
         }
-        // The newest that was told is none of these: nothing of it comes again.
+        // Event 2 is the newest, so it is not repeated.
         let newest = Stream::open(plan.events("?last_event_id=2")).await;
         run::finish(&**store, &lease, Status::Succeeded).await;
         let whole = plan.read("").await;
@@ -255,7 +255,7 @@ async fn a_rate_thins_the_curve_but_keeps_the_last_route() {
 }
 
 #[tokio::test]
-async fn a_held_back_point_leaves_when_the_run_pauses() {
+async fn a_throttled_event_is_sent_when_the_run_pauses() {
     for_every_backend(async |backend| {
         let plan = Followed::on(backend).await;
         let store = &plan.api.store;
@@ -269,7 +269,7 @@ async fn a_held_back_point_leaves_when_the_run_pauses() {
         store.append(&lease, points).await.expect("the lease holds");
         let mut names = Vec::new();
         for _ in 0..4 {
-            // Without an event to close the window, time does.
+            // Without another event, time closes the window.
             let block = stream.next().await.expect("open");
             names.push(events(&[block])[0].1.clone());
         }
@@ -279,7 +279,7 @@ async fn a_held_back_point_leaves_when_the_run_pauses() {
 }
 
 #[tokio::test]
-async fn lines_tell_the_same_as_events() {
+async fn ndjson_lines_carry_the_same_events() {
     let plan = Followed::new().await;
     run::complete(&*plan.api.store, a_run()).await;
     let request = plan.events("").header("accept", "application/x-ndjson");
@@ -304,7 +304,7 @@ async fn lines_tell_the_same_as_events() {
 }
 
 #[tokio::test]
-async fn plans_without_a_route_end_without_a_result() {
+async fn the_end_event_of_a_plan_without_a_route_names_no_result() {
     for_every_backend(async |backend| {
         let plan = Followed::on(backend).await;
         let lease = plan.api.store.claim().await.expect("a queued plan");
@@ -321,7 +321,7 @@ async fn plans_without_a_route_end_without_a_result() {
         let plan = Followed::on(backend).await;
         plan.api
             .store
-            .request_cancel(lease_id(&plan.address), 0)
+            .request_cancel(id_of(&plan.address), 0)
             .await
             .expect("queued");
         let Some(Block::Event { data, .. }) = plan.read("").await.pop() else {
@@ -335,7 +335,7 @@ async fn plans_without_a_route_end_without_a_result() {
     .await;
 }
 
-fn lease_id(address: &str) -> noctule::job::PlanId {
+fn id_of(address: &str) -> noctule::job::PlanId {
     address
         .trim_start_matches("/plans/")
         .parse()
@@ -366,7 +366,7 @@ async fn a_stream_of_a_deleted_plan_ends_as_cancelled() {
 }
 
 #[tokio::test]
-async fn the_end_of_a_deleted_plan_has_the_next_id_whatever_a_reader_named() {
+async fn the_end_of_a_deleted_plan_has_the_next_id_for_every_reader() {
     for_every_backend(async |backend| {
         let plan = Followed::on(backend).await;
         let mut ahead = Stream::open(plan.events("?last_event_id=1000")).await;
@@ -400,7 +400,7 @@ async fn streams_end_when_the_service_stops() {
 }
 
 #[tokio::test]
-async fn many_readers_of_one_plan_read_the_same() {
+async fn many_readers_of_one_plan_read_the_same_events() {
     for_every_backend(async |backend| {
         let plan = Followed::on(backend).await;
         let streams = join_all((0..50).map(|_| Stream::open(plan.events("?rate=0")))).await;
@@ -417,7 +417,7 @@ async fn many_readers_of_one_plan_read_the_same() {
     .await;
 }
 
-/// A plan of whose history the first `forgotten` events are no longer kept, and its last id.
+/// A plan whose first `forgotten` events are no longer kept, with `forgotten` and its last id.
 async fn with_a_forgotten_beginning(backend: Backend) -> (Followed, u64, u64) {
     let options = Options {
         events_kept: 20,
@@ -438,7 +438,7 @@ async fn with_a_forgotten_beginning(backend: Backend) -> (Followed, u64, u64) {
 }
 
 #[tokio::test]
-async fn who_asks_for_forgotten_events_is_told_which_are_missing() {
+async fn a_reader_who_asks_for_forgotten_events_gets_a_gap_event() {
     for_every_backend(async |backend| {
         let (plan, forgotten, last) = with_a_forgotten_beginning(backend).await;
         for after in [1, 2, forgotten - 1] {
@@ -452,7 +452,7 @@ async fn who_asks_for_forgotten_events_is_told_which_are_missing() {
             let ids: Vec<u64> = events(&blocks).into_iter().map(|(id, _)| id).collect();
             assert_eq!(ids, (forgotten..=last).collect::<Vec<_>>());
         }
-        // Nothing is missing for who has read as far as that.
+        // A reader who has read that far misses nothing.
         let blocks = plan
             .read(&format!("?rate=0&last_event_id={forgotten}"))
             .await;
@@ -463,7 +463,7 @@ async fn who_asks_for_forgotten_events_is_told_which_are_missing() {
 }
 
 #[tokio::test]
-async fn who_comes_fresh_to_a_long_history_begins_with_the_record_as_it_is() {
+async fn a_new_reader_of_a_truncated_history_starts_with_the_current_status() {
     for_every_backend(async |backend| {
         let (plan, forgotten, last) = with_a_forgotten_beginning(backend).await;
         let blocks = plan.read("?rate=0").await;

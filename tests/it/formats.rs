@@ -1,4 +1,4 @@
-//! Formats over HTTP and from the command line: what is chosen, what is named, what is refused.
+//! Formats over HTTP and on the command line: selection, file names, refusals.
 
 use std::fs;
 
@@ -29,7 +29,7 @@ fn scenario() -> Value {
     })
 }
 
-/// Submit the scenario and end its plan with a route by way of one place; the plan's address.
+/// Submits the scenario and ends its plan with a route through one place; the plan's address.
 async fn ended(api: &Api, scenario: &Value, lat: f64, lon: f64) -> String {
     let answer = api.post("/plans", scenario).await;
     assert_eq!(answer.status, 202, "{answer:?}");
@@ -88,7 +88,7 @@ async fn feasible(api: &Api) -> String {
 }
 
 #[tokio::test]
-async fn every_format_by_name_and_by_media_type() {
+async fn every_format_is_selected_by_name_and_by_media_type() {
     let api = Api::new();
     let plan = feasible(&api).await;
     let tail = &plan[plan.len() - 8..];
@@ -120,7 +120,7 @@ async fn every_format_by_name_and_by_media_type() {
 }
 
 #[tokio::test]
-async fn options_are_heard_or_refused() {
+async fn format_options_are_applied_or_refused() {
     let api = Api::new();
     let plan = feasible(&api).await;
     let uri = |query: &str| format!("{plan}/result?{query}");
@@ -163,7 +163,7 @@ async fn options_are_heard_or_refused() {
 }
 
 #[tokio::test]
-async fn a_route_that_breaks_constraints_is_not_for_flying() {
+async fn an_infeasible_route_is_refused_in_flight_formats() {
     let api = Api::new();
     // Straight through the mast.
     let plan = ended(&api, &scenario(), 47.4010, 8.5500).await;
@@ -180,9 +180,9 @@ async fn a_route_that_breaks_constraints_is_not_for_flying() {
     }
 }
 
-/// `Accept` names what would do: what the plan cannot be written in is no answer to it.
+/// `Accept` lists alternatives: a format that the plan cannot be written in is skipped.
 #[tokio::test]
-async fn who_takes_several_formats_gets_one_that_the_plan_has() {
+async fn accept_skips_formats_that_the_plan_cannot_be_written_in() {
     let api = Api::new();
     api.submit().await;
     let lease = crate::support::run::complete(&*api.store, Vec::new()).await;
@@ -217,7 +217,7 @@ async fn who_takes_several_formats_gets_one_that_the_plan_has() {
             "*/*",
             "no-geodetic-frame",
         ),
-        // What is asked of the mission is nothing that another format could do.
+        // Mission options exclude every other format.
         (
             local + "?landing=true",
             "text/plain, application/json;q=0.5",
@@ -235,7 +235,7 @@ async fn who_takes_several_formats_gets_one_that_the_plan_has() {
 }
 
 #[tokio::test]
-async fn metres_lie_nowhere_on_the_earth() {
+async fn a_local_plan_is_refused_in_geodetic_formats() {
     let api = Api::new();
     api.submit().await;
     let lease = crate::support::run::complete(&*api.store, Vec::new()).await;
@@ -255,7 +255,7 @@ async fn metres_lie_nowhere_on_the_earth() {
 }
 
 #[tokio::test]
-async fn a_threat_below_the_start_is_in_the_way_of_a_take_off() {
+async fn a_threat_below_the_start_blocks_a_take_off() {
     let api = Api::new();
     let mut low = scenario();
     low["threats"][0] = json!({
@@ -270,9 +270,9 @@ async fn a_threat_below_the_start_is_in_the_way_of_a_take_off() {
     assert_eq!(answer.status, 200);
 }
 
-/// What is exported comes back as a scenario that is accepted, its ends and threats where they were.
+/// An exported file converts back to an accepted scenario with the same ends and threats.
 #[tokio::test]
-async fn exports_become_scenarios_again() {
+async fn exports_convert_back_to_scenarios() {
     let api = Api::new();
     let plan = feasible(&api).await;
     for (format, media_type) in [
@@ -282,7 +282,7 @@ async fn exports_become_scenarios_again() {
     ] {
         let file = api.get(&format!("{plan}/result?format={format}")).await;
         let headers = [("content-type", media_type)];
-        // The body of a request may be 4096 bytes here; the path is not needed.
+        // A request body is limited to 4096 bytes here; the path is not needed.
         let text = String::from_utf8(file.body.to_vec()).expect("UTF-8");
         let text = without_path(format, &text);
         let answer = api
@@ -303,9 +303,9 @@ async fn exports_become_scenarios_again() {
     }
 }
 
-/// Cut at the 180th meridian, as GeoJSON asks; a route along the cut would go through.
+/// GeoJSON requires a cut at the 180th meridian; a route along the cut would pass through.
 #[tokio::test]
-async fn a_polygon_across_the_antimeridian_comes_back_whole() {
+async fn a_polygon_across_the_antimeridian_converts_back_to_one_threat() {
     let api = Api::new();
     let mut scenario = scenario();
     scenario["start"] = json!({"lat": -17.0, "lon": 179.99, "alt": 500});
@@ -331,7 +331,7 @@ async fn a_polygon_across_the_antimeridian_comes_back_whole() {
     assert_eq!(lons, expected);
 }
 
-/// The file with the long lines of its path and rings cut short.
+/// The file without its path, its rings shortened.
 fn without_path(format: &str, text: &str) -> String {
     match format {
         "geojson" => {
@@ -363,7 +363,7 @@ fn without_path(format: &str, text: &str) -> String {
 }
 
 #[tokio::test]
-async fn what_is_no_file_of_a_scenario_is_refused() {
+async fn files_that_are_no_scenario_are_refused() {
     let api = Api::new();
     for (media_type, body, status, slug) in [
         ("application/geo+json", "{", 400, "invalid-json"),
@@ -418,7 +418,7 @@ async fn what_is_no_file_of_a_scenario_is_refused() {
 }
 
 #[test]
-fn the_command_line_writes_reads_back_and_exports() {
+fn the_command_line_plans_exports_and_converts() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let path = |name: &str| {
         let path = directory.path().join(name);
@@ -440,7 +440,7 @@ fn the_command_line_writes_reads_back_and_exports() {
     assert!(text("a.KML").starts_with("<?xml"));
     assert!(text("a.plan").contains("\"fileType\": \"Plan\""));
 
-    // The scenario names its seed; another one is not that of the result.
+    // The seed in the scenario is used; another scenario does not match the result.
     let export = |scenario: &str, more: &[&str]| {
         let (result, scenario) = (path("result.json"), path(scenario));
         let arguments = ["export", &result, "--scenario", &scenario];

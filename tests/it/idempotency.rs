@@ -1,4 +1,4 @@
-//! `Idempotency-Key`: the same request twice makes one plan.
+//! `Idempotency-Key`: repeating a request makes one plan.
 
 use axum::body::Body;
 use axum::http::{Method, StatusCode};
@@ -22,7 +22,7 @@ async fn post(api: &Api, key: &str, body: String) -> Answer {
 }
 
 #[tokio::test]
-async fn the_same_request_gets_the_same_plan_however_it_stands() {
+async fn a_repeated_request_gets_the_same_plan_in_every_state() {
     for_every_backend(async |backend| {
         let api = Api::on(backend, Options::new(1)).await;
         let mut unseeded = scenario();
@@ -32,7 +32,7 @@ async fn the_same_request_gets_the_same_plan_however_it_stands() {
         let first = post(&api, "k", body.clone()).await;
         assert_eq!(first.status, StatusCode::ACCEPTED);
         assert!(!first.headers.contains_key("idempotency-replayed"));
-        // The queue is full now, and no seed is drawn again.
+        // The queue is full by now, and no new seed is drawn.
         let again = post(&api, "\"k\"", body.clone()).await;
         assert_eq!(again.status, StatusCode::ACCEPTED);
         assert_eq!(again.header("idempotency-replayed"), "true");
@@ -54,9 +54,9 @@ async fn the_same_request_gets_the_same_plan_however_it_stands() {
     .await;
 }
 
-/// Nothing of it can be accepted any more, but it was.
+/// It could no longer be accepted, but it once was.
 #[tokio::test]
-async fn a_repetition_gets_its_plan_though_what_it_names_has_gone() {
+async fn a_repeated_request_gets_its_plan_after_its_warm_start_is_deleted() {
     for_every_backend(async |backend| {
         let api = Api::on(backend, Options::new(1_000)).await;
         let known = api.submit().await;
@@ -99,7 +99,7 @@ async fn a_refused_request_leaves_its_key_free() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_thousand_requests_at_once_make_one_plan() {
+async fn a_thousand_concurrent_requests_make_one_plan() {
     for_every_backend(async |backend| {
         let api = Api::on(backend, Options::new(1_000)).await;
         let body = scenario().to_string();
@@ -122,7 +122,7 @@ async fn a_thousand_requests_at_once_make_one_plan() {
 }
 
 #[tokio::test]
-async fn a_request_whose_first_is_still_coming_in_is_told_to_wait() {
+async fn a_key_is_in_flight_while_its_first_request_is_still_arriving() {
     let api = Api::new();
     let never = futures_util::stream::pending::<Result<Frame<Bytes>, std::io::Error>>();
     let headers = [
@@ -134,7 +134,7 @@ async fn a_request_whose_first_is_still_coming_in_is_told_to_wait() {
     assert!((&mut first).now_or_never().is_none());
     let second = post(&api, "k", scenario().to_string()).await;
     second.expect_problem(409, "idempotency-in-flight");
-    // A caller who goes away takes nothing along.
+    // A caller who disconnects releases the key.
     drop(first);
     let third = post(&api, "k", scenario().to_string()).await;
     assert_eq!(third.status, StatusCode::ACCEPTED);

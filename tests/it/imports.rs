@@ -1,5 +1,5 @@
-//! Files to convert that nobody would write: they are read or refused. What the readers make of sound files is
-//! tested beside them.
+//! Malformed files to convert: they are read or refused. What the readers make of valid files is tested beside
+//! them.
 
 use noctule::import::{ImportError, Syntax, convert};
 use proptest::prelude::*;
@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use crate::support::patience::at_little_cost;
 use crate::support::size::cases;
 
-/// One of each format, with everything in it that its reader looks at.
+/// One file of each format, with everything that its reader handles.
 const FILES: [&str; 3] = [GEOJSON, KML, PLAN];
 
 const GEOJSON: &str = r#"{"type": "FeatureCollection", "name": "flight", "features": [
@@ -44,7 +44,7 @@ const PLAN: &str = r#"{"fileType": "Plan", "version": 1, "groundStation": "QGrou
   "rallyPoints": {"points": [[47.3, 8.5, 10]]}}"#;
 
 #[test]
-fn whole_they_are_read() {
+fn complete_files_are_read() {
     for file in FILES {
         let read = convert(file.as_bytes(), Syntax::of(file.as_bytes())).expect("a scenario");
         let threats = read.scenario["threats"].as_array().expect("a list");
@@ -52,9 +52,9 @@ fn whole_they_are_read() {
     }
 }
 
-/// Broad or deep, each costs what its length does.
+/// Broad or deep, the cost is proportional to the length.
 #[test]
-fn long_files_are_read_soon() {
+fn long_files_are_read_in_linear_time() {
     let check = |many: usize, open: &str, close: &str| {
         let text = format!("<kml>{}{}</kml>", open.repeat(many), close.repeat(many));
         let refused = at_little_cost(|| convert(text.as_bytes(), Syntax::Xml));
@@ -82,7 +82,7 @@ fn use_up(bytes: &[u8]) {
 proptest! {
     #![proptest_config(cases(64, 20_000))]
 
-    /// Cut anywhere, a byte of it another, or a part of it again elsewhere.
+    /// One byte changed, a part duplicated elsewhere, then cut anywhere.
     #[test]
     fn damaged_files_never_break_the_readers(
         at: prop::sample::Index, byte: u8, from: prop::sample::Index, long in 1..60_usize, cut: prop::sample::Index,
@@ -100,7 +100,7 @@ proptest! {
         }
     }
 
-    /// A position of a plan or a GeoJSON has fewer numbers.
+    /// A position in a plan or GeoJSON has too few numbers.
     #[test]
     fn short_positions_never_break_the_readers(which: prop::sample::Index, left in 0..3_usize) {
         for file in [GEOJSON, PLAN] {
@@ -113,7 +113,7 @@ proptest! {
         }
     }
 
-    /// A number of a plan or a GeoJSON is another value.
+    /// A number in a plan or GeoJSON is replaced.
     #[test]
     fn other_values_never_break_the_readers(which: prop::sample::Index, with in prop::sample::select(vec![
         "null", "true", "-1", "1e308", "1e-320", "18446744073709551615", "\"12\"", "[]", "{}", "[[8.5, 47.3]]",

@@ -1,20 +1,20 @@
-//! The rooms of the house, and what each may name: a room imports only from those above it.
+//! The layers of the crate: each room imports only from the rooms above it and names only its own libraries.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What a room may import of the crate.
+/// What a room may import from the crate.
 enum Imports {
     /// Any room in a row above its own.
     Above,
-    /// These, wherever they stand.
+    /// Only these, wherever they stand.
     Only(&'static [&'static str]),
 }
 use Imports::{Above, Only};
 
-/// From the ground up: geometry knows nothing of flying, the optimizers nothing of routes, the engine
-/// nothing of plans on disk, and nobody anything of the command line. Flags and logs stand below the
-/// engine: what may change a result is in the request.
+/// From the ground up: geometry knows nothing of flying, the optimizers nothing of routes, the engine nothing
+/// of stored plans, and no room knows the command line. Flags and logs stand below the engine: everything that
+/// may change a result is in the request.
 const ROOMS: [(&str, Imports); 19] = [
     ("digest", Only(&[])),
     ("geometry", Only(&[])),
@@ -37,7 +37,7 @@ const ROOMS: [(&str, Imports); 19] = [
     ("cli", Above),
 ];
 
-/// Libraries that only these rooms may name.
+/// Libraries that only the listed rooms may name.
 const LIBRARIES: [(&str, &[&str]); 15] = [
     ("axum", &["http", "cli"]),
     ("hyper", &["http", "cli"]),
@@ -66,7 +66,7 @@ fn every_room_imports_only_from_rooms_above_it() {
 }
 
 #[test]
-fn only_the_edges_name_the_libraries_of_the_edges() {
+fn every_library_is_named_only_in_its_own_rooms() {
     let mut faults = Vec::new();
     for (path, text) in sources() {
         faults.extend(libraries_out_of_place(&path, &text));
@@ -75,7 +75,7 @@ fn only_the_edges_name_the_libraries_of_the_edges() {
 }
 
 #[test]
-fn the_table_lists_the_rooms_that_are_there() {
+fn the_table_lists_exactly_the_existing_rooms() {
     let mut there: Vec<String> = sources()
         .iter()
         .map(|(path, _)| room_of(path).to_owned())
@@ -88,7 +88,7 @@ fn the_table_lists_the_rooms_that_are_there() {
 }
 
 #[test]
-fn imports_out_of_rank_are_found() {
+fn the_checker_finds_imports_out_of_rank() {
     #[track_caller]
     fn check(path: &str, text: &str, expected: &[&str]) {
         let found = imports_out_of_rank(Path::new(path), text);
@@ -98,7 +98,7 @@ fn imports_out_of_rank_are_found() {
             .collect();
         assert_eq!(found, expected, "{text}");
     }
-    // What is above, or within.
+    // Above, or within the room.
     check("cost/fuel.rs", "use crate::geometry::Point3;", &[]);
     check(
         "cost/fuel.rs",
@@ -110,7 +110,7 @@ fn imports_out_of_rank_are_found() {
         "pub(crate) fn a() {} use crate::VERSION;",
         &[],
     );
-    // What is below, in every way to write it.
+    // Below, in every spelling.
     check("cost/fuel.rs", "use crate::planner::plan;", &["planner"]);
     check("cost/fuel.rs", "use crate::planner;", &["planner"]);
     check(
@@ -144,7 +144,7 @@ fn imports_out_of_rank_are_found() {
         "use super::{config, store::Store};",
         &["store"],
     );
-    // A module may bear the name of a room.
+    // A module may have the name of a room.
     check("scenario/json/fields.rs", "use super::planner::read;", &[]);
     check(
         "scenario/json/mod.rs",
@@ -156,7 +156,7 @@ fn imports_out_of_rank_are_found() {
         "mod tests { } use super::super::job;",
         &["job"],
     );
-    // Those that import nothing, or but one.
+    // Rooms that may import nothing, or only one other.
     check(
         "optimizer/swarm.rs",
         "use crate::geometry::Point3;",
@@ -193,7 +193,7 @@ fn imports_out_of_rank_are_found() {
 }
 
 #[test]
-fn libraries_out_of_place_are_found() {
+fn the_checker_finds_libraries_out_of_place() {
     #[track_caller]
     fn check(path: &str, text: &str, expected: &[&str]) {
         let found = libraries_out_of_place(Path::new(path), text);
@@ -214,7 +214,7 @@ fn libraries_out_of_place_are_found() {
     );
     check("job/mod.rs", "#[tokio::test]\nasync fn a() {}", &["tokio"]);
     check("worker/mod.rs", "use anyhow::Context;", &["anyhow"]);
-    // Words that only look like it.
+    // Words that only look like libraries.
     check(
         "planner/mod.rs",
         "let tower = 1; self.axum(); crate::planner::hyper::a();",
@@ -222,7 +222,7 @@ fn libraries_out_of_place_are_found() {
     );
 }
 
-/// The rooms of the crate that `text` names and its room may not import.
+/// The rooms that `text` names and its room may not import.
 fn imports_out_of_rank(path: &Path, text: &str) -> Vec<String> {
     let room = room_of(path);
     let rank = |room: &str| ROOMS.iter().position(|(name, _)| *name == room);
@@ -238,7 +238,7 @@ fn imports_out_of_rank(path: &Path, text: &str) -> Vec<String> {
         .collect()
 }
 
-/// The libraries that `text` names and its room may not.
+/// The libraries that `text` names and its room may not name.
 fn libraries_out_of_place(path: &Path, text: &str) -> Vec<String> {
     let room = room_of(path);
     let tokens = tokens(text);
@@ -257,13 +257,13 @@ fn libraries_out_of_place(path: &Path, text: &str) -> Vec<String> {
         .collect()
 }
 
-/// What stands directly below the root of the crate in the paths of a file: `a` and `b` in `crate::a`
-/// and in `crate::{a::c, b}`, and in the same reached by enough steps of `super`.
+/// The names directly below the crate root in the paths of a file: `a` and `b` in `crate::a` and in
+/// `crate::{a::c, b}`, or reached through enough steps of `super`.
 fn named_of_the_crate<'a>(path: &Path, tokens: &'a [String]) -> Vec<&'a str> {
     // `cost/mod.rs` and `config.rs` are one step below the root, `cost/fuel.rs` is two.
     let file_depth = path.components().count() - usize::from(path.ends_with("mod.rs"));
     let mut named = Vec::new();
-    // For each open brace, whether it is that of a module.
+    // For each open brace, whether it opens a module.
     let mut braces = Vec::new();
     let mut at = 0;
     while at < tokens.len() {
@@ -289,7 +289,7 @@ fn named_of_the_crate<'a>(path: &Path, tokens: &'a [String]) -> Vec<&'a str> {
     named
 }
 
-/// The first segments of the paths that go on after `crate` or `super`.
+/// The first segments of the paths that follow `crate` or `super`.
 fn first_segments(rest: &[String]) -> Vec<&str> {
     match rest {
         [colons, open, list @ ..] if colons == "::" && open == "{" => {
@@ -316,7 +316,7 @@ fn first_segments(rest: &[String]) -> Vec<&str> {
     }
 }
 
-/// The words of a source text, `::`, and every other sign on its own; comments and texts left out.
+/// The words of a source text, `::`, and every other character on its own; without comments and literals.
 fn tokens(text: &str) -> Vec<String> {
     let mut tokens = Vec::new();
     let mut rest = text;
@@ -353,7 +353,7 @@ fn is_word(token: &str) -> bool {
     token.starts_with(|c: char| c.is_alphanumeric() || c == '_')
 }
 
-/// Bytes of the block comment that `text` begins with; they nest.
+/// Length in bytes of the block comment that `text` starts with; comments nest.
 fn block_comment(text: &str) -> usize {
     let mut depth = 0;
     let mut at = 0;
@@ -368,7 +368,7 @@ fn block_comment(text: &str) -> usize {
     text.len()
 }
 
-/// Bytes of the string or character that `text` begins with, if it does.
+/// Length in bytes of the string or character literal that `text` starts with, if any.
 fn quoted(text: &str) -> Option<usize> {
     let bytes = text.as_bytes();
     let prefix = usize::from(bytes.starts_with(b"b"));
@@ -390,7 +390,7 @@ fn quoted(text: &str) -> Option<usize> {
     }
     match bytes.get(prefix) {
         Some(b'"') => Some(closed_by(b'"', bytes, prefix + 1)),
-        // A character, unless it is a lifetime: that one is not closed.
+        // A character literal, unless it is a lifetime, which has no closing quote.
         Some(b'\'') if bytes.get(prefix + 1) == Some(&b'\\') => {
             Some(closed_by(b'\'', bytes, prefix + 1))
         }
@@ -403,7 +403,7 @@ fn quoted(text: &str) -> Option<usize> {
     }
 }
 
-/// The place after the next `quote` that no backslash stands before.
+/// The position after the next `quote` without a backslash before it.
 fn closed_by(quote: u8, bytes: &[u8], mut at: usize) -> usize {
     while at < bytes.len() && bytes[at] != quote {
         at += if bytes[at] == b'\\' { 2 } else { 1 };
@@ -417,7 +417,7 @@ fn room_of(path: &Path) -> &str {
     first.expect("a path below src").trim_end_matches(".rs")
 }
 
-/// Every file of every room: its path below `src`, and its text.
+/// The path below `src` and the text of every file of every room.
 fn sources() -> Vec<(PathBuf, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut directories = vec![root.clone()];

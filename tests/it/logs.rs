@@ -1,4 +1,4 @@
-//! The log: which lines there are, and that each names its request and its plan.
+//! The log: which lines it has, and that each names its request and its plan.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -12,13 +12,13 @@ use crate::support::scenario;
 
 const TRACE_ID: &str = "4bf92f3577b34da6a3ce929d0e0e4736";
 
-/// Post `document` to a service with JSON lines, as request `caller-1` of a trace, and stop the
-/// service when the plan has ended. The plan's id and the lines.
+/// Posts `document` to a service with JSON logs, as request `caller-1` of a trace, and stops the service when
+/// the plan has ended. The plan's id and the log lines.
 async fn logged(arguments: &[&str], document: &Value) -> (String, Vec<Value>) {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let log = directory.path().join("log");
     let file = File::create(&log).expect("a file");
-    // Fewer connections than any machine has files for, or a line says so.
+    // Few enough connections for any machine's file limit; otherwise the service logs a warning.
     let few = ["--http-max-connections", "100"];
     let arguments = [&["--log-format", "json"], &few[..], arguments].concat();
     let service = Service::start_with_log(&directory.path().join("data"), &arguments, file);
@@ -54,7 +54,7 @@ fn line<'a>(lines: &'a [Value], message: &str) -> &'a Value {
 }
 
 #[tokio::test]
-async fn lines_of_a_plan_name_it_and_the_request_that_it_came_from() {
+async fn log_lines_of_a_plan_name_the_plan_and_its_request() {
     let (id, lines) = logged(&["--log", "debug"], &scenario()).await;
     for (message, span) in [
         ("accepted", "request"),
@@ -74,7 +74,7 @@ async fn lines_of_a_plan_name_it_and_the_request_that_it_came_from() {
     assert!(ended["run_ms"].is_number(), "{ended}");
 }
 
-/// The spans that a collector took.
+/// The spans that a collector received.
 fn spans(collector: &Collector) -> Vec<Value> {
     let mut spans = Vec::new();
     for Taken {
@@ -100,7 +100,7 @@ fn spans(collector: &Collector) -> Vec<Value> {
 }
 
 #[tokio::test]
-async fn a_plan_and_its_request_are_exported_as_parts_of_the_callers_trace() {
+async fn request_and_run_spans_are_exported_within_the_callers_trace() {
     let collector = Collector::start();
     let endpoint = format!("http://{}", collector.address);
     let (id, lines) = logged(
@@ -138,7 +138,7 @@ async fn a_plan_and_its_request_are_exported_as_parts_of_the_callers_trace() {
 }
 
 #[tokio::test]
-async fn without_a_collector_plans_run_and_one_line_tells() {
+async fn without_a_collector_plans_run_and_one_line_is_logged() {
     let endpoint = format!("http://{}", nobodys());
     let (_, lines) = logged(&["--otlp-endpoint", &endpoint], &scenario()).await;
     let told = lines
@@ -148,15 +148,15 @@ async fn without_a_collector_plans_run_and_one_line_tells() {
     line(&lines, "plan ended");
 }
 
-/// A port on which nobody listens: it has just been given back.
+/// A port that nothing listens on: it has just been released.
 fn nobodys() -> std::net::SocketAddr {
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
     listener.local_addr().expect("bound")
 }
 
-/// Webhooks are sent when neither the request nor the run is there any more.
+/// Webhooks are sent after both the request and the run are over.
 #[tokio::test]
-async fn a_line_about_a_webhook_names_its_plan() {
+async fn a_failed_webhook_is_logged_with_its_plan() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let (log, secret) = (
         directory.path().join("log"),
@@ -191,9 +191,9 @@ async fn a_line_about_a_webhook_names_its_plan() {
     assert_eq!(tried().expect("told")["plan_id"], accepted["id"]);
 }
 
-/// Whoever looks for a plan looks for one name.
+/// Searching the log for a plan takes one field name.
 #[test]
-fn no_line_calls_a_plans_id_otherwise() {
+fn no_source_logs_a_plan_id_as_plan() {
     let mut rooms = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("src")];
     while let Some(room) = rooms.pop() {
         for entry in fs::read_dir(&room).expect("a directory") {

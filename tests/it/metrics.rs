@@ -1,4 +1,4 @@
-//! `GET /metrics`: well-formed, true, and of so many series only.
+//! `GET /metrics`: well-formed, correct, and with a bounded number of series.
 
 use axum::http::Method;
 use serde_json::{Value, json};
@@ -22,7 +22,7 @@ async fn read_from(service: &Service) -> Reading {
 }
 
 #[tokio::test]
-async fn the_queue_is_as_it_is_now() {
+async fn the_queue_metrics_show_the_current_queue() {
     let api = Api::with_queue(5);
     let empty = read(&api).await;
     assert!(empty.value("noctule_queue_oldest_age_seconds") == 0.0);
@@ -54,7 +54,7 @@ async fn the_queue_is_as_it_is_now() {
     drop(lease);
 }
 
-/// Whatever callers send, there are no more series.
+/// Callers cannot add series, whatever they send.
 #[tokio::test]
 async fn callers_cannot_make_series() {
     let api = Api::new();
@@ -83,20 +83,16 @@ async fn callers_cannot_make_series() {
 }
 
 #[tokio::test]
-async fn a_run_is_counted() {
+async fn a_finished_run_is_counted() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &[]);
     let address = service.submit(&scenario()).await;
     let status = service.ended(&address).await;
     assert_eq!(status["status"], "succeeded");
-    // The end is known to callers before the worker has counted it.
+    // Callers may learn of the end before the worker has counted it.
     let ended = "noctule_plans_ended_total{status=\"succeeded\"}";
-    let reading = loop {
-        let reading = read_from(&service).await;
-        if reading.value(ended) > 0.5 {
-            break reading;
-        }
-    };
+    eventually(async || read_from(&service).await.value(ended) > 0.5).await;
+    let reading = read_from(&service).await;
     let count = |series: &str| reading.value(series);
     for series in [
         ended,
@@ -123,7 +119,7 @@ async fn a_run_is_counted() {
 }
 
 #[tokio::test]
-async fn a_run_that_loses_its_plan_is_counted() {
+async fn a_run_whose_plan_is_deleted_is_counted_as_lost() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &["--workers", "1"]);
     let address = service.submit(&a_run_of(3_600_000)).await;
@@ -139,9 +135,9 @@ async fn a_run_that_loses_its_plan_is_counted() {
     eventually(async || lost().await > 0.5).await;
 }
 
-/// No run of it is left that could count it.
+/// After the loss no run of the plan is left to count it.
 #[tokio::test]
-async fn a_plan_that_loses_its_workers_is_counted() {
+async fn a_plan_that_loses_its_workers_is_counted_as_failed() {
     for_every_backend(async |backend| {
         let place = Place::new(backend);
         let serve = || place.serve(&["--workers", "1"]);
@@ -167,9 +163,9 @@ async fn a_plan_that_loses_its_workers_is_counted() {
     .await;
 }
 
-/// Whoever restarts without end accepts nothing meanwhile, so no other figure would have to change.
+/// A service that restarts endlessly accepts nothing, so no other metric need change.
 #[tokio::test]
-async fn a_restart_is_seen_though_nothing_was_accepted() {
+async fn a_restart_changes_the_start_time() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let start = async || {
         let service = Service::start(directory.path(), &[]);
@@ -180,16 +176,16 @@ async fn a_restart_is_seen_though_nothing_was_accepted() {
         let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
         since.expect("after 1970").as_secs_f64()
     };
-    // To the millisecond.
+    // The metric has millisecond resolution.
     let before = now_s() - 0.001;
     let first = start().await;
     let second = start().await;
     assert!(before <= first && first < second && second <= now_s());
 }
 
-/// What is shown and what alerts are raised on is there.
+/// Every metric that the dashboard shows or an alert uses exists.
 #[tokio::test]
-async fn dashboard_and_alerts_name_metrics_that_there_are() {
+async fn dashboard_and_alerts_name_only_existing_metrics() {
     const DASHBOARD: &str = include_str!("../../deploy/grafana/noctule.json");
     const ALERTS: &str = include_str!("../../deploy/prometheus/alerts.yml");
     let directory = tempfile::tempdir().expect("a temporary directory");
@@ -197,7 +193,7 @@ async fn dashboard_and_alerts_name_metrics_that_there_are() {
     let address = service.submit(&scenario()).await;
     service.ended(&address).await;
     let reading = read_from(&service).await;
-    // People call a histogram by its name; what reads it names a series.
+    // Documentation names a histogram by its family; queries name its series.
     let histograms = reading.families.iter();
     let histograms = histograms.filter(|(_, kind)| *kind == "histogram");
     let mut exported = reading.names();
@@ -219,9 +215,9 @@ async fn dashboard_and_alerts_name_metrics_that_there_are() {
     }
 }
 
-/// `docs/OPERATIONS.md` tells of every metric, and of no other.
+/// `docs/OPERATIONS.md` describes every metric, and no others.
 #[tokio::test]
-async fn every_metric_is_in_the_manual() {
+async fn the_manual_lists_exactly_the_metrics() {
     let manual = include_str!("../../docs/OPERATIONS.md");
     let api = Api::new();
     api.submit().await;
@@ -253,5 +249,5 @@ async fn streams_are_counted_while_they_are_open() {
     let open = |reading: &Reading| reading.value("noctule_http_event_streams");
     assert!((open(&read_from(&service).await) - 1.0).abs() < 0.5);
     drop(stream);
-    while open(&read_from(&service).await) > 0.5 {}
+    eventually(async || open(&read_from(&service).await) < 0.5).await;
 }

@@ -1,5 +1,5 @@
-//! `openapi.yaml` is true: each route is described and each description has a route. That answers
-//! are as described is checked with every request of `support::api`.
+//! `openapi.yaml` is accurate: each route is described and each description has a route. `support::api` checks
+//! with every request that responses are as described.
 
 use std::collections::BTreeSet;
 
@@ -15,7 +15,7 @@ use crate::support::description::{DESCRIPTION, check_schema, resolve};
 use crate::support::run;
 
 #[test]
-fn routes_and_descriptions_are_the_same() {
+fn the_description_lists_exactly_the_routes() {
     let routed: BTreeSet<String> = noctule::http::routes()
         .iter()
         .map(|route| format!("{} {}", route.method, route.path))
@@ -38,23 +38,27 @@ fn described() -> BTreeSet<String> {
         .collect()
 }
 
-/// Each route answers with its own handler's statuses, not with the fallbacks'.
+/// No route falls through to the fallbacks for unknown methods and paths, and routes with an id reach their own handler.
 #[tokio::test]
-async fn every_described_route_is_there() {
+async fn every_described_route_reaches_a_handler() {
     let api = Api::new();
     for operation in described() {
         let (method, path) = operation.split_once(' ').expect("a method and a path");
         let method: Method = method.parse().expect("a method");
         let id = "01936f2c-7d1a-7c55-9a53-27b1b44c1a10";
-        let answer = api
-            .send(
-                method,
-                &path.replace("{id}", id).replace("{name}", "nowhere"),
-                &[],
-                "",
-            )
-            .await;
+        // Names that exist where others have the same answer as paths without a route.
+        let uri = path
+            .replace("{id}", id)
+            .replace("/scenarios/{name}", "/scenarios/paper-1")
+            .replace("/terrains/{name}", "/terrains/nowhere")
+            .replace("/page/vendor/{file}", "/page/vendor/three.js")
+            .replace("/page/{file}", "/page/main.js")
+            .replace("{slug}", "gone");
+        assert!(!uri.contains('{'), "{operation}: {uri}");
+        let answer = api.send(method, &uri, &[], "").await;
         assert_ne!(answer.status, 405, "{operation}");
+        let text = String::from_utf8_lossy(&answer.body);
+        assert!(!text.contains("nothing is at "), "{operation}: {text}");
         if path.contains("{id}") {
             assert_eq!(
                 answer.json()["detail"],
@@ -66,7 +70,7 @@ async fn every_described_route_is_there() {
 }
 
 #[test]
-fn every_reference_leads_somewhere_and_every_component_is_used() {
+fn every_reference_resolves_and_every_component_is_used() {
     let mut used = BTreeSet::new();
     references(&DESCRIPTION, &mut used);
     let mut defined = BTreeSet::new();
@@ -84,7 +88,7 @@ fn references(node: &Value, found: &mut BTreeSet<String>) {
             if let Some(Value::String(reference)) = members.get("$ref") {
                 found.insert(reference.clone());
             }
-            // Schemes are named where the others are referred to.
+            // Security schemes are referred to by name, not by `$ref`.
             let schemes = members.get("security").and_then(Value::as_array);
             for scheme in schemes.into_iter().flatten().filter_map(Value::as_object) {
                 let scheme = scheme
@@ -102,7 +106,7 @@ fn references(node: &Value, found: &mut BTreeSet<String>) {
 }
 
 #[test]
-fn examples_are_as_their_schemas_say() {
+fn examples_match_their_schemas() {
     let mut examples = 0;
     let bodies = DESCRIPTION["paths"]
         .as_object()
@@ -151,9 +155,9 @@ async fn example_scenarios_are_accepted() {
     }
 }
 
-/// Programs that read JSON read the same.
+/// Clients that read JSON get the same description.
 #[tokio::test]
-async fn the_description_comes_as_yaml_and_as_json() {
+async fn the_description_is_the_same_as_yaml_and_as_json() {
     let api = Api::new();
     let yaml = api.get("/openapi.yaml").await;
     let yaml: Value = serde_yaml_ng::from_slice(&yaml.body).expect("YAML");
@@ -161,9 +165,9 @@ async fn the_description_comes_as_yaml_and_as_json() {
     assert_eq!(yaml, *DESCRIPTION);
 }
 
-/// Every operation and every schema has its place on the page, and every link leads to one.
+/// Every operation and every schema has an anchor on the page, and every link leads to an anchor.
 #[tokio::test]
-async fn the_reference_is_whole() {
+async fn the_reference_page_is_complete() {
     let answer = Api::new().get("/docs").await;
     let page = std::str::from_utf8(&answer.body).expect("UTF-8");
     let attributes = |name: &str| {
@@ -201,9 +205,9 @@ async fn the_reference_is_whole() {
     assert!(attributes("src").is_empty(), "nothing is loaded");
 }
 
-/// The page's policy lets in its own style and nothing else.
+/// The page's policy allows its own style and nothing else.
 #[tokio::test]
-async fn pages_are_closed_to_everything_but_their_style() {
+async fn pages_load_nothing_but_their_own_style() {
     let api = Api::new();
     for path in ["/docs", "/problems/queue-full"] {
         let answer = api.get(path).await;
@@ -221,9 +225,9 @@ async fn pages_are_closed_to_everything_but_their_style() {
     }
 }
 
-/// What a plan fails for is a problem with a page, which tells of the same status, and described.
+/// Every failure kind is described and has a problem page; the table in the docs gives the same status.
 #[tokio::test]
-async fn what_plans_fail_for_leads_to_its_page() {
+async fn every_failure_kind_has_a_problem_page_and_is_described() {
     let problems = include_str!("../../docs/PROBLEMS.md");
     let mut told = BTreeSet::new();
     for kind in FailureKind::ALL {
@@ -248,9 +252,9 @@ async fn what_plans_fail_for_leads_to_its_page() {
     assert_eq!(described.collect::<BTreeSet<_>>(), told);
 }
 
-/// The `type` of a problem is an address.
+/// The `type` of a problem is a path.
 #[tokio::test]
-async fn problem_types_lead_to_their_pages() {
+async fn every_problem_type_leads_to_its_page() {
     let api = Api::new();
     let types = DESCRIPTION["components"]["schemas"]["Problem"]["properties"]["type"]["enum"]
         .as_array()
@@ -267,7 +271,7 @@ async fn problem_types_lead_to_their_pages() {
 }
 
 #[test]
-fn problem_types_are_documented() {
+fn every_problem_type_is_documented() {
     let page = include_str!("../../docs/PROBLEMS.md");
     let types =
         DESCRIPTION["components"]["schemas"]["Problem"]["properties"]["type"]["enum"].as_array();

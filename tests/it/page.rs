@@ -1,4 +1,4 @@
-//! The page and its files: policy, entity tags, codings; and what it needs of the interface.
+//! The page and its files: policy, entity tags, codings; and the endpoints it uses.
 
 use std::io::Read as _;
 
@@ -6,8 +6,8 @@ use axum::http::{Method, StatusCode};
 use flate2::read::GzDecoder;
 use serde_json::{Value, json};
 
-use crate::support::api::{Answer, Api};
-use crate::support::keys::entry;
+use crate::support::api::Api;
+use crate::support::keys::{bearer, entry};
 
 /// Ground that rises by 1 m every 200 m to the east, and by 10 m to the north.
 fn sloping() -> Value {
@@ -21,7 +21,7 @@ fn sloping() -> Value {
 }
 
 #[tokio::test]
-async fn the_page_is_for_everybody_and_loads_from_here_alone() {
+async fn the_page_needs_no_key_and_loads_only_from_its_own_origin() {
     let api = Api::with_keys(&entry("alice", "of alice", "plan", ""));
     for (path, media_type) in [
         ("/", "text/html; charset=utf-8"),
@@ -55,9 +55,9 @@ async fn the_page_is_for_everybody_and_loads_from_here_alone() {
     );
 }
 
-/// What the markup names is there: the page has no dead links of its own.
+/// Everything that the markup refers to exists: the page has no dead links of its own.
 #[tokio::test]
-async fn what_the_page_names_is_served() {
+async fn every_path_named_in_the_page_is_served() {
     let api = Api::new();
     let page = String::from_utf8(api.get("/").await.body.to_vec()).expect("text");
     let named: Vec<_> = page
@@ -73,7 +73,7 @@ async fn what_the_page_names_is_served() {
 }
 
 #[tokio::test]
-async fn what_has_not_changed_is_not_sent_again() {
+async fn an_unchanged_file_is_not_sent_again() {
     let api = Api::new();
     for (path, coding, offered) in [
         ("/page/main.js", None, "identity"),
@@ -104,7 +104,7 @@ async fn what_has_not_changed_is_not_sent_again() {
 }
 
 #[tokio::test]
-async fn gzip_holds_the_same_bytes() {
+async fn gzip_carries_the_same_bytes() {
     let api = Api::new();
     let plain = api.get("/page/scene.js").await;
     let coded = api
@@ -118,7 +118,7 @@ async fn gzip_holds_the_same_bytes() {
 }
 
 #[tokio::test]
-async fn shipped_scenarios_are_for_everybody() {
+async fn shipped_scenarios_need_no_key() {
     let api = Api::with_keys(&entry("alice", "of alice", "plan", ""));
     let list = api.get("/scenarios").await.json();
     let scenarios = list["scenarios"].as_array().expect("a list").clone();
@@ -193,15 +193,24 @@ async fn ground_in_degrees_is_sampled_in_degrees() {
 }
 
 #[tokio::test]
-async fn keys_are_asked_for_where_work_is_done() {
-    let api = Api::with_keys(&entry("alice", "of alice", "plan", ""));
-    let refused: Answer = api
-        .send(
-            Method::POST,
-            "/scenarios:ground",
-            &[("content-type", "application/json")],
-            "{}",
-        )
-        .await;
-    assert_eq!(refused.status, StatusCode::UNAUTHORIZED);
+async fn sampling_ground_needs_a_key_that_may_plan() {
+    let keys = [
+        entry("alice", "of alice", "plan", ""),
+        entry("rita", "of rita", "read", ""),
+    ];
+    let api = Api::with_keys(&keys.concat());
+    let ask = async |more: &[(&str, &str)]| {
+        let headers = [&[("content-type", "application/json")], more].concat();
+        let body = sloping().to_string();
+        api.send(Method::POST, "/scenarios:ground", &headers, body)
+            .await
+    };
+    assert_eq!(ask(&[]).await.status, StatusCode::UNAUTHORIZED);
+    for (secret, expected) in [
+        ("of rita", StatusCode::FORBIDDEN),
+        ("of alice", StatusCode::OK),
+    ] {
+        let answer = ask(&[("authorization", &bearer(secret))]).await;
+        assert_eq!(answer.status, expected, "{secret}");
+    }
 }

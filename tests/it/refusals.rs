@@ -1,16 +1,16 @@
-//! What the service refuses, and the problem that it answers with.
+//! What the service refuses, and the problem document of each refusal.
 
 use axum::http::Method;
 use serde_json::{Value, json};
 
 use crate::support::api::{Answer, Api};
 
-/// A header of a request.
+/// A request header.
 type Header = (&'static str, &'static str);
 
 const JSON: Header = ("content-type", "application/json");
 
-/// Requests without a body; `{plan}` is a plan that is queued.
+/// Requests without a body; `{plan}` is a queued plan.
 const WITHOUT_BODY: &[(&str, u16)] = &[
     ("GET /nothing", 404),
     ("GET /plans/", 404),
@@ -84,7 +84,7 @@ const BODIES: &[(&[Header], &str, u16)] = &[
 ];
 
 #[tokio::test]
-async fn refusals_are_problems() {
+async fn every_refusal_is_a_problem_document() {
     let api = Api::new();
     let plan = api.submit().await;
     let mut problems = Vec::new();
@@ -129,7 +129,7 @@ fn record(request: &str, answer: &Answer, status: u16) -> Value {
 }
 
 #[tokio::test]
-async fn a_body_beyond_the_limit_is_refused_whether_announced_or_not() {
+async fn a_body_beyond_the_limit_is_refused_with_and_without_a_length() {
     let api = Api::new();
     let chunks = futures_util::stream::repeat_with(|| {
         Ok::<_, std::io::Error>(bytes::Bytes::from(vec![b' '; 1000]))

@@ -1,4 +1,4 @@
-//! Nodes that share a store: some answer, some run plans.
+//! Nodes that share a store: some answer requests, some run plans.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::support::patience::eventually;
 use crate::support::process::{Service, run_with};
 use crate::support::{nats, scenario};
 
-/// A node of a store that other machines could reach, too.
+/// A node on a shared store.
 fn node(directory: &Path, address: &str, arguments: &[&str]) -> Service {
     let arguments = [&["--store", address], arguments].concat();
     Service::start(directory, &arguments)
@@ -20,7 +20,7 @@ fn directory() -> TempDir {
 }
 
 #[tokio::test]
-async fn one_node_answers_and_another_runs_the_plans() {
+async fn one_node_accepts_plans_and_another_runs_them() {
     let address = nats::address();
     let (of_api, of_worker) = (directory(), directory());
     let api = node(of_api.path(), &address, &["--role", "api"]);
@@ -48,7 +48,7 @@ async fn one_node_answers_and_another_runs_the_plans() {
 }
 
 #[tokio::test]
-async fn a_worker_answers_those_alone_who_look_after_it() {
+async fn a_worker_serves_only_operational_routes() {
     let directory = directory();
     let worker = node(directory.path(), &nats::address(), &["--role", "worker"]);
     worker.until_ready(200).await;
@@ -70,7 +70,7 @@ async fn a_worker_answers_those_alone_who_look_after_it() {
 }
 
 #[tokio::test]
-async fn limits_tell_of_the_workers_of_all_nodes() {
+async fn limits_count_the_workers_of_all_nodes() {
     let address = nats::address();
     let (first, second) = (directory(), directory());
     let worker = node(
@@ -79,7 +79,7 @@ async fn limits_tell_of_the_workers_of_all_nodes() {
         &["--role", "worker", "--workers", "5"],
     );
     worker.until_ready(200).await;
-    // It counts the others at its start.
+    // It counts the workers of other nodes at its start.
     let api = node(second.path(), &address, &["--role", "api"]);
     api.until_ready(200).await;
     eventually(async || {
@@ -89,9 +89,9 @@ async fn limits_tell_of_the_workers_of_all_nodes() {
     .await;
 }
 
-/// A node without its servers answers, says why it is not ready, and goes on when they are there.
+/// A node without its servers answers, is not ready, refuses plans and can be stopped.
 #[tokio::test]
-async fn a_node_waits_for_its_servers() {
+async fn a_node_without_its_servers_is_alive_but_not_ready() {
     let directory = directory();
     let alone = node(
         directory.path(),
@@ -107,7 +107,7 @@ async fn a_node_waits_for_its_servers() {
 }
 
 #[test]
-fn the_commands_for_the_file_say_what_looks_after_servers() {
+fn file_commands_on_a_shared_store_name_the_nats_commands_instead() {
     let variables = [("NOCTULE_STORE", "nats://127.0.0.1:1")];
     for (arguments, instead) in [
         (&["store", "check"][..], "nats server check jetstream"),

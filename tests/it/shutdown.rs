@@ -1,4 +1,4 @@
-//! SIGTERM on the real binary: nothing is lost, streams end, the exit comes in time.
+//! SIGTERM on the real binary: nothing is lost, streams end, and the process exits in time.
 
 use std::time::{Duration, Instant};
 
@@ -11,15 +11,15 @@ use crate::support::process::Service;
 use crate::support::sse::{Block, events};
 use crate::support::stores::{Place, for_every_backend};
 
-/// Longer than a test waits for the end of a service: milliseconds of a plan, seconds of a grace period.
+/// Longer than any test waits for a service to end: a plan in milliseconds, a grace period in seconds.
 const AN_HOUR_MS: u64 = 3_600_000;
 const AN_HOUR: &str = "3600";
 
-/// An end that waited for such a plan, for a stream, or for the whole of an idle grace period would come after it.
+/// An exit that waited for such a plan, for a stream, or for a whole idle grace period would come later.
 const LONG_BEFORE: Duration = Duration::from_secs(30);
 
 #[tokio::test]
-async fn an_idle_service_leaves_at_once() {
+async fn an_idle_service_exits_at_once() {
     for_every_backend(async |backend| {
         for signal in ["TERM", "INT"] {
             let place = Place::new(backend);
@@ -45,16 +45,8 @@ async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
 
         let begun = Instant::now();
         service.signal("TERM");
-        let refused = loop {
-            let ready = service
-                .get("/readyz")
-                .send()
-                .await
-                .expect("it still answers");
-            if ready.status() == 503 {
-                break service.post(&a_run_of(10)).await;
-            }
-        };
+        service.until_ready(503).await;
+        let refused = service.post(&a_run_of(10)).await;
         assert_eq!(refused.status(), 503);
         assert!(refused.headers().contains_key("retry-after"));
         let problem: Value = refused.json().await.expect("JSON");
@@ -83,7 +75,7 @@ async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
         let told = life(&service, &address).await;
         let (both_runs, end) = told.split_at(4);
         assert_eq!(both_runs, ["queued", "running", "queued", "running"]);
-        // It is running, too, when it is told to stop.
+        // Cancelling a running plan repeats its status `running`.
         assert_eq!(end, ["running", "cancelled"]);
         assert_eq!(
             life(&service, &waiting).await,
@@ -94,7 +86,7 @@ async fn a_plan_that_outlasts_the_grace_period_runs_again_after_a_restart() {
 }
 
 #[tokio::test]
-async fn a_plan_that_ends_within_the_grace_period_is_kept() {
+async fn a_plan_that_ends_within_the_grace_period_keeps_its_result() {
     for_every_backend(async |backend| {
         let place = Place::new(backend);
         let service = place.serve(&["--workers", "1", "--grace", "30"]);
@@ -120,35 +112,27 @@ async fn a_plan_that_ends_within_the_grace_period_is_kept() {
 }
 
 #[tokio::test]
-async fn a_second_signal_does_not_wait() {
+async fn a_second_signal_exits_without_waiting() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &["--workers", "1", "--grace", AN_HOUR]);
     let address = service.submit(&a_run_of(AN_HOUR_MS)).await;
     let _stream = running(&service, &address).await;
     service.signal("TERM");
-    while service
-        .get("/readyz")
-        .send()
-        .await
-        .expect("it still answers")
-        .status()
-        != 503
-    {}
+    service.until_ready(503).await;
     service.signal("TERM");
     assert_eq!(service.exit().await.code(), Some(1));
 }
 
 #[tokio::test]
-async fn open_streams_do_not_hold_up_the_end() {
+async fn open_streams_do_not_delay_the_exit() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &["--workers", "1", "--grace", "8"]);
     let address = service.submit(&a_run_of(AN_HOUR_MS)).await;
-    // Of so many readers only that they are let go matters.
+    // Of so many readers it only matters that they are released.
     let streams = join_all((0..500).map(|_| running_at(&service, &address, 0.01))).await;
     let begun = Instant::now();
     service.signal("TERM");
-    let ready = async || service.get("/readyz").send().await.expect("an answer");
-    while ready().await.status() != 503 {}
+    service.until_ready(503).await;
     for stream in streams {
         let rest = stream.rest().await;
         assert!(

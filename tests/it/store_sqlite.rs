@@ -1,4 +1,4 @@
-//! What only the embedded store does.
+//! Behaviour of the embedded store alone.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
@@ -17,7 +17,7 @@ fn options() -> Options {
     Options::new(1_000)
 }
 
-/// The message with which opening is refused.
+/// The message of a refused opening.
 fn refusal(data_dir: &Path) -> String {
     match SqliteStore::open(data_dir, options()) {
         Ok(_) => panic!("{} was opened", data_dir.display()),
@@ -26,7 +26,7 @@ fn refusal(data_dir: &Path) -> String {
 }
 
 #[tokio::test]
-async fn the_data_directory_is_made_for_its_owner_alone() {
+async fn a_new_data_directory_is_private_to_its_owner() {
     let parent = TempDir::new().unwrap();
     let data_dir = parent.path().join("a/b");
     let store = SqliteStore::open(&data_dir, options()).unwrap();
@@ -47,13 +47,13 @@ async fn a_second_opener_is_refused_until_the_first_has_closed() {
     assert!(matches!(second, Err(StoreError::InUse(path)) if path == directory.path()));
     store.close().await;
     let second = SqliteStore::open(directory.path(), options()).unwrap();
-    // Dropping is closing too.
+    // Dropping closes as well.
     drop(second);
     SqliteStore::open(directory.path(), options()).unwrap();
 }
 
 #[tokio::test]
-async fn a_newer_schema_is_refused_and_left_alone() {
+async fn a_newer_schema_is_refused_and_left_unchanged() {
     let directory = TempDir::new().unwrap();
     SqliteStore::open(directory.path(), options()).unwrap();
     let file = directory.path().join("noctule.db");
@@ -73,7 +73,7 @@ async fn a_newer_schema_is_refused_and_left_alone() {
 }
 
 #[test]
-fn what_is_no_data_directory_is_refused_by_name() {
+fn a_path_or_file_that_is_not_a_store_is_refused_by_name() {
     let directory = TempDir::new().unwrap();
     let in_the_way = directory.path().join("file");
     std::fs::write(&in_the_way, "").unwrap();
@@ -97,11 +97,11 @@ fn what_is_no_data_directory_is_refused_by_name() {
 }
 
 #[test]
-fn a_directory_that_cannot_be_written_is_refused_by_name() {
+fn a_lock_file_that_cannot_be_made_is_refused_by_name() {
     let directory = TempDir::new().unwrap();
     let data_dir = directory.path().join("data");
     std::fs::create_dir(&data_dir).unwrap();
-    // A directory in the lock's place keeps out even those who may write anywhere.
+    // A directory in place of the lock file stops even root.
     std::fs::create_dir(data_dir.join("noctule.lock")).unwrap();
     let message = refusal(&data_dir);
     assert!(
@@ -111,7 +111,7 @@ fn a_directory_that_cannot_be_written_is_refused_by_name() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_person_can_read_the_file() {
+async fn the_database_can_be_read_with_plain_sql() {
     let directory = TempDir::new().unwrap();
     let store = SqliteStore::open(directory.path(), options()).unwrap();
     let submission = submission();
@@ -138,9 +138,9 @@ async fn a_person_can_read_the_file() {
     );
 }
 
-/// It has no row of its own: whatever became of the plan since, it is told as it was.
+/// The event has no row of its own, yet it reads back unchanged whatever has become of the plan.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_plan_s_acceptance_is_told_to_the_last_bit() {
+async fn the_acceptance_event_of_a_plan_reads_back_unchanged() {
     let directory = TempDir::new().unwrap();
     let store = SqliteStore::open(directory.path(), options()).unwrap();
     let mut accepted = Vec::new();
@@ -167,7 +167,7 @@ async fn a_plan_s_acceptance_is_told_to_the_last_bit() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn one_failed_write_does_not_spoil_the_others() {
+async fn one_failed_write_does_not_fail_the_others() {
     let directory = TempDir::new().unwrap();
     let store = SqliteStore::open(directory.path(), options()).unwrap();
     let twice = submission();
@@ -192,27 +192,27 @@ async fn one_failed_write_does_not_spoil_the_others() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_write_waits_for_a_person_who_holds_the_file() {
+async fn a_write_waits_for_another_process_that_locks_the_file() {
     let directory = TempDir::new().unwrap();
     let store = SqliteStore::open(directory.path(), options()).unwrap();
     let person = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
     person.execute_batch("BEGIN IMMEDIATE").unwrap();
     let mut submit = store.submit(submission());
     assert!(futures_util::FutureExt::now_or_never(&mut submit).is_none());
-    // Reading goes on meanwhile.
+    // Reads go on meanwhile.
     assert_eq!(store.stats().await.unwrap().queued, 0);
     person.execute_batch("COMMIT").unwrap();
     submit.await.unwrap();
 }
 
-/// A run may begin before its claim is durable; here the disk then refuses the claim.
+/// A run may begin before its claim is durable; here the claim then fails to commit.
 #[tokio::test(flavor = "multi_thread")]
 async fn an_early_lease_whose_claim_fails_is_lost() {
     let directory = TempDir::new().unwrap();
     let store = SqliteStore::open(directory.path(), options()).unwrap();
     let id = store.submit(submission()).await.unwrap().plan.id;
     let database = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
-    // Broken as late as can be: at the commit itself.
+    // Breaks as late as possible: at the commit.
     database
         .execute_batch(
             "CREATE TABLE broken (of INTEGER REFERENCES plans (seq) DEFERRABLE INITIALLY DEFERRED);
@@ -221,7 +221,7 @@ async fn an_early_lease_whose_claim_fails_is_lost() {
         .unwrap();
     let void = store.claim_early().await.unwrap();
     assert_eq!((void.plan.id, void.plan.status), (id, Status::Running));
-    // The next write comes after the one that fails.
+    // This write comes after the one that fails.
     store.health().await.unwrap();
     assert_eq!(store.get(id).await.unwrap().status, Status::Queued);
     let lost = store.append(&void, vec![point(1, None)]).await;
@@ -243,9 +243,9 @@ async fn an_early_lease_whose_claim_fails_is_lost() {
     assert_eq!(ids, [1, 2, 3, 4], "nothing remains of the void run");
 }
 
-/// Of those that share a transaction, what fails after it has written is refused alone.
+/// Of writes that share a transaction, one that fails after it has written is refused alone.
 #[tokio::test(flavor = "multi_thread")]
-async fn one_that_fails_half_done_leaves_nothing_and_spoils_nobody() {
+async fn a_write_that_fails_halfway_leaves_nothing_and_fails_no_other() {
     let directory = TempDir::new().unwrap();
     let store = SqliteStore::open(directory.path(), options()).unwrap();
     let database = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
@@ -283,7 +283,7 @@ async fn one_that_fails_half_done_leaves_nothing_and_spoils_nobody() {
 }
 
 #[tokio::test]
-async fn a_backup_may_be_called_what_a_file_may() {
+async fn a_backup_may_have_any_file_name() {
     use std::os::unix::ffi::OsStrExt as _;
 
     let directory = TempDir::new().unwrap();
@@ -299,9 +299,9 @@ async fn a_backup_may_be_called_what_a_file_may() {
     assert_eq!(restored.get(id).await.unwrap().status, Status::Queued);
 }
 
-/// Whatever is wrong with the plan at the head of the queue, those behind it have their turn.
+/// Whatever is wrong with the plan at the head of the queue, those behind it are still claimed.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_plan_that_cannot_be_read_holds_up_nobody() {
+async fn an_unreadable_plan_fails_and_does_not_block_the_queue() {
     let directory = TempDir::new().unwrap();
     let (tell, ended) = std::sync::mpsc::channel();
     let options = Options {
@@ -342,9 +342,9 @@ async fn a_plan_that_cannot_be_read_holds_up_nobody() {
     assert_eq!(status, "failed");
 }
 
-/// However often claims fail after they have written, nobody who shares their transactions does.
+/// However often claims fail after they have written, other writes in their transactions succeed.
 #[tokio::test(flavor = "multi_thread")]
-async fn claims_that_fail_spoil_nobody_s_write() {
+async fn failing_claims_fail_no_other_write() {
     let directory = TempDir::new().unwrap();
     let store = SqliteStore::open(directory.path(), options()).unwrap();
     let id = store.submit(submission()).await.unwrap().plan.id;
@@ -355,7 +355,7 @@ async fn claims_that_fail_spoil_nobody_s_write() {
              BEGIN SELECT raise(ABORT, 'not taken'); END; BEGIN IMMEDIATE",
         )
         .unwrap();
-    // While the file is held, they all come together; more claims than could be answered before the last write.
+    // While the file is locked they queue up together; more claims than can be answered before the last write.
     let mut claims = futures_util::future::join_all((0..20).map(|_| store.claim()));
     assert!(futures_util::FutureExt::now_or_never(&mut claims).is_none());
     let mut writes = futures_util::future::join_all((0..10).map(|_| store.submit(submission())));

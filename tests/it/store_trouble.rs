@@ -1,5 +1,5 @@
-//! Disks that are full, read-only or damaged, and data directories that somebody else has: the
-//! service says so, loses nothing, and goes on when the cause is gone.
+//! Disks that are full, read-only or damaged, and data directories that are in use: the service reports it,
+//! loses nothing, and goes on when the cause is gone.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
@@ -21,11 +21,11 @@ use crate::support::plans::submission;
 use crate::support::process::{Service, run};
 use crate::support::scenario;
 
-/// Take what room is left at `path`.
+/// Fills the disk with a file at `path`.
 fn fill(path: &Path) {
     let mut ballast = File::create(path).unwrap();
     while ballast.write_all(&[1; 4096]).is_ok() {}
-    // The last bytes too.
+    // Down to the last byte.
     while ballast.write_all(&[1]).is_ok() {}
 }
 
@@ -58,7 +58,7 @@ async fn a_full_disk_refuses_plans_and_loses_none() {
     let detail = service.until_ready(503).await;
     assert!(detail.contains("disk of the store is full"), "{detail}");
     service.bytes("/livez").await;
-    // What was done can still be read.
+    // Finished plans can still be read.
     service.bytes(&format!("{}/result", accepted[0])).await;
 
     std::fs::remove_file(&ballast).unwrap();
@@ -68,7 +68,7 @@ async fn a_full_disk_refuses_plans_and_loses_none() {
 }
 
 #[tokio::test]
-async fn a_read_only_directory_is_told_and_tried_again() {
+async fn a_read_only_directory_is_reported_and_retried() {
     let directory = TempDir::new().unwrap();
     let service = Service::start_on_a_small_disk(directory.path(), "size=3m,ro");
     let detail = service.until_ready(503).await;
@@ -96,7 +96,7 @@ async fn a_second_process_waits_until_the_first_is_gone() {
 }
 
 #[tokio::test]
-async fn a_damaged_file_is_told_and_its_backup_can_be_put_back() {
+async fn a_damaged_file_is_reported_and_its_backup_can_be_restored() {
     let directory = TempDir::new().unwrap();
     let file = directory.path().join("noctule.db");
     let backup = directory.path().join("backup.db");
@@ -104,7 +104,7 @@ async fn a_damaged_file_is_told_and_its_backup_can_be_put_back() {
     let service = Service::start(directory.path(), &[]);
     let address = service.submit(&scenario()).await;
     service.ended(&address).await;
-    // Beside the running service.
+    // While the service runs.
     let copied = run(&["store", "backup", "--data-dir", paths[0], paths[1]], "");
     assert_eq!(copied.status.code(), Some(0), "{copied:?}");
     let again = run(&["store", "backup", "--data-dir", paths[0], paths[1]], "");
@@ -133,7 +133,7 @@ async fn a_damaged_file_is_told_and_its_backup_can_be_put_back() {
 }
 
 #[test]
-fn what_is_no_store_has_no_backup() {
+fn a_file_that_is_not_a_store_is_not_backed_up() {
     let directory = TempDir::new().unwrap();
     std::fs::write(directory.path().join("noctule.db"), "").unwrap();
     let backup = directory.path().join("backup.db");
@@ -145,7 +145,7 @@ fn what_is_no_store_has_no_backup() {
 
 /// Damage that shows only when the page in question is read.
 #[tokio::test(flavor = "multi_thread")]
-async fn damage_that_is_met_on_the_way_closes_the_store_until_it_is_mended() {
+async fn damage_found_while_reading_closes_the_store_until_it_is_repaired() {
     let directory = TempDir::new().unwrap();
     let data_dir = directory.path().to_owned();
     let open: Open = Arc::new(move |suspicious| {
@@ -170,7 +170,7 @@ async fn damage_that_is_met_on_the_way_closes_the_store_until_it_is_mended() {
     let path = directory.path().join("noctule.db");
     let sound = std::fs::read(&path).unwrap();
     let file = File::options().write(true).open(&path).unwrap();
-    // A page that holds nothing but a part of a document, and the number of the page that goes on.
+    // A page that holds only a part of a document, and the number of the next page.
     let page_bytes = 4096;
     let part = (0..sound.len() / page_bytes)
         .map(|page| page * page_bytes)
@@ -182,7 +182,7 @@ async fn damage_that_is_met_on_the_way_closes_the_store_until_it_is_mended() {
         .expect("the documents are long");
     file.write_all_at(&[0xff; 4], part as u64).unwrap();
     assert!(!upkeep::check(directory.path()).unwrap().faults.is_empty());
-    // No half of a backup is left.
+    // No partial backup is left.
     let backups = TempDir::new().unwrap();
     upkeep::backup(directory.path(), &backups.path().join("backup.db")).unwrap_err();
     assert_eq!(std::fs::read_dir(backups.path()).unwrap().count(), 0);
@@ -197,7 +197,7 @@ async fn damage_that_is_met_on_the_way_closes_the_store_until_it_is_mended() {
         }
     }
     assert_eq!(told, Some(Trouble::Damaged));
-    // Closed, also for what would not have met the damage.
+    // Closed, even to what would not have touched the damage.
     until(&store, false).await;
     file.write_all_at(&sound[part..part + 4], part as u64)
         .unwrap();

@@ -1,4 +1,4 @@
-//! Files that earlier versions of the embedded store have left: they are brought up, and nothing in them is lost.
+//! Files of earlier versions of the embedded store are migrated without loss.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
@@ -15,7 +15,7 @@ fn options() -> Options {
     Options::new(1_000)
 }
 
-/// A data directory with the file that `dump` describes.
+/// A data directory with the database of `dump`.
 fn left(dump: &str) -> TempDir {
     let directory = TempDir::new().unwrap();
     let database = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
@@ -23,9 +23,9 @@ fn left(dump: &str) -> TempDir {
     directory
 }
 
-/// What was written before owners, idempotency keys and retention were known.
+/// Written before owners, idempotency keys and retention existed.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_file_of_the_first_version_is_brought_up_and_goes_on() {
+async fn a_file_of_version_1_is_migrated_and_goes_on() {
     use Status::{Queued, Succeeded};
     let directory = left(include_str!("fixtures/store-version-1.sql"));
     let file = directory.path().join("noctule.db");
@@ -45,7 +45,7 @@ async fn a_file_of_the_first_version_is_brought_up_and_goes_on() {
         assert_eq!(document.is_some(), plan.status == Succeeded);
         assert!(store.scenario(plan.id).await.unwrap().contains("planner"));
     }
-    // The interrupted run is the next one, and the bytes of old plans count.
+    // The interrupted run is next in the queue, and the bytes of old plans count.
     let lease = store.claim().await.unwrap();
     assert_eq!(lease.plan.name.as_deref(), Some("long"));
     store
@@ -78,10 +78,10 @@ async fn a_file_of_the_first_version_is_brought_up_and_goes_on() {
     assert_eq!(store.list(all).await.unwrap().len(), 1);
 }
 
-/// A second after the fourth version's process was killed.
+/// One second after the process of the fourth version was killed.
 const SOON_MS: i64 = 1_795_369_517_000;
 
-/// What belongs to a plan of the fourth version is there, and in order.
+/// Everything of a plan of the fourth version is there, and in order.
 async fn is_whole(store: &SqliteStore, plan: &Plan) {
     let is_long = plan.name.as_deref() == Some("long");
     let ended = plan.status.is_final();
@@ -103,9 +103,9 @@ async fn is_whole(store: &SqliteStore, plan: &Plan) {
     assert_eq!(searched, is_long || plan.status == Status::Succeeded);
 }
 
-/// What was written when events were text: everything that there was to keep, of two owners.
+/// Written when events were stored as text: one of everything, for two owners.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_file_of_the_fourth_version_is_brought_up_with_all_that_is_in_it() {
+async fn a_file_of_version_4_is_migrated_with_all_its_contents() {
     use Status::{Cancelled, Queued, Succeeded};
     let directory = left(include_str!("fixtures/store-version-4.sql"));
     let soon = Options {
@@ -140,7 +140,7 @@ async fn a_file_of_the_fourth_version_is_brought_up_with_all_that_is_in_it() {
         panic!("there are six");
     };
 
-    // Keys, tombstones, datasets and webhooks mean what they meant.
+    // Keys, tombstones, datasets and webhooks keep their meaning.
     let repeated = async |owner: &str, key: &str, body_sha256: &str| {
         let (key, body_sha256) = (key.to_owned(), body_sha256.to_owned());
         let idempotency = Idempotency { key, body_sha256 };
@@ -175,7 +175,7 @@ async fn a_file_of_the_fourth_version_is_brought_up_with_all_that_is_in_it() {
         .collect();
     assert_eq!(due, [(told.id, "http://127.0.0.1:9/hook", 1)]);
 
-    // The interrupted run is the next one, begins anew, and its end is told where its caller wanted.
+    // The interrupted run is next, starts over, and its end is due at its caller's webhook.
     assert_eq!(
         (long.queue_position, queued.queue_position),
         (Some(1), Some(2))

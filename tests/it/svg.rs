@@ -1,5 +1,5 @@
-//! The drawing of a plan: well-formed whatever the names, for every shipped scenario, over HTTP and
-//! from the command line.
+//! The drawing of a plan: well-formed whatever the names, for every shipped scenario, over HTTP and on the
+//! command line.
 
 use std::fs;
 
@@ -15,7 +15,7 @@ use uuid::Uuid;
 use crate::support::api::Api;
 use crate::support::{process, run, scenario};
 
-/// The colour that only infeasible routes have.
+/// The colour used only for infeasible routes.
 const ALARM: &str = "#d0021b";
 
 fn accepted(document: &Value) -> String {
@@ -36,7 +36,7 @@ fn draw(scenario: &Value, result: &ResultDocument) -> String {
         .expect("every plan can be drawn")
 }
 
-/// A result with a path that cuts the corner of its waypoints.
+/// A result whose path cuts the corner of its waypoints.
 fn result() -> ResultDocument {
     let mut result = run::result(Uuid::nil(), "iterations");
     result.path = Some(Path {
@@ -58,7 +58,7 @@ fn result() -> ResultDocument {
     result
 }
 
-/// Panics unless it is XML that stands alone; the words that it shows.
+/// Panics unless the drawing is self-contained XML; its visible texts.
 #[track_caller]
 fn words(drawing: &str) -> Vec<String> {
     let document = Document::parse(drawing).unwrap_or_else(|error| panic!("{error}\n{drawing}"));
@@ -128,13 +128,13 @@ fn a_small_plan() {
         expect_words(&drawing, expected);
     }
     assert!(!drawing.contains(ALARM));
-    // The relief is tested by itself; without it the rest can be read.
+    // The relief is tested separately; without it the snapshot is readable.
     let lines: Vec<&str> = drawing.lines().filter(|line| line.len() < 600).collect();
     insta::assert_snapshot!(lines.join("\n"));
 }
 
 #[test]
-fn hostile_names_stay_words() {
+fn hostile_names_are_escaped() {
     for name in [
         "</text><script>alert(1)</script>",
         "\" onload=\"alert(1)",
@@ -171,7 +171,7 @@ fn hostile_names_stay_words() {
 }
 
 #[test]
-fn an_infeasible_route_is_unmistakable() {
+fn an_infeasible_route_is_clearly_marked() {
     let mut walled = scenario();
     walled["threats"] = json!([{
         "kind": "polygon",
@@ -220,7 +220,7 @@ fn every_shipped_scenario_draws() {
     assert!(drawn >= 5, "{drawn}");
 }
 
-/// Shapes that a page could burst at: lines, dots, and more names than there is room for.
+/// Shapes that could overflow a page: lines, dots, and more names than there is room for.
 #[test]
 fn odd_areas_draw() {
     let area = |width: f64, height: f64| {
@@ -262,7 +262,7 @@ fn odd_areas_draw() {
 }
 
 #[tokio::test]
-async fn the_service_draws_for_who_asks() {
+async fn the_service_draws_a_plan_on_request() {
     let api = Api::new();
     let address = api.submit().await;
     let early = api.get(&format!("{address}/result?format=svg")).await;
@@ -309,7 +309,7 @@ async fn the_service_draws_for_who_asks() {
 }
 
 #[test]
-fn the_name_of_the_file_decides_unless_a_format_is_named() {
+fn the_file_extension_decides_unless_a_format_is_given() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let path = |name: &str| {
         directory

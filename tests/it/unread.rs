@@ -1,4 +1,4 @@
-//! Requests that are none: refused before any handler sees them, with a problem document all the same.
+//! Malformed requests: refused with a problem document before any handler sees them.
 
 use serde_json::Value;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
@@ -7,7 +7,7 @@ use tokio::net::TcpStream;
 use crate::support::patience::in_time;
 use crate::support::process::Service;
 
-/// Everything that comes back for `bytes` until the service closes the connection.
+/// Everything received for `bytes` until the service closes the connection.
 async fn answers(service: &Service, bytes: &[u8]) -> String {
     let mut stream = TcpStream::connect(service.address())
         .await
@@ -19,7 +19,7 @@ async fn answers(service: &Service, bytes: &[u8]) -> String {
     answers
 }
 
-/// The last of some answers is a problem of that type, and well-formed.
+/// Checks that the last of the responses is a well-formed problem of this type.
 fn expect_problem(answers: &str, status: u16, slug: &str) {
     let begin = answers.rfind("HTTP/1.1 4").expect("a status line");
     let parts = answers[begin..].split_once("\r\n\r\n");
@@ -49,7 +49,7 @@ fn expect_problem(answers: &str, status: u16, slug: &str) {
 }
 
 #[tokio::test]
-async fn what_is_no_request_gets_a_problem() {
+async fn a_malformed_request_gets_a_problem() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &[]);
     for request in [
@@ -76,7 +76,7 @@ async fn what_is_no_request_gets_a_problem() {
 }
 
 #[tokio::test]
-async fn what_is_wrong_with_the_way_that_a_body_comes_is_told() {
+async fn a_faulty_transfer_encoding_is_explained() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &[]);
     for (coding, status, detail) in [
@@ -100,10 +100,10 @@ async fn what_is_wrong_with_the_way_that_a_body_comes_is_told() {
 }
 
 #[tokio::test]
-async fn a_head_too_large_gets_a_problem() {
+async fn a_head_that_is_too_large_gets_a_problem() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &[]);
-    // As much as fits is read at once, so that what is a little longer may do.
+    // A whole buffer is read at once, so a head slightly above the limit may pass.
     let long = "a".repeat(2 * 64 * 1024);
     let many = "x: 1\r\n".repeat(101);
     for request in [
@@ -122,7 +122,7 @@ async fn a_head_too_large_gets_a_problem() {
 }
 
 #[tokio::test]
-async fn what_follows_a_request_and_is_none_gets_a_problem_of_its_own() {
+async fn garbage_after_a_request_gets_its_own_problem() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &[]);
     let request = "GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\nGARBAGE\r\n\r\n";

@@ -1,4 +1,4 @@
-//! Starting from a route that is known: out of the store, or given.
+//! Starting from a known route: a stored plan's, or one given in the document.
 
 use noctule::job::Status;
 use serde_json::{Value, json};
@@ -7,7 +7,7 @@ use crate::support::api::Api;
 use crate::support::process::{Service, run};
 use crate::support::{run as worker, scenario};
 
-/// The small scenario, to be planned from the route of a plan.
+/// The small scenario, to be planned from another plan's route.
 fn from_plan(id: &str) -> Value {
     let mut document = scenario();
     document["planner"]["warm_start"] = json!({"plan_id": id});
@@ -19,7 +19,7 @@ fn id_of(address: &str) -> String {
 }
 
 #[tokio::test]
-async fn a_plans_waypoints_take_the_place_of_its_id() {
+async fn a_plan_id_is_replaced_by_that_plans_waypoints() {
     let api = Api::new();
     let first = api.submit().await;
     worker::complete(&*api.store, vec![worker::convergence(0, 0.1)]).await;
@@ -42,7 +42,7 @@ async fn a_plans_waypoints_take_the_place_of_its_id() {
         }
     }
 
-    // The accepted document stands for itself: the first plan may go.
+    // The accepted document is self-contained: the first plan may be deleted.
     assert_eq!(api.delete(&first).await.status, 204);
     let answer = api.post("/plans", &kept.json()).await;
     assert_eq!(answer.status, 202, "{answer:?}");
@@ -52,7 +52,7 @@ async fn a_plans_waypoints_take_the_place_of_its_id() {
 }
 
 #[tokio::test]
-async fn validation_alone_shows_the_waypoints_too() {
+async fn validate_only_also_shows_the_waypoints() {
     let api = Api::new();
     let first = api.submit().await;
     worker::complete(&*api.store, vec![worker::convergence(0, 0.1)]).await;
@@ -65,7 +65,7 @@ async fn validation_alone_shows_the_waypoints_too() {
 }
 
 #[tokio::test]
-async fn a_plan_without_a_route_is_no_start() {
+async fn a_warm_start_from_a_plan_without_a_route_is_refused() {
     let api = Api::new();
     let deleted = api.submit().await;
     worker::complete(&*api.store, vec![worker::convergence(0, 0.1)]).await;
@@ -101,14 +101,14 @@ async fn a_plan_without_a_route_is_no_start() {
         }
     }
 
-    // A cancelled one has the best route so far.
+    // A cancelled plan has the best route so far.
     worker::finish(&*api.store, &lease, Status::Cancelled).await;
     let answer = api.post("/plans", &from_plan(&id_of(&running))).await;
     assert_eq!(answer.status, 202, "{answer:?}");
 }
 
 #[tokio::test]
-async fn an_unreadable_store_is_not_the_callers_fault() {
+async fn an_unavailable_store_is_not_reported_as_a_fault_of_the_document() {
     let api = Api::new();
     let first = api.submit().await;
     worker::complete(&*api.store, vec![worker::convergence(0, 0.1)]).await;
@@ -119,7 +119,7 @@ async fn an_unreadable_store_is_not_the_callers_fault() {
 }
 
 #[test]
-fn without_the_service_there_are_no_plans_to_start_from() {
+fn the_command_line_refuses_a_warm_start_by_plan_id() {
     let refused = run(
         &["plan", "-"],
         &from_plan("01936f2c-7d1a-7c55-9a53-27b1b44c1a10").to_string(),
@@ -136,10 +136,10 @@ fn without_the_service_there_are_no_plans_to_start_from() {
     }
 }
 
-/// A plan from the route of another: with a budget that finds nothing good of itself, never worse
-/// than what it starts from.
+/// A plan from the route of another, with a budget too small to find a good route by itself: never worse than
+/// its start.
 #[tokio::test]
-async fn a_search_does_not_lose_the_route_it_starts_from() {
+async fn a_search_is_never_worse_than_its_warm_start() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &[]);
     let planned = async |document: &Value| {
@@ -176,9 +176,9 @@ async fn a_search_does_not_lose_the_route_it_starts_from() {
     );
 }
 
-/// A route in degrees, as another scenario in degrees may start from it: near enough for its plane.
+/// A route in degrees can start another scenario in degrees if it is near enough for its plane.
 #[tokio::test]
-async fn a_route_on_another_part_of_the_earth_is_no_start() {
+async fn a_warm_start_from_a_distant_route_is_refused() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &[]);
     let around = |lat: f64, lon: f64, start: Value| {

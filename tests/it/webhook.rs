@@ -1,4 +1,4 @@
-//! Webhooks: a plan's end told to a receiver of ours, signed, again until it is heard, and across restarts.
+//! Webhooks: a plan's end is sent to a receiver, signed, retried until received, and across restarts.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -37,14 +37,14 @@ fn sender(api: &Api, allow_private: bool) -> Sender {
     Sender::start(api.store.clone(), settings(allow_private), wall_clock())
 }
 
-/// A message that has come.
+/// A received message.
 struct Message {
     uri: Uri,
     headers: HashMap<String, String>,
     body: String,
 }
 
-/// Answers with these statuses, one after the other, and then with 204; what comes is handed on.
+/// Answers with the given statuses in turn, then with 204; passes on what it receives.
 struct Receiver {
     url: String,
     messages: mpsc::UnboundedReceiver<Message>,
@@ -69,7 +69,7 @@ async fn hear(
         })
         .collect();
     let body = String::from_utf8(body.to_vec()).expect("UTF-8");
-    // A test that has seen enough listens no more.
+    // A finished test no longer listens.
     let _ = messages.send(Message { uri, headers, body });
     let status = statuses.lock().expect("no panic").next().unwrap_or(204);
     let status = StatusCode::from_u16(status).expect("a status");
@@ -96,7 +96,7 @@ impl Receiver {
     }
 }
 
-/// Our own server, which needs a phase that never changes.
+/// The service's own server, with a phase that never changes.
 async fn axum_serve(listener: TcpListener, router: Router) {
     let (_phase, watched) = tokio::sync::watch::channel(noctule::http::Phase::Serving);
     let settings = noctule::http::server::Settings {
@@ -109,7 +109,7 @@ async fn axum_serve(listener: TcpListener, router: Router) {
     noctule::http::server::serve(listener, router, watched, settings).await;
 }
 
-/// The signature as its receiver computes it, without any of our code: HMAC (RFC 2104) by hand.
+/// The signature computed independently, as a receiver would: HMAC (RFC 2104) by hand.
 fn signature(message: &Message) -> String {
     use base64::Engine as _;
     let id = &message.headers["webhook-id"];
@@ -130,7 +130,7 @@ fn signature(message: &Message) -> String {
     format!("v1,{coded}")
 }
 
-/// Panics unless it is a message about `plan`, well formed and well signed; the plan's document.
+/// Panics unless the message is about `plan`, well-formed and correctly signed; the plan's document.
 #[track_caller]
 fn check(message: &Message, plan: &str) -> Value {
     assert_eq!(message.uri, "/hook?x=1");
@@ -153,13 +153,13 @@ async fn submit(api: &Api, url: &str) -> Answer {
     api.send(Method::POST, "/plans", &headers, body).await
 }
 
-/// The address of a plan whose end is told to `url`.
+/// Submits a plan with `url` as its webhook; the plan's address.
 async fn accepted(api: &Api, url: &str) -> String {
     submit(api, url).await.header("location").to_owned()
 }
 
 #[tokio::test]
-async fn an_end_is_told_once_and_signed() {
+async fn a_webhook_is_sent_once_and_signed() {
     let api = Api::with_webhooks(settings(true));
     let mut receiver = Receiver::new(&[]).await;
     let plan = accepted(&api, &receiver.url).await;
@@ -167,7 +167,7 @@ async fn an_end_is_told_once_and_signed() {
     run::complete(&*api.store, Vec::new()).await;
     let told = check(&receiver.next().await, &plan);
     assert_eq!(told, api.get(&plan).await.json());
-    // Another one's end comes after it, and nothing between.
+    // The next message is about the other plan's end, so nothing came in between.
     let other = accepted(&api, &receiver.url).await;
     api.send(Method::POST, &format!("{other}/cancel"), &[], "")
         .await;
@@ -175,14 +175,20 @@ async fn an_end_is_told_once_and_signed() {
     assert_eq!(told["status"], "cancelled");
     api.submit().await;
     run::complete(&*api.store, Vec::new()).await;
-    assert!(
-        receiver.messages.try_recv().is_err(),
-        "of a plan that asked for none"
-    );
+    // Nothing is told of a plan that asked for no webhook: next comes the end of a later one that did.
+    let last = accepted(&api, &receiver.url).await;
+    run::complete(&*api.store, Vec::new()).await;
+    check(&receiver.next().await, &last);
+    eventually(async || {
+        let due = api.store.due_webhooks(i64::MAX, 10).await;
+        due.expect("it is open").is_empty()
+    })
+    .await;
+    assert!(receiver.messages.try_recv().is_err());
 }
 
 #[tokio::test]
-async fn an_address_of_a_host_and_a_query_is_called() {
+async fn a_webhook_address_without_a_path_is_called() {
     let mut receiver = Receiver::new(&[]).await;
     let api = Api::with_webhooks(settings(true));
     let _sender = sender(&api, true);
@@ -193,7 +199,7 @@ async fn an_address_of_a_host_and_a_query_is_called() {
 }
 
 #[tokio::test]
-async fn what_is_not_heard_is_told_again_and_redirects_lead_nowhere() {
+async fn a_failed_webhook_is_retried_and_redirects_are_not_followed() {
     let api = Api::with_webhooks(settings(true));
     let mut receiver = Receiver::new(&[307]).await;
     let plan = accepted(&api, &receiver.url).await;
@@ -214,7 +220,7 @@ async fn what_is_not_heard_is_told_again_and_redirects_lead_nowhere() {
 }
 
 #[tokio::test]
-async fn a_receiver_that_is_gone_hears_no_more() {
+async fn a_webhook_answered_with_410_is_not_retried() {
     let api = Api::with_webhooks(settings(true));
     let mut receiver = Receiver::new(&[410]).await;
     submit(&api, &receiver.url).await;
@@ -233,7 +239,7 @@ async fn nothing_is_due(api: &Api) {
 }
 
 #[tokio::test]
-async fn what_cannot_be_written_down_at_once_is_told_no_more_often() {
+async fn a_webhook_whose_record_fails_is_not_sent_twice() {
     let api = Api::with_webhooks(settings(true));
     let mut receiver = Receiver::new(&[]).await;
     submit(&api, &receiver.url).await;
@@ -246,7 +252,7 @@ async fn what_cannot_be_written_down_at_once_is_told_no_more_often() {
 }
 
 #[tokio::test]
-async fn an_end_whose_telling_broke_is_told_again() {
+async fn a_webhook_whose_record_panics_is_sent_again() {
     let api = Api::with_webhooks(settings(true));
     let mut receiver = Receiver::new(&[]).await;
     let plan = accepted(&api, &receiver.url).await;
@@ -262,7 +268,7 @@ async fn an_end_whose_telling_broke_is_told_again() {
 #[tokio::test]
 async fn private_receivers_are_not_called() {
     let mut receiver = Receiver::new(&[]).await;
-    // Accepted while it was allowed, under a name that leads here, and due when it no longer is.
+    // Accepted while private addresses were allowed, one by host name, and due when they no longer are.
     let api = Api::with_webhooks(settings(true));
     let port = receiver
         .url
@@ -285,7 +291,7 @@ async fn private_receivers_are_not_called() {
 }
 
 #[tokio::test]
-async fn addresses_are_looked_at_before_a_plan_is_accepted() {
+async fn webhook_addresses_are_checked_before_a_plan_is_accepted() {
     let off = Api::new();
     let refused = submit(&off, "https://hooks.example/").await;
     let problem = refused.expect_problem(400, "invalid-parameter");
@@ -304,7 +310,7 @@ async fn addresses_are_looked_at_before_a_plan_is_accepted() {
     assert_eq!(submit(&api, "https://hooks.example/").await.status, 202);
 }
 
-/// A service of its own in `directory`, which tells whom it is asked to.
+/// A service process in `directory` that sends webhooks.
 fn start(directory: &Path, variables: &[(&str, &str)]) -> Service {
     let secret = directory.join("secret");
     std::fs::write(&secret, SECRET).expect("written");
@@ -318,7 +324,7 @@ fn start(directory: &Path, variables: &[(&str, &str)]) -> Service {
     Service::start_with(variables, &directory.join("data"), &arguments)
 }
 
-/// The address of a plan whose end is to be told to `url`.
+/// Submits a plan with `url` as its webhook; the plan's address.
 async fn submit_to(service: &Service, url: &str) -> String {
     let request = service.client().post(service.url("/plans"));
     let request = request.json(&scenario()).header("noctule-webhook", url);
@@ -331,7 +337,7 @@ async fn submit_to(service: &Service, url: &str) -> String {
 }
 
 #[tokio::test]
-async fn a_restart_forgets_no_webhook() {
+async fn a_pending_webhook_survives_a_restart() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let mut receiver = Receiver::new(&[500]).await;
     let service = start(directory.path(), &[]);
@@ -345,7 +351,7 @@ async fn a_restart_forgets_no_webhook() {
 }
 
 #[tokio::test]
-async fn tls_is_spoken_with_whom_the_machine_trusts() {
+async fn tls_certificates_are_checked_against_the_trusted_authorities() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
     let port = listener.local_addr().expect("bound").port();
@@ -355,7 +361,7 @@ async fn tls_is_spoken_with_whom_the_machine_trusts() {
         acceptor.accept(stream).await
     };
 
-    // Of an authority that nobody knows.
+    // The receiver's certificate is from an unknown authority.
     let service = start(directory.path(), &[]);
     let url = format!("https://localhost:{port}/hook?x=1");
     let plan = submit_to(&service, &url).await;
@@ -377,7 +383,7 @@ async fn tls_is_spoken_with_whom_the_machine_trusts() {
     check(&message.expect("a message"), &plan);
 }
 
-/// Of a receiver called localhost.
+/// For a receiver named localhost.
 fn acceptor() -> tokio_rustls::TlsAcceptor {
     use tokio_rustls::rustls::pki_types::pem::PemObject as _;
     use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};

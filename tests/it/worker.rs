@@ -1,4 +1,4 @@
-//! The pool: how plans are run, told of, stopped and given back.
+//! The worker pool: how plans are run, reported, stopped and given back.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
@@ -20,7 +20,7 @@ use crate::support::openmetrics::Reading;
 use crate::support::plans::{history, kind, statuses, submission, until};
 use crate::support::stores::{Fixture, on_every_backend};
 
-/// Longer than any test waits.
+/// Longer than any test takes.
 const AGES: Duration = Duration::from_secs(3_600);
 
 fn settings(workers: usize, clock: Clock) -> Settings {
@@ -54,7 +54,7 @@ async fn result(store: &dyn Store, id: PlanId) -> ResultDocument {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_plan_is_run_and_its_result_and_events_are_kept_in_order() {
+async fn a_run_keeps_its_result_and_its_events_in_order() {
     on_every_backend(10, async |store| {
         let pool = pool(store, 1, deterministic(5_000));
         let id = submit(&**store, "{}").await;
@@ -168,7 +168,7 @@ async fn a_panic_fails_its_plan_and_no_other() {
                 [Some("planner-panic"), Some("terrain-missing"), None][nth % 3]
             );
             assert!(!error.is_some_and(|error| error.detail.contains("secret")));
-            // What was told before the end is kept.
+            // Events from before the end are kept.
             let told = history(&**store, id).await;
             assert!(matches!(told[2], Event::Convergence(_)));
             assert_eq!((told.len(), &told[4]), (5, &Event::End(status)));
@@ -179,7 +179,7 @@ async fn a_panic_fails_its_plan_and_no_other() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_cannot_be_planned_now_is_planned_a_little_later() {
+async fn a_plan_that_cannot_run_now_is_retried() {
     on_every_backend(10, async |store| {
         let asked = Arc::new(AtomicUsize::new(0));
         let counted = Arc::clone(&asked);
@@ -206,7 +206,7 @@ async fn what_cannot_be_planned_now_is_planned_a_little_later() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn who_waits_to_plan_heeds_a_stop() {
+async fn a_run_that_waits_for_a_retry_can_be_cancelled_and_drained() {
     on_every_backend(10, async |store| {
         let never: Engine = Arc::new(|_, _, _| Err(Unplanned::NotNow("away".to_owned())));
         let settings = settings(2, store.clock());
@@ -282,7 +282,7 @@ async fn deleting_a_running_plan_stops_it_and_frees_its_worker() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn no_more_plans_run_at_a_time_than_there_are_workers() {
+async fn no_more_plans_run_at_once_than_there_are_workers() {
     on_every_backend(50, async |store| {
         let (running, most) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0)));
         let (go_on, told_to) = mpsc::channel::<()>();
@@ -324,7 +324,7 @@ async fn no_more_plans_run_at_a_time_than_there_are_workers() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn draining_gives_back_what_does_not_end_and_a_rerun_ends_as_if_alone() {
+async fn draining_gives_back_unfinished_plans_and_a_rerun_gives_the_same_result() {
     on_every_backend(10, async |store| {
         let first = pool(store, 2, endless());
         let mut ids = Vec::new();
@@ -360,7 +360,7 @@ async fn draining_gives_back_what_does_not_end_and_a_rerun_ends_as_if_alone() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn draining_lets_a_run_end_and_begins_no_other() {
+async fn draining_lets_a_run_end_and_starts_no_other() {
     on_every_backend(10, async |store| {
         let (go_on, told_to) = mpsc::channel::<()>();
         let told_to = Mutex::new(told_to);
@@ -392,7 +392,7 @@ async fn draining_lets_a_run_end_and_begins_no_other() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_idle_pool_drains_at_once_and_takes_nothing() {
+async fn an_idle_pool_drains_and_takes_no_plan() {
     on_every_backend(10, async |store| {
         let pool = pool(store, 4, endless());
         store.health().await.unwrap();
@@ -432,7 +432,7 @@ async fn a_dropped_pool_stops_its_threads() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_store_that_fails_now_and_then_loses_nothing() {
+async fn intermittent_store_failures_lose_no_events() {
     on_every_backend(20, async |store| {
         let faulty = Arc::new(FaultyStore::new(store.share()));
         let clock = store.clock();
@@ -491,7 +491,7 @@ async fn the_number_of_workers_changes_no_result() {
     .await;
 }
 
-/// The bytes of a result, but for its plan's id and its wall times.
+/// The result as JSON without its plan's id and its wall times.
 fn without_times(document: &ResultDocument) -> String {
     let mut document = document.clone();
     document.plan_id = None;
@@ -500,10 +500,10 @@ fn without_times(document: &ResultDocument) -> String {
     document.to_json()
 }
 
-/// Whoever asks something while every core plans is not to wait for a turn.
+/// Requests must not wait for a processor while every core plans.
 #[cfg(target_os = "linux")]
 #[tokio::test(flavor = "multi_thread")]
-async fn planning_lets_others_go_first() {
+async fn planning_runs_at_a_lower_priority() {
     let priority = || rustix::process::getpriority_process(None).unwrap();
     on_every_backend(10, async |store| {
         let seen = Arc::new(Mutex::new(Vec::new()));

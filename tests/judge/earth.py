@@ -1,7 +1,7 @@
-"""Scenarios in degrees: laid onto the plane that the definitions are stated in, independently of the service.
+"""Scenarios in degrees: projected onto the plane that the definitions are stated in, independently of the service.
 
-The plane touches the ellipsoid's normal in the middle of the area, at the mean altitude of start and target; a place is
-laid onto it from that height, whatever the altitude of what stands there, and z is the altitude above the datum.
+The plane touches the ellipsoid in the middle of the area, at the mean altitude of start and target; every place is
+projected onto it from that height, whatever stands there, and z is the altitude above the datum.
 """
 
 import math
@@ -11,9 +11,9 @@ from dataclasses import dataclass
 AXIS = 6378137.0
 FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
-# A latitude's last bit is a billionth of a metre: so exact is a place that was written in degrees.
+# The last bit of a latitude is a billionth of a metre: the accuracy of a place written in degrees.
 HAIR = 1e-9
-# Points along each side of an area, of which the greatest rectangle inside is found.
+# Points along each side of an area, used to find the greatest rectangle inside.
 SIDE = 64
 
 
@@ -24,14 +24,14 @@ class Earth:
     lat: float
     lon: float
     height: float  # above the ellipsoid, metres
-    complaints: list  # where the result's frame is not the one that follows from the scenario
+    complaints: list  # complaints: list  # where the result's frame does not follow from the scenario
 
     def local(self, lat, lon):
         """East and north of the origin, metres."""
         phi, phi0 = math.radians(lat), math.radians(self.lat)
         way = math.radians(math.remainder(lon - self.lon, 360.0))
-        # All differences are taken before they are multiplied by the earth's radius, of which a billionth of a
-        # metre would be lost otherwise: as much as a path's shortest legs turn by.
+        # All differences are taken before multiplying by the earth's radius, which would lose a billionth of a
+        # metre: enough to turn a path's shortest legs.
         normal, normal0 = _normal(phi), _normal(phi0)
         down, down0 = AXIS / normal, AXIS / normal0
         longer = AXIS * ECCENTRICITY_SQUARED * math.sin(phi + phi0) * math.sin(phi - phi0)
@@ -47,7 +47,7 @@ class Earth:
         return east, north
 
     def flat(self, document):
-        """The document with every place and point in it on the plane."""
+        """The document with every place and point projected onto the plane."""
         if isinstance(document, list):
             return [self.flat(item) for item in document]
         if not isinstance(document, dict):
@@ -58,7 +58,7 @@ class Earth:
         return {key: self.flat(value) for key, value in document.items()}
 
     def scenario(self, document):
-        """A scenario document in the local frame."""
+        """A scenario document converted to the local frame."""
         flat = self.flat({key: value for key, value in document.items() if key not in ("area", "altitude_datum")})
         flat["frame"] = "local"
         if document.get("area") is not None:
@@ -66,11 +66,11 @@ class Earth:
         return flat
 
     def result(self, document):
-        """A result document in the local frame."""
+        """A result document converted to the local frame."""
         return self.flat({key: value for key, value in document.items() if key != "frame"})
 
     def _rectangle(self, area, start, target):
-        """The greatest rectangle in an area of degrees, and its ends, which may lie where the area bends beyond."""
+        """The greatest rectangle inside an area of degrees, extended to the ends, which may lie where sides bend."""
         (south, west), (north, east) = ((area[corner]["lat"], area[corner]["lon"]) for corner in ("min", "max"))
         width = (east - west) % 360.0
         steps = [step / SIDE for step in range(SIDE + 1)]
@@ -114,5 +114,5 @@ def earth_of(document, result):
 
 
 def _normal(lat):
-    """From the axis down the normal, metres, at a latitude in radians."""
+    """The distance from the axis along the normal, metres, at a latitude in radians."""
     return AXIS / math.sqrt(1.0 - ECCENTRICITY_SQUARED * math.sin(lat) ** 2)

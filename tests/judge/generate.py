@@ -1,8 +1,8 @@
-"""Seeded random scenarios, hostile but valid: what the planner must take without a false figure or a fall.
+"""Seeded random scenarios, hostile but valid: the planner must handle them without false figures or crashes.
 
     python3 tests/judge/generate.py SEED [--out FILE]
 
-The same seed gives the same document. Most of them are at an extreme in several things at once: scale, band, vehicle,
+The same seed gives the same document. Most documents are extreme in several respects at once: scale, band, vehicle,
 terrain, threats, smoothing, the algorithm's constants.
 """
 
@@ -15,7 +15,7 @@ from pathlib import Path
 
 from scenario import read_scenario
 
-# Ranges of the algorithm's own constants.
+# Ranges of the algorithms' constants.
 PARAMETERS = {
     "f_min": (0.0, 10.0),
     "f_max": (0.0, 10.0),
@@ -36,7 +36,7 @@ def scenario(seed):
 
 
 class _Scene:
-    """A scenario in the making, of `size` metres from start to target, about `offset`."""
+    """A scenario being generated, with about `size` metres from start to target, around `offset`."""
 
     def __init__(self, rng):
         self.rng = rng
@@ -138,7 +138,7 @@ class _Scene:
         return found
 
     def search(self, planner, rng):
-        """How to search, drawn apart so that the scene of a seed stays what it was: often the defaults."""
+        """Search settings, drawn separately so that a seed's scene never changes: often the defaults."""
         if rng.random() < 0.3:
             planner["seeding"] = rng.choice(["random", "tangent"])
         if rng.random() < 0.3:
@@ -151,7 +151,7 @@ class _Scene:
             planner["warm_start"] = {"waypoints": [self.anywhere(rng) for _ in range(rng.choice([0, 1, 2, 5, 60]))]}
 
     def anywhere(self, rng):
-        """A point of no good route: it may lie in a threat, under ground or outside the area."""
+        """An arbitrary point: it may lie in a threat, below ground or outside the area."""
         (x, y), reach = self.start[:2], 2.0 * self.size
         return _plane(x + rng.uniform(-reach, reach), y + rng.uniform(-reach, reach)) | {"z": rng.uniform(-50.0, 300.0)}
 
@@ -187,7 +187,7 @@ class _Scene:
 
     def peak(self, relief):
         rng = self.rng
-        # Narrower ones take the judge, who steps along every leg, minutes.
+        # Narrower ones take minutes to judge, because the judge steps along every leg.
         spread = [max(1.0, self.size * rng.choice([0.005, 0.02, 0.1, 0.5])) for _ in range(2)]
         return {
             "center": _plane(*self.somewhere()),
@@ -196,13 +196,13 @@ class _Scene:
         }
 
     def somewhere(self):
-        """A place about the straight way from start to target."""
+        """A place near the straight way from start to target."""
         share, aside = self.rng.uniform(-0.1, 1.1), self.rng.gauss(0.0, 0.15)
         dx, dy = self.target[0] - self.start[0], self.target[1] - self.start[1]
         return (self.start[0] + share * dx - aside * dy, self.start[1] + share * dy + aside * dx)
 
     def threats(self, blank):
-        """Threats of every shape that neither start nor target lies in."""
+        """Threats of every shape that contain neither start nor target."""
         rng, found = self.rng, []
         for index in range(rng.choice([0, 1, 2, 5, 12])):
             threat = self.cylinder() if rng.random() < 0.6 else self.polygon()
@@ -251,7 +251,7 @@ class _Scene:
         return {"kind": "polygon", "vertices": vertices, "margin": reach * rng.choice([0.0, 0.1, 1.0])}
 
     def allowed(self, threat, blank):
-        """Whether the scenario's ends are clear of a threat, at whatever height where that is close."""
+        """Whether the scenario's ends are clear of a threat or outside its heights."""
         document = {"start": _plane(*self.start) | {"z": 0.0}, "target": _plane(*self.target) | {"z": 0.0}}
         shape = read_scenario(document | {"threats": [threat]}).threats[0]
         for end in (blank.start, blank.target):
@@ -266,7 +266,7 @@ def _plane(x, y):
 
 
 def main(arguments=None):
-    """Writes the scenario of a seed."""
+    """Prints or writes the scenario of a seed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("seed", type=int)
     parser.add_argument("--out", type=Path)

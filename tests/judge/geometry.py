@@ -1,6 +1,6 @@
 """Plane and space geometry of points, segments and rings, in metres.
 
-A point is a tuple `(x, y)` or `(x, y, z)`; a leg is a pair of 3-D points, and `t` in [0, 1] runs along it.
+A point is a tuple `(x, y)` or `(x, y, z)`; a leg is a pair of 3-D points, along which `t` runs over [0, 1].
 """
 
 import math
@@ -58,7 +58,7 @@ def circle_crossings(a, b, centre, radius):
 
 
 def line_crossing(a, b, c, d, offset=0.0):
-    """The `t` where the line `a`, `b` is at the signed distance `offset` left of `c`, `d`; None if parallel."""
+    """The `t` where the line `a`, `b` is at the signed distance `offset` to the left of `c`, `d`; None if parallel."""
     ex, ey = d[0] - c[0], d[1] - c[1]
     length = math.hypot(ex, ey)
     if length == 0.0:
@@ -114,7 +114,7 @@ def turns(points):
 
 
 def wrap(angle):
-    """The angle in degrees brought into (-180, 180]."""
+    """The angle in degrees, normalised to (-180, 180]."""
     angle = math.fmod(angle, 360.0)
     if angle > 180.0:
         return angle - 360.0
@@ -122,5 +122,5 @@ def wrap(angle):
 
 
 def climb(a, b):
-    """Climb angle of a leg in degrees, up positive; 0 for a leg of no length."""
+    """The climb angle of a leg in degrees, up positive; 0 for a leg of zero length."""
     return math.degrees(math.atan2(b[2] - a[2], horizontal(a, b)))

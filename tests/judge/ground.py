@@ -26,13 +26,13 @@ class Flat:
 class Peaks:
     """Gaussian hills summed on a base: height * exp(-(dx/sx)^2 - (dy/sy)^2)."""
 
-    # Over analytic peaks a route may miss a height by a millimetre.
+    # Over analytic peaks a route's height may be off by a millimetre.
     slack = 1e-3
 
     def __init__(self, base, hills):
         self.base, self.hills = base, hills
         spreads = [spread for hill in hills for spread in hill[3:]]
-        # Finer than the specification asks of the program judged.
+        # Finer than the specification requires of the program.
         self.step = min([5.0, *(spread / 5.0 for spread in spreads)]) / 6.0
 
     def elevation(self, x, y):
@@ -44,7 +44,7 @@ class Peaks:
     def heights(self, a, b):
         """Least and greatest height above ground on the segment from `a` to `b`.
 
-        Steps along it, and refines wherever the slope changes its sign between two steps.
+        Steps along it and refines wherever the slope changes sign between two steps.
         """
         count = max(1, math.ceil(geo.horizontal(a, b) / self.step))
         marks = [step / count for step in range(count + 1)]
@@ -60,7 +60,7 @@ class Peaks:
         return z - self.elevation(x, y)
 
     def _slope(self, a, b, t):
-        """Derivative of `_height` by `t`."""
+        """The derivative of `_height` by `t`."""
         x, y, _ = geo.lerp(a, b, t)
         dx, dy = b[0] - a[0], b[1] - a[1]
         slope = b[2] - a[2]
@@ -81,7 +81,7 @@ class Peaks:
 
 
 class Grid:
-    """Elevations at nodes, row by row from the south, bilinear between; beyond the extent the edge is continued."""
+    """Elevations at nodes, row by row from the south, bilinear in between; the edge continues beyond the extent."""
 
     slack = 0.0
 
@@ -120,7 +120,7 @@ class Grid:
 
     @staticmethod
     def _place(position, count):
-        """The cell's index and the share of the way through it, of a position counted in cells."""
+        """The cell's index and the fraction of the way through it, for a position counted in cells."""
         position = min(max(position, 0.0), count - 1.0)
         index = max(0, min(int(position), count - 2))
         return index, position - index

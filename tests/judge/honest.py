@@ -1,4 +1,4 @@
-"""A result document made from the judge's own measures: what the self-tests falsify."""
+"""A result document built from the judge's own measures, which the self-tests then falsify."""
 
 import json
 import math
@@ -16,7 +16,7 @@ def point(place):
 
 
 def checks(points, scenario):
-    """The document of the figures measured on a polyline."""
+    """The document of the figures measured along a polyline."""
     heights, angles = route.heights(points, scenario), route.angles(points)
     return {
         "clearance": [
@@ -32,7 +32,7 @@ def checks(points, scenario):
 
 
 def smoothed(points, scenario):
-    """The document of a path: one Bezier arc with the waypoints as control points, sampled evenly."""
+    """The document of a path: one Bezier arc with the waypoints as control points, evenly sampled."""
     degree = len(points) - 1
     curve = Spline(degree, [0.0] * (degree + 1) + [1.0] * (degree + 1), points)
     count = math.ceil(1.5 * route.length(points) / scenario.spacing)
@@ -49,7 +49,7 @@ def smoothed(points, scenario):
 
 
 def result(document, free):
-    """A true result document for a scenario document and the free waypoints of a route."""
+    """A correct result document for a scenario document and the free waypoints of a route."""
     scenario = read_scenario(document)
     points = [scenario.start, *free, scenario.target]
     faults = route.faults(points, scenario).certain

@@ -1,11 +1,11 @@
-"""Judges results of `noctule` from the definitions of cost and constraints alone, sharing no code with it.
+"""Judges results of `noctule` from the definitions of cost and constraints alone, without sharing code with it.
 
     python3 tests/judge/judge.py --scenario SCENARIO.json --result RESULT.json [--result ...]
     python3 tests/judge/judge.py --pair DIR            every NAME.result.json beside its NAME.scenario.json
 
-The scenario is the caller's document or the accepted one, over any terrain but datasets. Exit status: 0 everything agrees,
-1 something disagrees (each is printed with the figure claimed, the one recomputed and the relative difference),
-2 the documents cannot be judged.
+The scenario is the caller's document or the accepted one, over any terrain except datasets.
+Exit status: 0 everything agrees, 1 something disagrees (each is printed with the figure claimed, the one
+recomputed and the relative difference), 2 the documents cannot be judged.
 """
 
 import argparse
@@ -46,7 +46,7 @@ def main(arguments=None):
 
 
 def contradictions(scenario, results):
-    """Lower bounds above the total of another feasible result of the same scenario: no proof holds such a bound."""
+    """Lower bounds above another feasible result's total for the same scenario: no valid proof allows such a bound."""
     if scenario.paper_quadrature:
         return []
     feasible = [result for result in results if result and result.get("feasible") is True]
@@ -59,11 +59,11 @@ def contradictions(scenario, results):
             if best is not None and lower is not None and lower > best * (1.0 + 1e-9)
         ]
     except (KeyError, TypeError):
-        return []  # told already, as the fault of that result
+        return []  # return []  # already reported as a fault of that result
 
 
 def summary(results):
-    """One line on a scenario's results: how many are feasible, and their totals."""
+    """One summary line for a scenario's results: how many are feasible, and their totals."""
     totals = [result["cost"]["total"] for result in results if result and result.get("feasible") is True]
     line = f"feasible {len(totals)}/{len(results)}"
     if totals:
@@ -85,7 +85,7 @@ def _options(arguments):
 
 
 def _batches(options):
-    """Lists of scenario and result file, one for each scenario; the seed makes no other scenario."""
+    """Lists of scenario and result file, grouped by scenario; the seed does not make a different scenario."""
     batches = []
     if options.scenario:
         document = load(options.scenario)
@@ -112,7 +112,7 @@ def _placed(document, file):
 
 
 def _judge_file(scenario, file, earth):
-    """The report on one file and its document, None when it could not be read."""
+    """The report on one file and its document, or None when it could not be read."""
     try:
         result = load(file)
     except (OSError, ValueError) as error:

@@ -1,6 +1,6 @@
 """Adaptive Gauss-Kronrod integration of one variable.
 
-The judge integrates the threat cost numerically, on purpose: a closed form could share a mistake with the program
+The judge integrates the threat cost numerically on purpose: a closed form could share a mistake with the program
 judged.
 """
 
@@ -49,7 +49,7 @@ def kronrod(f, a, b):
 
 
 def integrate(f, a, b, tolerance):
-    """The integral of `f` over [a, b], bisecting until two rules agree within the absolute `tolerance`.
+    """The integral of `f` over [a, b], bisected until two rules agree within the absolute `tolerance`.
 
     `f` should be smooth inside: split at known kinks first (see `integrate_pieces`).
     """

@@ -30,9 +30,9 @@ class Report:
         return self.that(claimed == expected, f"{what}: claimed {claimed!r}, expected {expected!r}")
 
     def near(self, what, claimed, low, scale, high=None):
-        """Records a disagreement unless the claimed figure is the recomputed one, or between `low` and `high`.
+        """Records a disagreement unless the claimed figure equals the recomputed one or lies between `low` and `high`.
 
-        None is a figure too, equal to itself only. `scale` is the size of the quantities that it was made of.
+        None is a figure too, equal only to itself. `scale` is the magnitude of the quantities behind the figure.
         """
         high = low if high is None else high
         if claimed is None or low is None:
@@ -51,7 +51,7 @@ class Report:
 
     @contextmanager
     def section(self, name):
-        """Turns a missing or ill-formed part of a result into a disagreement."""
+        """Turns a missing or malformed part of a result into a disagreement."""
         try:
             yield
         except KeyError as error:

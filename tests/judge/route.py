@@ -1,4 +1,4 @@
-"""What a polyline measures and costs: Eq. 1-9 and the constraints, continuously along every leg."""
+"""The measures and cost of a polyline: Eq. 1-9 and the constraints, evaluated continuously along every leg."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from threats import leg_integral, leg_samples, route_clearance
 
 @dataclass
 class Zone:
-    """The neighbourhood of an end of the route in which the altitude band is not asked."""
+    """The zone around an end of the route in which the altitude band does not apply."""
 
     centre: tuple
     ramp: float
@@ -18,7 +18,7 @@ class Zone:
     ceiling: float
 
     def span(self, a, b):
-        """The range of `t` where the leg is in the zone, not limited to [0, 1]; None when its line never is."""
+        """The range of `t` where the leg is in the zone, not limited to [0, 1]; None when its line never enters it."""
         if geo.horizontal(a, b) == 0.0:
             return (-math.inf, math.inf) if geo.horizontal(a, self.centre) <= self.ramp else None
         return geo.circle_crossings(a, b, self.centre, self.ramp) or None
@@ -36,7 +36,7 @@ def zones(scenario):
 
 
 def sections(a, b, both):
-    """The leg's consecutive parts `(low, high, zones)`, with those of `both` zones that hold there."""
+    """The leg's consecutive parts `(low, high, zones)`, with those of `both` zones that apply there."""
     spans = [(zone, zone.span(a, b)) for zone in both]
     spans = [(zone, span) for zone, span in spans if span is not None]
     cuts = [t for _, span in spans for t in span]
@@ -49,7 +49,7 @@ def sections(a, b, both):
 
 @dataclass
 class Heights:
-    """Heights above ground of a route: extremes outside the zones, and how far it oversteps each limit (<= 0: kept)."""
+    """Heights above ground of a route: extremes outside the zones, and the excess over each limit (<= 0: kept)."""
 
     least: float | None
     greatest: float | None
@@ -82,7 +82,7 @@ def heights(points, scenario):
 
 @dataclass
 class Angles:
-    """Greatest turn and climb in degrees and shortest leg in metres."""
+    """Greatest turn and climb angles in degrees, and the shortest leg in metres."""
 
     turn: float
     climb: float
@@ -105,9 +105,9 @@ def length(points):
 
 
 def cost(points, scenario, leg_price=leg_integral, shrink=0.0):
-    """The weighted terms of Eq. 1 and their sum, of the route S, P1..PN, T.
+    """The weighted terms of Eq. 1 and their sum for the route S, P1..PN, T.
 
-    `leg_price` says how a threat is charged along a leg; `shrink` narrows the threats' heights (for tolerances).
+    `leg_price` defines how a threat is charged along a leg; `shrink` narrows the threats' heights (for tolerances).
     """
     threat = math.fsum(
         leg_price(threat, a, b, shrink) for threat in scenario.threats for a, b in zip(points, points[1:])
@@ -123,13 +123,13 @@ def cost(points, scenario, leg_price=leg_integral, shrink=0.0):
 
 
 def sampled_cost(points, scenario, shrink=0.0):
-    """`cost` with the threats charged by the paper's five samples a leg."""
+    """`cost`, with the threats charged by the paper's five samples per leg."""
     return cost(points, scenario, leg_samples, shrink)
 
 
 @dataclass
 class Faults:
-    """Kinds of violation that a route certainly has, and those it has when judged with no slack to spare."""
+    """The kinds of violation that a route certainly has, and those that it has when judged with no slack."""
 
     certain: dict
     possible: dict
@@ -153,7 +153,7 @@ def faults(points, scenario, smoothed=False):
             found.certain[kind] = max(amount, found.certain.get(kind, amount))
 
     for threat in scenario.threats:
-        # A route a hair below `top` is over it within the tolerance for lengths.
+        # Just below `top`, within the tolerance for lengths, a route counts as above the threat.
         for shrink, kinds in ((0.0, found.possible), (metres, found.certain)):
             clear = route_clearance(threat, points, shrink)
             if clear is not None and clear < -metres:
@@ -161,14 +161,14 @@ def faults(points, scenario, smoothed=False):
     add("terrain", along.below_ground, high, nearness)
     add("altitude", max(along.below_band, along.above_band), high, nearness)
     if along.above_band <= high and "terrain" in found.certain:
-        # A route underground is below the band too; saying so once is enough.
+        # A route below ground is also below the band; reporting it once is enough.
         found.certain.pop("altitude", None)
     add("turn", measured.turn - scenario.max_turn, 1e-6)
     add("climb", measured.climb - scenario.max_climb, 0.05 if smoothed else 1e-6)
     if not smoothed:
         add("leg", scenario.min_leg - measured.leg, metres)
         if scenario.area is None:
-            # The box that the service takes is its own affair; a route may break it.
+            # An area chosen by the service is not checked; a route may leave it.
             found.possible["area"] = 0.0
         else:
             add("area", max((_outside(point, scenario.area) for point in points[1:-1]), default=0.0), metres)

@@ -1,4 +1,4 @@
-"""A scenario document, as a caller posts it or as the service gives it back, made ready for measuring."""
+"""A scenario document, as posted by a caller or returned by the service, prepared for measuring."""
 
 import json
 import math
@@ -8,7 +8,7 @@ import geometry as geo
 from ground import Flat, Grid, Peaks
 from threats import Band, Cylinder, Polygon
 
-# What the contract's document shows, where the caller says nothing.
+# The contract's defaults for what the caller leaves out.
 DEFAULTS = {
     "altitude": {"min": 0.0, "max": 200.0},
     "vehicle": {"max_turn_deg": 60.0, "max_climb_deg": 45.0, "cruise_speed": 15.0, "fuel_per_km": 1000.0},
@@ -19,16 +19,16 @@ DEFAULTS = {
 
 
 class Unsupported(Exception):
-    """The scenario is of a kind that this judge cannot measure."""
+    """This judge cannot measure a scenario of this kind."""
 
 
 @dataclass
 class Scenario:
-    """Everything that the figures of a result follow from. Metres, degrees, metres a second."""
+    """Everything that a result's figures depend on. Metres, degrees, metres per second."""
 
     start: tuple
     target: tuple
-    area: tuple | None  # x_min, y_min, x_max, y_max; None when the document leaves it to the service
+    area: tuple | None  # area: tuple | None  # x_min, y_min, x_max, y_max; None when the service chooses it
     threats: list
     ground: object
     min_height: float
@@ -43,15 +43,15 @@ class Scenario:
     degree: int
     spacing: float
     paper_quadrature: bool
-    gap: float  # the search may end once so much is proven; 0 is never
+    gap: float  # gap: float  # the search may end once this gap is proven; 0 means never
     algorithm: str | None
     seed: int | None
-    scale: float  # the diagonal of everything, for tolerances
-    hair: float = 0.0  # how far places may be off that were laid onto the plane, metres
+    scale: float  # scale: float  # the diagonal of everything, used for tolerances
+    hair: float = 0.0  # hair: float = 0.0  # how far projected places may be off, metres
 
     @property
     def slack(self):
-        """Largest overstepping in metres that still counts as feasible."""
+        """The largest violation in metres that still counts as feasible."""
         return max(1e-6, 1e-9 * self.scale)
 
     @property
@@ -67,7 +67,7 @@ def load(path):
 
 
 def read_scenario(document):
-    """The `Scenario` of a document. Raises `Unsupported` for what cannot be measured without the service."""
+    """The `Scenario` of a document. Raises `Unsupported` for scenarios that cannot be measured without the service."""
     if document.get("frame", "local") != "local":
         raise Unsupported(f"frame {document['frame']}, only local is judged")
     start, target = _point(document["start"]), _point(document["target"])
@@ -103,7 +103,7 @@ def read_scenario(document):
 
 
 def _filled(document, key):
-    """The object `key` of a document with the defaults of `DEFAULTS` where it is silent."""
+    """The object `key` of a document, with `DEFAULTS` for missing members."""
     given = document.get(key) or {}
     return DEFAULTS[key] | {name: value for name, value in given.items() if value is not None}
 
@@ -151,7 +151,7 @@ def _area(area, ground):
 
 
 def _diagonal(area, start, target, threats):
-    """The area's diagonal in metres; without an area, that of a box round everything named."""
+    """The area's diagonal in metres; without an area, that of a box around everything named."""
     if area is None:
         spots = [start, target]
         for threat in threats:

@@ -3,19 +3,19 @@
 from bisect import bisect_right
 from math import dist
 
-# Points tabulated between two consecutive knots; also the fineness with which the curve is searched.
+# Points tabulated between two consecutive knots; also the resolution at which the curve is searched.
 _PER_SPAN = 16
 _GOLDEN = 0.6180339887498949
 
 
 class Spline:
-    """The curve of `degree`, `knots` and `control` points."""
+    """The curve with `degree`, `knots` and `control` points."""
 
     def __init__(self, degree, knots, control):
         self.degree, self.knots, self.control = degree, knots, control
 
     def faults(self):
-        """What is wrong with the knots; nothing, when they are those of a clamped spline."""
+        """What is wrong with the knots; nothing if they are those of a clamped spline."""
         degree, knots, count = self.degree, self.knots, len(self.control)
         if degree < 1 or count < degree + 1:
             return [f"{count} control points are too few for degree {degree}"]
@@ -48,7 +48,7 @@ class Spline:
         return points[p]
 
     def table(self):
-        """Parameters along the whole curve, dense within every span of knots, with their points."""
+        """Parameters along the whole curve, dense within every knot span, with their points."""
         marks = sorted(set(self.knots))
         found = [
             low + (high - low) * step / _PER_SPAN for low, high in zip(marks, marks[1:]) for step in range(_PER_SPAN)
@@ -57,10 +57,10 @@ class Spline:
         return [(u, self.at(u)) for u in found]
 
     def walk(self, samples, tolerance):
-        """The parameters, never going back, at which the curve passes within `tolerance` of each sample in turn.
+        """Non-decreasing parameters at which the curve passes within `tolerance` of each sample in turn.
 
-        For each sample the first place is taken, which leaves the most of the curve to the others. The second value is
-        the nearest approach to the sample that was missed, None when none was.
+        For each sample the first such place is used, which leaves most of the curve to the others. The second value
+        is the nearest approach to a sample that was missed, None when none was.
         """
         table = self.table()
         found, here, least = [], 0, self.knots[0]
@@ -68,7 +68,7 @@ class Spline:
             nearest = None
             for index in range(here, len(table) - 1):
                 (low, start), (high, end) = table[index], table[index + 1]
-                # A stretch of the curve cannot come nearer than this to what is far from both its ends.
+                # A stretch of the curve cannot be nearer than this to a point far from both its ends.
                 if min(dist(start, sample), dist(end, sample)) > 2.0 * dist(start, end) + tolerance:
                     continue
                 u, away = self._approach(sample, max(low, least), high)
@@ -82,7 +82,7 @@ class Spline:
         return found, None
 
     def _approach(self, sample, low, high):
-        """Where between two parameters the curve is nearest to a point, by golden sections, and how near."""
+        """The parameter between two others where the curve is nearest to a point, by golden sections, and how near."""
         ends = [(dist(self.at(u), sample), u) for u in (low, high)]
         a, b = low, high
         c, d = b - _GOLDEN * (b - a), a + _GOLDEN * (b - a)

@@ -1,10 +1,10 @@
-"""Degrees come onto the plane where PROJ puts them, and a frame that does not follow from its scenario is told."""
+"""Degrees are projected where PROJ projects them, and a frame that does not follow from its scenario is reported."""
 
 import unittest
 
 from earth import Earth, earth_of
 
-# PROJ 9.5.1: +proj=topocentric at 36.59 N, 84.25 W, 300 m, after +proj=cart; both ends 300 m high.
+# PROJ 9.5.1: +proj=topocentric at 36.59 N, 84.25 W, 300 m, after +proj=cart; both ends are 300 m high.
 PLACES = [
     (36.59, -84.25, 0.0, 0.0),
     (36.7, -84.1, 13404.6365421, 12217.8378893),
@@ -28,7 +28,7 @@ FRAME = {
 
 
 class TestEarth(unittest.TestCase):
-    def test_places_are_where_proj_puts_them(self):
+    def test_places_are_projected_as_by_proj(self):
         plane = Earth(36.59, -84.25, 300.0, [])
         for lat, lon, x, y in PLACES:
             east, north = plane.local(lat, lon)
@@ -46,12 +46,12 @@ class TestEarth(unittest.TestCase):
         self.assertLess(flat["start"]["x"], -8e3)
         self.assertGreater(flat["target"]["x"], 8e3)
         area = flat["area"]
-        # The northern side is the shorter one, and parallels bend towards the pole.
+        # The northern side is the shorter one, and parallels curve towards the pole.
         self.assertAlmostEqual(area["max"]["x"], earth.local(36.8, -179.8)[0], delta=1e-6)
         self.assertAlmostEqual(area["max"]["y"], earth.local(36.8, 180.0)[1], delta=1e-6)
         self.assertAlmostEqual(area["min"]["y"], earth.local(36.4, 179.8)[1], delta=1e-6)
 
-    def test_another_frame_is_told(self):
+    def test_a_wrong_frame_is_reported(self):
         falsehoods = [
             {"altitude_datum": "ellipsoid"},
             {"undulation": 900.0},

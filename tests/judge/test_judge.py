@@ -1,4 +1,4 @@
-"""The judge agrees with a true result and finds every falsehood put into it."""
+"""The judge agrees with correct results and finds every falsification."""
 
 import contextlib
 import copy
@@ -46,7 +46,7 @@ GRID = {
     "rows": 6,
     "elevations": [0.2 * ((7 * node) % 5) for node in range(54)],
 }
-# Figures that a result states and nobody else can know.
+# Figures that only the result can know.
 UNKNOWABLE = ("elapsed_ms", "mean_cost", "feasible_fraction", "best_violation", "timing") + tuple(
     f"convergence.{index}." for index in range(3)
 )
@@ -97,7 +97,7 @@ class Truth(Case):
             changed = put(result, (cost, "threat"), lambda x: x + 1e-2)
             self.found(changed, f"{cost}.threat", planner=planner)
 
-    def test_of_a_route_that_violates(self):
+    def test_of_an_infeasible_route(self):
         for free, kind in (
             ([(60.0, 30.0, 50.0), (150.0, -10.0, 50.0)], "threat"),
             ([(100.0, 40.0, 120.0), (200.0, 40.0, 50.0)], "altitude"),
@@ -112,8 +112,8 @@ class Truth(Case):
             self.assertIn(kind, [violation["kind"] for violation in result["checks"]["violations"]])
             self.agrees(result)
 
-    def test_of_heights_that_are_rounded(self):
-        # In the middle of the band, where fuel is for nothing: all that is left to pay for is how heights are rounded.
+    def test_of_rounded_heights(self):
+        # At the middle of the band and with free fuel, the only cost left comes from rounding heights.
         nothing = {"weights": {"fuel": 0, "threat": 1, "altitude": 1}, "threats": []}
         result = honest.result(SCENARIO | nothing, [(x, y, 55.0) for x, y, _ in FREE])
         self.assertEqual(result["cost"]["total"], 0.0)
@@ -121,8 +121,8 @@ class Truth(Case):
             complaints = self.complaints(put(result, ("cost", "altitude"), lambda _, off=off: off), **nothing)
             self.assertEqual(any("cost.altitude" in complaint for complaint in complaints), is_told)
 
-    def test_of_a_route_out_of_an_area_that_the_service_chose(self):
-        # The scenario says nothing of it, so the claim cannot be told from a lie.
+    def test_of_a_route_outside_an_area_chosen_by_the_service(self):
+        # The scenario gives no area, so a false claim cannot be told from a true one.
         result = honest.result(SCENARIO, [(100.0, 155.0, 60.0), (200.0, 155.0, 60.0)])
         self.assertIn("area", [violation["kind"] for violation in result["checks"]["violations"]])
         self.assertEqual(self.complaints(result, area=None), self.complaints(result))
@@ -142,7 +142,7 @@ class Falsehood(Case):
             changed = put(self.truth, path, lambda x: x * (1.0 + 1e-4) if x else x + 1e-4)
             self.assertNotEqual(self.complaints(changed), [], f"{name} may be anything")
 
-    def test_every_part_is_asked_for(self):
+    def test_every_part_is_required(self):
         for part in self.truth:
             if part == "plan_id":
                 continue
@@ -204,7 +204,7 @@ class Falsehood(Case):
         self.found(swapped, "the spline passes it by")
 
     def test_a_spline_that_dips_into_a_threat_between_samples(self):
-        """A polyline of two samples about a disc that the curve cuts: as clear as can be, but for the curve."""
+        """Two samples whose polyline clears a disc that the curve cuts."""
         disc = {"kind": "cylinder", "center": {"x": 73.0, "y": 33.5}, "radius": 0.1}
         near = SCENARIO | {"threats": [disc]}
         points = self.truth["path"]["points"]
@@ -213,7 +213,7 @@ class Falsehood(Case):
         curve = honest.Spline(3, [0.0] * 4 + [1.0] * 4, control)
         count = len(points) - 1
         arc = curve.at(20.5 / count)
-        # The disc's rim is 0.2 mm off the chord and the curve bulges towards it by several millimetres.
+        # The disc's rim is 0.2 mm off the chord, and the curve bulges towards it by several millimetres.
         bulge = honest.geo.distance(arc, middle)
         self.assertGreater(bulge, 3e-3)
         away = [(arc[axis] - middle[axis]) / honest.geo.horizontal(arc, middle) for axis in range(2)]
@@ -222,7 +222,7 @@ class Falsehood(Case):
         self.found(result, "the spline is", threats=[disc])
 
     def test_a_spline_that_leaves_the_band_between_samples(self):
-        """Samples as far apart as the whole route is long, and a limit that they keep and the curve does not."""
+        """Samples as far apart as the whole route, and a limit that they keep but the curve does not."""
         ends = {"start": {"x": 0, "y": 0, "z": 20}, "target": {"x": 300, "y": 0, "z": 20}, "threats": []}
         planner = SCENARIO["planner"] | {"smoothing": {"spacing": 200.0}}
         result = honest.result(SCENARIO | ends | {"planner": planner}, FREE)
@@ -255,14 +255,14 @@ class Falsehood(Case):
         self.found(put(self.truth, ("bound", "lower"), lambda x: 1.2 * x), "above the total")
         self.found(put(self.truth, ("bound", "gap"), lambda _: None), "bound.gap")
 
-    def test_a_convergence_that_nothing_proves(self):
+    def test_an_unproven_convergence(self):
         converged = put(self.truth, ("stop_reason",), lambda _: "converged")
         self.found(converged, "asked for 0.0")
         for asked, sound in [(2.0 * self.truth["bound"]["gap"], True), (0.5 * self.truth["bound"]["gap"], False)]:
             planner = SCENARIO["planner"] | {"parameters": {"gap": asked}}
             self.assertEqual(self.complaints(converged, planner=planner) == [], sound, asked)
 
-    def test_what_is_no_number(self):
+    def test_values_that_are_no_numbers(self):
         self.found(put(self.truth, ("cost", "total"), lambda _: "471"), "no number")
         self.found(put(self.truth, ("waypoints", 1, "x"), lambda _: "100"), "ill-formed")
         self.found(put(self.truth, ("legs",), lambda _: None), "ill-formed")
@@ -314,7 +314,7 @@ class CommandLine(unittest.TestCase):
             self.assertEqual(status, 1)
             self.assertIn("of another result", output)
 
-    def test_what_cannot_be_judged(self):
+    def test_documents_that_cannot_be_judged(self):
         status, _ = self.run_with([{}], scenario=SCENARIO | {"frame": "wgs84"})
         self.assertEqual(status, 2)
 

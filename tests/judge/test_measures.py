@@ -73,21 +73,21 @@ class Turns(unittest.TestCase):
 
 class CylinderThreat(unittest.TestCase):
     def test_a_chord_of_the_soft_zone(self):
-        # Influence 5, passing the axis at 3: the chord runs from -4 to 4, and the integral of 5 - sqrt(9 + s^2) is
-        # 40 - (4 * 5 + 9 asinh(4/3)) = 20 - 9 ln 3.
+        # Influence 5, passing the axis at distance 3: the chord runs from -4 to 4, and the integral of 5 -
+        # sqrt(9 + s^2) is 40 - (4 * 5 + 9 asinh(4/3)) = 20 - 9 ln 3.
         known = 20.0 - 9.0 * math.log(3.0)
         threat = cylinder(radius=2.0)
         self.assertAlmostEqual(leg_integral(threat, (-50.0, 3.0, 0.0), (70.0, 3.0, 0.0)), known, delta=1e-9)
         # Climbing at 45 degrees the same chord is sqrt(2) longer.
         climbing = leg_integral(threat, (-50.0, 3.0, 0.0), (70.0, 3.0, 120.0))
         self.assertAlmostEqual(climbing, known * math.sqrt(2.0), delta=1e-9)
-        # Half of it, for a leg that ends abreast of the axis.
+        # Half of it for a leg that ends abreast of the axis.
         self.assertAlmostEqual(leg_integral(threat, (-50.0, 3.0, 0.0), (0.0, 3.0, 0.0)), known / 2.0, delta=1e-9)
 
-    def test_through_the_axis_the_cost_goes_on_growing(self):
+    def test_the_cost_keeps_growing_towards_the_axis(self):
         self.assertAlmostEqual(leg_integral(cylinder(), (-9.0, 0.0, 0.0), (9.0, 0.0, 0.0)), 25.0, delta=1e-9)
 
-    def test_a_leg_far_from_the_origin_takes_no_longer(self):
+    def test_a_leg_far_from_the_origin_is_integrated_as_fast(self):
         away = (3_000_016.2, 3_000_024.7)
         ring = [(x + away[0], y + away[1]) for x, y in ((0.0, 0.0), (1.5, 0.1), (1.4, 1.6), (0.1, 1.3))]
         here = square(margin=0.3, ring=[(x - away[0], y - away[1]) for x, y in ring])
@@ -109,7 +109,8 @@ class CylinderThreat(unittest.TestCase):
         self.assertEqual(leg_integral(cylinder(), a, b), 0.0)
 
     def test_five_samples(self):
-        # At -10, -5, 0, 5, 10 along the chord at distance 3 only the middle is within 5: T = 2, a fifth of 20 m of it.
+        # Of the samples at -10, -5, 0, 5, 10 along the chord at distance 3, only the middle one is within 5: T = 2,
+        # times a fifth of 20 m.
         self.assertAlmostEqual(leg_samples(cylinder(), (-10.0, 3.0, 0.0), (10.0, 3.0, 0.0)), 8.0)
 
     def test_over_the_top(self):
@@ -129,7 +130,7 @@ class CylinderThreat(unittest.TestCase):
         threat = cylinder(base=10.0)
         self.assertIsNone(leg_clearance(threat, (-50.0, 0.0, 9.9), (50.0, 0.0, 9.9)))
         self.assertEqual(leg_clearance(threat, (-50.0, 0.0, 10.0), (50.0, 0.0, 10.0)), -5.0)
-        # Touching the base at its end only: that point counts.
+        # The leg touches the base at its end only: that point counts.
         self.assertEqual(leg_clearance(threat, (-50.0, 0.0, 9.0), (9.0, 0.0, 10.0)), 4.0)
 
     def test_the_least_of_the_legs(self):
@@ -155,7 +156,7 @@ class PolygonThreat(unittest.TestCase):
         self.check((20, 5), (30, 5), 10)
         self.check((-5, 0), (15, 0), 0)
         self.check((-5, 5), (5, 15), 0)
-        # Across a corner, 0.4 m deep along the diagonal: deepest abreast of the corner, at (0.4, 9.6) / 2 of it.
+        # Across a corner, 0.4 m deep along the diagonal: deepest abreast of the corner, at (0.4, 9.6) / 2 from it.
         self.check((-4, 5.6), (4.4, 14), -0.2)
         self.check((3, 5), (3, 5), -3)
 
@@ -168,18 +169,18 @@ class PolygonThreat(unittest.TestCase):
         self.assertEqual(square(ring=[*SQUARE, SQUARE[0]]).ring, SQUARE)
 
     def test_beside_it(self):
-        # 4 m beside an edge of 10 m with a margin of 5: 10 * 1 abreast, and twice the integral over 0..3 of
-        # 5 - sqrt(16 + s^2) at its ends, 15/2 - 8 ln 2 each.
+        # 4 m beside an edge of 10 m with a margin of 5: 10 * 1 abreast of it, plus twice the integral over 0..3
+        # of 5 - sqrt(16 + s^2) at its ends, 15/2 - 8 ln 2 each.
         known = 10.0 + 15.0 - 16.0 * math.log(2.0)
         self.assertAlmostEqual(leg_integral(square(), (-20.0, -4.0, 0.0), (30.0, -4.0, 0.0)), known, delta=1e-9)
 
     def test_across_it(self):
-        # The margin twice, 5^2 / 2 each, and all of it over the 10 m inside.
+        # The margin twice, 5^2 / 2 each, and its full value over the 10 m inside.
         self.assertAlmostEqual(leg_integral(square(), (-20.0, 5.0, 0.0), (30.0, 5.0, 0.0)), 75.0, delta=1e-9)
 
     def test_grazing_its_margin(self):
         self.assertEqual(leg_integral(square(), (-20.0, -5.0, 0.0), (30.0, -5.0, 0.0)), 0.0)
-        # A corner at (0, 0) passed at 4.9: the same chord as of a disc of 5.
+        # A corner at (0, 0) passed at distance 4.9: the same chord as for a disc of 5.
         half = math.sqrt(25.0 - 4.9**2)
         known = 2.0 * (5.0 * half - 0.5 * (half * 5.0 + 4.9**2 * math.asinh(half / 4.9)))
         a = (-4.9 * math.sqrt(0.5) - 500.0, -4.9 * math.sqrt(0.5) + 500.0, 0.0)
@@ -222,14 +223,14 @@ class Ground(unittest.TestCase):
 
 
 class TerminalZones(unittest.TestCase):
-    """Start and target at heights off the band, which reaches from 10 to 100 unless stated."""
+    """Start and target at heights outside the band, which is 10 to 100 m unless given."""
 
     def measure(self, points, **changes):
         scenario = read_scenario(document(**({"altitude": {"min": 10, "max": 100}} | changes)))
         return route.heights([scenario.start, *points, scenario.target], scenario)
 
     def test_the_ramp_is_twice_the_missing_height(self):
-        # 10 m are missing at 45 degrees: 20 m. Rising by one in twenty the route is at 1 m there.
+        # 10 m are missing at 45 degrees: a ramp of 20 m. Rising by one in twenty, the route is at 1 m at its end.
         found = self.measure([(200.0, 0.0, 10.0), (800.0, 0.0, 10.0)])
         self.assertAlmostEqual(found.least, 1.0)
         self.assertAlmostEqual(found.below_band, 9.0)
@@ -253,8 +254,8 @@ class TerminalZones(unittest.TestCase):
         self.assertIsNone(found.greatest)
         self.assertLessEqual(found.below_ground, 0.0)
 
-    def test_standing_a_little_under_ground(self):
-        # The zone is 0.1 m wide: whoever is out of the ground by then has not been below it.
+    def test_standing_slightly_below_ground(self):
+        # The zone is 0.1 m wide: a route that is above ground at its edge has not been below it.
         start, altitude = {"x": 0, "y": 0, "z": -0.05}, {"min": 0, "max": 100}
         found = self.measure([(50.0, 0.0, 49.95), (500.0, 0.0, 50.0)], start=start, altitude=altitude)
         self.assertAlmostEqual(found.below_ground, 0.0)
@@ -272,7 +273,7 @@ class TerminalZones(unittest.TestCase):
             start={"x": 0, "y": 0, "z": 100},
             target={"x": 1000, "y": 0, "z": 50},
         )
-        # The ramp is 20 m: there the route is at 104 over ground of 98.
+        # The ramp is 20 m long: at its end the route is at 104 over ground at 98.
         self.assertAlmostEqual(found.least, 6.0)
 
     def test_the_ramp_begins_at_the_ground_of_a_peak(self):
@@ -280,7 +281,7 @@ class TerminalZones(unittest.TestCase):
         terrain["peaks"].append({"center": {"x": 0, "y": 0}, "height": 100, "spread": {"x": 90, "y": 90}})
         start = {"x": 0, "y": 0, "z": 100}
         found = self.measure([(20.0, 0.0, 105.0), (980.0, 0.0, 15.0)], terrain=terrain, start=start)
-        # At the ramp's end, 20 m away, the ground has fallen as a Gaussian does.
+        # At the ramp's end, 20 m away, the ground has fallen as the Gaussian does.
         self.assertAlmostEqual(found.least, 105.0 - 100.0 * math.exp(-((20.0 / 90.0) ** 2)), delta=1e-9)
         self.assertAlmostEqual(found.below_band, 10.0 - found.least)
 
@@ -290,7 +291,7 @@ class Faults(unittest.TestCase):
         scenario = read_scenario(document(**changes))
         found = route.faults([scenario.start, *free, scenario.target], scenario)
         self.assertEqual(set(found.certain), expected)
-        # Underground the band is left as well.
+        # Below ground the band is left as well.
         self.assertEqual(set(found.possible) - ({"altitude"} if "terrain" in expected else set()), expected)
 
     def test_each_kind(self):
@@ -313,7 +314,7 @@ class Faults(unittest.TestCase):
         ring = {"kind": "polygon", "vertices": [{"x": x, "y": y} for x, y in ((250, 0), (350, 0), (300, 60))]}
         self.check([(500, 0, 50)], set(), threats=[disc, ring])
 
-    def test_the_last_leg_climbs_too(self):
+    def test_the_last_leg_counts_towards_the_climb(self):
         self.check([(960, 0, 50)], {"climb"})
 
 
@@ -329,12 +330,12 @@ class Curves(unittest.TestCase):
         self.assertEqual(curve.at(1.0), self.CONTROL[-1])
 
     def test_two_spans_of_degree_two(self):
-        # At the middle knot a quadratic spline is halfway between the two control points about it.
+        # At the middle knot a quadratic spline is halfway between its two neighbouring control points.
         curve = Spline(2, [0.0, 0.0, 0.0, 0.5, 1.0, 1.0, 1.0], self.CONTROL)
         for value, known in zip(curve.at(0.5), (2.0, 2.0, 0.5)):
             self.assertAlmostEqual(value, known)
 
-    def test_knots_that_are_wrong(self):
+    def test_wrong_knots(self):
         for knots in (
             [0.0] * 4 + [1.0] * 3,
             [0.0, 0.0, 0.0, 0.1, 1.0, 1.0, 1.0, 1.0],
@@ -347,7 +348,7 @@ class Curves(unittest.TestCase):
         torn = [0.0] * 2 + [0.5] * 2 + [1.0] * 2
         self.assertNotEqual(Spline(1, torn, self.CONTROL).faults(), [])
 
-    def test_walking_it(self):
+    def test_walking_the_curve(self):
         curve = Spline(3, [0.0] * 4 + [1.0] * 4, self.CONTROL)
         given = [0.0, 0.1, 0.37, 0.62, 1.0]
         samples = [curve.at(u) for u in given]
@@ -363,7 +364,7 @@ class Curves(unittest.TestCase):
 
 
 class Documents(unittest.TestCase):
-    def test_what_cannot_be_measured(self):
+    def test_unsupported_scenarios(self):
         for changes in ({"frame": "wgs84"}, {"terrain": {"kind": "dataset", "name": "jacksboro"}}):
             with self.assertRaises(Unsupported):
                 read_scenario(document(**changes))

@@ -1,4 +1,4 @@
-"""The judge's exact measures against nothing but many samples, on random legs, shapes and grounds of fixed seeds."""
+"""The judge's exact measures against dense samples, on random legs, shapes and grounds of fixed seeds."""
 
 import math
 import random
@@ -14,7 +14,7 @@ STEPS = 2000
 
 
 def star(chance):
-    """A simple ring, not convex as a rule, about the origin."""
+    """A simple ring around the origin, usually not convex."""
     count = chance.randint(3, 9)
     angles = sorted(chance.uniform(0.0, 2.0 * math.pi) for _ in range(count))
     reach = [chance.uniform(5.0, 40.0) for _ in angles]
@@ -22,7 +22,7 @@ def star(chance):
 
 
 def spot(chance, height=50.0):
-    """A point about the origin."""
+    """A random point around the origin."""
     return chance.uniform(-60.0, 60.0), chance.uniform(-60.0, 60.0), chance.uniform(0.0, height)
 
 
@@ -49,7 +49,7 @@ class AgainstSamples(unittest.TestCase):
                         self.assertLessEqual(clear, sampled + 1e-9)
                         self.assertAlmostEqual(clear, sampled, delta=width)
                     total = width * math.fsum(threat.price_at(point) for point in points)
-                    # The ends of the band are met within a sample, where the price may jump.
+                    # The ends of the band are located only to a sample's width, and the price may jump there.
                     self.assertAlmostEqual(leg_integral(threat, a, b), total, delta=width * (threat.influence + 1.0))
 
     def test_heights(self):
@@ -83,7 +83,7 @@ class AgainstSamples(unittest.TestCase):
                 underground = max(underground, min((zone.floor for zone in within), default=0.0) - height)
                 if not within:
                     outside.append(height)
-        # Samples are less than 0.1 m apart, the slopes of ground and legs below a few metres a metre.
+        # Samples are less than 0.1 m apart, and the slopes of ground and legs are below a few metres per metre.
         self.assertAlmostEqual(found.below_ground, underground, delta=0.4)
         self.assertGreaterEqual(found.below_ground, underground - 1e-6)
         if not outside:

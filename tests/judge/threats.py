@@ -1,4 +1,4 @@
-"""Threats: how near a leg comes, and what flying there costs (Eq. 4-5)."""
+"""Threats: the clearance of a leg, and the cost of flying there (Eq. 4-5)."""
 
 import math
 
@@ -21,7 +21,7 @@ class Band:
         return self.base + shrink <= z < self.top - shrink
 
     def part(self, a, b, shrink=0.0):
-        """The closed range of `t` where the leg is in the band, None when it never is; touching `top` is not in it.
+        """The closed range of `t` where the leg is in the band, None when it never is; touching `top` does not count.
 
         A negative `shrink` widens the band.
         """
@@ -37,7 +37,7 @@ class Band:
 
 
 class Cylinder:
-    """A disc never to be entered, `radius`, in a wider one that costs, `influence`, both in metres."""
+    """A disc of `radius` that must not be entered, within one of `influence` that costs, both in metres."""
 
     def __init__(self, name, centre, radius, influence, band):
         self.name, self.centre, self.radius, self.influence, self.band = name, centre, radius, influence, band
@@ -64,7 +64,7 @@ class Cylinder:
 
 
 class Polygon:
-    """A ring never to be entered, with a soft zone of `margin` metres around it."""
+    """A ring that must not be entered, with a soft zone of `margin` metres around it."""
 
     radius = 0.0
 
@@ -109,7 +109,8 @@ class Polygon:
             found.extend(geo.circle_crossings(a, b, c, self.influence))
             found.extend(geo.circle_crossings(a, b, d, self.influence))
             found.extend(geo.line_crossing(a, b, c, d, offset) for offset in (-self.influence, self.influence))
-            # Where the nearest point of the edge moves onto one of its ends: the lines square to the edge there.
+            # Where the nearest point of the edge moves onto one of its ends: the lines perpendicular to the edge
+            # there.
             for end in (c, d):
                 found.append(geo.line_crossing(a, b, end, (end[0] - d[1] + c[1], end[1] + d[0] - c[0])))
         return [t for t in found if t is not None]
@@ -118,7 +119,7 @@ class Polygon:
         return min(geo.to_segment(point, c, d) for c, d in self.edges)
 
     def _crossings(self, a, b):
-        """The `t` where the leg meets an edge; a hair beyond either's ends counts, a cut too many does no harm."""
+        """The `t` where the leg meets an edge, with slightly extended ends; an extra cut does no harm."""
         found = []
         for c, d in self.edges:
             t, u = geo.line_crossing(a, b, c, d), geo.line_crossing(c, d, a, b)
@@ -127,10 +128,10 @@ class Polygon:
         return found
 
     def _depth(self, a, b):
-        """Greatest distance from the ring of the points of a segment that lies inside it.
+        """The greatest distance from the ring of any point on a segment that lies inside it.
 
-        The distance from one edge is convex along the segment, so that on a piece of it no point is farther from an
-        edge than the farther of the piece's ends: a bound to branch with, until it is met within 1e-10 m.
+        The distance from one edge is convex along the segment, so no point of a piece is farther from an edge than the
+        farther of the piece's ends: a bound for branching, until it is met within 1e-10 m.
         """
         best, todo = 0.0, [(0.0, 1.0)]
         while todo:
@@ -145,7 +146,7 @@ class Polygon:
 
 
 def leg_clearance(threat, a, b, shrink=0.0):
-    """Least horizontal distance to the threat of the part of the leg in its band; None when no part is."""
+    """The least horizontal distance from the threat to the part of the leg in its band; None when no part is."""
     part = threat.band.part(a, b, shrink)
     if part is None:
         return None
@@ -159,7 +160,7 @@ def route_clearance(threat, points, shrink=0.0):
 
 
 def leg_integral(threat, a, b, shrink=0.0):
-    """Integral of T over the 3-D length of the leg, by adaptive quadrature split where T is not smooth."""
+    """The integral of T over the 3-D length of the leg, by adaptive quadrature split where T is not smooth."""
     part = threat.band.part(a, b, shrink)
     length = geo.distance(a, b)
     if part is None or length == 0.0 or threat.influence <= 0.0 or part[1] <= part[0]:
@@ -168,7 +169,7 @@ def leg_integral(threat, a, b, shrink=0.0):
     if cuts is None:
         return 0.0
     price = lambda t: threat.price_at(geo.lerp(a, b, t))
-    # Far from the origin T is known no better than the places where it is looked up.
+    # Far from the origin T is known only as precisely as the places where it is evaluated.
     rounding = 8.0 * max(math.ulp(coordinate) for end in (a, b) for coordinate in end[:2])
     return length * integrate_pieces(price, *part, cuts, max(PRECISION * threat.influence, rounding))
 

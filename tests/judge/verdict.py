@@ -1,4 +1,4 @@
-"""The judgement of one result: every figure of the document compared with its definition."""
+"""The judgement of one result: every figure of the document is compared with its definition."""
 
 import math
 
@@ -10,14 +10,14 @@ from threats import route_clearance
 
 KINDS = {"threat", "altitude", "terrain", "turn", "climb", "leg", "area"}
 STOP_REASONS = {"iterations", "converged", "time-limit", "cancelled"}
-# How far the spline may come off the clear between its samples, metres: at threats, and in height.
+# How far the spline may violate limits between its samples, metres: at threats, and in height.
 SPLINE_THREAT, SPLINE_HEIGHT = 1e-3, 1e-2
 # Points of the spline examined between two samples.
 SPLINE_STEPS = 20
 
 
 def judge(scenario, result):
-    """Compares everything in `result` with what follows from `scenario`, a `Report`."""
+    """Compares everything in `result` with what follows from `scenario`; a `Report`."""
     report = Report()
     parts = (
         ("heading", _heading),
@@ -93,7 +93,7 @@ def _terms(report, name, claimed, points, scenario, price):
     low, high = price(points, scenario), None
     if scenario.threats and any(threat.band.base > -1e300 or threat.band.top < 1e300 for threat in scenario.threats):
         low, high = (price(points, scenario, shrink=shrink) for shrink in (hair, -hair))
-    # Heights are told above the sea: where the middle of the band costs nothing, their rounding does.
+    # Heights are given above sea level: where the middle of the band costs nothing, their rounding still does.
     rounded = scenario.weights["altitude"] * max(abs(point[2]) for point in points)
     scale = max(low["total"], rounded)
     for term in ("fuel", "threat", "altitude", "total"):
@@ -115,7 +115,7 @@ def _checks(report, name, claimed, points, scenario):
     heights, angles = route.heights(points, scenario), route.angles(points)
     report.near(f"{name}.min_agl", claimed["min_agl"], heights.least, scenario.scale)
     report.near(f"{name}.max_agl", claimed["max_agl"], heights.greatest, scenario.scale)
-    # Either leg's direction is as uncertain as its ends are, for its length.
+    # Each leg's direction is uncertain by the uncertainty of its ends divided by its length.
     turned = math.degrees(2.0 * scenario.hair / angles.leg) if angles.leg > 0.0 else 0.0
     report.near(f"{name}.max_turn_deg", claimed["max_turn_deg"], angles.turn, 180.0 + turned / ABSOLUTE)
     report.near(f"{name}.max_climb_deg", claimed["max_climb_deg"], angles.climb, 90.0)
@@ -138,7 +138,7 @@ def _clearance(report, where, claimed, threat, points, scenario):
 
 
 def _violations(report, scenario, result):
-    """Feasible or not: the violations that the waypoints have must be those that are claimed, no more and no less."""
+    """Feasible or not: the claimed violations must be exactly those that the waypoints have."""
     claimed = {violation["kind"] for violation in result["checks"]["violations"]}
     report.that(claimed <= KINDS, f"checks.violations: unknown kinds {sorted(claimed - KINDS)}")
     for violation in result["checks"]["violations"]:
@@ -188,7 +188,7 @@ def _path(report, scenario, result):
 
 
 def _spline(report, scenario, path, points):
-    """The curve runs through the samples in order and is as clear between them."""
+    """The curve runs through the samples in order and keeps the limits between them."""
     report.same("path.degree", path["degree"], scenario.degree)
     curve = Spline(path["degree"], path["knots"], _points(path["control_points"]))
     wrong = curve.faults()
@@ -207,7 +207,7 @@ def _spline(report, scenario, path, points):
     dense, stray = _densely(curve, parameters)
     for index, threat in enumerate(scenario.threats):
         if not _within(threat, points, stray):
-            continue  # out of the reach of the curve, whatever its height
+            continue  # continue  # beyond the reach of the curve at any height
         depth = max((-_clear(threat, point) for point in dense), default=0.0)
         report.that(depth <= SPLINE_THREAT, f"path: the spline is {depth:.3g} m inside threat {index}")
     both = route.zones(scenario)
@@ -216,7 +216,7 @@ def _spline(report, scenario, path, points):
 
 
 def _densely(curve, parameters):
-    """Points of the curve between the given parameters, and how far they stray from the sample before them."""
+    """Points of the curve between the given parameters, and how far they stray from the preceding sample."""
     found, stray = [], 0.0
     for low, high in zip(parameters, parameters[1:]):
         first = curve.at(low)
@@ -228,19 +228,19 @@ def _densely(curve, parameters):
 
 
 def _within(threat, points, reach):
-    """Whether a polyline comes within `reach` of a threat, at any height."""
+    """Whether a polyline comes within `reach` of a threat, whatever the height."""
     return any(threat.clearance_between(a, b) <= reach for a, b in zip(points, points[1:]))
 
 
 def _clear(threat, point):
-    """Clearance of a point of the spline; a point less than the tolerance within the threat's heights is clear."""
+    """Clearance of a point of the spline; a point within the threat's heights by less than the tolerance is clear."""
     if not threat.band.holds(point[2], SPLINE_THREAT):
         return float("inf")
     return threat.clearance_at(point)
 
 
 def _height_fault(point, scenario, both):
-    """How far a point is out of the heights asked for where it is, in metres; `both` are the terminal zones."""
+    """How far a point is outside the heights required where it is, in metres; `both` are the terminal zones."""
     within = [zone for zone in both if geo.horizontal(zone.centre, point) <= zone.ramp]
     height = point[2] - scenario.ground.elevation(point[0], point[1])
     if within:
@@ -252,7 +252,7 @@ def _bound(report, scenario, result):
     bound, total = result["bound"], result["cost"]["total"]
     lower, gap = bound["lower"], bound["gap"]
     if result["stop_reason"] == "converged":
-        # A route that costs nothing is the best there is, though its gap is no figure.
+        # A route that costs nothing is optimal, although its gap is not a number.
         near = total <= lower * (1.0 + scenario.gap) * (1.0 + 1e-9)
         proven = result["feasible"] and scenario.gap > 0.0 and near
         report.that(proven, f"stop_reason: converged with a gap of {gap!r}, asked for {scenario.gap!r}")
@@ -269,7 +269,7 @@ def _convergence(report, scenario, result):
     points, total = result["convergence"], result["cost"]["total"]
     numbers = [point["iteration"] for point in points]
     steps = [after - before for before, after in zip(numbers, numbers[1:])]
-    # The polish may add a point of its own to the last iteration.
+    # The polish may add its own point to the last iteration.
     report.that(
         numbers[0] == 0 and all(step == 1 for step in steps[:-1]) and all(step in (0, 1) for step in steps[-1:]),
         f"convergence: iterations are not 0..n in order, {numbers[:3]} to {numbers[-3:]}",

@@ -1,4 +1,4 @@
-// The page is for everybody: those with a key, those without eyes, mice, wide screens.
+// The page is accessible: with a key, with a screen reader, by keyboard, on narrow screens.
 
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
@@ -19,9 +19,9 @@ after(async () => {
   await site?.stop();
 });
 
-/** What axe-core finds that is serious. */
+/** The serious findings of axe-core. */
 async function serious(page) {
-  // By the debugger, which the page's policy does not bind.
+  // Evaluated through the debugger, which the page's policy does not restrict.
   await page.evaluate(AXE);
   const { violations } = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ['violations'] }));
   return violations.filter(({ impact }) => ['serious', 'critical'].includes(impact))
@@ -110,7 +110,7 @@ test('a service with keys is asked with one, kept in memory, and followed with t
   assert.ok(asked.some((url) => url.includes('/events?') && url.includes('ticket=')), 'a ticket opened the stream');
   assert.ok(!asked.some((url) => url.includes(key)), 'the key was in no address');
   assert.deepEqual(await page.evaluate(() => [localStorage.length, sessionStorage.length, document.cookie]), [0, 0, '']);
-  // Forgotten with the page: it is asked for again.
+  // The key is forgotten with the page, so it is requested again.
   await page.reload();
   await page.waitForSelector('#key[open]');
   await page.done();

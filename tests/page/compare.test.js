@@ -1,4 +1,4 @@
-// Plans are listed, laid over one another, made anew from a known route, and taken away.
+// Plans are listed, overlaid, replanned from a known route, and taken away.
 
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
@@ -27,7 +27,7 @@ test('two plans are laid over one another in scene and chart', async () => {
   const box = await page.locator('#canvas').boundingBox();
   assert.ok(await pixels(page, other, box) > 100, 'its colour is in the scene');
   await page.waitForFunction(() => /two/.test(document.getElementById('legend').textContent));
-  // The address brings both back.
+  // The URL restores both.
   const again = await open(chrome, page.url());
   await again.waitForFunction(() => globalThis.noctule?.scene()?.routes.length === 2);
   await again.done();
@@ -36,7 +36,7 @@ test('two plans are laid over one another in scene and chart', async () => {
   await page.done();
 });
 
-/** Holds the answers to what matches; `release()` lets them through, and promises that the page has them. */
+/** Holds back responses to matching requests; `release()` lets them through and resolves when the page has them. */
 async function held(page, pattern) {
   let waiting = [];
   await page.route(pattern, (route) => (waiting ? waiting.push(route) : route.continue()));
@@ -73,7 +73,7 @@ test('what is taken away before it has opened stays away, and what is laid over 
   assert.equal(openings(), 1);
   release = await held(page, `**/plans/${early}`);
   await tick.check();
-  // The list is read anew meanwhile, and knows of it.
+  // The list is reloaded meanwhile and still shows the tick.
   await page.waitForResponse(/plans[?]limit/);
   await page.waitForResponse(/plans[?]limit/);
   assert.ok(await tick.isChecked());
@@ -108,12 +108,12 @@ test('five running plans over a sixth leave the page a connection', async (t) =>
     ids.push(id);
   }
   const page = await open(chrome, `${other.url}#plan=${ids[0]}&with=${ids.slice(1).join('+')}`);
-  // Each has had its turn.
+  // Each of them has had its turn.
   await page.waitForFunction(() => globalThis.noctule?.scene()?.routes.length === 6);
   await page.click('#cancel');
   await page.waitForSelector('.verdict');
   assert.equal((await scene(page)).routes.length, 6);
-  // One of them comes to the front, with all that it has told.
+  // One of them comes to the front, with all events so far.
   await page.click('#tab-plans');
   await page.click(`[data-key="open ${ids[3]}"]`);
   await page.waitForFunction(() => document.getElementById('state').textContent === 'running');
@@ -155,7 +155,7 @@ test('the list has states, a filter and pages, and lets go', async (t) => {
   await page.waitForFunction(() => document.querySelectorAll('.plans tbody tr').length === 20);
   await page.selectOption('#plans-filter', 'running');
   await page.waitForFunction(() => document.querySelectorAll('.plans tbody tr').length === 0);
-  // One that begins is there without being asked for.
+  // A plan that starts appears without reloading.
   await ask(other.url, '/plans', { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify({ ...SMALL, name: 'long', planner: LONG }) });
   await page.waitForFunction(() => /long.*running/s.test(document.querySelector('.plans tbody')?.textContent ?? ''));
   await page.click('.plans [aria-label="Remove long"]');
@@ -166,7 +166,7 @@ test('the list has states, a filter and pages, and lets go', async (t) => {
   await page.done();
 });
 
-/** A page whose plan runs for long, its first route drawn. */
+/** A page whose plan runs for a long time, with its first route drawn. */
 async function running() {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);
@@ -241,7 +241,7 @@ test('a map becomes a flight plan, in every format that flies', async () => {
   await fill(page, '/planner/iterations', '20');
   const id = await plan(page);
   const result = await ask(site.url, `/plans/${id}/result`);
-  // What is drawn in metres is where the degrees say.
+  // Positions drawn in metres match the degrees.
   const [start, end] = await page.evaluate((p) => [globalThis.noctule.routeAt(0), globalThis.noctule.toMetres(p)], result.waypoints[0]);
   assert.ok(Math.hypot(start.x - end.x, start.y - end.y) < 0.01);
   const across = await page.evaluate((p) => p.map(globalThis.noctule.toMetres), [result.waypoints[0], result.waypoints.at(-1)]);

@@ -1,4 +1,4 @@
-// A scenario is chosen, opened, dropped, drawn and mended.
+// Scenarios are chosen, opened, dropped, drawn and corrected.
 
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
@@ -19,7 +19,7 @@ test('a shipped scenario is there at once, and another is one choice away', asyn
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);
   assert.match(await page.title(), /Jacksboro.*Noctule/);
-  // Flat until the service has said what its ground is.
+  // Flat until the service has returned its ground.
   await page.waitForFunction(() => globalThis.noctule.scene().ground.kind === 'mesh');
   await page.selectOption('#source', 'paper-4');
   await drawn(page, 5);
@@ -63,7 +63,7 @@ test('a scenario is drawn by hand, taken back and done again', async () => {
     await page.mouse.click(at.x, at.y);
   };
   const toDocument = (p) => p + 500;
-  // The frame's middle is that of the area: 500, 500.
+  // The frame's origin is the middle of the area: 500, 500.
   await page.click('[data-tool=start]');
   await click(-300, -250);
   let now = await document_(page);
@@ -75,7 +75,7 @@ test('a scenario is drawn by hand, taken back and done again', async () => {
   now = await document_(page);
   const { radius } = now.threats[0];
   assert.equal((await scene(page)).handles, 3);
-  // Its core's dot lies to the east.
+  // The handle of the core's radius is to the east.
   const dot = await groundPoint(page, radius, 0);
   const to = await groundPoint(page, radius + 60, 0);
   await page.mouse.move(dot.x, dot.y);
@@ -84,7 +84,7 @@ test('a scenario is drawn by hand, taken back and done again', async () => {
   await page.mouse.up();
   const wider = (await document_(page)).threats[0];
   assert.ok(Math.abs(wider.radius - radius - 60) < 6, `${wider.radius}`);
-  // Dragged as a whole by its middle.
+  // Dragging the middle moves the whole threat.
   const [middle, away] = [await groundPoint(page, 0, 0), await groundPoint(page, 120, 90)];
   await page.mouse.move(middle.x, middle.y);
   await page.mouse.down();
@@ -99,7 +99,7 @@ test('a scenario is drawn by hand, taken back and done again', async () => {
   await page.keyboard.press('Enter');
   await drawn(page, 2);
   assert.equal((await document_(page)).threats[1].vertices.length, 3);
-  // Polygon, drag, drag: one step each.
+  // Polygon, drag, drag: one undo step each.
   await page.click('#undo');
   await drawn(page, 1);
   await page.click('#undo');
@@ -128,7 +128,7 @@ test('a scenario across the antimeridian is drawn and placed where it is', async
     await settled(page);
     const [start, target] = await page.evaluate((ends) => ends.map(globalThis.noctule.toMetres), [crossing.start, crossing.target]);
     const east = Math.sign(to - from) * -1;
-    // A degree has 106.7 km there.
+    // A degree is 106.7 km there.
     assert.ok(Math.abs((target.x - start.x) * east - 3203) < 20, JSON.stringify([start, target]));
     assert.ok(Math.abs(start.x + target.x) < 1 && Math.abs(start.y) < 1, 'the middle is between them');
     for (const x of [-1500, 1500]) {
@@ -159,7 +159,7 @@ test('faults stand where they are, in the words of the service', async () => {
   await fill(page, '/altitude/max', 'high');
   await page.waitForSelector('[data-pointer="/altitude/max"][aria-invalid=true]');
   assert.match(await page.textContent('.faults h3'), /2 things to mend/);
-  // Planning nonetheless leads to the first of them.
+  // Planning anyway moves the focus to the first fault.
   await page.click('#plan');
   await page.waitForFunction(() => document.activeElement?.dataset.pointer?.startsWith('/'));
   await fill(page, '/threats/0/radius', '60');

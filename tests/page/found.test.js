@@ -1,4 +1,4 @@
-// What people who used the page stumbled over.
+// Problems that users of the page have run into.
 
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
@@ -36,7 +36,7 @@ test('a route within a threat is seen there', async () => {
   const page = await opened(await made(site.url, WALLED));
   await settled(page);
   const fault = await color(page, 'fault');
-  // Within the wall, but for the dots of the waypoints and of the fault.
+  // Within the wall, away from the dots of waypoints and faults.
   const within = [0.46, 0.48, 0.52, 0.54];
   const seen = [];
   for (const share of within) seen.push(await pixels(page, fault, await around(page, await page.evaluate((t) => globalThis.noctule.routeAt(t), share))));
@@ -44,7 +44,7 @@ test('a route within a threat is seen there', async () => {
   await page.done();
 });
 
-/** Fails where one of what a selector finds covers another. */
+/** Fails if any two elements that match the selector overlap. */
 async function apart(page, selector, atLeast) {
   const boxes = await page.locator(selector).evaluateAll((nodes) => nodes.map((node) => {
     const { left, right, top, bottom } = node.getBoundingClientRect();

@@ -1,4 +1,5 @@
-// How fast the page draws, and what it keeps: the figures of docs/PAGE.md. Not a test, for a busy machine would fail it.
+// Drawing speed and memory use of the page: the figures of docs/PAGE.md. Not a test, since it would fail on a busy
+// machine.
 //
 //     NOCTULE_BIN=target/release/noctule node tests/page/measure.js [frames] [leaks]
 
@@ -26,7 +27,7 @@ function wide() {
   };
 }
 
-/** Seconds of processor time of the browser's processes so far. */
+/** Processor seconds of the browser's processes so far. */
 function processorTime() {
   const parents = new Map();
   const spent = new Map();
@@ -36,7 +37,7 @@ function processorTime() {
       parents.set(Number(entry), Number(fields[1]));
       spent.set(Number(entry), Number(fields[11]) + Number(fields[12]));
     } catch {
-      // It has just ended.
+      // The process has just ended.
     }
   }
   const ours = (pid) => pid === process.pid || (parents.has(pid) && ours(parents.get(pid)));
@@ -48,7 +49,7 @@ function processorTime() {
   return ticks / 100;
 }
 
-/** The service, but for a plan's events: those are `rate` incumbents a second, of 22 points each. */
+/** The service, but with a plan's events replaced by `rate` incumbents a second of 22 points each. */
 async function busy(url, rate) {
   const { port } = new URL(url);
   const at = (k, n) => ({ x: 500 + (28500 * k) / 21, y: 500 + (28500 * k) / 21 + 900 * Math.sin(k + n / 6), z: 330 + 40 * Math.sin(k * 2 + n / 5) });
@@ -76,9 +77,9 @@ async function busy(url, rate) {
   return { url: `http://127.0.0.1:${server.address().port}`, stop: () => { server.closeAllConnections(); server.close(); } };
 }
 
-/** Frames within five seconds in which `act` is done again and again, in words. */
+/** Frames within five seconds while `act` is repeated, as text. */
 async function drawing(page, act) {
-  // Processor time beside the elapsed: it is the same on a machine that others use, too.
+  // Processor time beside elapsed time: it is the same on a shared machine.
   const from = { count: (await scene(page)).frames.count, cpu: processorTime(), at: performance.now() };
   while (performance.now() - from.at < 5000) await act();
   const { frames: { count, ms } } = await scene(page);
@@ -88,7 +89,7 @@ async function drawing(page, act) {
   return `${drawn_} frames in ${(elapsed / 1000).toFixed(1)} s, ${(elapsed / drawn_).toFixed(1)} ms by the clock and ${(cpu / drawn_).toFixed(1)} ms of processor time each (all processes of the browser), script ${ms.toFixed(1)} ms; ${size}`;
 }
 
-/** At 20 incumbents a second, at more than can be drawn, and while the camera is turned. */
+/** At 20 incumbents a second, at more than can be drawn, and while the camera turns. */
 async function frames(site, chrome) {
   for (const rate of [20, 100]) {
     const stage = await busy(site.url, rate);
@@ -127,7 +128,7 @@ async function leaks(site, chrome) {
   for (let n = 1; n <= 500; n += 1) {
     await page.evaluate(() => document.querySelector('.verdict')?.classList.add('old'));
     await page.click('#plan');
-    // No handle is kept of what is waited for: it would keep the elements.
+    // No handles are kept of awaited elements: they would keep the elements alive.
     await page.waitForFunction(() => document.querySelector('.verdict:not(.old)') !== null);
     if ([20, 100, 200, 300, 400, 500].includes(n)) console.log(`after ${n} plans: ${JSON.stringify(await state())}`);
   }

@@ -1,4 +1,4 @@
-// Where the processor draws, what stands still is drawn once, and what moves is drawn coarser: nobody sees a difference at rest.
+// On a software renderer, still parts are drawn once and moving ones more coarsely: at rest the picture is the same.
 
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
@@ -20,7 +20,7 @@ test('a picture of ground and threats with a route on it is what drawing all of 
   await drawn(page, FIRST);
   await choose(page, 'paper-1');
   await plan(page);
-  // The scene as it is after `act`, in the very frame that this asked for.
+  // The scene after `act`, in the very frame that it requested.
   const picture = (act, target) => page.evaluate(async ([what, selector]) => {
     const node = document.querySelector(selector);
     if (what === 'click') node.click();

@@ -1,4 +1,4 @@
-// A service, a browser, and a person's hands and eyes.
+// A service, a browser, and helpers that act as a person would.
 
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
@@ -14,10 +14,10 @@ const ARGUMENTS = [
   '--disable-component-update', '--disable-sync',
 ];
 
-/** What has not come by then does not come: long, since the machine may be busy with other things. */
+/** What has not happened by then will not happen: long, since the machine may be busy. */
 const PATIENCE_MS = 600000;
 
-/** What the browser itself notes about answers that the page expects: refusals are shown in the page. */
+/** Messages that the browser logs about responses that the page expects: refusals are shown in the page. */
 const EXPECTED = /Failed to load resource: the server responded with a status of (401|404|409|410|422)|GPU stall due to ReadPixels/;
 
 /** Starts the program on a port of its own. Returns `{url, stop}`. */
@@ -46,7 +46,7 @@ export async function service(...settings) {
   return { url, stop };
 }
 
-/** A wire to the service that can be cut: `{url, cut, mend, stop}`. */
+/** A connection to the service that can be cut: `{url, cut, mend, stop}`. */
 export async function wire(url) {
   const { port } = new URL(url);
   const sockets = new Set();
@@ -78,7 +78,7 @@ export async function wire(url) {
 /** A browser with an empty profile. */
 export const browser = () => chromium.launch({ executablePath: CHROMIUM, args: ARGUMENTS });
 
-/** The page, opened; its console is watched, and `done` says that nothing was wrong in it. */
+/** Opens the page and watches its console; `done` asserts that nothing went wrong in it. */
 export async function open(chrome, url, settings = {}) {
   const context = await chrome.newContext({ viewport: { width: 1440, height: 900 }, acceptDownloads: true, ...settings });
   await context.grantPermissions(['clipboard-read', 'clipboard-write']).catch(() => {});
@@ -97,7 +97,7 @@ export async function open(chrome, url, settings = {}) {
   return Object.assign(page, { done });
 }
 
-/** Threats of the scenario that is there at once. */
+/** Threats of the initial scenario. */
 export const FIRST = 4;
 
 /** Waits until a scenario is drawn. */
@@ -106,7 +106,7 @@ export const drawn = (page, threats) => page.waitForFunction((count) => {
   return scene && scene.ends === 2 && (count === undefined ? scene.frames.count > 1 : scene.threats === count);
 }, threats);
 
-/** Waits until nothing more is drawn. Counted in the page's own frames: a slow machine is given its time. */
+/** Waits until nothing more is drawn. Counted in the page's own frames, so a slow machine gets the time it needs. */
 export const settled = (page) => page.evaluate(async () => {
   const drawings = () => globalThis.noctule.scene()?.frames.count;
   for (let still = 0, before = drawings(); still < 20; still += 1) {
@@ -128,11 +128,11 @@ export async function choose(page, name, values = {}) {
   for (const [pointer, value] of Object.entries(values)) await fill(page, pointer, value);
 }
 
-/** Types into the field of a pointer, opening what it is in. */
+/** Types into the field of a pointer, opening its surrounding sections first. */
 export async function fill(page, pointer, value) {
   const field = page.locator(`[data-pointer="${pointer}"]`);
   await field.waitFor({ state: 'attached' });
-  // In one step: the form may be built anew between two.
+  // In one step: the form may be rebuilt between two.
   await page.evaluate((selector) => { for (let at = document.querySelector(selector); at; at = at.parentElement) if (at.tagName === 'DETAILS') at.open = true; }, `[data-pointer="${pointer}"]`);
   await field.fill(String(value));
 }
@@ -145,7 +145,7 @@ export async function plan(page, button = '#plan') {
   return page.evaluate(() => new URLSearchParams(location.hash.slice(1)).get('plan'));
 }
 
-/** How many pixels of a CSS box on the screen have a colour, give or take. */
+/** The number of pixels in a CSS box whose colour is close to the given one. */
 export async function pixels(page, color, clip) {
   const picture = (await page.screenshot({ clip })).toString('base64');
   const eye = await page.context().newPage();
@@ -168,7 +168,7 @@ export async function pixels(page, color, clip) {
   }
 }
 
-/** What share of the pixels of two pictures, addresses of data both, differs by more than a shade. */
+/** The share of pixels that differ by more than a shade between two pictures, both given as data URLs. */
 export async function difference(page, one, other) {
   const eye = await page.context().newPage();
   try {
@@ -193,7 +193,7 @@ export async function difference(page, one, other) {
 /** A colour of the style sheet. */
 export const color = (page, name) => page.evaluate((variable) => getComputedStyle(document.documentElement).getPropertyValue(`--${variable}`).trim(), name);
 
-/** A box of `size` pixels round a place of the scene, on the screen. */
+/** A box of `size` pixels around a place of the scene, on the screen. */
 export async function around(page, place, size = 14) {
   const box = await page.locator('#canvas').boundingBox();
   const at = await page.evaluate((p) => globalThis.noctule.onScreen(p), place);
@@ -201,7 +201,7 @@ export async function around(page, place, size = 14) {
   return { x: box.x + at.x - size / 2, y: box.y + at.y - size / 2, width: size, height: size };
 }
 
-/** Where a place on the ground is on the screen. */
+/** The screen position of a place on the ground. */
 export async function groundPoint(page, x, y) {
   const z = await page.evaluate(([a, b]) => globalThis.noctule.groundAt(a, b), [x, y]);
   const { x: px, y: py, width } = await around(page, { x, y, z });
@@ -219,27 +219,27 @@ export async function drop(page, name, text, type) {
   await page.dispatchEvent('body', 'drop', { dataTransfer: transfer });
 }
 
-/** What the interface answers. */
+/** The response of an endpoint. */
 export const ask = async (url, path, options) => (await fetch(new URL(path, url), options)).json();
 
-/** Makes a plan by the interface, and waits for its end. */
+/** Makes a plan through the API and waits for its end. */
 export async function made(url, document) {
   const status = await ask(url, '/plans', { method: 'POST', headers: { 'content-type': 'application/json', prefer: 'wait=30' }, body: JSON.stringify(document) });
   assert.equal(status.status, 'succeeded', JSON.stringify(status));
   return status.id;
 }
 
-/** Small and soon planned. */
+/** A small scenario that is planned quickly. */
 export const SMALL = {
   name: 'small', start: { x: 100, y: 100, z: 50 }, target: { x: 900, y: 900, z: 50 }, area: { min: { x: 0, y: 0 }, max: { x: 1000, y: 1000 } },
   threats: [{ kind: 'cylinder', name: 'radar', center: { x: 500, y: 500 }, radius: 100, influence: 160 }],
   altitude: { min: 20, max: 120 }, planner: { population: 30, iterations: 20, waypoints: 6, seed: 1 },
 };
 
-/** A search that lasts until it is told to end, however fast the program and the machine: minutes at the least. */
+/** A search that lasts until it is stopped, however fast the program and the machine: minutes at least. */
 export const LONG = { iterations: 100000, population: 2000 };
 
-/** No way leads past it. */
+/** A wall that no route can pass. */
 export const WALLED = {
   ...SMALL, name: 'walled',
   threats: [{ kind: 'polygon', name: 'wall', vertices: [{ x: -500, y: 450 }, { x: 1500, y: 450 }, { x: 1500, y: 550 }, { x: -500, y: 550 }] }],

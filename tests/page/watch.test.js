@@ -1,4 +1,4 @@
-// A search is watched, its end read; what is pointed at in one place is marked in the others.
+// A search is watched and its end read; pointing at a place in one view marks it in the others.
 
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
@@ -12,7 +12,7 @@ after(async () => {
   await site?.stop();
 });
 
-/** What makes a shipped scenario such a search. */
+/** Settings that make a shipped scenario last. */
 const LASTING = { '/planner/iterations': LONG.iterations, '/planner/population': LONG.population, '/planner/waypoints': 8 };
 
 test('the swarm is seen converging, and cancelling keeps the best', async () => {
@@ -44,7 +44,7 @@ test('the route is drawn where it is, and a place in it is one place everywhere'
   assert.equal(there.waypoints, result.waypoints.length - 2);
   assert.equal(there.trail, 0);
   const route = await color(page, 'route');
-  // From above, so that no threat stands before it.
+  // From above, so that no threat hides it.
   await page.click('text=Above');
   await settled(page);
   for (const share of [0.21, 0.47, 0.83]) {
@@ -53,21 +53,21 @@ test('the route is drawn where it is, and a place in it is one place everywhere'
   }
   const nowhere = await page.evaluate(() => ({ x: -350, y: 350, z: 0 }));
   assert.equal(await pixels(page, route, await around(page, nowhere)), 0);
-  // Where the strip is pointed at, scene and table are marked.
+  // Pointing at the strip marks scene and table.
   const strip = await page.locator('#strip').boundingBox();
   await page.mouse.move(strip.x + strip.width * 0.5, strip.y + strip.height * 0.5);
   await page.waitForFunction(() => globalThis.noctule.scene().mark === 1);
   assert.equal(await page.locator('.legs tr.marked').count(), 1);
   assert.match(await page.textContent('#strip-at'), /m above ground/);
-  // And a leg of the table in the strip and the scene.
+  // Pointing at a leg in the table marks strip and scene.
   await page.locator('.legs tr[data-leg="2"]').hover();
   await page.waitForSelector('.legs tr[data-leg="2"].marked');
   assert.equal((await scene(page)).mark, 1);
-  // And the route in the scene.
+  // Pointing at the route in the scene marks the table.
   const spot = await around(page, await page.evaluate(() => globalThis.noctule.routeAt(0.1)));
   await page.mouse.move(spot.x + 7, spot.y + 7);
   await page.waitForSelector('.legs tr[data-leg="0"].marked');
-  // The chart shows the best as it was then.
+  // Pointing at the chart shows the best route of that time.
   const chart = page.locator('#chart .u-over');
   await chart.hover({ position: { x: (await chart.boundingBox()).width - 1, y: 40 } });
   await page.waitForFunction(() => globalThis.noctule.scene().routes.some((one) => one.name === 'then'));
@@ -167,7 +167,7 @@ test('a search of milliseconds has its whole history, also when its plan is open
   const known = (page, count) => page.waitForFunction((wanted) => globalThis.noctule.history().incumbents >= wanted, count);
   const later = await open(chrome, `${site.url}#plan=${id}`);
   await later.waitForSelector('.verdict.good');
-  // On a busy machine it may take a second, and is thinned.
+  // On a busy machine it may take a second, so events are thinned.
   await known(later, 4);
   assert.equal(await later.evaluate(() => globalThis.noctule.history().points), convergence.length);
   await later.done();
@@ -177,7 +177,7 @@ test('a search of milliseconds has its whole history, also when its plan is open
   await drawn(page, 5);
   await plan(page);
   await known(page, 4);
-  // By the keyboard: the first route, step by step, and the result again.
+  // By keyboard: the first route, step by step, then the result again.
   await page.locator('#iteration').focus();
   await page.keyboard.press('Home');
   await page.keyboard.press('ArrowRight');
@@ -186,7 +186,7 @@ test('a search of milliseconds has its whole history, also when its plan is open
   await page.locator('#chart .u-cursor-pt').first().waitFor();
   await page.keyboard.press('Tab');
   await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 1);
-  // All of it once more, and the result at its end.
+  // Everything is replayed, with the result at the end.
   await page.click('#again');
   await page.waitForFunction(() => globalThis.noctule.scene().trail >= 2);
   assert.equal(await page.textContent('#again'), 'Stop');

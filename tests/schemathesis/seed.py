@@ -1,9 +1,9 @@
-"""Gives a service what requests made out of its description would never come upon: plans that have ended, and a dataset.
+"""Gives a service what generated requests would never reach: plans that have ended, and a dataset.
 
     seed.py URL KEY DATASET
 
-Writes their names into files in the working directory, as dictionaries of schemathesis; and into others, those of plans
-and datasets that are there to be deleted.
+Writes their names into files in the working directory, as dictionaries for schemathesis; and the names of plans and
+datasets to be deleted into other files.
 """
 
 import json
@@ -20,7 +20,7 @@ LOCAL = {
     "altitude": {"min": 0, "max": 100},
     "planner": PLANNER,
 }
-# The whole area across.
+# A wall across the whole area.
 WALL = [{"x": x, "y": y} for x, y in ((480, -500), (520, -500), (520, 500), (480, 500))]
 WALLED = LOCAL | {"name": "no way", "threats": [{"kind": "polygon", "vertices": WALL}]}
 DEGREES = {
@@ -31,7 +31,7 @@ DEGREES = {
     "altitude": {"min": 0, "max": 120},
     "planner": PLANNER,
 }
-# How many of either may be deleted.
+# How many of each may be deleted.
 SPARE = 40
 GRID = b"""ncols 2
 nrows 2

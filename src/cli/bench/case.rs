@@ -175,7 +175,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn the_planner_of_a_case_is_ours() {
+    fn a_case_can_override_planner_settings_and_add_threats() {
         let cases = cases(&[PathBuf::from("paper-2")]).expect("a shipped one");
         assert_eq!(cases.len(), 1);
         let scenario = cases[0]

@@ -27,7 +27,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn work_takes_time() {
+    fn processor_time_increases_with_work_and_stays_within_all_cores() {
         let (watch, wall) = (Stopwatch::start(), std::time::Instant::now());
         let mut before = 0.0;
         while before < 2e-3 {

@@ -395,14 +395,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sizes_are_distinct_and_possible() {
+    fn sizes_are_distinct_and_valid() {
         assert_eq!(scaled(200, 2), [50, 100, 200, 400]);
         assert_eq!(scaled(2, 2), [2, 4]);
         assert_eq!(distinct([0, 1, 2, 3]), [1, 2, 3]);
     }
 
     #[test]
-    fn every_group_is_led_by_what_it_is_compared_with() {
+    fn every_group_starts_with_its_reference() {
         let base = Setting {
             algorithm: REFERENCE,
             constant: None,

@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn it_agrees_with_scipy() {
+    fn the_rank_sum_test_agrees_with_scipy() {
         check(
             &[1.0, 2.0, 3.0, 4.0, 5.0],
             &[6.0, 7.0, 8.0, 9.0, 10.0],
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_runs_are_no_evidence() {
+    fn equal_or_single_runs_give_no_evidence() {
         check(&[1.0; 3], &[1.0; 3], 4.5, 1.0);
         check(&[0.5], &[0.7], 0.0, 1.0);
     }

@@ -357,12 +357,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn far_threats_keep_away_from_the_area() {
+    fn far_threats_lie_outside_the_area() {
         for idx in 0..1000 {
             let threat = far_threat(idx, 1000);
             let offset = |axis: &str| threat["center"][axis].as_f64().expect("a number") - 500.0;
             let distance = (offset("x") * offset("x") + offset("y") * offset("y")).sqrt();
-            // A corner of the area is 707.1 from its middle.
+            // A corner of the area is 707.1 m from its middle.
             assert!(distance > 1199.9, "{threat}");
         }
     }

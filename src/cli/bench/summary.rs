@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn costs_are_those_of_feasible_runs() {
+    fn costs_are_summarised_over_feasible_runs_only() {
         let runs = [(2.0, 0.0), (4.0, 0.0), (1.0, 3.0), (9.0, 0.0)];
         let runs = runs.map(|(cost, violation)| trial(cost, violation));
         let summary = Summary::of(&runs);

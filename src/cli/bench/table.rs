@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_table_reads_well_and_parses() {
+    fn a_table_is_written_as_markdown_and_csv() {
         let table = Table {
             name: "small",
             title: "Small".to_owned(),

@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn connections_leave_room_for_the_rest() {
+    fn the_connection_limit_leaves_descriptors_for_everything_else() {
         for (wished, limit, expected) in [
             (20_000, 1_048_576, 20_000),
             (20_000, 20_512, 20_000),

@@ -1,5 +1,5 @@
-//! Tests that lanes agree with the scalar code, whatever the scenario and the routes, and give the same bits whatever
-//! the processor and the neighbours.
+//! Lanes agree with the scalar code for any scenario and routes, and give the same bits on any processor and
+//! beside any neighbouring lanes.
 
 use proptest::prelude::*;
 use pulp::Arch;
@@ -15,7 +15,7 @@ use crate::terrain::dem::{Crs, Lattice, Raster};
 use crate::terrain::{Dem, Flat, Grid, Peak, Peaks, Terrain};
 use crate::threat::{Cylinder, Polygon, Shape, Threat};
 
-/// Successive choices from a proptest case.
+/// Successive choices drawn by a proptest case.
 struct Choices(std::vec::IntoIter<f64>);
 
 impl Choices {
@@ -44,7 +44,7 @@ impl Choices {
         }
         if kind < 0.7 {
             let peaks = (0..6).map(|_| {
-                // Some needles, ridges and table mountains among them.
+                // Some of them needles, ridges and table mountains.
                 let narrow = if self.one_in(6.0) { 1.0 } else { 20.0 };
                 let wide = if self.one_in(6.0) { 5000.0 } else { 150.0 };
                 Peak {
@@ -71,7 +71,7 @@ impl Choices {
         })
     }
 
-    /// Elevations in degrees or metres of a map, not parallel to the scenario's axes.
+    /// An elevation raster that is not parallel to the scenario's axes.
     fn file(&mut self) -> Terrain {
         let corner = LatLon {
             lat: self.between(-70.0, 70.0),
@@ -84,7 +84,7 @@ impl Choices {
             across * metre / libm::cos(corner.lat.to_radians()),
             -along * metre,
         ];
-        // Number of the shortest cells that span the routes.
+        // Enough of the shortest cells to span the routes.
         let [columns, rows] = [44; 2];
         let raster = Raster {
             lattice: Lattice {
@@ -117,7 +117,7 @@ impl Choices {
             let corner = |angle: f64, away: f64| {
                 center + nalgebra::Vector2::new(libm::cos(angle), libm::sin(angle)) * away
             };
-            // Some are convex, some have bays narrower and wider than their soft zones.
+            // Some are convex, some have bays narrower or wider than their soft zones.
             let count = 3.0 + (9.0 * self.share()).floor();
             let least = if self.one_in(3.0) { 85.0 } else { 20.0 };
             let step = std::f64::consts::TAU / count;
@@ -145,7 +145,7 @@ impl Choices {
         }
     }
 
-    /// Read by the reader for the parts that do not matter here, and random otherwise.
+    /// The reader supplies the parts that do not matter here; the rest is random.
     fn scenario(&mut self) -> Scenario {
         let algorithm = AlgorithmRule {
             name: "any",
@@ -197,7 +197,7 @@ impl Choices {
         scenario
     }
 
-    /// From start to target, mostly as one would fly.
+    /// From start to target, mostly along plausible ways.
     fn route(&mut self, scenario: &Scenario) -> Vec<Point3> {
         let spread =
             [1.0, 30.0, 300.0][usize::from(self.one_in(2.0)) + usize::from(self.one_in(2.0))];
@@ -211,8 +211,8 @@ impl Choices {
             let band = scenario.altitude;
             point.z = scenario.terrain.elevation(point.xy()) + self.between(band.min, band.max);
             if self.one_in(12.0) {
-                // Straight up, a tiny step, or nearly none at all. Of steps between, both lose digits: the
-                // way past an axis is then a small difference of large numbers.
+                // Straight up, a tiny step, or almost none. For steps in between, both codes lose digits: the
+                // distance past an axis is then a small difference of large numbers.
                 point = before;
                 point.z += [20.0, 0.0][usize::from(self.one_in(2.0))];
                 point.x += [0.01, 1e-10][usize::from(self.one_in(3.0))];
@@ -245,7 +245,7 @@ fn bits(price: &Price) -> [[u64; LANES]; 2] {
     ]
 }
 
-/// Between one number and as many as this processor takes at once, if there is such a width.
+/// A SIMD width between one number and the processor's widest, if there is one.
 fn narrower() -> Arch {
     #[cfg(target_arch = "x86_64")]
     if let Some(simd) = pulp::x86::V3::try_new() {
@@ -262,7 +262,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases / 2, ..ProptestConfig::default() })]
 
     #[test]
-    fn lanes_come_to_what_the_scalar_code_comes_to(
+    fn lanes_agree_with_the_scalar_code(
         choices in prop::collection::vec(0.0..1.0f64, 1500),
     ) {
         let mut choices = Choices(choices.into_iter());
@@ -304,7 +304,7 @@ proptest! {
             prop_assert!(close(together.violation[lane], violation), "{} {violation}", together.violation[lane]);
             prop_assert!(close(together.cost[lane], figures.total), "{} {figures:?}", together.cost[lane]);
             prop_assert!(close(least[lane], figures.fuel + figures.altitude), "{} {figures:?}", least[lane]);
-            // Its neighbours have no influence.
+            // Neighbouring lanes have no influence.
             let alone = pricer.routes(&rows(&vec![route.clone(); LANES]));
             prop_assert_eq!(bits(&alone).map(|row| row[0]), bits(&together).map(|row| row[lane]));
             for (leg_idx, ends) in route.windows(2).enumerate() {

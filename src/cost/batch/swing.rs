@@ -68,7 +68,7 @@ mod tests {
         }
     }
 
-    /// The ground above, and below, the line between two points of it, at most.
+    /// The greatest height of the ground above, and below, the line between two points on it.
     fn strays(terrain: &Terrain, a: Point2, b: Point2) -> [f64; 2] {
         let at = |t: f64| terrain.elevation(a + (b - a) * t);
         let (from, to) = (at(0.0), at(1.0));
@@ -83,7 +83,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_ground_strays_farther(
+        fn the_ground_never_strays_beyond_the_bound(
             choices in prop::collection::vec(0.0..1.0f64, 15),
             (x, y) in (0.0..100.0f64, 0.0..100.0f64),
             (dx, dy) in (-60.0..60.0f64, -60.0..60.0f64),
@@ -99,9 +99,9 @@ mod tests {
         }
     }
 
-    /// Over a summit, and where a slope bends up most, short legs stray almost so far.
+    /// Over a summit, and where a slope curves upwards most, short legs come close to the bound.
     #[test]
-    fn some_ground_strays_almost_as_far() {
+    fn the_bound_is_nearly_reached() {
         let peaks = massif(&[0.5, 0.5, 0.8, 0.3, 0.3]);
         let (spread, swing) = (peaks.peaks[0].spread.x, Swing::of(&peaks));
         let terrain = Terrain::Peaks(peaks);

@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn several_limits_make_one_list() {
+    fn several_limits_are_written_as_one_list() {
         let mut headers = HeaderMap::new();
         let field = |headers: &HeaderMap, name| headers[name].to_str().expect("ASCII").to_owned();
         Allowance::none_left("plans", 2).write(&mut headers);

@@ -19,7 +19,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_are_known_by_their_form() {
+    fn fresh_keys_are_distinct_and_recognisable() {
         let (one, other) = (key().expect("random"), key().expect("random"));
         assert_ne!(one, other);
         assert_eq!(one.len(), PREFIX.len() + 64);

@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn refusals_name_the_entry_and_never_its_sum() {
+    fn refusals_name_the_entry_and_never_its_checksum() {
         #[track_caller]
         fn check(text: &str, expected: &str) {
             let text = text.replace("SUM", SUM);

@@ -152,7 +152,7 @@ mod tests {
     use crate::digest::sha256_hex;
 
     #[test]
-    fn finds_each_key_and_no_other() {
+    fn each_key_is_found_and_no_other() {
         let entries: Vec<String> = (0..5)
             .map(|n| {
                 let sum = sha256_hex(format!("secret {n}").as_bytes());
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn knows_a_key_when_it_sees_one() {
+    fn a_key_is_recognised_inside_a_url() {
         let key = format!("{PREFIX}{}", "0a".repeat(32));
         assert!(holds_a_key(&key));
         assert!(holds_a_key(&format!("/plans/{key}/x")));

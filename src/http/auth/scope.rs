@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn admin_may_all_and_plan_may_read() {
+    fn admin_includes_every_scope_and_plan_includes_read() {
         for (has, asked, may) in [
             (Scope::Read, Scope::Read, true),
             (Scope::Read, Scope::Plan, false),
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_named_asks_for_more() {
+    fn unlisted_routes_need_the_stricter_scope() {
         for (method, path, needs) in [
             ("GET", "/livez", Needs::Nothing),
             ("GET", "/plans", Needs::Scope(Scope::Read)),

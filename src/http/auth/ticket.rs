@@ -73,7 +73,7 @@ mod tests {
     use super::*;
     use crate::job::new_id;
 
-    /// A file with one key.
+    /// A key file with one key.
     fn keys(name: &str, digit: char) -> Keys {
         let sum = digit.to_string().repeat(64);
         let text = format!("[[key]]\nname = {name:?}\nsha256 = \"{sum}\"\nscopes = [\"read\"]\n");
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ticket_is_for_one_plan_and_some_time_in_one_key_s_name() {
+    fn a_ticket_is_bound_to_one_plan_one_key_and_a_time() {
         let (ours, plan) = (keys("ä", '1'), new_id(0));
         let key = ours.named("ä");
         let ticket = issue(plan, key, 600_000);
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn no_bit_of_it_can_be_changed_and_nothing_be_left_out() {
+    fn a_ticket_with_a_changed_bit_or_cut_short_is_refused() {
         let (keys, plan) = (keys("a", '1'), new_id(0));
         let ticket = issue(plan, keys.named("a"), 600_000);
         let bytes = BASE64.decode(&ticket).expect("of this alphabet");
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn where_nobody_has_a_key_it_is_a_ticket_all_the_same() {
+    fn without_keys_a_ticket_is_still_bound_to_its_plan_and_time() {
         let plan = new_id(0);
         let ticket = issue(plan, None, 600_000);
         assert_eq!(holder(&ticket, plan, None, 599_999), Ok(None));

@@ -134,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn types_are_told_in_a_few_words() {
+    fn types_are_described_briefly() {
         for (schema, expected) in [
             (json!({"type": "string", "format": "uuid"}), "string, uuid"),
             (

@@ -31,7 +31,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_is_told_and_others_together() {
+    fn the_first_complaint_is_reported_and_later_ones_are_batched() {
         let begin = Instant::now();
         let mut complaints = Complaints::default();
         for (after_ms, expected) in [

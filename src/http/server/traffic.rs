@@ -157,7 +157,7 @@ mod tests {
 
     const TIME: Duration = Duration::from_secs(30);
 
-    /// Seconds until `traffic` has been still for [`TIME`].
+    /// Seconds until `traffic` has been idle for [`TIME`].
     async fn still_after_s(traffic: &Traffic) -> u64 {
         let begin = Instant::now();
         traffic.still_for(TIME).await;
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn what_is_asked_and_what_is_sent_counts() {
+    async fn only_data_worth_noting_resets_the_idle_time() {
         let traffic = Arc::new(Traffic::new());
         assert_eq!(still_after_s(&traffic).await, 30, "nobody asks");
         assert_eq!(still_after_s(&traffic).await, 30, "from now on");
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_request_moves_until_it_is_answered_and_a_stream_until_it_ends() {
+    async fn a_request_is_active_until_answered_and_a_stream_until_it_ends() {
         let traffic = Arc::new(Traffic::new());
         let after = async |held: Box<dyn Send>| {
             tokio::time::sleep(Duration::from_secs(100)).await;

@@ -104,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_public_internet_is_called() {
+    fn only_public_addresses_are_called() {
         for (text, public) in [
             ("1.1.1.1", true),
             ("93.184.215.14", true),
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn an_address_is_https_and_names_a_host() {
+    fn a_webhook_address_must_be_https_and_name_a_host() {
         for (text, public, private) in [
             ("https://hooks.example/plan?x=1", true, true),
             ("https://hooks.example:8443/", true, true),

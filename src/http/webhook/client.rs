@@ -150,7 +150,7 @@ mod tests {
 
     use super::*;
 
-    /// Breaks as soon as it has answered what was written to it, or instead of answering.
+    /// Breaks the connection right after its answer to what was written, or instead of an answer.
     struct Breaking {
         answer: &'static [u8],
         heard: bool,
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn an_answer_counts_though_the_connection_breaks_behind_it() {
+    async fn a_complete_answer_counts_even_if_the_connection_then_breaks() {
         let answer = sent(b"HTTP/1.1 200 OK\r\ncontent-length: 0\r\n\r\n").await;
         assert_eq!(answer.expect("it came"), StatusCode::OK);
         for cut_off in ["", "HTTP/1.1 200 OK\r\ncontent-le"] {

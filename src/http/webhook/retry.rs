@@ -27,7 +27,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pauses_grow_to_about_a_day_and_end() {
+    fn retry_pauses_grow_and_total_one_day() {
         assert_eq!(pause_ms(1, 0.5), Some(5_000));
         assert_eq!(pause_ms(1, 0.0), Some(4_000));
         assert_eq!(pause_ms(1, 1.0), Some(6_000));

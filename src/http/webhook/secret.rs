@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_secrets_of_some_length_are_taken() {
+    fn only_secrets_of_valid_length_are_accepted() {
         let coded = |bytes: usize| format!("whsec_{}", BASE64.encode(vec![7_u8; bytes]));
         for (text, taken) in [
             (coded(24), true),
@@ -71,9 +71,9 @@ mod tests {
         assert_eq!(format!("{secret:?}"), "Secret(..)");
     }
 
-    /// Compared with `openssl dgst -sha256 -hmac`.
+    /// The expected signature is from `openssl dgst -sha256 -hmac`.
     #[test]
-    fn signs_id_time_and_body() {
+    fn the_signature_covers_id_time_and_body() {
         let secret =
             Secret::read("whsec_MDEyMzQ1Njc4OWFiY2RlZjAxMjM0NTY3ODlhYmNkZWY=").expect("a secret");
         let signature = secret.sign("msg_1", 1_700_000_000, "{\"a\":1}");

@@ -101,7 +101,7 @@ mod tests {
     use crate::terrain::{Flat, Terrain};
 
     #[test]
-    fn a_position_is_its_waypoints_over_the_ground() {
+    fn a_position_holds_its_waypoints_above_ground() {
         let mut scenario = scenario();
         scenario.terrain = Terrain::Flat(Flat { elevation: 40.0 });
         let coding = Cartesian::new(&scenario, 2);
@@ -127,9 +127,9 @@ mod tests {
         }
     }
 
-    /// Where a vehicle takes off below the band, waypoints may lie below it too.
+    /// Where a vehicle takes off below the band, waypoints may also lie below it.
     #[test]
-    fn what_only_the_ends_allow_is_not_cut_off() {
+    fn heights_allowed_only_near_the_ends_are_not_clamped() {
         let mut scenario = scenario();
         scenario.altitude.min = 100.0;
         let model = Model::new(&scenario);

@@ -93,9 +93,9 @@ mod tests {
         route
     }
 
-    /// A target due east: outside the mirrored sector, in the middle of this one.
+    /// A target due east: outside the mirrored sector, in the middle of this coding's sector.
     #[test]
-    fn straight_ahead_is_towards_the_target() {
+    fn zero_angles_lead_straight_to_the_target() {
         let mut scenario = scenario();
         scenario.start = Point3::new(100.0, 500.0, 50.0);
         scenario.target = Point3::new(900.0, 500.0, 50.0);
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn the_chain_is_held_to_area_and_band() {
+    fn the_chain_is_kept_within_area_and_band() {
         let scenario = scenario();
         let coding = Course::new(&scenario, 2);
         let longest = coding.bounds().upper[0];

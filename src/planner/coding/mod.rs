@@ -129,10 +129,10 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever the coding and the position: the ends are exact, the waypoints as many as asked
-        /// for, their heights within the band.
+        /// For every coding and position: the ends are exact, the waypoint count is as requested, and all
+        /// heights are within the band.
         #[test]
-        fn every_position_is_a_route_within_the_band(
+        fn every_position_decodes_to_a_route_within_the_band(
             shares in prop::collection::vec(0.0..=1.0f64, 3 * 13),
             waypoints in 1..=12_usize,
         ) {

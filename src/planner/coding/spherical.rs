@@ -139,10 +139,10 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Whatever the position: the ends are exact, the turns within the limit except for the first leg's own
-        /// direction, the heights within the band.
+        /// For every position: the ends are exact, the turns within the limit (the first leg's own direction is
+        /// free), and the heights within the band.
         #[test]
-        fn every_position_is_a_route_within_turn_and_band(shares in prop::collection::vec(0.0..1.0f64, 33)) {
+        fn every_position_decodes_to_a_route_within_turn_and_band(shares in prop::collection::vec(0.0..1.0f64, 33)) {
             let scenario = scenario();
             let coding = Spherical::new(&scenario, 10);
             let bounds = coding.bounds().clone();
@@ -156,7 +156,7 @@ mod tests {
             prop_assert_eq!(route.len(), 12);
             prop_assert_eq!(route[0], scenario.start);
             prop_assert_eq!(route[11], scenario.target);
-            // Very short legs lose digits of their heading to the closing transform.
+            // Very short legs lose digits of their heading in the closing transform.
             let short = route.windows(2).any(|ends| (ends[1] - ends[0]).norm() < 1e-3);
             for turn in turns(&route) {
                 prop_assert!(short || turn.abs().to_degrees() <= scenario.vehicle.max_turn_deg + 1e-6);

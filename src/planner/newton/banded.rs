@@ -94,7 +94,7 @@ mod tests {
     use std::iter::repeat;
 
     #[test]
-    fn solutions_solve() {
+    fn the_solution_satisfies_the_shifted_system() {
         let mut random = Random::new(3);
         for size in [1, 2, 8, 9, 10, 40] {
             let mut matrix = Banded::zero(size);

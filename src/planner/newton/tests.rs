@@ -1,4 +1,4 @@
-//! The derivatives are those of the merit, and the resulting route is better and keeps the limits.
+//! The derivatives match the merit, and the improved route is better and keeps the limits.
 
 use super::equations::advance;
 use super::*;
@@ -8,7 +8,7 @@ use crate::planner::polish::{Polish, Steps};
 use crate::planner::tests::{hilly_scenario, radar, scenario};
 use crate::scenario::Scenario;
 
-/// A vehicle that turns so little that hardly anything else shapes its routes.
+/// A vehicle whose turn limit is so tight that hardly anything else shapes its routes.
 fn stiff() -> Scenario {
     let mut scenario = scenario();
     scenario.vehicle.max_turn_deg = 16.0;
@@ -16,12 +16,12 @@ fn stiff() -> Scenario {
     scenario.planner.waypoints = 8;
     (scenario.planner.population, scenario.planner.iterations) = (200, 200);
     (scenario.start.z, scenario.target.z) = (100.0, 100.0);
-    // The first radar is in the way at once.
+    // The first radar is in the way immediately.
     scenario.threats = vec![radar(270.0, 180.0, 75.0), radar(560.0, 520.0, 110.0)];
     scenario
 }
 
-/// From start to target in an arc, at a random height of the band, all places off by up to `off` metres.
+/// From start to target in an arc around a height of 100 m above ground, every coordinate off by up to `off` metres.
 fn arc(scenario: &Scenario, free: usize, bulge: f64, off: f64, random: &mut Random) -> Vec<Point3> {
     let way = scenario.target - scenario.start;
     let mut route = vec![scenario.start];
@@ -39,9 +39,9 @@ fn arc(scenario: &Scenario, free: usize, bulge: f64, off: f64, random: &mut Rand
     route
 }
 
-/// Along random directions, compares the equations with two steps.
+/// Compares the equations with central differences along random directions.
 #[test]
-fn derivatives_are_those_of_the_merit() {
+fn derivatives_match_the_merit() {
     let mut random = Random::new(11);
     let mut free = stiff();
     free.threats.clear();
@@ -89,7 +89,7 @@ fn derivatives_are_those_of_the_merit() {
                 .sum();
             let scale = 1.0 + bend.abs().max(expected.abs());
             assert!(bend - expected < accuracy * scale, "{bend} {expected}");
-            // Negative curvature in soft zones and over hills is left out.
+            // Negative curvature in soft zones and over hills is left out of the matrix.
             if scenario.threats.is_empty() && scenario.terrain.is_flat() {
                 assert!(expected - bend < accuracy * scale, "{bend} {expected}");
             }
@@ -97,9 +97,9 @@ fn derivatives_are_those_of_the_merit() {
     }
 }
 
-/// Whatever a route looks like to begin with, it ends at the best one nearby, within the limits.
+/// Whatever the initial route looks like, it ends at the best one nearby, within the limits.
 #[test]
-fn routes_that_lead_one_way_end_as_one() {
+fn perturbed_routes_on_the_same_side_converge_to_one_cost() {
     let scenario = stiff();
     let model = Model::new(&scenario);
     let mut random = Random::new(5);
@@ -115,7 +115,7 @@ fn routes_that_lead_one_way_end_as_one() {
     assert!(costs.iter().all(|cost| *cost < 1.01 * least), "{costs:?}");
 }
 
-/// What the lattice leaves of a route whose turns are at their limit is far from the best.
+/// For a route whose turns are at their limit, the lattice's result is far from the best.
 #[test]
 fn a_bend_is_moved_as_a_whole() {
     let scenario = stiff();
@@ -139,9 +139,9 @@ fn a_bend_is_moved_as_a_whole() {
     assert!(newton.evaluations > 0);
 }
 
-/// Another route replaces the first only if it leads to a better one.
+/// Another route replaces the first only if it leads to a better result.
 #[test]
-fn the_better_one_of_several_is_taken() {
+fn other_routes_never_worsen_the_result() {
     let scenario = stiff();
     let model = Model::new(&scenario);
     let mut random = Random::new(9);
@@ -164,7 +164,7 @@ fn the_better_one_of_several_is_taken() {
 }
 
 #[test]
-fn limits_that_nothing_comes_near_are_not_felt() {
+fn distant_limits_are_inactive() {
     let mut scenario = scenario();
     scenario.threats.clear();
     scenario.start.z = 100.0;
@@ -178,9 +178,9 @@ fn limits_that_nothing_comes_near_are_not_felt() {
     assert!(!is_felt(&model, &route));
 }
 
-/// Zero weights, ends above each other and other edge cases give a route at least as good as before.
+/// Zero weights and coinciding waypoints give a route at least as good as before.
 #[test]
-fn what_counts_for_nothing_does_no_harm() {
+fn zero_weights_never_worsen_a_route() {
     let mut random = Random::new(4);
     for (fuel, threat, altitude) in [
         (0.0, 1.0, 1.0),
@@ -196,7 +196,7 @@ fn what_counts_for_nothing_does_no_harm() {
             scenario.planner.waypoints = free;
             let model = Model::new(&scenario);
             let mut routes = vec![arc(&scenario, free, 200.0, 30.0, &mut random)];
-            // All waypoints in one place.
+            // All waypoints in the same place.
             routes.push(routes[0].clone());
             let at = routes[1][1];
             routes[1][1..=free].fill(at);

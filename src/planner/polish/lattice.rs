@@ -351,9 +351,9 @@ mod tests {
     use crate::planner::tests::hilly_scenario;
     use crate::planner::{Nobody, plan};
 
-    /// From a feasible route the quick way and the thorough one choose the same places.
+    /// From a feasible route the quick sweep and the thorough one choose the same places.
     #[test]
-    fn the_clear_way_is_the_best_of_all() {
+    fn the_quick_sweep_agrees_with_the_thorough_one() {
         let mut scenario = hilly_scenario();
         scenario.planner.iterations = 3;
         for seed in 0..4 {

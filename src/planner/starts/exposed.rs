@@ -26,9 +26,9 @@ mod tests {
     use crate::planner::tests::scenario;
     use crate::scenario::Weights;
 
-    /// Crossing the soft zones straight costs more than a way that is longer by as much.
+    /// Crossing the soft zones straight costs more than a detour of this much.
     #[test]
-    fn ways_are_looked_for_as_far_about_as_they_may_pay() {
+    fn detours_are_limited_to_what_may_pay_off() {
         let mut scenario = scenario();
         let straight = [scenario.start, scenario.target];
         let of = |scenario: &crate::scenario::Scenario| detour(&Model::new(scenario), &straight);

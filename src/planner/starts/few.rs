@@ -169,7 +169,7 @@ mod tests {
 
     const SHARPEST: f64 = 0.0;
 
-    /// Legs between random points, some of which turn out to be missing.
+    /// Legs between random points, some of which turn out not to exist.
     struct Net {
         points: Vec<Point3>,
         costs: Vec<Vec<f64>>,
@@ -208,7 +208,7 @@ mod tests {
                 .sum()
         }
 
-        /// The cost of the cheapest of all chains that extend `chain`, which itself costs `cost`.
+        /// The cost of the cheapest completion of `chain`, which itself costs `cost`.
         fn cheapest(&mut self, chain: &mut Vec<usize>, cost: f64, most: usize) -> f64 {
             let last = chain[chain.len() - 1];
             if last + 1 == self.places() {
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_chain_is_the_cheapest_of_so_few_legs() {
+    fn the_first_chain_is_the_cheapest_with_at_most_the_given_legs() {
         let (mut found, mut dearer) = (0, 0);
         for seed in 1..=60 {
             let mut before = f64::INFINITY;
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn chains_come_the_cheapest_first() {
+    fn chains_come_in_order_of_cost() {
         let mut found = 0;
         for seed in 1..=20 {
             let mut costs = Vec::new();

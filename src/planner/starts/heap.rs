@@ -68,7 +68,7 @@ mod tests {
     use crate::planner::tests::{route, scenario};
 
     #[test]
-    fn waypoints_on_one_place_are_spread() {
+    fn coinciding_waypoints_are_spread_along_the_route() {
         let mut scenario = scenario();
         scenario.vehicle.min_leg = 0.0;
         let model = Model::new(&scenario);
@@ -81,9 +81,9 @@ mod tests {
         assert!((price(&model, &apart).cost - price(&model, &heap).cost).abs() < 1e-6);
     }
 
-    /// Where only one place is in the middle of the band, the waypoints crowded there are put a hair apart.
+    /// Where only one place is in the middle of the band, waypoints crowded there are moved apart minimally.
     #[test]
-    fn waypoints_on_the_best_place_are_put_a_hair_apart() {
+    fn waypoints_on_the_best_place_are_moved_apart_minimally() {
         let mut scenario = scenario();
         scenario.vehicle.min_leg = 0.0;
         scenario.start.z = 0.0;

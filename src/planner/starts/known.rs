@@ -38,9 +38,9 @@ mod tests {
     use crate::planner::tests::scenario;
     use crate::scenario::AltitudeBand;
 
-    /// A climb from the ground to a band that begins at 100 m, and a point far from the start that is too low.
+    /// A climb from the ground to a band that starts at 100 m, and a point far from the start that is too low.
     #[test]
-    fn a_known_climb_to_the_band_stays_one() {
+    fn a_known_climb_to_the_band_is_kept() {
         let mut scenario = scenario();
         scenario.start.z = 0.0;
         scenario.altitude = AltitudeBand {

@@ -96,7 +96,7 @@ mod tests {
     use crate::geometry::Segment;
     use crate::planner::tests::{radar, scenario};
 
-    /// With a threat up to `top` and one from `base`, beside each other; the middle of the band is at 100.
+    /// One threat up to `top` and, elsewhere, one from `base`; the middle of the band is at 100 m.
     fn passable(top: f64, base: f64) -> Scenario {
         let mut scenario = scenario();
         scenario.threats = vec![radar(350.0, 250.0, 60.0), radar(680.0, 620.0, 60.0)];
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn places_about_a_threat_have_the_heights_that_clear_it() {
+    fn places_around_a_threat_have_the_heights_that_clear_it() {
         let scenario = passable(130.0, 70.0);
         assert_eq!(heights(&scenario, 350.0, 370.0), [100.0, 130.0, 134.0]);
         assert_eq!(heights(&scenario, 680.0, 500.0), [100.0, 69.999, 66.0]);
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_middle_of_the_band_clears_needs_no_height() {
+    fn threats_cleared_at_the_middle_of_the_band_add_no_heights() {
         let scenario = passable(99.0, 101.0);
         for (x, y) in [(350.0, 250.0), (680.0, 620.0)] {
             assert_eq!(heights(&scenario, x, y), [100.0]);
@@ -127,16 +127,16 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_outside_of_the_band_or_beyond_a_climb() {
+    fn heights_outside_the_band_or_beyond_the_climb_are_left_out() {
         let scenario = passable(199.0, 201.0);
         assert_eq!(heights(&scenario, 350.0, 370.0), [100.0, 199.0]);
-        // From the start, at 0 m, 145 m away.
+        // From the start, which is at 0 m, 145 m away.
         let heights = heights(&scenario, 280.0, 220.0);
         assert_eq!(heights, [100.0]);
     }
 
     #[test]
-    fn of_many_heights_the_nearest_are_kept_and_the_one_that_clears_all() {
+    fn of_many_heights_the_nearest_and_the_one_that_clears_all_are_kept() {
         let mut scenario = passable(130.0, 0.0);
         for top in [140.0, 150.0, 160.0, 170.0] {
             let mut threat = scenario.threats[0].clone();
@@ -148,10 +148,10 @@ mod tests {
     }
 
     #[test]
-    fn a_climb_from_an_end_is_over_after_one_leg() {
+    fn a_climb_from_an_end_takes_at_most_one_leg() {
         let mut scenario = scenario();
         (scenario.start.x, scenario.start.y) = (300.0, 300.0);
-        // The target is 50 m above the middle, which a leg reaches before that.
+        // The target is 50 m above the middle, which a leg reaches before its end.
         let places = about_ends(&scenario, 60.0);
         assert_eq!(places.len(), DIRECTIONS);
         for b in places {

@@ -328,9 +328,9 @@ mod tests {
     use crate::planner::tests::{hilly_scenario, scenario};
     use crate::threat::Polygon;
 
-    /// Legs take long to price round a coast of thousands of corners, and hardly any of the usual time.
+    /// Around a coast of thousands of corners legs take long to price, so a stop is checked after few of them.
     #[test]
-    fn a_stop_is_heard_where_legs_take_long() {
+    fn a_stop_is_noticed_while_legs_take_long_to_price() {
         let mut scenario = scenario();
         let priced = |scenario: &Scenario, looks: u32| {
             let looked = std::cell::Cell::new(0);
@@ -359,9 +359,9 @@ mod tests {
         assert!(0 < few && few <= 3 * most && 3 * most < all, "{few} {all}");
     }
 
-    /// Chains are the same whether legs are measured when their turn comes or all beforehand.
+    /// Chains are the same whether legs are measured on demand or all beforehand.
     #[test]
-    fn legs_measured_late_change_no_chain() {
+    fn measuring_legs_on_demand_changes_no_chain() {
         let scenario = hilly_scenario();
         let model = Model::new(&scenario);
         let places = places(&model);

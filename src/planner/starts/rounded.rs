@@ -57,10 +57,10 @@ mod tests {
     use crate::planner::tests::scenario;
 
     #[test]
-    fn a_sharp_turn_is_flown_in_several() {
+    fn a_sharp_turn_is_split_into_several() {
         let mut scenario = scenario();
         scenario.threats.clear();
-        // Up to the middle of the band, and after a turn of 83 degrees on to the target.
+        // Up to the middle of the band, then a turn of 83 degrees towards the target.
         let chain = [
             scenario.start,
             Point3::new(330.0, 40.0, 100.0),

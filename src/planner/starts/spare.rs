@@ -226,7 +226,7 @@ mod tests {
         }
     }
 
-    /// Where a leg is above the middle of the band from end to end, spare waypoints go down to it.
+    /// Where a leg is above the middle of the band throughout, spare waypoints go down to the middle.
     #[test]
     fn spare_waypoints_leave_a_high_leg() {
         let mut scenario = scenario();
@@ -237,12 +237,12 @@ mod tests {
         let many = fill(&model, high.clone(), 10);
         let [few, many] = [high, many].map(|route| price(&model, &route));
         assert!(many.violation <= 0.0);
-        // Each would cost 30 or more on the leg.
+        // Each would cost at least 30 on the leg.
         assert!(many.cost < few.cost + 3.0, "{few:?} {many:?}");
     }
 
-    /// A waypoint that goes up to the middle of the band costs more than one on the leg, and makes room there for all
-    /// others.
+    /// A waypoint raised to the middle of the band costs more than one on the leg, but all others then fit
+    /// beside it.
     #[test]
     fn spare_waypoints_share_one_way_up() {
         let mut scenario = scenario();

@@ -116,7 +116,7 @@ mod tests {
     use crate::planner::tests::{route, scenario};
 
     #[test]
-    fn the_waypoint_that_is_missed_least_is_left_out() {
+    fn the_least_useful_waypoint_is_left_out() {
         let scenario = scenario();
         let model = Model::new(&scenario);
         let many = route(&[
@@ -129,9 +129,9 @@ mod tests {
         assert!(!price(&model, &without_the_middle).beats(&price(&model, &few)));
     }
 
-    /// Each single step examines every waypoint anew.
+    /// Removing one at a time examines every waypoint again at each step.
     #[test]
-    fn many_are_left_out_as_one_by_one() {
+    fn leaving_out_many_equals_leaving_out_one_by_one() {
         let scenario = scenario();
         let model = Model::new(&scenario);
         let free: Vec<[f64; 3]> = (0..60_u32)
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn waypoints_on_one_place_are_finite_when_left_out() {
+    fn leaving_out_coinciding_waypoints_gives_finite_coordinates() {
         let scenario = scenario();
         let model = Model::new(&scenario);
         let many = route(&[[500.0, 480.0, 100.0]; 6]);

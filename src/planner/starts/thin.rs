@@ -245,7 +245,7 @@ mod tests {
     use crate::planner::tests::{radar, scenario};
     use crate::scenario::Scenario;
 
-    /// A chain that leaves the direct way at once, and the cost of its legs by definition, ignoring turns.
+    /// A chain that leaves the direct way immediately.
     fn astray(scenario: &Scenario) -> Vec<Point3> {
         let between = [
             (0.15, 130.0),
@@ -295,7 +295,7 @@ mod tests {
         (sum_of_legs(&model, &thin), thin)
     }
 
-    /// Those places of a chain are kept that make the best route through them with turns that the vehicle can fly.
+    /// The places kept make the best route through the chain's places that the vehicle can turn along.
     #[test]
     fn a_chain_is_thinned_to_the_best_of_its_places() {
         let mut scenario = scenario();
@@ -324,10 +324,10 @@ mod tests {
         assert!(costs[1] > 1.001 * costs[0], "{costs:?}");
     }
 
-    /// Half round a disc in steps of a few metres, no leg of which may cut across; and one that needs longer legs than
-    /// those that are looked at first, as a route of one waypoint does.
+    /// Half way around a disc in steps of a few metres, which no leg may cut across; and a route of one
+    /// waypoint, which needs longer legs than those tried first.
     #[test]
-    fn of_a_long_chain_long_legs_that_break_limits_are_not_priced() {
+    fn long_infeasible_legs_of_a_long_chain_are_not_priced() {
         let mut scenario = scenario();
         scenario.start = Point3::new(200.0, 500.0, 100.0);
         scenario.target = Point3::new(800.0, 500.0, 100.0);

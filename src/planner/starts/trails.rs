@@ -286,7 +286,7 @@ mod tests {
         [290.0, 212.0, 261.0, 82.0, 96.0],
     ];
 
-    /// Slopes twice as steep as the vehicle climbs, 20 to 120 m above which it must stay.
+    /// Slopes twice as steep as the vehicle climbs; the band is 20 to 120 m above ground.
     fn mountains() -> Scenario {
         let mut scenario = scenario();
         scenario.terrain = Terrain::Peaks(Peaks {
@@ -323,9 +323,9 @@ mod tests {
         scenario
     }
 
-    /// Where the coarse net has no way at all, the fine one has several that can be flown as they are.
+    /// Where the coarse net has no feasible way, the fine one has at least one.
     #[test]
-    fn a_way_is_found_through_steep_mountains() {
+    fn the_fine_net_finds_a_way_through_steep_mountains() {
         let scenario = mountains();
         let model = Model::new(&scenario);
         let can_be_flown = |route: &&Vec<Point3>| price(&model, route).is_feasible();
@@ -344,9 +344,9 @@ mod tests {
         }
     }
 
-    /// Among discs in staggered rows the coarse net has no way that can be flown, and the fine one better ones.
+    /// Among discs in staggered rows the coarse net has no feasible way, and the fine one has a better one.
     #[test]
-    fn a_way_is_found_through_a_crowd() {
+    fn the_fine_net_finds_a_better_way_through_a_crowd() {
         let mut scenario = scenario();
         scenario.threats = (0..9)
             .flat_map(|row| (0..8).map(move |column| (f64::from(row), f64::from(column))))
@@ -364,7 +364,7 @@ mod tests {
             })
             .collect();
         scenario.planner.waypoints = 8;
-        // With no climb at the ends, for which the coarse net has places of their own.
+        // Without a climb at the ends, for which the coarse net has places of its own.
         (scenario.start.z, scenario.target.z) = (100.0, 100.0);
         let model = Model::new(&scenario);
         let best = |found: Found| {
@@ -377,6 +377,7 @@ mod tests {
         ]
         .map(best);
         assert!(!coarse.is_feasible());
+        assert!(fine.is_feasible(), "{fine:?}");
         assert!(fine.beats(&coarse), "{coarse:?} {fine:?}");
     }
 }

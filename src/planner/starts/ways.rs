@@ -86,7 +86,7 @@ mod tests {
     use crate::planner::{Nobody, plan};
     use crate::scenario::{Scenario, Seeding};
 
-    /// Sixty discs at random, in gaps of ten metres and more.
+    /// Sixty random discs with gaps of at least ten metres.
     fn minefield(seed: u64) -> Scenario {
         let mut scenario = scenario();
         scenario.threats.clear();
@@ -113,10 +113,10 @@ mod tests {
         scenario
     }
 
-    /// Fourteen discs, of which the soft zones of two overlap by four metres: a route costs 588 through that gap, 699
-    /// round it. The same holds with a distant hill.
+    /// Fourteen discs, two of whose soft zones overlap by four metres: a route costs 588 through that gap and
+    /// 699 around it. The same holds with a distant hill.
     #[test]
-    fn a_gap_between_few_threats_is_passed() {
+    fn a_cheap_gap_between_few_threats_is_found() {
         let discs = [
             [472.0, 577.0, 73.0, 103.0],
             [829.0, 433.0, 53.0, 93.0],
@@ -148,9 +148,9 @@ mod tests {
         }
     }
 
-    /// Among few threats such ways are sought where a gap is no more expensive than what is known, and only there.
+    /// Among few threats, ways are sought only where a gap may be no more expensive than the known route.
     #[test]
-    fn ways_among_few_threats_are_looked_for_where_a_gap_may_be_cheaper() {
+    fn ways_among_few_threats_are_sought_where_a_gap_may_be_cheaper() {
         let mut scenario = scenario();
         let of =
             |scenario: &Scenario, known: f64| sought(&Model::new(scenario), Some(known), &|| false);
@@ -166,7 +166,7 @@ mod tests {
         assert_eq!(of(&scenario, 1e6), None);
     }
 
-    /// By more than a twentieth in every second field, before any search.
+    /// By more than a twentieth in at least half of the fields, before any search.
     #[test]
     fn ways_through_minefields_are_cheaper_than_strings_and_nets() {
         let mut far_better = 0;

@@ -112,16 +112,15 @@ mod tests {
 
     /// The search alone ends at 624.
     #[test]
-    fn a_way_that_is_open_in_a_few_headings_is_found() {
+    fn a_way_that_is_open_in_few_headings_is_found() {
         let outcome = plan(&between_mountains(), &mut Nobody, &Nobody);
         assert!(outcome.feasible);
         assert!(outcome.cost.total < 600.0, "{}", outcome.cost.total);
     }
 
-    /// Every route passed on breaks limits of the band and is cheaper in a wider one; none is passed on where that is
-    /// impossible.
+    /// Every route returned breaks a limit; none is returned where the known cost cannot be improved on.
     #[test]
-    fn only_what_a_wider_band_makes_cheaper_is_taken() {
+    fn routes_of_a_wider_band_are_returned_only_where_they_may_be_cheaper() {
         let scenario = between_mountains();
         let model = Model::new(&scenario);
         let known = |cost: f64| Fitness {

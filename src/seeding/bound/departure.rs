@@ -181,10 +181,10 @@ mod tests {
         examine(&prices, ends_of((&walls, &radii), &prices, &[]));
     }
 
-    /// Straight out of a zone on the far side of its core, in the direction of the way: all of it is counted, except
-    /// for what going round takes at the end.
+    /// Straight out of a zone on the far side of its core, in the direction of the way: the whole cost is
+    /// counted, except for what a detour would save at the end.
     #[test]
-    fn straight_out() {
+    fn leaving_a_zone_straight_costs_nearly_the_whole_way_out() {
         // The target is (600, 700) away from the start.
         let along = crate::geometry::Vector2::new(600.0, 700.0).normalize();
         let center = Point2::new(200.0, 100.0) - along * 50.0;
@@ -203,10 +203,11 @@ mod tests {
         );
     }
 
-    /// A start 20 m deep in the zone of a threat whose top is 30 m above it, and a climb of 45 degrees: no route is over it
-    /// within 30 m. Where the top is 10 m above, half of what leaving costs is paid all the same.
+    /// A start 20 m deep in the zone of a threat whose top is 30 m above it, with climbs of 45 degrees: no
+    /// route is above the threat within 30 m. With the top 10 m above, half of the cost of leaving is still
+    /// paid.
     #[test]
-    fn no_route_is_over_a_threat_at_once() {
+    fn no_route_is_above_a_threat_immediately() {
         for (top, paid) in [(30.0, 200.0), (10.0, 150.0)] {
             let scenario = scenario(&format!(
                 r#""threats": [{{"kind": "cylinder", "center": {{"x": 200, "y": 0}}, "radius": 90, "influence": 120, "top": {top}}}]"#
@@ -218,22 +219,22 @@ mod tests {
             assert!((start.toll - paid).abs() < 1e-4 * paid, "{start:?} {paid}");
             assert!(target.toll <= 0.0 && start.at == prices.ends[0].xy());
             assert!((early(&walls, &prices) - start.toll).abs() < 1e-9);
-            // It is counted for something else.
+            // Counted elsewhere, so not here.
             assert!(ends_of((&walls, &[None]), &prices, &[0])[0].toll <= 0.0);
         }
     }
 
-    /// Of two zones, one is widened over the end, and only the other counts for the way out; a zone that contains both
-    /// ends counts for the difference in depth.
+    /// Of two zones, one is widened over the end and only the other counts for the way out; a zone that
+    /// contains both ends counts for the difference in depth.
     #[test]
-    fn out_of_several() {
+    fn only_one_of_overlapping_zones_counts_for_the_way_out() {
         departures(
             r#"{"kind": "cylinder", "center": {"x": 150, "y": 100}, "radius": 30, "influence": 100},
                {"kind": "cylinder", "center": {"x": 200, "y": 40}, "radius": 30, "influence": 70},
                {"kind": "cylinder", "center": {"x": 500, "y": 100}, "radius": 50, "influence": 800}"#,
             |prices, [start, target]| {
                 assert!((start.at - prices.ends[0].xy()).norm() > 10.0);
-                // The target is 763 metres from the third, the start 300.
+                // The target is 763 m from the third centre, the start 300 m.
                 let deeper = 0.5 * (500.0 * 500.0 - 37.0 * 37.0);
                 let toll = start.toll - prices.exposure * (deeper + 50.0);
                 let alone = prices.fuel * 50.0 + prices.exposure * 1250.0;

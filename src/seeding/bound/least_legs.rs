@@ -56,8 +56,8 @@ mod tests {
     use super::*;
     use crate::seeding::tests::scenario;
 
-    /// In fuel, of 70 m below the middle of the band and 30 m above it, at `weight` a metre, with legs of 40 m or more and
-    /// climbs of 30 degrees at most.
+    /// The least cost in units of fuel from 70 m below the middle of the band to 30 m above it, at `weight` per
+    /// metre off it, with legs of at least 40 m and climbs of at most 30 degrees.
     fn least(weight: f64, waypoints: usize) -> f64 {
         let mut scenario = scenario(r#""threats": []"#);
         let middle = 0.5 * (scenario.altitude.min + scenario.altitude.max);
@@ -70,28 +70,28 @@ mod tests {
     }
 
     #[test]
-    fn the_first_leg_climbs_as_far_as_it_pays() {
+    fn the_first_leg_climbs_as_far_as_it_pays_off() {
         let check = |found: f64, expected: f64| {
             assert!((found - expected).abs() < 1e-3, "{found} {expected}");
         };
         check(least(0.0, 9), 10.0 * 40.0);
-        // Each leg brings the next waypoints 20 m closer; four are off: one more metre would bring them closer by half
-        // a metre.
+        // Each leg brings the next waypoints 20 m closer; four are off the middle, and another metre would
+        // bring them closer by half a metre.
         check(
             least(0.1, 9),
             10.0 * 40.0 + 0.1 * (50.0 + 30.0 + 10.0 + 10.0),
         );
-        // With two or more it is worth it, with one it is not.
+        // A longer leg pays for two or more waypoints, but not for one.
         check(least(1.0, 9), 8.0 * 40.0 + 100.0 + 20.0 + 40.0 + 10.0);
-        // It is not worth having any waypoint off the middle.
+        // It pays to have no waypoint off the middle.
         check(least(3.0, 9), 8.0 * 40.0 + 140.0 + 60.0);
-        // A single one counts once.
+        // A single waypoint counts once.
         check(least(1.0, 1), 40.0 + 50.0 + 40.0);
     }
 
-    /// No other lengths of legs are cheaper.
+    /// No other leg lengths are cheaper.
     #[test]
-    fn no_legs_are_cheaper() {
+    fn no_other_leg_lengths_are_cheaper() {
         for (metre, shortest, weight) in [
             (0.5, 7.0, 0.4),
             (0.5, 7.0, 3.0),

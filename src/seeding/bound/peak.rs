@@ -56,7 +56,7 @@ mod tests {
     use super::super::super::tests::scenario;
     use super::*;
 
-    /// From 100 m below the middle and back to there, by climbs of 45 degrees.
+    /// From 100 m below the middle and back down, with climbs of up to 45 degrees.
     fn peak(weight: f64) -> Peak {
         Peak {
             off_middle: [100.0, 100.0],
@@ -66,22 +66,22 @@ mod tests {
     }
 
     #[test]
-    fn what_is_dear_is_climbed_to_and_what_is_cheap_is_not() {
+    fn the_climb_to_the_middle_is_made_only_where_it_pays_off() {
         let check = |weight: f64, across: f64, expected: f64| {
             let found = peak(weight).least(0.5, across);
             assert!((found - expected).abs() < 1e-6, "{found} {expected}");
         };
         check(50.0, 1000.0, libm::hypot(1000.0, 100.0));
-        // Ten metres are worth the climb.
+        // Ten metres of climb pay off.
         check(0.01, 1000.0, libm::hypot(1000.0, 10.0) + 0.9);
         // No room to climb that high without a longer way.
         check(50.0, 60.0, 100.0 * 2.0_f64.sqrt());
     }
 
     proptest! {
-        /// No route over level ground with its waypoints at those heights costs less.
+        /// No route over level ground with waypoints at those heights costs less.
         #[test]
-        fn no_way_to_and_fro_is_cheaper(
+        fn no_climb_and_descent_is_cheaper(
             heights in prop::collection::vec(-40.0..200.0f64, 1..6),
             longer in prop::collection::vec(1.0..4.0f64, 6),
             (ends, weight, climb) in ([-50.0..90.0f64, -50.0..90.0f64], 0.01..3.0f64, 10.0..70.0f64),

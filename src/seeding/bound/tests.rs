@@ -1,12 +1,12 @@
-//! What is proven of whole scenarios, against the best routes known.
+//! The bound of whole scenarios, compared with the best known routes.
 
 use super::super::tests::{among, read, scenario};
 use super::*;
 use crate::geometry::Point3;
 
-/// From the ground to the ground, in bands above it.
+/// From ground to ground, with bands above it.
 #[test]
-fn within_half_a_percent_where_a_route_takes_off_and_lands() {
+fn the_bound_is_within_half_a_percent_with_take_off_and_landing() {
     let check = |document: &str, [min, max]: [u32; 2], best: f64| {
         let band = format!(r#""min": {min}, "max": {max}"#);
         let document = document.replace(r#""min": 0, "max": 200"#, &band);
@@ -24,9 +24,9 @@ fn within_half_a_percent_where_a_route_takes_off_and_lands() {
     check(two, [30, 120], 510.5145);
 }
 
-/// Where only the length counts, the way out of the ground's zone and back into it may be flown in any number of legs.
+/// Where only length counts, the way out of the zone around each end may be flown in any number of legs.
 #[test]
-fn a_short_route_climbs_out_of_the_zones_round_its_ends() {
+fn the_bound_counts_the_climb_out_of_the_zones_around_both_ends() {
     let mut scenario = scenario(
         r#""threats": [{"kind": "cylinder", "center": {"x": 500, "y": 520}, "radius": 50}]"#,
     );
@@ -43,10 +43,10 @@ fn a_short_route_climbs_out_of_the_zones_round_its_ends() {
     );
 }
 
-/// Strings account for neither: the last leg climbs through the soft zone that the target lies in, and the best route
-/// leaves the string where it may do so straight ahead.
+/// Strings account for neither effect: the last leg climbs through the target's soft zone, and the best route
+/// leaves the string where it can go straight ahead.
 #[test]
-fn within_a_percent_where_the_last_leg_climbs_out_of_a_gap() {
+fn the_bound_is_within_a_percent_where_the_last_leg_climbs_out_of_a_gap() {
     let discs = [
         [916, 787, 66, 105],
         [406, 734, 75, 112],
@@ -66,9 +66,9 @@ fn within_a_percent_where_the_last_leg_climbs_out_of_a_gap() {
     assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
 }
 
-/// The minimum legs leave such a slowly climbing vehicle no other way than the known route.
+/// The minimum leg length leaves this slowly climbing vehicle no other way than the known route.
 #[test]
-fn tight_where_legs_are_long_and_climbs_slow() {
+fn the_bound_is_within_a_thousandth_with_long_legs_and_slow_climbs() {
     let mut scenario = scenario(r#""threats": []"#);
     scenario.start = Point3::new(78.0, 83.6, 20.5);
     scenario.target = Point3::new(799.6, 804.0, 138.7);
@@ -80,9 +80,9 @@ fn tight_where_legs_are_long_and_climbs_slow() {
     assert!(bound <= best && bound > 0.999 * best, "{bound} {best}");
 }
 
-/// Best routes known, from long searches: upper bounds of the optimum.
+/// The best known routes, from long searches, are upper bounds of the optimum.
 #[test]
-fn within_two_percent_of_the_best_routes_known() {
+fn the_bound_is_within_its_gap_of_the_best_known_paper_routes() {
     let check = |document: &str, best: f64, gap: f64| {
         let bound = lower_bound(&read(document));
         assert!(bound <= best, "{bound} {best}");
@@ -110,10 +110,10 @@ fn within_two_percent_of_the_best_routes_known() {
     );
 }
 
-/// A start and a target in soft zones that are in each other's way, with three gaps between: the best known has 30
+/// Start and target in soft zones that block each other, with three gaps between: the best known route has 30
 /// waypoints.
 #[test]
-fn within_a_percent_where_soft_zones_are_left_and_gaps_are_passed() {
+fn the_bound_is_within_a_percent_through_soft_zones_and_gaps() {
     let mut scenario = scenario(
         r#""threats": [
             {"kind": "cylinder", "center": {"x": 240, "y": 150}, "radius": 45, "influence": 75},
@@ -130,9 +130,9 @@ fn within_a_percent_where_soft_zones_are_left_and_gaps_are_passed() {
     assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
 }
 
-/// A start low in two wide soft zones, out of which every leg climbs: the best known has 20 waypoints.
+/// A start low in two wide soft zones, out of which every leg climbs: the best known route has 20 waypoints.
 #[test]
-fn within_two_percent_where_a_leg_climbs_in_soft_zones() {
+fn the_bound_is_within_two_percent_where_a_leg_climbs_in_soft_zones() {
     let mut scenario = among([
         [344.0, 72.0, 17.0, 252.0],
         [156.0, 557.0, 30.0, 107.0],
@@ -145,9 +145,9 @@ fn within_two_percent_where_a_leg_climbs_in_soft_zones() {
     assert!(bound <= best && bound > 0.98 * best, "{bound} {best}");
 }
 
-/// Ends low in soft zones that could be flown over with enough room to climb: the best known has 30 waypoints.
+/// Ends low in soft zones that could be flown over only with room to climb: the best known route has 30 waypoints.
 #[test]
-fn within_a_percent_where_what_may_be_passed_cannot_be_at_once() {
+fn the_bound_is_within_a_percent_where_threats_cannot_be_overflown_immediately() {
     let mut scenario = scenario(
         r#""threats": [
             {"kind": "cylinder", "center": {"x": 166, "y": 232}, "radius": 58, "influence": 85, "top": 106},
@@ -161,9 +161,10 @@ fn within_a_percent_where_what_may_be_passed_cannot_be_at_once() {
     assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
 }
 
-/// The target is 9 m above the top of a disc on the way: a last leg over it comes from nowhere near the middle of the band.
+/// The target is 9 m above the top of a disc on the way: a last leg over the disc cannot come from near the middle of
+/// the band.
 #[test]
-fn within_a_percent_where_the_last_leg_leads_over_a_top() {
+fn the_bound_is_within_a_percent_where_the_last_leg_passes_over_a_top() {
     let mut scenario = scenario(
         r#""threats": [
             {"kind": "cylinder", "center": {"x": 819, "y": 715}, "radius": 79, "influence": 116, "top": 139},
@@ -179,10 +180,10 @@ fn within_a_percent_where_the_last_leg_leads_over_a_top() {
     assert!(bound <= best && bound > 0.99 * best, "{bound} {best}");
 }
 
-/// The gain from cutting corners can be worth more than the way; and a route may go through what is thinner than its
+/// The gain from cutting corners may exceed the way; and a route may pass through anything thinner than its
 /// tolerance.
 #[test]
-fn never_above_a_way_through_what_is_no_obstacle() {
+fn the_bound_never_exceeds_a_way_through_negligible_obstacles() {
     let check = |ring: &str, fuel: f64, threat: f64| {
         let mut scenario = scenario(&format!(
             r#""threats": [{{"kind": "polygon", "margin": 60, "vertices": [{ring}]}}]"#
@@ -194,7 +195,7 @@ fn never_above_a_way_through_what_is_no_obstacle() {
         let bound = lower_bound(&scenario);
         assert!(bound <= straight, "{bound} {straight}");
     };
-    // Both stay out of the way, including their soft zones.
+    // Both obstacles are out of the way, including their soft zones.
     let triangle = r#"{"x": 900, "y": 0}, {"x": 990, "y": 0}, {"x": 950, "y": 90}"#;
     check(triangle, 1e-6, 1000.0);
     let needle = r#"{"x": 900, "y": 0}, {"x": 900.001, "y": 0}, {"x": 900, "y": 100}"#;
@@ -205,7 +206,7 @@ fn never_above_a_way_through_what_is_no_obstacle() {
         0.5,
         0.0,
     );
-    // A block with an arm of a micrometre.
+    // A block with an arm one micrometre wide.
     check(
         r#"{"x": 0, "y": 900}, {"x": 0, "y": 500}, {"x": 900, "y": 500},
            {"x": 900, "y": 500.000001}, {"x": 50, "y": 500.000001}, {"x": 50, "y": 900}"#,
@@ -214,9 +215,9 @@ fn never_above_a_way_through_what_is_no_obstacle() {
     );
 }
 
-/// A comb with close teeth: nearly as many pairs as teeth squared, each of which involves all teeth.
+/// A comb with close teeth: nearly as many pairs as teeth squared, each involving all teeth.
 #[test]
-fn a_stop_is_heard_among_gaps() {
+fn a_stop_is_noticed_while_gaps_are_examined() {
     let teeth = 20;
     let corners: Vec<String> = (0..=2 * teeth)
         .map(|corner| {
@@ -245,7 +246,7 @@ fn a_stop_is_heard_among_gaps() {
 }
 
 #[test]
-fn never_below_the_straight_line() {
+fn the_bound_is_never_below_the_straight_line() {
     let scenario = scenario(r#""threats": []"#);
     let straight = 0.5 * (scenario.target - scenario.start).norm();
     assert!(lower_bound(&scenario) >= straight * (1.0 - 1e-8));

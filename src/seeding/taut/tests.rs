@@ -1,4 +1,4 @@
-//! Taut strings worked by hand, and against finely sampled circles.
+//! Taut strings checked against lengths worked by hand and against finely sampled circles.
 
 use super::*;
 use crate::geometry::Rect;
@@ -43,7 +43,7 @@ fn lengths(outlines: &[Outline], ends: [[f64; 2]; 2], k: usize) -> Vec<f64> {
     strings.iter().map(|string| string.length).collect()
 }
 
-/// The outline that a piece rounds, if any.
+/// The outline around which a piece bends, if any.
 fn rounded(piece: &Piece) -> Option<usize> {
     match piece {
         Piece::Arc { outline, .. } => Some(*outline),
@@ -69,32 +69,32 @@ fn round_a_disc() -> f64 {
 }
 
 #[test]
-fn worked_by_hand() {
+fn strings_around_discs_have_the_lengths_worked_by_hand() {
     let west_east = [[-10.0, 0.0], [10.0, 0.0]];
     check(&[], west_east, &[20.0]);
     check(&[disc(0.0, 20.0, 5.0)], west_east, &[20.0]);
     check(&[disc(0.0, 5.0, 5.0)], west_east, &[20.0]);
     check(&[disc(0.0, 0.0, 5.0)], west_east, &[round_a_disc(); 2]);
-    // The same disc twice gives no second way of passing it.
+    // A duplicate of the disc adds no second way past it.
     check(
         &[disc(0.0, 0.0, 5.0), disc(0.0, 0.0, 5.0)],
         west_east,
         &[round_a_disc(); 2],
     );
-    // One within the other, touching it from the inside.
+    // One inside the other, touching it from within.
     check(
         &[disc(0.0, 0.0, 5.0), disc(0.0, 3.0, 2.0)],
         west_east,
         &[round_a_disc(); 2],
     );
-    // Two discs side by side, tangents along both.
+    // Two discs side by side, with tangents along both.
     let side_by_side = 2.0 * 75.0_f64.sqrt() + 5.0 * PI / 3.0 + 8.0;
     check(
         &[disc(0.0, 0.0, 5.0), disc(8.0, 0.0, 5.0)],
         [[-10.0, 0.0], [18.0, 0.0]],
         &[side_by_side; 2],
     );
-    // Above one and below the other: the inner tangent crosses at 30 degrees, cos 60 = 2 * 5 / 20.
+    // Above one disc and below the other: the inner tangent crosses at 30 degrees, cos 60 = 2 * 5 / 20.
     let slalom = 2.0 * (400.0_f64 - 25.0).sqrt() + 300.0_f64.sqrt();
     let s_shaped = strings(
         &[disc(0.0, 0.0, 5.0), disc(20.0, 0.0, 5.0)],
@@ -111,7 +111,7 @@ fn worked_by_hand() {
 }
 
 #[test]
-fn corners_of_rings() {
+fn strings_around_ring_corners_have_the_lengths_worked_by_hand() {
     let square = [[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]];
     let west_east = [[-10.0, 0.0], [10.0, 0.0]];
     check(
@@ -119,7 +119,7 @@ fn corners_of_rings() {
         west_east,
         &[2.0 * 50.0_f64.sqrt() + 10.0; 2],
     );
-    // Widened by 1, a quarter of a circle is shared by the two corners.
+    // Widened by 1: the two corners share a quarter circle.
     let to_corner = (25.0_f64 + 25.0 - 1.0).sqrt();
     let slope = libm::atan2(5.0, 5.0) + libm::asin(1.0 / 50.0_f64.sqrt());
     check(
@@ -133,7 +133,7 @@ fn corners_of_rings() {
         [[-10.0, -10.0], [10.0, 10.0]],
         &[2.0 * (25.0_f64 + 225.0).sqrt(); 2],
     );
-    // Two squares with a side in common leave a way between them no wider than a line.
+    // Two squares with a common side, between which no way leads.
     let next = [[5.0, -5.0], [15.0, -5.0], [15.0, 5.0], [5.0, 5.0]];
     check(
         &[ring(&square, 0.0), ring(&next, 0.0)],
@@ -143,7 +143,7 @@ fn corners_of_rings() {
 }
 
 #[test]
-fn a_u_opens_to_one_side() {
+fn a_string_leaves_a_u_through_its_open_side() {
     let u = [
         [-20.0, -20.0],
         [20.0, -20.0],
@@ -154,13 +154,13 @@ fn a_u_opens_to_one_side() {
         [-18.0, 20.0],
         [-20.0, 20.0],
     ];
-    // To the inner corner, over the wall, down its outside, below it.
+    // To the inner corner, over the wall, down its outside, and below it.
     let length = (18.0_f64 * 18.0 + 20.0 * 20.0).sqrt() + 2.0 + 40.0 + 800.0_f64.sqrt();
     check(&[ring(&u, 0.0)], [[0.0, 0.0], [0.0, -40.0]], &[length; 2]);
 }
 
 #[test]
-fn a_ring_of_discs_has_one_opening() {
+fn strings_enter_a_ring_of_discs_only_through_its_gap() {
     let mut discs = Vec::new();
     for i in 1..24 {
         let angle = PI * f64::from(i) / 12.0;
@@ -185,18 +185,18 @@ fn a_ring_of_discs_has_one_opening() {
 }
 
 #[test]
-fn an_end_on_or_in_the_soft_zone_of_an_obstacle() {
+fn ends_on_or_inside_a_soft_zone_shrink_it() {
     let soft = Outline {
         core: 2.0,
         ..disc(0.0, 0.0, 5.0)
     };
-    // From a circle's own edge to the point opposite.
+    // From the circle's edge to the opposite point.
     check(
         std::slice::from_ref(&soft),
         [[-5.0, 0.0], [5.0, 0.0]],
         &[5.0 * PI; 2],
     );
-    // Shrunk to the distance of the nearer end.
+    // The zone is shrunk to the distance of the nearer end.
     let tangent = 91.0_f64.sqrt();
     let arc = 3.0 * (PI - libm::acos(0.3));
     check(
@@ -204,7 +204,7 @@ fn an_end_on_or_in_the_soft_zone_of_an_obstacle() {
         [[-3.0, 0.0], [10.0, 0.0]],
         &[tangent + arc; 2],
     );
-    // In the core: assumed to be above it.
+    // Inside the core, the end is assumed to be above it.
     check(
         std::slice::from_ref(&soft),
         [[-1.0, 0.0], [10.0, 0.0]],
@@ -218,7 +218,7 @@ fn an_end_on_or_in_the_soft_zone_of_an_obstacle() {
 }
 
 #[test]
-fn strings_keep_to_the_area() {
+fn strings_stay_within_the_area() {
     let area = Rect {
         min: Point2::new(-20.0, -3.0),
         max: Point2::new(20.0, 20.0),
@@ -233,9 +233,9 @@ fn strings_keep_to_the_area() {
     assert!(found[0].at(0.5).y > 4.9);
 }
 
-/// A small disc protrudes from a large one, and a string round both comes back to the large one.
+/// A small disc protrudes from a large one, and a string around both returns to the large one.
 #[test]
-fn a_string_comes_back_to_a_circle() {
+fn a_string_can_return_to_the_same_circle() {
     let outlines = [
         disc(39.28, -4.78, 13.27),
         disc(40.49, 2.78, 5.73),
@@ -251,8 +251,8 @@ fn a_string_comes_back_to_a_circle() {
     }
 }
 
-/// Shortest path among points sampled on the circles, by brute force; its ways are a hair
-/// outside, so that it is never shorter than the taut string.
+/// The shortest path among points sampled on the circles, by brute force; the samples lie slightly outside, so
+/// that it is never shorter than the taut string.
 fn sampled(discs: &[(f64, f64, f64)], ends: [[f64; 2]; 2]) -> f64 {
     const SAMPLES: i32 = 48;
     let step = PI / f64::from(SAMPLES);
@@ -296,7 +296,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases / 4, ..ProptestConfig::default() })]
 
     #[test]
-    fn as_short_as_brute_force(
+    fn the_first_string_is_as_short_as_by_brute_force(
         discs in prop::collection::vec((10.0..90.0f64, -40.0..40.0f64, 3.0..16.0f64), 1..7),
     ) {
         let ends = [[0.0, 0.0], [100.0, 0.0]];
@@ -310,7 +310,7 @@ proptest! {
         let brute = sampled(&free, ends);
         if let Some(&found) = found.first() {
             prop_assert!(found <= brute + 1e-6, "{found} {brute}");
-            // The sampled circles lie a little outside of the discs and close the narrowest gaps.
+            // The sampled circles lie slightly outside the discs and close the narrowest gaps.
             let is_narrow = |(i, (x, y, r)): (usize, &(f64, f64, f64))| {
                 free[..i].iter().any(|(u, v, s)| {
                     let gap = ((x - u) * (x - u) + (y - v) * (y - v)).sqrt() - r - s;
@@ -325,7 +325,7 @@ proptest! {
         } else {
             prop_assert!(brute.is_infinite(), "{brute}");
         }
-        // Asking for more does not change the first, and every further one is longer.
+        // Asking for more strings does not change the first, and lengths never decrease.
         let several = lengths(&outlines, ends, 5);
         if let Some(first) = found.first() {
             prop_assert!((several[0] - first).abs() < 1e-9);

@@ -333,7 +333,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_old_server_is_refused_by_its_version() {
+    fn a_server_that_is_too_old_is_refused() {
         assert!(check_version("2.12.0").is_ok());
         assert!(check_version("2.15.1-RC.2").is_ok());
         let refusal = check_version("2.9.10").expect_err("it is too old");

@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[tokio::test(start_paused = true)]
-    async fn what_passes_is_asked_again_for_a_few_seconds() {
+    async fn a_passing_error_is_retried_for_a_few_seconds() {
         let mut asked = 0;
         let answer = outlast(
             |&passes: &bool| passes,
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn what_does_not_pass_is_said_at_once() {
+    async fn a_lasting_error_is_returned_at_once() {
         let mut asked = 0;
         let answer = outlast(
             |&passes: &bool| passes,

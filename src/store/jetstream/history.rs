@@ -226,7 +226,7 @@ mod tests {
         Record::accepted(&submission, queued, Document::scenario(Uuid::nil(), "{}"))
     }
 
-    /// Steps of one, two, one, two ... events.
+    /// Steps of one, two, one, two, ... events.
     fn steps(count: u64) -> Vec<Step> {
         let mut record = record();
         (0..count)
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn pages_are_whole_from_any_place_and_say_what_is_forgotten() {
+    fn pages_are_complete_from_any_position_and_count_forgotten_events() {
         let mut histories = Histories::new(6);
         for step in steps(10) {
             histories.push(Uuid::nil(), &step);
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn a_history_with_a_hole_is_not_kept_and_one_without_a_beginning_not_begun() {
+    fn a_history_with_a_gap_or_without_its_beginning_is_not_kept() {
         let steps = steps(6);
         let mut histories = Histories::new(u64::MAX);
         histories.push(Uuid::nil(), &steps[2]);
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn a_history_that_was_read_before_the_last_step_came_is_not_kept() {
+    fn a_history_read_before_the_latest_step_is_not_kept() {
         let (id, steps) = (Uuid::nil(), steps(3));
         let mut known = Known::new(u64::MAX);
         for (sequence, step) in (1..).zip(steps.clone()) {
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_reads_makes_room() {
+    fn the_oldest_unread_histories_are_evicted() {
         let mut histories = Histories::new(u64::MAX);
         let step = &steps(1)[0];
         let count = ROOM / (2 * SMALL_EVENT) + 10;

@@ -99,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn versions_are_ordered_by_their_numbers() {
+    fn versions_are_ordered_numerically() {
         let version = |text| Version::read(text).expect("it is one");
         assert!(version("0.9.10") < version("0.10.0"));
         assert!(version("2.11.0-preview.2") == version("2.11.0"));

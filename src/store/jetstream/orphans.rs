@@ -72,7 +72,7 @@ mod tests {
     use crate::job::new_id;
 
     #[tokio::test(start_paused = true)]
-    async fn a_job_comes_again_ever_later_and_is_nobodys_after_a_minute() {
+    async fn a_job_without_a_record_is_retried_ever_later_and_given_up_after_a_minute() {
         let (orphans, id) = (Orphans::default(), new_id(0));
         let mut came = 0;
         assert!(!orphans.is_known(id));
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_job_whose_record_came_is_no_orphan() {
+    async fn a_job_whose_record_arrived_is_not_an_orphan() {
         let (orphans, id, other) = (Orphans::default(), new_id(0), new_id(0));
         assert_eq!(orphans.miss(id), Orphan::Waits(SOONEST));
         orphans.miss(other);
@@ -96,7 +96,7 @@ mod tests {
         orphans.found(id);
         assert_eq!(orphans.miss(id), Orphan::Waits(SOONEST));
         assert_eq!(orphans.miss(other), Orphan::Nobodys);
-        // Jobs that other nodes discarded are forgotten.
+        // Jobs that other nodes discarded are eventually forgotten.
         tokio::time::sleep(FORGOTTEN).await;
         orphans.miss(other);
         assert!(!orphans.is_known(id));

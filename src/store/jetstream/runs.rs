@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_are_all_in_order_and_none_is_too_long_for_a_message() {
+    fn parts_are_complete_in_order_and_fit_into_messages() {
         for (events, waypoints) in [(0, 3), (1, 3), (600, 3), (40, 200), (3, 20_000)] {
             let all = vec![incumbent(waypoints); events];
             let parts = parts(&all);

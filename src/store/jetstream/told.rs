@@ -85,7 +85,7 @@ mod tests {
         told.forget_before(40);
         assert_eq!((told.events, told.bytes_left()), (20, Some(500)));
         assert_eq!(told.excess(20), None);
-        // A step that is too long by itself is kept whole.
+        // A single step above the limit is kept whole.
         told.push(Appended {
             sequence: 90,
             events: 256,

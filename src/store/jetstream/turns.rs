@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn the_owner_with_the_fewest_runs_is_next_and_of_equals_the_oldest_plan() {
+    fn the_owner_with_the_fewest_runs_is_next_and_ties_go_to_the_oldest_plan() {
         let queued = lanes(&[(small("crowd"), &[1, 2, 3, 4]), (small("one"), &[5])]);
         let none = lanes(&[]);
         assert_eq!(turn(&queued, &none, 4), Some(small("crowd")));
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn large_plans_leave_a_quarter_of_the_slots_but_are_run_where_there_is_one() {
+    fn large_plans_leave_a_quarter_of_the_slots_unless_there_is_only_one() {
         let large = lane("1.0.0", Size::Large, "a");
         let queued = lanes(&[(large.clone(), &[1, 2, 3])]);
         for (slots, room) in [(1, 1), (2, 1), (4, 3), (5, 3), (16, 12)] {

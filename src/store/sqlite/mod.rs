@@ -336,8 +336,8 @@ mod tests {
         }
     }
 
-    /// What the writer's own connection reports after the store has been opened: only with these settings does a commit
-    /// return after the log is on the disk, and only then is it the log that is waited for.
+    /// The settings of the writer's own connection after opening: only with these does a commit return after
+    /// the log has reached the disk.
     #[tokio::test]
     async fn a_commit_waits_for_the_disk() {
         let directory = tempfile::TempDir::new().expect("a temporary directory");
@@ -350,15 +350,15 @@ mod tests {
         };
         let wal = Value::Text("wal".to_owned());
         assert_eq!(set("journal_mode").await.expect("it is told"), wal);
-        // On the scale from OFF, 0, to EXTRA, 3, this is FULL.
+        // FULL, on the scale from OFF, 0, to EXTRA, 3.
         let full = Value::Integer(2);
         assert_eq!(set("synchronous").await.expect("it is told"), full);
         store.close().await;
     }
 
-    /// Other programs are held to the known states; a file with an unknown one is damaged.
+    /// The schema holds other programs to the known states; a file with an unknown one counts as damaged.
     #[test]
-    fn a_plan_is_in_no_state_that_there_is_not() {
+    fn unknown_plan_states_are_refused_and_count_as_damage() {
         let directory = tempfile::TempDir::new().expect("a temporary directory");
         let file = directory.path().join(DATABASE);
         drop(open_database(&file).expect("the directory can be written"));
@@ -387,7 +387,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_full_disk_refuses_what_has_no_room_and_spoils_nothing() {
+    async fn a_full_disk_refuses_what_does_not_fit_and_damages_nothing() {
         let directory = tempfile::TempDir::new().expect("a temporary directory");
         let lock = lock(directory.path()).expect("nobody else has it");
         let file = directory.path().join(DATABASE);

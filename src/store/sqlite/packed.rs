@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn events_of_a_search_come_back_to_the_last_bit() {
+    fn packed_events_unpack_to_the_same_bits() {
         let (x, y, z) = (305.474_248_726_745_7, -0.0, f64::MIN_POSITIVE);
         let (lat, lon, alt) = (48.1, -11.5, 520.25);
         let events = [
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn others_are_not_packed() {
+    fn other_events_are_not_packed() {
         let (x, y, z) = (1.0, 2.0, 3.0);
         let (lat, lon, alt) = (1.0, 2.0, 3.0);
         let mixed = vec![
@@ -217,9 +217,9 @@ mod tests {
         }
     }
 
-    /// Later versions read what is in the files.
+    /// Later versions must be able to read existing files.
     #[test]
-    fn bytes_stay_what_they_are() {
+    fn the_packed_format_does_not_change() {
         let bytes = pack(&[point(None)]).expect("it is of a search");
         let mut expected = vec![1, 0, 101, 0xe4, 0xc1, 0x02];
         expected.extend(22.021_484_f64.to_le_bytes());

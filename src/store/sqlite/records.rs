@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_commit_ends_what_it_may_have_changed() {
+    fn a_commit_invalidates_what_it_may_have_changed() {
         let records = Records::default();
         let [active, ended, touched] = [
             (1, Status::Queued),
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn does_not_grow_without_bound() {
+    fn the_cache_does_not_grow_without_bound() {
         let records = Records::default();
         for id in 0..3 * CAPACITY as u128 {
             records.keep_plan(records.version(), &plan(id, Status::Failed));

@@ -261,9 +261,9 @@ fn seconds(ms: i64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The operator needs metrics even when the store cannot be read.
+    /// Operators need metrics even when the store cannot be read.
     #[test]
-    fn what_is_not_known_is_not_a_number() {
+    fn unknown_figures_are_exported_as_nan() {
         let queue = Queue {
             queued: None,
             running: None,

@@ -1,4 +1,4 @@
-//! The leader of three servers and one of three workers are killed again and again while plans come in.
+//! The leader of three servers and one of three workers are killed repeatedly while plans are submitted.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use futures_util::stream::{self, StreamExt as _};
 use serde_json::Value;
 
-use super::{Node, is_whole, turn};
+use super::{Node, is_whole};
 use crate::support::lives::a_plan;
 use crate::support::nats::Cluster;
 use crate::support::process::Service;
@@ -19,7 +19,7 @@ use crate::support::sse::{Stream, events};
 /// Between two kills.
 const PERIOD: Duration = Duration::from_secs(5);
 
-/// Post until it is accepted: a store without a leader refuses.
+/// Submits until accepted: a store without a leader refuses.
 async fn submit(api: &Service, nth: usize) -> String {
     let document = a_plan(30, 60, nth);
     loop {
@@ -37,7 +37,7 @@ async fn submit(api: &Service, nth: usize) -> String {
     }
 }
 
-/// Follow a plan to its end over however many connections, each taken up where the last one broke.
+/// Follows a plan to its end, resuming each broken connection where it ended.
 async fn follow(api: &Service, address: &str) -> Vec<(u64, String)> {
     let mut told: Vec<(u64, String)> = Vec::new();
     loop {
@@ -56,10 +56,9 @@ async fn follow(api: &Service, address: &str) -> Vec<(u64, String)> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn leaders_and_workers_are_killed_and_every_plan_ends_once() {
-    let _turn = turn().await;
+async fn every_plan_ends_once_while_leaders_and_workers_are_killed() {
     let (n_plans, n_kills) = size((60, 2), (2_000, usize::MAX));
-    let mut cluster = Cluster::start();
+    let mut cluster = Cluster::start().await;
     let address = cluster.address();
     let api = Arc::new(Node::api(&address, &["--store-replicas", "3"]));
     let teller = Arc::new(Node::api(&address, &["--store-replicas", "3"]));
@@ -72,7 +71,7 @@ async fn leaders_and_workers_are_killed_and_every_plan_ends_once() {
     let load = tokio::spawn({
         let (api, teller, done) = (api.clone(), teller.clone(), done.clone());
         async move {
-            // In CI they come as long as there are kills; at full size as fast as they are done.
+            // In CI the plans are spread over all kills; at full size each follows as soon as one is done.
             let pace = size(pace, Duration::ZERO);
             let followed = stream::iter(0..n_plans)
                 .then(|nth| async move {

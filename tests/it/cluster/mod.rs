@@ -1,4 +1,4 @@
-//! Failures among several servers and several processes.
+//! Failures with several servers and several processes.
 
 mod chaos;
 mod nodes;
@@ -14,24 +14,17 @@ use std::sync::Arc;
 use noctule::store::jetstream::{JetStreamStore, Settings};
 use noctule::store::{Options, Store};
 use tempfile::TempDir;
-use tokio::sync::{Mutex, MutexGuard};
 
 use crate::support::process::Service;
 use crate::support::sse::{Stream, events};
 use crate::support::stores::node;
 
-/// Clusters of servers take turns: two at a time would keep this machine from anything else.
-async fn turn() -> MutexGuard<'static, ()> {
-    static TURN: Mutex<()> = Mutex::const_new(());
-    TURN.lock().await
-}
-
-/// A node as a store alone.
+/// A node that is only a store.
 async fn open(address: &str) -> Arc<dyn Store> {
     open_as(node(address)).await
 }
 
-/// Tried again, as the service does: while a cluster makes streams, its servers may be late to answer.
+/// Retried, as the service does: while a cluster creates streams its servers may answer late.
 async fn open_as(settings: Settings) -> Arc<dyn Store> {
     let mut opened = JetStreamStore::open(settings.clone(), Options::new(1_000)).await;
     for _ in 0..5 {
@@ -50,12 +43,12 @@ struct Node {
 }
 
 impl Node {
-    /// That answers, and runs nothing.
+    /// Answers requests and runs no plans.
     fn api(address: &str, arguments: &[&str]) -> Self {
         Self::start(address, "api", arguments)
     }
 
-    /// That runs plans, one at a time.
+    /// Runs plans, one at a time.
     fn worker(address: &str, arguments: &[&str]) -> Self {
         Self::start(address, "worker", arguments)
     }
@@ -81,18 +74,18 @@ impl Node {
         node
     }
 
-    /// Start it again, as it was started first.
+    /// Starts it again with the same arguments.
     fn restart(&mut self) {
         let arguments: Vec<_> = self.arguments.iter().map(String::as_str).collect();
         self.service = Some(Service::start(self.directory.path(), &arguments));
     }
 
-    /// Kill it as a power cut would.
+    /// Kills it as a power cut would.
     fn kill(&mut self) {
         self.service.take().expect("it runs").kill();
     }
 
-    /// Ask it to go, and wait until it has.
+    /// Asks it to stop and waits until it has.
     async fn leave(&mut self) {
         let service = self.service.take().expect("it runs");
         service.signal("TERM");
@@ -108,7 +101,7 @@ impl Deref for Node {
     }
 }
 
-/// Wait for the plan's end, and see that its events tell of one, and have no gap.
+/// Waits for the plan's end and checks that its events have exactly one end and no gap.
 async fn ends_once(service: &Service, address: &str) {
     let ended = service.ended(address).await;
     assert_eq!(ended["status"], "succeeded", "{ended}");
@@ -116,7 +109,7 @@ async fn ends_once(service: &Service, address: &str) {
     is_whole(&events(&Stream::open(request).await.rest().await), address);
 }
 
-/// One end, at the end, and no gap before it.
+/// Exactly one end, in last place, and no gap before it.
 fn is_whole(told: &[(u64, String)], address: &str) {
     let ends = told.iter().filter(|(_, name)| name == "end").count();
     assert_eq!(ends, 1, "{address}: {told:?}");

@@ -1,4 +1,4 @@
-//! Several nodes over the same servers: what one does the others see, and no plan is two nodes' at once.
+//! Several nodes over the same servers: each sees what the others do, and no two nodes run the same plan.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
@@ -16,7 +16,7 @@ use crate::support::nats::{self, NatsServer};
 use crate::support::plans::{ending, history, kind, point, statuses, submission, until};
 use crate::support::stores::node;
 
-/// Until another node knows of the plan.
+/// Waits until another node knows the plan.
 async fn known(store: &dyn Store, id: PlanId) {
     let mut changes = store.changes(id);
     while store.get(id).await.is_err() {
@@ -33,7 +33,7 @@ fn of(owner: &str, work: u64) -> Submission {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_one_node_accepts_and_another_runs_a_third_tells() {
+async fn a_plan_accepted_by_one_node_and_run_by_another_is_readable_on_a_third() {
     let address = nats::address();
     let (accepting, running, telling) =
         tokio::join!(open(&address), open(&address), open(&address));
@@ -94,7 +94,7 @@ async fn a_cancel_reaches_the_node_that_runs_the_plan() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_key_makes_one_plan_whichever_node_is_asked() {
+async fn an_idempotency_key_makes_one_plan_across_all_nodes() {
     let address = nats::address();
     let nodes = join_all((0..3).map(|_| open(&address))).await;
     let answers = join_all((0..60).map(|nth| {
@@ -114,7 +114,7 @@ async fn a_key_makes_one_plan_whichever_node_is_asked() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_plan_is_taken_once_however_many_nodes_take() {
+async fn every_plan_is_claimed_once_by_concurrent_nodes() {
     let address = nats::address();
     let nodes = join_all((0..3).map(|_| open(&address))).await;
     let submitted = join_all((0..90).map(|nth| nodes[nth % 3].submit(submission()))).await;
@@ -142,7 +142,7 @@ async fn every_plan_is_taken_once_however_many_nodes_take() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_plan_whose_node_is_lost_is_another_nodes_to_run() {
+async fn a_plan_of_a_lost_node_is_run_by_another() {
     let address = nats::address();
     let (lost, other) = tokio::join!(open(&address), open(&address));
     let id = other.submit(submission()).await.unwrap().plan.id;
@@ -167,7 +167,7 @@ async fn a_plan_whose_node_is_lost_is_another_nodes_to_run() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_plan_that_loses_one_node_after_another_fails() {
+async fn a_plan_that_loses_five_nodes_fails() {
     let address = nats::address();
     let settings = || Settings {
         lease: Duration::from_secs(1),
@@ -193,7 +193,7 @@ async fn a_plan_that_loses_one_node_after_another_fails() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn owners_and_small_plans_do_not_wait_behind_a_crowd() {
+async fn other_owners_and_small_plans_do_not_wait_behind_a_crowd() {
     let store = open(&nats::address()).await;
     for _ in 0..10 {
         store.submit(of("crowd", 1)).await.unwrap();
@@ -205,7 +205,7 @@ async fn owners_and_small_plans_do_not_wait_behind_a_crowd() {
     }
     assert_eq!(owners, ["crowd", "late", "crowd"]);
 
-    // One of four slots is never a large plan's.
+    // One of four slots is reserved for small plans.
     let store = open(&nats::address()).await;
     for _ in 0..6 {
         store.submit(of("same", u64::MAX)).await.unwrap();
@@ -227,7 +227,7 @@ async fn refusal(settings: Settings) -> String {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn servers_that_cannot_give_what_is_promised_are_refused() {
+async fn servers_without_enough_replicas_or_jetstream_are_refused() {
     let address = nats::address();
     let three = Settings {
         replicas: 3,

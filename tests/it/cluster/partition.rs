@@ -1,4 +1,4 @@
-//! A node that is cut off from the servers, and one whose clock is wrong.
+//! A node that is cut off from the servers, and one with a wrong clock.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
@@ -15,14 +15,14 @@ use crate::support::plans::{ending, history, kind, point, submission, until};
 use crate::support::stores::{LEASE, node};
 use crate::support::wire::Wire;
 
-/// Steps that are written while the other node is away: more than what waits in sockets.
+/// Steps written while the other node is away: more than sockets buffer.
 const STEPS: usize = 300;
 
-/// Events of each.
+/// Events of each step.
 const EVENTS: usize = 40;
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_node_that_is_cut_off_loses_its_run_and_catches_up_when_it_is_back() {
+async fn a_node_that_is_cut_off_loses_its_run_and_catches_up_later() {
     let server = NatsServer::start();
     let address = server.address();
     let wire = Wire::to(server.host()).await;
@@ -36,7 +36,7 @@ async fn a_node_that_is_cut_off_loses_its_run_and_catches_up_when_it_is_back() {
     let taken = near.claim().await.unwrap();
     assert_eq!((taken.plan.id, taken.attempt), (id, lost.attempt + 1));
     assert_eq!(kind(far.health().await), Err("unavailable"));
-    // What is known is still told.
+    // Known plans can still be read.
     assert_eq!(far.get(id).await.unwrap().status, Status::Running);
     assert_eq!(kind(far.submit(submission()).await), Err("unavailable"));
     for _ in 0..STEPS {
@@ -62,7 +62,7 @@ async fn a_node_that_is_cut_off_loses_its_run_and_catches_up_when_it_is_back() {
     assert_eq!(near.claim().await.unwrap().plan.id, next);
 }
 
-/// A node whose clock is wrong by so much.
+/// A node whose clock is off by `off_ms`.
 async fn open_at(address: &str, off_ms: i64) -> Arc<dyn Store> {
     let clock = wall_clock();
     let options = Options {
@@ -74,7 +74,7 @@ async fn open_at(address: &str, off_ms: i64) -> Arc<dyn Store> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_wrong_clock_takes_no_run_from_anybody() {
+async fn a_wrong_clock_never_takes_over_a_run() {
     let address = nats::address();
     let hours = 3_600_000;
     let (fast, slow) = tokio::join!(open_at(&address, 5 * hours), open_at(&address, -5 * hours));

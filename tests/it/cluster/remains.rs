@@ -1,4 +1,4 @@
-//! What work that broke off leaves on the servers, and what becomes of it.
+//! What interrupted work leaves on the servers, and how it is cleaned up.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
@@ -15,14 +15,14 @@ use crate::support::nats;
 use crate::support::plans::{failure, kind, submission};
 use crate::support::stores::node;
 
-/// A client that is no node.
+/// A client that is not a node.
 async fn client(address: &str) -> Context {
     let servers = Address::read(address).unwrap().servers;
     async_nats::jetstream::new(async_nats::connect(servers).await.unwrap())
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_result_that_no_record_tells_of_goes_with_its_plan() {
+async fn deleting_a_plan_removes_results_that_no_record_names() {
     let address = nats::address();
     let store = super::open(&address).await;
     let id = store.submit(submission()).await.unwrap().plan.id;
@@ -47,7 +47,7 @@ async fn a_result_that_no_record_tells_of_goes_with_its_plan() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_request_that_broke_off_keeps_its_key_for_a_minute() {
+async fn an_interrupted_submission_holds_its_key_for_a_minute() {
     let address = nats::address();
     let now_ms = Arc::new(AtomicI64::new(1_000_000));
     let open = async || {
@@ -72,7 +72,7 @@ async fn a_request_that_broke_off_keeps_its_key_for_a_minute() {
     let store = open().await;
     let first = submit(&store).await.unwrap();
     store.close().await;
-    // As if the record, which is written last, had not been.
+    // As if the record, which is written last, had never been written.
     let plans = format!("{}-plans", nats::namespace(&address));
     let plans = client(&address).await.get_stream(plans).await.unwrap();
     plans.purge().await.unwrap();

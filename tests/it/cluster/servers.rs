@@ -1,4 +1,4 @@
-//! The servers that the other tests break: what they promise when they are killed and paused.
+//! The servers that the other tests break: what they guarantee when killed and paused.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
@@ -6,6 +6,7 @@ use async_nats::jetstream;
 use async_nats::jetstream::context::CreateStreamErrorKind;
 
 use crate::support::nats::{self, Cluster, NatsServer};
+use crate::support::patience::eventually;
 
 async fn client(address: &str) -> jetstream::Context {
     let (hosts, _) = address
@@ -16,7 +17,7 @@ async fn client(address: &str) -> jetstream::Context {
     jetstream::new(async_nats::connect(hosts).await.expect("connected"))
 }
 
-/// A stream of `config`. A cluster whose leader changes meanwhile drops the question: it is asked again.
+/// Creates a stream of `config`; retried, because a cluster whose leader changes drops the request.
 async fn created(
     context: &jetstream::Context,
     config: jetstream::stream::Config,
@@ -39,7 +40,7 @@ fn stream(address: &str, num_replicas: usize) -> jetstream::stream::Config {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_a_server_acknowledged_is_there_after_its_kill() {
+async fn what_a_server_acknowledged_survives_a_kill() {
     let mut server = NatsServer::start();
     let address = server.address();
     let context = client(&address).await;
@@ -58,7 +59,7 @@ async fn what_a_server_acknowledged_is_there_after_its_kill() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn namespaces_on_the_shared_server_know_nothing_of_one_another() {
+async fn namespaces_on_the_shared_server_are_isolated() {
     for _ in 0..2 {
         let address = nats::address();
         let context = client(&address).await;
@@ -71,8 +72,8 @@ async fn namespaces_on_the_shared_server_know_nothing_of_one_another() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_cluster_goes_on_without_one_of_its_servers() {
-    let mut cluster = Cluster::start();
+async fn a_cluster_survives_the_loss_of_its_leader() {
+    let mut cluster = Cluster::start().await;
     let address = cluster.address();
     let context = client(&address).await;
     let mut stream = created(&context, stream(&address, 3)).await;
@@ -85,10 +86,9 @@ async fn a_cluster_goes_on_without_one_of_its_servers() {
         .find(|server| server.name() == leader)
         .unwrap()
         .kill();
-    loop {
+    eventually(async || {
         let sent = context.publish(subject.clone(), "x".into()).await.unwrap();
-        if sent.await.is_ok() {
-            break;
-        }
-    }
+        sent.await.is_ok()
+    })
+    .await;
 }

@@ -1,4 +1,4 @@
-//! The readers over files that nobody would write: nothing panics, and nothing takes long.
+//! The readers on malformed files: nothing panics, and nothing takes long.
 
 use noctule::geometry::geodesy::{LatLon, TangentPlane};
 use noctule::geometry::{Point2, Rect};
@@ -8,14 +8,14 @@ use super::{corpus, file, open, tile};
 use crate::support::patience::at_little_cost;
 use crate::support::size::cases;
 
-/// What a spoilt file is made of.
+/// One way to damage a file.
 #[derive(Debug, Clone)]
 enum Harm {
     Byte(prop::sample::Index, u8),
-    /// Four bytes that are often a count or an offset.
+    /// Four bytes that often are a count or an offset.
     Word(prop::sample::Index, u32),
     Cut(prop::sample::Index),
-    /// A part of it again, elsewhere.
+    /// Part of the file repeated elsewhere.
     Copy(prop::sample::Index, prop::sample::Index, usize),
 }
 
@@ -64,7 +64,7 @@ fn spoilt(mut bytes: Vec<u8>, harms: &[Harm]) -> Vec<u8> {
     bytes
 }
 
-/// Do all that can be done with a file.
+/// Uses every operation on a file.
 fn use_up(name: &str, bytes: &[u8]) {
     let (_directory, path) = file(name, bytes);
     if let Ok(dataset) = open(&path) {
@@ -93,20 +93,20 @@ proptest! {
     #![proptest_config(cases(1_000, 100_000))]
 
     #[test]
-    fn a_spoilt_file_never_panics(which: prop::sample::Index, harms in prop::collection::vec(harm(), 1..6)) {
+    fn a_damaged_file_never_panics(which: prop::sample::Index, harms in prop::collection::vec(harm(), 1..6)) {
         let (name, bytes) = which.get(corpus());
         let bytes = spoilt(bytes.clone(), &harms);
         at_little_cost(|| use_up(name, &bytes));
     }
 
     #[test]
-    fn bytes_never_panic(magic in prop::sample::select(vec!["II*\0", "MM\0*", "II+\0", "ncols 2\n", ""]), bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+    fn random_bytes_never_panic(magic in prop::sample::select(vec!["II*\0", "MM\0*", "II+\0", "ncols 2\n", ""]), bytes in prop::collection::vec(any::<u8>(), 0..300)) {
         at_little_cost(|| use_up("bytes", &[magic.as_bytes(), &bytes].concat()));
     }
 }
 
 #[test]
-fn a_spoilt_tile_never_panics() {
+fn a_damaged_tile_never_panics() {
     let mut bytes = tile(1201, 300);
     for (idx, byte) in bytes.iter_mut().enumerate() {
         if idx % 4001 == 0 {

@@ -1,4 +1,4 @@
-//! Files that are wrong, or mean harm: each is refused for what is wrong, and costs next to nothing.
+//! Malformed and malicious files: each is refused for its actual fault, at little cost.
 
 use std::io::Write;
 use std::process::Command;
@@ -14,7 +14,7 @@ fn deflated(bytes: &[u8]) -> Vec<u8> {
     encoder.finish().expect("memory")
 }
 
-/// Wrong files, and what must be said about each.
+/// Wrong files, and what the refusal must say.
 fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
     use Value::{Ascii, Double, Long, Raw, Short};
     let right = Tiff::right;
@@ -33,20 +33,20 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
     let looped = Tiff { next: 8, ..right() };
     let asc = |text: &str| text.as_bytes().to_vec();
     vec![
-        // Not what they are called, or nothing at all.
+        // Not what the name says, or empty.
         ("empty.tif", vec![], "none of GeoTIFF"),
         ("text.tif", asc("There is no elevation in here.\n"), "none of GeoTIFF"),
         ("short.hgt", tile(1200, 5), "none of GeoTIFF"),
         ("magic.tif", asc("II*\0"), "not a valid GeoTIFF"),
         ("magic-big.tif", asc("MM\0+"), "not a valid GeoTIFF"),
-        // Cut off.
+        // Truncated.
         ("headers-only.tif", whole[..200].to_vec(), "not a valid GeoTIFF"),
         ("cut.tif", whole[..whole.len() - 4].to_vec(), "lies beyond its end"),
         ("cut-strip.tif", right().with(tiff::COUNTS, Long(vec![40])).bytes(), "ends after 40 bytes"),
         ("far-strip.tif", right().with(tiff::OFFSETS, Long(vec![u32::MAX])).bytes(), "lies beyond its end"),
         ("half-unpacked.tif", packed(right(), &[0; 40]).bytes(), "not a valid GeoTIFF"),
         ("spoilt.tif", right().with(tiff::COMPRESSION, Short(vec![8])).bytes(), "not a valid GeoTIFF"),
-        // Larger than they are.
+        // Declared larger than they are.
         ("vast.tif", square(1 << 31).bytes(), "at most 1073741824"),
         ("wide.tif", right().with(tiff::WIDTH, Long(vec![1 << 20])).bytes(), "number of columns"),
         ("widest.tif", right().with(tiff::WIDTH, Long(vec![1 << 20])).with(tiff::OFFSETS, Long(vec![0])).bytes(), "number of columns"),
@@ -70,7 +70,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("scaled.tif", right().with(tiff::GDAL_METADATA, Ascii("<GDALMetadata><Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.1</Item></GDALMetadata>")).bytes(), "scaled or shifted"),
         ("feet.tif", right().with(tiff::KEYS, Short(vec![1, 1, 0, 3, 1024, 0, 1, 2, 2048, 0, 1, 4326, 4099, 0, 1, 9002])).bytes(), "EPSG:9002"),
         ("no-data.tif", right().with(tiff::NO_DATA, Ascii("none")).bytes(), "no-data value is \"none\""),
-        // Nowhere.
+        // Without a usable position.
         ("nowhere.tif", right().without(tiff::TIE_POINT).bytes(), "not a GeoTIFF|no georeferenced image"),
         ("unscaled.tif", right().without(tiff::SCALE).bytes(), "neither one tie point and a pixel scale"),
         ("flat.tif", right().with(tiff::SCALE, Double(vec![0.0, 0.01, 0.0])).bytes(), "must be wider than 0"),
@@ -87,7 +87,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("mixed-crs.tif", right().with(tiff::KEYS, tiff::keys(1, 3072, 4326)).bytes(), "which it is not"),
         ("earth-centred.tif", right().with(tiff::KEYS, tiff::keys(3, 2048, 4978)).bytes(), "earth-centred"),
         ("bad-keys.tif", right().with(tiff::KEYS, Short(vec![9, 1, 0, 0])).bytes(), "geo keys"),
-        // Text.
+        // Text grids.
         ("header.asc", asc("ncols 3\nnrows 2\n"), "ends in its header"),
         ("unplaced.asc", asc("ncols 3\nnrows 2\ncellsize 1\n1 2 3 4 5 6"), "neither xllcorner nor xllcenter"),
         ("placed-twice.asc", asc("ncols 3\nnrows 2\nxllcorner 1\nxllcenter 1\nyllcorner 0\ncellsize 1\n1 2 3 4 5 6"), "both xllcorner and xllcenter"),
@@ -102,13 +102,13 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("long.asc", asc("ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3 4 5 6 7"), "more than 3 x 2"),
         ("not-a-number.asc", asc("ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 three 4 5 6"), "holds \"three\""),
         ("endless.asc", [asc("ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 "), vec![b'9'; 1 << 20]].concat(), "must hold a number"),
-        // Elevations that are none.
+        // Values that are not elevations.
         ("N10E010.hgt", tile(1201, 20_000), "must be within -12000 to 12000 m"),
     ]
 }
 
 #[test]
-fn each_is_refused_for_what_is_wrong() {
+fn each_wrong_file_is_refused_for_its_fault() {
     let mut faults = Vec::new();
     for (name, bytes, expected) in cases() {
         let (_directory, path) = file(name, &bytes);
@@ -125,10 +125,10 @@ fn each_is_refused_for_what_is_wrong() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// A program that may take 160 MB of addresses, its own code and stacks included, refuses all of them.
+/// A program limited to 160 MB of address space, code and stacks included, refuses all of them.
 #[test]
 #[cfg(target_os = "linux")]
-fn none_takes_much_memory() {
+fn wrong_files_are_refused_in_little_memory() {
     for (name, bytes, _) in cases() {
         let (_directory, path) = file(name, &bytes);
         let output = Command::new("sh")
@@ -147,7 +147,7 @@ fn none_takes_much_memory() {
 }
 
 #[test]
-fn a_format_that_is_said_must_be_found() {
+fn a_declared_format_or_reference_system_must_match_the_file() {
     let (_directory, path) = file("right.tif", &Tiff::right().bytes());
     let declared = |format, crs| {
         let declared = Declared {

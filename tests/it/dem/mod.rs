@@ -1,4 +1,4 @@
-//! Files of elevations: right ones, wrong ones, and those that mean harm.
+//! Elevation files: valid, malformed and malicious ones.
 
 mod fuzz;
 mod hostile;
@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 
 use noctule::terrain::dem::{self, Dataset, Declared, DemError};
 
-/// A file named `name` with these bytes, in a directory that goes with it.
+/// A file named `name` with these bytes, in a temporary directory.
 fn file(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let path = directory.path().join(name);
@@ -22,12 +22,12 @@ fn open(path: &Path) -> Result<Dataset, DemError> {
     dem::open(path, Declared::default())
 }
 
-/// An SRTM tile, every sample the same.
+/// An SRTM tile with the same value everywhere.
 fn tile(side: usize, sample: i16) -> Vec<u8> {
     sample.to_be_bytes().repeat(side * side)
 }
 
-/// The small files that are kept for tests, by name.
+/// The small test files, by name.
 fn corpus() -> &'static [(String, Vec<u8>)] {
     static FILES: LazyLock<Vec<(String, Vec<u8>)>> = LazyLock::new(|| {
         let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/dem/corpus");

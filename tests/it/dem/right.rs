@@ -1,4 +1,4 @@
-//! What is read of files that are right.
+//! What is read from valid files.
 
 use noctule::geometry::geodesy::{LatLon, TangentPlane};
 use noctule::geometry::{Point2, Rect};
@@ -20,7 +20,7 @@ fn the_whole_corpus_is_read() {
         let survey = dataset
             .survey()
             .unwrap_or_else(|error| panic!("{name}: {error}"));
-        // All were cut out of mountains between 236 and 1076 m.
+        // All were cut from mountains between 236 and 1076 m.
         assert!(
             200.0 < survey.min && survey.min < survey.max && survey.max < 1100.0,
             "{name}: {survey:?}"
@@ -33,9 +33,9 @@ fn the_whole_corpus_is_read() {
     }
 }
 
-/// Samples hold in the middle of areas and on points; half a cell is 5000 times what is asserted.
+/// Samples hold at pixel centres for areas, and at the grid points themselves for points.
 #[test]
-fn areas_and_points_lie_half_a_cell_apart() {
+fn pixel_areas_and_pixel_points_differ_by_half_a_cell() {
     let check = |raster_type: u16, lat: f64, lon: f64| {
         let keys = Value::Short(vec![
             1,
@@ -58,7 +58,7 @@ fn areas_and_points_lie_half_a_cell_apart() {
         let bytes = Tiff::right().with(tiff::KEYS, keys).bytes();
         let (_directory, path) = file("right.tif", &bytes);
         let dataset = open(&path).expect("it is right");
-        // Half way from the first to the second column, a fifth from the first to the second row.
+        // Half way from the first to the second column, a fifth of the way from the first to the second row.
         let found = dataset
             .sample(&[at(lat - 0.002, lon + 0.005)])
             .expect("read")[0];
@@ -73,7 +73,7 @@ fn areas_and_points_lie_half_a_cell_apart() {
 }
 
 #[test]
-fn samples_end_where_the_data_end() {
+fn there_is_no_elevation_beyond_the_samples_or_beside_no_data() {
     let samples: Vec<f32> = (0..12_u8)
         .map(|idx| if idx == 11 { -9999.0 } else { idx.into() })
         .collect();
@@ -131,7 +131,7 @@ fn a_tile_is_placed_by_its_name() {
 }
 
 #[test]
-fn a_grid_of_text_needs_a_reference_system_beyond_degrees() {
+fn a_text_grid_outside_degrees_needs_a_reference_system() {
     let text = |x: f64, cell: f64| {
         format!(
             "NCOLS 3\nNROWS 2\nXLLCENTER {x}\nYLLCENTER 40\nCELLSIZE {cell}\n1 2 3\n4 5 -9999\n"
@@ -169,7 +169,7 @@ fn a_grid_of_text_needs_a_reference_system_beyond_degrees() {
 }
 
 #[test]
-fn a_ground_is_cut_out_of_a_file() {
+fn ground_cut_out_of_a_file_agrees_with_its_samples() {
     let path =
         std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/terrain/jacksboro.tif");
     let dataset = open(&path).expect("it is right");
@@ -197,7 +197,7 @@ fn a_ground_is_cut_out_of_a_file() {
             "{elevation} {sample:?}"
         );
     }
-    // Too many samples, and too wide.
+    // Too many samples, or too wide.
     assert!(matches!(
         dataset.ground(&plane, area, 1000.0, 10_000),
         Err(DemError::TooLarge { .. })
@@ -212,7 +212,7 @@ fn a_ground_is_cut_out_of_a_file() {
         .ground(&plane, covered, 0.0, 1_000_000)
         .expect("all of it is covered");
     assert_eq!(ground.extent(), covered);
-    // The file reaches 14.6 to 15.4 km from the middle, and its edges are hardly bent.
+    // The file reaches 14.6 to 15.4 km from the middle, and its edges are almost straight.
     let corner = plane.local(at(36.7325, -84.41333));
     assert!(
         (covered.min.x - corner.x).abs() < 120.0 && (covered.max.y - corner.y).abs() < 120.0,

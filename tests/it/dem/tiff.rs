@@ -1,18 +1,18 @@
-//! A writer of small TIFFs, right ones and wrong ones.
+//! A writer of small TIFFs, valid and invalid.
 
-/// A value of a tag.
+/// The value of a tag.
 #[derive(Clone)]
 pub(super) enum Value {
     Short(Vec<u16>),
     Long(Vec<u32>),
     Double(Vec<f64>),
     Ascii(&'static str),
-    /// A type, a count and an offset, as they are.
+    /// A type, a count and an offset, written as given.
     Raw(u16, u32, u32),
 }
 use Value::{Ascii, Double, Long, Raw, Short};
 
-/// One image: its tags, what follows them, and where the next image is said to be.
+/// One image: its tags, its data, and the offset of the next image.
 #[derive(Clone)]
 pub(super) struct Tiff {
     pub(super) tags: Vec<(u16, Value)>,
@@ -20,7 +20,7 @@ pub(super) struct Tiff {
     pub(super) next: u32,
 }
 
-/// Where the data of [`Tiff::bytes`] begin.
+/// Offset of the data in [`Tiff::bytes`].
 pub(super) const DATA: u32 = 2048;
 
 pub(super) const WIDTH: u16 = 256;
@@ -39,7 +39,7 @@ pub(super) const KEYS: u16 = 34735;
 pub(super) const GDAL_METADATA: u16 = 42112;
 pub(super) const NO_DATA: u16 = 42113;
 
-/// Geo keys: model type, and a reference system by its key and code.
+/// Geo keys: the model type, and a reference system by key and code.
 pub(super) fn keys(model: u16, key: u16, code: u16) -> Value {
     Short(vec![
         1, 1, 0, 3, 1024, 0, 1, model, 1025, 0, 1, 1, key, 0, 1, code,
@@ -47,7 +47,7 @@ pub(super) fn keys(model: u16, key: u16, code: u16) -> Value {
 }
 
 impl Tiff {
-    /// 4 x 3 samples of single precision in degrees, 0 to 11 m.
+    /// 4 x 3 single-precision samples in degrees, 0 to 11 m.
     pub(super) fn right() -> Self {
         let samples = (0..12_u8).map(f32::from);
         Self {
@@ -71,7 +71,7 @@ impl Tiff {
         }
     }
 
-    /// With another value of a tag.
+    /// Replaces the value of a tag.
     pub(super) fn with(mut self, tag: u16, value: Value) -> Self {
         self.tags.retain(|(known, _)| *known != tag);
         self.tags.push((tag, value));
@@ -84,7 +84,7 @@ impl Tiff {
         self
     }
 
-    /// With one strip of these bytes.
+    /// With these bytes as its only strip.
     pub(super) fn holding(self, data: Vec<u8>) -> Self {
         let count = u32::try_from(data.len()).expect("a small file");
         Self {
@@ -97,7 +97,7 @@ impl Tiff {
         let mut file = b"II*\0\x08\0\0\0".to_vec();
         let entries = u16::try_from(self.tags.len()).expect("few tags");
         file.extend(entries.to_le_bytes());
-        // Values that do not fit into their entry.
+        // Values that do not fit into their entries.
         let mut values = Vec::new();
         let values_at = 8 + 2 + 12 * self.tags.len() + 4;
         for (tag, value) in &self.tags {

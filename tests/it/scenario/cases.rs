@@ -1,10 +1,10 @@
-//! One document for every fault: what is replaced in the full document, and what is said of it.
+//! One document per fault: what is replaced in the full document, and the fault reported.
 
 use noctule::scenario::json::Fault;
 
 use super::edited;
 
-/// What is replaced, by what, and the one fault it makes: pointer, code, detail.
+/// The text replaced, its replacement, and the one fault this causes: pointer, code, detail.
 type Case = (
     &'static str,
     &'static str,
@@ -412,7 +412,7 @@ const CASES: &[Case] = &[
     ),
 ];
 
-/// The cases, and those that take more than a replacement: the document, and its one fault.
+/// All cases, including those that take more than a replacement: the document and its one fault.
 pub(crate) fn all_cases() -> Vec<(String, Fault)> {
     let fault = |pointer: &str, code, detail: &str| Fault {
         pointer: pointer.to_owned(),

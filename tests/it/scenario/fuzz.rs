@@ -1,11 +1,11 @@
-//! Scenario documents that nobody would write: nothing panics, and what is accepted is kept.
+//! Malformed scenario documents: nothing panics, and accepted ones survive a round trip.
 
 use noctule::scenario::json;
 use proptest::prelude::*;
 
 use super::{FULL, read, rules};
 
-/// Any JSON, rich in the words of a scenario.
+/// Any JSON, rich in words of scenario documents.
 fn any_json() -> impl Strategy<Value = serde_json::Value> {
     let leaf = prop_oneof![
         Just(serde_json::Value::Null),
@@ -23,7 +23,7 @@ fn any_json() -> impl Strategy<Value = serde_json::Value> {
     })
 }
 
-/// Every word of the full document, and others.
+/// Every word of the full document, and random ones.
 fn word() -> impl Strategy<Value = String> {
     let words: Vec<String> = FULL
         .split(|c: char| !c.is_alphanumeric() && c != '_' && c != '-')
@@ -33,7 +33,7 @@ fn word() -> impl Strategy<Value = String> {
     prop_oneof![9 => prop::sample::select(words), 1 => ".*"]
 }
 
-/// All pointers into a value.
+/// All JSON pointers into a value.
 fn pointers(value: &serde_json::Value, here: &str, found: &mut Vec<String>) {
     found.push(here.to_owned());
     match value {
@@ -52,7 +52,7 @@ fn pointers(value: &serde_json::Value, here: &str, found: &mut Vec<String>) {
     }
 }
 
-/// Most documents are accepted: numbers of every magnitude, in range, and points far enough apart.
+/// Valid documents: numbers of every magnitude, in range, and points far enough apart.
 fn scenario_document() -> impl Strategy<Value = String> {
     let threat = prop_oneof![
         (-1e4..1e4, 500.0..1e4_f64, 0.001..400.0, 0.0..100.0, prop::option::of(-50.0..50.0)).prop_map(
@@ -109,7 +109,7 @@ proptest! {
     }
 
     #[test]
-    fn a_cut_or_spoilt_document_never_panics(at in 0..FULL.len(), byte: u8) {
+    fn a_truncated_or_damaged_document_never_panics(at in 0..FULL.len(), byte: u8) {
         let _ = json::read(&FULL.as_bytes()[..at], &rules(), 0);
         let mut spoilt = FULL.as_bytes().to_vec();
         spoilt[at] = byte;
@@ -117,7 +117,7 @@ proptest! {
     }
 
     #[test]
-    fn json_never_panics(value in any_json()) {
+    fn random_json_never_panics(value in any_json()) {
         let _ = read(&value.to_string());
     }
 
@@ -134,7 +134,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_written_reads_as_the_same_scenario(document in scenario_document()) {
+    fn a_written_scenario_reads_back_unchanged(document in scenario_document()) {
         let scenario = read(&document).map_err(|refusal| TestCaseError::fail(refusal.to_string()))?;
         let text = json::write(&scenario);
         let again = read(&text).map_err(|refusal| TestCaseError::fail(refusal.to_string()))?;

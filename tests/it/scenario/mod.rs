@@ -1,4 +1,4 @@
-//! Scenario documents: what is accepted, and every fault of what is not.
+//! Scenario documents: what is accepted, and every fault that is reported.
 
 mod cases;
 mod dataset;
@@ -58,10 +58,10 @@ fn faults(text: &str) -> Vec<Fault> {
     }
 }
 
-/// The least that a document must say.
+/// The smallest complete document.
 const LEAST: &str = r#"{"start":{"x":0,"y":0,"z":0},"target":{"x":300,"y":400,"z":0},"altitude":{"min":0,"max":200}}"#;
 
-/// A document with everything in it; the cases below replace one part each.
+/// A document with every member; the cases below replace one part each.
 pub(crate) const FULL: &str = r#"{
 "name":"full","frame":"local",
 "start":{"x":100,"y":100,"z":0},"target":{"x":900,"y":800,"z":150},
@@ -89,7 +89,7 @@ fn edited(from: &str, to: &str) -> String {
 }
 
 #[test]
-fn every_case_makes_its_own_fault_and_no_other() {
+fn every_case_causes_exactly_its_own_fault() {
     for (document, expected) in all_cases() {
         assert_eq!(faults(&document), [expected]);
     }
@@ -130,7 +130,7 @@ fn every_code_has_a_case_and_a_row_in_the_docs() {
     );
 }
 
-/// So far apart that samples every 5 m would be more than the server takes.
+/// At 300 km apart, samples every 5 m would exceed the limit.
 #[test]
 fn a_default_spacing_is_never_refused() {
     let spacing = |x: u32| {
@@ -144,16 +144,20 @@ fn a_default_spacing_is_never_refused() {
     }
 }
 
-/// A target that is steeper above the start than the vehicle climbs needs room for a detour, and so does the middle of
-/// the band over ends that are near to each other.
+/// A target that is steeper above the start than the vehicle climbs needs room for a detour, and so does the
+/// middle of the band over ends that are close together.
 #[test]
-fn a_default_area_has_room_for_the_climb() {
+fn the_default_area_has_room_for_the_climb() {
     let area = |target: &str, climb: &str| {
         let text = format!(
             r#"{{"start":{{"x":0,"y":0,"z":0}},"target":{target},"altitude":{{"min":400,"max":700}},
             "terrain":{{"kind":"flat","elevation":-500}},"vehicle":{{"max_climb_deg":{climb}}}}}"#
         );
-        let area = read(&text).expect("no fault").area;
+        let scenario = read(&text).expect("no fault");
+        // What is written is accepted again, with the same area.
+        let again = read(&json::write(&scenario)).expect("no fault");
+        assert_eq!(again.area, scenario.area, "{text}");
+        let area = scenario.area;
         [area.min.x, area.min.y, area.max.x, area.max.y]
     };
     let check = |target, climb, expected: [f64; 4]| {
@@ -164,26 +168,26 @@ fn a_default_area_has_room_for_the_climb() {
             );
         }
     };
-    // As steep as the vehicle: a quarter of the box.
+    // As steep as the vehicle climbs: a quarter of the box.
     check(
         r#"{"x":100,"y":0,"z":100}"#,
         "45.001",
         [-25.0, -25.0, 125.0, 25.0],
     );
-    // Half of the 300 m over ground that the climb takes, on every side.
+    // Half of the 300 m of ground distance that the climb takes, on every side.
     check(
         r#"{"x":100,"y":0,"z":300}"#,
         "45",
         [-150.0, -150.0, 250.0, 150.0],
     );
-    // The middle of the band is at 50 m: up to there, and down.
+    // The middle of the band is at 50 m: up to there, and down again.
     check(
         r#"{"x":100,"y":0,"z":-300}"#,
         "45",
         [-200.0, -200.0, 300.0, 200.0],
     );
     check(r#"{"x":30,"y":0,"z":0}"#, "45", [-50.0, -50.0, 80.0, 50.0]);
-    // However slowly it climbs, the document that is written is accepted again.
+    // However slowly the vehicle climbs, the area stays within limits.
     let far = area(r#"{"x":100,"y":0,"z":1000}"#, "1e-9");
     assert!(far.iter().all(|coordinate| coordinate.abs() < 1e8));
 }
@@ -196,14 +200,14 @@ fn the_least_document_is_filled_with_the_defaults() {
     assert_eq!(scenario.planner.seeding, Seeding::Tangent);
     assert!(scenario.planner.polish);
     assert_eq!(scenario.planner.quadrature, Quadrature::Integral);
-    // |ST| / (10 (N + 1)) with |ST| = 500 and N = 10, and a box of 300 by 400 plus a quarter of 500 around.
+    // |ST| / (10 (N + 1)) with |ST| = 500 and N = 10, and a box of 300 by 400 with a quarter of 500 added all round.
     assert!((scenario.vehicle.min_leg - 500.0 / 110.0).abs() < 1e-12);
     assert!((scenario.area.min.x + 125.0).abs() < 1e-9);
     assert!((scenario.area.max.y - 525.0).abs() < 1e-9);
 }
 
 #[test]
-fn a_full_document_is_read_as_it_says() {
+fn every_part_of_a_full_document_is_read() {
     let scenario = read(FULL).expect("it has no fault");
     assert_eq!(scenario.name.as_deref(), Some("full"));
     assert_eq!(scenario.threats.len(), 2);
@@ -220,9 +224,9 @@ fn a_full_document_is_read_as_it_says() {
 }
 
 #[test]
-fn what_is_nearly_a_fault_is_none() {
+fn values_at_the_edge_of_a_fault_are_accepted() {
     for (from, to) in [
-        // Touching a threat is not being inside; neither is being at its top.
+        // Touching a threat is not being inside it; neither is being at its top.
         (r#""x":100,"y":100,"z":0"#, r#""x":290,"y":250,"z":0"#),
         (r#""x":100,"y":100,"z":0"#, r#""x":350,"y":250,"z":500"#),
         (r#""x":100,"y":100,"z":0"#, r#""x":550,"y":500,"z":0"#),
@@ -248,7 +252,7 @@ fn what_is_nearly_a_fault_is_none() {
         ),
         (r#""influence":90,"#, r#""influence":60,"#),
         (r#""name":"full""#, r#""name":null"#),
-        // A known route may name its ends, or nothing at all.
+        // A known route may include its ends, or be empty.
         (r#""warm_start":null"#, r#""warm_start":{"waypoints":[]}"#),
         (
             r#""warm_start":null"#,
@@ -274,7 +278,7 @@ fn a_drawn_seed_stays_below_two_to_the_53() {
 }
 
 #[test]
-fn without_an_area_everything_is_inside_and_a_grid_is_its_own_area() {
+fn the_default_area_contains_everything_and_a_grid_is_its_own_area() {
     let area = "\"area\":{\"min\":{\"x\":0,\"y\":0},\"max\":{\"x\":1000,\"y\":1000}},\n";
     let scenario = read(&edited(area, "")).expect("it has no fault");
     assert!((scenario.area.max.x - 1000.0).abs() < 1e-9 && scenario.area.min.x.abs() < 1e-9);
@@ -313,9 +317,9 @@ fn all_faults_come_at_once_and_in_document_order() {
     insta::assert_snapshot!(Refusal::Invalid(faults).to_string());
 }
 
-/// What needs no frame is checked without one, and what every algorithm has without an algorithm.
+/// Whatever needs no frame is checked without one, and whatever all algorithms share without an algorithm.
 #[test]
-fn a_frame_or_an_algorithm_that_is_unknown_hides_no_other_faults() {
+fn an_unknown_frame_or_algorithm_hides_no_other_faults() {
     let unknown = r#"{
         "start":{"x":0,"y":0},"target":{"x":"a","y":0,"z":0},"altitude":{"min":5,"max":1},"frame":"bogus",
         "threats":[1,{"kind":"cylinder","radius":-3},{"kind":"polygon","vertices":[{"x":0}],"margin":-1},
@@ -347,7 +351,7 @@ fn a_frame_or_an_algorithm_that_is_unknown_hides_no_other_faults() {
         ]
     );
 
-    // Places that no plane can be laid under are degrees all the same.
+    // Places are read as degrees even where no plane fits.
     let wide = r#"{
         "frame":"wgs84","area":{"min":{"lat":0,"lon":0},"max":{"lat":9,"lon":9}},
         "start":{"lat":1,"lon":1},"target":{"lat":91,"lon":2,"alt":0},"altitude":{"min":0,"max":90},
@@ -372,7 +376,7 @@ fn a_frame_or_an_algorithm_that_is_unknown_hides_no_other_faults() {
 }
 
 #[test]
-fn ten_thousand_faults_make_a_short_answer() {
+fn ten_thousand_faults_are_reported_briefly() {
     let threat = r#"{"kind":"cylinder","center":{"x":0,"y":0},"radius":-1},"#;
     let threats = format!(
         r#""threats":[{}],"altitude""#,
@@ -406,7 +410,7 @@ fn hostile_keys_and_texts_are_not_echoed_in_full() {
 }
 
 #[test]
-fn what_is_not_an_object_is_no_scenario() {
+fn a_document_that_is_not_an_object_is_refused() {
     for text in ["null", "[]", "7", "\"scenario\"", "[1,2]"] {
         let faults = faults(text);
         assert_eq!(
@@ -433,7 +437,7 @@ fn broken_json_says_line_column_and_pointer() {
 }
 
 #[test]
-fn a_body_of_eight_mebibytes_is_read_at_once() {
+fn a_grid_of_a_million_nodes_is_read_quickly() {
     let nodes = 1_000_000;
     let elevations = "123.25,".repeat(nodes - 1) + "123.25";
     let grid = format!(
@@ -448,7 +452,7 @@ fn a_body_of_eight_mebibytes_is_read_at_once() {
 }
 
 #[test]
-fn a_hostile_body_of_eight_mebibytes_is_refused_at_once() {
+fn a_hostile_body_of_eight_mebibytes_is_refused_quickly() {
     let size = 8 << 20;
     for (open, item, close) in [
         ("{", "\"\":0,", "\"\":0}"),
@@ -499,7 +503,7 @@ fn every_document_in_scenarios_is_accepted() {
 }
 
 #[test]
-fn the_codes_are_unlike_each_other() {
+fn the_fault_codes_are_distinct_and_well_formed() {
     let codes: BTreeSet<&str> = CODES.iter().map(|(code, _)| *code).collect();
     assert_eq!(codes.len(), CODES.len());
     assert!(

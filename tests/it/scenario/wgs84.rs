@@ -1,4 +1,4 @@
-//! Documents in degrees: laid onto a plane, written back as they came, refused where no plane fits.
+//! Documents in degrees: projected onto a plane, written back unchanged, refused where no plane fits.
 
 use noctule::geometry::Point2;
 use noctule::scenario::frame::{Datum, Wgs84};
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::{faults, read};
 
-/// What is refused only in degrees: the document, the pointer, the code and the detail.
+/// Refusals specific to degrees: the document, the pointer, the code and the detail.
 pub(super) fn cases() -> Vec<(String, &'static str, &'static str, &'static str)> {
     let mut wide = document();
     wide["area"] = json!({"min": {"lat": 35.5, "lon": -85.5}, "max": {"lat": 37.5, "lon": -83.0}});
@@ -49,7 +49,7 @@ pub(super) fn cases() -> Vec<(String, &'static str, &'static str, &'static str)>
     ]
 }
 
-/// A flight of 27 km in Tennessee, round a radar and a polygon.
+/// A flight of 27 km in Tennessee, around a radar and a polygon.
 pub(crate) const IN_DEGREES: &str = r#"{
 "frame":"wgs84",
 "start":{"lat":36.5,"lon":-84.35,"alt":420},"target":{"lat":36.66,"lon":-84.15,"alt":500},
@@ -73,7 +73,7 @@ fn accepted(document: &Value) -> Scenario {
 }
 
 #[test]
-fn it_comes_back_as_it_was_written() {
+fn a_document_in_degrees_is_written_back_unchanged() {
     let document = document();
     let scenario = accepted(&document);
     let text = json::write(&scenario);
@@ -99,7 +99,7 @@ fn it_comes_back_as_it_was_written() {
 }
 
 #[test]
-fn its_plane_is_in_the_middle_of_its_area() {
+fn the_plane_touches_at_the_middle_of_the_area() {
     let mut document = document();
     document["area"] =
         json!({"min": {"lat": 36.45, "lon": -84.41}, "max": {"lat": 36.73, "lon": -84.08}});
@@ -108,7 +108,7 @@ fn its_plane_is_in_the_middle_of_its_area() {
     assert!((origin.lat - 36.59).abs() < 1e-12 && (origin.lon + 84.245).abs() < 1e-12);
     let area = scenario.area;
     assert!(area.contains(scenario.start.xy()) && area.contains(scenario.target.xy()));
-    // The rectangle lies in the box of degrees, and its edges touch it somewhere.
+    // The rectangle lies within the box of degrees and spans it from south to north.
     let corners = [
         (area.min.x, area.min.y),
         (area.min.x, area.max.y),
@@ -131,7 +131,7 @@ fn its_plane_is_in_the_middle_of_its_area() {
 }
 
 #[test]
-fn altitudes_are_above_the_datum_that_is_named() {
+fn altitudes_are_above_the_named_datum() {
     let mut document = document();
     assert_eq!(earth(&accepted(&document)).datum, Datum::Msl);
     document["altitude_datum"] = "ellipsoid".into();
@@ -144,7 +144,7 @@ fn altitudes_are_above_the_datum_that_is_named() {
 }
 
 #[test]
-fn the_antimeridian_is_nothing_special() {
+fn documents_across_the_antimeridian_are_read_alike() {
     let mut document = document();
     let shifted = |node: &mut Value| {
         let lon = node["lon"].as_f64().expect("a longitude") + 84.25 + 180.0;
@@ -164,7 +164,7 @@ fn the_antimeridian_is_nothing_special() {
         shifted(document.pointer_mut(path).expect("a place"));
     }
     let there = accepted(&document);
-    // The geoid lies elsewhere there, and with it the height at which metres are true.
+    // The geoid differs there, and so does the height at which the plane is true to scale.
     assert!((here.start - there.start).norm() < 0.5);
     assert!((here.target - there.target).norm() < 0.5);
     assert!((here.area.min - there.area.min).norm() < 1.0);
@@ -176,8 +176,7 @@ fn the_antimeridian_is_nothing_special() {
     );
 }
 
-/// What is set where, and the one fault it makes.
-/// Without an area, waypoints may be wherever the grid is, and the document that says so is accepted as it is.
+/// Without an area, waypoints may be anywhere on the grid, and the written document is accepted unchanged.
 #[test]
 fn the_default_area_over_a_grid_is_all_of_it() {
     for (lat, lon) in [(36.4_f64, -84.45_f64), (-70.0, 179.9), (0.001, 8.5)] {
@@ -220,7 +219,7 @@ fn the_default_area_has_room_for_a_climb_that_is_steeper_than_the_vehicle() {
 }
 
 #[test]
-fn what_no_plane_fits_is_refused() {
+fn wrong_documents_in_degrees_are_refused() {
     let cases = [
         ("/target/lon", json!(-81.0), "/target", "area-too-wide"),
         (
@@ -288,7 +287,7 @@ fn what_no_plane_fits_is_refused() {
 }
 
 #[test]
-fn a_default_area_that_no_plane_fits_is_the_fault_of_what_reaches_out() {
+fn a_default_area_too_large_for_a_plane_is_blamed_on_what_extends_it() {
     for (path, value, pointer, code) in [
         ("/target/lon", json!(-81.0), "/target", "area-too-wide"),
         ("/target/lat", json!(89.5), "/target", "near-pole"),
@@ -332,9 +331,9 @@ fn a_default_area_that_no_plane_fits_is_the_fault_of_what_reaches_out() {
 }
 
 proptest! {
-    /// Wherever on the earth: what is accepted reads again to the same bits.
+    /// Anywhere on the earth: an accepted document reads back to the same bits.
     #[test]
-    fn what_is_accepted_reads_again(
+    fn an_accepted_document_reads_back_to_the_same_bits(
         lat in -88.5..88.5f64, lon in -180.0..180.0f64, north in -0.3..0.3f64, east in -0.3..0.3f64,
         alt in -100.0..4000.0f64, ellipsoid: bool,
     ) {

@@ -1,4 +1,4 @@
-//! Callers who send too slowly or nothing at all, in masses, while others are served.
+//! Masses of callers who send too slowly or nothing at all, while others are served.
 
 use std::fs::{self, File};
 use std::io::ErrorKind;
@@ -18,7 +18,7 @@ use crate::support::scenario;
 use crate::support::size::size;
 use crate::support::sse::Block;
 
-/// Everything until the service closes the connection.
+/// Everything received until the service closes the connection.
 async fn until_closed(mut stream: TcpStream) -> String {
     let mut text = Vec::new();
     if let Err(error) = in_time(stream.read_to_end(&mut text)).await {
@@ -27,7 +27,7 @@ async fn until_closed(mut stream: TcpStream) -> String {
     String::from_utf8(text).expect("UTF-8")
 }
 
-/// Send `text` at once and then a byte of `drip` at a time until the service has had enough.
+/// Sends `text` at once, then `drip` byte by byte until the service closes the connection.
 async fn drip(address: SocketAddr, text: &str, drip: u8) -> String {
     let stream = TcpStream::connect(address).await.expect("connected");
     let (mut reading, mut writing) = stream.into_split();
@@ -46,7 +46,7 @@ async fn drip(address: SocketAddr, text: &str, drip: u8) -> String {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn slow_and_silent_callers_are_let_go_while_others_are_served() {
+async fn slow_and_silent_callers_are_disconnected_while_others_are_served() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let limits = [
         "--http-head-timeout",
@@ -72,11 +72,11 @@ async fn slow_and_silent_callers_are_let_go_while_others_are_served() {
     let siege = async {
         let head = "POST /plans HTTP/1.1\r\nhost: localhost\r\n";
         let body = format!("{head}content-type: application/json\r\ncontent-length: 1000\r\n\r\n");
-        // One after the other: who comes when the listener's backlog is full is not even refused.
+        // One at a time: a caller who finds the listener's backlog full is not even refused.
         let mut silent = Vec::new();
         for caller in 0..size(1_000, 10_000) {
             let mut stream = TcpStream::connect(address).await.expect("connected");
-            // Some have asked before, and then say nothing more.
+            // Half of them send one request and then nothing more.
             let asks = caller % 2 == 0;
             if asks {
                 let request = "GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\n";
@@ -107,9 +107,9 @@ async fn slow_and_silent_callers_are_let_go_while_others_are_served() {
     println!("the longest wait for /readyz: {longest:.1?}");
 }
 
-/// The service raises what it may.
+/// The service raises its soft limit.
 #[tokio::test(flavor = "multi_thread")]
-async fn more_callers_are_met_than_files_may_be_open_at_first() {
+async fn the_service_raises_its_soft_file_limit() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let few = "ulimit -S -n 128";
     let patient = ["--http-head-timeout", "3600"];
@@ -130,9 +130,9 @@ async fn more_callers_are_met_than_files_may_be_open_at_first() {
     }
 }
 
-/// The others wait until some have gone.
+/// The others wait until some have left.
 #[tokio::test(flavor = "multi_thread")]
-async fn no_more_callers_are_let_in_than_files_may_be_open() {
+async fn the_hard_file_limit_bounds_the_connections() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let log = directory.path().join("log");
     let service = Service::start_with_few_files(
@@ -158,12 +158,12 @@ async fn no_more_callers_are_let_in_than_files_may_be_open() {
     assert!(!log.contains("could not be accepted"), "{log}");
 }
 
-/// Whole or byte by byte, the first of which may be those of either.
+/// Sent whole or byte by byte; the first bytes may belong to either version.
 #[tokio::test(flavor = "multi_thread")]
-async fn both_versions_of_http_are_spoken_however_they_come() {
+async fn both_versions_of_http_are_recognised_in_any_pieces() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &["--workers", "1"]);
-    // An empty SETTINGS frame after the preface; the service's own begins with its length and type.
+    // An empty SETTINGS frame follows the preface; the service's own begins with its length and type.
     let http2: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\x04\0\0\0\0\0";
     let get: &[u8] = b"GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\n";
     let put: &[u8] = b"PUT /livez HTTP/1.1\r\nhost: localhost\r\ncontent-length: 0\r\n\r\n";
@@ -190,16 +190,17 @@ async fn both_versions_of_http_are_spoken_however_they_come() {
     }
 }
 
-/// For a connection with an open stream. hyper alone keeps two buffers of 8 KiB for each, of which some pages are never touched.
+/// KiB per connection with an open stream. hyper alone keeps two 8 KiB buffers for each, some pages of which are
+/// never touched.
 const MOST_KIB: f64 = 16.0;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn an_idle_stream_costs_little_memory() {
-    // With a hundred before them as many as the service lets in.
+    // With the hundred opened first, as many as the service allows.
     let n_streams = size(1_000, 9_900);
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &["--workers", "1", "--grace", "0"]);
-    // Only when its bats fly does the search have all the memory that it needs: some megabytes.
+    // The search has allocated all its memory, some megabytes, only once its bats fly.
     let lasting = service.submit(&a_plan(10_000, 30_000, 7)).await;
     let mut search = running(&service, &lasting).await;
     let mut flown = 0;
@@ -224,7 +225,7 @@ async fn an_idle_stream_costs_little_memory() {
         }
         stream
     };
-    // What the first ones cost is the service's, not a stream's.
+    // The first streams also pay for what the service allocates once.
     let mut streams = Vec::new();
     for _ in 0..100 {
         streams.push(open().await);

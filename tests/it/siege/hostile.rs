@@ -1,14 +1,14 @@
-//! Documents at the edge of JSON: the exact answer to each.
+//! Documents at the edges of JSON: each gets an exact response.
 
 use crate::support::api::Api;
 
-/// A good document with something in place of a number of it.
+/// A valid document with one number replaced.
 fn with_number(number: &str) -> Vec<u8> {
     let document = r#"{"start":{"x":0,"y":0,"z":0},"target":{"x":NUMBER,"y":400,"z":0},"altitude":{"min":0,"max":200}}"#;
     document.replace("NUMBER", number).into_bytes()
 }
 
-/// A good document with a member more.
+/// A valid document with one more member.
 fn with_member(member: &str) -> Vec<u8> {
     let mut document = with_number("300");
     document.truncate(document.len() - 1);
@@ -120,7 +120,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, (u16, &'static str))> {
 }
 
 #[tokio::test]
-async fn documents_at_the_edge_of_json_get_exact_answers() {
+async fn documents_at_the_edges_of_json_get_exact_responses() {
     let api = Api::new();
     for (name, document, (status, slug)) in cases() {
         let headers = [("content-type", "application/json")];

@@ -1,4 +1,4 @@
-//! kill -9 again and again while plans come in: what was accepted is done, once, and what was done stays.
+//! kill -9 repeatedly while plans come in: every accepted plan is done, once, and finished plans keep their results.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -13,10 +13,10 @@ use crate::support::size::size;
 use crate::support::sse::{Stream, events};
 use crate::support::stores::{Place, for_every_backend};
 
-/// A kill comes so many milliseconds after the start at the latest.
+/// Each kill comes at most this many milliseconds after the start.
 const LIFE_MS: usize = 400;
 
-/// A plan that loses five workers is taken for the reason: before a fifth kill, all end.
+/// A plan that loses five workers fails, so before every fourth kill all plans are left to end.
 const KILLS_OF_A_PLAN: usize = 4;
 
 /// What the caller knows.
@@ -27,7 +27,7 @@ struct Known {
 }
 
 impl Known {
-    /// Post plans until `enough` were accepted.
+    /// Submits plans until `enough` have been accepted.
     async fn post(&mut self, service: &Service, enough: usize) {
         while self.accepted.len() < enough {
             let plan = a_plan(50, 100, self.accepted.len());
@@ -35,7 +35,7 @@ impl Known {
         }
     }
 
-    /// Post plans until there are `enough`, then look for results.
+    /// Submits plans until there are `enough`, then looks for results.
     async fn grow(&mut self, service: &Service, enough: usize) {
         self.post(service, enough).await;
         for address in &self.accepted {
@@ -67,14 +67,14 @@ async fn kills_at_random_points_lose_nothing_and_repeat_nothing() {
                     service.ended(address).await;
                 }
             }
-            // The point is random; whatever happens then is cut, a request on its way included.
+            // The kill comes at a random time and may cut any request.
             let point = Instant::now() + Duration::from_millis(dice.below(LIFE_MS) as u64);
             let enough = n_plans * kill / n_kills;
             let _ = tokio::time::timeout_at(point, known.grow(&service, enough)).await;
             service.kill();
         }
         let service = place.serve(&["--workers", "2"]);
-        // Those that the kills left no time for.
+        // Those that there was no time for between the kills.
         known.post(&service, n_plans).await;
         let (accepted, finished) = (known.accepted, known.finished);
         assert_eq!(accepted.iter().collect::<BTreeSet<_>>().len(), n_plans);

@@ -1,4 +1,4 @@
-//! Very many plans and documents: memory stays, what is too many goes, nothing breaks.
+//! Very many plans and documents: memory use stays bounded, surplus plans are removed, nothing breaks.
 
 use std::time::{Duration, Instant};
 
@@ -15,11 +15,11 @@ use crate::support::process::Service;
 use crate::support::scenario;
 use crate::support::size::size;
 
-/// Ended plans that are kept.
+/// Ended plans that are retained.
 const KEPT: usize = 200;
 
 #[tokio::test(flavor = "multi_thread")]
-async fn thousands_of_plans_fit_into_the_memory_and_the_limit_of_some() {
+async fn thousands_of_plans_stay_within_memory_and_retention() {
     let n_plans = size(600, 100_000);
     let directory = tempfile::tempdir().expect("a temporary directory");
     let kept = KEPT.to_string();
@@ -36,7 +36,7 @@ async fn thousands_of_plans_fit_into_the_memory_and_the_limit_of_some() {
             let address = service.submit(&tiny).await;
             let request = service.get(&address).header("prefer", "wait=30");
             let status = request.send().await.expect("an answer").status();
-            // It may have gone again already.
+            // Retention may have removed it already.
             assert!(status == 200 || status == 410, "{status}");
             let asked = Instant::now();
             service.get(&address).send().await.expect("an answer");
@@ -53,7 +53,7 @@ async fn thousands_of_plans_fit_into_the_memory_and_the_limit_of_some() {
         "{first} KiB after {} plans, {second} KiB after {n_plans}",
         n_plans / 2
     );
-    // Few plans leave much to the allocator's chance.
+    // With few plans, allocator noise is larger.
     assert!(
         second as f64 <= size(1.2, 1.1) * first as f64,
         "{first} KiB, then {second} KiB"
@@ -71,7 +71,7 @@ async fn thousands_of_plans_fit_into_the_memory_and_the_limit_of_some() {
     in_time(settled).await;
 }
 
-/// Valid documents, to be spoilt.
+/// Valid documents to damage.
 const CORPUS: [&str; 5] = [
     crate::scenario::IN_DEGREES,
     include_str!("../../../scenarios/paper-1.json"),
@@ -80,7 +80,7 @@ const CORPUS: [&str; 5] = [
     r#"{"start":{"x":0,"y":0,"z":0},"target":{"x":300,"y":400,"z":0},"altitude":{"min":0,"max":200}}"#,
 ];
 
-/// What breaks readers of JSON, and of scenarios.
+/// Words that break JSON readers and scenario readers.
 const WORDS: [&str; 24] = [
     "NaN",
     "-0",
@@ -108,7 +108,7 @@ const WORDS: [&str; 24] = [
     "0.1e-7",
 ];
 
-/// A document spoilt in up to four places.
+/// A document damaged in one to four places.
 fn spoilt(dice: &mut Dice) -> Vec<u8> {
     let mut bytes = CORPUS[dice.below(CORPUS.len())].as_bytes().to_vec();
     for _ in 0..=dice.below(4) {
@@ -124,7 +124,7 @@ fn spoilt(dice: &mut Dice) -> Vec<u8> {
                 drop(bytes.splice(to..to, copy));
             }
             4 => bytes.truncate(end),
-            // A number, so that most documents remain documents.
+            // Replaces a number, so that most documents stay valid JSON.
             _ => {
                 if let Some(digit) = bytes[at..].iter().position(u8::is_ascii_digit) {
                     let at = at + digit;
@@ -138,7 +138,7 @@ fn spoilt(dice: &mut Dice) -> Vec<u8> {
 }
 
 #[test]
-fn spoilt_documents_are_read_or_refused() {
+fn damaged_documents_are_read_or_refused() {
     let rules = planner::rules(Limits::default());
     let mut dice = Dice::new(3);
     let mut read = 0_usize;
@@ -156,7 +156,7 @@ fn spoilt_documents_are_read_or_refused() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn spoilt_bodies_get_the_answer_of_a_mistake() {
+async fn damaged_bodies_never_cause_a_server_error() {
     let api = Api::new();
     let mut dice = Dice::new(4);
     for _ in 0..size(1_000, 20_000) {

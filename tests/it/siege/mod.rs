@@ -1,4 +1,4 @@
-//! Trying to break the service: kills, races, cut and stalled readers, slow and lying callers, masses.
+//! Attempts to break the service: kills, races, cut and stalled readers, slow and lying callers, masses.
 //!
 //! `NOCTULE_SIEGE=full` runs each at the size of docs/RELIABILITY.md, otherwise at one that fits CI.
 
@@ -12,7 +12,7 @@ mod races;
 mod still;
 mod streams;
 
-/// Numbers that look random and are the same each time: `SplitMix64`.
+/// Reproducible pseudo-random numbers: `SplitMix64`.
 pub(crate) struct Dice(u64);
 
 impl Dice {
@@ -28,7 +28,7 @@ impl Dice {
         z ^ (z >> 31)
     }
 
-    /// From 0 to `n` - 1.
+    /// A number from 0 to `n` - 1.
     pub(crate) fn below(&mut self, n: usize) -> usize {
         usize::try_from(self.next() % n as u64).expect("less than n")
     }

@@ -1,4 +1,4 @@
-//! More than the queue takes, and asking at once for what was just accepted.
+//! More submissions than the queue holds, and reading plans immediately after acceptance.
 
 use axum::http::StatusCode;
 use futures_util::future::join_all;
@@ -9,7 +9,7 @@ use crate::support::scenario;
 use crate::support::server::Server;
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_thousand_more_than_there_is_room_for_are_a_thousand_refusals() {
+async fn every_submission_beyond_the_queue_limit_is_refused() {
     const QUEUE: usize = 50;
     let api = Api::with_queue(QUEUE);
     let mut running = Vec::new();
@@ -35,7 +35,7 @@ async fn a_thousand_more_than_there_is_room_for_are_a_thousand_refusals() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_was_accepted_is_there_at_once() {
+async fn an_accepted_plan_can_be_read_at_once() {
     let api = Api::new();
     let server = Server::start(&api).await;
     let client = Client::builder().no_proxy().build().expect("a client");

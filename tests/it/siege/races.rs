@@ -1,4 +1,4 @@
-//! Cancel against finish: one terminal state, and one `end`, whoever comes first.
+//! Cancel against finish: one final state and one `end`, whichever comes first.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::support::run;
 use crate::support::size::size;
 use crate::support::stores::{for_every_backend, on_every_backend};
 
-/// Races at the same time.
+/// Concurrent races.
 const LANES: usize = 16;
 
 async fn has_one_end(store: &dyn Store, id: PlanId) {
@@ -24,7 +24,7 @@ async fn has_one_end(store: &dyn Store, id: PlanId) {
     assert_eq!(told.last(), Some(&Event::End(plan.status)));
 }
 
-/// Which of the two is sent first, and how the run ends, change from race to race.
+/// How the run ends varies from race to race.
 fn finish_with(race: usize) -> Status {
     if race.is_multiple_of(3) {
         Status::Cancelled

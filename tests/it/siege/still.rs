@@ -1,4 +1,4 @@
-//! Connections on which nothing moves, by either version of HTTP: let go, but for streams of events.
+//! Idle connections, over either version of HTTP: closed, unless they carry an event stream.
 
 use std::path::Path;
 use std::time::Duration;
@@ -16,7 +16,7 @@ use crate::support::lives::waiting;
 use crate::support::patience::{eventually, in_time};
 use crate::support::process::Service;
 
-/// A service that lets go soon, and a plan that waits there.
+/// A service with short timeouts, and a plan that waits in its queue.
 async fn impatient(data_dir: &Path) -> (Service, String) {
     let limits = [
         "--http-head-timeout",
@@ -33,14 +33,14 @@ async fn impatient(data_dir: &Path) -> (Service, String) {
     (service, waiting)
 }
 
-/// A connection of HTTP/2, which answers pings and asks for nothing by itself.
+/// An HTTP/2 connection that answers pings and sends nothing else by itself.
 struct Http2 {
     sender: SendRequest<Empty<Bytes>>,
     until_closed: JoinHandle<hyper::Result<()>>,
 }
 
 impl Http2 {
-    /// Taking at most so many bytes of an answer before somebody reads them.
+    /// Accepts at most `window` bytes of a response until they are read.
     async fn new(service: &Service, window: u32) -> Self {
         let stream = TcpStream::connect(service.address())
             .await
@@ -62,10 +62,10 @@ impl Http2 {
         in_time(answer).await.expect("an answer")
     }
 
-    /// Nothing more is asked meanwhile.
+    /// Waits until the service closes it; sends nothing meanwhile.
     async fn closed(self) {
         let closed = in_time(self.until_closed).await;
-        // Whether it was told first or not.
+        // With or without a GOAWAY.
         let _ = closed.expect("no panic");
     }
 }
@@ -73,7 +73,7 @@ impl Http2 {
 const WINDOW: u32 = 65_535;
 
 #[tokio::test(flavor = "multi_thread")]
-async fn who_asks_for_nothing_more_is_let_go_and_a_stream_stays() {
+async fn idle_connections_are_closed_and_event_streams_stay_open() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let (service, waiting) = impatient(directory.path()).await;
     let events = format!("{waiting}/events");
@@ -81,7 +81,7 @@ async fn who_asks_for_nothing_more_is_let_go_and_a_stream_stays() {
     let second = following.get(service.url(&events)).await.into_body();
     let mut first = service.get(&events).send().await.expect("an answer");
 
-    // One after the other, so that the streams have stood still for much longer than is allowed.
+    // One after the other, so that the streams stay idle for much longer than the timeout.
     for _ in 0..3 {
         Http2::new(&service, WINDOW).await.closed().await;
         let mut asked = Http2::new(&service, WINDOW).await;
@@ -112,11 +112,11 @@ async fn who_asks_for_nothing_more_is_let_go_and_a_stream_stays() {
     following.closed().await;
 }
 
-/// The largest file of the page, so that much of it waits to be sent.
+/// The largest file of the page, so that much of it stays unsent.
 const LARGE: &str = "/page/vendor/three.js";
 
 #[tokio::test(flavor = "multi_thread")]
-async fn who_does_not_take_what_it_asked_for_is_let_go() {
+async fn a_caller_who_does_not_read_the_response_is_disconnected() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let (service, _) = impatient(directory.path()).await;
 
@@ -126,7 +126,7 @@ async fn who_does_not_take_what_it_asked_for_is_let_go() {
     let request = format!("GET {LARGE} HTTP/1.1\r\nhost: localhost\r\n\r\n");
     let requests = request.repeat(20);
     unread.write_all(requests.as_bytes()).await.expect("sent");
-    // What is said to a connection that is over is answered with a reset.
+    // Writing to a closed connection is answered with a reset.
     let said = tokio::sync::Mutex::new(unread);
     eventually(async || said.lock().await.write_all(b"\r\n").await.is_err()).await;
 
@@ -137,15 +137,15 @@ async fn who_does_not_take_what_it_asked_for_is_let_go() {
     drop(answer);
 }
 
-/// Who has asked for nothing does not get the time of those who have yet to take an answer.
+/// A caller who never completes a head is not granted the body timeout.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_head_that_never_ends_is_waited_for_no_longer_than_it_may_take() {
+async fn an_incomplete_head_is_closed_after_the_head_timeout() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let limits = ["--http-head-timeout", "1", "--http-body-timeout", "3600"];
     let service = Service::start(directory.path(), &limits);
     let asked = "GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\n";
     let half = "POST /plans HT";
-    // The first letter might begin the other version, too.
+    // The first letter could also begin HTTP/2.
     for (n_asked, alone) in [(0, 0), (1, 0), (2, 0), (0, 1)] {
         let mut stream = TcpStream::connect(service.address())
             .await

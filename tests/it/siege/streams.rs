@@ -1,4 +1,4 @@
-//! Readers of events: cut anywhere, many, and one who does not read.
+//! Event readers: cut anywhere, many at once, and one that never reads.
 
 use std::net::SocketAddr;
 
@@ -20,7 +20,7 @@ use crate::support::size::size;
 use crate::support::sse::{Stream, events};
 use crate::support::stores::{Backend, for_every_backend};
 
-/// A plan on a real port, whose run the test plays.
+/// A plan on a real port whose run the test controls.
 struct Plan {
     api: Api,
     server: Server,
@@ -46,7 +46,7 @@ impl Plan {
         }
     }
 
-    /// Run it, in batches of some events, until `n` iterations are told.
+    /// Runs the plan for `n` iterations, in batches of 20.
     async fn run(&self, n: usize) {
         let lease = self.api.store.claim().await.expect("it is queued");
         for first in (0..n).step_by(20) {
@@ -68,7 +68,7 @@ impl Plan {
         run::finish(&*self.api.store, &lease, Status::Succeeded).await;
     }
 
-    /// Read after event `after` until the end or until `bytes` have come, and let go of the connection.
+    /// Reads after event `after` until the end or until `bytes` have arrived, then drops the connection.
     async fn read(&self, query: &str, after: u64, bytes: usize) -> Vec<Told> {
         let request = self
             .client
@@ -87,10 +87,10 @@ impl Plan {
     }
 }
 
-/// An event, by its id and name.
+/// The id and name of an event.
 type Told = (u64, String);
 
-/// The whole events of a stream that may have been cut anywhere.
+/// The complete events of a stream that may have been cut anywhere.
 fn told(text: &[u8]) -> Vec<Told> {
     let whole = text
         .windows(2)
@@ -117,7 +117,7 @@ fn told(text: &[u8]) -> Vec<Told> {
     told
 }
 
-/// What `cuts` connections, each cut at a random byte, and a last one tell together.
+/// All events read over `cuts` connections, each cut at a random byte, and a final one.
 async fn read_with_cuts(plan: &Plan, query: &str, cuts: usize, dice: &mut Dice) -> Vec<Told> {
     let mut all: Vec<Told> = Vec::new();
     for cut in 0..=cuts {
@@ -136,7 +136,7 @@ async fn read_with_cuts(plan: &Plan, query: &str, cuts: usize, dice: &mut Dice) 
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_hundred_cuts_anywhere_lose_nothing_and_repeat_nothing() {
+async fn a_stream_cut_a_hundred_times_loses_and_repeats_nothing() {
     for_every_backend(async |backend| {
         let plan = Plan::on(backend).await;
         let mut dice = Dice::new(7);
@@ -149,7 +149,7 @@ async fn a_hundred_cuts_anywhere_lose_nothing_and_repeat_nothing() {
         assert_eq!(live.iter().filter(|(_, name)| name == "end").count(), 1);
         assert_eq!(live, plan.read("?rate=0", 0, usize::MAX).await);
 
-        // Of a thinned stream the same events, wherever it is cut.
+        // A thinned stream has the same events wherever it is cut.
         let whole = plan.read("?rate=20", 0, usize::MAX).await;
         assert!(whole.len() < live.len() / 2, "{} events", whole.len());
         for _ in 0..10 {
@@ -180,7 +180,7 @@ async fn five_hundred_readers_see_every_incumbent_and_one_end() {
     .await;
 }
 
-/// A reader who has asked for all events of a plan, and reads none.
+/// A reader that has requested all events of a plan and reads none.
 async fn stall(service: SocketAddr, plan: &str) -> TcpStream {
     let mut stalled = TcpStream::connect(service).await.expect("connected");
     let request = format!(
@@ -190,7 +190,7 @@ async fn stall(service: SocketAddr, plan: &str) -> TcpStream {
     stalled
 }
 
-/// What it finds when it reads after all.
+/// What it receives once it reads.
 async fn rest(stalled: &mut TcpStream) -> String {
     let mut text = Vec::new();
     let rest = in_time(stalled.read_to_end(&mut text)).await;
@@ -199,11 +199,11 @@ async fn rest(stalled: &mut TcpStream) -> String {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_reader_who_does_not_read_costs_the_others_nothing() {
+async fn a_stalled_reader_delays_no_other_and_loses_nothing() {
     let plan = Plan::new().await;
     let mut stalled = stall(plan.server.address, &plan.address).await;
 
-    // More than the buffers of a connection hold; nobody waits for the one who does not read.
+    // More than the buffers of a connection hold; nobody waits for the stalled reader.
     let all = async { tokio::join!(plan.read("?rate=0", 0, usize::MAX), plan.run(20_000)).0 };
     let others = in_time(all).await;
     assert_eq!(others.last().map(|(_, name)| name.as_str()), Some("end"));
@@ -220,9 +220,9 @@ async fn a_reader_who_does_not_read_costs_the_others_nothing() {
     );
 }
 
-/// Beside readers who follow a run of a minute from its beginning to its end.
+/// Alongside readers that follow a run from beginning to end; at full size it lasts a minute.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_reader_stalled_for_the_length_of_a_run_costs_the_others_nothing() {
+async fn a_reader_stalled_for_a_whole_run_delays_no_other_and_loses_nothing() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start(directory.path(), &["--workers", "1"]);
     let plan = service.submit(&a_run_of(size(1_000, 60_000))).await;

@@ -1,4 +1,4 @@
-//! Which datasets plans are planned over.
+//! Which datasets the kept plans use.
 
 use noctule::job::Submission;
 use noctule::store::{DatasetUse, Store};
@@ -27,7 +27,7 @@ async fn uses(store: &dyn Store) -> Vec<(String, u64, u64)> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn datasets_are_in_use_as_long_as_plans_are_kept() {
+async fn a_dataset_is_in_use_while_a_plan_over_it_is_kept() {
     on_every_backend(10, async |store| {
         assert_eq!(uses(&**store).await, []);
         store.submit(submission()).await.unwrap();
@@ -37,7 +37,7 @@ async fn datasets_are_in_use_as_long_as_plans_are_kept() {
         let named = |name: &str, active, plans| (name.to_owned(), active, plans);
         assert_eq!(uses(&**store).await, [named("a", 1, 1), named("b", 2, 2)]);
 
-        // Running is active, too; ended is not, whatever the end.
+        // A running plan counts as active, an ended one does not, however it ended.
         let lease = store.claim().await.unwrap();
         store.finish(&lease, failure().at(0)).await.unwrap();
         let lease = store.claim().await.unwrap();

@@ -1,4 +1,4 @@
-//! What is kept, and for how long.
+//! What is retained, and for how long.
 
 use noctule::job::{Event, PlanId, Status, Submission};
 use noctule::store::{Retention, SWEEP, Store, StoreError, TOMBSTONE_MS};
@@ -7,7 +7,7 @@ use crate::support::plans::{ending, failure, history, kind, point, submission};
 use crate::support::run::incumbent;
 use crate::support::stores::{Fixture, on_every_backend};
 
-/// Submit a plan and end it now.
+/// Submits a plan and ends it now.
 async fn ended(store: &Fixture) -> PlanId {
     store.submit(submission()).await.unwrap();
     let lease = store.claim().await.unwrap();
@@ -25,7 +25,7 @@ async fn kept(store: &dyn Store, ids: &[PlanId]) -> Vec<bool> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_plan_is_kept_for_its_time_from_its_end() {
+async fn a_plan_expires_its_retention_time_after_its_end() {
     on_every_backend(10, async |store| {
         store.retention = Retention {
             age_ms: Some(1_000),
@@ -55,7 +55,7 @@ async fn a_plan_is_kept_for_its_time_from_its_end() {
         store.pass_ms(TOMBSTONE_MS);
         assert_eq!(kind(store.get(done).await), Err("not found"));
 
-        // The promise of a time stands when the setting changes.
+        // An expiry time already promised stands when the setting changes.
         let promised = ended(store).await;
         store.retention = Retention::default();
         store.reopen().await;
@@ -68,14 +68,14 @@ async fn a_plan_is_kept_for_its_time_from_its_end() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn of_too_many_the_longest_ended_go() {
+async fn beyond_the_plan_limit_the_earliest_ended_plans_are_removed() {
     on_every_backend(1_000, async |store| {
         store.retention = Retention {
             plans: Some(3),
             ..Retention::default()
         };
         store.reopen().await;
-        // The order of the ends counts, not that of acceptance.
+        // The order of the ends counts, not the order of acceptance.
         let mut leases = Vec::new();
         for _ in 0..5 {
             store.submit(submission()).await.unwrap();
@@ -100,7 +100,7 @@ async fn of_too_many_the_longest_ended_go() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn of_too_many_bytes_the_longest_ended_go() {
+async fn beyond_the_byte_limit_the_earliest_ended_plans_are_removed() {
     on_every_backend(10, async |store| {
         store.retention = Retention::default();
         store.reopen().await;
@@ -127,7 +127,7 @@ async fn of_too_many_bytes_the_longest_ended_go() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn events_are_bytes_too_as_long_as_they_are_kept() {
+async fn kept_events_count_towards_the_byte_limit() {
     const LIMIT: u64 = 20_000;
     on_every_backend(10, async |store| {
         store.retention.bytes = Some(LIMIT);
@@ -150,7 +150,7 @@ async fn events_are_bytes_too_as_long_as_they_are_kept() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn of_steps_that_tell_much_the_newest_events_are_kept() {
+async fn the_newest_events_of_large_steps_are_kept() {
     on_every_backend(10, async |store| {
         store.events_kept = 100;
         store.reopen().await;
@@ -168,7 +168,7 @@ async fn of_steps_that_tell_much_the_newest_events_are_kept() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_sweep_is_short_and_goes_on_at_the_next() {
+async fn a_sweep_is_bounded_and_the_next_one_continues() {
     on_every_backend(10, async |store| {
         store.retention = Retention {
             plans: Some(0),
@@ -186,7 +186,7 @@ async fn a_sweep_is_short_and_goes_on_at_the_next() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn of_a_long_history_the_newest_events_are_kept() {
+async fn the_newest_events_of_a_long_history_are_kept() {
     on_every_backend(10, async |store| {
         store.events_kept = 20;
         store.reopen().await;
@@ -218,7 +218,7 @@ async fn of_a_long_history_the_newest_events_are_kept() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_best_route_of_the_present_run_is_kept() {
+async fn the_best_route_of_the_current_run_is_kept() {
     on_every_backend(10, async |store| {
         let id = store.submit(submission()).await.unwrap().plan.id;
         assert_eq!(store.incumbent(id).await.unwrap(), None);

@@ -1,4 +1,4 @@
-//! What every store does, whatever it is made of. Each test runs on each backend of the table.
+//! What every store guarantees. Each test runs on each backend of the table.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 

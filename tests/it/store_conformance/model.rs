@@ -1,4 +1,4 @@
-//! Random operations on a store and on a model of it in memory agree.
+//! A store and its in-memory model agree over random operations.
 
 use std::collections::BTreeSet;
 
@@ -14,7 +14,7 @@ use crate::support::stores::{BACKENDS, Fixture, Place};
 
 const QUEUE_LIMIT: usize = 4;
 
-/// Plans and leases are named by a number, taken modulo how many there are.
+/// Plans and leases are given by a number, taken modulo their count.
 #[derive(Debug, Clone)]
 enum Step {
     Submit,
@@ -24,7 +24,7 @@ enum Step {
     Release(usize),
     Cancel(usize),
     Delete(usize),
-    /// Where a plan stands; what is answered may come from what was read before.
+    /// Reads a plan's state; the answer may come from a cache.
     Look(usize),
     Sweep,
     Reopen,
@@ -51,7 +51,7 @@ fn step() -> impl Strategy<Value = Step> {
     ]
 }
 
-/// What the store should hold of a plan.
+/// What the store should hold about a plan.
 #[derive(Debug)]
 struct Expected {
     id: PlanId,
@@ -64,9 +64,9 @@ struct Expected {
 #[derive(Default)]
 struct Model {
     plans: Vec<Expected>,
-    /// Indices into `plans`; acceptance is their order.
+    /// Indices into `plans`, in order of acceptance.
     queue: BTreeSet<usize>,
-    /// Every lease there ever was, with its plan.
+    /// Every lease there has been, with its plan.
     leases: Vec<(usize, Lease)>,
 }
 
@@ -110,7 +110,7 @@ impl Model {
                     self.look(store, which % self.plans.len()).await;
                 }
             }
-            // Nothing expires on a clock that stands.
+            // Nothing expires while the clock stands still.
             Step::Sweep => assert_eq!(store.sweep(store.now_ms()).await.expect("it is open"), 0),
             Step::Reopen => {
                 store.reopen().await;

@@ -16,7 +16,7 @@ const ALL: ListQuery = ListQuery {
 };
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_accepted_plan_reads_back_as_it_was_handed_in() {
+async fn an_accepted_plan_reads_back_as_submitted() {
     on_every_backend(10, async |store| {
         let first = submission();
         store.submit(submission()).await.unwrap();
@@ -40,7 +40,7 @@ async fn an_accepted_plan_reads_back_as_it_was_handed_in() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn plans_run_in_the_order_of_acceptance() {
+async fn plans_are_claimed_in_the_order_of_acceptance() {
     on_every_backend(20, async |store| {
         let mut ids = Vec::new();
         for _ in 0..20 {
@@ -62,7 +62,7 @@ async fn plans_run_in_the_order_of_acceptance() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_queue_is_full_at_its_limit_and_has_room_after_a_claim() {
+async fn a_full_queue_refuses_and_a_claim_makes_room() {
     on_every_backend(3, async |store| {
         let tries = join_all((0..10).map(|_| store.submit(submission()))).await;
         let accepted = tries.into_iter().flatten().count();
@@ -73,7 +73,7 @@ async fn the_queue_is_full_at_its_limit_and_has_room_after_a_claim() {
         let lease = store.claim().await.unwrap();
         assert_eq!(kind(store.submit(submission()).await), Ok(()));
         assert_eq!(kind(store.submit(submission()).await), Err("queue full"));
-        // What comes back has been accepted already.
+        // A released plan has been accepted already.
         store.release(&lease).await.unwrap();
         assert_eq!(store.stats().await.unwrap().queued, 4);
         store.request_cancel(lease.plan.id, 0).await.unwrap();
@@ -97,7 +97,7 @@ async fn an_early_lease_runs_its_plan() {
         let second = store.submit(submission()).await.unwrap().plan.id;
         let leases = [waiting.await.unwrap(), store.claim_early().await.unwrap()];
         assert_eq!(leases.clone().map(|lease| lease.plan.id), [first, second]);
-        // What comes next finds the claim, however late it became durable.
+        // Later operations find the claim even if it was made durable late.
         store
             .append(&leases[0], vec![point(1, None)])
             .await
@@ -140,19 +140,19 @@ async fn a_claim_waits_for_a_plan() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_dropped_claim_takes_nothing() {
+async fn a_dropped_claim_takes_no_plan() {
     on_every_backend(10, async |store| {
-        // Dropped while it waits.
+        // Dropped while waiting.
         let mut waiting = Box::pin(store.claim());
         assert!(waiting.as_mut().now_or_never().is_none());
         drop(waiting);
         let id = store.submit(submission()).await.unwrap().plan.id;
         assert_eq!(store.get(id).await.unwrap().status, Status::Queued);
 
-        // Dropped at any time after it has been sent, its answer on the way or already there.
+        // Dropped at any time after it was sent, with its answer on the way or already there.
         for round in 0..50 {
             let mut claim = Box::pin(store.claim());
-            // Whose answer is there at once has the plan, and gives it back.
+            // A claim that is answered at once holds the plan and gives it back.
             if let Some(lease) = claim.as_mut().now_or_never() {
                 store.release(&lease.unwrap()).await.unwrap();
             } else if round % 2 == 0 {
@@ -169,7 +169,7 @@ async fn a_dropped_claim_takes_nothing() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_dropped_submission_is_still_told_to_claimers_and_followers() {
+async fn a_dropped_submission_still_reaches_claimers_and_followers() {
     on_every_backend(10, async |store| {
         let submission = submission();
         let id = submission.id;
@@ -184,7 +184,7 @@ async fn a_dropped_submission_is_still_told_to_claimers_and_followers() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_released_plan_is_next_and_begins_anew() {
+async fn a_released_plan_keeps_its_place_and_starts_over() {
     on_every_backend(10, async |store| {
         let ids = [
             store.submit(submission()).await.unwrap().plan.id,

@@ -1,4 +1,4 @@
-//! Submissions that come again, and owners.
+//! Repeated submissions, quotas, and lists by owner.
 
 use futures_util::future::join_all;
 use noctule::job::{Idempotency, Submission};
@@ -34,7 +34,7 @@ async fn the_same_key_and_body_get_the_same_plan() {
             (0..100).map(|nth| store.submit(if nth == 50 { first.clone() } else { again() })),
         )
         .await;
-        // A full queue does not stop a repetition.
+        // A full queue does not refuse a repetition.
         let answers: Vec<_> = tries.into_iter().map(Result::unwrap).collect();
         assert_eq!(answers.iter().filter(|answer| !answer.replayed).count(), 1);
         let id = answers[0].plan.id;
@@ -54,7 +54,7 @@ async fn the_same_key_and_body_get_the_same_plan() {
         assert_eq!(kind(store.submit(other_body).await), Err("key reused"));
         assert_eq!(kind(store.submit(other_owner).await), Err("queue full"));
 
-        // What is told is how the plan stands now, by whoever opens the store.
+        // A repetition returns the plan's current state, also after reopening.
         let lease = store.claim().await.unwrap();
         assert_eq!(lease.plan.id, id);
         store.reopen().await;
@@ -71,7 +71,7 @@ async fn the_same_key_and_body_get_the_same_plan() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_key_is_remembered_for_a_day() {
+async fn an_idempotency_key_is_remembered_for_a_day() {
     on_every_backend(10, async |store| {
         let again = || with_key(submission(), "k", "body");
         let first = store.submit(again()).await.unwrap().plan.id;
@@ -102,7 +102,7 @@ async fn a_refused_submission_leaves_its_key_free() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_owner_has_so_many_active_plans_and_no_more() {
+async fn an_owner_cannot_exceed_its_quota_of_active_plans() {
     on_every_backend(100, async |store| {
         let limited = |owner: &str| Submission {
             quota: Some(2),
@@ -125,7 +125,7 @@ async fn an_owner_has_so_many_active_plans_and_no_more() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_list_may_be_one_owners() {
+async fn plans_can_be_listed_by_owner() {
     on_every_backend(100, async |store| {
         for owner in ["alice", "bob", "alice"] {
             store.submit(of(owner)).await.unwrap();

@@ -1,4 +1,4 @@
-//! Ends of plans that are to be told.
+//! Webhooks: ends of plans that are due to be sent.
 
 use noctule::job::{Status, Submission};
 use noctule::store::Webhook;
@@ -13,7 +13,7 @@ fn with_webhook(url: &str) -> Submission {
     }
 }
 
-/// Whose end is due by `now_ms`, where to, and after how many tries.
+/// URL and number of tries of each due webhook.
 fn told(due: &[Webhook]) -> Vec<(&str, u32)> {
     due.iter()
         .map(|due| (due.url.as_str(), due.tries))
@@ -21,7 +21,7 @@ fn told(due: &[Webhook]) -> Vec<(&str, u32)> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_end_is_due_at_once_and_after_a_restart() {
+async fn a_webhook_is_due_at_the_end_and_after_a_restart() {
     on_every_backend(10, async |store| {
         let first = store.submit(with_webhook("a")).await.unwrap().plan.id;
         let second = store.submit(with_webhook("b")).await.unwrap().plan.id;
@@ -38,7 +38,7 @@ async fn an_end_is_due_at_once_and_after_a_restart() {
         assert_eq!(told(&due), [("a", 0)]);
         assert_eq!(due[0].plan, ended);
 
-        // However a plan ends; the longest due comes first.
+        // Any kind of end is due; the one due longest comes first.
         store.request_cancel(second, 11_000).await.unwrap();
         store.reopen().await;
         let due = store.due_webhooks(12_000, 10).await.unwrap();
@@ -49,7 +49,7 @@ async fn an_end_is_due_at_once_and_after_a_restart() {
             [("b", 0)]
         );
 
-        // The third one's is nobody's to tell.
+        // The third plan has no webhook.
         let lease = store.claim().await.unwrap();
         store.finish(&lease, failure().at(12_000)).await.unwrap();
         assert_eq!(store.due_webhooks(i64::MAX, 10).await.unwrap().len(), 2);
@@ -68,7 +68,7 @@ async fn an_end_is_due_at_once_and_after_a_restart() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_plan_that_runs_again_ends_once_and_a_deleted_one_tells_nothing() {
+async fn a_rerun_plan_has_one_webhook_and_a_deleted_plan_has_none() {
     on_every_backend(10, async |store| {
         let id = store.submit(with_webhook("a")).await.unwrap().plan.id;
         let lost = store.claim().await.unwrap();

@@ -1,4 +1,4 @@
-//! The service without a socket, over a store of its own. Each answer is held to `openapi.yaml`.
+//! The service without a socket, over a store of its own. Every response is checked against `openapi.yaml`.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -36,7 +36,7 @@ pub(crate) struct Api {
     place: Place,
 }
 
-/// An answer, read to its end.
+/// A complete response.
 #[derive(Debug)]
 pub(crate) struct Answer {
     pub(crate) status: StatusCode,
@@ -60,7 +60,7 @@ impl Api {
         Self::made(options, Access::new(None, Settings::default()), &[])
     }
 
-    /// Over a store of this kind.
+    /// Over a store of the given kind.
     pub(crate) async fn on(backend: Backend, options: Options) -> Self {
         let place = Place::new(backend);
         let queue = options.queue_limit;
@@ -69,7 +69,7 @@ impl Api {
         Self::over(store, place, queue, access, &[])
     }
 
-    /// Over a store of this kind, where it is what `clock` says.
+    /// Over a store of the given kind, on the given clock.
     pub(crate) async fn by_clock(
         backend: Backend,
         clock: Arc<SteadyClock>,
@@ -85,24 +85,24 @@ impl Api {
         api
     }
 
-    /// For holders of keys alone.
+    /// For callers with keys only.
     pub(crate) fn with_keys(keys: &str) -> Self {
         Self::with_access(keys, Settings::default())
     }
 
-    /// The same with other settings.
+    /// The same with other access settings.
     pub(crate) fn with_access(keys: &str, settings: Settings) -> Self {
         let keys = Keys::read(keys).expect("keys");
         Self::made(Options::new(1000), Access::new(Some(keys), settings), &[])
     }
 
-    /// For pages of these origins.
+    /// Open to pages of these origins.
     pub(crate) fn with_origins(origins: &[&str]) -> Self {
         let access = Access::new(None, Settings::default());
         Self::made(Options::new(1000), access, origins)
     }
 
-    /// Which tells ends of plans.
+    /// Sends webhooks.
     pub(crate) fn with_webhooks(settings: webhook::Settings) -> Self {
         let mut api = Self::new();
         api.state.webhooks = Some(settings);
@@ -110,10 +110,10 @@ impl Api {
         api
     }
 
-    /// Whose datasets are kept otherwise: the function is given the directory for uploads.
+    /// With another catalogue of datasets: the function is given the directory for uploads.
     pub(crate) fn with_catalogue(open: impl FnOnce(PathBuf) -> Directories) -> Self {
         let mut api = Self::new();
-        // A directory of its own: the first one is taken.
+        // A separate directory: the first one is in use.
         let catalogue = Arc::new(open(api.place.path().join("more")));
         let rules = (*api.state.rules).clone().with_datasets(catalogue.clone());
         api.state.rules = Arc::new(rules);
@@ -179,7 +179,7 @@ impl Api {
         }
     }
 
-    /// Send a request with headers out of `(name, value)` pairs.
+    /// Sends a request with `(name, value)` pairs as headers.
     pub(crate) async fn send(
         &self,
         method: Method,
@@ -233,7 +233,7 @@ impl Api {
         self.send(Method::DELETE, uri, &[], Body::empty()).await
     }
 
-    /// Post the small scenario; its address.
+    /// Submits the small scenario; the plan's address.
     pub(crate) async fn submit(&self) -> String {
         let answer = self.post("/plans", &super::scenario()).await;
         assert_eq!(answer.status, 202, "{answer:?}");
@@ -254,7 +254,7 @@ impl Answer {
         value.to_str().expect("visible ASCII")
     }
 
-    /// Panics unless it is a problem of that kind.
+    /// Panics unless the response is a problem of that kind.
     #[track_caller]
     pub(crate) fn expect_problem(&self, status: u16, slug: &str) -> Value {
         assert_eq!(self.status, status, "{self:?}");

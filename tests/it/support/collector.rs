@@ -1,4 +1,4 @@
-//! An OpenTelemetry collector: takes traces, and keeps what it took.
+//! An OpenTelemetry collector that keeps the traces it receives.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, channel};
 
 use serde_json::Value;
 
-/// A document that was posted.
+/// A document that was posted to it.
 pub(crate) struct Taken {
     pub(crate) path: String,
     /// Lines `name: value`.
@@ -35,7 +35,7 @@ impl Collector {
         Self { address, taken }
     }
 
-    /// What has been posted.
+    /// Everything posted so far.
     pub(crate) fn taken(&self) -> Vec<Taken> {
         self.taken.try_iter().collect()
     }

@@ -1,4 +1,4 @@
-//! `openapi.yaml`, and whether an answer is one that it describes.
+//! `openapi.yaml`, and whether a response matches it.
 
 use std::collections::HashMap;
 use std::io::Read as _;
@@ -8,12 +8,12 @@ use axum::http::{HeaderMap, Method, StatusCode};
 use jsonschema::Validator;
 use serde_json::{Value, json};
 
-/// The description that the service serves.
+/// The description served by the service.
 pub(crate) static DESCRIPTION: LazyLock<Value> = LazyLock::new(|| {
     serde_yaml_ng::from_str(include_str!("../../../openapi.yaml")).expect("well-formed YAML")
 });
 
-/// Follow `$ref`s within the description.
+/// Follows `$ref`s within the description.
 pub(crate) fn resolve(node: &'static Value) -> &'static Value {
     match node.get("$ref").and_then(Value::as_str) {
         Some(reference) => {
@@ -28,7 +28,7 @@ pub(crate) fn resolve(node: &'static Value) -> &'static Value {
     }
 }
 
-/// The described path that `path` is an instance of.
+/// The described path that matches `path`.
 pub(crate) fn template(path: &str) -> Option<&'static str> {
     let paths = DESCRIPTION["paths"].as_object().expect("paths");
     let matches = |template: &str| {
@@ -45,7 +45,7 @@ pub(crate) fn template(path: &str) -> Option<&'static str> {
         .find(|template| matches(template))
 }
 
-/// Panics unless the description knows such an answer.
+/// Panics unless the description allows this response.
 pub(crate) fn check(
     method: &Method,
     path: &str,
@@ -66,7 +66,7 @@ pub(crate) fn check(
     };
     let operation = template(path).and_then(|template| DESCRIPTION["paths"][template].get(&name));
     let Some(operation) = operation else {
-        // 400 is for a key in the address.
+        // 400 is for a key in the URL.
         let known = [400, 404, 405].contains(&status.as_u16());
         assert!(known, "{place} is not described");
         if method != Method::HEAD {
@@ -91,7 +91,7 @@ pub(crate) fn check(
     }
 }
 
-/// As it was before it was packed for the way; what brotli packed is no document, and left as it is.
+/// The body without gzip; a brotli body is no document and is left as it is.
 fn plain(headers: &HeaderMap, body: &[u8]) -> Vec<u8> {
     let mut plain = Vec::new();
     if headers
@@ -108,8 +108,8 @@ fn plain(headers: &HeaderMap, body: &[u8]) -> Vec<u8> {
 }
 
 fn check_headers(response: &Value, headers: &HeaderMap, place: &str) {
-    // Every answer has these, or every answer to the holder of a limited key or to a page from
-    // elsewhere, or transport adds them.
+    // Headers that every response has, that every response to a limited key or a cross-origin page has, or that
+    // transport adds.
     const COMMON: [&str; 16] = [
         "access-control-allow-origin",
         "access-control-expose-headers",
@@ -163,7 +163,7 @@ fn parse(body: &[u8], place: &str) -> Value {
     serde_json::from_slice(body).unwrap_or_else(|error| panic!("{place}: {error}"))
 }
 
-/// Panics unless `instance` is as `schema` says, references taken from the description.
+/// Panics unless `instance` matches `schema`, with references resolved within the description.
 pub(crate) fn check_schema(schema: &Value, instance: &Value, place: &str) {
     let faults: Vec<String> = validator(schema)
         .iter_errors(instance)
@@ -172,7 +172,7 @@ pub(crate) fn check_schema(schema: &Value, instance: &Value, place: &str) {
     assert!(faults.is_empty(), "{place}: {faults:#?}\n{instance:#}");
 }
 
-/// Compiled once for each schema.
+/// Each schema is compiled once.
 fn validator(schema: &Value) -> Arc<Validator> {
     static COMPILED: LazyLock<Mutex<HashMap<String, Arc<Validator>>>> =
         LazyLock::new(Mutex::default);

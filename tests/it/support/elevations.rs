@@ -1,8 +1,8 @@
-//! Files of elevations, made for a test.
+//! Elevation files made for a test.
 
 use std::io::{self, Write};
 
-/// An ESRI ASCII grid: `elevation` of column and row, both from the south-west.
+/// An ESRI ASCII grid; `elevation` takes column and row, both from the south-west.
 pub(crate) fn ascii_grid(
     [columns, rows]: [usize; 2],
     [west, south]: [f64; 2],
@@ -22,8 +22,8 @@ pub(crate) fn ascii_grid(
     text
 }
 
-/// A plain `GeoTIFF` of 16-bit integers in EPSG:4326, one strip, as large as it needs to be: it is
-/// written row by row. `elevation` is of column and row from the north-west.
+/// A plain `GeoTIFF` of 16-bit integers in EPSG:4326 with one strip, written row by row so that it can be any
+/// size. `elevation` takes column and row from the north-west.
 pub(crate) fn write_tiff(
     out: &mut impl Write,
     [columns, rows]: [u32; 2],
@@ -35,7 +35,7 @@ pub(crate) fn write_tiff(
     const SHORT: u16 = 3;
     const LONG: u16 = 4;
     const DOUBLE: u16 = 12;
-    // The directory, then what does not fit into it, then the samples.
+    // The directory, then values that do not fit into it, then the samples.
     let beyond = 8 + 2 + 12 * u32::from(N_TAGS) + 4;
     let (scale, tie, keys) = (beyond, beyond + 24, beyond + 72);
     let samples = keys + 32;
@@ -66,7 +66,7 @@ pub(crate) fn write_tiff(
     for number in [cell, cell, 0.0, 0.0, 0.0, 0.0, west, north, 0.0] {
         head.extend(number.to_le_bytes());
     }
-    // Three keys: geographic, pixels are points, EPSG:4326.
+    // Three keys: geographic model, pixel is point, EPSG:4326.
     for key in [
         1, 1, 0, 3, 1024, 0, 1, 2, 1025, 0, 1, 2, 2048, 0, 1, 4326_u16,
     ] {

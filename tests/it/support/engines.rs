@@ -1,4 +1,4 @@
-//! Engines that do as the test says.
+//! Engines controlled by the test.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use noctule::planner::{
 use noctule::scenario::Frame;
 use noctule::worker::{Engine, Unplanned};
 
-/// Wraps a function as an engine that plans or fails.
+/// Wraps a function as an engine that either plans or fails.
 pub(crate) fn engine(
     plan: impl Fn(&str, &mut dyn Observer, &dyn Stop) -> Result<Outcome, Failure>
     + Send
@@ -23,8 +23,8 @@ pub(crate) fn engine(
     })
 }
 
-/// An engine that runs `iterations` and finds a better route in each third; its figures are drawn
-/// from the document alone.
+/// An engine that runs `iterations` and finds a better route in every third one; its figures depend only on the
+/// document.
 pub(crate) fn deterministic(iterations: usize) -> Engine {
     engine(move |scenario, observer, stop| Ok(search(scenario, iterations, observer, stop)))
 }
@@ -52,7 +52,7 @@ fn search(
         }
         let point = point(iteration, cost);
         observer.iteration(&point);
-        // The endless one keeps no endless curve.
+        // The endless one keeps only its first point.
         if iterations < usize::MAX || convergence.is_empty() {
             convergence.push(point);
         }

@@ -1,4 +1,4 @@
-//! A store that fails at every other step of a run or of a webhook, and is sound otherwise.
+//! A store that fails at every other step of a run or a webhook, and works otherwise.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -26,7 +26,7 @@ impl FaultyStore {
         }
     }
 
-    /// Which breaks where the other one fails.
+    /// Panics where the other one fails.
     pub(crate) fn that_panics(sound: Arc<dyn Store>) -> Self {
         Self {
             panics: true,
@@ -34,7 +34,7 @@ impl FaultyStore {
         }
     }
 
-    /// Fails for the first, third, fifth caller and so on.
+    /// Fails for the first, third, fifth, ... caller.
     fn stumble(&self) -> Result<(), StoreError> {
         match self.steps.fetch_add(1, Ordering::SeqCst) % 2 {
             0 if self.panics => panic!("as it shall"),

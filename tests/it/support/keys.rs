@@ -5,18 +5,18 @@ use noctule::digest::sha256_hex;
 
 use super::api::{Answer, Api};
 
-/// The entry of a key that is called `name` and is `secret`; `more` are further lines.
+/// The entry of a key named `name` with the secret `secret`; `more` are further lines.
 pub(crate) fn entry(name: &str, secret: &str, scope: &str, more: &str) -> String {
     let sum = sha256_hex(secret.as_bytes());
     format!("[[key]]\nname = {name:?}\nsha256 = \"{sum}\"\nscopes = [{scope:?}]\n{more}\n")
 }
 
-/// What goes into `Authorization`.
+/// The value of the `Authorization` header.
 pub(crate) fn bearer(secret: &str) -> String {
     format!("Bearer {secret}")
 }
 
-/// Send a request with a key.
+/// Sends a request with a key.
 pub(crate) async fn send(api: &Api, secret: &str, request: &str) -> Answer {
     let (method, uri) = request.split_once(' ').expect("a method and a path");
     let method: Method = method.parse().expect("a method");
@@ -25,7 +25,7 @@ pub(crate) async fn send(api: &Api, secret: &str, request: &str) -> Answer {
         .await
 }
 
-/// Post the small scenario with a key.
+/// Submits the small scenario with a key.
 pub(crate) async fn post(api: &Api, secret: &str) -> Answer {
     let bearer = bearer(secret);
     let headers = [

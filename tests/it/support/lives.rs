@@ -1,4 +1,4 @@
-//! Lives of plans in the real program, followed as a caller would.
+//! Plans in the real program, followed from submission to end as a caller would.
 
 use serde_json::Value;
 
@@ -6,14 +6,14 @@ use super::process::Service;
 use super::scenario;
 use super::sse::{Block, Stream, events};
 
-/// A plan that runs for so long, wherever it runs: its iterations alone would take minutes.
+/// A plan that runs for `ms` on any machine: its iterations alone would take minutes.
 pub(crate) fn a_run_of(ms: u64) -> Value {
     let mut scenario = a_plan(4_000, 100_000, 7);
     scenario["planner"]["time_limit_ms"] = ms.into();
     scenario
 }
 
-/// A plan of so many bats and iterations.
+/// A plan with the given population and number of iterations.
 pub(crate) fn a_plan(population: u64, iterations: u64, seed: usize) -> Value {
     let mut scenario = scenario();
     scenario["planner"]["population"] = population.into();
@@ -22,25 +22,25 @@ pub(crate) fn a_plan(population: u64, iterations: u64, seed: usize) -> Value {
     scenario
 }
 
-/// A plan that waits behind one that lasts, where there is one worker; its address.
+/// A plan that waits behind a long one when there is one worker; its address.
 pub(crate) async fn waiting(service: &Service) -> String {
     service.submit(&a_plan(10_000, 30_000, 7)).await;
     service.submit(&scenario()).await
 }
 
-/// Read until the plan is running.
+/// Reads until the plan is running.
 pub(crate) async fn running(service: &Service, address: &str) -> Stream {
     running_at(service, address, 10.0).await
 }
 
-/// The same, told so many points a second.
+/// The same, with at most `rate_hz` points a second.
 pub(crate) async fn running_at(service: &Service, address: &str, rate_hz: f64) -> Stream {
     let mut stream = Stream::open(service.get(&format!("{address}/events?rate={rate_hz}"))).await;
     await_run(&mut stream).await;
     stream
 }
 
-/// Read on until the plan's next run begins.
+/// Reads until the plan's next run starts.
 pub(crate) async fn await_run(stream: &mut Stream) {
     loop {
         match stream.next().await.expect("it has not ended").status() {
@@ -50,7 +50,7 @@ pub(crate) async fn await_run(stream: &mut Stream) {
     }
 }
 
-/// The statuses of a plan that has ended, which it did once.
+/// The statuses of a plan, which must have ended exactly once.
 pub(crate) async fn life(service: &Service, address: &str) -> Vec<String> {
     let stream = Stream::open(service.get(&format!("{address}/events?rate=1"))).await;
     let blocks = stream.rest().await;

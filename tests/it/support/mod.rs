@@ -1,4 +1,4 @@
-//! What several subjects need: a service over a fresh store, and hands to play the worker with.
+//! Shared by several subjects: a service over a fresh store, and helpers to play the worker.
 
 pub(crate) mod api;
 pub(crate) mod collector;
@@ -22,7 +22,7 @@ pub(crate) mod wire;
 
 use serde_json::{Value, json};
 
-/// A small scenario that can be planned in no time.
+/// A small scenario that is planned almost instantly.
 pub(crate) fn scenario() -> Value {
     json!({
         "name": "two radars",

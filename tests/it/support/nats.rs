@@ -1,8 +1,8 @@
-//! Real NATS servers on this machine: one that all tests share, and clusters to break.
+//! Real NATS servers on this machine: one shared by all tests, and clusters to break.
 //!
-//! The program is `NATS_SERVER_BIN`, or what `tests/nats/install` has installed, or `nats-server` on the
-//! `PATH`. Each server has a guardian, a
-//! shell that kills it and removes its files as soon as the tests' process is gone, however it went.
+//! The program is `NATS_SERVER_BIN`, what `tests/nats/install` has installed, or `nats-server` on the `PATH`.
+//! Each server has a guardian: a shell that kills it and removes its files as soon as the tests' process is
+//! gone, however it ended.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
@@ -13,12 +13,13 @@ use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
+use tokio::sync::{Mutex, MutexGuard};
 use uuid::Uuid;
 
-use super::patience::PATIENCE;
+use super::patience::{PATIENCE, in_time};
 
-/// Says the server's process id, waits for a line, and kills. Without a line whoever asked for the
-/// server is gone, and what the server wrote goes too.
+/// Prints the server's process id, waits for a line, and kills the server. If the pipe closes without a line,
+/// the tests' process is gone, and the server's files are removed too.
 const GUARDIAN: &str = r#"
 "$0" --config "$1/server.conf" >>"$1/log" 2>&1 &
 echo $!
@@ -28,12 +29,12 @@ wait
 [ -n "$line" ] || rm -rf "$1"
 "#;
 
-/// The server that every test shares, each in a namespace of its own. What it acknowledges is on the disk.
+/// The server shared by all tests, each in its own namespace. It acknowledges only what is on the disk.
 static SHARED: LazyLock<NatsServer> = LazyLock::new(NatsServer::start);
 
-/// The address of a namespace on the shared server that nobody else uses.
+/// The address of an unused namespace on the shared server.
 pub(crate) fn address() -> String {
-    // Who cannot have one shall hear why, each time.
+    // Without a server program every test reports why, not only the first.
     program();
     address_on(&[&SHARED])
 }
@@ -43,7 +44,7 @@ fn address_on(servers: &[&NatsServer]) -> String {
     format!("nats://{}/{}", hosts.join(","), Uuid::new_v4().simple())
 }
 
-/// One server, on the same ports and files as often as it is started.
+/// One server; each start uses the same ports and files.
 pub(crate) struct NatsServer {
     directory: TempDir,
     port: u16,
@@ -51,7 +52,7 @@ pub(crate) struct NatsServer {
     running: Option<Running>,
 }
 
-/// Its process.
+/// The server's process.
 struct Running {
     guardian: Child,
     orders: ChildStdin,
@@ -59,14 +60,14 @@ struct Running {
 }
 
 impl NatsServer {
-    /// Alone; returns when it can be used.
+    /// A single server; returns when it is ready.
     pub(crate) fn start() -> Self {
         let mut server = Self::new("", "sync_interval: always");
         server.restart();
         server
     }
 
-    /// One that keeps nothing.
+    /// A server without `JetStream`, which stores nothing.
     pub(crate) fn without_jetstream() -> Self {
         let mut server = Self::new("", "enabled: false");
         server.launch();
@@ -74,7 +75,7 @@ impl NatsServer {
         server
     }
 
-    /// Neither started nor alone, perhaps.
+    /// Not started yet; `cluster` may make it part of a cluster.
     fn new(cluster: &str, storage: &str) -> Self {
         let directory = TempDir::new().expect("a temporary directory");
         let (port, monitor) = (free_port(), free_port());
@@ -92,22 +93,22 @@ impl NatsServer {
         }
     }
 
-    /// Where clients find it.
+    /// The host and port for clients.
     pub(crate) fn host(&self) -> String {
         format!("127.0.0.1:{}", self.port)
     }
 
-    /// The address of a namespace that nobody else uses.
+    /// The address of an unused namespace.
     pub(crate) fn address(&self) -> String {
         address_on(&[self])
     }
 
-    /// How it calls itself.
+    /// The server's name.
     pub(crate) fn name(&self) -> String {
         format!("n{}", self.port)
     }
 
-    /// Start it again, over what it wrote before; returns when it can be used.
+    /// Starts it again over its files; returns when it is ready.
     pub(crate) fn restart(&mut self) {
         self.launch();
         self.wait("/healthz?js-enabled-only=true");
@@ -118,7 +119,7 @@ impl NatsServer {
         let mut guardian = Command::new("sh")
             .args(["-c", GUARDIAN, program()])
             .arg(self.directory.path())
-            // What is typed at the tests' terminal is none of its business.
+            // Input from the tests' terminal must not reach it.
             .process_group(0)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -136,7 +137,7 @@ impl NatsServer {
         });
     }
 
-    /// Wait until `path` of its monitor says that all is well.
+    /// Waits until `path` of its monitor reports success.
     fn wait(&self, path: &str) {
         let until = Instant::now() + PATIENCE;
         while !well(self.monitor, path) {
@@ -146,19 +147,19 @@ impl NatsServer {
         }
     }
 
-    /// Kill it as a power cut would; what it wrote stays.
+    /// Kills it as a power cut would; its files stay.
     pub(crate) fn kill(&mut self) {
         let mut running = self.running.take().expect("it runs");
         running.orders.write_all(b"keep\n").expect("heard");
         running.guardian.wait().expect("reaped");
     }
 
-    /// Stop it in the middle of whatever it does, until [`NatsServer::resume`].
+    /// Pauses it in the middle of whatever it does, until [`NatsServer::resume`].
     pub(crate) fn pause(&self) {
         self.signal("STOP");
     }
 
-    /// Let it go on.
+    /// Lets it continue.
     pub(crate) fn resume(&self) {
         self.signal("CONT");
     }
@@ -179,20 +180,26 @@ impl Drop for NatsServer {
                 ..
             } = running;
             drop(orders);
-            // Fails when it has been reaped already.
+            // Fails if it has been reaped already.
             let _ = guardian.wait();
         }
     }
 }
 
-/// Three servers that keep three copies of everything.
+/// Three servers that keep three replicas of everything.
+///
+/// One cluster runs at a time: two at once would take up the whole machine.
 pub(crate) struct Cluster {
     pub(crate) servers: Vec<NatsServer>,
+    /// Dropped last: the next cluster starts when these servers are gone.
+    _turn: MutexGuard<'static, ()>,
 }
 
 impl Cluster {
-    /// Returns when they have found one another.
-    pub(crate) fn start() -> Self {
+    /// Waits until no other test has a cluster; returns when the servers are connected to one another.
+    pub(crate) async fn start() -> Self {
+        static TURN: Mutex<()> = Mutex::const_new(());
+        let turn = TURN.lock().await;
         let ports = [free_port(), free_port(), free_port()];
         let routes = ports.map(|port| format!("\"nats-route://127.0.0.1:{port}\""));
         let routes = routes.join(", ");
@@ -207,40 +214,46 @@ impl Cluster {
         for server in &servers {
             server.wait("/healthz");
         }
-        Self { servers }
+        Self {
+            servers,
+            _turn: turn,
+        }
     }
 
-    /// Which of them leads the plans of an address.
+    /// The server that leads the plans of an address.
     pub(crate) async fn leader(&self, address: &str) -> usize {
         self.leader_of(&format!("{}-plans", namespace(address)))
             .await
     }
 
-    /// Which of them leads a stream.
+    /// The server that leads a stream.
     pub(crate) async fn leader_of(&self, stream: &str) -> usize {
         let hosts: Vec<_> = self.servers.iter().map(NatsServer::host).collect();
         let client = async_nats::connect(hosts).await.expect("connected");
         let context = async_nats::jetstream::new(client);
-        loop {
-            if let Ok(mut stream) = context.get_stream(stream).await
-                && let Ok(info) = stream.info().await
-                && let Some(leader) = info.cluster.as_ref().and_then(|one| one.leader.clone())
-                && let Some(found) = self.servers.iter().position(|one| one.name() == leader)
-                && self.servers[found].running.is_some()
-            {
-                return found;
+        let elected = async {
+            loop {
+                if let Ok(mut stream) = context.get_stream(stream).await
+                    && let Ok(info) = stream.info().await
+                    && let Some(leader) = info.cluster.as_ref().and_then(|one| one.leader.clone())
+                    && let Some(found) = self.servers.iter().position(|one| one.name() == leader)
+                    && self.servers[found].running.is_some()
+                {
+                    return found;
+                }
+                tokio::time::sleep(Duration::from_millis(50)).await;
             }
-            tokio::time::sleep(Duration::from_millis(50)).await;
-        }
+        };
+        in_time(elected).await
     }
 
-    /// The address of a namespace that nobody else uses, by way of any of them.
+    /// The address of an unused namespace, reachable through any of the servers.
     pub(crate) fn address(&self) -> String {
         address_on(&self.servers.iter().collect::<Vec<_>>())
     }
 }
 
-/// Which program the servers are.
+/// The server program.
 fn program() -> &'static str {
     static PROGRAM: LazyLock<Option<String>> = LazyLock::new(|| {
         let installed = concat!(
@@ -263,7 +276,7 @@ fn program() -> &'static str {
     )
 }
 
-/// A port that nobody listens on, beneath those that the system hands out: nobody gets it by chance
+/// A port that nothing listens on, below the range that the system assigns: no other program gets it by chance
 /// while its server is down.
 fn free_port() -> u16 {
     static NEXT: LazyLock<AtomicU16> =

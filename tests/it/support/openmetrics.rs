@@ -1,18 +1,18 @@
-//! What `GET /metrics` answers, read as strictly as the format is written down.
+//! The response of `GET /metrics`, parsed as strictly as the format specifies.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The metrics of one reading.
+/// The metrics of one response.
 #[derive(Debug)]
 pub(crate) struct Reading {
     /// Names of families, with their types.
     pub(crate) families: BTreeMap<String, String>,
-    /// Series as they are written, `name{label="value"}`, with their values.
+    /// Series as written, `name{label="value"}`, with their values.
     pub(crate) series: BTreeMap<String, f64>,
 }
 
 impl Reading {
-    /// Panics at the first line that is not as `OpenMetrics` says.
+    /// Panics at the first line that is not valid `OpenMetrics`.
     pub(crate) fn read(text: &str) -> Self {
         let mut lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.pop(), Some("# EOF"), "the end is marked");
@@ -58,7 +58,7 @@ impl Reading {
         names.collect()
     }
 
-    /// Buckets grow, and the last holds all.
+    /// Bucket counts must not decrease, and the last one must equal the total.
     fn check_histograms(&self) {
         for (family, _) in self
             .families
@@ -87,7 +87,7 @@ impl Reading {
     }
 }
 
-/// The series that counts all buckets of this one's histogram, and this one's bound.
+/// The `_count` series of this bucket's histogram, and the bucket's bound.
 fn without_bound(bucket: &str) -> (String, f64) {
     let (name, labels) = bucket.split_once("_bucket{").expect("a bucket");
     let labels = labels.trim_end_matches('}').split(',');
@@ -110,7 +110,7 @@ fn name(series: &str) -> &str {
     series.split('{').next().expect("one part at least")
 }
 
-/// A series belongs to the family declared above it, with a suffix of its type.
+/// A series must belong to the family declared above it, with a suffix of its type.
 fn check_name(series: &str, (family, kind): &(String, String)) {
     let suffixes: &[&str] = match kind.as_str() {
         "counter" => &["_total"],

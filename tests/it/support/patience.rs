@@ -1,17 +1,17 @@
-//! How long a test waits. No test measures its machine: what is slow comes late, what hangs is told apart.
+//! How long tests wait. No test measures the machine's speed: slow is allowed, only hanging fails.
 
 use std::panic::Location;
 use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
 
-/// Far more than anything takes, on however slow a machine; what has not come by then hangs.
+/// Far longer than anything takes on any machine; what has not happened by then hangs.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(600);
 
-/// How long to leave alone what was found not to be so yet.
+/// The pause between two checks.
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// What `wait` comes to. A test that hangs fails here.
+/// The result of `wait`. A test that hangs fails here.
 #[track_caller]
 pub(crate) fn in_time<T>(wait: impl Future<Output = T>) -> impl Future<Output = T> {
     let caller = Location::caller();
@@ -21,7 +21,7 @@ pub(crate) fn in_time<T>(wait: impl Future<Output = T>) -> impl Future<Output = 
     }
 }
 
-/// Ask until it is so.
+/// Waits until `is_so` returns true.
 #[track_caller]
 pub(crate) fn eventually(is_so: impl AsyncFn() -> bool) -> impl Future<Output = ()> {
     in_time(async move {
@@ -31,7 +31,7 @@ pub(crate) fn eventually(is_so: impl AsyncFn() -> bool) -> impl Future<Output = 
     })
 }
 
-/// Do what costs far less of a processor than this, on one thread, unless its cost grows faster than its input.
+/// Runs work that costs far less processor time than this on one thread, unless its cost grows faster than its input.
 #[track_caller]
 pub(crate) fn at_little_cost<T>(work: impl FnOnce() -> T) -> T {
     const MOST: Duration = Duration::from_secs(5);

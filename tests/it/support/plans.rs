@@ -4,7 +4,9 @@ use noctule::export::document::Convergence;
 use noctule::job::{Event, Failure, Plan, PlanId, Status, Submission};
 use noctule::store::{Ending, Store, StoreError};
 
-/// A plan of ten iterations.
+use super::patience::in_time;
+
+/// A submission of ten iterations.
 pub(crate) fn submission() -> Submission {
     let id = PlanId::now_v7();
     Submission {
@@ -36,7 +38,7 @@ pub(crate) fn point(iteration: usize, best_cost: Option<f64>) -> Event {
     })
 }
 
-/// With a result document that a careless store would change.
+/// Its result document would be changed by a store that parsed and rewrote it.
 pub(crate) fn ending(status: Status) -> Ending {
     Ending::Result {
         cancelled: status == Status::Cancelled,
@@ -68,7 +70,7 @@ pub(crate) async fn history(store: &dyn Store, id: PlanId) -> Vec<Event> {
         .collect()
 }
 
-/// The statuses that a plan has gone through, as its events tell.
+/// The statuses that a plan has gone through, according to its events.
 pub(crate) fn statuses(events: &[Event]) -> Vec<Status> {
     let statuses = events.iter().filter_map(|event| match event {
         Event::Status(plan) => Some(plan.status),
@@ -77,19 +79,22 @@ pub(crate) fn statuses(events: &[Event]) -> Vec<Status> {
     statuses.collect()
 }
 
-/// Wait until the record is as `wanted`.
+/// Waits until the record is as `wanted`.
 pub(crate) async fn until(store: &dyn Store, id: PlanId, wanted: impl Fn(&Plan) -> bool) -> Plan {
     let mut changes = store.changes(id);
-    loop {
-        let plan = store.get(id).await.expect("the plan is there");
-        if wanted(&plan) {
-            return plan;
+    let plan = async {
+        loop {
+            let plan = store.get(id).await.expect("the plan is there");
+            if wanted(&plan) {
+                return plan;
+            }
+            changes.changed().await.expect("the store is open");
         }
-        changes.changed().await.expect("the store is open");
-    }
+    };
+    in_time(plan).await
 }
 
-/// Which error it is, without its details.
+/// The kind of error, without its details.
 pub(crate) fn kind<T>(result: Result<T, StoreError>) -> Result<(), &'static str> {
     result.map(drop).map_err(|error| match error {
         StoreError::NotFound(_) => "not found",

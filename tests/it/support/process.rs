@@ -1,4 +1,4 @@
-//! The real binary as a process of its own, always reaped.
+//! The real binary as a separate process that is always reaped.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::SocketAddr;
@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::patience::{PATIENCE, in_time};
 
-/// A free port of this machine alone.
+/// A free port on the loopback interface.
 const LOOPBACK: &str = "127.0.0.1:0";
 
 pub(crate) fn noctule() -> Command {
@@ -20,7 +20,7 @@ pub(crate) fn noctule() -> Command {
     command
 }
 
-/// The binary with a disk of its own, mounted on `data_dir` where nobody else sees it.
+/// The binary with a small disk of its own, mounted on `data_dir` in a private namespace.
 fn on_a_small_disk(data_dir: &Path, options: &str) -> Command {
     const MOUNT: &str = "mount -t tmpfs -o \"$0\" tmpfs \"$1\" && shift && exec \"$@\"";
     let mut command = Command::new("unshare");
@@ -32,7 +32,7 @@ fn on_a_small_disk(data_dir: &Path, options: &str) -> Command {
     command
 }
 
-/// The binary where the shell's `ulimit` holds it to so many open files.
+/// The binary limited by the shell's `ulimit` to a number of open files.
 fn with_few_files(ulimit: &str) -> Command {
     let mut command = Command::new("sh");
     command
@@ -43,7 +43,7 @@ fn with_few_files(ulimit: &str) -> Command {
 }
 
 fn clean(command: &mut Command) {
-    // What the tests are run with must not change what they see.
+    // The environment of the tests must not change the outcome.
     for (name, _) in std::env::vars_os() {
         if name.to_string_lossy().starts_with("NOCTULE_") {
             command.env_remove(name);
@@ -51,7 +51,7 @@ fn clean(command: &mut Command) {
     }
 }
 
-/// Run the binary to its end, with `input` as its standard input.
+/// Runs the binary to its end, with `input` as standard input.
 pub(crate) fn run(arguments: &[&str], input: &str) -> Output {
     run_with(&[], arguments, input)
 }
@@ -66,7 +66,7 @@ pub(crate) fn run_with(variables: &[(&str, &str)], arguments: &[&str], input: &s
         .stderr(Stdio::piped())
         .spawn()
         .expect("the binary starts");
-    // A process that does not read its input closes it.
+    // A process that does not read its input closes the pipe.
     let _ = child
         .stdin
         .take()
@@ -83,12 +83,12 @@ pub(crate) struct Service {
 }
 
 impl Service {
-    /// On a free port; returns when it listens.
+    /// On a free port; returns once it listens.
     pub(crate) fn start(data_dir: &Path, arguments: &[&str]) -> Self {
         Self::start_with_log(data_dir, arguments, Stdio::null())
     }
 
-    /// The same, with its log.
+    /// The same, with its log in a file.
     pub(crate) fn start_with_log(
         data_dir: &Path,
         arguments: &[&str],
@@ -108,7 +108,7 @@ impl Service {
         Self::start_as(command, LOOPBACK, data_dir, arguments, Stdio::null())
     }
 
-    /// The same on another address.
+    /// The same on a given address.
     pub(crate) fn start_on(
         listen: &str,
         data_dir: &Path,
@@ -118,13 +118,13 @@ impl Service {
         Self::start_as(noctule(), listen, data_dir, arguments, log)
     }
 
-    /// With `data_dir` on a disk of its own, mounted with such options as `size=3m`.
+    /// With `data_dir` on a disk of its own, mounted with options such as `size=3m`.
     pub(crate) fn start_on_a_small_disk(data_dir: &Path, options: &str) -> Self {
         let command = on_a_small_disk(data_dir, options);
         Self::start_as(command, LOOPBACK, data_dir, &[], Stdio::null())
     }
 
-    /// Held to so many open files, such as by `ulimit -n 256`.
+    /// Limited in open files, for example by `ulimit -n 256`.
     pub(crate) fn start_with_few_files(
         ulimit: &str,
         data_dir: &Path,
@@ -175,7 +175,7 @@ impl Service {
         &self.client
     }
 
-    /// Where it listens.
+    /// The address that it listens on.
     pub(crate) fn address(&self) -> SocketAddr {
         let address = self
             .url
@@ -184,7 +184,7 @@ impl Service {
         address.parse().expect("an address")
     }
 
-    /// Memory that the process occupies now, KiB.
+    /// The memory that the process occupies now, KiB.
     pub(crate) fn rss_kib(&self) -> u64 {
         self.memory_kib("VmRSS:")
     }
@@ -215,7 +215,7 @@ impl Service {
         request.send().await.expect("an answer")
     }
 
-    /// Post a scenario; the plan's address.
+    /// Submits a scenario; the plan's address.
     pub(crate) async fn submit(&self, document: &Value) -> String {
         let answer = self.post(document).await;
         assert_eq!(answer.status(), 202);
@@ -225,40 +225,43 @@ impl Service {
             .to_owned()
     }
 
-    /// The status document once the plan has ended.
+    /// Waits for the plan's end; its status document.
     pub(crate) async fn ended(&self, address: &str) -> Value {
-        loop {
-            let request = self.get(address).header("prefer", "wait=30");
-            let status: Value = request
-                .send()
-                .await
-                .expect("an answer")
-                .json()
-                .await
-                .expect("JSON");
-            if ["succeeded", "failed", "cancelled"]
-                .contains(&status["status"].as_str().expect("text"))
-            {
-                return status;
+        let ended = async {
+            loop {
+                let request = self.get(address).header("prefer", "wait=30");
+                let status: Value = request
+                    .send()
+                    .await
+                    .expect("an answer")
+                    .json()
+                    .await
+                    .expect("JSON");
+                if ["succeeded", "failed", "cancelled"]
+                    .contains(&status["status"].as_str().expect("text"))
+                {
+                    return status;
+                }
             }
-        }
+        };
+        in_time(ended).await
     }
 
-    /// The bytes of `path`, which must be there.
+    /// The body of `path`, which must exist.
     pub(crate) async fn bytes(&self, path: &str) -> bytes::Bytes {
         let answer = self.get(path).send().await.expect("an answer");
         assert_eq!(answer.status(), 200, "{path}");
         answer.bytes().await.expect("a whole body")
     }
 
-    /// `path` as the process sees it.
+    /// `path` as the process sees it, inside its mount namespace.
     pub(crate) fn seen(&self, path: &Path) -> std::path::PathBuf {
         let path = path.strip_prefix("/").expect("absolute");
         let process = Path::new("/proc").join(self.child.id().to_string());
         process.join("root").join(path)
     }
 
-    /// Mount the small disk on `data_dir` anew, with these options.
+    /// Remounts the small disk on `data_dir` with these options.
     pub(crate) fn remount(&self, data_dir: &Path, options: &str) {
         let done = Command::new("nsenter")
             .args(["--user", "--mount", "--preserve-credentials", "--target"])
@@ -270,7 +273,7 @@ impl Service {
         assert!(done.success());
     }
 
-    /// Wait until `/readyz` answers so; its detail.
+    /// Waits until `/readyz` answers with this status; its detail.
     pub(crate) async fn until_ready(&self, status: u16) -> String {
         let answer = async {
             loop {
@@ -285,7 +288,7 @@ impl Service {
         in_time(answer).await
     }
 
-    /// Send `SIG{name}`.
+    /// Sends `SIG{name}`.
     pub(crate) fn signal(&self, name: &str) {
         let pid = self.child.id().to_string();
         let sent = Command::new("kill")
@@ -295,13 +298,13 @@ impl Service {
         assert!(sent.success());
     }
 
-    /// Kill the process as a power cut would.
+    /// Kills the process as a power cut would.
     pub(crate) fn kill(mut self) {
         self.child.kill().expect("killed");
         self.child.wait().expect("reaped");
     }
 
-    /// Wait for the process to end by itself.
+    /// Waits for the process to end by itself.
     pub(crate) async fn exit(mut self) -> ExitStatus {
         let ended = tokio::task::spawn_blocking(move || self.child.wait().expect("reaped"));
         in_time(ended).await.expect("no panic")
@@ -310,7 +313,7 @@ impl Service {
 
 impl Drop for Service {
     fn drop(&mut self) {
-        // Both fail when it has been reaped already.
+        // Both fail if it has been reaped already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -1,4 +1,4 @@
-//! Playing the worker: runs whose every step the test decides.
+//! Playing the worker: runs whose every step the test controls.
 
 use noctule::export::document::{
     Bound, Checks, Clearance, Convergence, Cost, Incumbent, Leg, MeasuresDocument, Position,
@@ -7,12 +7,12 @@ use noctule::export::document::{
 use noctule::job::{Event, FailureKind, PlanId, Status};
 use noctule::store::{Ending, Lease, Store};
 
-/// A point of the curve at a time of the run.
+/// A convergence point at the given time of the run.
 pub(crate) fn convergence(iteration: usize, elapsed_ms: f64) -> Event {
     Event::Convergence(curve(iteration, elapsed_ms))
 }
 
-/// A better route at a time of the run.
+/// A better route at the given time of the run.
 pub(crate) fn incumbent(iteration: usize, elapsed_ms: f64) -> Event {
     Event::Incumbent(Incumbent {
         iteration,
@@ -23,7 +23,7 @@ pub(crate) fn incumbent(iteration: usize, elapsed_ms: f64) -> Event {
     })
 }
 
-/// Take the only queued plan, tell `events`, and end with a result.
+/// Claims the only queued plan, appends `events`, and ends it with a result.
 pub(crate) async fn complete(store: &dyn Store, events: Vec<Event>) -> Lease {
     let lease = store.claim().await.expect("a queued plan");
     store.append(&lease, events).await.expect("the lease holds");
@@ -31,7 +31,7 @@ pub(crate) async fn complete(store: &dyn Store, events: Vec<Event>) -> Lease {
     lease
 }
 
-/// End a run with a result.
+/// Ends a run with a result.
 pub(crate) async fn finish(store: &dyn Store, lease: &Lease, status: Status) {
     let stop_reason = match status {
         Status::Cancelled => "cancelled",
@@ -52,12 +52,12 @@ pub(crate) async fn finish(store: &dyn Store, lease: &Lease, status: Status) {
         .expect("the lease holds");
 }
 
-/// End a run without one.
+/// Ends a run without a result.
 pub(crate) async fn fail(store: &dyn Store, lease: &Lease) {
     fail_for(store, lease, FailureKind::PlannerPanic).await;
 }
 
-/// End a run without one, for this reason.
+/// Ends a run without a result, for the given reason.
 pub(crate) async fn fail_for(store: &dyn Store, lease: &Lease, kind: FailureKind) {
     let failure = kind.because("the planner broke");
     let ended_ms = lease.plan.created_ms + 50;

@@ -1,4 +1,4 @@
-//! A service on a real port of this machine, for what needs a connection.
+//! A service on a real port, for tests that need a connection.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -39,7 +39,7 @@ impl Server {
         }
     }
 
-    /// The whole address of `path`.
+    /// The full URL of `path`.
     pub(crate) fn url(&self, path: &str) -> String {
         format!("http://{}{path}", self.address)
     }

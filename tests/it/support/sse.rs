@@ -1,4 +1,4 @@
-//! Reading a stream of server-sent events, strictly.
+//! A strict reader of server-sent events.
 
 use reqwest::{RequestBuilder, Response};
 use serde_json::{Value, json};
@@ -14,7 +14,7 @@ pub(crate) enum Block {
 }
 
 impl Block {
-    /// What a `status` event says.
+    /// The status that a `status` event carries.
     pub(crate) fn status(&self) -> Option<String> {
         match self {
             Self::Event { name, data, .. } if name == "status" => {
@@ -25,14 +25,14 @@ impl Block {
     }
 }
 
-/// A stream that is being read.
+/// An open stream.
 pub(crate) struct Stream {
     response: Response,
     text: String,
 }
 
 impl Stream {
-    /// Send the request and check the answer's head.
+    /// Sends the request and checks the head of the response.
     pub(crate) async fn open(request: RequestBuilder) -> Self {
         let response = request.send().await.expect("an answer");
         assert_eq!(response.status(), 200);

@@ -1,4 +1,4 @@
-//! Every store there is, on a clock that the test turns.
+//! Every store backend, on a clock that the test controls.
 
 use std::ops::Deref;
 use std::path::Path;
@@ -26,18 +26,18 @@ pub(crate) enum Backend {
 /// The backends that the conformance suite runs on.
 pub(crate) const BACKENDS: [Backend; 2] = [Backend::Sqlite, Backend::JetStream];
 
-/// How long a run is a node's after it last said so.
+/// How long a run stays with its node after the node's last renewal.
 pub(crate) const LEASE: Duration = Duration::from_secs(2);
 
-/// Where a store keeps its plans, and finds them when it is opened again.
+/// Where a store keeps its plans and finds them when reopened.
 pub(crate) struct Place {
     directory: TempDir,
-    /// Of the namespace, where plans are kept on servers.
+    /// The namespace, for plans on servers.
     address: Option<String>,
 }
 
 impl Place {
-    /// Which nobody else uses.
+    /// A place that nobody else uses.
     pub(crate) fn new(backend: Backend) -> Self {
         Self {
             address: (backend == Backend::JetStream).then(nats::address),
@@ -50,7 +50,7 @@ impl Place {
         self.directory.path()
     }
 
-    /// Open the store.
+    /// Opens the store.
     pub(crate) async fn open(&self, options: Options) -> Result<Arc<dyn Store>, StoreError> {
         if let Some(address) = &self.address {
             let store = JetStreamStore::open(node(address), options).await?;
@@ -62,7 +62,7 @@ impl Place {
         Ok(Arc::new(opened.expect("no panic")?))
     }
 
-    /// A service over the store, as a process of its own.
+    /// A service process over the store.
     pub(crate) fn serve(&self, arguments: &[&str]) -> Service {
         let lease = format!("{}s", LEASE.as_secs());
         let mut all = arguments.to_vec();
@@ -73,7 +73,7 @@ impl Place {
     }
 }
 
-/// How a node on one server, that runs some plans at a time, keeps them there.
+/// The settings of a node on one server that runs up to four plans at a time.
 pub(crate) fn node(address: &str) -> Settings {
     Settings {
         address: Address::read(address).expect("it is one"),
@@ -84,13 +84,13 @@ pub(crate) fn node(address: &str) -> Settings {
     }
 }
 
-/// An open store in a place of its own.
+/// An open store in its own place.
 pub(crate) struct Fixture {
     place: Place,
     queue_limit: u64,
-    /// Of the next opening.
+    /// Takes effect at the next opening.
     pub(crate) retention: Retention,
-    /// Of the next opening.
+    /// Takes effect at the next opening.
     pub(crate) events_kept: u64,
     now_ms: Arc<AtomicI64>,
     store: Option<Arc<dyn Store>>,
@@ -134,7 +134,7 @@ impl Fixture {
         self.now_ms.fetch_add(ms, Ordering::SeqCst);
     }
 
-    /// Close the store and open it again, as a new process would.
+    /// Closes the store and opens it again, as a new process would.
     pub(crate) async fn reopen(&mut self) {
         self.close().await;
         self.open().await;
@@ -146,7 +146,7 @@ impl Fixture {
         }
     }
 
-    /// Open the store again without having closed it, as after the end of its process.
+    /// Opens the store again without closing it, as after a crash.
     pub(crate) async fn lose(&mut self) {
         drop(self.store.take());
         self.open().await;
@@ -166,16 +166,16 @@ impl Deref for Fixture {
     }
 }
 
-/// Run a test for each backend.
+/// Runs a test on each backend.
 pub(crate) async fn for_every_backend(test: impl AsyncFn(Backend)) {
     for backend in BACKENDS {
-        // Shown when the test fails.
+        // Printed when the test fails.
         println!("on {backend:?}");
         test(backend).await;
     }
 }
 
-/// Run a test on each backend, with room for `queue_limit` plans.
+/// Runs a test on each backend, with room for `queue_limit` plans.
 pub(crate) async fn on_every_backend(queue_limit: u64, test: impl AsyncFn(&mut Fixture)) {
     for_every_backend(async |backend| {
         let mut fixture = Fixture::new(Place::new(backend), queue_limit).await;

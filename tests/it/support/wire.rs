@@ -1,4 +1,4 @@
-//! A wire between a node and a server, that can be cut without either being told.
+//! A connection between a node and a server that can be cut without either end being notified.
 
 use std::net::SocketAddr;
 
@@ -8,7 +8,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
-/// Carries bytes while it is whole. While it is cut they wait, and whoever comes anew is turned away.
+/// Carries bytes while it is whole. While it is cut, bytes wait and new connections are closed.
 pub(crate) struct Wire {
     near: SocketAddr,
     whole: watch::Sender<bool>,
@@ -16,7 +16,7 @@ pub(crate) struct Wire {
 }
 
 impl Wire {
-    /// To a host and port.
+    /// A wire to a host and port.
     pub(crate) async fn to(far: String) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let near = listener.local_addr().expect("it has one");

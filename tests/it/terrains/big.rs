@@ -1,4 +1,4 @@
-//! A large file: through the service in little memory, and planned over.
+//! A large file: uploaded in little memory, and planned over.
 
 use std::io::{BufWriter, Write as _};
 use std::sync::Arc;
@@ -11,12 +11,12 @@ use crate::support::elevations::write_tiff;
 use crate::support::process::Service;
 use crate::support::size::size;
 
-/// More than a service may take for it beyond what it has when idle, KiB.
+/// The most that the service may take above its idle memory, KiB.
 const ROOM_KIB: u64 = 64 * 1024;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_large_file_takes_little_memory_and_is_planned_over() {
-    // A cell of 20 m: 100 MB of 16-bit samples are 142 km by 142 km.
+    // At 20 m per cell, 100 MB of 16-bit samples are 142 km by 142 km.
     let side = size(3_000, 7_100);
     let directory = tempfile::tempdir().expect("a temporary directory");
     let file = directory.path().join("large.tif");
@@ -65,7 +65,7 @@ async fn a_large_file_takes_little_memory_and_is_planned_over() {
     println!("{length} bytes: {idle} KiB when idle, {most} KiB at most");
     assert!(most <= idle + ROOM_KIB, "{idle} KiB, then {most} KiB");
 
-    // 20 km across a corner of it.
+    // 20 km across one corner.
     let document = json!({
         "frame": "wgs84",
         "start": {"lat": 45.85, "lon": 10.10, "alt": 1000},

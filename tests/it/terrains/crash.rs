@@ -1,4 +1,4 @@
-//! kill -9 while a dataset comes in.
+//! kill -9 during an upload.
 
 use serde_json::Value;
 use tokio::io::AsyncWriteExt as _;
@@ -9,7 +9,7 @@ use crate::support::patience::eventually;
 use crate::support::process::Service;
 
 #[tokio::test]
-async fn a_crash_midway_leaves_what_was_there_and_nothing_else() {
+async fn a_crash_during_an_upload_leaves_the_earlier_datasets_and_nothing_else() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let uploads = directory.path().join("terrains");
     let service = Service::start(directory.path(), &[]);
@@ -42,7 +42,7 @@ async fn a_crash_midway_leaves_what_was_there_and_nothing_else() {
     };
     eventually(arrived).await;
     service.kill();
-    // With the dataset that comes with the program.
+    // Including the dataset that ships with the program.
     assert_eq!(kept(&uploads), [4, 2, 1]);
 
     let service = Service::start(directory.path(), &[]);

@@ -1,4 +1,4 @@
-//! Files that are none, bodies that are too long or break off: a problem, and nothing left behind.
+//! Unusable files, and bodies that are too long or break off: each gets a problem and leaves nothing behind.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -24,7 +24,7 @@ use crate::support::patience::{PATIENCE, eventually, in_time};
 use crate::support::process::Service;
 use crate::support::server::Server;
 
-/// A service that takes datasets of so many bytes.
+/// A service that limits datasets to `terrain_bytes`.
 fn with_limit(terrain_bytes: u64) -> Api {
     let mut api = Api::new();
     let mut rules = (*api.state.rules).clone();
@@ -46,7 +46,7 @@ fn tiff(size: [u32; 2]) -> Vec<u8> {
     bytes
 }
 
-/// The same with another value of a tag; all of them are numbers of the first directory.
+/// Replaces the value of a tag, which must be a number in the first directory.
 fn with_tag(mut bytes: Vec<u8>, tag: u16, value: u32) -> Vec<u8> {
     let place = (0..13)
         .map(|idx| 10 + 12 * idx)
@@ -56,10 +56,10 @@ fn with_tag(mut bytes: Vec<u8>, tag: u16, value: u32) -> Vec<u8> {
     bytes
 }
 
-/// What it is, how it is sent, and what is sent.
+/// A description, the query of the upload, and its body.
 type Case = (&'static str, &'static str, Vec<u8>);
 
-/// Files that are none.
+/// Files that are not usable elevations.
 fn hostile() -> Vec<Case> {
     let whole = jacksboro();
     let mut damaged = whole.clone();
@@ -145,7 +145,7 @@ fn hostile() -> Vec<Case> {
 }
 
 #[tokio::test]
-async fn files_that_cannot_be_used_leave_nothing_behind() {
+async fn unusable_files_are_refused_and_leave_nothing_behind() {
     let api = Api::new();
     for (what, query, body) in hostile() {
         let answer = put(&api, &format!("/terrains/hostile{query}"), body).await;
@@ -164,7 +164,7 @@ async fn files_that_cannot_be_used_leave_nothing_behind() {
     api.get("/terrains/hostile")
         .await
         .expect_problem(404, "not-found");
-    // What is there stays there.
+    // An existing dataset stays as it was.
     put(&api, "/terrains/hill", hill(1.0)).await;
     put(&api, "/terrains/hill", b"no more hill".to_vec())
         .await
@@ -174,7 +174,7 @@ async fn files_that_cannot_be_used_leave_nothing_behind() {
 }
 
 #[tokio::test]
-async fn a_body_is_held_to_the_limit_however_it_comes() {
+async fn the_upload_limit_holds_in_every_transfer_and_content_coding() {
     let text = hill(1.0).into_bytes();
     let api = with_limit(text.len() as u64);
     let chunks = |bytes: &[u8]| {
@@ -199,7 +199,7 @@ async fn a_body_is_held_to_the_limit_however_it_comes() {
         put_it(chunks(&packed(body)), &[("content-encoding", "gzip")]).await;
     }
     assert_eq!(kept(&api.uploads())[1..], [0, 0]);
-    // Announced.
+    // A length announced beyond the limit.
     let length = [("content-length", "99999999")];
     let answer = put_with(&api, "/terrains/hill", &length, text.clone()).await;
     let problem = answer.expect_problem(413, "body-too-large");
@@ -209,7 +209,7 @@ async fn a_body_is_held_to_the_limit_however_it_comes() {
             .expect("text")
             .contains("terrain_bytes")
     );
-    // A bomb goes no farther than the limit.
+    // A bomb is unpacked no further than the limit.
     let bomb = packed(&vec![b' '; 20 << 20]);
     let gzip = [("content-encoding", "gzip")];
     let answer = put_with(&api, "/terrains/hill", &gzip, bomb).await;
@@ -224,7 +224,7 @@ async fn a_body_is_held_to_the_limit_however_it_comes() {
 }
 
 #[tokio::test]
-async fn a_body_that_breaks_off_or_lies_about_its_length_leaves_nothing_behind() {
+async fn an_upload_that_breaks_off_or_has_a_wrong_length_leaves_nothing_behind() {
     let api = Api::new();
     let server = Server::start(&api).await;
     let file = jacksboro();
@@ -258,13 +258,13 @@ async fn a_body_that_breaks_off_or_lies_about_its_length_leaves_nothing_behind()
     }
 }
 
-/// Who leaves is noticed a little later.
+/// A lost connection is noticed a little later.
 async fn nothing_comes_in(api: &Api) {
     eventually(async || kept(&api.uploads())[2] == 0).await;
 }
 
 #[tokio::test]
-async fn a_body_that_stalls_is_given_up() {
+async fn a_stalled_or_trickling_upload_is_given_up() {
     let mut api = Api::new();
     api.state.body_timeout = std::time::Duration::from_millis(200);
     api.router = http::router(api.state.clone());
@@ -279,7 +279,7 @@ async fn a_body_that_stalls_is_given_up() {
         .send(axum::http::Method::PUT, "/terrains/slow", &[], body)
         .await;
     answer.expect_problem(408, "request-timeout");
-    // One that goes on, but for no more than to keep its place.
+    // A body that trickles just enough to seem alive.
     let drips = futures_util::stream::unfold((), async |()| {
         tokio::time::sleep(std::time::Duration::from_millis(20)).await;
         Some((
@@ -295,9 +295,9 @@ async fn a_body_that_stalls_is_given_up() {
     nothing_comes_in(&api).await;
 }
 
-/// As many as may come at once.
+/// As many as may arrive at once.
 #[tokio::test]
-async fn uploads_that_stall_keep_nobody_else_waiting() {
+async fn stalled_uploads_do_not_block_other_requests() {
     let mut api = Api::new();
     api.state.body_timeout = PATIENCE;
     api.router = http::router(api.state.clone());
@@ -320,7 +320,7 @@ async fn uploads_that_stall_keep_nobody_else_waiting() {
     }
 }
 
-/// Of how many uploads something is on the disk.
+/// The number of uploads with data on disk.
 fn begun(uploads: &Path) -> usize {
     let coming = std::fs::read_dir(uploads.join("incoming")).expect("it is there");
     let lengths = coming.map(|entry| {
@@ -334,7 +334,7 @@ fn begun(uploads: &Path) -> usize {
 }
 
 #[tokio::test]
-async fn a_full_disk_refuses_the_upload_and_goes_on() {
+async fn a_full_disk_refuses_the_upload_and_the_service_goes_on() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let service = Service::start_on_a_small_disk(directory.path(), "size=3m");
     let upload = async |body: Vec<u8>| {
@@ -350,7 +350,7 @@ async fn a_full_disk_refuses_the_upload_and_goes_on() {
         "{problem}"
     );
     let uploads = service.seen(&directory.path().join("terrains"));
-    // The dataset that comes with the program alone.
+    // Only the dataset that ships with the program.
     assert_eq!(kept(&uploads), [2, 1, 0]);
     assert_eq!(upload(tiff([200, 100])).await.status(), 201);
 }

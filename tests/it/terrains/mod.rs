@@ -1,4 +1,4 @@
-//! Datasets as users meet them: uploaded, mounted, planned over, replaced, deleted.
+//! Datasets as users see them: uploaded, mounted, planned over, replaced, deleted.
 
 mod big;
 mod crash;
@@ -18,17 +18,17 @@ use serde_json::{Value, json};
 use crate::support::api::{Answer, Api};
 use crate::support::elevations::ascii_grid;
 
-/// The file that ships.
+/// The shipped elevation file.
 fn jacksboro() -> Vec<u8> {
     std::fs::read(shipped().join("jacksboro.tif")).expect("it ships")
 }
 
-/// The directory of files that ship.
+/// The directory of shipped files.
 fn shipped() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/terrain")
 }
 
-/// A hill of so many metres on 36.0 to 36.4 N, 85.0 to 84.6 W.
+/// A hill `height` metres high, on 36.0 to 36.4 N, 85.0 to 84.6 W.
 fn hill(height: f64) -> String {
     ascii_grid([41, 41], [-85.0, 36.0], 0.01, |column, row| {
         let (x, y) = (column as f64 - 20.0, row as f64 - 20.0);
@@ -36,7 +36,7 @@ fn hill(height: f64) -> String {
     })
 }
 
-/// Over a dataset on the hill's place.
+/// A scenario over a dataset in the hill's place.
 fn over(name: &str) -> Value {
     json!({
         "name": "over a hill", "frame": "wgs84",
@@ -61,7 +61,7 @@ async fn put_with(
     api.send(Method::PUT, uri, headers, body.into()).await
 }
 
-/// What lies in the directory of uploads: of `content`, `names` and `incoming`, how many files each.
+/// The number of files in `content`, `names` and `incoming` of the directory of uploads.
 fn kept(uploads: &Path) -> [usize; 3] {
     ["content", "names", "incoming"].map(|part| {
         let entries = std::fs::read_dir(uploads.join(part));

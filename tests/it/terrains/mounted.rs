@@ -1,4 +1,4 @@
-//! The operator's own files.
+//! Files mounted by the operator.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ fn with_mounted(directory: &Path) -> Api {
 }
 
 #[tokio::test]
-async fn mounted_files_are_datasets_by_their_names() {
+async fn mounted_files_are_datasets_named_after_their_files() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     for (name, content) in [
         ("Hill.ASC", hill(7.0).into_bytes()),
@@ -50,7 +50,7 @@ async fn mounted_files_are_datasets_by_their_names() {
             ("other", false)
         ]
     );
-    // What takes reading all of a file is known once somebody asks.
+    // Figures that take reading the whole file are known after the first request for them.
     assert_eq!(terrains[1]["sha256"], serde_json::Value::Null);
     let hill = api.get("/terrains/hill").await.json();
     assert_eq!(
@@ -66,7 +66,7 @@ async fn mounted_files_are_datasets_by_their_names() {
 }
 
 #[tokio::test]
-async fn mounted_files_cannot_be_changed_from_here() {
+async fn mounted_files_cannot_be_replaced_or_deleted() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     std::fs::write(directory.path().join("hill.asc"), hill(7.0)).expect("written");
     let api = with_mounted(directory.path());
@@ -81,7 +81,7 @@ async fn mounted_files_cannot_be_changed_from_here() {
 }
 
 #[tokio::test]
-async fn a_mounted_file_that_changes_is_another_content() {
+async fn a_changed_mounted_file_no_longer_matches_its_checksum() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let file = directory.path().join("hill.asc");
     std::fs::write(&file, hill(7.0)).expect("written");
@@ -111,7 +111,7 @@ async fn a_mounted_file_that_changes_is_another_content() {
 }
 
 #[test]
-fn a_directory_that_is_not_there_is_refused_at_the_start() {
+fn a_missing_directory_is_refused_at_startup() {
     let error = Mounted::open(Path::new("/nowhere/at/all")).expect_err("nothing is there");
     assert!(
         error

@@ -1,4 +1,4 @@
-//! What a name stands for, and who may change it.
+//! What a name refers to, and who may change it.
 
 use axum::http::Method;
 
@@ -7,7 +7,7 @@ use crate::support::api::Api;
 use crate::support::keys::{bearer, entry};
 
 #[tokio::test]
-async fn an_upload_says_what_it_holds() {
+async fn an_upload_is_described_and_its_content_stored_once() {
     let api = Api::new();
     let answer = put(&api, "/terrains/jacksboro", jacksboro()).await;
     assert_eq!(answer.status, 201, "{answer:?}");
@@ -42,11 +42,11 @@ async fn an_upload_says_what_it_holds() {
         std::slice::from_ref(&created)
     );
 
-    // The same again changes nothing, its time neither.
+    // Uploading it again changes nothing, not even its time.
     let again = put(&api, "/terrains/jacksboro", jacksboro()).await;
     assert_eq!(again.status, 200);
     assert_eq!(again.json(), created);
-    // Under another name it is the same content, kept once.
+    // Under another name it is the same content, stored once.
     let other = put(&api, "/terrains/other", jacksboro()).await;
     assert_eq!(other.status, 201);
     assert_eq!(other.json()["sha256"], sum);
@@ -54,7 +54,7 @@ async fn an_upload_says_what_it_holds() {
 }
 
 #[tokio::test]
-async fn a_name_can_be_given_to_another_content() {
+async fn a_name_can_be_moved_to_other_content_on_conditions() {
     let api = Api::new();
     let first = put(&api, "/terrains/hill", hill(100.0)).await.json();
     let second = put(&api, "/terrains/hill", hill(50.0)).await;
@@ -62,7 +62,7 @@ async fn a_name_can_be_given_to_another_content() {
     let second = second.json();
     assert_ne!(first["sha256"], second["sha256"]);
     assert_eq!(api.get("/terrains/hill").await.json(), second);
-    // As the caller expects.
+    // Conditional on the content that the caller expects.
     let tag = |document: &serde_json::Value| {
         format!("\"{}\"", document["sha256"].as_str().expect("a sum"))
     };
@@ -86,7 +86,7 @@ async fn a_name_can_be_given_to_another_content() {
         ("if-match", &*tag(&first), 412),
         ("if-none-match", &*tag(&second), 412),
         ("if-match", &*tag(&second), 204),
-        // Who asks again had no answer the first time.
+        // A repeated deletion may be a retry after a lost response.
         ("if-match", &*tag(&second), 204),
     ] {
         let headers = [(header, value)];
@@ -111,9 +111,9 @@ async fn a_name_can_be_given_to_another_content() {
     }
 }
 
-/// The document's tag changes with all that it says, and stands for its content where that is changed.
+/// The document's tag changes with everything in it; in a conditional change it stands for the content.
 #[tokio::test]
-async fn who_knows_a_dataset_already_is_told_so() {
+async fn a_known_dataset_document_is_answered_with_304() {
     let api = Api::new();
     put(&api, "/terrains/hill", hill(100.0)).await;
     let shown = api.get("/terrains/hill").await;
@@ -153,7 +153,7 @@ async fn who_knows_a_dataset_already_is_told_so() {
 }
 
 #[tokio::test]
-async fn a_name_is_deleted_once_and_for_all() {
+async fn deleting_a_name_is_idempotent() {
     let api = Api::new();
     put(&api, "/terrains/hill", hill(100.0)).await;
     for _ in 0..2 {
@@ -170,7 +170,7 @@ async fn a_name_is_deleted_once_and_for_all() {
 }
 
 #[tokio::test]
-async fn only_names_that_scenarios_can_write_are_taken() {
+async fn only_valid_dataset_names_are_accepted() {
     let api = Api::new();
     for name in [
         "Hill",
@@ -191,7 +191,7 @@ async fn only_names_that_scenarios_can_write_are_taken() {
 }
 
 #[tokio::test]
-async fn a_file_name_that_no_file_has_is_refused() {
+async fn a_file_name_that_is_too_long_is_refused() {
     let api = Api::new();
     let long = format!("/terrains/hill?filename={}.hgt", "n".repeat(300));
     let answer = put(&api, &long, hill(1.0)).await;
@@ -200,9 +200,9 @@ async fn a_file_name_that_no_file_has_is_refused() {
 }
 
 #[tokio::test]
-async fn what_is_declared_belongs_to_the_content() {
+async fn declared_properties_are_part_of_the_content() {
     let api = Api::new();
-    // All sea: only the name tells one tile from the other.
+    // Sea level everywhere: only the file name tells one tile from another.
     let sea = vec![0; 2 * 1201 * 1201];
     let here = put(&api, "/terrains/n36w085", sea.clone()).await;
     assert_eq!(here.status, 201, "{here:?}");
@@ -241,7 +241,7 @@ async fn what_is_declared_belongs_to_the_content() {
         sums.push(answer.json()["sha256"].clone());
     }
     assert_ne!(sums[0], sums[1]);
-    // What the file would be taken for anyway need not be said.
+    // Declaring what the file already implies makes no difference.
     let degrees = grid(-85.0, 36.0, 0.01);
     let plain = put(&api, "/terrains/plain", degrees.clone()).await.json();
     let said = put(&api, "/terrains/said?crs=epsg:4326&format=asc", degrees)
@@ -251,7 +251,7 @@ async fn what_is_declared_belongs_to_the_content() {
 }
 
 #[tokio::test]
-async fn everybody_sees_datasets_and_their_uploader_changes_them() {
+async fn every_key_reads_datasets_and_only_uploader_or_admin_changes_them() {
     let people = [
         ("reader", "read"),
         ("alice", "plan"),
@@ -281,7 +281,7 @@ async fn everybody_sees_datasets_and_their_uploader_changes_them() {
     upload(2, 2.0).await.expect_problem(403, "forbidden");
     assert_eq!(upload(1, 2.0).await.status, 200);
     assert_eq!(upload(3, 3.0).await.status, 200);
-    // It is the operator's now.
+    // The dataset is the operator's now.
     upload(1, 4.0).await.expect_problem(403, "forbidden");
     for (who, status) in [(0, 403), (1, 403), (2, 403), (3, 204)] {
         let key = bearer(who);

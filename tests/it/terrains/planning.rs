@@ -1,4 +1,4 @@
-//! Plans over datasets: the same ground for the same document, whatever happens to the name.
+//! Plans over datasets: the same document has the same ground, whatever happens to the name.
 
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -21,7 +21,7 @@ async fn result(service: &Service, address: &str) -> Value {
     serde_json::from_slice(&bytes).expect("JSON")
 }
 
-/// What of a result does not come from the machine.
+/// The parts of a result that do not depend on the machine.
 fn route(result: &Value) -> [Value; 4] {
     ["waypoints", "path", "cost", "scenario_sha256"].map(|name| result[name].clone())
 }
@@ -37,7 +37,7 @@ async fn an_accepted_plan_keeps_its_ground() {
     let document: Value = serde_json::from_slice(&document).expect("JSON");
     assert_eq!(document["terrain"]["sha256"], high["sha256"]);
 
-    // The same document again, under a name that stands for something else by now, and after a restart.
+    // The same document again, after its name has moved to other content, and after a restart.
     upload(&service, "/terrains/hill", hill(5.0)).await;
     let again = service.submit(&document).await;
     assert_eq!(route(&result(&service, &again).await), route(&before));
@@ -53,7 +53,7 @@ async fn an_accepted_plan_keeps_its_ground() {
             .bytes(&format!("{first}/result?format={format}"))
             .await;
     }
-    // A content that never was.
+    // Content that never existed.
     let mut wrong = over("hill");
     wrong["terrain"]["sha256"] = json!("0".repeat(64));
     let refused: Value = service.post(&wrong).await.json().await.expect("JSON");
@@ -64,7 +64,7 @@ async fn an_accepted_plan_keeps_its_ground() {
 }
 
 #[tokio::test]
-async fn the_service_and_the_command_line_plan_the_same() {
+async fn the_service_and_the_command_line_plan_the_same_route() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let terrains = shipped();
     let terrains = terrains.to_str().expect("UTF-8");
@@ -86,15 +86,33 @@ async fn the_service_and_the_command_line_plan_the_same() {
     let planned: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(route(&planned), route(&served));
 
-    // Without its ground it is refused, and so is writing what was planned over it.
-    let output = run(&["plan", "-"], &scenario.to_string());
+    // With its ground the result can be exported.
+    let file = directory.path().join("scenario.json");
+    std::fs::write(&file, scenario.to_string()).expect("written");
+    let file = file.to_str().expect("UTF-8");
+    let export = ["export", "-", "--scenario", file, "--format", "svg"];
+    let result = planned.to_string();
+    let output = run(
+        &[&export[..], &["--terrain-dir", terrains]].concat(),
+        &result,
+    );
     let errors = String::from_utf8(output.stderr).expect("UTF-8");
-    assert_eq!(output.status.code(), Some(2), "{errors}");
-    assert!(errors.contains("unknown-dataset"), "{errors}");
+    assert_eq!(output.status.code(), Some(0), "{errors}");
+
+    // Without its ground the scenario is refused, and so is the export.
+    for (arguments, input) in [
+        (&["plan", "-"][..], scenario.to_string()),
+        (&export, result),
+    ] {
+        let output = run(arguments, &input);
+        let errors = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(2), "{errors}");
+        assert!(errors.contains("unknown-dataset"), "{errors}");
+    }
 }
 
 #[tokio::test]
-async fn a_plan_whose_ground_went_while_it_waited_fails_and_says_why() {
+async fn a_plan_whose_ground_changed_while_it_waited_fails_and_says_why() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let mounted = tempfile::tempdir().expect("a temporary directory");
     let file = mounted.path().join("hill.asc");
@@ -104,7 +122,7 @@ async fn a_plan_whose_ground_went_while_it_waited_fails_and_says_why() {
     let service = Service::start(directory.path(), &arguments);
     let done = service.submit(&over("hill")).await;
     result(&service, &done).await;
-    // It waits behind a long one.
+    // It waits behind a long plan.
     let mut long = over("hill");
     long["planner"] = json!({"population": 400, "iterations": 100_000, "seed": 1});
     let running = service.submit(&long).await;
@@ -117,7 +135,7 @@ async fn a_plan_whose_ground_went_while_it_waited_fails_and_says_why() {
     let detail = status["error"]["detail"].as_str().expect("text");
     assert!(detail.contains("no longer kept"), "{detail}");
     assert_eq!(status["error"]["type"], "/problems/no-ground");
-    // What needs the ground says so, too; the stored result does not.
+    // Formats that need the ground are refused as well; the stored result is not.
     service.bytes(&format!("{done}/result")).await;
     let answer = service
         .get(&format!("{done}/result?format=svg"))

@@ -1,4 +1,4 @@
-//! A dataset sampled to be drawn.
+//! Sampling a dataset for drawing.
 
 use serde_json::{Value, json};
 
@@ -6,7 +6,7 @@ use super::{hill, put};
 use crate::support::api::Api;
 
 #[tokio::test]
-async fn a_grid_of_degrees_is_sampled_from_south_to_north() {
+async fn a_dataset_is_sampled_from_south_to_north() {
     let api = Api::new();
     let text = crate::support::elevations::ascii_grid([5, 5], [-85.0, 36.0], 0.1, |column, row| {
         (100 * row + 10 * column) as f64
@@ -25,7 +25,7 @@ async fn a_grid_of_degrees_is_sampled_from_south_to_north() {
             .map(f64::from)
         )
     );
-    // Bilinear, and null beyond the outermost samples.
+    // Bilinear between samples, null beyond the outermost ones.
     let part = api
         .get(&format!(
             "{uri}?south=36.1&west=-85.05&north=36.2&east=-84.95&columns=3&rows=2"
@@ -45,7 +45,7 @@ async fn a_grid_of_degrees_is_sampled_from_south_to_north() {
     let tag = whole.header("etag").to_owned();
     let known = api.get_with(uri, &[("if-none-match", &tag)]).await;
     assert_eq!(known.status, 304);
-    // Compressed, the same samples are other bytes.
+    // A weak tag, because the compressed response has other bytes.
     let gzip = [("accept-encoding", "gzip")];
     let packed = api.get_with(uri, &gzip).await;
     assert_eq!(packed.header("content-encoding"), "gzip");
@@ -54,7 +54,7 @@ async fn a_grid_of_degrees_is_sampled_from_south_to_north() {
         assert_eq!(answer.header("vary"), "accept-encoding");
     }
     assert!(tag.starts_with("W/"), "{tag}");
-    // What a plan was made over, when the name stands for another.
+    // The content that a plan was made over, after the name has moved.
     put(&api, "/terrains/steps", hill(1.0)).await;
     let sum = sum.as_str().expect("a sum");
     let pinned = api
@@ -68,7 +68,7 @@ async fn a_grid_of_degrees_is_sampled_from_south_to_north() {
 }
 
 #[tokio::test]
-async fn what_cannot_be_sampled_is_refused() {
+async fn invalid_sampling_requests_are_refused() {
     let api = Api::new();
     put(&api, "/terrains/hill", hill(1.0)).await;
     for query in [

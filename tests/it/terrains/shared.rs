@@ -1,4 +1,4 @@
-//! Datasets that several nodes share, on real servers.
+//! Datasets shared by several nodes, on real servers.
 
 use std::collections::BTreeSet;
 use std::io::{self, Cursor, Read, Seek, SeekFrom};
@@ -40,7 +40,7 @@ fn shelf(address: &str) -> Arc<dyn Shelf> {
     Arc::new(JetStreamShelf::new(settings(address, 1)))
 }
 
-/// A node of a service whose datasets are shared; contents go as soon as nothing refers to them.
+/// A node with shared datasets; content is removed as soon as nothing refers to it.
 struct Node {
     api: Api,
     catalogue: Arc<dyn Catalogue>,
@@ -64,7 +64,7 @@ impl Node {
         }
     }
 
-    /// Files of its cache.
+    /// The files in its cache.
     fn copies(&self) -> Vec<PathBuf> {
         let entries = std::fs::read_dir(self.cache.join("content")).expect("it is there");
         entries
@@ -89,7 +89,7 @@ impl Node {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_one_node_uploads_every_node_plans_over() {
+async fn a_dataset_uploaded_to_one_node_is_used_by_every_node() {
     let address = nats::address();
     let (a, b) = (Node::new(&address), Node::new(&address));
     assert_eq!(
@@ -108,7 +108,7 @@ async fn what_one_node_uploads_every_node_plans_over() {
         uploaded.json()["sha256"]
     );
 
-    // Whose name it is and what it stands for is told everywhere at once.
+    // Every node knows at once what the name refers to.
     let again = put_with(
         &b.api,
         "/terrains/hill",
@@ -122,7 +122,7 @@ async fn what_one_node_uploads_every_node_plans_over() {
     assert_eq!(replaced.status, 200);
     let late = put_with(&a.api, "/terrains/hill", &[("if-match", tag)], hill(25.0)).await;
     late.expect_problem(412, "precondition-failed");
-    // An accepted document keeps its ground, on every node, for as long as its plan is kept.
+    // An accepted document keeps its ground on every node as long as its plan is kept.
     for node in [&a, &b] {
         let answer = node
             .api
@@ -149,7 +149,7 @@ async fn what_one_node_uploads_every_node_plans_over() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn nodes_that_sweep_at_once_wait_for_nothing_that_the_other_takes_away() {
+async fn nodes_that_sweep_concurrently_do_not_block_each_other() {
     let address = nats::address();
     let (a, b) = (Node::new(&address), Node::new(&address));
     for height in 1..=20 {
@@ -162,7 +162,7 @@ async fn nodes_that_sweep_at_once_wait_for_nothing_that_the_other_takes_away() {
     assert_eq!(files(&address).await, 0);
 }
 
-/// Files on the servers, whole ones and others.
+/// The number of files on the servers, complete or not.
 async fn files(address: &str) -> usize {
     let shelf = shelf(address);
     let files = spawn_blocking(move || shelf.files()).await;
@@ -170,7 +170,7 @@ async fn files(address: &str) -> usize {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_damaged_copy_is_fetched_again() {
+async fn a_damaged_cached_copy_is_fetched_again() {
     let address = nats::address();
     let (a, b) = (Node::new(&address), Node::new(&address));
     put(&a.api, "/terrains/hill", hill(100.0)).await;
@@ -191,9 +191,9 @@ async fn a_damaged_copy_is_fetched_again() {
     );
 }
 
-/// More than one message, and more than the servers' memory for one.
+/// A file of more than one message, and larger than one message's buffer on the servers.
 #[tokio::test(flavor = "multi_thread")]
-async fn files_of_many_chunks_come_whole() {
+async fn files_of_many_chunks_arrive_complete() {
     let address = nats::address();
     let shelf = shelf(&address);
     let moved = spawn_blocking(move || {
@@ -208,7 +208,7 @@ async fn files_of_many_chunks_come_whole() {
         assert!(shelf.fetch(&empty, &mut came).expect("fetched"));
         assert_eq!(came.len(), bytes.len());
         assert!(!shelf.fetch("nothing", &mut came).expect("answered"));
-        // Who cannot write says so himself.
+        // A writer that fails reports its own error.
         let mut full = [0; 1000];
         let error = shelf
             .fetch(&file, &mut &mut full[..])
@@ -226,7 +226,7 @@ async fn files_of_many_chunks_come_whole() {
     moved.await.expect("no panic");
 }
 
-/// Breaks off after so many bytes.
+/// Breaks off after this many bytes.
 struct Broken(usize);
 
 impl Read for Broken {
@@ -248,7 +248,7 @@ impl Seek for Broken {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_upload_that_broke_is_seen_by_nobody_and_removed() {
+async fn an_interrupted_upload_is_invisible_and_swept() {
     let address = nats::address();
     let node = Node::new(&address);
     put(&node.api, "/terrains/hill", hill(100.0)).await;
@@ -256,7 +256,7 @@ async fn an_upload_that_broke_is_seen_by_nobody_and_removed() {
     let broken = spawn_blocking(move || own.put(&mut Broken(1 << 20))).await;
     let error = broken.expect("no panic").expect_err("it broke");
     assert_eq!(error.to_string(), "broken");
-    // What was put, but never came to have a name: its process was killed.
+    // A file whose process was killed before it got a name.
     let own = shelf(&address);
     let lost = spawn_blocking(move || own.put(&mut Cursor::new("whole"))).await;
     lost.expect("no panic").expect("put");
@@ -267,14 +267,14 @@ async fn an_upload_that_broke_is_seen_by_nobody_and_removed() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn while_the_servers_are_away_all_is_refused_and_nothing_lost() {
+async fn while_the_servers_are_away_requests_are_refused_and_nothing_is_lost() {
     let mut server = NatsServer::start();
     let address = server.address();
     let (a, b) = (Node::new(&address), Node::new(&address));
     let uploaded = put(&a.api, "/terrains/hill", hill(100.0)).await;
     let sha256 = uploaded.json()["sha256"].as_str().expect("text").to_owned();
     server.kill();
-    // What is pinned and there needs no server; nothing else is told from what is gone.
+    // A pinned file in the cache needs no server; everything else is refused as unavailable, not as gone.
     let catalogue = a.catalogue.clone();
     let pinned = sha256.clone();
     let found = spawn_blocking(move || catalogue.find("hill", Some(&pinned))).await;
@@ -301,7 +301,7 @@ async fn while_the_servers_are_away_all_is_refused_and_nothing_lost() {
 }
 
 impl Node {
-    /// Whose plans are shared, too.
+    /// Also shares its plans.
     async fn with_store(mut self, address: &str, slots: usize) -> Self {
         let settings = Settings {
             slots,
@@ -315,7 +315,7 @@ impl Node {
         self
     }
 
-    /// Plan as the service does.
+    /// Runs plans as the service does.
     fn work(&self) -> Pool {
         let rules = self.api.state.rules.clone();
         let engine: Engine = Arc::new(move |document, observer, stop| {
@@ -331,7 +331,7 @@ impl Node {
         Pool::start(self.api.store.clone(), settings, engine)
     }
 
-    /// Once as many plans as that are known here to be queued or running over a dataset.
+    /// Waits until this node knows that `plans` queued or running plans use the dataset.
     async fn until_in_use(&self, path: &str, plans: u64) {
         eventually(async || self.api.get(path).await.json()["in_use"] == plans).await;
     }
@@ -347,7 +347,7 @@ impl Node {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_worker_plans_over_what_was_uploaded_elsewhere_and_replaced_since() {
+async fn a_worker_plans_over_content_uploaded_elsewhere_and_since_replaced() {
     let address = nats::address();
     let a = Node::new(&address).with_store(&address, 0).await;
     let b = Node::new(&address).with_store(&address, 1).await;
@@ -358,7 +358,7 @@ async fn a_worker_plans_over_what_was_uploaded_elsewhere_and_replaced_since() {
     b.until_in_use("/terrains/hill", 1).await;
     let problem = b.api.delete("/terrains/hill").await;
     assert_eq!(problem.expect_problem(409, "terrain-in-use")["plans"], 1);
-    // The name goes on; what the plan was promised stays, though two nodes sweep.
+    // The name moves on; the plan's content stays although two nodes sweep.
     assert_eq!(put(&b.api, "/terrains/hill", hill(50.0)).await.status, 200);
     for node in [&a, &b] {
         let uses = node.api.store.datasets_in_use().await.expect("it is open");
@@ -377,7 +377,7 @@ async fn a_worker_plans_over_what_was_uploaded_elsewhere_and_replaced_since() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_plan_waits_for_ground_that_is_away() {
+async fn a_plan_waits_until_its_ground_is_available() {
     let mut server = NatsServer::start();
     let (datasets, plans) = (server.address(), nats::address());
     let a = Node::new(&datasets).with_store(&plans, 0).await;
@@ -397,7 +397,7 @@ async fn a_plan_waits_for_ground_that_is_away() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn processes_share_what_one_of_them_was_given() {
+async fn processes_share_the_datasets_uploaded_to_one_of_them() {
     let address = nats::address();
     let directories = [(); 2].map(|()| tempfile::tempdir().expect("a temporary directory"));
     let start = |node: usize, role: &str| {
@@ -405,7 +405,7 @@ async fn processes_share_what_one_of_them_was_given() {
         Service::start(directories[node].path(), &arguments)
     };
     let (front, worker) = (start(0, "api"), start(1, "worker"));
-    // A service that is new begins with a dataset; with one, however many nodes start.
+    // A new service starts with one dataset, however many nodes start.
     let shipped: Value = of(&front, "/terrains").await;
     assert_eq!(shipped["terrains"][0]["name"], "jacksboro");
     let upload = front.request(Method::PUT, "/terrains/hill");
@@ -418,7 +418,7 @@ async fn processes_share_what_one_of_them_was_given() {
     let metrics = std::str::from_utf8(&metrics).expect("UTF-8");
     let fetched = "noctule_terrain_fetches_total{outcome=\"fetched\"} 1";
     assert!(metrics.lines().any(|line| line == fetched), "{metrics}");
-    // A node that comes later finds it all, and lays nothing down again.
+    // A node that joins later finds everything and does not add the shipped dataset again.
     let deleted = front.request(Method::DELETE, "/terrains/jacksboro");
     assert_eq!(deleted.send().await.expect("an answer").status(), 204);
     drop(front);
@@ -434,13 +434,13 @@ async fn of(service: &Service, path: &str) -> Value {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_node_killed_amid_an_upload_leaves_nothing_that_is_seen() {
+async fn a_node_killed_during_an_upload_leaves_nothing_visible() {
     let address = nats::address();
     let directories = [(); 2].map(|()| tempfile::tempdir().expect("a temporary directory"));
     let start = |node: usize| Service::start(directories[node].path(), &["--store", &address]);
     let (a, b) = (start(0), start(1));
     let before = b.bytes("/terrains").await;
-    // Long enough to be caught in the middle of.
+    // Large enough to be caught in the middle of the upload.
     let request = a.request(Method::PUT, "/terrains/sea?filename=N36W085.hgt");
     let upload = tokio::spawn(request.body(vec![0; 2 * 3601 * 3601]).send());
     let own = shelf(&address);
@@ -454,7 +454,7 @@ async fn a_node_killed_amid_an_upload_leaves_nothing_that_is_seen() {
     a.kill();
     assert!(upload.await.expect("no panic").is_err(), "it was too quick");
     assert_eq!(b.bytes("/terrains").await, before);
-    // Its chunks go with time, which for this node is short.
+    // Its chunks are removed after a while, which is short for this node.
     let impatient = Node::new(&address);
     impatient.sweep(BTreeSet::new()).await;
     assert_eq!(files(&address).await, 1);
@@ -465,10 +465,10 @@ async fn a_node_killed_amid_an_upload_leaves_nothing_that_is_seen() {
     assert!(of(&b, "/terrains/sea/elevations").await["elevations"].is_array());
 }
 
-/// Three copies of everything: what was answered by one server is known to all.
+/// With three replicas of everything, a change acknowledged by one server is visible through all.
 #[tokio::test(flavor = "multi_thread")]
-async fn names_are_the_same_at_once_wherever_they_are_asked_for() {
-    let cluster = Cluster::start();
+async fn a_changed_name_is_visible_at_once_on_every_node() {
+    let cluster = Cluster::start().await;
     let address = cluster.address();
     let mut nodes = Vec::new();
     for _ in 0..3 {
@@ -489,10 +489,10 @@ async fn names_are_the_same_at_once_wherever_they_are_asked_for() {
     }
 }
 
-/// Whoever is refused asks again, as any caller would; whoever is answered was told the truth.
+/// Refused requests are retried, as any caller would; every answer must be correct.
 #[tokio::test(flavor = "multi_thread")]
-async fn names_are_the_same_whichever_servers_have_been_lost() {
-    let mut cluster = Cluster::start();
+async fn names_stay_consistent_when_servers_are_lost() {
+    let mut cluster = Cluster::start().await;
     let address = cluster.address();
     let nodes = [(); 2].map(|()| {
         let shelf = Arc::new(JetStreamShelf::new(settings(&address, 3)));
@@ -521,7 +521,7 @@ async fn names_are_the_same_whichever_servers_have_been_lost() {
     }
 }
 
-/// What is answered when the store is there, asked for until it is.
+/// Retries until the store is available; the response.
 async fn answered(ask: impl AsyncFn() -> Answer) -> Answer {
     in_time(async {
         loop {
@@ -536,7 +536,7 @@ async fn answered(ask: impl AsyncFn() -> Answer) -> Answer {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn copies_are_counted() {
+async fn cached_copies_are_counted_in_the_metrics() {
     let address = nats::address();
     let (a, b) = (Node::new(&address), Node::new(&address));
     put(&a.api, "/terrains/hill", hill(100.0)).await;

@@ -1,4 +1,4 @@
-//! Which datasets plans need, and what becomes of those that none does.
+//! Which datasets plans use, and what becomes of unused ones.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -12,13 +12,13 @@ use super::{hill, kept, over, put};
 use crate::support::api::Api;
 use crate::support::patience::eventually;
 
-/// Whose content goes as soon as nothing refers to it.
+/// Removes content as soon as nothing refers to it.
 fn impatient() -> Api {
     Api::with_catalogue(|uploads| Directories::with_grace(uploads, None, Duration::ZERO))
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_a_plan_waits_over_cannot_be_deleted() {
+async fn a_dataset_in_use_by_queued_plans_cannot_be_deleted() {
     let api = impatient();
     put(&api, "/terrains/hill", hill(100.0)).await;
     let submit = async || {
@@ -37,7 +37,7 @@ async fn what_a_plan_waits_over_cannot_be_deleted() {
         .await
         .expect_problem(409, "terrain-in-use");
     assert_eq!(problem["plans"], 2);
-    // Another content under the name leaves theirs where it is.
+    // Moving the name to other content leaves the plans' content in place.
     put(&api, "/terrains/hill", hill(50.0)).await;
     let uses = api.store.datasets_in_use().await.expect("it is open");
     let used: BTreeSet<String> = uses.into_iter().map(|used| used.sha256).collect();
@@ -46,14 +46,14 @@ async fn what_a_plan_waits_over_cannot_be_deleted() {
     assert_eq!(kept(&api.uploads()), [4, 1, 0]);
     assert_eq!(api.delete("/terrains/hill").await.status, 204);
     for plan in &plans {
-        let svg = api.get(&format!("{plan}/scenario")).await;
-        assert_eq!(svg.status, 200);
+        let scenario = api.get(&format!("{plan}/scenario")).await;
+        assert_eq!(scenario.status, 200);
         assert_eq!(api.delete(plan).await.status, 204);
     }
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn content_goes_with_the_last_plan_over_it() {
+async fn content_is_removed_with_the_last_plan_over_it() {
     let api = impatient();
     put(&api, "/terrains/hill", hill(100.0)).await;
     let plan = api
@@ -77,7 +77,7 @@ async fn until_kept(api: &Api, expected: [usize; 3]) {
 }
 
 #[tokio::test]
-async fn what_was_asked_for_lately_is_kept_for_a_while() {
+async fn recently_requested_content_is_kept_for_a_while() {
     let api = Api::new();
     put(&api, "/terrains/hill", hill(100.0)).await;
     let accepted = api
@@ -88,13 +88,13 @@ async fn what_was_asked_for_lately_is_kept_for_a_while() {
     let catalogue = &api.state.terrains.catalogue;
     assert!(catalogue.has_unnamed());
     assert_eq!(catalogue.sweep(&BTreeSet::new()).expect("swept"), 0);
-    // Somebody who was told that it is right may still hand it in.
+    // A caller whose document was just validated may still submit it.
     let answer = api.post("/plans", &accepted["scenario"]).await;
     assert_eq!(answer.status, 202, "{answer:?}");
 }
 
 #[tokio::test]
-async fn a_restart_finds_everything() {
+async fn a_restart_keeps_every_dataset_and_removes_crash_remains() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let open =
         || Api::with_catalogue(|_| Directories::new(directory.path().join("terrains"), None));
@@ -109,7 +109,7 @@ async fn a_restart_finds_everything() {
     .await;
     let before = api.get("/terrains").await.json();
     drop(api);
-    // Of a crash: an upload that had not ended, and one whose content had not come when its record had.
+    // Left by a crash: an unfinished upload, and a record whose content never arrived.
     let part = |path: &str| directory.path().join("terrains").join(path);
     std::fs::write(part("incoming/half.part"), "half").expect("written");
     let orphan = format!("content/{}.json", "0".repeat(64));

@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_model_is_that_of_one_worker_where_the_formula_is_known() {
+    fn the_queue_model_matches_the_known_formula_for_one_worker() {
         // M/D/1: rho / (2 (1 - rho)).
         for busy in [0.1, 0.5, 0.9] {
             assert!((mean_wait(1, busy) - busy / (2.0 * (1.0 - busy))).abs() < 1e-12);

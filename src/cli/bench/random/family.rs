@@ -241,9 +241,9 @@ mod tests {
     use super::*;
     use crate::cli::bench::case::Case;
 
-    /// Whatever the seed, the reader accepts the document; and it is the same each time.
+    /// For every seed the reader accepts the document, and it is the same each time.
     #[test]
-    fn every_scenario_is_valid_and_its_seeds_own() {
+    fn every_scenario_is_valid_and_reproducible_from_its_seed() {
         for family in &FAMILIES {
             let documents: Vec<Value> = (1..=60).map(|seed| family.scenario(seed)).collect();
             for (document, seed) in documents.iter().zip(1..) {

@@ -120,8 +120,8 @@ mod tests {
     use crate::planner::{Nobody, plan};
     use crate::scenario::Seeding;
 
-    /// Over level ground in a band of 400 m: with this distance from start to target, rise, greatest climb and greatest
-    /// turn.
+    /// Over level ground in a band of 400 m, with the given distance from start to target, rise, maximum climb
+    /// angle and maximum turn angle.
     fn steep([distance, rise, climb, turn]: [f64; 4], waypoints: usize) -> Scenario {
         let mut scenario = scenario();
         scenario.threats.clear();
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_way_that_is_long_enough_is_left_alone() {
+    fn no_climb_is_added_where_the_direct_way_is_long_enough() {
         for shape in [[900.0, 0.0, 45.0, 60.0], [400.0, 200.0, 45.0, 60.0]] {
             assert!(
                 routes(&Model::new(&steep(shape, 10)), &|| false)
@@ -154,9 +154,9 @@ mod tests {
         }
     }
 
-    /// Straight up and over, on four shapes of ground, the way is long enough, and can be flown as it is.
+    /// For four geometries of start and target, some start is feasible without a search.
     #[test]
-    fn longer_ways_climb_and_keep_every_limit() {
+    fn steep_climbs_get_a_feasible_start() {
         for (shape, waypoints) in [
             ([30.0, 0.0, 45.0, 60.0], 10),
             ([100.0, 300.0, 45.0, 60.0], 12),
@@ -176,9 +176,9 @@ mod tests {
         }
     }
 
-    /// The plans themselves, not only their starts; with what each must not exceed in cost.
+    /// Complete plans, not only their starts, with an upper bound for each cost.
     #[test]
-    fn steep_climbs_are_planned() {
+    fn steep_climbs_are_planned_at_low_cost() {
         for (shape, waypoints, most) in [
             ([30.0, 0.0, 45.0, 60.0], 10, 600.0),
             ([100.0, 300.0, 30.0, 60.0], 10, 550.0),

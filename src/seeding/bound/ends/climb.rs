@@ -141,8 +141,8 @@ mod tests {
     #[test]
     fn climbing_costs_more_in_soft_zones() {
         check(|end| {
-            // A metre costs 2 instead of 0.5: the leg climbs until a metre of climb costs as much as a metre off the
-            // middle.
+            // A metre costs 2 instead of 0.5, so the leg climbs until another metre of climb costs as much as a
+            // metre off the middle.
             let climbed = 100.0 / 3.0_f64.sqrt();
             let slant = (1e4 + climbed * climbed).sqrt();
             let expected = 2.0 * (slant - 100.0) + 100.0 - climbed;

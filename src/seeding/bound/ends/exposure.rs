@@ -97,9 +97,10 @@ mod tests {
     use super::super::super::prices::Prices;
     use super::*;
 
-    /// No leg of a sector has less exposure, summed finely; one to a disc has hardly more where the sector is slim.
+    /// No leg in the sector has less exposure than stated, by fine summation; for a slim sector the stated value is
+    /// close.
     #[test]
-    fn no_leg_of_a_sector_is_exposed_less() {
+    fn no_leg_in_a_sector_has_less_exposure_than_stated() {
         let scenario = scenario(
             r#""threats": [
                 {"kind": "cylinder", "center": {"x": 300, "y": 160}, "radius": 40, "influence": 100},

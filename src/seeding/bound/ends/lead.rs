@@ -61,10 +61,10 @@ mod tests {
     use super::super::over;
     use super::*;
 
-    /// From 85 m below the middle of the band to 44 above it, among 36 discs with overlapping soft zones: legs lead
-    /// where none of the cheapest ways seen from above does.
+    /// From 85 m below the middle of the band to 44 m above it, among 36 discs with overlapping soft zones: the
+    /// legs at the ends go elsewhere than the cheapest ways seen from above.
     #[test]
-    fn a_potential_that_knows_of_legs_proves_more_with_them() {
+    fn a_potential_that_considers_the_first_legs_proves_more() {
         let mut scenario = among((0..36).map(|idx| {
             let (column, row) = (f64::from(idx % 6), f64::from(idx / 6));
             let aside = 40.0 * (row % 2.0);
@@ -88,9 +88,9 @@ mod tests {
         };
         let [across, free] = proven(&FREE);
         let [across_with, with] = proven(&leads(&scenario, &prices, (&walls, &radii), &|| false));
-        // The best route known has 30 waypoints.
+        // The best known route has 30 waypoints.
         assert!(with > 1.005 * free && with <= 1492.740, "{free} {with}");
-        // What is proven about the way seen from above hardly suffers.
+        // The bound on the way seen from above is hardly lower.
         assert!(across_with > 0.985 * across, "{across} {across_with}");
     }
 }

@@ -113,9 +113,9 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// No leg of those lengths and no climb that leaves the zone costs less.
+        /// No leg within those lengths, and no climb that leaves the zone, costs less.
         #[test]
-        fn no_leg_is_cheaper(
+        fn no_leg_out_of_the_zone_is_cheaper_than_stated(
             (shortest, more) in (1.0..500.0f64, prop_oneof![Just(0.0), 0.0..500.0f64, Just(f64::INFINITY)]),
             (length, climb) in (0.0..1.0f64, 0.0..1.0f64),
             (fuel, exposed, weight) in (0.01..2.0f64, prop_oneof![Just(0.0), 0.0..300.0f64], 0.01..3.0f64),
@@ -135,9 +135,9 @@ mod tests {
     }
 
     proptest! {
-        /// No way out of the zone with a waypoint on it costs less, whatever a potential rises by on it.
+        /// No way out of the zone with a waypoint on it costs less, however the potential rises along it.
         #[test]
-        fn no_way_out_is_cheaper(
+        fn no_way_out_with_a_waypoint_is_cheaper_than_stated(
             (reach, slope, off) in (1.0..500.0f64, 0.05..0.6f64, 0.0..200.0f64),
             (at, climb, detour, higher) in (0.0..1.0f64, 0.0..1.0f64, 0.0..200.0f64, 0.0..100.0f64),
             (fuel, weight) in (0.01..2.0f64, prop_oneof![Just(0.0), 0.01..3.0f64]),
@@ -156,10 +156,10 @@ mod tests {
         }
     }
 
-    /// From 60 m below the band, with climbs of 45 degrees: out of the zone it climbs half a metre a metre, so that the
-    /// middle, 160 m above, is passed after 320 m.
+    /// From 60 m below the band, with climbs of 45 degrees: leaving the zone it climbs half a metre per metre,
+    /// so it passes the middle, 160 m above, after 320 m.
     #[test]
-    fn a_long_leg_leads_past_the_middle() {
+    fn a_long_leg_overshoots_the_middle() {
         let ramp = Ramp {
             reach: 120.0,
             slope: 0.5,

@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_slope_is_in_a_part() {
+    fn every_slope_belongs_to_a_part() {
         for steepest in [0.3, 1.0, 2.0, 11.4, 1.6e16] {
             let parts = Slopes::parts(steepest);
             assert!(parts.len() > 8 && parts.iter().all(|part| part.least < part.most));
@@ -95,9 +95,10 @@ mod tests {
         }
     }
 
-    /// A leg that climbs by a fifth to a fourth, beneath a top that is 20 m up, above a base 10 m down, or from 10 m below it.
+    /// A leg that climbs by a fifth to a fourth: below a top 20 m up, above a base 10 m down, or entering from 10 m
+    /// below a base.
     #[test]
-    fn a_threat_counts_while_every_leg_is_at_its_heights() {
+    fn a_threat_counts_only_where_every_leg_is_at_its_heights() {
         let slopes = Slopes {
             is_towards: true,
             least: 0.2,

@@ -117,10 +117,10 @@ mod tests {
     use super::super::kind::tests::end;
     use super::*;
 
-    /// Beneath the top for 60 m, a leg is as exposed, and as blocked, as one of that length; a shorter one leaves
-    /// something to the legs after it.
+    /// A leg that is below the top for 60 m is as exposed, and as blocked, as one of that length; a shorter one
+    /// leaves exposure to the legs after it.
     #[test]
-    fn a_leg_is_under_a_top_for_as_long_as_it_climbs() {
+    fn a_leg_is_exposed_only_until_it_has_climbed_to_the_top() {
         let scenario = scenario(
             r#""threats": [{"kind": "cylinder", "center": {"x": 260, "y": 100}, "radius": 30, "influence": 100, "top": 60}]"#,
         );

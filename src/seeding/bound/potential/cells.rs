@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_place_is_in_the_square_of_its_cell() {
+    fn every_place_lies_in_the_square_of_its_cell() {
         let rect = Rect {
             min: Point2::new(-5.0, 3.0),
             max: Point2::new(7.0, 10.5),

@@ -98,7 +98,7 @@ mod tests {
     use crate::geometry::Point2;
 
     #[test]
-    fn a_spike_is_shared_with_what_lies_about_it() {
+    fn a_spike_is_spread_over_its_surroundings() {
         let at = |i: u32, j: u32| Point2::new(f64::from(i), f64::from(j));
         let vertices: Vec<Point2> = (0..=10)
             .flat_map(|j| (0..=10).map(move |i| at(i, j)))

@@ -93,7 +93,7 @@ mod tests {
     use super::*;
     use crate::geometry::Point2;
 
-    /// A strip of a thousand metres, the first two vertices at its ends.
+    /// A strip of a thousand metres with the first two vertices at its ends.
     fn strip() -> Mesh {
         let mut vertices = vec![Point2::new(0.0, 0.0), Point2::new(1000.0, 0.0)];
         vertices.extend((1..100).map(|i| Point2::new(10.0 * f64::from(i), 0.0)));
@@ -101,9 +101,9 @@ mod tests {
         Mesh::new(&vertices, |_| false).expect("they are apart")
     }
 
-    /// A triangle whose area is lost in rounding: its rise is not known, and counts as zero.
+    /// The area of a triangle is lost in rounding: its rise is unknown and counts as zero.
     #[test]
-    fn a_triangle_that_is_too_slim_takes_its_levels_away() {
+    fn a_degenerate_triangle_removes_its_levels() {
         let vertices = [[0.0, 0.0], [1000.0, 0.0], [500.0, 1e-8], [500.0, 400.0]];
         let mesh = Mesh::new(&vertices.map(Point2::from), |_| false).expect("they are apart");
         assert_eq!(mesh.triangles.len(), 3);
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_steep_costs_the_levels_at_which_it_lies() {
+    fn excess_steepness_is_deducted_at_its_own_levels() {
         let mesh = strip();
         let check = |limit: f64, height: &dyn Fn(Point2) -> f64, expected: f64| {
             let limits = vec![[limit; 6]; mesh.triangles.len()];
@@ -127,7 +127,7 @@ mod tests {
             assert!(found > expected - 40.0 * limit, "{found} {expected}");
         };
         check(2.0, &|at| 2.0 * at.x, 2000.0);
-        // Not as steep as allowed everywhere, and too steep on a tenth of the way.
+        // Less steep than allowed everywhere, then too steep on a tenth of the way.
         check(2.0, &|at| at.x, 2000.0);
         check(1.0, &|at| at.x + (at.x - 500.0).clamp(0.0, 100.0), 1000.0);
         check(1.0, &|at| 4.0 * at.x.min(100.0) + 1e-3 * at.x, 1000.0);

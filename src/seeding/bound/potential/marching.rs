@@ -313,7 +313,7 @@ mod tests {
     use super::*;
     use crate::geometry::Point2;
 
-    /// A square of `n` by `n` steps of a metre, cut along its diagonals, without the squares that are `left_out`.
+    /// A square of `n` by `n` one-metre steps, cut along diagonals, without the squares that are `left_out`.
     fn square(n: u32, left_out: impl Fn(Point2) -> bool) -> Mesh {
         let at = |i: u32, j: u32| Point2::new(f64::from(i), f64::from(j));
         let vertices: Vec<Point2> = (0..=n)
@@ -323,14 +323,14 @@ mod tests {
         Mesh::new(&vertices, |corners| left_out(middle(corners))).expect("they are apart")
     }
 
-    /// The cost of all nodes from the first one.
+    /// The costs of all nodes from the first one.
     fn from_first(mesh: &Mesh, prices: &[[f64; 6]]) -> Vec<f64> {
         let [costs, _] = march(mesh, prices, &[Seed::about(mesh, prices, 0, 0.0), vec![]]);
         costs
     }
 
     #[test]
-    fn every_part_is_round_each_of_its_corners() {
+    fn every_part_is_listed_at_each_of_its_corners() {
         for (part, nodes) in PARTS.iter().enumerate() {
             for (corner, node) in nodes.iter().enumerate() {
                 assert!(PARTS_ROUND[*node].contains(&(part, corner)));
@@ -340,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn as_far_as_the_straight_line() {
+    fn at_a_uniform_price_costs_are_those_of_the_straight_line() {
         let mesh = square(20, |_| false);
         let costs = from_first(&mesh, &vec![[3.0; 6]; mesh.triangles.len()]);
         for (node, cost) in mesh.nodes.iter().zip(&costs) {
@@ -352,9 +352,10 @@ mod tests {
         }
     }
 
-    /// Where a metre costs more with distance from the first node, the ways are straight, and their cost bends.
+    /// The price per metre grows with the distance from the first node: the ways are straight and the cost is
+    /// quadratic.
     #[test]
-    fn as_dear_as_the_way_is() {
+    fn at_a_growing_price_costs_are_those_of_the_way() {
         let mesh = square(20, |_| false);
         let price = |at: Point2| 1.0 + 0.2 * at.coords.norm();
         let triangles = mesh.triangles.iter();
@@ -372,9 +373,9 @@ mod tests {
         }
     }
 
-    /// A front that is a straight line, ahead of which a node has been reached at less cost.
+    /// A straight front, ahead of which a cheaper seed has been placed.
     #[test]
-    fn from_the_cheapest_of_all_seeds() {
+    fn costs_come_from_the_cheapest_seed() {
         let mesh = square(20, |_| false);
         let mut seeds: Vec<Seed> = (0..mesh.nodes.len())
             .filter(|node| mesh.nodes[*node].x < 1e-9)
@@ -401,9 +402,9 @@ mod tests {
     }
 
     proptest! {
-        /// However the side bulges and whatever metres cost.
+        /// Whatever the costs along the side and the prices.
         #[test]
-        fn nothing_is_over_a_side_for_less_than_told_at_once(
+        fn the_quick_bound_of_a_side_is_never_above_its_cost(
             (x, y) in (-2.0..3.0f64, 0.05..3.0f64),
             (first, last) in (0.0..5.0f64, 0.0..5.0f64),
             rises in prop::array::uniform2(-6.0..6.0f64),
@@ -423,8 +424,8 @@ mod tests {
     }
 
     #[test]
-    fn round_what_is_left_out() {
-        // A wall with a way round its upper end.
+    fn the_front_goes_around_missing_triangles() {
+        // A wall with a way around its upper end.
         let mesh = square(20, |at| (10.0..11.0).contains(&at.x) && at.y < 15.0);
         let costs = from_first(&mesh, &vec![[1.0; 6]; mesh.triangles.len()]);
         let to = mesh
@@ -434,7 +435,7 @@ mod tests {
         let cost = costs[to.expect("it is a corner")];
         let round = 2.0 * Point2::new(9.7, 15.0).coords.norm();
         assert!((round..1.06 * round).contains(&cost), "{cost} {round}");
-        // Nothing leads into what is walled in.
+        // No way leads past a complete wall.
         let mesh = square(20, |at| (10.0..11.0).contains(&at.x));
         let costs = from_first(&mesh, &vec![[1.0; 6]; mesh.triangles.len()]);
         assert!(costs.iter().any(|cost| cost.is_infinite()));

@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_square_without_one_of_its_triangles() {
+    fn a_mesh_omits_rejected_triangles_and_has_exact_midpoints_and_rates() {
         let vertices = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.1]].map(Point2::from);
         let mesh = Mesh::new(&vertices, |corners| corners.contains(&vertices[1]));
         let mesh = mesh.expect("they are apart");
@@ -138,7 +138,7 @@ mod tests {
             let between = nalgebra::center(&places[one], &places[other]);
             assert!((places[middle] - between).norm() < 1e-15);
         }
-        // The barycentric coordinate of each corner is 1 there and 0 in the others.
+        // Each corner's barycentric coordinate is 1 there and 0 at the others.
         for (corner, rate) in triangle.rates.iter().enumerate() {
             for (other, place) in places[..3].iter().enumerate() {
                 let share = 1.0 + rate.dot(&(place - places[corner]));
@@ -146,7 +146,7 @@ mod tests {
                 assert!((share - expected).abs() < 1e-12);
             }
         }
-        // All parts are alike.
+        // All parts are similar to the whole at half size.
         let edges = |[a, b, c]: [Point2; 3]| [b - a, c - b, a - c].map(|edge| edge.norm());
         let whole = edges([places[0], places[1], places[2]]);
         for part in PARTS {

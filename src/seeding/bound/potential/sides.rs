@@ -39,7 +39,7 @@ impl Rays {
 mod tests {
     use super::*;
 
-    /// What a way over `places` crosses.
+    /// The sum of the rays crossed on a way over `places`.
     fn sum(rays: &Rays, places: &[[f64; 2]]) -> u64 {
         let pieces = places.windows(2);
         let crossed = pieces.map(|ends| rays.crossed([ends[0].into(), ends[1].into()]));
@@ -47,7 +47,7 @@ mod tests {
     }
 
     #[test]
-    fn ways_are_told_apart_by_what_lies_between_them() {
+    fn ways_differ_only_by_the_points_between_them() {
         let rays = Rays(
             [(0.0, 0.0), (1.0, 3.0), (1.0, 5.0)]
                 .map(|(x, y)| Point2::new(x, y))
@@ -57,7 +57,7 @@ mod tests {
         );
         let direct = sum(&rays, &[[-4.0, 1.0], [4.0, 1.0]]);
         assert_eq!(direct, 1);
-        // However they are bent and subdivided, from right to left, and with loops that come back.
+        // However the way is bent and subdivided, and with loops that return; reversed it is negated.
         for same in [
             vec![[-4.0, 1.0], [0.0, 2.9], [0.0, 0.5], [1.0, 0.5], [4.0, 1.0]],
             vec![

@@ -76,7 +76,7 @@ mod tests {
     use super::*;
     use crate::geometry::Point2;
 
-    /// A triangle, and a quadratic with its gradient.
+    /// A triangle, and a quadratic function with its gradient.
     fn example() -> (Mesh, impl Fn(Point2) -> f64, impl Fn(Point2) -> Vector2) {
         let corners = [[1.0, 2.0], [6.0, 3.0], [2.5, 7.0]].map(Point2::from);
         let mesh = Mesh::new(&corners, |_| false).expect("they are apart");
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn gradients_are_those_of_the_quadratic() {
+    fn gradients_of_a_quadratic_are_exact() {
         let (mesh, height, slope) = example();
         let triangle = &mesh.triangles[0];
         let places = mesh.places(triangle);
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn a_response_is_what_one_value_more_changes() {
+    fn a_response_is_the_change_of_gradients_per_unit_of_a_value() {
         let (mesh, height, _) = example();
         let triangle = &mesh.triangles[0];
         let values = mesh.places(triangle).map(&height);
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn no_place_is_beyond_the_range() {
+    fn the_range_bounds_every_place() {
         let (mesh, height, _) = example();
         let places = mesh.places(&mesh.triangles[0]);
         let [least, most] = range(&places.map(&height));

@@ -134,10 +134,10 @@ mod tests {
     use crate::seeding::bound::prices::Prices;
     use crate::seeding::tests::scenario;
 
-    /// A coarse mesh estimates the way past the middle as twice as expensive as the cheapest; a finer one shows that
-    /// the cheapest costs a tenth more.
+    /// The coarse mesh estimates the way through the middle as twice as expensive as the cheapest; a finer one
+    /// shows that the cheapest costs a tenth more.
     #[test]
-    fn prices_are_lowered_less_where_the_cheapest_route_turns_out_dearer() {
+    fn prices_are_lowered_less_when_the_cheapest_route_proves_more_expensive() {
         let scenario = scenario(r#""threats": []"#);
         let prices = Prices::of(&scenario);
         let walls = around::walls(&scenario, &prices);

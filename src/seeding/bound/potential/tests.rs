@@ -8,7 +8,7 @@ use crate::geometry::{Vector2, ring};
 use crate::scenario::Scenario;
 use crate::seeding::outline::OutlineShape;
 
-/// From (200, 500) to (800, 500), `fuel` a metre, in a square of a kilometre.
+/// From (200, 500) to (800, 500) in a square of a kilometre, at `fuel` per metre.
 fn scenario(fuel: f64, threats: &str) -> Scenario {
     read(&format!(
         r#"{{ "frame": "local",
@@ -32,8 +32,8 @@ fn proven(scenario: &Scenario) -> f64 {
     proof.expect("there is a way").total()
 }
 
-/// The cheapest way over a lattice of `NODES` nodes a side with legs in 32 directions, each summed by the midpoint
-/// rule: apart from that sum, more expensive than the cheapest way of all.
+/// The cheapest way over a lattice of `NODES` nodes a side, with legs of up to 4 nodes in each axis, each
+/// summed by the midpoint rule: apart from the error of that sum, more expensive than the optimum.
 fn over_lattice(scenario: &Scenario) -> f64 {
     const NODES: i32 = 51;
     let spacing = 20.0;
@@ -84,14 +84,14 @@ fn over_lattice(scenario: &Scenario) -> f64 {
 }
 
 #[test]
-fn a_soft_zone_far_from_the_way_leaves_the_fuel_of_the_straight_line() {
+fn a_soft_zone_far_from_the_way_leaves_the_straight_line_bound() {
     let scenario = scenario(1.0, &disc(500.0, 930.0, 10.0, 20.0));
     let proven = proven(&scenario);
     assert!(proven <= 600.0 && proven > 0.98 * 600.0, "{proven}");
 }
 
 #[test]
-fn a_little_below_the_cheapest_way() {
+fn the_bound_is_slightly_below_the_cheapest_way() {
     let check = |fuel: f64, threats: &[String], share: f64| {
         let scenario = scenario(fuel, &threats.join(", "));
         let (proven, found) = (proven(&scenario), over_lattice(&scenario));
@@ -101,22 +101,22 @@ fn a_little_below_the_cheapest_way() {
     // One soft zone over both ends, without and with a core in the way.
     check(1.0, &[disc(500.0, 560.0, 1.0, 600.0)], 0.95);
     check(1.0, &[disc(500.0, 510.0, 80.0, 400.0)], 0.95);
-    // Ends in zones of their own.
+    // Each end in a zone of its own.
     let ends = [
         disc(230.0, 500.0, 20.0, 150.0),
         disc(800.0, 460.0, 25.0, 120.0),
     ];
     check(0.5, &ends, 0.95);
-    // A wall of zones that overlap.
+    // A wall of overlapping zones.
     let wall: Vec<String> = (0..9)
         .map(|i| disc(500.0, 60.0 + 110.0 * f64::from(i), 30.0, 110.0))
         .collect();
     check(0.5, &wall, 0.90);
 }
 
-/// A potential that is nowhere steeper than prices is not reduced.
+/// A potential that is nowhere steeper than the prices is not reduced.
 #[test]
-fn what_a_march_finds_is_proven_but_for_little() {
+fn nearly_all_of_the_marched_cost_is_proven() {
     let scenario = scenario(0.2, &zones());
     let prices = Prices::of(&scenario);
     let walls = around::walls(&scenario, &prices);
@@ -138,10 +138,10 @@ fn what_a_march_finds_is_proven_but_for_little() {
     }
 }
 
-/// In every triangle that is kept, the linear interpolation between the limits of its parts is no more than the cost of
-/// a metre there; and what is left out is cores.
+/// In every triangle kept, interpolating the limits linearly over its parts never exceeds the price per metre;
+/// triangles left out lie entirely in cores.
 #[test]
-fn limits_are_nowhere_more_than_a_metre_costs() {
+fn limits_never_exceed_the_price_per_metre() {
     let scenario = scenario(0.2, &zones());
     let prices = Prices::of(&scenario);
     let walls = around::walls(&scenario, &prices);
@@ -194,7 +194,7 @@ fn limits_are_nowhere_more_than_a_metre_costs() {
     );
 }
 
-/// Where edges cross the border of the area, touch it or run close to it, vertices are on it or clearly inside.
+/// Where edges cross the border of the area, touch it or run close to it, vertices are on it or well inside.
 #[test]
 fn no_triangle_along_the_border_is_slim() {
     let threats = [
@@ -238,7 +238,7 @@ fn no_triangle_along_the_border_is_slim() {
 
 /// However close start and target are to the border.
 #[test]
-fn a_mesh_begins_and_ends_where_routes_do() {
+fn a_mesh_contains_the_exact_start_and_target() {
     let mut scenario = scenario(0.2, &disc(500.0, 60.0, 20.0, 60.0));
     (scenario.start.y, scenario.target.y) = (1e-9, 1000.0 - 0.3);
     let prices = Prices::of(&scenario);
@@ -250,7 +250,7 @@ fn a_mesh_begins_and_ends_where_routes_do() {
 }
 
 #[test]
-fn thousands_of_discs_at_one_place_are_no_more_work() {
+fn thousands_of_coinciding_discs_do_not_increase_the_work() {
     let mut scenario = scenario(0.2, &disc(500.0, 480.0, 20.0, 100.0));
     let same = scenario.threats[0].clone();
     scenario.threats.extend((0..3000).map(|_| same.clone()));
@@ -265,7 +265,7 @@ fn thousands_of_discs_at_one_place_are_no_more_work() {
     assert!((500..2000).contains(&vertices), "{vertices}");
 }
 
-/// Over both ends, between them, on a ring with a bay and beyond the area.
+/// Over both ends, between them, around a ring with a bay, and beyond the area.
 fn zones() -> String {
     [
         disc(240.0, 510.0, 20.0, 150.0),
@@ -281,7 +281,7 @@ fn zones() -> String {
 
 /// A straight leg into or out of any place costs at least the rise of the potential along it.
 #[test]
-fn no_leg_costs_less_than_the_rise() {
+fn no_leg_costs_less_than_the_rise_of_the_potential() {
     let scenario = scenario(0.2, &zones());
     let prices = Prices::of(&scenario);
     let walls = around::walls(&scenario, &prices);
@@ -321,7 +321,7 @@ fn no_leg_costs_less_than_the_rise() {
                 "{to_there} {cost} to {to}"
             );
             tight += u32::from(to_there > 0.95 * cost);
-            // Among all places around it, one has at least this rise.
+            // At least one of the places around it has this rise.
             let about = rise(to + Vector2::new(3.0, -2.0), 4.0);
             assert!(about >= to_there - 1e-6, "{about} {to_there}");
         }
@@ -330,7 +330,7 @@ fn no_leg_costs_less_than_the_rise() {
 }
 
 #[test]
-fn a_way_that_costs_as_much_as_is_known_is_not_looked_at() {
+fn a_proof_is_skipped_when_it_cannot_help_or_is_stopped() {
     let scenario = scenario(1.0, &disc(500.0, 930.0, 10.0, 20.0));
     assert!(proof(&scenario, (600.0, 600.0), false).is_none());
     assert!(proof(&scenario, (0.0, 0.0), true).is_none());

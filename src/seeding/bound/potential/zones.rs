@@ -186,16 +186,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_zone_whose_edge_cuts_a_part_counts_as_far_as_it_helps() {
+    fn a_zone_whose_edge_cuts_a_part_counts_with_its_best_share() {
         let check = |limits: [f64; 3], zone: [f64; 3], expected: [f64; 3]| {
             let found = with_best_share(&limits, &zone);
             let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs());
             assert!(off.fold(0.0, f64::max) < 1e-12, "{found:?}");
         };
-        // The third node lies outside, but deeper in another.
+        // The third node lies outside this zone, but deeper in another.
         check([0.5, 0.5, 1.25], [0.5, 0.5, -0.25], [1.0, 1.0, 1.0]);
         check([0.5, 0.5, 1.0], [0.5, 0.5, -0.5], [0.75, 0.75, 0.75]);
-        // Nothing would be left for it.
+        // No share of the zone would help.
         check([0.5, 0.5, 0.5], [0.5, 0.5, -0.25], [0.5, 0.5, 0.5]);
     }
 }

@@ -66,9 +66,9 @@ impl Cylinder {
     /// Integral of `T` over the part `window` of `leg`, Eq. 4-5, in closed form.
     ///
     /// With `p` the distance of the axis from the leg's line and `s` the distance from the foot of the perpendicular,
-    /// `T = influence - sqrt(p^2 + s^2)` over the chord inside the disc, so an antiderivative is `influence s - (s d
-    /// + p^2 asinh(s / p)) / 2` with `d = sqrt(p^2 + s^2)`. Near the edge of the soft zone this is a small difference
-    /// of large numbers, but there `T` is smooth and is integrated numerically.
+    /// `T = influence - d` with `d = sqrt(p^2 + s^2)` over the chord inside the disc, so an antiderivative is
+    /// `influence s - (s d + p^2 asinh(s / p)) / 2`. Near the edge of the soft zone this is a small difference of large
+    /// numbers, but there `T` is smooth and is integrated numerically.
     pub(super) fn exposure(&self, leg: &Segment, window: (f64, f64)) -> f64 {
         let length = leg.horizontal_length();
         if length < LEVEL {

@@ -250,7 +250,7 @@ impl<'s> Legs<'s> {
             let level = leg.xy().norm();
             level > LEVEL && leg.z.abs() <= self.steepest * level
         };
-        let spots = &self.near[self.spot(from)];
+        let spots = &self.near[spot_of(from)];
         let ends: Vec<(usize, usize)> = spots
             .iter()
             .flat_map(|&spot| self.places_over(spot))
@@ -276,11 +276,6 @@ impl<'s> Legs<'s> {
         legs.collect()
     }
 
-    /// The number of the spot of a place.
-    fn spot(&self, place: usize) -> usize {
-        place.div_ceil(HEIGHTS.len())
-    }
-
     /// The places over a spot.
     fn places_over(&self, spot: usize) -> Range<usize> {
         let from = (spot * HEIGHTS.len() + 1).saturating_sub(HEIGHTS.len());
@@ -291,6 +286,11 @@ impl<'s> Legs<'s> {
             from..(from + HEIGHTS.len()).min(last)
         }
     }
+}
+
+/// The number of the spot of a place.
+fn spot_of(place: usize) -> usize {
+    place.div_ceil(HEIGHTS.len())
 }
 
 /// `spot` at that share of the band's height, or as near to it as one straight leg to the nearer end allows where that
@@ -481,7 +481,7 @@ mod tests {
         let all: Vec<usize> = (0..spots).flat_map(|spot| legs.places_over(spot)).collect();
         assert_eq!(all, (0..legs.places.len()).collect::<Vec<_>>());
         for spot in 0..spots {
-            assert!(legs.places_over(spot).all(|place| legs.spot(place) == spot));
+            assert!(legs.places_over(spot).all(|place| spot_of(place) == spot));
         }
     }
 }

@@ -2,6 +2,7 @@
 //! that is already known.
 
 mod climbs;
+mod contours;
 mod count;
 mod exposed;
 mod few;
@@ -125,14 +126,10 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
                 evaluations += shapes.len() as u64;
                 (shapes, low) = worth::promising(model, shapes);
             }
-            let is_hilly = !model.scenario.terrain.is_flat();
-            let none_is_flown = || flown(model, priced(model, &shapes)).next().is_none();
-            if is_hilly && (is_steep(model.scenario) || none_is_flown()) {
-                evaluations += shapes.len() as u64;
-                let along_flanks = flanks::routes(model, OVERLAND, &is_over);
-                legs_priced += along_flanks.legs_priced;
-                shapes.extend(along_flanks.routes);
-            }
+            let (round, routes_priced) = round_mountains(model, &shapes, &is_over);
+            legs_priced += round.legs_priced;
+            evaluations += routes_priced;
+            shapes.extend(round.routes);
         }
     }
     if shapes.is_empty() {
@@ -320,6 +317,30 @@ fn over_ground(
     let turned: Vec<_> = found.routes.iter().filter_map(rounded).collect();
     found.routes.extend(turned);
     (found, detour.is_some() || sought.is_some())
+}
+
+/// Routes that wind round mountains, and how many whole routes were priced: along flanks where one end is too far above
+/// the other, or where none of the `known` routes over hills can be flown; along contours where that finds none either.
+fn round_mountains(
+    model: &Model,
+    known: &[Vec<Point3>],
+    is_over: &dyn Fn() -> bool,
+) -> (Found, u64) {
+    let mut found = Found::default();
+    if model.scenario.terrain.is_flat() {
+        return (found, 0);
+    }
+    let can_any_be_flown = |routes| flown(model, priced(model, routes)).next().is_some();
+    let mut routes_priced = known.len();
+    let is_known = can_any_be_flown(known);
+    if is_steep(model.scenario) || !is_known {
+        found.add(flanks::routes(model, OVERLAND, is_over));
+        routes_priced += found.routes.len();
+        if !is_known && !can_any_be_flown(&found.routes) {
+            found.add(contours::routes(model, is_over));
+        }
+    }
+    (found, routes_priced as u64)
 }
 
 /// A route and its price.

@@ -5,8 +5,8 @@
 //! serves requests. Deliberately absent: what is in a file (`terrain::dem`), and which plans use it, which only the
 //! store knows.
 
-mod both;
 mod content;
+mod directories;
 mod error;
 mod files;
 mod mounted;
@@ -18,8 +18,8 @@ mod staged;
 mod stamp;
 mod uploaded;
 
-pub use both::Directories;
 pub use content::{Checked, Declaration, Identity};
+pub use directories::Directories;
 pub use error::CatalogueError;
 pub use mounted::Mounted;
 pub use shared::Sharing;
@@ -27,7 +27,7 @@ pub use shelf::{Change, Changes, Shelf, Source};
 pub use shipped::lay_down;
 pub use staged::Staged;
 
-use both::Uploads;
+use directories::Uploads;
 use std::collections::BTreeSet;
 use std::time::Duration;
 

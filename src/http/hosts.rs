@@ -14,9 +14,9 @@ use axum::http::{HeaderMap, Uri, Version, header};
 use axum::response::IntoResponse as _;
 use futures_util::FutureExt as _;
 
-use super::around::{Answering, Around, Next};
 use super::auth;
 use super::browser::Origins;
+use super::layer::{Answering, Around, Next};
 use super::problem::Problem;
 
 /// The hosts that this service answers for.

@@ -4,7 +4,6 @@
 //! (`partial` alone asks the planner how a route would be delivered), and storage, which is behind [`Store`].
 
 mod accept;
-mod around;
 pub mod auth;
 mod body;
 mod browser;
@@ -16,6 +15,7 @@ mod feed;
 mod ground;
 mod hosts;
 mod idempotency;
+mod layer;
 mod list;
 mod metrics;
 mod off_thread;
@@ -69,8 +69,8 @@ pub use terrains::Terrains;
 use crate::scenario::json::Rules;
 use crate::store::{Stats, SteadyClock, Store};
 use crate::telemetry::Instruments;
-use around::Layered;
 use auth::{Access, Gate, Needs};
+use layer::Layered;
 use problem::Problem;
 
 /// What every handler can access; cheap to clone, since each request does.

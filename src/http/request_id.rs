@@ -12,7 +12,7 @@ use futures_util::FutureExt as _;
 use tracing::{Instrument, Level, Span};
 use uuid::Uuid;
 
-use super::around::{Answering, Around, Next};
+use super::layer::{Answering, Around, Next};
 use super::problem::Problem;
 use super::{auth, browser};
 use crate::telemetry::traceparent::{self, TraceParent};

@@ -2,10 +2,10 @@
 //!
 //! An accept loop of our own because `axum::serve` lets a caller hold an idle connection for ever.
 
-mod complaints;
+mod refused_by_hyper;
+mod repeated_failures;
 mod socket;
 pub(super) mod traffic;
-mod unread;
 
 use std::cell::RefCell;
 use std::convert::Infallible;
@@ -28,7 +28,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use tokio::time::Instant;
 use tower::Service as _;
 
-use self::complaints::Complaints;
+use self::repeated_failures::RepeatedFailures;
 use self::socket::Socket;
 use self::traffic::Traffic;
 use super::Phase;
@@ -73,7 +73,7 @@ pub async fn serve(
         idle: settings.head_timeout,
         unread: settings.body_timeout,
     };
-    let mut complaints = Complaints::default();
+    let mut failures_to_accept = RepeatedFailures::default();
     loop {
         let arrival = tokio::select! {
             arrival = accept(&listener, &places) => arrival,
@@ -90,7 +90,7 @@ pub async fn serve(
                 });
             }
             Err(error) => {
-                if let Some(failures) = complaints.count(Instant::now()) {
+                if let Some(failures) = failures_to_accept.count(Instant::now()) {
                     tracing::warn!(%error, failures, "a connection could not be accepted");
                 }
                 tokio::time::sleep(ACCEPT_PAUSE).await;

@@ -14,8 +14,8 @@ use crate::terrain::DatasetError;
 /// Most attempts to fetch a file: one put a moment ago may not have reached every server.
 const TRIES: u32 = 4;
 
-/// Half the pause after the first attempt; the pause doubles with each attempt.
-const PAUSE: Duration = Duration::from_millis(50);
+/// The pause after the first attempt; it doubles with each further one.
+const PAUSE: Duration = Duration::from_millis(100);
 
 impl Shared {
     /// Remove the mark from a needed content; `false` if it was removed or changed meanwhile.
@@ -145,7 +145,7 @@ impl Shared {
             match path {
                 Err(error) if tries < TRIES => {
                     tracing::debug!(sha256, %error, "a dataset could not be fetched; trying again");
-                    thread::sleep(PAUSE * (1 << tries));
+                    thread::sleep(PAUSE * (1 << (tries - 1)));
                 }
                 path => return path,
             }

@@ -32,7 +32,7 @@ pub use self::sharing::Sharing;
 use self::cache::Cache;
 use self::retire::Watched;
 use self::view::{View, name_key};
-use super::both::Uploads;
+use super::directories::Uploads;
 use super::records::Name;
 use super::{CatalogueError, Checked, Entry, Kept, Naming, Shelf, Staged, Tally};
 use crate::telemetry::Instruments;

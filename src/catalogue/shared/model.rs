@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use super::memory::{Memory, Trouble};
 use super::tests::{Node, height, naming};
 use crate::catalogue::CatalogueError;
-use crate::catalogue::both::Uploads as _;
+use crate::catalogue::directories::Uploads as _;
 
 #[derive(Debug, Clone)]
 enum Step {

@@ -5,9 +5,9 @@
 //! passwords, sessions, any key in readable form.
 
 mod allowance;
-mod fresh;
 mod key_file;
 mod keys;
+mod new_key;
 mod rate;
 mod scope;
 mod streams;
@@ -26,8 +26,8 @@ use jiff::Timestamp;
 use tokio::sync::watch;
 use tokio::time::Instant;
 
-pub use fresh::key as fresh_key;
 pub use keys::{Key, Keys, KeysError};
+pub use new_key::key as fresh_key;
 pub use rate::Rate;
 pub use scope::{Needs, Scope};
 
@@ -35,8 +35,8 @@ pub(super) use allowance::Allowance;
 pub(super) use keys::{Digest, holds_a_key};
 pub(super) use streams::{Permit, TooMany};
 
-use super::around::{Answering, Around, Next};
 use super::caller::Caller;
+use super::layer::{Answering, Around, Next};
 use super::params::ticket_of;
 use super::problem::Problem;
 use crate::config;

@@ -8,8 +8,8 @@ use std::task::{Context, Poll, ready};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
 
+use super::refused_by_hyper;
 use super::traffic::Traffic;
-use super::unread;
 use crate::telemetry::Instruments;
 
 /// Data written to it counts as traffic once the system has taken it.
@@ -33,7 +33,7 @@ impl Socket {
 
     /// Whether something else is sent in place of `bytes`, which then count as written.
     fn is_told_better(&mut self, bytes: &[u8]) -> bool {
-        let Some(told) = unread::told_better(bytes, &self.instruments) else {
+        let Some(told) = refused_by_hyper::told_better(bytes, &self.instruments) else {
             return false;
         };
         self.instead = told;

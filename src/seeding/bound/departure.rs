@@ -169,8 +169,8 @@ fn apart(one: &Wall, other: &Wall) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::super::tests::{disc, scenario};
-    use super::super::around::walls;
     use super::super::string::departures as ends_of;
+    use super::super::widening::walls;
     use super::*;
 
     fn departures(threats: &str, examine: impl Fn(&Prices, [Departure; 2])) {

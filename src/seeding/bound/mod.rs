@@ -7,7 +7,6 @@
 //! field of all prices proves more; the better of both counts. Finally, a start or target at another height than the
 //! middle of the band costs what its straight legs do.
 
-mod around;
 mod departure;
 mod ends;
 mod event;
@@ -20,6 +19,7 @@ mod promise;
 mod string;
 mod toll;
 mod wall;
+mod widening;
 
 use std::cell::Cell;
 
@@ -79,7 +79,7 @@ pub fn cheapest_slip(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
     if prices.fuel <= 0.0 {
         return f64::INFINITY;
     }
-    let walls = around::walls(scenario, &prices);
+    let walls = widening::walls(scenario, &prices);
     if ends::are_too_many(&walls) {
         return f64::INFINITY;
     }
@@ -90,7 +90,7 @@ pub fn cheapest_slip(scenario: &Scenario, stop: &dyn Fn() -> bool) -> f64 {
 
 /// The largest cost that can be proven: by strings round walls, by a potential, and by the legs that leave the ends.
 fn round_walls(scenario: &Scenario, prices: &Prices, stop: &dyn Fn() -> bool) -> f64 {
-    let walls = around::walls(scenario, prices);
+    let walls = widening::walls(scenario, prices);
     let Some(events) = event::events(&walls, prices, stop) else {
         let radii = string::cores(&walls);
         let proven = string::plain(&walls, &radii, prices, stop);

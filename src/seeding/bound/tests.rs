@@ -234,7 +234,7 @@ fn a_stop_is_noticed_while_gaps_are_examined() {
         corners.join(", ")
     ));
     let prices = Prices::of(&scenario);
-    let walls = around::walls(&scenario, &prices);
+    let walls = widening::walls(&scenario, &prices);
     assert!(event::events(&walls, &prices, &|| false).is_some());
     let looks = Cell::new(0);
     let stop = || {

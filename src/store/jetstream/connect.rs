@@ -10,9 +10,9 @@ use async_nats::jetstream::{self, Context, kv, object_store};
 use async_nats::{Client, ConnectOptions, Event};
 
 use super::election::{Election, outlast};
+use super::errors::{failed, passes};
 use super::lane::Version;
 use super::settings::Settings;
-use super::trouble::{failed, passes};
 use crate::job::PlanId;
 use crate::store::{IDEMPOTENCY_MS, Options, StoreError};
 

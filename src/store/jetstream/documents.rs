@@ -5,8 +5,8 @@ use bytes::Bytes;
 use tokio::io::AsyncReadExt as _;
 
 use super::connect::Servers;
+use super::errors::failed;
 use super::record::Document;
-use super::trouble::failed;
 use crate::job::PlanId;
 use crate::store::StoreError;
 

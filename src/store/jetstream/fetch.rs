@@ -10,8 +10,8 @@ use futures_util::StreamExt as _;
 
 use super::JetStream;
 use super::connect::PATIENCE;
+use super::errors::{failed, refused};
 use super::lane::Lane;
-use super::trouble::{failed, refused};
 use crate::store::StoreError;
 
 /// How long the servers keep a consumer that is not used.

@@ -10,9 +10,9 @@ use tokio::sync::watch;
 
 use super::JetStream;
 use super::connect::plan_of;
+use super::errors::{failed, refused};
 use super::history::History;
 use super::record::{Placed, State, Step};
-use super::trouble::{failed, refused};
 use crate::job::PlanId;
 use crate::store::StoreError;
 

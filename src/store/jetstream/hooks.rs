@@ -6,9 +6,9 @@ use std::sync::PoisonError;
 use async_nats::jetstream::kv::CreateErrorKind;
 
 use super::JetStream;
+use super::errors::failed;
 use super::record::State;
 use super::steps::Change;
-use super::trouble::failed;
 use crate::job::PlanId;
 use crate::store::{StoreError, Webhook};
 

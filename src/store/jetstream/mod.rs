@@ -9,6 +9,7 @@ mod claim;
 mod connect;
 mod documents;
 mod election;
+mod errors;
 mod fetch;
 mod follow;
 mod history;
@@ -26,7 +27,6 @@ mod shelf;
 mod steps;
 mod submit;
 mod told;
-mod trouble;
 mod turns;
 mod view;
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::JetStream;
 use super::connect::ALIVE;
-use super::trouble::failed;
+use super::errors::failed;
 use crate::store::StoreError;
 
 /// What a node announces about itself.

@@ -1,9 +1,9 @@
 //! Plans that are removed, and what remains of them.
 
 use super::JetStream;
+use super::errors::failed;
 use super::record::{Grave, State};
 use super::steps::Change;
-use super::trouble::failed;
 use crate::job::PlanId;
 use crate::store::{SWEEP, StoreError};
 

@@ -7,9 +7,9 @@ use bytes::Bytes;
 
 use super::connect::Servers;
 use super::election::Election;
+use super::errors::{failed, is_outrun};
 use super::leases::Leases;
 use super::record::{Placed, Record, State, Step};
-use super::trouble::{failed, is_outrun};
 use super::view::{Standing, View};
 use crate::job::{Event, PlanId};
 use crate::store::StoreError;

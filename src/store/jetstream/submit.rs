@@ -14,10 +14,10 @@ use serde::{Deserialize, Serialize};
 use tokio::time::{Instant, timeout};
 
 use super::JetStream;
+use super::errors::{failed, is_outrun};
 use super::lane::Lane;
 use super::record::{Document, Queued, Record};
 use super::steps::Change;
-use super::trouble::{failed, is_outrun};
 use crate::digest::sha256_hex;
 use crate::job::{Idempotency, Owner, Plan, PlanId, Submission};
 use crate::store::{IDEMPOTENCY_MS, StoreError, Submitted};

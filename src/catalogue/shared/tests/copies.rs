@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::{Node, height, hill, naming, sharing, two_with};
-use crate::catalogue::both::Uploads as _;
+use crate::catalogue::directories::Uploads as _;
 use crate::catalogue::shared::Shared;
 use crate::catalogue::shared::memory::{Memory, Trouble};
 use crate::catalogue::{CatalogueError, Declaration};

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::mpsc;
 
 use super::{Node, height, naming, two};
-use crate::catalogue::both::Uploads as _;
+use crate::catalogue::directories::Uploads as _;
 use crate::catalogue::shared::memory::Trouble;
 use crate::catalogue::{CatalogueError, Claim, Expected, Kept, Naming};
 use crate::terrain::DatasetError;

@@ -15,7 +15,7 @@ use tempfile::TempDir;
 
 use super::memory::Memory;
 use super::{Shared, Sharing};
-use crate::catalogue::both::Uploads as _;
+use crate::catalogue::directories::Uploads as _;
 use crate::catalogue::{CatalogueError, Checked, Claim, Declaration, Expected, Kept, Naming};
 use crate::geometry::geodesy::LatLon;
 use crate::telemetry::Instruments;

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use std::time::Duration;
 
 use super::{Node, height, naming, two, two_with};
-use crate::catalogue::both::Uploads as _;
+use crate::catalogue::directories::Uploads as _;
 use crate::catalogue::shared::memory::Trouble;
 use crate::catalogue::{Kept, Shelf as _};
 

@@ -93,8 +93,8 @@ fn beside(wall: &Wall, (a, b): (Point2, Point2), spread: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::super::super::tests::scenario;
-    use super::super::super::around::walls;
     use super::super::super::prices::Prices;
+    use super::super::super::widening::walls;
     use super::*;
 
     /// No leg in the sector has less exposure than stated, by fine summation; for a slim sector the stated value is

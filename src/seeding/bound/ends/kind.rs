@@ -298,7 +298,7 @@ impl End<'_> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::super::super::tests::scenario;
-    use super::super::super::around;
+    use super::super::super::widening;
     use super::*;
     use crate::seeding::arc::point_segment;
 
@@ -333,7 +333,7 @@ pub(super) mod tests {
             r#""threats": [{"kind": "cylinder", "center": {"x": 400, "y": 160}, "radius": 50, "influence": 80}]"#,
         );
         let prices = Prices::of(&scenario);
-        let walls = around::walls(&scenario, &prices);
+        let walls = widening::walls(&scenario, &prices);
         let radii: Vec<_> = walls.iter().map(|wall| Some(wall.wide)).collect();
         examine(&end(&prices, &walls, &radii));
     }
@@ -402,7 +402,7 @@ pub(super) mod tests {
         });
         let scenario = scenario(&format!(r#""threats": [{}]"#, threats.join(", ")));
         let prices = Prices::of(&scenario);
-        let walls = around::walls(&scenario, &prices);
+        let walls = widening::walls(&scenario, &prices);
         let end = end(&prices, &walls, &[None; 4]);
         let mut kinds = Kind::all(0.0);
         for round in 0..600 {

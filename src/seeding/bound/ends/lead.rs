@@ -57,7 +57,7 @@ impl End<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::super::super::tests::among;
-    use super::super::super::{around, potential, string};
+    use super::super::super::{potential, string, widening};
     use super::super::over;
     use super::*;
 
@@ -77,7 +77,7 @@ mod tests {
         }));
         (scenario.start.z, scenario.target.z) = (15.0, 144.0);
         let prices = Prices::of(&scenario);
-        let walls = around::walls(&scenario, &prices);
+        let walls = widening::walls(&scenario, &prices);
         let radii = string::cores(&walls);
         let proven = |leads: &Leads| {
             let known = (0.0, 4000.0);

@@ -112,8 +112,8 @@ mod tests {
     use nalgebra::Vector2;
 
     use super::super::super::super::tests::scenario;
-    use super::super::super::around;
     use super::super::super::prices::Prices;
+    use super::super::super::widening;
     use super::super::kind::tests::end;
     use super::*;
 
@@ -125,7 +125,7 @@ mod tests {
             r#""threats": [{"kind": "cylinder", "center": {"x": 260, "y": 100}, "radius": 30, "influence": 100, "top": 60}]"#,
         );
         let prices = Prices::of(&scenario);
-        let walls = around::walls(&scenario, &prices);
+        let walls = widening::walls(&scenario, &prices);
         let end = end(&prices, &walls, &[None]);
         let to = |length: f64| end.from - Vector2::new(0.0, length);
         let exposed = |length: f64| end.exposed(to(length), 0.0, Climb::Any)[0];

@@ -129,9 +129,9 @@ impl Spacing {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::seeding::bound::around;
     use crate::seeding::bound::potential::vertices;
     use crate::seeding::bound::prices::Prices;
+    use crate::seeding::bound::widening;
     use crate::seeding::tests::scenario;
 
     /// The coarse mesh estimates the way through the middle as twice as expensive as the cheapest; a finer one
@@ -140,7 +140,7 @@ mod tests {
     fn prices_are_lowered_less_when_the_cheapest_route_proves_more_expensive() {
         let scenario = scenario(r#""threats": []"#);
         let prices = Prices::of(&scenario);
-        let walls = around::walls(&scenario, &prices);
+        let walls = widening::walls(&scenario, &prices);
         let (rect, ends) = (scenario.area, prices.ends.map(|end| end.xy()));
         let zones = Zones::new(&walls, &prices, rect);
         let even = Spacing::even(rect, &zones, 500);

@@ -1,7 +1,7 @@
 //! Compares potentials with lattices of legs, and their components with prices at many places.
 
 use super::super::super::tests::{disc, read};
-use super::super::around;
+use super::super::widening;
 use super::mesh::PARTS;
 use super::*;
 use crate::geometry::{Vector2, ring};
@@ -23,7 +23,7 @@ fn scenario(fuel: f64, threats: &str) -> Scenario {
 
 fn proof(scenario: &Scenario, known: (f64, f64), stop: bool) -> Option<Proof> {
     let prices = Prices::of(scenario);
-    let walls = around::walls(scenario, &prices);
+    let walls = widening::walls(scenario, &prices);
     prove(&walls, &prices, &scenario.area, known, &FREE, &|| stop)
 }
 
@@ -38,7 +38,7 @@ fn over_lattice(scenario: &Scenario) -> f64 {
     const NODES: i32 = 51;
     let spacing = 20.0;
     let prices = Prices::of(scenario);
-    let walls = around::walls(scenario, &prices);
+    let walls = widening::walls(scenario, &prices);
     let price = |a: Point2, b: Point2| {
         let parts = 8;
         let sum: f64 = (0..parts)
@@ -119,7 +119,7 @@ fn the_bound_is_slightly_below_the_cheapest_way() {
 fn nearly_all_of_the_marched_cost_is_proven() {
     let scenario = scenario(0.2, &zones());
     let prices = Prices::of(&scenario);
-    let walls = around::walls(&scenario, &prices);
+    let walls = widening::walls(&scenario, &prices);
     let ends = prices.ends.map(|end| end.xy());
     let zones = Zones::new(&walls, &prices, scenario.area);
     let mut spacing = Spacing::even(scenario.area, &zones, 4000);
@@ -144,7 +144,7 @@ fn nearly_all_of_the_marched_cost_is_proven() {
 fn limits_never_exceed_the_price_per_metre() {
     let scenario = scenario(0.2, &zones());
     let prices = Prices::of(&scenario);
-    let walls = around::walls(&scenario, &prices);
+    let walls = widening::walls(&scenario, &prices);
     let rect = scenario.area;
     let zones = Zones::new(&walls, &prices, rect);
     let spacing = Spacing::even(rect, &zones, 1000);
@@ -206,7 +206,7 @@ fn no_triangle_along_the_border_is_slim() {
     ];
     let scenario = scenario(0.2, &threats.join(", "));
     let prices = Prices::of(&scenario);
-    let walls = around::walls(&scenario, &prices);
+    let walls = widening::walls(&scenario, &prices);
     let rect = scenario.area;
     let zones = Zones::new(&walls, &prices, rect);
     let ends = prices.ends.map(|end| end.xy());
@@ -242,7 +242,7 @@ fn a_mesh_contains_the_exact_start_and_target() {
     let mut scenario = scenario(0.2, &disc(500.0, 60.0, 20.0, 60.0));
     (scenario.start.y, scenario.target.y) = (1e-9, 1000.0 - 0.3);
     let prices = Prices::of(&scenario);
-    let walls = around::walls(&scenario, &prices);
+    let walls = widening::walls(&scenario, &prices);
     let zones = Zones::new(&walls, &prices, scenario.area);
     let ends = prices.ends.map(|end| end.xy());
     let vertices = vertices::lay(ends, &zones, &Spacing::even(scenario.area, &zones, 500));
@@ -255,7 +255,7 @@ fn thousands_of_coinciding_discs_do_not_increase_the_work() {
     let same = scenario.threats[0].clone();
     scenario.threats.extend((0..3000).map(|_| same.clone()));
     let prices = Prices::of(&scenario);
-    let walls = around::walls(&scenario, &prices);
+    let walls = widening::walls(&scenario, &prices);
     let zones = Zones::new(&walls, &prices, scenario.area);
     let near = zones.near(Point2::new(500.0, 480.0)).count();
     assert!((50..=100).contains(&near), "{near}");
@@ -284,7 +284,7 @@ fn zones() -> String {
 fn no_leg_costs_less_than_the_rise_of_the_potential() {
     let scenario = scenario(0.2, &zones());
     let prices = Prices::of(&scenario);
-    let walls = around::walls(&scenario, &prices);
+    let walls = widening::walls(&scenario, &prices);
     let mut proof = proof(&scenario, (0.0, f64::INFINITY), false).expect("there is a way");
     proof.look_up();
     let mut tight = 0;

@@ -16,8 +16,8 @@ use tokio::runtime::Handle;
 
 use self::opened::Opened;
 use super::election::outlast;
+use super::errors::passes;
 use super::settings::Settings;
-use super::trouble::passes;
 use crate::catalogue::{Changes, Shelf, Source};
 use crate::store::{StoreError, Trouble};
 

@@ -25,8 +25,8 @@ use crate::catalogue::{Change, Changes, Source};
 use crate::store::StoreError;
 use crate::store::jetstream::connect::{Maker, Servers, connect, maker};
 use crate::store::jetstream::election::outlast;
+use crate::store::jetstream::errors::{failed, is_outrun, passes};
 use crate::store::jetstream::settings::Settings;
-use crate::store::jetstream::trouble::{failed, is_outrun, passes};
 
 /// If no part of a file arrives for this long, the servers are considered away.
 const STALL: Duration = Duration::from_secs(10);

@@ -9,20 +9,23 @@ const PAUSE: Duration = Duration::from_secs(10);
 
 /// When the next line is due, and how many failures it covers.
 #[derive(Debug, Default)]
-pub(super) struct Complaints {
-    told: Option<Instant>,
-    untold: u64,
+pub(super) struct RepeatedFailures {
+    last_line: Option<Instant>,
+    since: u64,
 }
 
-impl Complaints {
+impl RepeatedFailures {
     /// A failure at `now`. Returns the number of failures since the last line, if one is due.
     pub(super) fn count(&mut self, now: Instant) -> Option<u64> {
-        self.untold += 1;
-        if self.told.is_some_and(|told| now < told + PAUSE) {
+        self.since += 1;
+        if self
+            .last_line
+            .is_some_and(|last_line| now < last_line + PAUSE)
+        {
             return None;
         }
-        self.told = Some(now);
-        Some(std::mem::take(&mut self.untold))
+        self.last_line = Some(now);
+        Some(std::mem::take(&mut self.since))
     }
 }
 
@@ -31,9 +34,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_complaint_is_reported_and_later_ones_are_batched() {
+    fn the_first_failure_is_logged_at_once_and_later_ones_together() {
         let begin = Instant::now();
-        let mut complaints = Complaints::default();
+        let mut failures = RepeatedFailures::default();
         for (after_ms, expected) in [
             (0, Some(1)),
             (100, None),
@@ -43,7 +46,7 @@ mod tests {
             (60_000, Some(2)),
         ] {
             let now = begin + Duration::from_millis(after_ms);
-            assert_eq!(complaints.count(now), expected, "after {after_ms} ms");
+            assert_eq!(failures.count(now), expected, "after {after_ms} ms");
         }
     }
 }

@@ -110,15 +110,24 @@ impl Fixture {
         fixture
     }
 
+    /// Opens the store. A server that another test is just starting holds copies of this process's files, locks
+    /// included, until it has become a program of its own.
     async fn open(&mut self) {
-        let options = Options {
+        let options = || Options {
             clock: self.clock(),
             retention: self.retention,
             events_kept: self.events_kept,
             ..Options::new(self.queue_limit)
         };
-        let store = self.place.open(options).await;
-        self.store = Some(store.expect("the store opens"));
+        let opened = async {
+            loop {
+                match self.place.open(options()).await {
+                    Err(StoreError::InUse(_)) => tokio::task::yield_now().await,
+                    opened => return opened.expect("the store opens"),
+                }
+            }
+        };
+        self.store = Some(in_time(opened).await);
     }
 
     pub(crate) fn clock(&self) -> noctule::store::Clock {

@@ -35,6 +35,25 @@ pub(super) fn hilly_scenario() -> Scenario {
     scenario
 }
 
+/// From the top of a mountain that is too steep to fly straight down to the plain, or up.
+pub(super) fn mountain(height: f64, is_down: bool) -> Scenario {
+    let mut scenario = scenario();
+    scenario.threats.clear();
+    scenario.terrain = peaks(0.0, &[[300.0, 500.0, height, 150.0, 150.0]]);
+    scenario.altitude = AltitudeBand {
+        min: 30.0,
+        max: 120.0,
+    };
+    scenario.vehicle.max_climb_deg = 20.0;
+    scenario.planner.waypoints = 16;
+    scenario.planner.seeding = Seeding::Tangent;
+    scenario.planner.polish = true;
+    let on_ground = |x, y| Point3::new(x, y, scenario.terrain.elevation(Point2::new(x, y)));
+    let ends = [on_ground(300.0, 500.0), on_ground(900.0, 600.0)];
+    [scenario.start, scenario.target] = if is_down { ends } else { [ends[1], ends[0]] };
+    scenario
+}
+
 /// A disc with a soft zone of 30 m.
 pub(super) fn radar(x: f64, y: f64, radius: f64) -> Threat {
     disc([x, y, radius, radius + 30.0])

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::support::collector::{Collector, Taken};
 use crate::support::patience::eventually;
-use crate::support::process::Service;
+use crate::support::process::{Service, json_of};
 use crate::support::scenario;
 
 const TRACE_ID: &str = "4bf92f3577b34da6a3ce929d0e0e4736";
@@ -27,13 +27,7 @@ async fn logged(arguments: &[&str], document: &Value) -> (String, Vec<Value>) {
         .header("x-request-id", "caller-1")
         .header("traceparent", format!("00-{TRACE_ID}-00f067aa0ba902b7-01"))
         .json(document);
-    let accepted: Value = request
-        .send()
-        .await
-        .expect("an answer")
-        .json()
-        .await
-        .expect("JSON");
+    let accepted = json_of(request).await;
     let id = accepted["id"].as_str().expect("an id").to_owned();
     service.ended(&format!("/plans/{id}")).await;
     service.signal("TERM");

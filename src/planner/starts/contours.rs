@@ -154,37 +154,8 @@ fn places(scenario: &Scenario, way: &[Point2], most: usize) -> Vec<Point3> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::planner::tests::scenario;
+    use crate::planner::tests::mountain;
     use crate::planner::{Nobody, plan};
-    use crate::scenario::Seeding;
-    use crate::terrain::{Peak, Peaks, Terrain};
-
-    /// From the top of a mountain down to the plain, or up.
-    fn mountain(height: f64, is_down: bool) -> Scenario {
-        let mut scenario = scenario();
-        scenario.threats.clear();
-        let peak = Peak {
-            center: Point2::new(300.0, 500.0),
-            height,
-            spread: Point2::new(150.0, 150.0),
-        };
-        scenario.terrain = Terrain::Peaks(Peaks {
-            base: 0.0,
-            peaks: vec![peak],
-        });
-        (scenario.altitude.min, scenario.altitude.max) = (30.0, 120.0);
-        scenario.vehicle.max_climb_deg = 20.0;
-        scenario.planner.waypoints = 16;
-        scenario.planner.seeding = Seeding::Tangent;
-        scenario.planner.polish = true;
-        let on_ground = |x, y| {
-            let at = Point2::new(x, y);
-            Point3::new(x, y, scenario.terrain.elevation(at))
-        };
-        let ends = [on_ground(300.0, 500.0), on_ground(900.0, 600.0)];
-        [scenario.start, scenario.target] = if is_down { ends } else { [ends[1], ends[0]] };
-        scenario
-    }
 
     #[test]
     fn a_mountain_that_is_too_steep_is_left_along_its_flanks_on_both_sides() {

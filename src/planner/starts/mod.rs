@@ -8,6 +8,7 @@ mod exposed;
 mod few;
 mod flanks;
 mod heap;
+mod height;
 mod known;
 mod levels;
 mod net;
@@ -25,16 +26,18 @@ mod worth;
 
 pub(super) use count::with_waypoints;
 pub(super) use heap::spread;
+pub(super) use height::steepest;
 
 use super::polish::{Polish, Steps};
 use super::price::price;
 use super::{Stop, same, why_stop};
 use crate::cost::Model;
-use crate::geometry::{LEVEL, Point2, Point3, Vector2};
+use crate::geometry::{LEVEL, Point3, Vector2};
 use crate::optimizer::Fitness;
-use crate::scenario::{Scenario, Seeding, WarmStart};
+use crate::scenario::{Seeding, WarmStart};
 use crate::seeding::{Obstacles, Outline, TautString, steep_ground, taut_strings_until};
 use crate::threat::Threat;
+use height::{is_steep, lifted, winding};
 use net::Found;
 
 /// Strings taken from each scene of obstacles.
@@ -335,8 +338,10 @@ fn round_mountains(
     let is_known = can_any_be_flown(known);
     if is_steep(model.scenario) || !is_known {
         found.add(flanks::routes(model, OVERLAND, is_over));
+    }
+    if !is_known {
         routes_priced += found.routes.len();
-        if !is_known && !can_any_be_flown(&found.routes) {
+        if !can_any_be_flown(&found.routes) {
             found.add(contours::routes(model, is_over));
         }
     }
@@ -382,39 +387,6 @@ fn along(model: &Model, string: &TautString) -> Vec<Point3> {
     route
 }
 
-/// `point` at that `share` of the band's height, or as near to it as the vehicle can climb from the
-/// start and to the target; from the nearer of them where no straight way joins them.
-fn lifted(scenario: &Scenario, point: Point2, share: f64) -> Point3 {
-    let band = scenario.altitude;
-    let point = scenario.area.nearest(point);
-    let height = band.min + share * (band.max - band.min);
-    let mut z = scenario.terrain.elevation(point) + height;
-    let ends = if is_steep(scenario) {
-        // How far the other end is along a way that is not straight nobody knows.
-        [nearer_end(scenario, point); 2]
-    } else {
-        [scenario.start, scenario.target]
-    };
-    for end in ends {
-        let reach = (point - end.xy()).norm() * steepest(scenario);
-        z = z.clamp(end.z - reach, end.z + reach);
-    }
-    Point3::new(point.x, point.y, z)
-}
-
-/// Of start and target the one that is nearer to `point`.
-fn nearer_end(scenario: &Scenario, point: Point2) -> Point3 {
-    let [start, target] = [scenario.start, scenario.target];
-    let is_nearer = (point - start.xy()).norm() <= (point - target.xy()).norm();
-    if is_nearer { start } else { target }
-}
-
-/// Whether one end is so far above the other that the straight way is too steep to fly.
-fn is_steep(scenario: &Scenario) -> bool {
-    let way = scenario.target - scenario.start;
-    way.z.abs() > way.xy().norm() * steepest(scenario)
-}
-
 /// Whether the turn at the middle of `corner` is no sharper than the one with cosine `sharpest`.
 fn may_turn(corner: [Point3; 3], sharpest: f64) -> bool {
     let [before, at, after] = corner.map(|point| point.xy());
@@ -432,9 +404,4 @@ fn may_turn_along(chain: &[Point3], sharpest: f64) -> bool {
 /// A vector of length 1.
 fn direction(heading: f64) -> Vector2 {
     Vector2::new(libm::cos(heading), libm::sin(heading))
-}
-
-/// Metres that the vehicle may climb per metre seen from above, less a hair.
-pub(super) fn steepest(scenario: &Scenario) -> f64 {
-    libm::tan(scenario.vehicle.max_climb_deg.to_radians()) * (1.0 - 1e-9)
 }

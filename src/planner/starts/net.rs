@@ -97,7 +97,7 @@ impl Tree {
     }
 
     /// From `place` back to where all chains begin.
-    fn trace(&self, mut place: usize) -> Vec<usize> {
+    pub(super) fn trace(&self, mut place: usize) -> Vec<usize> {
         let mut chain = vec![place];
         while self.before[place] != place {
             place = self.before[place];

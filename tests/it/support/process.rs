@@ -229,14 +229,7 @@ impl Service {
     pub(crate) async fn ended(&self, address: &str) -> Value {
         let ended = async {
             loop {
-                let request = self.get(address).header("prefer", "wait=30");
-                let status: Value = request
-                    .send()
-                    .await
-                    .expect("an answer")
-                    .json()
-                    .await
-                    .expect("JSON");
+                let status = json_of(self.get(address).header("prefer", "wait=30")).await;
                 if ["succeeded", "failed", "cancelled"]
                     .contains(&status["status"].as_str().expect("text"))
                 {
@@ -317,4 +310,10 @@ impl Drop for Service {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// The document that a request is answered with.
+pub(crate) async fn json_of(request: reqwest::RequestBuilder) -> Value {
+    let answer = request.send().await.expect("an answer");
+    answer.json().await.expect("JSON")
 }

@@ -21,8 +21,8 @@ const SECTORS: u32 = 8;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Kind {
     /// The middle of their headings, and half of their range, radians.
-    heading: f64,
-    half: f64,
+    pub(super) heading: f64,
+    pub(super) half: f64,
     /// Lengths seen from above, metres; the second may be infinite.
     pub(super) lengths: [f64; 2],
     /// No route with such a leg costs less than this seen from above.
@@ -31,17 +31,17 @@ pub(super) struct Kind {
     pub(super) steepness: f64,
     /// The least cost of the shortest of them seen from above, less the fuel from their ends to that of the one in the
     /// middle.
-    leg: f64,
+    pub(super) leg: f64,
     /// Possible gain from dividing the headings.
-    turned: f64,
+    pub(super) turned: f64,
     /// Whether a string may show that the cost is higher.
     pub(super) is_rough: bool,
     /// Least cost of the soft zones along the shortest of them.
-    exposed: f64,
+    pub(super) exposed: f64,
     /// Their slopes; `None` for all.
-    slopes: Option<Slopes>,
+    pub(super) slopes: Option<Slopes>,
     /// Possible gain from dividing the slopes.
-    sloped: f64,
+    pub(super) sloped: f64,
 }
 
 impl Kind {
@@ -95,79 +95,6 @@ pub(super) struct End<'a> {
 }
 
 impl End<'_> {
-    /// Possible gain from examining `kind` more closely.
-    pub(super) fn gain(&self, kind: &Kind) -> f64 {
-        if kind.is_rough {
-            f64::INFINITY
-        } else {
-            kind.turned.max(self.longer(kind)).max(kind.sloped)
-        }
-    }
-
-    /// Possible gain from dividing the lengths of `kind`.
-    fn longer(&self, kind: &Kind) -> f64 {
-        // What is flown in the zone round the other end is not divided.
-        if kind.lengths[0] >= self.apart {
-            return 0.0;
-        }
-        self.steepness([kind.lengths[0]; 2], kind.exposed, kind.slopes) - kind.steepness
-    }
-
-    /// `kind` divided into parts, not yet priced.
-    pub(super) fn parts(&self, kind: &Kind) -> Vec<Kind> {
-        let longer = self.longer(kind);
-        if kind.sloped > kind.turned.max(longer) {
-            let all = Slopes::parts(self.steepest).into_iter();
-            let part = |slopes| Kind {
-                slopes: Some(slopes),
-                sloped: 0.0,
-                ..*kind
-            };
-            return all.map(part).collect();
-        }
-        if kind.turned >= longer {
-            let half = 0.5 * kind.half;
-            let part = |side: f64| Kind {
-                heading: kind.heading + side * half,
-                half,
-                ..*kind
-            };
-            return vec![part(-1.0), part(1.0)];
-        }
-        let [shortest, longest] = kind.lengths;
-        let between = self.between(kind).clamp(shortest, longest);
-        let cut = [[shortest, between], [between, longest]];
-        cut.map(|lengths| Kind { lengths, ..*kind }).to_vec()
-    }
-
-    /// The length at which `kind` is divided.
-    fn between(&self, kind: &Kind) -> f64 {
-        let [shortest, longest] = kind.lengths;
-        if kind.slopes.is_some() {
-            return if longest.is_finite() {
-                0.5 * (shortest + longest)
-            } else {
-                (2.0 * shortest)
-                    .max(self.height / self.steepest.min(1.0))
-                    .max(1.0)
-            };
-        }
-        if let Some(ramp) = self.ramp {
-            let bends = [ramp.reach, ramp.run(self.height)];
-            let mut within = bends
-                .into_iter()
-                .filter(|at| shortest < *at && *at < longest);
-            if let Some(bend) = within.next() {
-                return bend;
-            }
-            if shortest >= ramp.reach {
-                return 0.5 * (shortest + longest);
-            }
-        }
-        let steepest = self.gently(shortest, kind.exposed);
-        self.length_of(0.5 * (steepest + kind.steepness), kind.exposed)
-    }
-
     /// `kind`, with the least cost of its legs at the price of the straight line from there.
     pub(super) fn priced(&self, kind: Kind) -> Kind {
         let [length, longest] = kind.lengths;

@@ -3,6 +3,7 @@
 //! docs/BOUND.md.
 
 mod climb;
+mod dividing;
 mod excess;
 mod exposure;
 mod kind;

@@ -334,11 +334,12 @@ fn round_mountains(
         return (found, 0);
     }
     let can_any_be_flown = |routes| flown(model, priced(model, routes)).next().is_some();
-    let mut routes_priced = known.len();
     let is_known = can_any_be_flown(known);
-    if is_steep(model.scenario) || !is_known {
-        found.add(flanks::routes(model, OVERLAND, is_over));
+    if is_known && !is_steep(model.scenario) {
+        return (found, 0);
     }
+    let mut routes_priced = known.len();
+    found.add(flanks::routes(model, OVERLAND, is_over));
     if !is_known {
         routes_priced += found.routes.len();
         if !can_any_be_flown(&found.routes) {

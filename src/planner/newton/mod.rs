@@ -26,7 +26,7 @@ use crate::cost::batch::Pricer;
 use crate::cost::{Model, metre};
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
-use deals::deals;
+use deals::{Effort, deals};
 use legs::Legs;
 use limits::{Limit, Limits};
 use merit::Prices;
@@ -42,9 +42,8 @@ struct Place {
 /// Maximum number of updates of the multipliers.
 const ROUNDS: usize = 14;
 
-/// A route that costs more than another by this share is given up as too expensive, after [`SURE`] rounds.
+/// A route that costs more than another by this share is given up as too expensive.
 const HOPE: f64 = 0.003;
-const SURE: usize = 2;
 
 /// Damping at the start of a search, as a share of how much the cost bends with each coordinate.
 const DAMPING: f64 = 0.1;
@@ -64,9 +63,14 @@ const FELT: f64 = 2e-3;
 /// A route this near to its limits, as a share of the way, is mended and finished.
 const KEPT: f64 = 1e-6;
 
-/// Initial price of a breach of the hundredth of the way, a metre of it in metres flown; the second is for routes that
-/// got lost with the first, which lets a route bend more freely.
-const RATES: [f64; 2] = [5.0, 500.0];
+/// Initial price of a breach of the hundredth of the way, a metre of it in metres flown: usual, low so that a route may
+/// first bend as if limits were wider, and high for routes that get lost with the others.
+const USUAL: f64 = 5.0;
+const LOW: f64 = 1.0;
+const HIGH: f64 = 500.0;
+
+/// Waypoints are not redistributed where a metre more of any leg would save less than this many metres flown.
+const SLIGHT: f64 = 0.2;
 
 /// Least weight of a metre flown relative to the other weights, in the scales of the method.
 const FREE: f64 = 0.01;
@@ -103,46 +107,58 @@ impl<'m, 's> Newton<'m, 's> {
     /// Improve `route`, or replace it by what one of `others` becomes; it stays as it is where nothing better that
     /// keeps the limits is found.
     pub(super) fn improve(&mut self, route: &mut Vec<Point3>, others: &[Vec<Point3>]) -> Fitness {
+        let effort = Effort::of(self.model);
         let mut best = price(self.model, route);
-        let mut forces = Vec::new();
-        for rate in RATES {
-            let found = self.search(route, rate, f64::INFINITY);
-            if self.take(found, route, &mut best, &mut forces) {
-                break;
-            }
+        let (original, mut forces) = (route.clone(), Vec::new());
+        let mut better = false;
+        for &rate in effort.rates {
+            let found = self.search(&original, rate, f64::INFINITY);
+            better |= self.take(found, route, &mut best, &mut forces);
         }
-        self.deal(route, &mut best, &mut forces);
+        if !better {
+            let found = self.search(&original, HIGH, f64::INFINITY);
+            self.take(found, route, &mut best, &mut forces);
+        }
         for other in others {
-            if self.is_spent() {
+            if self.is_spent(effort) {
                 break;
             }
-            let found = self.search(other, RATES[0], known(best));
-            if self.take(found, route, &mut best, &mut forces) {
-                self.deal(route, &mut best, &mut forces);
-            }
+            let found = self.search(other, USUAL, known(best));
+            self.take(found, route, &mut best, &mut forces);
+        }
+        for &rate in effort.rates {
+            self.deal(effort, rate, route, &mut best, &mut forces);
         }
         best
     }
 
     /// Put waypoints of `route` where limits are felt, for as long as that makes it better.
-    fn deal(&mut self, route: &mut Vec<Point3>, best: &mut Fitness, forces: &mut Vec<f64>) {
-        let mut better = !forces.is_empty();
-        while better {
+    fn deal(
+        &mut self,
+        effort: &Effort,
+        rate: f64,
+        route: &mut Vec<Point3>,
+        best: &mut Fitness,
+        forces: &mut Vec<f64>,
+    ) {
+        let slight = SLIGHT * metre(self.model.scenario);
+        let mut better = true;
+        while better && forces.iter().any(|force| *force > slight) {
             better = false;
-            for deal in deals(forces, route) {
-                if better || self.is_spent() {
+            for deal in deals(effort, forces, route) {
+                if better || self.is_spent(effort) {
                     break;
                 }
-                let found = self.search(&deal, RATES[0], known(*best));
+                let found = self.search(&deal, rate, known(*best));
                 better = self.take(found, route, best, forces);
             }
         }
     }
 
-    /// Whether as many routes were priced as the bats' budget allows.
-    fn is_spent(&self) -> bool {
+    /// Whether as many routes were priced as `effort` allows.
+    fn is_spent(&self, effort: &Effort) -> bool {
         let settings = &self.model.scenario.planner;
-        self.evaluations >= (settings.population * settings.iterations) as u64
+        self.evaluations >= effort.budgets * (settings.population * settings.iterations) as u64
     }
 
     /// Keep what a search `found` if it is better than the best so far, the `route`.
@@ -169,20 +185,27 @@ impl<'m, 's> Newton<'m, 's> {
     /// The best route near `route`, and the forces of limits along each of its legs; given up where it would cost more
     /// than `known`.
     fn search(&mut self, route: &[Point3], rate: f64, known: f64) -> (Vec<Point3>, Vec<f64>) {
-        let way = self.way();
+        let (way, effort) = (self.way(), Effort::of(self.model));
         let limits = Limits::of(self.model, route.len() - 2);
         let mut prices = Prices::new(route.len(), rate * self.dear());
         let mut places = self.places(route);
         let mut damping = DAMPING;
         let (mut worst, mut cost, mut lost) = (f64::INFINITY, f64::INFINITY, 0);
+        let legs = route.len() - 1;
+        let mut forces = vec![0.0; legs];
         for round in 0..ROUNDS {
             let merit = self.descend(&mut places, &limits, &prices, &mut damping);
             // What is still beyond limits makes a route cheap, and costs more from round to round.
-            let is_dear = round >= SURE && merit.value > known * (1.0 + HOPE);
+            let is_dear = round >= effort.patience && merit.value > known * (1.0 + HOPE);
             if is_dear || why_stop(self.model.scenario, self.stop).is_some() {
                 break;
             }
             self.feel(&limits, &places, &mut prices);
+            let felt = prices.felt(legs);
+            // In the end, when breaches are dear, a hair to the inside is enough for no limit to be felt any more.
+            if felt.iter().any(|force| *force > 0.0) {
+                forces = felt;
+            }
             damping = damping.min(MOST_DAMPING);
             let gained = (cost - merit.value).abs();
             if merit.worst < KEPT * way && gained < WORTH * merit.value.abs() {
@@ -203,7 +226,7 @@ impl<'m, 's> Newton<'m, 's> {
         }
         self.settle(&mut places, &prices.lifts);
         self.mend(&mut places, &limits, &prices.limits);
-        (self.route(&places), prices.felt(route.len() - 1))
+        (self.route(&places), forces)
     }
 
     fn legs(&self) -> Legs<'_, 's> {

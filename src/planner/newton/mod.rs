@@ -12,6 +12,7 @@
 mod banded;
 mod deals;
 mod descent;
+mod effort;
 mod equations;
 mod legs;
 mod limits;
@@ -26,7 +27,8 @@ use crate::cost::batch::Pricer;
 use crate::cost::{Model, metre};
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
-use deals::{Effort, deals};
+use deals::deals;
+use effort::Effort;
 use legs::Legs;
 use limits::{Limit, Limits};
 use merit::Prices;

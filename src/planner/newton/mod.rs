@@ -88,6 +88,7 @@ pub(super) struct Newton<'m, 's> {
     model: &'m Model<'s>,
     pricer: Pricer<'s>,
     stop: &'m dyn Stop,
+    effort: &'static Effort,
     /// Approximate number of routes priced.
     pub(super) evaluations: u64,
 }
@@ -102,6 +103,7 @@ impl<'m, 's> Newton<'m, 's> {
             pricer: Pricer::new(model, model.scenario.planner.quadrature, blind),
             model,
             stop,
+            effort: Effort::of(model),
             evaluations: 0,
         }
     }
@@ -109,11 +111,10 @@ impl<'m, 's> Newton<'m, 's> {
     /// Improve `route`, or replace it by what one of `others` becomes; it stays as it is where nothing better that
     /// keeps the limits is found.
     pub(super) fn improve(&mut self, route: &mut Vec<Point3>, others: &[Vec<Point3>]) -> Fitness {
-        let effort = Effort::of(self.model);
         let mut best = price(self.model, route);
         let (original, mut forces) = (route.clone(), Vec::new());
         let mut better = false;
-        for &rate in effort.rates {
+        for &rate in self.effort.rates {
             let found = self.search(&original, rate, f64::INFINITY);
             better |= self.take(found, route, &mut best, &mut forces);
         }
@@ -122,14 +123,14 @@ impl<'m, 's> Newton<'m, 's> {
             self.take(found, route, &mut best, &mut forces);
         }
         for other in others {
-            if self.is_spent(effort) {
+            if self.is_spent() {
                 break;
             }
             let found = self.search(other, USUAL, known(best));
             self.take(found, route, &mut best, &mut forces);
         }
-        for &rate in effort.rates {
-            self.deal(effort, rate, route, &mut best, &mut forces);
+        for &rate in self.effort.rates {
+            self.deal(rate, route, &mut best, &mut forces);
         }
         best
     }
@@ -137,7 +138,6 @@ impl<'m, 's> Newton<'m, 's> {
     /// Put waypoints of `route` where limits are felt, for as long as that makes it better.
     fn deal(
         &mut self,
-        effort: &Effort,
         rate: f64,
         route: &mut Vec<Point3>,
         best: &mut Fitness,
@@ -147,8 +147,8 @@ impl<'m, 's> Newton<'m, 's> {
         let mut better = true;
         while better && forces.iter().any(|force| *force > slight) {
             better = false;
-            for deal in deals(effort, forces, route) {
-                if better || self.is_spent(effort) {
+            for deal in deals(self.effort, forces, route) {
+                if better || self.is_spent() {
                     break;
                 }
                 let found = self.search(&deal, rate, known(*best));
@@ -157,10 +157,10 @@ impl<'m, 's> Newton<'m, 's> {
         }
     }
 
-    /// Whether as many routes were priced as `effort` allows.
-    fn is_spent(&self, effort: &Effort) -> bool {
+    /// Whether as many routes were priced as the effort allows.
+    fn is_spent(&self) -> bool {
         let settings = &self.model.scenario.planner;
-        self.evaluations >= effort.budgets * (settings.population * settings.iterations) as u64
+        self.evaluations >= self.effort.budgets * (settings.population * settings.iterations) as u64
     }
 
     /// Keep what a search `found` if it is better than the best so far, the `route`.
@@ -187,7 +187,7 @@ impl<'m, 's> Newton<'m, 's> {
     /// The best route near `route`, and the forces of limits along each of its legs; given up where it would cost more
     /// than `known`.
     fn search(&mut self, route: &[Point3], rate: f64, known: f64) -> (Vec<Point3>, Vec<f64>) {
-        let (way, effort) = (self.way(), Effort::of(self.model));
+        let way = self.way();
         let limits = Limits::of(self.model, route.len() - 2);
         let mut prices = Prices::new(route.len(), rate * self.dear());
         let mut places = self.places(route);
@@ -198,7 +198,7 @@ impl<'m, 's> Newton<'m, 's> {
         for round in 0..ROUNDS {
             let merit = self.descend(&mut places, &limits, &prices, &mut damping);
             // What is still beyond limits makes a route cheap, and costs more from round to round.
-            let is_dear = round >= effort.patience && merit.value > known * (1.0 + HOPE);
+            let is_dear = round >= self.effort.patience && merit.value > known * (1.0 + HOPE);
             if is_dear || why_stop(self.model.scenario, self.stop).is_some() {
                 break;
             }

@@ -31,6 +31,8 @@ struct Joint {
     /// What it costs to its end from the start, and from which place of the waypoint before.
     reached: Pairs,
     from: [[u8; CHOICES]; CHOICES],
+    /// Places where it may begin, if the way over them is to cost no more than the known one.
+    hopeful: u16,
     /// Places from which it is worse than last time.
     touched: u16,
 }
@@ -64,6 +66,7 @@ impl ClearWays {
                 rest: [0.0; CHOICES],
                 reached: [[f64::INFINITY; CHOICES]; CHOICES],
                 from: [[0; CHOICES]; CHOICES],
+                hopeful: 0,
                 touched: ALL,
             });
         }
@@ -76,6 +79,27 @@ impl ClearWays {
                 ways.fold(f64::INFINITY, |least, (own, rest)| least.min(own + rest))
             });
             self.legs[leg_idx - 1].rest = rest;
+        }
+        self.find_hopeful();
+    }
+
+    /// Look from the start, with turns of any size, which places are too expensive to reach.
+    fn find_hopeful(&mut self) {
+        // Lower bounds of the cost from the start, and from the place to the target.
+        let mut reached = [f64::INFINITY; CHOICES];
+        reached[0] = 0.0;
+        let mut rest = [0.0; CHOICES];
+        for leg in &mut self.legs {
+            for (place, (reached, rest)) in reached.iter().zip(&rest).enumerate() {
+                leg.hopeful |= u16::from(reached + rest <= self.limit) << place;
+            }
+            let mut next = [f64::INFINITY; CHOICES];
+            for (reached, own) in reached.iter().zip(&leg.own) {
+                for (next, own) in next.iter_mut().zip(own) {
+                    *next = next.min(reached + own);
+                }
+            }
+            (reached, rest) = (next, leg.rest);
         }
     }
 
@@ -93,7 +117,7 @@ impl ClearWays {
         for leg_idx in 0..last {
             let rows = changed | std::mem::take(&mut self.legs[leg_idx].touched);
             changed = 0;
-            for b in (0..count(leg_idx, last)).filter(|b| rows >> b & 1 == 1) {
+            for b in places(rows & self.legs[leg_idx].hopeful) {
                 changed |= self.reach(legs, leg_idx, b);
             }
         }
@@ -122,7 +146,8 @@ impl ClearWays {
     fn reach(&mut self, legs: &[Leg], leg_idx: usize, b: usize) -> u16 {
         let last = self.legs.len();
         let (before, rest) = self.legs.split_at_mut(leg_idx);
-        let joint = &mut rest[0];
+        let (joint, after) = rest.split_first_mut().expect("there is such a leg");
+        let ends = after.first().map_or(1, |next| next.hopeful);
         let mut changed = 0;
         let mut arrivals = Arrivals::default();
         if let Some(before) = before.last() {
@@ -132,7 +157,7 @@ impl ClearWays {
         } else {
             arrivals.push(0, 0.0);
         }
-        for c in 0..count(leg_idx + 1, last) {
+        for c in places(ends) {
             let (own, rest) = (joint.own[b][c], joint.rest[c]);
             let mut best = (f64::INFINITY, 0);
             for &(cost, from) in arrivals.sorted() {
@@ -158,6 +183,16 @@ impl ClearWays {
         }
         changed
     }
+}
+
+/// The places whose bits are set.
+fn places(bits: u16) -> impl Iterator<Item = usize> {
+    let mut left = bits;
+    std::iter::from_fn(move || {
+        let next = left.trailing_zeros() as usize;
+        left &= left.wrapping_sub(1);
+        (next < CHOICES).then_some(next)
+    })
 }
 
 /// Places from which another is reached, the cheapest first; equals in their own order.

@@ -41,6 +41,11 @@ const POPULATION: usize = 200;
 /// Members and iterations of the search that gathers the positions which are then priced.
 const GATHERED: usize = 40;
 const GATHERING: u32 = 50;
+/// How far the courses of two copies of a member are apart, and how much they change from batch to batch: of a leg of
+/// some hundred metres the end moves by more than a rounding, but by less than from one copy to the next for as long as
+/// anybody measures.
+const APART_RAD: f64 = 1e-7;
+const SHIFT_RAD: f64 = 1e-12;
 /// How far from a route its neighbours are, as a share of the way.
 const NEIGHBOURHOOD: f64 = 0.01;
 /// A measurement is divided into this many; the fastest counts, because the others were disturbed.
@@ -243,10 +248,14 @@ fn rate(objective: &mut impl Objective, positions: &[f64], batch: usize, time_ms
     let mut fitness = vec![Fitness::WORST; batch];
     let mut positions = positions.to_vec();
     let dimension = positions.len() / batch;
+    // A member is there more than once: its copies must have no leg in common.
+    for (idx, position) in positions.chunks_exact_mut(dimension).enumerate() {
+        position[1] += APART_RAD * idx as f64;
+    }
     best_rate(batch, time_ms, || {
         // Shift the course slightly, so that remembered legs are of no use.
         for position in positions.chunks_exact_mut(dimension) {
-            position[1] = position[1].next_up();
+            position[1] += SHIFT_RAD;
         }
         objective.evaluate(&positions, &mut fitness);
         std::hint::black_box(&fitness);

@@ -5,6 +5,8 @@
 //! priced as if they kept them; of those that may still win, only legs with unknown heights are measured. No price
 //! depends on which other positions are in a block.
 
+use std::ops::Range;
+
 use super::coding::Coding;
 use super::kept::{End, Kept};
 use crate::cost::batch::{LANES, PointRow, Price, Pricer, Row};
@@ -112,7 +114,6 @@ impl<'a, 's> Blocks<'a, 's> {
         mut may_go_on: impl FnMut(usize) -> bool,
     ) {
         let block = LANES * self.coding.bounds().dimension();
-        let rival = |owner: usize| rivals.map_or(Fitness::WORST, |rivals| rivals[owner]);
         for (idx, positions) in positions.chunks(block).enumerate() {
             let first = idx * LANES;
             let count = LANES.min(fitness.len() - first);
@@ -121,28 +122,40 @@ impl<'a, 's> Blocks<'a, 's> {
                 continue;
             }
             self.decode(positions, count);
-            let least = self.pricers.full.least_costs(&self.points, &self.ground);
-            for (lane, &cost) in least.iter().enumerate().take(count) {
-                let owner = first + lane;
-                fitness[owner] = Fitness {
-                    violation: 0.0,
-                    cost,
-                };
-                if fitness[owner].beats(&rival(owner)) {
-                    self.waiting.push(&self.points, &self.ground, lane, owner);
-                }
-                if self.waiting.owners.len() == LANES {
-                    self.price_waiting(&rival, fitness);
-                }
+            if let Some(rivals) = rivals {
+                self.sift(first, count, rivals, fitness);
+            } else {
+                let owners = first..first + count;
+                self.waiting
+                    .take(&mut self.points, &mut self.ground, owners);
+                self.price_waiting(None, fitness);
             }
             self.settle(LEGS_AT_ONCE, fitness);
         }
-        self.price_waiting(&rival, fitness);
+        self.price_waiting(rivals, fitness);
         self.settle(1, fitness);
     }
 
+    /// Let those of the decoded routes wait that may beat their rivals; `first` is the number of the first position.
+    fn sift(&mut self, first: usize, count: usize, rivals: &[Fitness], fitness: &mut [Fitness]) {
+        let least = self.pricers.full.least_costs(&self.points, &self.ground);
+        for (lane, &cost) in least.iter().enumerate().take(count) {
+            let owner = first + lane;
+            fitness[owner] = Fitness {
+                violation: 0.0,
+                cost,
+            };
+            if fitness[owner].beats(&rivals[owner]) {
+                self.waiting.push(&self.points, &self.ground, lane, owner);
+            }
+            if self.waiting.owners.len() == LANES {
+                self.price_waiting(Some(rivals), fitness);
+            }
+        }
+    }
+
     /// Price the routes that wait, above hills as if they kept their heights.
-    fn price_waiting(&mut self, rival: &impl Fn(usize) -> Fitness, fitness: &mut [Fitness]) {
+    fn price_waiting(&mut self, rivals: Option<&[Fitness]>, fitness: &mut [Fitness]) {
         let Waiting {
             points,
             ground,
@@ -159,7 +172,7 @@ impl<'a, 's> Blocks<'a, 's> {
         };
         for (lane, owner) in owners.drain(..).enumerate() {
             fitness[owner] = of_lane(&price, lane);
-            let rival = rival(owner);
+            let rival = rivals.map_or(Fitness::WORST, |rivals| rivals[owner]);
             if self.hilly && fitness[owner].beats(&rival) {
                 let unmeasured = &mut self.unmeasured[usize::from(!rival.is_feasible())];
                 unmeasured.push(points, lane, owner, &self.proven, self.kept);
@@ -196,6 +209,13 @@ impl<'a, 's> Blocks<'a, 's> {
 }
 
 impl Waiting {
+    /// Take all of a block as it is, when none is waiting. What is left in its place is of no use.
+    fn take(&mut self, points: &mut Vec<PointRow>, ground: &mut Vec<Row>, owners: Range<usize>) {
+        std::mem::swap(&mut self.points, points);
+        std::mem::swap(&mut self.ground, ground);
+        self.owners.extend(owners);
+    }
+
     /// Add the route in lane `lane` of `points`.
     fn push(&mut self, points: &[PointRow], ground: &[Row], lane: usize, owner: usize) {
         let place = self.owners.len();

@@ -10,21 +10,24 @@ use tokio::time::Instant;
 use tracing::field::display;
 
 use super::connect::plan_of;
-use super::lane::Version;
+use super::lane::{Lane, Version};
 use super::leases::Job;
 use super::orphans::Orphan;
 use super::record::{Document, Record, State};
 use super::steps::Change;
 use super::view::Standing;
 use super::{JetStream, closed};
-use crate::job::{Plan, PlanId, Status};
-use crate::store::{Lease, StoreError, lost};
+use crate::job::{FailureKind, Plan, PlanId, Status};
+use crate::store::{Ending, Lease, StoreError, lost};
 
 /// A job may be seen before its record; a claim waits this long for the record.
 const RECORD_PATIENCE: Duration = Duration::from_millis(100);
 
 /// Attempts on lanes whose jobs others claim first.
 const TRIES: usize = 4;
+
+/// Maximum number of lanes that are asked in turn.
+const LANES: usize = 64;
 
 /// Pause between two attempts.
 const BREATH: Duration = Duration::from_millis(5);
@@ -101,9 +104,22 @@ impl JetStream {
 
     /// The next job, from the lane whose turn it is or from a lane with lost workers.
     async fn next_job(&self) -> Result<Option<Message>, StoreError> {
-        for _ in 0..TRIES {
-            let lane = self.view.known().next_lane(Version::own(), self.slots());
-            let Some(lane) = lane else { break };
+        // A lane whose only jobs are held, by a claimer that was lost, must not keep the turn from the others.
+        let mut passed = Vec::new();
+        let mut tries = 0;
+        while tries < LANES {
+            let next = |passed: &[Lane]| {
+                let known = self.view.known();
+                known.next_lane(Version::own(), self.slots(), passed)
+            };
+            let Some(lane) = next(&passed) else {
+                if passed.is_empty() || tries >= TRIES {
+                    break;
+                }
+                passed.clear();
+                continue;
+            };
+            tries += 1;
             if let Some(job) = self.fetch(&lane).await? {
                 // The next slot need not ask for it again.
                 if let Some(id) = plan_of(&job.subject) {
@@ -111,6 +127,7 @@ impl JetStream {
                 }
                 return Ok(Some(job));
             }
+            passed.push(lane);
             tokio::time::sleep(BREATH).await;
         }
         if self.is_patrol_due() {
@@ -192,14 +209,21 @@ impl JetStream {
             }
         };
         let (found, scenario) = tokio::join!(self.start(id, &job), self.servers.read(&document));
-        match found? {
+        let found = match found {
+            Ok(found) => found,
+            Err(error) => {
+                answer(id, &job, AckKind::Nak(None)).await;
+                return Err(error);
+            }
+        };
+        match found {
             Found::Over => answer(id, &job, AckKind::Ack).await,
             Found::Lost(plan) => {
                 (self.options.lost)(&plan);
                 answer(id, &job, AckKind::Ack).await;
             }
             Found::Ours => {}
-            Found::Run(record) => return self.lease(*record, scenario, job).await.map(Some),
+            Found::Run(record) => return self.lease(*record, scenario, job).await,
         }
         Ok(None)
     }
@@ -268,9 +292,9 @@ impl JetStream {
     async fn lease(
         &self,
         record: Record,
-        scenario: Result<String, StoreError>,
+        scenario: Result<Option<String>, StoreError>,
         job: Job,
-    ) -> Result<Lease, StoreError> {
+    ) -> Result<Option<Lease>, StoreError> {
         let (id, attempt) = (record.id(), record.attempt);
         let cancel = self.leases.hold(id, attempt, job, self.settings.lease);
         // Take in requests that came between the step and the hold.
@@ -278,12 +302,36 @@ impl JetStream {
             self.leases.heed(id, &standing.state);
         }
         match scenario {
-            Ok(scenario) => Ok(Lease {
+            Ok(Some(scenario)) => Ok(Some(Lease {
                 plan: record.plan,
                 scenario: scenario.into(),
                 attempt,
                 cancel,
-            }),
+            })),
+            Ok(None) => {
+                self.fail_without_scenario(id, attempt).await?;
+                Ok(None)
+            }
+            Err(error) => {
+                self.release(id, attempt).await?;
+                Err(error)
+            }
+        }
+    }
+
+    /// End a plan that can never be run, so that those behind it are.
+    async fn fail_without_scenario(&self, id: PlanId, attempt: u64) -> Result<(), StoreError> {
+        tracing::error!(plan_id = %id, "a queued plan has lost its document and fails");
+        let lost =
+            FailureKind::ScenarioLost.because("the store has lost the document that was accepted");
+        let end = Ending::Failed(lost).at((self.options.clock)());
+        match self.finish(id, attempt, &end).await {
+            Ok(plan) => {
+                (self.options.lost)(&plan);
+                Ok(())
+            }
+            // It was deleted, or ended, meanwhile.
+            Err(StoreError::LeaseLost(_)) => Ok(()),
             Err(error) => {
                 self.release(id, attempt).await?;
                 Err(error)

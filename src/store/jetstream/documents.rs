@@ -1,6 +1,7 @@
 //! Scenarios and results: beside the steps, so that a step stays small.
 
-use async_nats::jetstream::object_store::DeleteErrorKind;
+use async_nats::jetstream::object_store::{DeleteErrorKind, GetErrorKind};
+use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use bytes::Bytes;
 use tokio::io::AsyncReadExt as _;
 
@@ -9,6 +10,9 @@ use super::errors::failed;
 use super::record::Document;
 use crate::job::PlanId;
 use crate::store::StoreError;
+
+/// The header of a message that stands for the removal of a document.
+const DELETION: &str = "KV-Operation";
 
 /// The longest document that goes into a message; servers accept messages of 1 MiB by default.
 const LONGEST: usize = 512 << 10;
@@ -37,6 +41,11 @@ impl Document {
             large: text.len() > LONGEST,
         }
     }
+
+    /// The error of a reader when the servers have lost it.
+    pub(super) fn missing(&self) -> StoreError {
+        StoreError::unavailable(format!("document {} is missing", self.key))
+    }
 }
 
 impl Servers {
@@ -60,18 +69,19 @@ impl Servers {
         Ok(())
     }
 
-    pub(super) async fn read(&self, document: &Document) -> Result<String, StoreError> {
+    /// `None` when the servers have lost it.
+    pub(super) async fn read(&self, document: &Document) -> Result<Option<String>, StoreError> {
         self.outlast(|| self.try_to_read(document)).await
     }
 
-    async fn try_to_read(&self, document: &Document) -> Result<String, StoreError> {
+    async fn try_to_read(&self, document: &Document) -> Result<Option<String>, StoreError> {
         let what = || format!("document {}", document.key);
         let bytes = if document.large {
-            let mut object = self
-                .objects
-                .get(&document.key)
-                .await
-                .map_err(|error| failed(&what(), &error))?;
+            let mut object = match self.objects.get(&document.key).await {
+                Ok(object) => object,
+                Err(error) if error.kind() == GetErrorKind::NotFound => return Ok(None),
+                Err(error) => return Err(failed(&what(), &error)),
+            };
             let mut bytes = Vec::with_capacity(object.info().size);
             object
                 .read_to_end(&mut bytes)
@@ -79,14 +89,30 @@ impl Servers {
                 .map_err(|error| failed(&what(), &error))?;
             bytes
         } else {
-            self.documents
-                .get(&document.key)
-                .await
-                .map_err(|error| failed(&what(), &error))?
-                .ok_or_else(|| StoreError::unavailable(format!("{} is missing", what())))?
-                .into()
+            let got = self.documents.get(&document.key).await;
+            let bytes = match got.map_err(|error| failed(&what(), &error))? {
+                Some(bytes) => bytes,
+                None => match self.of_the_leader(document).await? {
+                    Some(bytes) => bytes,
+                    None => return Ok(None),
+                },
+            };
+            bytes.into()
         };
-        String::from_utf8(bytes).map_err(|error| failed(&what(), &error))
+        let text = String::from_utf8(bytes).map_err(|error| failed(&what(), &error))?;
+        Ok(Some(text))
+    }
+
+    /// A server that is behind the others has not got every document yet; the leader has.
+    async fn of_the_leader(&self, document: &Document) -> Result<Option<Bytes>, StoreError> {
+        let subject = format!("{}{}", self.documents.prefix, document.key);
+        let stream = &self.documents.stream;
+        match stream.get_last_raw_message_by_subject(&subject).await {
+            Ok(message) if message.headers.get(DELETION).is_some() => Ok(None),
+            Ok(message) => Ok(Some(message.payload)),
+            Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => Ok(None),
+            Err(error) => Err(failed(&format!("document {}", document.key), &error)),
+        }
     }
 
     /// Remove all documents of a plan. `objects` are the keys of those that may be in the object store.

@@ -31,9 +31,15 @@ impl JetStream {
         }
         // The servers redeliver jobs in the order in which they were given back.
         let mut jobs = vec![first];
-        while jobs.len() < MOST_SORTED
-            && let Some(job) = self.fetch_any(lane).await?
-        {
+        while jobs.len() < MOST_SORTED {
+            let job = match self.fetch_any(lane).await {
+                Ok(Some(job)) => job,
+                Ok(None) => break,
+                Err(error) => {
+                    tracing::debug!(%error, "no more jobs are sorted");
+                    break;
+                }
+            };
             let again = came_again(&job);
             jobs.push(job);
             if !again {

@@ -332,9 +332,14 @@ impl Known {
         }
     }
 
-    /// The lane whose turn it is; see [`turns::next`].
-    pub(super) fn next_lane(&self, version: Version, slots: usize) -> Option<Lane> {
-        turns::next(&self.lanes, &self.running, version, slots)
+    /// The lane whose turn it is, but for those that are `passed` over; see [`turns::next`].
+    pub(super) fn next_lane(
+        &self,
+        version: Version,
+        slots: usize,
+        passed: &[Lane],
+    ) -> Option<Lane> {
+        turns::next(&self.lanes, &self.running, version, slots, passed)
     }
 
     /// Lanes whose running plans may have lost their workers.

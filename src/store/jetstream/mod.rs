@@ -225,14 +225,18 @@ impl Store for JetStreamStore {
         let store = self.open_store()?;
         let standing = store.plans().standing(id).await?;
         let record = standing.record(id, (store.options.clock)())?;
-        store.servers.read(&record.scenario).await
+        let found = store.servers.read(&record.scenario).await?;
+        found.ok_or_else(|| record.scenario.missing())
     }
 
     async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError> {
         let store = self.open_store()?;
         let standing = store.plans().standing(id).await?;
         match &standing.record(id, (store.options.clock)())?.result {
-            Some(result) => store.servers.read(result).await.map(Some),
+            Some(result) => {
+                let found = store.servers.read(result).await?;
+                found.ok_or_else(|| result.missing()).map(Some)
+            }
             None => Ok(None),
         }
     }

@@ -10,12 +10,13 @@ pub(super) type Lanes = HashMap<Lane, BTreeSet<(u64, PlanId)>>;
 
 /// The lane from which a worker of this version takes the next plan, in a system of `slots` slots: that of the owner
 /// with the fewest plans running; between equals, that of the oldest plan. Large plans leave a quarter of the slots to
-/// small ones. Lanes of newer versions are left to newer workers.
+/// small ones. Lanes of newer versions are left to newer workers, and those in `passed` are passed over.
 pub(super) fn next(
     queued: &Lanes,
     running: &Lanes,
     version: Version,
     slots: usize,
+    passed: &[Lane],
 ) -> Option<Lane> {
     let mut shares: HashMap<&str, usize> = HashMap::new();
     let mut large = 0;
@@ -25,7 +26,9 @@ pub(super) fn next(
     }
     let room_for_large = large < slots.saturating_sub(slots.div_ceil(4)).max(1);
     let open = queued.iter().filter(|(lane, _)| {
-        lane.version <= version && (lane.size == Size::Small || room_for_large)
+        lane.version <= version
+            && (lane.size == Size::Small || room_for_large)
+            && !passed.contains(lane)
     });
     open.min_by_key(|(lane, plans)| {
         let share = shares.get(lane.owner.as_str()).copied();
@@ -59,7 +62,7 @@ mod tests {
 
     fn turn(queued: &Lanes, running: &Lanes, slots: usize) -> Option<Lane> {
         let version = Version::read("1.0.0").expect("it is one");
-        next(queued, running, version, slots)
+        next(queued, running, version, slots, &[])
     }
 
     #[test]
@@ -88,6 +91,23 @@ mod tests {
         let both = lanes(&[(large.clone(), &[1]), (small("a"), &[2])]);
         let full = lanes(&[(large, &[7, 8, 9])]);
         assert_eq!(turn(&both, &full, 4), Some(small("a")));
+    }
+
+    #[test]
+    fn a_lane_that_is_passed_over_leaves_the_turn_to_the_next() {
+        let queued = lanes(&[
+            (small("a"), &[1, 4]),
+            (small("b"), &[2]),
+            (small("c"), &[3]),
+        ]);
+        let version = Version::read("1.0.0").expect("it is one");
+        let mut passed = Vec::new();
+        for owner in ["a", "b", "c"] {
+            let lane = next(&queued, &lanes(&[]), version, 4, &passed).expect("one is left");
+            assert_eq!(lane, small(owner));
+            passed.push(lane);
+        }
+        assert_eq!(next(&queued, &lanes(&[]), version, 4, &passed), None);
     }
 
     #[test]

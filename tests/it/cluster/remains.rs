@@ -2,17 +2,21 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use async_nats::jetstream::Context;
+use async_nats::jetstream::consumer::PullConsumer;
+use futures_util::StreamExt as _;
 use noctule::config::Address;
-use noctule::job::{Idempotency, PlanId, Submission};
-use noctule::store::jetstream::JetStreamStore;
+use noctule::job::{Event, Idempotency, Plan, PlanId, Status, Submission};
+use noctule::store::jetstream::{JetStreamStore, Settings};
 use noctule::store::{Options, Store, StoreError};
 
 use crate::support::nats;
-use crate::support::plans::{failure, kind, submission};
+use crate::support::patience::in_time;
+use crate::support::plans::{failure, history, kind, submission};
 use crate::support::stores::node;
 
 /// A client that is not a node.
@@ -84,4 +88,92 @@ async fn an_interrupted_submission_holds_its_key_for_a_minute() {
     let second = submit(&store).await.unwrap();
     assert_ne!(second, first);
     assert_eq!(submit(&store).await.unwrap(), second);
+}
+
+/// The only waiting job of an owner, taken by a claimer that then does nothing with it.
+async fn held_job(address: &str) -> async_nats::jetstream::Message {
+    let jobs = format!("{}-jobs", nats::namespace(address));
+    let jobs = client(address).await.get_stream(jobs).await.unwrap();
+    let names: Vec<_> = jobs.consumer_names().collect().await;
+    let [Ok(lane)] = &names[..] else {
+        panic!("one lane has been asked so far: {names:?}")
+    };
+    let lane: PullConsumer = jobs.get_consumer(lane).await.unwrap();
+    let mut batch = lane.fetch().max_messages(1).messages().await.unwrap();
+    batch.next().await.unwrap().unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_job_that_somebody_holds_does_not_keep_the_turn_from_other_owners() {
+    let address = nats::address();
+    let patient = Settings {
+        lease: Duration::from_secs(600),
+        ..node(&address)
+    };
+    let store = super::open_as(patient).await;
+    let submit = async |owner: &str| {
+        let owned = Submission {
+            owner: Some(owner.to_owned()),
+            ..submission()
+        };
+        store.submit(owned).await.unwrap().plan.id
+    };
+    submit("one").await;
+    let lease = store.claim().await.unwrap();
+    store.finish(&lease, failure().at(0)).await.unwrap();
+
+    let first = submit("one").await;
+    let held = held_job(&address).await;
+    assert!(held.subject.ends_with(&first.to_string()));
+    let second = submit("other").await;
+    let claimed = in_time(store.claim()).await.unwrap();
+    assert_eq!(claimed.plan.id, second);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plan_whose_document_is_lost_fails_and_does_not_block_the_queue() {
+    let address = nats::address();
+    let ended: Arc<Mutex<Vec<Plan>>> = Arc::default();
+    let tell = Arc::clone(&ended);
+    let options = Options {
+        lost: Arc::new(move |plan| tell.lock().unwrap().push(plan.clone())),
+        ..Options::new(10)
+    };
+    let store = JetStreamStore::open(node(&address), options).await.unwrap();
+    let mut ids = Vec::new();
+    for document in ["{}".to_owned(), "{}".to_owned(), " ".repeat(600_000)] {
+        let submission = Submission {
+            scenario: document,
+            ..submission()
+        };
+        ids.push(store.submit(submission).await.unwrap().plan.id);
+    }
+    let sound = store.submit(submission()).await.unwrap().plan.id;
+
+    let namespace = nats::namespace(&address);
+    let client = client(&address).await;
+    let documents = client.get_key_value(format!("{namespace}-documents")).await;
+    let documents = documents.unwrap();
+    let purged = documents.stream.purge();
+    let of_the_first = format!("{}{}.>", documents.prefix, ids[0]);
+    assert_eq!(purged.filter(of_the_first).await.unwrap().purged, 1);
+    let key = format!("{}.scenario", ids[1]);
+    documents.delete(&key).await.unwrap();
+    let objects = client
+        .get_object_store(format!("{namespace}-objects"))
+        .await;
+    let key = format!("{}.scenario", ids[2]);
+    objects.unwrap().delete(&key).await.unwrap();
+
+    assert_eq!(in_time(store.claim()).await.unwrap().plan.id, sound);
+    for id in &ids {
+        let plan = store.get(*id).await.unwrap();
+        assert_eq!(plan.status, Status::Failed);
+        assert_eq!(plan.error.as_ref().unwrap().kind, "scenario-lost");
+        let told = history(&store, *id).await;
+        assert_eq!(told.last(), Some(&Event::End(Status::Failed)));
+        assert!(ended.lock().unwrap().contains(&plan));
+    }
+    let stats = store.stats().await.unwrap();
+    assert_eq!((stats.queued, stats.running), (0, 1));
 }

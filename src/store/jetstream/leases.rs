@@ -82,7 +82,7 @@ impl Leases {
             held.cancel.send_replace(true);
         }
         if !own {
-            // Its worker will find out what happened, and let go.
+            // Its worker is told so at its next step, which lets go.
             held.renewing.abort();
         }
     }

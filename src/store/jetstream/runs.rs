@@ -25,6 +25,44 @@ impl JetStream {
         attempt: u64,
         events: &[Event],
     ) -> Result<(), StoreError> {
+        let appended = self.try_to_append(id, attempt, events).await;
+        self.let_go_when_lost(id, attempt, appended)
+    }
+
+    pub(super) async fn finish(
+        &self,
+        id: PlanId,
+        attempt: u64,
+        end: &End,
+    ) -> Result<Plan, StoreError> {
+        let finished = self.try_to_finish(id, attempt, end).await;
+        self.let_go_when_lost(id, attempt, finished)
+    }
+
+    pub(super) async fn release(&self, id: PlanId, attempt: u64) -> Result<Plan, StoreError> {
+        let released = self.try_to_release(id, attempt).await;
+        self.let_go_when_lost(id, attempt, released)
+    }
+
+    /// Nothing is held any more of a run that turns out to be no longer this node's.
+    fn let_go_when_lost<T>(
+        &self,
+        id: PlanId,
+        attempt: u64,
+        done: Result<T, StoreError>,
+    ) -> Result<T, StoreError> {
+        if matches!(done, Err(StoreError::LeaseLost(_))) {
+            self.leases.let_go(id, attempt);
+        }
+        done
+    }
+
+    async fn try_to_append(
+        &self,
+        id: PlanId,
+        attempt: u64,
+        events: &[Event],
+    ) -> Result<(), StoreError> {
         if events.is_empty() {
             return self.still_own(id, attempt).await;
         }
@@ -108,6 +146,7 @@ impl JetStream {
             .await;
         let standing = appended.map_err(|error| lost(error, id))?;
         let step = Appended {
+            number,
             sequence: standing.sequence,
             events: events.len() as u64,
             bytes,
@@ -116,12 +155,7 @@ impl JetStream {
         Ok(())
     }
 
-    pub(super) async fn finish(
-        &self,
-        id: PlanId,
-        attempt: u64,
-        end: &End,
-    ) -> Result<Plan, StoreError> {
+    async fn try_to_finish(&self, id: PlanId, attempt: u64, end: &End) -> Result<Plan, StoreError> {
         let mut parts = parts(&end.told);
         let last = parts.pop().unwrap_or_default();
         self.still_own(id, attempt).await?;
@@ -159,7 +193,7 @@ impl JetStream {
         Ok(record.plan.clone())
     }
 
-    pub(super) async fn release(&self, id: PlanId, attempt: u64) -> Result<Plan, StoreError> {
+    async fn try_to_release(&self, id: PlanId, attempt: u64) -> Result<Plan, StoreError> {
         let now_ms = (self.options.clock)();
         let mut back = AckKind::Nak(None);
         let released = self

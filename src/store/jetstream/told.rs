@@ -5,6 +5,8 @@ use std::collections::VecDeque;
 /// A step that a run appended.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Appended {
+    /// Counts the steps of the run.
+    pub(super) number: u64,
     /// Its sequence in the plans' stream.
     pub(super) sequence: u64,
     pub(super) events: u64,
@@ -22,7 +24,15 @@ pub(super) struct Told {
 }
 
 impl Told {
+    /// Add a step, unless it is there already: a retry appends again what was followed by a failure.
     pub(super) fn push(&mut self, step: Appended) {
+        if self
+            .steps
+            .back()
+            .is_some_and(|last| step.number <= last.number)
+        {
+            return;
+        }
         self.events += step.events;
         self.bytes += step.bytes;
         self.steps.push_back(step);
@@ -69,14 +79,18 @@ mod tests {
         let mut told = Told::default();
         for sequence in 1..=7 {
             assert_eq!(told.excess(20), None);
-            told.push(Appended {
+            let step = Appended {
+                number: sequence,
                 sequence: 10 * sequence,
                 events: 4,
                 bytes: 100,
-            });
+            };
+            told.push(step);
+            told.push(step);
         }
         assert_eq!((told.excess(20), told.bytes_left()), (None, None));
         told.push(Appended {
+            number: 8,
             sequence: 80,
             events: 4,
             bytes: 100,
@@ -87,6 +101,7 @@ mod tests {
         assert_eq!(told.excess(20), None);
         // A single step above the limit is kept whole.
         told.push(Appended {
+            number: 9,
             sequence: 90,
             events: 256,
             bytes: 6_400,

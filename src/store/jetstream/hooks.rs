@@ -12,15 +12,22 @@ use super::steps::Change;
 use crate::job::PlanId;
 use crate::store::{StoreError, Webhook};
 
+/// As many times the webhooks that are wanted are looked at.
+const LOOKED_AT: usize = 16;
+
 impl JetStream {
     pub(super) async fn due_webhooks(
         &self,
         now_ms: i64,
         limit: usize,
     ) -> Result<Vec<Webhook>, StoreError> {
-        let due = self.view.known().due(now_ms, limit);
+        // Other nodes may be sending those that have been due longest.
+        let due = self.view.known().due(now_ms, LOOKED_AT * limit);
         let mut taken = Vec::new();
         for id in due {
+            if taken.len() == limit {
+                break;
+            }
             if !self.may_tell(id).await? {
                 continue;
             }

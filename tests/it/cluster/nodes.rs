@@ -246,3 +246,25 @@ async fn servers_without_enough_replicas_or_jetstream_are_refused() {
     let Address { servers, .. } = Address::read(&gone).unwrap();
     assert!(detail.contains(&servers[0]), "{detail}");
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn webhooks_behind_those_that_another_node_sends_are_sent() {
+    let address = nats::address();
+    let (one, other) = tokio::join!(open(&address), open(&address));
+    let mut ids = Vec::new();
+    for url in ["a", "b"] {
+        let submission = Submission {
+            webhook: Some(url.to_owned()),
+            ..submission()
+        };
+        let id = one.submit(submission).await.unwrap().plan.id;
+        one.request_cancel(id, 1_000).await.unwrap();
+        until(&*other, id, |plan| plan.status.is_final()).await;
+        ids.push(id);
+    }
+    for (node, id) in [(&one, ids[0]), (&other, ids[1])] {
+        let due = node.due_webhooks(i64::MAX, 1).await.unwrap();
+        let due: Vec<_> = due.iter().map(|due| due.plan.id).collect();
+        assert_eq!(due, [id]);
+    }
+}

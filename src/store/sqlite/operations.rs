@@ -247,6 +247,7 @@ fn give_back(tx: &mut Transaction<'_>, mut row: PlanRow) -> Result<Plan, StoreEr
     tx.effects.push(Effect::Unleased(row.plan.id));
     if row.plan.cancel_requested {
         row.plan.cancel(tx.now_ms())?;
+        forget_incumbent(tx, &row)?;
         tell_end(tx, &mut row)?;
         row.update(tx.connection)?;
         return Ok(row.plan);

@@ -251,6 +251,14 @@ async fn the_best_route_of_the_current_run_is_kept() {
         assert_eq!(store.incumbent(id).await.unwrap(), None);
         store.delete(id, store.now_ms()).await.unwrap();
         assert_eq!(kind(store.incumbent(id).await), Err("gone"));
+
+        let id = store.submit(submission()).await.unwrap().plan.id;
+        let lease = store.claim().await.unwrap();
+        store.append(&lease, vec![incumbent(1, 0.1)]).await.unwrap();
+        store.request_cancel(id, store.now_ms()).await.unwrap();
+        let given_back = store.release(&lease).await.unwrap();
+        assert_eq!(given_back.status, Status::Cancelled);
+        assert_eq!(store.incumbent(id).await.unwrap(), None);
         let unknown = store.incumbent(PlanId::now_v7()).await;
         assert_eq!(kind(unknown), Err("not found"));
     })

@@ -22,6 +22,14 @@ pub(super) const BATCH: usize = 512;
 /// Longest delay before fewer events are stored: waking up for each costs more than storing it.
 const DELAY: Duration = Duration::from_millis(50);
 
+/// Why something was not stored.
+enum Unstored {
+    /// The plan is no longer ours.
+    Lost,
+    /// The pool must end.
+    GivenUp,
+}
+
 /// A run that is over, but not yet in the store.
 pub(super) struct Over {
     lease: Lease,
@@ -67,13 +75,18 @@ impl Slot {
             rest = self.keep_events(&lease, told, news) => rest,
             never = stop_when_asked(&lease, self.phase.clone(), &stop) => match never {},
         };
-        let rest = rest.unwrap_or_else(|| {
+        if rest.is_err() {
             stop.raise(Reason::Abandoned);
-            Vec::new()
-        });
+        }
         let ending = ending
             .await
             .expect("the planning thread answers even when it panics");
+        let rest = match rest {
+            Ok(rest) => rest,
+            Err(Unstored::GivenUp) => Vec::new(),
+            // Nothing is left to conclude.
+            Err(Unstored::Lost) => return None,
+        };
         let abandoned = matches!(ending, Some(Ending::Result { .. })) && stop.is_abandoned();
         Some(Over {
             lease,
@@ -109,14 +122,13 @@ impl Slot {
         conclusion.instrument(span).await;
     }
 
-    /// Store events until there are no more; returns the last of them, which are stored with the end, or `None` when
-    /// storing them became pointless. `news` ticks when there are many, and loses its sender after the last.
+    /// Store events until there are no more; returns the last of them, which are stored with the end. `news` ticks when there are many, and loses its sender after the last.
     async fn keep_events(
         &self,
         lease: &Lease,
         mut told: mpsc::Receiver<Event>,
         mut news: watch::Receiver<()>,
-    ) -> Option<Vec<Event>> {
+    ) -> Result<Vec<Event>, Unstored> {
         let mut batch = Vec::new();
         loop {
             tokio::select! {
@@ -128,7 +140,7 @@ impl Slot {
                 batch.push(event);
             }
             if was_last {
-                return Some(batch);
+                return Ok(batch);
             }
             if batch.is_empty() {
                 // A quiet search wakes nobody, and neither does the first event of a short one.
@@ -144,7 +156,7 @@ impl Slot {
     async fn finish(&self, lease: &Lease, told: Vec<Event>, ending: Ending) {
         let end = ending.after(told, (self.clock)());
         let finish = || self.store.finish(lease, Arc::clone(&end));
-        if let Some(plan) = self.persist("ending", finish).await {
+        if let Ok(plan) = self.persist("ending", finish).await {
             self.tell_end(&plan);
         }
     }
@@ -153,9 +165,9 @@ impl Slot {
         let release = || self.store.release(lease);
         match self.persist("release", release).await {
             // Its end had been requested, and it has no ending of its own to wait for.
-            Some(plan) if plan.status.is_final() => self.tell_end(&plan),
-            Some(_) => tracing::info!("plan given back to the queue"),
-            None => {}
+            Ok(plan) if plan.status.is_final() => self.tell_end(&plan),
+            Ok(_) => tracing::info!("plan given back to the queue"),
+            Err(Unstored::Lost | Unstored::GivenUp) => {}
         }
     }
 
@@ -172,9 +184,8 @@ impl Slot {
         });
     }
 
-    /// Do a store operation, and retry while the store fails; `None` when the plan is no longer ours, or when the pool
-    /// must end.
-    async fn persist<T, F>(&self, what: &str, step: impl Fn() -> F) -> Option<T>
+    /// Do a store operation, and retry while the store fails.
+    async fn persist<T, F>(&self, what: &str, step: impl Fn() -> F) -> Result<T, Unstored>
     where
         F: Future<Output = Result<T, StoreError>>,
     {
@@ -182,16 +193,16 @@ impl Slot {
         loop {
             let last_try = *self.phase.borrow() == Phase::Stopping;
             match step().await {
-                Ok(done) => return Some(done),
+                Ok(done) => return Ok(done),
                 Err(StoreError::LeaseLost(plan)) => {
                     self.instruments.origins.forget(plan);
                     self.instruments.metrics.lost();
                     tracing::info!("the plan was taken from its worker");
-                    return None;
+                    return Err(Unstored::Lost);
                 }
                 Err(error) if last_try => {
                     tracing::error!(%error, what, "not stored; the next process runs the plan again");
-                    return None;
+                    return Err(Unstored::GivenUp);
                 }
                 Err(error) => tracing::warn!(%error, what, "not stored yet; trying again"),
             }

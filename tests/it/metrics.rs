@@ -4,7 +4,7 @@ use axum::http::Method;
 use serde_json::{Value, json};
 
 use crate::support::api::Api;
-use crate::support::lives::{a_run_of, await_run, running};
+use crate::support::lives::{a_plan, a_run_of, await_run, running};
 use crate::support::openmetrics::Reading;
 use crate::support::patience::eventually;
 use crate::support::process::Service;
@@ -133,6 +133,10 @@ async fn a_run_whose_plan_is_deleted_is_counted_as_lost() {
     let deleted = service.request(Method::DELETE, &address).send().await;
     assert_eq!(deleted.expect("an answer").status(), 204);
     eventually(async || lost().await > 0.5).await;
+    // The only worker is free once it has concluded that run.
+    let next = service.submit(&a_plan(2, 1, 1)).await;
+    service.ended(&next).await;
+    assert!((lost().await - 1.0).abs() < 0.5, "it is counted once");
 }
 
 /// After the loss no run of the plan is left to count it.

@@ -6,6 +6,7 @@ mod refused_by_hyper;
 mod repeated_failures;
 mod socket;
 pub(super) mod traffic;
+mod unread;
 
 use std::cell::RefCell;
 use std::convert::Infallible;
@@ -31,6 +32,7 @@ use tower::Service as _;
 use self::repeated_failures::RepeatedFailures;
 use self::socket::Socket;
 use self::traffic::Traffic;
+use self::unread::Received;
 use super::Phase;
 use super::phase::stopping;
 use crate::telemetry::Instruments;
@@ -146,6 +148,7 @@ async fn answer(socket: Socket, router: Router, mut phase: watch::Receiver<Phase
     let router = RefCell::new(router);
     let service = service_fn(move |request: Request<Incoming>| {
         let busy = watched.clone().begin();
+        let request = request.map(|body| Received::new(body, watched.clone()));
         let answer = router.borrow_mut().call(request);
         async move { Ok::<_, Infallible>(busy.answered(answer.await?)) }
     });

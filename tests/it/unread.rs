@@ -75,6 +75,33 @@ async fn a_malformed_request_gets_a_problem() {
     assert!(metrics.contains(counted), "{metrics}");
 }
 
+/// To a caller who reads nothing until it has sent everything.
+#[tokio::test]
+async fn a_caller_who_is_still_sending_gets_its_answer() {
+    const LENGTH: usize = 9_000_000;
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &[]);
+    let body = "x".repeat(LENGTH);
+    for (request, kind, status, slug) in [
+        ("POST /plans", "application/json", 413, "body-too-large"),
+        ("POST /plans", "text/plain", 415, "unsupported-media-type"),
+        ("POST /nowhere", "application/json", 404, "not-found"),
+        ("PUT /terrains/NAME", "image/tiff", 400, "invalid-parameter"),
+    ] {
+        let head = format!(
+            "{request} HTTP/1.1\r\nhost: localhost\r\ncontent-type: {kind}\r\ncontent-length: {LENGTH}\r\n\r\n"
+        );
+        let answer = answers(&service, (head + &body).as_bytes()).await;
+        assert!(
+            answer.starts_with(&format!("HTTP/1.1 {status} ")),
+            "{answer}"
+        );
+        let (_, problem) = answer.split_once("\r\n\r\n").expect("a head and a body");
+        let problem: Value = serde_json::from_str(problem).expect("JSON");
+        assert_eq!(problem["type"], format!("/problems/{slug}"));
+    }
+}
+
 #[tokio::test]
 async fn a_faulty_transfer_encoding_is_explained() {
     let directory = tempfile::tempdir().expect("a temporary directory");

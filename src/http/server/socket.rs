@@ -4,13 +4,18 @@ use std::io::{self, IoSlice};
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll, ready};
+use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
+use tokio::time::Sleep;
 
 use super::refused_by_hyper;
 use super::traffic::Traffic;
 use crate::telemetry::Instruments;
+
+/// For how long a caller is heard that is still sending what is not read.
+const LINGERING: Duration = Duration::from_secs(5);
 
 /// Data written to it counts as traffic once the system has taken it.
 pub(super) struct Socket {
@@ -19,6 +24,8 @@ pub(super) struct Socket {
     instruments: Arc<Instruments>,
     /// What remains to be sent in place of hyper's last write.
     instead: Vec<u8>,
+    /// The end of the time for which it reads what comes after the last answer.
+    lingering: Option<Pin<Box<Sleep>>>,
 }
 
 impl Socket {
@@ -28,6 +35,7 @@ impl Socket {
             traffic: Arc::new(Traffic::new()),
             instruments,
             instead: Vec::new(),
+            lingering: None,
         }
     }
 
@@ -37,6 +45,7 @@ impl Socket {
             return false;
         };
         self.instead = told;
+        self.traffic.leave_unread();
         true
     }
 
@@ -50,6 +59,24 @@ impl Socket {
             self.instead.drain(..written);
         }
         Poll::Ready(Ok(()))
+    }
+
+    /// Read and forget what the caller is still sending, so that it comes to read its answer.
+    fn poll_linger(&mut self, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        let sleep = || Box::pin(tokio::time::sleep(LINGERING));
+        let until = self.lingering.get_or_insert_with(sleep);
+        let mut scrap = [0; 4096];
+        loop {
+            if until.as_mut().poll(context).is_ready() {
+                return Poll::Ready(Ok(()));
+            }
+            let mut buffer = ReadBuf::new(&mut scrap);
+            let read = Pin::new(&mut self.stream).poll_read(context, &mut buffer);
+            let has_ended = ready!(read).is_err() || buffer.filled().is_empty();
+            if has_ended {
+                return Poll::Ready(Ok(()));
+            }
+        }
     }
 
     fn counted(&self, written: Poll<io::Result<usize>>) -> Poll<io::Result<usize>> {
@@ -112,6 +139,10 @@ impl AsyncWrite for Socket {
 
     fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
         ready!(self.poll_instead(context))?;
-        Pin::new(&mut self.stream).poll_shutdown(context)
+        ready!(Pin::new(&mut self.stream).poll_shutdown(context))?;
+        if self.traffic.is_unread() {
+            return self.poll_linger(context);
+        }
+        Poll::Ready(Ok(()))
     }
 }

@@ -36,6 +36,8 @@ struct State {
     unnoted: usize,
     /// Whether data is waiting that the caller does not take.
     held_up: bool,
+    /// Whether something that the caller sends is not read.
+    unread: bool,
 }
 
 impl Traffic {
@@ -45,6 +47,7 @@ impl Traffic {
             moved: Instant::now(),
             unnoted: 0,
             held_up: false,
+            unread: false,
         }))
     }
 
@@ -72,6 +75,16 @@ impl Traffic {
     /// Whether data is waiting that the caller does not take.
     pub(super) fn is_held_up(&self) -> bool {
         self.state().held_up
+    }
+
+    /// Part of what the caller sends is not read.
+    pub(super) fn leave_unread(&self) {
+        self.state().unread = true;
+    }
+
+    /// Whether the caller may still be sending what is not read.
+    pub(super) fn is_unread(&self) -> bool {
+        self.state().unread
     }
 
     /// Returns once there has been no traffic for `time`, counted from now at the earliest.

@@ -73,6 +73,10 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
             }
         }
     }
+    if reason != StopReason::Iterations && starts::is_vast(model.scenario) {
+        elites.truncate(1);
+        best_starts.clear();
+    }
     let mut elites = whole(elites, log);
     // Coarse routes do not show what spare waypoints cost: a start that was dropped may be the best of all.
     let best_starts = whole(best_starts, log);

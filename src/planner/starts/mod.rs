@@ -27,6 +27,7 @@ mod worth;
 pub(super) use count::with_waypoints;
 pub(super) use heap::spread;
 pub(super) use height::steepest;
+pub(super) use roadmap::is_vast;
 
 use super::polish::{Polish, Steps};
 use super::price::price;
@@ -150,7 +151,12 @@ pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
         evaluations: evaluations + legs_priced / (coarse as u64 + 1),
     };
     let mut priced: Vec<(Fitness, Vec<Point3>)> = Vec::new();
+    let is_vast = roadmap::is_vast(model.scenario);
     for shape in shapes {
+        // The first will do where looking at another takes time that is not there.
+        if is_vast && !priced.is_empty() && is_over() {
+            break;
+        }
         let route = with_waypoints(model, shape, coarse);
         if !priced
             .iter()

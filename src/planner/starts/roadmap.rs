@@ -41,6 +41,12 @@ const MOST_LEGS: usize = 12;
 /// Maximum number of chains of few legs looked at.
 const EFFORT: usize = 4_000;
 
+/// With fewer legs than this between two checks, a scene is vast.
+const VAST: usize = 10_000;
+
+/// A leg past the corners of a jagged ring takes so many times as long as one past as many discs.
+const A_CORNER: usize = 10;
+
 /// Number of threats, ring corners and peaks, counted for each leg priced, between two checks whether to stop: the net
 /// of an ordinary scene takes so little time that it pays even where time is over.
 const MET_UNWATCHED: usize = 4_000_000;
@@ -56,14 +62,14 @@ pub(super) fn routes(
 ) -> (Found, Vec<Vec<Point3>>) {
     let places = places(model);
     let mut legs = Legs::new(model, &places, known, is_over);
-    if legs.is_broken_off {
+    let trees = [0, places.len() - 1].map(|end| legs.cheapest(end));
+    if legs.watch.is_broken_off {
         let found = Found {
             routes: Vec::new(),
             legs_priced: legs.priced,
         };
         return (found, Vec::new());
     }
-    let trees = [0, places.len() - 1].map(|end| legs.cheapest(end));
     let routes = net::chains(model, &places, &trees, count);
     let most = model.scenario.planner.waypoints + 1;
     let can_be_flown =
@@ -103,7 +109,7 @@ fn places(model: &Model) -> Vec<Point3> {
 fn legs_unwatched(scenario: &Scenario) -> usize {
     let met = |threat: &Threat| match &threat.shape {
         Shape::Cylinder(_) => 1,
-        Shape::Polygon(polygon) => polygon.vertices().len(),
+        Shape::Polygon(polygon) => A_CORNER * polygon.vertices().len(),
     };
     let peaks = match &scenario.terrain {
         Terrain::Peaks(peaks) => peaks.peaks.len(),
@@ -111,6 +117,33 @@ fn legs_unwatched(scenario: &Scenario) -> usize {
     };
     let met = peaks + scenario.threats.iter().map(met).sum::<usize>();
     (MET_UNWATCHED / met.max(1)).next_multiple_of(LANES)
+}
+
+/// Whether so much may be met that even single routes take long to price.
+pub(in crate::planner) fn is_vast(scenario: &Scenario) -> bool {
+    legs_unwatched(scenario) < VAST
+}
+
+/// Looks now and then whether there is time left.
+struct Watch<'p> {
+    is_over: &'p dyn Fn() -> bool,
+    most_unwatched: usize,
+    /// Legs since it looked last.
+    unwatched: usize,
+    /// Whether there was no time for all of them.
+    is_broken_off: bool,
+}
+
+impl Watch<'_> {
+    /// Whether so many legs more may be looked at.
+    fn may_go_on(&mut self, legs: usize) -> bool {
+        self.unwatched += legs;
+        if self.unwatched > self.most_unwatched {
+            self.is_broken_off |= (self.is_over)();
+            self.unwatched = legs;
+        }
+        !self.is_broken_off
+    }
 }
 
 /// The legs between places.
@@ -122,8 +155,7 @@ struct Legs<'p, 's> {
     /// Whether it is known to keep its heights; where those take long to measure, few legs are.
     measured: Vec<Vec<bool>>,
     priced: u64,
-    /// Whether there was no time to price all of them.
-    is_broken_off: bool,
+    watch: Watch<'p>,
     /// Cosine of the sharpest turn.
     sharpest: f64,
 }
@@ -134,7 +166,7 @@ impl<'p, 's> Legs<'p, 's> {
         model: &Model<'s>,
         places: &'p [Point3],
         known: f64,
-        is_over: &dyn Fn() -> bool,
+        is_over: &'p dyn Fn() -> bool,
     ) -> Self {
         let scenario = model.scenario;
         let tolerance = model.tolerance.scaled(PRICED_FROM);
@@ -157,8 +189,13 @@ impl<'p, 's> Legs<'p, 's> {
         let farthest = ways.fold(worthwhile.max(DETOUR * direct), f64::max);
         // Priced in portions, as all at once would fill megabytes.
         let mut costs = vec![vec![f64::INFINITY; count]; count];
-        let (mut priced, mut unwatched, mut is_broken_off) = (0, 0, false);
-        let most_unwatched = legs_unwatched(scenario);
+        let mut priced = 0;
+        let mut watch = Watch {
+            is_over,
+            most_unwatched: legs_unwatched(scenario),
+            unwatched: 0,
+            is_broken_off: false,
+        };
         'rows: for a in 0..count {
             let is_near = |b: &usize| {
                 let about = (away[0][a] + away[1][*b]).min(away[0][*b] + away[1][a]);
@@ -166,14 +203,9 @@ impl<'p, 's> Legs<'p, 's> {
             };
             let ends: Vec<(usize, usize)> =
                 (a + 1..count).filter(is_near).map(|b| (a, b)).collect();
-            for ends in ends.chunks(most_unwatched) {
-                unwatched += ends.len();
-                if unwatched > most_unwatched {
-                    if is_over() {
-                        is_broken_off = true;
-                        break 'rows;
-                    }
-                    unwatched = ends.len();
+            for ends in ends.chunks(watch.most_unwatched) {
+                if !watch.may_go_on(ends.len()) {
+                    break 'rows;
                 }
                 let [from, to] = net::rows(places, ends);
                 let mut prices = vec![Price::ZERO; from.len()];
@@ -198,7 +230,7 @@ impl<'p, 's> Legs<'p, 's> {
             costs,
             measured: vec![vec![!hilly; count]; count],
             priced,
-            is_broken_off,
+            watch,
             sharpest: libm::cos(scenario.vehicle.max_turn_deg.to_radians()),
         }
     }
@@ -226,8 +258,16 @@ impl<'p, 's> Legs<'p, 's> {
             .collect();
         let [from, to] = net::rows(self.places, &ends);
         let mut prices = vec![Price::ZERO; from.len()];
-        self.pricer
-            .heights_of_legs(&from, &to, ends.len(), &mut prices);
+        if self.watch.may_go_on(ends.len()) {
+            self.pricer
+                .heights_of_legs(&from, &to, ends.len(), &mut prices);
+        } else {
+            // None of them is used.
+            prices.fill(Price {
+                violation: [f64::INFINITY; LANES],
+                ..Price::ZERO
+            });
+        }
         for (idx, &(a, b)) in ends.iter().enumerate() {
             (self.measured[a][b], self.measured[b][a]) = (true, true);
             if prices[idx / LANES].violation[idx % LANES] > 0.0 {
@@ -246,8 +286,9 @@ impl<'p, 's> Legs<'p, 's> {
         let (costs, before) = (&mut tree.costs, &mut tree.before);
         let mut open: Vec<usize> = (0..count).collect();
         let mut closed = Vec::with_capacity(count);
-        while let Some(nearest) =
-            (0..open.len()).min_by(|&a, &b| costs[open[a]].total_cmp(&costs[open[b]]))
+        while !self.watch.is_broken_off
+            && let Some(nearest) =
+                (0..open.len()).min_by(|&a, &b| costs[open[a]].total_cmp(&costs[open[b]]))
         {
             let place = open[nearest];
             let last = before[place];

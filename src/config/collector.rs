@@ -2,17 +2,19 @@
 
 use std::fmt;
 
+use ::http::Uri;
+
 use super::value::{Given, Value, quoted};
 
-/// The address of a collector that speaks HTTP without encryption.
+/// The address of a collector that speaks HTTP without encryption; it has no trailing slash.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd)]
 pub struct Endpoint(String);
 
 impl Endpoint {
-    /// Without a trailing slash.
+    /// Where traces are sent: a valid URI.
     #[must_use]
-    pub fn as_str(&self) -> &str {
-        &self.0
+    pub fn traces(&self) -> String {
+        format!("{}/v1/traces", self.0)
     }
 }
 
@@ -21,11 +23,12 @@ impl Value for Option<Endpoint> {
 
     fn read(given: &Given) -> Option<Self> {
         let text = given.text()?.trim_end_matches('/');
-        let (host, _) = split_http(text)?;
-        let (name, port) = host.rsplit_once(':').unwrap_or((host, "80"));
         let is_sane = |byte: u8| byte.is_ascii_graphic() && !b"@?#".contains(&byte);
-        let sane = !name.is_empty() && text.bytes().all(is_sane) && port.parse::<u16>().is_ok();
-        sane.then(|| Some(Endpoint(text.to_owned())))
+        let endpoint = Endpoint(text.to_owned());
+        // What is checked is what will be asked for, so that the exporter cannot refuse it later.
+        let uri: Uri = endpoint.traces().parse().ok()?;
+        let sane = text.bytes().all(is_sane) && uri.scheme_str() == Some("http");
+        (sane && has_host(&uri)).then_some(Some(endpoint))
     }
 
     fn to_toml(&self) -> Option<String> {
@@ -95,10 +98,19 @@ fn decoded(text: &str) -> Option<String> {
     decoded.bytes().all(is_sane).then_some(decoded)
 }
 
-/// Host with port, and path, of an `http` URL.
-fn split_http(url: &str) -> Option<(&str, &str)> {
-    let rest = url.strip_prefix("http://")?;
-    Some(rest.split_at(rest.find('/').unwrap_or(rest.len())))
+/// Whether an address names a host, and a port at most.
+fn has_host(uri: &Uri) -> bool {
+    let Some(authority) = uri.authority() else {
+        return false;
+    };
+    let host = authority.host();
+    let port = authority.as_str().strip_prefix(host);
+    let is_port = |port: &str| {
+        let port = port.strip_prefix(':');
+        port.is_some_and(|port| port.parse::<u16>().is_ok())
+    };
+    !host.trim_matches(['[', ']']).is_empty()
+        && port.is_some_and(|port| port.is_empty() || is_port(port))
 }
 
 #[cfg(test)]
@@ -111,7 +123,19 @@ mod tests {
             ("http://127.0.0.1:4318", true),
             ("http://collector:4318/", true),
             ("http://[::1]:4318/otlp", true),
+            ("http://[::1]", true),
+            ("http://[::1]/otlp/", true),
             ("http://collector", true),
+            ("http://collector:70000", false),
+            ("http://collector:", false),
+            ("http://::1:4318", false),
+            ("http://::1", false),
+            ("http://[::1", false),
+            ("http://[::1]4318", false),
+            ("http://[::1]:port", false),
+            ("http://[]:4318", false),
+            ("http:///otlp", false),
+            ("http://a\"b", false),
             ("https://collector:4318", false),
             ("collector:4318", false),
             ("http://", false),
@@ -122,6 +146,16 @@ mod tests {
         ] {
             let read = <Option<Endpoint>>::read(&Given::Word(text.to_owned()));
             assert_eq!(read.is_some(), taken, "{text}");
+        }
+    }
+
+    #[test]
+    fn an_endpoint_that_no_uri_can_hold_is_refused() {
+        // The longest URI has 65,534 bytes, and the path of the traces is added to the address.
+        for (bytes, taken) in [(65_500, true), (65_530, false)] {
+            let text = format!("http://{}", "a".repeat(bytes - 7));
+            let read = <Option<Endpoint>>::read(&Given::Word(text));
+            assert_eq!(read.is_some(), taken, "{bytes}");
         }
     }
 

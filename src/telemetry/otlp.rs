@@ -34,11 +34,11 @@ impl Exporter {
                 headers,
                 failing: AtomicBool::new(false),
             })
-            .with_endpoint(format!("{}/v1/traces", endpoint.as_str()))
+            .with_endpoint(endpoint.traces())
             .with_protocol(Protocol::HttpJson)
             .with_timeout(TIMEOUT)
             .build()
-            .expect("the endpoint is a URL, and nothing else can be wrong");
+            .expect("the endpoint was read as a URI, and nothing else can be wrong");
         let resource = Resource::builder();
         // The resource already contains what OpenTelemetry's own variables say.
         let resource = if is_named_by_environment() {

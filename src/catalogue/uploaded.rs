@@ -32,6 +32,8 @@ pub(super) struct Uploaded {
 #[derive(Debug, Default)]
 struct State {
     names: BTreeMap<String, Name>,
+    /// Records of names that cannot be read: nobody knows which contents they need.
+    unread: BTreeSet<PathBuf>,
     contents: BTreeMap<String, Content>,
     /// When each content was last used.
     asked: HashMap<String, Instant>,
@@ -81,7 +83,14 @@ impl Uploaded {
             let stem = path.file_stem().and_then(|stem| stem.to_str());
             if let (Some(name), Some(record)) = (stem, read(&path)) {
                 state.names.insert(name.to_owned(), record);
+            } else {
+                state.unread.insert(path);
             }
+        }
+        if !state.unread.is_empty() {
+            tracing::warn!(
+                "datasets without a name are kept until every name's record can be read"
+            );
         }
         Ok(())
     }
@@ -219,7 +228,9 @@ impl Uploads for Uploaded {
             return Ok(kept);
         }
         let record = Name::new(file, naming);
-        self.write(&self.name(&name), &record)?;
+        let path = self.name(&name);
+        self.write(&path, &record)?;
+        state.unread.remove(&path);
         state.names.insert(name, record);
         let now = Instant::now();
         state.asked.insert(file.sha256.clone(), now);
@@ -274,8 +285,11 @@ impl Uploads for Uploaded {
 }
 
 impl State {
-    /// Contents without a name.
+    /// Contents without a name; none while a record that cannot be read may name them.
     fn unnamed(&self) -> Vec<String> {
+        if !self.unread.is_empty() {
+            return Vec::new();
+        }
         let named: BTreeSet<&String> = self.names.values().map(|name| &name.sha256).collect();
         let contents = self.contents.keys();
         contents

@@ -126,3 +126,43 @@ async fn a_restart_keeps_every_dataset_and_removes_crash_remains() {
     let answer = api.post("/plans?validate_only=true", &pinned).await;
     assert_eq!(answer.status, 200, "{answer:?}");
 }
+
+/// The record may be damaged, or of a newer version: its content must be there once it can be read.
+#[tokio::test]
+async fn nothing_is_removed_while_the_record_of_a_name_cannot_be_read() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let uploads = directory.path().join("terrains");
+    let open =
+        || Api::with_catalogue(|_| Directories::with_grace(uploads.clone(), None, Duration::ZERO));
+    let api = open();
+    put(&api, "/terrains/hill", hill(100.0)).await;
+    put(&api, "/terrains/other", hill(50.0)).await;
+    api.delete("/terrains/other").await;
+    let before = api.get("/terrains").await.json();
+    drop(api);
+
+    let record = uploads.join("names/hill.json");
+    let text = std::fs::read_to_string(&record).expect("it is there");
+    let newer = format!(r#"{{"newer": {text}}}"#);
+    for (written, datasets) in [(newer.as_str(), 0), ("", 0), (text.as_str(), 1)] {
+        std::fs::write(&record, written).expect("written");
+        let api = open();
+        let catalogue = &api.state.terrains.catalogue;
+        assert_eq!(catalogue.has_unnamed(), datasets > 0, "{written}");
+        let removed = catalogue.sweep(&BTreeSet::new()).expect("swept");
+        assert_eq!(removed, datasets, "{written}");
+        let listed = api.get("/terrains").await.json();
+        let listed = listed["terrains"].as_array().expect("a list").len();
+        assert_eq!(listed, datasets, "{written}");
+    }
+    assert_eq!(open().get("/terrains").await.json(), before);
+    assert_eq!(kept(&uploads), [2, 1, 0]);
+
+    // A new upload takes the place of a record that cannot be read.
+    std::fs::write(&record, newer).expect("written");
+    let api = open();
+    put(&api, "/terrains/hill", hill(25.0)).await;
+    let catalogue = &api.state.terrains.catalogue;
+    assert_eq!(catalogue.sweep(&BTreeSet::new()).expect("swept"), 1);
+    assert_eq!(kept(&uploads), [2, 1, 0]);
+}

@@ -47,8 +47,14 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
             return reason;
         }
         if let Some(mut route) = roomy(model, times, log) {
-            let fitness = leave_out(model, &mut route, log);
-            log.offer(&route, fitness);
+            match leave_out(model, &mut route, log) {
+                Ok(fitness) => log.offer(&route, fitness),
+                Err(reason) => {
+                    // What was priced until then counts.
+                    log.last_point();
+                    return reason;
+                }
+            };
         }
         if log.best.is_feasible() {
             return finish(model, StopReason::Iterations, &[], &[], log);
@@ -86,9 +92,15 @@ fn more(waypoints: usize, times: f64) -> usize {
 }
 
 /// Remove one waypoint after another, always the one without which the rest is best once pulled into place.
-fn leave_out(model: &Model, route: &mut Vec<Point3>, log: &mut Log) -> Fitness {
+///
+/// # Errors
+/// Why the run must stop; then the route still has too many waypoints.
+fn leave_out(model: &Model, route: &mut Vec<Point3>, log: &mut Log) -> Result<Fitness, StopReason> {
     let mut best = price(model, route);
     while route.len() - 2 > model.scenario.planner.waypoints {
+        if let Some(reason) = why_stop(model.scenario, log.stop) {
+            return Err(reason);
+        }
         let mut rests: Vec<_> = (1..route.len() - 1)
             .map(|idx| {
                 let mut rest = route.clone();
@@ -107,7 +119,7 @@ fn leave_out(model: &Model, route: &mut Vec<Point3>, log: &mut Log) -> Fitness {
             (best, *route) = placed;
         }
     }
-    best
+    Ok(best)
 }
 
 fn into_place(model: &Model, route: &mut Vec<Point3>, log: &mut Log) -> Fitness {
@@ -125,7 +137,7 @@ fn into_place(model: &Model, route: &mut Vec<Point3>, log: &mut Log) -> Fitness 
 mod tests {
     use super::*;
     use crate::geometry::Point2;
-    use crate::planner::tests::scenario;
+    use crate::planner::tests::{Looks, scenario};
     use crate::scenario::{Scenario, Seeding};
     use crate::threat::{Polygon, Shape, Threat};
 
@@ -158,21 +170,44 @@ mod tests {
         scenario
     }
 
+    fn straight(scenario: &Scenario) -> Vec<Point3> {
+        let step = (scenario.target - scenario.start) / 10.0;
+        (0..=10)
+            .map(|idx| scenario.start + step * f64::from(idx))
+            .collect()
+    }
+
     #[test]
     fn searching_with_more_waypoints_finds_a_route_with_the_requested_number() {
         let scenario = slalom();
         let model = Model::new(&scenario);
         let mut nobody = Nobody;
         let mut log = Log::new(&model, &mut nobody, &Nobody);
-        let step = (scenario.target - scenario.start) / 10.0;
-        let straight: Vec<_> = (0..=10)
-            .map(|idx| scenario.start + step * f64::from(idx))
-            .collect();
+        let straight = straight(&scenario);
         log.offer_unpriced(&straight);
         assert!(!log.best.is_feasible());
         search(&model, &mut log);
         assert!(log.best.is_feasible(), "{:?}", log.best);
         assert_eq!(log.route.len(), straight.len());
+    }
+
+    #[test]
+    fn a_stop_is_heard_between_two_waypoints_left_out() {
+        let scenario = slalom();
+        let model = Model::new(&scenario);
+        let (mut nobody, looks) = (Nobody, Looks::until(u32::MAX));
+        let mut log = Log::new(&model, &mut nobody, &looks);
+        roomy(&model, TIMES[0], &mut log).expect("more waypoints are enough");
+        let (before, priced) = (looks.count.get(), log.evaluations);
+        // One look before the search with more waypoints, and one after it.
+        for rounds in [0, 1] {
+            let (mut nobody, looks) = (Nobody, Looks::until(before + 1 + rounds));
+            let mut log = Log::new(&model, &mut nobody, &looks);
+            log.offer_unpriced(&straight(&scenario));
+            assert_eq!(search(&model, &mut log), StopReason::Cancelled);
+            assert_eq!(log.route, straight(&scenario));
+            assert_eq!(log.evaluations > priced + 1, rounds > 0);
+        }
     }
 
     #[test]
@@ -193,7 +228,7 @@ mod tests {
         let whole = route.clone();
         let mut nobody = Nobody;
         let mut log = Log::new(&model, &mut nobody, &Nobody);
-        let fitness = leave_out(&model, &mut route, &mut log);
+        let fitness = leave_out(&model, &mut route, &mut log).expect("nobody stops it");
         assert!(fitness.is_feasible() && route.len() == 5, "{fitness:?}");
         assert!(log.evaluations > 0);
         // Leaving out any two others, and moving nothing, gives no better route.

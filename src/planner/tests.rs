@@ -142,13 +142,13 @@ impl Observer for Diary {
 }
 
 /// A clock that advances only when it is read, and a stop after a number of reads.
-struct Looks {
-    count: std::cell::Cell<u32>,
+pub(super) struct Looks {
+    pub(super) count: std::cell::Cell<u32>,
     stop_after: u32,
 }
 
 impl Looks {
-    fn until(stop_after: u32) -> Self {
+    pub(super) fn until(stop_after: u32) -> Self {
         Self {
             count: std::cell::Cell::new(0),
             stop_after,

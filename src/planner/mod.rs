@@ -99,7 +99,7 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
         let stop_reason = search(&model, &mut log);
         return measured(&model, log.route, log.convergence, lower, stop_reason);
     }
-    let (stop_reason, lower) = beside::bounded(scenario, || search(&model, &mut log));
+    let (stop_reason, lower) = beside::bounded(scenario, stop, || search(&model, &mut log));
     measured(&model, log.route, log.convergence, lower, stop_reason)
 }
 

@@ -64,6 +64,19 @@ pub(in crate::http) async fn elevations(
     Ok(tagged(answer, Some(tag)))
 }
 
+/// What may stand for a dataset.
+fn checksum(text: &str) -> Result<String, Problem> {
+    let is_one = text.len() == 64
+        && text
+            .bytes()
+            .all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
+    if is_one {
+        Ok(text.to_owned())
+    } else {
+        Err(params::refused("sha256", text, "64 digits of 0-9 and a-f"))
+    }
+}
+
 /// The request for samples.
 struct Asked {
     name: String,
@@ -84,7 +97,7 @@ impl Asked {
         }
         Ok(Self {
             name,
-            sha256: params.text("sha256").map(str::to_owned),
+            sha256: params.text("sha256").map(checksum).transpose()?,
             area: area(&params)?,
             columns,
             rows,

@@ -65,6 +65,10 @@ async fn a_dataset_is_sampled_from_south_to_north() {
     let zeros = "0".repeat(64);
     let lost = api.get(&format!("{uri}?sha256={zeros}")).await;
     lost.expect_problem(409, "no-ground");
+    for malformed in ["x".to_owned(), sum.to_uppercase(), format!("{sum}0")] {
+        let answer = api.get(&format!("{uri}?sha256={malformed}")).await;
+        answer.expect_problem(400, "invalid-parameter");
+    }
 }
 
 #[tokio::test]

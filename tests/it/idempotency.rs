@@ -7,6 +7,7 @@ use futures_util::FutureExt as _;
 use futures_util::future::join_all;
 use http_body_util::StreamBody;
 use hyper::body::Frame;
+use noctule::http::Phase;
 use noctule::store::Options;
 
 use crate::support::api::{Answer, Api};
@@ -52,6 +53,20 @@ async fn a_repeated_request_gets_the_same_plan_in_every_state() {
         post(&api, "k", body).await.expect_problem(410, "gone");
     })
     .await;
+}
+
+/// A repeated request asks for no plan that is not there.
+#[tokio::test]
+async fn a_repeated_request_gets_its_plan_from_a_draining_service() {
+    let api = Api::new();
+    let first = post(&api, "k", scenario().to_string()).await;
+    api.phase.send_replace(Phase::Draining);
+    let again = post(&api, "k", scenario().to_string()).await;
+    assert_eq!(again.status, StatusCode::ACCEPTED);
+    assert_eq!(again.header("idempotency-replayed"), "true");
+    assert_eq!(again.header("location"), first.header("location"));
+    let other = post(&api, "l", scenario().to_string()).await;
+    other.expect_problem(503, "draining");
 }
 
 /// It could no longer be accepted, but it once was.

@@ -36,12 +36,23 @@ pub(in crate::http) fn submit(
         Err(refusal) => return Either::Left(ready(Err(refusal))),
     };
     Either::Right(async move {
-        if !asked.validate_only {
-            refuse_when_draining(&state).await?;
-        }
+        let draining = if asked.validate_only {
+            None
+        } else {
+            refusal_when_draining(&state).await?
+        };
+        // A repeated request is answered all the same: it asks for no other plan.
+        let draining = match draining {
+            Some(refusal) if asked.once.is_none() => return Err(refusal),
+            draining => draining,
+        };
         let bytes = asked.announced.read(body).await?;
         let idempotency = asked.once.as_ref().map(|once| once.with(&bytes));
-        let submitting: BoxFuture<'_, _> = match accept(&state, &caller, bytes).await {
+        let read = match draining {
+            Some(refusal) => Err(refusal),
+            None => accept(&state, &caller, bytes).await,
+        };
+        let submitting: BoxFuture<'_, _> = match read {
             Ok(submission) if asked.validate_only => return Ok(valid(&submission)),
             Ok(submission) => {
                 let submission = Submission {
@@ -203,12 +214,13 @@ fn accepted(plan: Plan, address: HeaderValue) -> Response {
         .into_response()
 }
 
-async fn refuse_when_draining(state: &AppState) -> Result<(), Problem> {
+/// The refusal of new plans while the service is about to end.
+async fn refusal_when_draining(state: &AppState) -> Result<Option<Problem>, Problem> {
     if *state.phase.borrow() == Phase::Serving {
-        return Ok(());
+        return Ok(None);
     }
     let retry_after_s = retry::for_room(&state.store.stats().await?, state.capacity);
-    Err(Problem::Draining { retry_after_s })
+    Ok(Some(Problem::Draining { retry_after_s }))
 }
 
 /// A document of this length, bytes, is read in less time than it takes to hand it to another thread.

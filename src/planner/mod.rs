@@ -193,7 +193,9 @@ fn measured(
     if let Some(last) = convergence.last_mut() {
         // The search aims at half the tolerance; the delivered route is judged by all of it.
         last.best_cost = feasible.then_some(cost.total);
-        last.best_violation = violations.iter().map(|violation| violation.amount).sum();
+        // From 0, since a sum of nothing is -0.
+        let amounts = violations.iter().map(|violation| violation.amount);
+        last.best_violation = amounts.fold(0.0, |sum, amount| sum + amount);
     }
     let path = feasible.then(|| smoothing::smooth(model, &route)).flatten();
     Outcome {

@@ -2,6 +2,7 @@
 
 use super::Problem;
 use crate::http::auth::TooMany;
+use crate::scenario::json::MORE_FAULTS;
 use crate::store::{Tombstone, Trouble};
 
 impl Problem {
@@ -138,7 +139,12 @@ impl Problem {
                 format!("content-encoding is {found}; send the body as it is, or as gzip")
             }
             Self::InvalidScenario(faults) if faults.len() == 1 => "1 fault; see errors".to_owned(),
-            Self::InvalidScenario(faults) => format!("{} faults; see errors", faults.len()),
+            Self::InvalidScenario(faults) => match &faults[..] {
+                [listed @ .., last] if last.code == MORE_FAULTS => {
+                    format!("more than {} faults; see errors", listed.len())
+                }
+                all => format!("{} faults; see errors", all.len()),
+            },
             Self::Internal => {
                 "a defect of the service; its log has more under this request's id".to_owned()
             }

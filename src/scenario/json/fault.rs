@@ -11,6 +11,9 @@ use super::value::quote;
 /// Most faults listed in one refusal; one more fault then counts the rest.
 pub const MAX_LISTED: usize = 100;
 
+/// Code of the last entry of a list that is not complete.
+pub const MORE_FAULTS: &str = "more-faults";
+
 /// Every code that a [`Fault`] can have, with its meaning; `docs/PROBLEMS.md` has an example of each.
 pub const CODES: &[(&str, &str)] = &[
     ("missing-field", "a required field is absent"),
@@ -234,7 +237,7 @@ impl Faults {
         if self.unlisted > 0 {
             self.listed.push(Fault {
                 pointer: String::new(),
-                code: "more-faults",
+                code: MORE_FAULTS,
                 detail: format!(
                     "{} more faults are not listed, at most {MAX_LISTED} are",
                     self.unlisted

@@ -26,7 +26,7 @@ mod value;
 mod vehicle;
 mod writer;
 
-pub use fault::{CODES, Fault, MAX_LISTED, Refusal};
+pub use fault::{CODES, Fault, MAX_LISTED, MORE_FAULTS, Refusal};
 pub use parameters::{COMMON, CommonParameter, Takes};
 
 use std::sync::Arc;

@@ -1,7 +1,7 @@
 //! The service's responses, one by one; `support::api` checks each of them against `openapi.yaml`.
 
 use std::io::Read as _;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::body::Body;
 use axum::http::{Method, StatusCode};
@@ -179,6 +179,14 @@ async fn a_status_document_is_sent_only_when_it_has_changed() {
     });
     assert_eq!(answer.json()["status"], "succeeded");
     assert!(!answer.headers.contains_key("retry-after"));
+
+    // Nothing changes after that, so there is nothing to wait for.
+    let tag = answer.header("etag").to_owned();
+    let known = [("if-none-match", tag.as_str()), ("prefer", "wait=30")];
+    let asked = Instant::now();
+    let answer = api.get_with(&address, &known).await;
+    assert_eq!(answer.status, StatusCode::NOT_MODIFIED);
+    assert!(asked.elapsed() < Duration::from_secs(30), "it waited");
 }
 
 #[tokio::test]

@@ -38,10 +38,13 @@ pub(super) async fn show(
 ) -> Result<Response, Problem> {
     let mut plan = caller.plan(&*state.store, id).await?;
     if let Some(wait) = wait {
-        // With a known version, wait for a different one; without, wait for the end.
-        let changed = wait_for(&state, id, wait.duration(), |plan| match &known {
+        // With a known version, wait for a different one; without, and where none can come, wait for the end.
+        let is_news = |plan: &Plan| match &known {
             Some(known) => !known.contain(&etag(plan)),
-            None => plan.status.is_final(),
+            None => false,
+        };
+        let changed = wait_for(&state, id, wait.duration(), |plan| {
+            plan.status.is_final() || is_news(plan)
         });
         // Few requests wait, so the future is boxed to keep the others' small.
         plan = Box::pin(changed).await?;

@@ -108,11 +108,7 @@ impl JetStream {
         let mut passed = Vec::new();
         let mut tries = 0;
         while tries < LANES {
-            let next = |passed: &[Lane]| {
-                let known = self.view.known();
-                known.next_lane(Version::own(), self.slots(), passed)
-            };
-            let Some(lane) = next(&passed) else {
+            let Some(lane) = self.next_lane(&passed) else {
                 if passed.is_empty() || tries >= TRIES {
                     break;
                 }
@@ -139,6 +135,12 @@ impl JetStream {
             }
         }
         Ok(None)
+    }
+
+    /// The lane whose turn it is, of those that are not `passed` over.
+    fn next_lane(&self, passed: &[Lane]) -> Option<Lane> {
+        let known = self.view.known();
+        known.next_lane(Version::own(), self.slots(), passed)
     }
 
     /// One slot of the node checks for all.

@@ -25,7 +25,7 @@ use crate::store::{IDEMPOTENCY_MS, StoreError, Submitted};
 /// How long a request waits for an earlier one with the same idempotency key.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// How long the writes of a submission may take; after that, it writes nothing more.
+/// How long the writes of a submission may take; after that, it begins no other.
 const LONGEST: Duration = Duration::from_secs(30);
 
 /// A request older than this whose plan does not exist was interrupted. Taking the key outlasts an election, and the writes

@@ -8,3 +8,12 @@ use sha2::{Digest as _, Sha256};
 pub fn sha256_hex(bytes: &[u8]) -> String {
     HEXLOWER.encode(&Sha256::digest(bytes))
 }
+
+/// What [`is_sha256`] takes, for refusals.
+pub const SHA256: &str = "64 hexadecimal digits in lower case";
+
+/// Whether `text` may be a checksum as [`sha256_hex`] writes it.
+#[must_use]
+pub fn is_sha256(text: &str) -> bool {
+    text.len() == 64 && HEXLOWER.decode(text.as_bytes()).is_ok()
+}

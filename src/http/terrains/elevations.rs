@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::document::{Corners, Place};
 use super::{Name, tagged};
+use crate::digest;
 use crate::geometry::geodesy::{LatLon, wrapped};
 use crate::http::AppState;
 use crate::http::entity_tags::EntityTags;
@@ -66,14 +67,10 @@ pub(in crate::http) async fn elevations(
 
 /// What may stand for a dataset.
 fn checksum(text: &str) -> Result<String, Problem> {
-    let is_one = text.len() == 64
-        && text
-            .bytes()
-            .all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
-    if is_one {
+    if digest::is_sha256(text) {
         Ok(text.to_owned())
     } else {
-        Err(params::refused("sha256", text, "64 digits of 0-9 and a-f"))
+        Err(params::refused("sha256", text, digest::SHA256))
     }
 }
 

@@ -1,6 +1,7 @@
 //! `terrain` of kind `dataset`: which dataset it is, the default area over it, and the ground cut out of it. Also
 //! fits the default area over a grid, which lies in the plane.
 
+use crate::digest;
 use crate::geometry::geodesy::{LatLon, LatLonBox, TangentPlane};
 use crate::geometry::{Point2, Point3, Rect, Vector2};
 use crate::scenario::limits::Limits;
@@ -203,18 +204,13 @@ pub(super) fn ground(fields: &Fields<'_>, site: &Site<'_>, faults: &mut Faults) 
     Some((Terrain::Dem(dem.into()), area))
 }
 
-/// 64 hexadecimal digits.
 fn sum(at: At<'_>, faults: &mut Faults) -> Option<String> {
     let text = at.text(faults)?;
-    let digit = |c: u8| c.is_ascii_digit() || (b'a'..=b'f').contains(&c);
-    if text.len() == 64 && text.bytes().all(digit) {
+    if digest::is_sha256(text) {
         return Some(text.to_owned());
     }
     faults.add(at.path, "unknown-value", || {
-        format!(
-            "sha256 is {}, must be 64 hexadecimal digits in lower case",
-            quote(text)
-        )
+        format!("sha256 is {}, must be {}", quote(text), digest::SHA256)
     });
     None
 }

@@ -1,11 +1,19 @@
-//! What becomes of a plan whose run was cut off because its process or machine died: one rule for all stores. A run
-//! that was given back was not cut off.
+//! What becomes of a plan whose run was cut off because its process or machine died, or whose document is gone: one rule
+//! for all stores. A run that was given back was not cut off.
+
+use std::fmt::Display;
 
 use crate::job::state::Refused;
-use crate::job::{FailureKind, Plan};
+use crate::job::{Failure, FailureKind, Plan, PlanId};
 
 /// After this many cut-off runs, the plan itself is taken to be the cause.
 const LOST_RUNS: u64 = 5;
+
+/// Why a queued plan fails whose document cannot be read: for `error`.
+pub(super) fn scenario(plan: PlanId, error: &dyn Display) -> Failure {
+    tracing::error!(plan_id = %plan, %error, "a queued plan has lost its document and fails");
+    FailureKind::ScenarioLost.because("the store has lost the document that was accepted")
+}
 
 /// End a running plan that must not run again after its `lost`th run was cut off, counted from 1: it is cancelled if
 /// that was requested, otherwise it has failed. Returns true if ended; if not, the caller queues it.

@@ -17,7 +17,7 @@ use super::record::{Document, Record, State};
 use super::steps::Change;
 use super::view::Standing;
 use super::{JetStream, closed};
-use crate::job::{FailureKind, Plan, PlanId, Status};
+use crate::job::{Plan, PlanId, Status};
 use crate::store::{Ending, Lease, StoreError, lost};
 
 /// A job may be seen before its record; a claim waits this long for the record.
@@ -311,7 +311,8 @@ impl JetStream {
                 cancel,
             })),
             Ok(None) => {
-                self.fail_without_scenario(id, attempt).await?;
+                let missing = record.scenario.missing();
+                self.fail_without_scenario(id, attempt, &missing).await?;
                 Ok(None)
             }
             Err(error) => {
@@ -322,10 +323,13 @@ impl JetStream {
     }
 
     /// End a plan that can never be run, so that those behind it are.
-    async fn fail_without_scenario(&self, id: PlanId, attempt: u64) -> Result<(), StoreError> {
-        tracing::error!(plan_id = %id, "a queued plan has lost its document and fails");
-        let lost =
-            FailureKind::ScenarioLost.because("the store has lost the document that was accepted");
+    async fn fail_without_scenario(
+        &self,
+        id: PlanId,
+        attempt: u64,
+        missing: &StoreError,
+    ) -> Result<(), StoreError> {
+        let lost = lost::scenario(id, missing);
         let end = Ending::Failed(lost).at((self.options.clock)());
         match self.finish(id, attempt, &end).await {
             Ok(plan) => {

@@ -7,7 +7,7 @@ use super::operations::{tell_end, tell_status};
 use super::row::PlanRow;
 use super::transaction::{Effect, Transaction};
 use crate::job::FailureKind;
-use crate::store::StoreError;
+use crate::store::{StoreError, lost};
 
 /// The record and document of the first plan that has both; those before it have failed. `None` when there is none.
 /// Nothing of a plan has been written when reading it fails, so the transaction remains sound.
@@ -47,9 +47,7 @@ fn fail(
     mut row: PlanRow,
     error: &rusqlite::Error,
 ) -> Result<(), StoreError> {
-    tracing::error!(plan_id = %row.plan.id, %error, "a queued plan has lost its document and fails");
-    let lost =
-        FailureKind::ScenarioLost.because("the store has lost the document that was accepted");
+    let lost = lost::scenario(row.plan.id, error);
     row.plan.start(tx.now_ms())?;
     tx.queued -= 1;
     tell_status(tx, &mut row)?;

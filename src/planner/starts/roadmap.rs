@@ -41,8 +41,8 @@ const MOST_LEGS: usize = 12;
 /// Maximum number of chains of few legs looked at.
 const EFFORT: usize = 4_000;
 
-/// With fewer legs than this between two checks, a scene is vast.
-const VAST: usize = 10_000;
+/// With fewer legs than this between two checks, a scene is vast: that of 400 ring corners is, or of 4,000 peaks.
+const VAST: usize = 1_000;
 
 /// A leg past the corners of a jagged ring takes so many times as long as one past as many discs.
 const A_CORNER: usize = 10;
@@ -373,6 +373,7 @@ mod tests {
     #[test]
     fn a_stop_is_noticed_while_legs_take_long_to_price() {
         let mut scenario = scenario();
+        assert!(!is_vast(&scenario));
         let priced = |scenario: &Scenario, looks: u32| {
             let looked = std::cell::Cell::new(0);
             let is_over = || {
@@ -394,6 +395,7 @@ mod tests {
             base: None,
             top: None,
         });
+        assert!(is_vast(&scenario));
         let most = legs_unwatched(&scenario) as u64;
         let (few, is_empty) = priced(&scenario, 2);
         assert!(is_empty);

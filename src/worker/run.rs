@@ -122,7 +122,8 @@ impl Slot {
         conclusion.instrument(span).await;
     }
 
-    /// Store events until there are no more; returns the last of them, which are stored with the end. `news` ticks when there are many, and loses its sender after the last.
+    /// Store events until there are no more; returns the last of them, which are stored with the end. `news` ticks when
+    /// there are many, and loses its sender after the last.
     async fn keep_events(
         &self,
         lease: &Lease,

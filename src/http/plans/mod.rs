@@ -39,12 +39,9 @@ pub(super) async fn show(
     let mut plan = caller.plan(&*state.store, id).await?;
     if let Some(wait) = wait {
         // With a known version, wait for a different one; without, and where none can come, wait for the end.
-        let is_news = |plan: &Plan| match &known {
-            Some(known) => !known.contain(&etag(plan)),
-            None => false,
-        };
         let changed = wait_for(&state, id, wait.duration(), |plan| {
-            plan.status.is_final() || is_news(plan)
+            let is_news = |known: &EntityTags| !known.contain(&etag(plan));
+            plan.status.is_final() || known.as_ref().is_some_and(is_news)
         });
         // Few requests wait, so the future is boxed to keep the others' small.
         plan = Box::pin(changed).await?;

@@ -42,10 +42,11 @@ pub(in crate::http) fn submit(
             refusal_when_draining(&state).await?
         };
         // A repeated request is answered all the same: it asks for no other plan.
-        let draining = match draining {
-            Some(refusal) if asked.once.is_none() => return Err(refusal),
-            draining => draining,
-        };
+        if asked.once.is_none()
+            && let Some(refusal) = draining
+        {
+            return Err(refusal);
+        }
         let bytes = asked.announced.read(body).await?;
         let idempotency = asked.once.as_ref().map(|once| once.with(&bytes));
         let read = match draining {

@@ -138,8 +138,8 @@ impl Problem {
             Self::UnsupportedCoding(found) => {
                 format!("content-encoding is {found}; send the body as it is, or as gzip")
             }
-            Self::InvalidScenario(faults) if faults.len() == 1 => "1 fault; see errors".to_owned(),
             Self::InvalidScenario(faults) => match &faults[..] {
+                [_] => "1 fault; see errors".to_owned(),
                 [listed @ .., last] if last.code == MORE_FAULTS => {
                     format!("more than {} faults; see errors", listed.len())
                 }

@@ -4,8 +4,10 @@
 use std::collections::BTreeSet;
 use std::fmt::Debug;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
+
+use parking_lot::Mutex;
 
 use super::shared::Shared;
 use super::uploaded::Uploaded;
@@ -29,10 +31,10 @@ pub(super) trait Uploads: Debug + Send + Sync {
     fn sweep(&self, used: &BTreeSet<String>) -> Result<usize, CatalogueError>;
 }
 
-/// Uploads in one place, mounted files in another.
+/// Uploads in one location, mounted files in another.
 #[derive(Debug)]
 pub struct Directories {
-    place: Place,
+    location: Location,
     mounted: Option<Mounted>,
     /// Opened as soon as possible: a disk that is read-only now may become writable.
     uploaded: Mutex<Option<Arc<dyn Uploads>>>,
@@ -40,7 +42,7 @@ pub struct Directories {
 
 /// Where uploads are kept.
 #[derive(Debug)]
-enum Place {
+enum Location {
     /// On this machine only.
     Own { directory: PathBuf, grace: Duration },
     /// On a shelf that every node can reach.
@@ -58,19 +60,19 @@ impl Directories {
     #[must_use]
     pub fn with_grace(uploads: PathBuf, mounted: Option<Mounted>, grace: Duration) -> Self {
         let directory = uploads;
-        Self::at(Place::Own { directory, grace }, mounted)
+        Self::at(Location::Own { directory, grace }, mounted)
     }
 
     /// Uploads on a shelf shared with other nodes. Mounted files belong to this node: plans over them can only be run
     /// by nodes that mount the same files.
     #[must_use]
     pub fn shared(sharing: Sharing, mounted: Option<Mounted>) -> Self {
-        Self::at(Place::Shared(sharing), mounted)
+        Self::at(Location::Shared(sharing), mounted)
     }
 
-    fn at(place: Place, mounted: Option<Mounted>) -> Self {
+    fn at(location: Location, mounted: Option<Mounted>) -> Self {
         let directories = Self {
-            place,
+            location,
             mounted,
             uploaded: Mutex::default(),
         };
@@ -81,13 +83,13 @@ impl Directories {
     }
 
     fn uploaded(&self) -> Result<Arc<dyn Uploads>, CatalogueError> {
-        let mut uploaded = self.uploaded.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut uploaded = self.uploaded.lock();
         if let Some(uploaded) = &*uploaded {
             return Ok(uploaded.clone());
         }
-        let opened: Arc<dyn Uploads> = match &self.place {
-            Place::Own { directory, grace } => Arc::new(Uploaded::open(directory, *grace)?),
-            Place::Shared(sharing) => Arc::new(Shared::open(sharing)?),
+        let opened: Arc<dyn Uploads> = match &self.location {
+            Location::Own { directory, grace } => Arc::new(Uploaded::open(directory, *grace)?),
+            Location::Shared(sharing) => Arc::new(Shared::open(sharing)?),
         };
         *uploaded = Some(opened.clone());
         Ok(opened)

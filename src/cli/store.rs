@@ -16,19 +16,19 @@ pub(super) enum Command {
     /// into an empty data directory as noctule.db
     Backup {
         #[command(flatten)]
-        place: Place,
+        place: Location,
         /// The new file
         file: PathBuf,
     },
     /// Look for damage and contradictions, also while the service runs; exits 1 when there are any
     Check {
         #[command(flatten)]
-        place: Place,
+        place: Location,
     },
 }
 
 #[derive(Args)]
-pub(super) struct Place {
+pub(super) struct Location {
     /// Directory of the plans [default: noctule in the user's data home]
     #[arg(long, env = "NOCTULE_DATA_DIR", value_name = "DIR")]
     data_dir: Option<PathBuf>,
@@ -42,7 +42,7 @@ pub(super) struct Place {
     store: Option<String>,
 }
 
-impl Place {
+impl Location {
     fn data_dir(self, instead: &str) -> anyhow::Result<PathBuf> {
         // A store that is not a file has its own tools.
         if self

@@ -64,8 +64,9 @@ impl Value for Filter {
 #[cfg(test)]
 mod tests {
     use std::io::{self, Write};
-    use std::sync::{Arc, Mutex};
+    use std::sync::Arc;
 
+    use parking_lot::Mutex;
     use tracing_subscriber::layer::SubscriberExt as _;
     use tracing_subscriber::{Layer as _, Registry, fmt};
 
@@ -77,7 +78,7 @@ mod tests {
 
     impl Write for Lines {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            self.0.lock().expect("no panic").extend(bytes);
+            self.0.lock().extend(bytes);
             Ok(bytes.len())
         }
 
@@ -111,7 +112,7 @@ mod tests {
             let span = tracing::info_span!(target: "noctule::http", "request", key = 1);
             span.in_scope(|| tracing::info!(target: "noctule::store", "within"));
         });
-        let bytes = lines.0.lock().expect("no panic").clone();
+        let bytes = lines.0.lock().clone();
         String::from_utf8(bytes).expect("text")
     }
 

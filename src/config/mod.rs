@@ -5,12 +5,12 @@
 //! what a setting does.
 
 mod address;
+mod backend;
 mod collector;
 mod file;
 mod filter;
 mod flags;
 mod layers;
-mod place;
 mod print;
 mod setting;
 mod settings;
@@ -21,11 +21,11 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 pub use address::Address;
+pub use backend::{Backend, Replicas, Role};
 pub use collector::{Endpoint, Headers};
 pub use filter::Filter;
 pub use flags::Flags;
 pub use layers::{Loaded, load};
-pub use place::{Place, Replicas, Role};
 pub use value::LogFormat;
 
 use crate::scenario::limits::Limits;
@@ -46,7 +46,7 @@ pub struct Config {
     /// Time from a signal to the exit.
     pub grace: Duration,
     /// Where plans are kept.
-    pub store: Place,
+    pub store: Backend,
     /// Credentials of this node for the servers of a shared store; a file as `nsc` writes it.
     pub store_credentials: Option<PathBuf>,
     /// How many copies the servers of a shared store keep.
@@ -126,7 +126,7 @@ impl Default for Config {
             workers: std::thread::available_parallelism().map_or(1, Into::into),
             queue: 1000,
             grace: Duration::from_secs(10),
-            store: Place::default(),
+            store: Backend::default(),
             store_credentials: None,
             store_replicas: Replicas::default(),
             store_lease: Duration::from_secs(30),

@@ -16,7 +16,7 @@ pub(super) struct Setting {
     pub(super) help: &'static str,
     /// A variable shared with other programs, used when its own is not set.
     pub(super) shared_variable: Option<&'static str>,
-    place: Box<dyn Place>,
+    field: Box<dyn AnyField>,
 }
 
 impl Setting {
@@ -46,27 +46,27 @@ impl Setting {
     /// # Errors
     /// The allowed values, when it is not one of them.
     pub(super) fn set(&self, config: &mut Config, given: &Given) -> Result<(), String> {
-        self.place.set(config, given)
+        self.field.set(config, given)
     }
 
     /// The value in `config`, as TOML; `None` when there is none.
     pub(super) fn shown(&self, config: &Config) -> Option<String> {
-        self.place.shown(config)
+        self.field.shown(config)
     }
 
     /// Whether its value is never shown.
     pub(super) fn is_secret(&self) -> bool {
-        self.place.is_secret()
+        self.field.is_secret()
     }
 
     /// Whether a refusal of `given` must not show it.
     pub(super) fn hides(&self, given: &Given) -> bool {
-        self.place.hides(given)
+        self.field.hides(given)
     }
 
     /// Whether its flag may be given without a value.
     pub(super) fn is_switch(&self) -> bool {
-        self.place.is_switch()
+        self.field.is_switch()
     }
 }
 
@@ -84,12 +84,12 @@ pub(super) fn row<T: Value>(
         placeholder,
         help,
         shared_variable: None,
-        place: Box::new(Field { range, field }),
+        field: Box::new(Field { range, field }),
     }
 }
 
 /// Gives access to a setting's field, whatever its type.
-trait Place {
+trait AnyField {
     fn set(&self, config: &mut Config, given: &Given) -> Result<(), String>;
     fn shown(&self, config: &Config) -> Option<String>;
     fn is_switch(&self) -> bool;
@@ -102,7 +102,7 @@ struct Field<T> {
     field: fn(&mut Config) -> &mut T,
 }
 
-impl<T: Value> Place for Field<T> {
+impl<T: Value> AnyField for Field<T> {
     fn set(&self, config: &mut Config, given: &Given) -> Result<(), String> {
         let value = T::read(given).filter(|value| self.range.holds(value));
         *(self.field)(config) = value.ok_or_else(|| self.range.allowed())?;

@@ -13,7 +13,7 @@ use tracing::{Instrument as _, Span};
 
 use super::auth::{Access, Digest, Permit};
 use super::caller::Caller;
-use super::feed::{Feed, Told};
+use super::feed::{Feed, News};
 use super::params::{self, Id, Params};
 use super::problem::Problem;
 use super::server::traffic::MayStandStill;
@@ -48,22 +48,22 @@ pub(super) async fn follow(
             available: Wire::MEDIA_TYPES.to_vec(),
         })?;
     let mut plan = caller.plan(&*state.store, id).await?;
-    let mut was_told = true;
+    let mut exists = true;
     if after > 0 {
-        was_told = state.store.has_told(id, after).await?;
+        exists = state.store.has_event(id, after).await?;
         // Read again, since that query may have brought news of the plan.
         plan = state.store.get(id).await?;
     }
     if plan.status.is_final() {
         let rest = state.store.events(id, after, 1).await?;
         if rest.events.is_empty() {
-            // Everything has been told; EventSource stops asking at a 204.
+            // The reader has had everything; EventSource stops asking at a 204.
             return Ok(StatusCode::NO_CONTENT.into_response());
         }
     }
-    // An event that has not been told yet belongs to another history, as after a restore from an older copy: a reader
+    // An event that the plan does not have yet belongs to another history, as after a restore from an older copy: a reader
     // who names one starts from the beginning.
-    let after = if was_told { after } else { 0 };
+    let after = if exists { after } else { 0 };
     let permit = state
         .access
         .open_stream(caller.owner.as_ref())
@@ -130,7 +130,7 @@ struct Stream {
 
 fn streamed(stream: Stream, wire: Wire) -> Response {
     let prologue = stream::iter([Ok(Bytes::from_static(wire.prologue().as_bytes()))]);
-    let told = stream::unfold(stream, move |mut stream| async move {
+    let events = stream::unfold(stream, move |mut stream| async move {
         let span = stream.span.clone();
         let text = stream.next(wire).instrument(span).await?;
         Some((Ok::<_, Infallible>(Bytes::from(text)), stream))
@@ -147,7 +147,7 @@ fn streamed(stream: Stream, wire: Wire) -> Response {
         (X_ACCEL_BUFFERING, HeaderValue::from_static("no")),
         (header::VARY, HeaderValue::from_static("accept")),
     ];
-    let body = Body::from_stream(futures_util::StreamExt::chain(prologue, told));
+    let body = Body::from_stream(futures_util::StreamExt::chain(prologue, events));
     // A slow reader costs a position in a plan's events and no memory, so it may be as slow as it likes.
     (Extension(MayStandStill), headers, body).into_response()
 }
@@ -155,20 +155,20 @@ fn streamed(stream: Stream, wire: Wire) -> Response {
 impl Stream {
     /// The next data to send; `None` at the end.
     async fn next(&mut self, wire: Wire) -> Option<String> {
-        let told = tokio::select! {
-            told = self.feed.next() => told?,
+        let news = tokio::select! {
+            news = self.feed.next() => news?,
             // Withdrawing a key ends its streams.
             () = self.access.withdrawn(self.key) => return None,
         };
-        Some(match told {
-            Told::Events(events) => self.written(events, wire).await,
-            Told::Gap { from, to } => {
+        Some(match news {
+            News::Events(events) => self.written(events, wire).await,
+            News::Gap { from, to } => {
                 let mut text = String::new();
                 wire.write(Outgoing::gap(from, to), &mut text);
                 text
             }
-            Told::Silence => wire.silence().to_owned(),
-            Told::Stopping(events) => self.written(events, wire).await + wire.stopping(),
+            News::Silence => wire.silence().to_owned(),
+            News::Stopping(events) => self.written(events, wire).await + wire.stopping(),
         })
     }
 

@@ -18,7 +18,7 @@ use crate::store::{Store, StoreError};
 /// Events read at once.
 const PAGE: usize = 128;
 
-/// Maximum number of pages read when the service stops: enough for what the last runs told in their last moments,
+/// Maximum number of pages read when the service stops: enough for what the last runs report in their last moments,
 /// including their end, and no more, so that nobody holds up the exit.
 const LAST_PAGES: usize = 16;
 
@@ -27,7 +27,7 @@ const SILENCE: Duration = Duration::from_secs(15);
 
 /// What a reader gets next.
 #[derive(Debug)]
-pub(super) enum Told {
+pub(super) enum News {
     /// One or more events; after the `end` nothing follows.
     Events(Vec<NumberedEvent>),
     /// The store no longer keeps the events `from` to `to`.
@@ -55,7 +55,7 @@ pub(super) struct Feed {
     /// Since when the throttle has been holding something back.
     held_since: Option<Instant>,
     /// When something was last sent to the reader.
-    told: Instant,
+    last_sent: Instant,
     /// Whether the reader has been given everything that the store had when last read.
     caught_up: bool,
     /// Pages that may still be read once the service stops.
@@ -81,7 +81,7 @@ impl Feed {
             throttle: Throttle::new(rate_hz),
             phase,
             held_since: None,
-            told: Instant::now(),
+            last_sent: Instant::now(),
             caught_up: false,
             last_pages: LAST_PAGES,
             over: false,
@@ -92,17 +92,17 @@ impl Feed {
         self.id
     }
 
-    /// Wait for what comes next; `None` after the end and after [`Told::Stopping`].
-    pub(super) async fn next(&mut self) -> Option<Told> {
-        let told = self.wait_for_next().await;
-        self.told = Instant::now();
-        told
+    /// Wait for what comes next; `None` after the end and after [`News::Stopping`].
+    pub(super) async fn next(&mut self) -> Option<News> {
+        let news = self.wait_for_next().await;
+        self.last_sent = Instant::now();
+        news
     }
 
-    async fn wait_for_next(&mut self) -> Option<Told> {
+    async fn wait_for_next(&mut self) -> Option<News> {
         let mut out = Vec::new();
         while !self.over {
-            // Read before the store: what was told until then will still be read.
+            // Read before the store: what is stored by then will still be read.
             let stopping = *self.phase.borrow() == Phase::Stopping;
             self.changes.mark_unchanged();
             let page = match self.store.events(self.id, self.after, PAGE).await {
@@ -123,12 +123,12 @@ impl Feed {
                 if quiet || self.last_pages == 0 {
                     // A reader who is further behind can read the rest from the next process.
                     self.over = true;
-                    return Some(Told::Stopping(out));
+                    return Some(News::Stopping(out));
                 }
                 self.last_pages -= 1;
             }
             if !out.is_empty() {
-                return Some(Told::Events(out));
+                return Some(News::Events(out));
             }
             if !quiet {
                 continue;
@@ -138,9 +138,9 @@ impl Feed {
                 Woken::WindowClosed => {
                     self.throttle.flush(&mut out);
                     self.held_since = None;
-                    return Some(Told::Events(out));
+                    return Some(News::Events(out));
                 }
-                Woken::Silence => return Some(Told::Silence),
+                Woken::Silence => return Some(News::Silence),
                 Woken::Closed => break,
             }
         }
@@ -150,23 +150,23 @@ impl Feed {
 
     /// Continue after the events that the store has deleted. A new reader asked for none of them, and starts with the
     /// current record.
-    async fn skip(&mut self, forgotten: u64) -> Option<Told> {
+    async fn skip(&mut self, forgotten: u64) -> Option<News> {
         if self.throttle.holds() {
             let mut out = Vec::new();
             self.throttle.flush(&mut out);
             self.held_since = None;
-            return Some(Told::Events(out));
+            return Some(News::Events(out));
         }
         let from = self.after + 1;
         self.after = forgotten;
         if from > 1 {
-            return Some(Told::Gap {
+            return Some(News::Gap {
                 from,
                 to: forgotten,
             });
         }
         let plan = self.store.get(self.id).await.ok()?;
-        Some(Told::Events(vec![NumberedEvent {
+        Some(News::Events(vec![NumberedEvent {
             id: forgotten,
             event: Event::Status(Box::new(plan)),
         }]))
@@ -174,7 +174,7 @@ impl Feed {
 
     /// The plan has been deleted, which cancels it if it had not ended. A reader who is behind cannot be told how it
     /// ended.
-    fn removed(&mut self) -> Option<Told> {
+    fn removed(&mut self) -> Option<News> {
         self.over = true;
         let mut out = Vec::new();
         self.throttle.flush(&mut out);
@@ -184,7 +184,7 @@ impl Feed {
                 event: Event::End(Status::Cancelled),
             });
         }
-        (!out.is_empty()).then_some(Told::Events(out))
+        (!out.is_empty()).then_some(News::Events(out))
     }
 
     fn take(&mut self, page: Vec<NumberedEvent>, out: &mut Vec<NumberedEvent>) {
@@ -204,7 +204,7 @@ impl Feed {
             .held_since
             .zip(self.throttle.window_ms())
             .map(|(since, window_ms)| since + Duration::from_secs_f64(window_ms / 1000.0));
-        let (deadline, woken) = due(self.told, window_closes);
+        let (deadline, woken) = due(self.last_sent, window_closes);
         tokio::select! {
             changed = self.changes.changed() => match changed {
                 Ok(()) => Woken::Changed,
@@ -216,10 +216,10 @@ impl Feed {
     }
 }
 
-/// When to wake for a reader to whom something was last sent at `told`: to release what the throttle holds when its
+/// When to wake for a reader to whom something was last sent at `last_sent`: to release what the throttle holds when its
 /// window closes, or to send a comment. Events that are held back postpone neither.
-fn due(told: Instant, window_closes: Option<Instant>) -> (Instant, Woken) {
-    let silent = told + SILENCE;
+fn due(last_sent: Instant, window_closes: Option<Instant>) -> (Instant, Woken) {
+    let silent = last_sent + SILENCE;
     match window_closes {
         Some(closes) if closes <= silent => (closes, Woken::WindowClosed),
         _ => (silent, Woken::Silence),
@@ -243,11 +243,14 @@ mod tests {
     /// Proxies cut silent connections, even when the reader's own rate holds events back.
     #[test]
     fn a_comment_is_due_while_the_throttle_holds_events_back() {
-        let told = Instant::now();
-        let after = |seconds| told + Duration::from_secs(seconds);
+        let last_sent = Instant::now();
+        let after = |seconds| last_sent + Duration::from_secs(seconds);
         let silence = (after(15), Woken::Silence);
-        assert_eq!(due(told, None), silence);
-        assert_eq!(due(told, Some(after(100))), silence);
-        assert_eq!(due(told, Some(after(3))), (after(3), Woken::WindowClosed));
+        assert_eq!(due(last_sent, None), silence);
+        assert_eq!(due(last_sent, Some(after(100))), silence);
+        assert_eq!(
+            due(last_sent, Some(after(3))),
+            (after(3), Woken::WindowClosed)
+        );
     }
 }

@@ -95,9 +95,9 @@ fn is_of_this_machine(host: &str, known: &[String]) -> bool {
 /// The layer before all routes, for what is checked on every address; a single one, because each layer costs every
 /// request.
 #[derive(Clone)]
-pub(super) struct Hold(pub(super) Hosts);
+pub(super) struct AddressCheck(pub(super) Hosts);
 
-impl Around for Hold {
+impl Around for AddressCheck {
     fn answer<S: Next>(&self, request: Request, next: &mut S) -> Answering {
         let uri = request.uri();
         let checked = self

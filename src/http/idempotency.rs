@@ -4,9 +4,10 @@
 //! that a request and its own repetition do not run side by side.
 
 use std::collections::HashSet;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use axum::http::{HeaderMap, HeaderName};
+use parking_lot::Mutex;
 
 use super::caller::Caller;
 use super::params;
@@ -50,8 +51,8 @@ impl InFlight {
         Ok(Some(Once { keys, key }))
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, HashSet<Key>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> parking_lot::MutexGuard<'_, HashSet<Key>> {
+        self.0.lock()
     }
 }
 

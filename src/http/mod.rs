@@ -69,7 +69,7 @@ pub use terrains::Terrains;
 use crate::scenario::json::Rules;
 use crate::store::{Stats, SteadyClock, Store};
 use crate::telemetry::Instruments;
-use auth::{Access, Gate, Needs};
+use auth::{Access, Gate, Needs, Scope};
 use layer::Layered;
 use problem::Problem;
 
@@ -147,41 +147,46 @@ pub struct Route {
     guarded: Box<dyn FnOnce(Layered<Gate>) -> MethodRouter<AppState>>,
 }
 
-/// All routes.
+/// All routes, each with what it requires of its caller.
 #[must_use]
 pub fn routes() -> Vec<Route> {
+    use Needs::{Nothing, Ticket};
+    const READ: Needs = Needs::Scope(Scope::Read);
+    const PLAN: Needs = Needs::Scope(Scope::Plan);
+    const METRICS: Needs = Needs::Scope(Scope::Metrics);
     vec![
-        post("/plans", plans::submit),
-        get("/plans", plans::list),
-        get("/plans/{id}", plans::show),
-        delete("/plans/{id}", plans::delete),
-        post("/plans/{id}/cancel", plans::cancel),
-        get("/plans/{id}/result", documents::result),
-        get("/plans/{id}/scenario", documents::scenario),
-        get("/plans/{id}/events", events::follow),
-        post("/plans/{id}/tickets", tickets::issue),
-        post("/scenarios:convert", scenarios::convert),
-        get("/terrains", terrains::list),
-        get("/terrains/{name}", terrains::show),
-        put("/terrains/{name}", terrains::put),
-        delete("/terrains/{name}", terrains::delete),
-        get("/terrains/{name}/elevations", terrains::elevations),
-        post("/scenarios:ground", ground::sample),
-        get("/scenarios", shipped::list),
-        get("/scenarios/{name}", shipped::show),
-        get("/algorithms", service::algorithms),
-        get("/limits", service::limits),
-        get("/version", service::version),
-        get("/livez", service::livez),
-        get("/readyz", service::readyz),
-        get("/metrics", metrics::show),
-        get("/openapi.yaml", pages::openapi_yaml),
-        get("/openapi.json", pages::openapi_json),
-        get("/", pages::front::front),
-        get("/page/{file}", pages::front::file),
-        get("/page/vendor/{file}", pages::front::vendored),
-        get("/docs", pages::docs),
-        get("/problems/{slug}", pages::problem),
+        post("/plans", PLAN, plans::submit),
+        get("/plans", READ, plans::list),
+        get("/plans/{id}", READ, plans::show),
+        delete("/plans/{id}", PLAN, plans::delete),
+        post("/plans/{id}/cancel", PLAN, plans::cancel),
+        get("/plans/{id}/result", READ, documents::result),
+        get("/plans/{id}/scenario", READ, documents::scenario),
+        get("/plans/{id}/events", Ticket, events::follow),
+        post("/plans/{id}/tickets", READ, tickets::issue),
+        post("/scenarios:convert", PLAN, scenarios::convert),
+        get("/terrains", READ, terrains::list),
+        get("/terrains/{name}", READ, terrains::show),
+        // The handler decides who may change a dataset.
+        put("/terrains/{name}", PLAN, terrains::put),
+        delete("/terrains/{name}", PLAN, terrains::delete),
+        get("/terrains/{name}/elevations", READ, terrains::elevations),
+        post("/scenarios:ground", PLAN, ground::sample),
+        get("/scenarios", Nothing, shipped::list),
+        get("/scenarios/{name}", Nothing, shipped::show),
+        get("/algorithms", Nothing, service::algorithms),
+        get("/limits", Nothing, service::limits),
+        get("/version", Nothing, service::version),
+        get("/livez", Nothing, service::livez),
+        get("/readyz", Nothing, service::readyz),
+        get("/metrics", METRICS, metrics::show),
+        get("/openapi.yaml", Nothing, pages::openapi_yaml),
+        get("/openapi.json", Nothing, pages::openapi_json),
+        get("/", Nothing, pages::front::front),
+        get("/page/{file}", Nothing, pages::front::file),
+        get("/page/vendor/{file}", Nothing, pages::front::vendored),
+        get("/docs", Nothing, pages::docs),
+        get("/problems/{slug}", Nothing, pages::problem),
     ]
 }
 
@@ -262,36 +267,49 @@ fn wrap(router: Router, cors: &Origins, hosts: Hosts, instruments: Arc<Instrumen
         .layer(MapResponseLayer::new(unwrap_uncompressed))
         .layer(CompressionLayer::new().compress_when(worth_compressing()))
         .layer(MapResponseLayer::new(note_status))
-        .layer(Layered(hosts::Hold(hosts)));
+        .layer(Layered(hosts::AddressCheck(hosts)));
     router.layer(layers)
 }
 
-fn get<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
-    row("GET", path, |gate| routing::get(handler.layer(gate)))
+fn get<H: Handler<T, AppState>, T: 'static>(path: &'static str, needs: Needs, handler: H) -> Route {
+    row("GET", path, needs, |gate| routing::get(handler.layer(gate)))
 }
 
-fn post<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
-    row("POST", path, |gate| routing::post(handler.layer(gate)))
+fn post<H: Handler<T, AppState>, T: 'static>(
+    path: &'static str,
+    needs: Needs,
+    handler: H,
+) -> Route {
+    row("POST", path, needs, |gate| {
+        routing::post(handler.layer(gate))
+    })
 }
 
-fn put<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
-    row("PUT", path, |gate| routing::put(handler.layer(gate)))
+fn put<H: Handler<T, AppState>, T: 'static>(path: &'static str, needs: Needs, handler: H) -> Route {
+    row("PUT", path, needs, |gate| routing::put(handler.layer(gate)))
 }
 
-fn delete<H: Handler<T, AppState>, T: 'static>(path: &'static str, handler: H) -> Route {
-    row("DELETE", path, |gate| routing::delete(handler.layer(gate)))
+fn delete<H: Handler<T, AppState>, T: 'static>(
+    path: &'static str,
+    needs: Needs,
+    handler: H,
+) -> Route {
+    row("DELETE", path, needs, |gate| {
+        routing::delete(handler.layer(gate))
+    })
 }
 
 /// The gate wraps the handler: as a layer of the route it would be one more box allocated for each request.
 fn row(
     method: &'static str,
     path: &'static str,
+    needs: Needs,
     guarded: impl FnOnce(Layered<Gate>) -> MethodRouter<AppState> + 'static,
 ) -> Route {
     Route {
         method,
         path,
-        needs: Needs::of(method, path),
+        needs,
         guarded: Box::new(guarded),
     }
 }

@@ -41,8 +41,8 @@ async fn curve(state: &AppState, plan: &Plan) -> Result<Vec<Convergence>, Proble
             return Ok(curve.into());
         };
         after = last.id;
-        for told in page.events {
-            match told.event {
+        for numbered in page.events {
+            match numbered.event {
                 Event::Convergence(point) => curve.push_back(point),
                 Event::Status(plan) if plan.started_ms.is_none() => curve.clear(),
                 _ => {}

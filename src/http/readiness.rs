@@ -24,7 +24,7 @@ struct Answer {
 
 impl Readiness {
     /// The answer of `ask`, or the one it has just given to somebody else.
-    pub(super) async fn told(
+    pub(super) async fn shared(
         &self,
         ask: impl Future<Output = Result<(), StoreError>>,
     ) -> Result<(), StoreError> {
@@ -58,14 +58,14 @@ mod tests {
     async fn concurrent_callers_share_one_answer() {
         let (readiness, asked) = (Readiness::default(), AtomicUsize::new(0));
         let ask = |answer: Result<(), StoreError>| {
-            readiness.told(async {
+            readiness.shared(async {
                 asked.fetch_add(1, Ordering::Relaxed);
                 answer
             })
         };
         let full = || Err(StoreError::unavailable("full"));
         let (answer, answered) = oneshot::channel();
-        let first = readiness.told(async { answered.await.expect("an answer") });
+        let first = readiness.shared(async { answered.await.expect("an answer") });
         let others = join_all((0..100).map(|_| ask(Ok(()))));
         let mut all = Box::pin(join(first, others));
         assert!(all.as_mut().now_or_never().is_none(), "they wait for it");
@@ -86,7 +86,7 @@ mod tests {
     #[tokio::test]
     async fn a_caller_that_disconnects_blocks_nobody() {
         let readiness = Readiness::default();
-        assert!(readiness.told(pending()).now_or_never().is_none());
-        assert!(readiness.told(async { Ok(()) }).await.is_ok());
+        assert!(readiness.shared(pending()).now_or_never().is_none());
+        assert!(readiness.shared(async { Ok(()) }).await.is_ok());
     }
 }

@@ -59,9 +59,9 @@ impl Wire {
         }
     }
 
-    /// Add `told` to `text`.
-    pub(super) fn write(self, told: Outgoing, text: &mut String) {
-        let Outgoing { id, event, data } = told;
+    /// Add `outgoing` to `text`.
+    pub(super) fn write(self, outgoing: Outgoing, text: &mut String) {
+        let Outgoing { id, event, data } = outgoing;
         match self {
             Self::Sse => write!(text, "id: {id}\nevent: {event}\ndata: {data}\n\n"),
             Self::Lines => writeln!(text, r#"{{"id":{id},"event":"{event}","data":{data}}}"#),

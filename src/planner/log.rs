@@ -16,7 +16,7 @@ pub(super) struct Log<'o> {
     pub(super) route: Vec<Point3>,
     pub(super) best: Fitness,
     /// The last route passed to the observer.
-    told: Option<Vec<Point3>>,
+    reported: Option<Vec<Point3>>,
     /// Routes priced so far.
     pub(super) evaluations: u64,
     /// Proven lower bound of a route's cost. Known only where the search makes use of it.
@@ -36,7 +36,7 @@ impl<'o> Log<'o> {
             convergence: Vec::new(),
             route: Vec::new(),
             best: Fitness::WORST,
-            told: None,
+            reported: None,
             evaluations: 0,
             lower: None,
         }
@@ -94,7 +94,7 @@ impl<'o> Log<'o> {
     fn record(&mut self, iteration: usize, mean_cost: f64, feasible_fraction: f64) {
         let elapsed_ms = self.stop.elapsed_ms();
         let best = self.best;
-        let last = self.told.as_ref();
+        let last = self.reported.as_ref();
         if last != Some(&self.route) {
             self.observer.incumbent(&Incumbent {
                 frame: self.model.scenario.frame.clone(),
@@ -104,7 +104,7 @@ impl<'o> Log<'o> {
                 feasible: best.is_feasible(),
                 waypoints: self.route.clone(),
             });
-            self.told = Some(self.route.clone());
+            self.reported = Some(self.route.clone());
         }
         let point = ConvergencePoint {
             iteration,

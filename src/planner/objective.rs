@@ -1,7 +1,8 @@
 //! Routes as an optimizer sees them: positions in, fitness out.
 
-use std::sync::Mutex;
 use std::thread;
+
+use parking_lot::Mutex;
 
 use super::Stop;
 use super::blocks::{Blocks, Pricers};
@@ -124,7 +125,7 @@ impl<'s> Routes<'s> {
         let share = fitness.len().div_ceil(threads).next_multiple_of(LANES);
         let shares = positions.chunks(share * dimension).zip(&mut self.kept);
         let shares = Mutex::new(shares.zip(fitness.chunks_mut(share)).enumerate());
-        let next = || shares.lock().expect("taking one never panics").next();
+        let next = || shares.lock().next();
         let price = || {
             while let Some((idx, ((positions, kept), fitness))) = next() {
                 let first = idx * share;

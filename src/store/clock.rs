@@ -1,8 +1,9 @@
 //! The time, for timestamps and expiry.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
+use parking_lot::Mutex;
 use rustix::time::{ClockId, clock_gettime};
 
 /// Tells the time: milliseconds since 1970.
@@ -76,7 +77,7 @@ impl SteadyClock {
     /// What the followed clock shows, and how far off it is.
     fn look(&self) -> (i64, Option<i64>) {
         // The state is consistent after every look, so a panic leaves nothing wrong behind.
-        let mut judge = self.judge.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut judge = self.judge.lock();
         let shown_ms = (self.followed)();
         (shown_ms, judge.jump_ms(shown_ms, (self.passed)()))
     }

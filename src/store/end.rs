@@ -36,13 +36,13 @@ impl Ending {
         self.after(Vec::new(), at_ms)
     }
 
-    /// At this time, with `told` the events since the last [`Store::append`](super::Store::append). Shared, because a
+    /// At this time, with `events` the events since the last [`Store::append`](super::Store::append). Shared, because a
     /// failed store call is retried.
     #[must_use]
-    pub fn after(self, told: Vec<Event>, at_ms: i64) -> Arc<End> {
+    pub fn after(self, events: Vec<Event>, at_ms: i64) -> Arc<End> {
         let ending = self;
         Arc::new(End {
-            told,
+            events,
             ending,
             at_ms,
         })
@@ -53,7 +53,7 @@ impl Ending {
 #[derive(Debug)]
 pub struct End {
     /// Events of the run since the last [`Store::append`](super::Store::append).
-    pub told: Vec<Event>,
+    pub events: Vec<Event>,
     /// How it ended.
     pub ending: Ending,
     /// When, milliseconds since 1970.
@@ -66,7 +66,7 @@ impl End {
     /// # Errors
     /// [`Refused`] when the plan is not running.
     pub(super) fn apply(&self, plan: &mut Plan) -> Result<(), Refused> {
-        plan.advance(&self.told);
+        plan.advance(&self.events);
         match &self.ending {
             Ending::Result {
                 cancelled,

@@ -118,8 +118,8 @@ impl Store for MeasuredStore {
         self.measured("events", step).await
     }
 
-    async fn has_told(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
-        self.measured("has_told", self.store.has_told(id, event))
+    async fn has_event(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
+        self.measured("has_event", self.store.has_event(id, event))
             .await
     }
 

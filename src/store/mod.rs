@@ -17,7 +17,7 @@ pub mod sqlite;
 pub use clock::{Clock, SteadyClock, wall_clock};
 pub use end::{End, Ending};
 pub use error::{StoreError, Trouble};
-pub use options::{Options, Retention, Tell};
+pub use options::{OnLost, Options, Retention};
 
 use std::sync::Arc;
 
@@ -149,7 +149,7 @@ pub trait Store: Send + Sync + 'static {
     ///
     /// # Errors
     /// As [`Store::get`].
-    async fn has_told(&self, id: PlanId, event: u64) -> Result<bool, StoreError>;
+    async fn has_event(&self, id: PlanId, event: u64) -> Result<bool, StoreError>;
 
     /// Ticks after each change of the plan or its events has become readable, and once more when it is deleted.
     /// Subscribe before reading, and no change is missed.

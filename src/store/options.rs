@@ -6,7 +6,7 @@ use super::clock::{Clock, wall_clock};
 use crate::job::Plan;
 
 /// Called with a plan in its present state.
-pub type Tell = Arc<dyn Fn(&Plan) + Send + Sync>;
+pub type OnLost = Arc<dyn Fn(&Plan) + Send + Sync>;
 
 /// What a store is opened with.
 #[derive(Clone)]
@@ -21,7 +21,7 @@ pub struct Options {
     pub events_kept: u64,
     /// Called with each plan that the store itself ends because its workers, or its document, were lost, once that is
     /// durable: there is no run that could report it.
-    pub lost: Tell,
+    pub on_lost: OnLost,
 }
 
 impl Options {
@@ -33,7 +33,7 @@ impl Options {
             clock: wall_clock(),
             retention: Retention::default(),
             events_kept: u64::MAX,
-            lost: Arc::new(|_| {}),
+            on_lost: Arc::new(|_| {}),
         }
     }
 }

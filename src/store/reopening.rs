@@ -45,8 +45,8 @@ impl Reopening {
         if let Err(error) = &first {
             tracing::error!(%error, "the store cannot be opened; trying again every second");
         }
-        let (told, state) = watch::channel(first);
-        let opener = tokio::spawn(keep_open(open, told, reports));
+        let (opened, state) = watch::channel(first);
+        let opener = tokio::spawn(keep_open(open, opened, reports));
         Self {
             state,
             damaged,
@@ -217,9 +217,9 @@ impl Store for Reopening {
         self.heed(&store, store.events(id, after, limit).await)
     }
 
-    async fn has_told(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
+    async fn has_event(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
         let store = self.store()?;
-        self.heed(&store, store.has_told(id, event).await)
+        self.heed(&store, store.has_event(id, event).await)
     }
 
     /// While it is not open, the sender is gone: a waiting reader reads again, and learns why.

@@ -1,8 +1,8 @@
 //! Which request a plan came from, so that log lines of its run can name it.
 
 use std::collections::BTreeMap;
-use std::sync::{Mutex, PoisonError};
 
+use parking_lot::Mutex;
 use uuid::Uuid;
 
 use super::traceparent::TraceParent;
@@ -28,7 +28,7 @@ pub struct Origins(Mutex<BTreeMap<Uuid, Origin>>);
 impl Origins {
     /// The plan called `plan` comes from `origin`.
     pub fn remember(&self, plan: Uuid, origin: Origin) {
-        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut known = self.0.lock();
         known.insert(plan, origin);
         if known.len() > REMEMBERED {
             // Ids begin with the time.
@@ -39,13 +39,13 @@ impl Origins {
     /// Where the plan called `plan` comes from, if that is known.
     #[must_use]
     pub fn of(&self, plan: Uuid) -> Option<Origin> {
-        let known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = self.0.lock();
         known.get(&plan).cloned()
     }
 
     /// The plan has ended, or is gone.
     pub fn forget(&self, plan: Uuid) {
-        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut known = self.0.lock();
         known.remove(&plan);
     }
 }

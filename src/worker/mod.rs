@@ -4,7 +4,9 @@
 //! Deliberately absent: what planning is, and how anybody learns of its progress.
 
 mod planning;
+mod reporter;
 mod run;
+mod stop;
 mod sweeper;
 
 use std::sync::Arc;

@@ -7,7 +7,9 @@ use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tracing::{Instrument as _, Span};
 
-use super::planning::{Reason, Reports, StopFlag, Thread};
+use super::planning::Thread;
+use super::reporter::Reports;
+use super::stop::{Reason, StopFlag};
 use super::{Pause, Phase, Slot, reached};
 use crate::job::{Event, Plan};
 use crate::store::{Ending, Lease, StoreError};
@@ -34,7 +36,7 @@ enum Unstored {
 pub(super) struct Over {
     lease: Lease,
     /// Its last events; stored with its end.
-    told: Vec<Event>,
+    events: Vec<Event>,
     /// `None` when its plan goes back to the queue.
     ending: Option<Ending>,
     span: Span,
@@ -53,11 +55,11 @@ impl Slot {
             self.instruments.metrics.started(waited_ms);
         }
         let stop = Arc::new(StopFlag::default());
-        let (events, told) = mpsc::channel(ON_THE_WAY);
-        let (telling, news) = watch::channel(());
+        let (events, reported) = mpsc::channel(ON_THE_WAY);
+        let (full_batches, full) = watch::channel(());
         let reports = Reports {
             events,
-            telling,
+            full_batches,
             stop: Arc::clone(&stop),
             instruments: Arc::clone(&self.instruments),
         };
@@ -72,7 +74,7 @@ impl Slot {
             }
         };
         let rest = tokio::select! {
-            rest = self.keep_events(&lease, told, news) => rest,
+            rest = self.keep_events(&lease, reported, full) => rest,
             never = stop_when_asked(&lease, self.phase.clone(), &stop) => match never {},
         };
         if rest.is_err() {
@@ -90,7 +92,7 @@ impl Slot {
         let abandoned = matches!(ending, Some(Ending::Result { .. })) && stop.is_abandoned();
         Some(Over {
             lease,
-            told: rest,
+            events: rest,
             ending: ending.filter(|_| !abandoned),
             span: Span::current(),
         })
@@ -109,35 +111,35 @@ impl Slot {
     pub(super) async fn conclude(&self, over: Over) {
         let Over {
             lease,
-            told,
+            events,
             ending,
             span,
         } = over;
         let conclusion = async {
             match ending {
-                Some(ending) => self.finish(&lease, told, ending).await,
+                Some(ending) => self.finish(&lease, events, ending).await,
                 None => self.give_back(&lease).await,
             }
         };
         conclusion.instrument(span).await;
     }
 
-    /// Store events until there are no more; returns the last of them, which are stored with the end. `news` ticks when
+    /// Store events until there are no more; returns the last of them, which are stored with the end. `full` ticks when
     /// there are many, and loses its sender after the last.
     async fn keep_events(
         &self,
         lease: &Lease,
-        mut told: mpsc::Receiver<Event>,
-        mut news: watch::Receiver<()>,
+        mut reported: mpsc::Receiver<Event>,
+        mut full: watch::Receiver<()>,
     ) -> Result<Vec<Event>, Unstored> {
         let mut batch = Vec::new();
         loop {
             tokio::select! {
-                _ = news.changed() => {}
+                _ = full.changed() => {}
                 () = tokio::time::sleep(DELAY) => {}
             }
-            let was_last = told.is_closed();
-            while let Ok(event) = told.try_recv() {
+            let was_last = reported.is_closed();
+            while let Ok(event) = reported.try_recv() {
                 batch.push(event);
             }
             if was_last {
@@ -145,7 +147,7 @@ impl Slot {
             }
             if batch.is_empty() {
                 // A quiet search wakes nobody, and neither does the first event of a short one.
-                told.recv_many(&mut batch, 1).await;
+                reported.recv_many(&mut batch, 1).await;
                 continue;
             }
             let events = std::mem::take(&mut batch);
@@ -154,11 +156,11 @@ impl Slot {
         }
     }
 
-    async fn finish(&self, lease: &Lease, told: Vec<Event>, ending: Ending) {
-        let end = ending.after(told, (self.clock)());
+    async fn finish(&self, lease: &Lease, events: Vec<Event>, ending: Ending) {
+        let end = ending.after(events, (self.clock)());
         let finish = || self.store.finish(lease, Arc::clone(&end));
         if let Ok(plan) = self.persist("ending", finish).await {
-            self.tell_end(&plan);
+            self.report_end(&plan);
         }
     }
 
@@ -166,13 +168,13 @@ impl Slot {
         let release = || self.store.release(lease);
         match self.persist("release", release).await {
             // Its end had been requested, and it has no ending of its own to wait for.
-            Ok(plan) if plan.status.is_final() => self.tell_end(&plan),
+            Ok(plan) if plan.status.is_final() => self.report_end(&plan),
             Ok(_) => tracing::info!("plan given back to the queue"),
             Err(Unstored::Lost | Unstored::GivenUp) => {}
         }
     }
 
-    fn tell_end(&self, plan: &Plan) {
+    fn report_end(&self, plan: &Plan) {
         let run_ms = plan
             .finished_ms
             .zip(plan.started_ms)

@@ -305,7 +305,7 @@ async fn an_unreadable_plan_fails_and_does_not_block_the_queue() {
     let directory = TempDir::new().unwrap();
     let (tell, ended) = std::sync::mpsc::channel();
     let options = Options {
-        lost: Arc::new(move |plan| tell.send(plan.clone()).unwrap()),
+        on_lost: Arc::new(move |plan| tell.send(plan.clone()).unwrap()),
         ..options()
     };
     let store = SqliteStore::open(directory.path(), options).unwrap();

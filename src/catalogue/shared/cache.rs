@@ -6,8 +6,9 @@ use std::collections::HashMap;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+
+use parking_lot::{Mutex, MutexGuard};
 
 use crate::catalogue::content::{Checked, Declaration, Identity};
 use crate::catalogue::stamp::Stamp;
@@ -265,11 +266,11 @@ impl Cache {
     fn lane(&self, sha256: &str) -> MutexGuard<'_, ()> {
         let sum = sha256.bytes().map(usize::from).sum::<usize>();
         let lane = &self.lanes[sum % LANES];
-        lane.lock().unwrap_or_else(PoisonError::into_inner)
+        lane.lock()
     }
 
     fn lock(&self) -> MutexGuard<'_, HashMap<String, Held>> {
-        self.files.lock().unwrap_or_else(PoisonError::into_inner)
+        self.files.lock()
     }
 }
 

@@ -22,9 +22,10 @@ mod model;
 mod tests;
 
 use std::collections::BTreeSet;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
+use parking_lot::{Mutex, MutexGuard};
 use serde::Serialize;
 
 pub use self::sharing::Sharing;
@@ -72,7 +73,7 @@ impl Shared {
             tracing::warn!("the shared datasets were replaced as a whole");
             changes = self.changes(0)?;
         }
-        let mut view = self.view.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut view = self.view.lock();
         if is_another {
             *view = Arc::default();
         }
@@ -83,7 +84,7 @@ impl Shared {
     }
 
     fn last_view(&self) -> Arc<View> {
-        let view = self.view.lock().unwrap_or_else(PoisonError::into_inner);
+        let view = self.view.lock();
         view.clone()
     }
 
@@ -127,7 +128,7 @@ impl Shared {
     }
 
     fn watched(&self) -> MutexGuard<'_, Watched> {
-        self.watched.lock().unwrap_or_else(PoisonError::into_inner)
+        self.watched.lock()
     }
 }
 

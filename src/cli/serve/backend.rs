@@ -7,11 +7,11 @@ use tokio::runtime::Handle;
 
 use super::{data_dir, slots};
 use crate::catalogue::Shelf;
-use crate::config::{self, Address, Config, Place};
+use crate::config::{self, Address, Backend, Config};
 use crate::store::jetstream::{JetStreamShelf, JetStreamStore, Settings};
 use crate::store::reopening::{Open, Reopening};
 use crate::store::sqlite::SqliteStore;
-use crate::store::{Clock, Options, Retention, Store, Tell};
+use crate::store::{Clock, OnLost, Options, Retention, Store};
 use crate::telemetry::Instruments;
 use crate::telemetry::metrics::Ended;
 
@@ -26,8 +26,8 @@ pub(super) async fn open(
 ) -> anyhow::Result<Arc<dyn Store>> {
     let options = options(config, clock, instruments);
     let open = match &config.store {
-        Place::Sqlite => sqlite(data_dir(config)?, options),
-        Place::Nats(address) => jetstream(settings(config, address), options),
+        Backend::Sqlite => sqlite(data_dir(config)?, options),
+        Backend::Nats(address) => jetstream(settings(config, address), options),
     };
     Ok(Arc::new(Reopening::start(open).await))
 }
@@ -60,8 +60,8 @@ fn jetstream(settings: Settings, options: Options) -> Open {
 /// Where nodes share their datasets; `None` where there is one node.
 pub(super) fn shelf(config: &Config) -> Option<Arc<dyn Shelf>> {
     match &config.store {
-        Place::Sqlite => None,
-        Place::Nats(address) => Some(Arc::new(JetStreamShelf::new(settings(config, address)))),
+        Backend::Sqlite => None,
+        Backend::Nats(address) => Some(Arc::new(JetStreamShelf::new(settings(config, address)))),
     }
 }
 
@@ -78,7 +78,7 @@ fn settings(config: &Config, address: &Address) -> Settings {
 fn options(config: &Config, clock: Clock, instruments: &Arc<Instruments>) -> Options {
     Options {
         clock,
-        lost: counted(instruments),
+        on_lost: counted(instruments),
         retention: retention(config.retention),
         events_kept: config.retention.events,
         ..Options::new(config.queue as u64)
@@ -86,7 +86,7 @@ fn options(config: &Config, clock: Clock, instruments: &Arc<Instruments>) -> Opt
 }
 
 /// Counts a plan as ended; the duration of its last run is unknown.
-fn counted(instruments: &Arc<Instruments>) -> Tell {
+fn counted(instruments: &Arc<Instruments>) -> OnLost {
     let instruments = Arc::clone(instruments);
     Arc::new(move |plan| {
         instruments.origins.forget(plan.id);

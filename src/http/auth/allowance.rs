@@ -45,9 +45,9 @@ impl Allowance {
         let mut policy = format!("\"{}\";q={}", self.name, self.quota);
         let mut limit = format!("\"{}\";r={}", self.name, self.left);
         if let Some(filling) = self.filling {
-            let told = write!(policy, ";w={}", filling.window_s)
+            let written = write!(policy, ";w={}", filling.window_s)
                 .and_then(|()| write!(limit, ";t={}", filling.full_in_s));
-            told.expect("a string takes all");
+            written.expect("a string takes all");
         }
         for (name, mut value) in [(RATELIMIT_POLICY, policy), (RATELIMIT, limit)] {
             if let Some(others) = headers.get(&name).and_then(|others| others.to_str().ok()) {

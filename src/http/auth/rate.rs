@@ -1,8 +1,8 @@
 //! How fast a key may send requests: one token bucket each.
 
 use std::collections::{HashMap, HashSet};
-use std::sync::{Mutex, PoisonError};
 
+use parking_lot::Mutex;
 use tokio::time::Instant;
 
 use super::allowance::{Allowance, Filling};
@@ -39,7 +39,7 @@ impl Buckets {
     /// Take a token for the key called `name`.
     pub(super) fn take(&self, name: &str, rate: Rate, now: Instant) -> Taken {
         let full = f64::from(rate.burst);
-        let mut buckets = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut buckets = self.0.lock();
         let bucket = buckets.entry(name.to_owned()).or_insert(Bucket {
             tokens: full,
             filled: now,
@@ -60,7 +60,7 @@ impl Buckets {
 
     /// Forget all buckets except those of `names`.
     pub(super) fn keep(&self, names: &HashSet<&str>) {
-        let mut buckets = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut buckets = self.0.lock();
         buckets.retain(|name, _| names.contains(name.as_str()));
     }
 }

@@ -1,4 +1,4 @@
-//! What a key may do, and what each route requires.
+//! What a key may do, and what a route may require.
 
 /// What a key may do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,39 +52,6 @@ pub enum Needs {
     Ticket,
 }
 
-impl Needs {
-    /// For the route with this method and path. Unlisted routes require more rather than less.
-    pub(in crate::http) fn of(method: &str, path: &str) -> Self {
-        match (method, path) {
-            (
-                "GET",
-                "/"
-                | "/algorithms"
-                | "/docs"
-                | "/limits"
-                | "/livez"
-                | "/openapi.json"
-                | "/openapi.yaml"
-                | "/page/{file}"
-                | "/page/vendor/{file}"
-                | "/problems/{slug}"
-                | "/readyz"
-                | "/scenarios"
-                | "/scenarios/{name}"
-                | "/version",
-            ) => Self::Nothing,
-            ("GET", "/metrics") => Self::Scope(Scope::Metrics),
-            ("GET", "/plans/{id}/events") => Self::Ticket,
-            ("GET", _) | ("POST", "/plans/{id}/tickets") => Self::Scope(Scope::Read),
-            (_, path) if path.starts_with("/plans") => Self::Scope(Scope::Plan),
-            // The handler decides who may change a dataset.
-            ("PUT" | "DELETE", "/terrains/{name}")
-            | ("POST", "/scenarios:convert" | "/scenarios:ground") => Self::Scope(Scope::Plan),
-            _ => Self::Scope(Scope::Admin),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,22 +69,6 @@ mod tests {
             (Scope::Admin, Scope::Plan, true),
         ] {
             assert_eq!(has.includes(asked), may, "{has:?} for {asked:?}");
-        }
-    }
-
-    #[test]
-    fn unlisted_routes_need_the_stricter_scope() {
-        for (method, path, needs) in [
-            ("GET", "/livez", Needs::Nothing),
-            ("GET", "/plans", Needs::Scope(Scope::Read)),
-            ("GET", "/something/new", Needs::Scope(Scope::Read)),
-            ("POST", "/plans", Needs::Scope(Scope::Plan)),
-            ("DELETE", "/plans/{id}", Needs::Scope(Scope::Plan)),
-            ("PUT", "/terrains/{name}", Needs::Scope(Scope::Plan)),
-            ("PUT", "/something/new", Needs::Scope(Scope::Admin)),
-            ("POST", "/livez", Needs::Scope(Scope::Admin)),
-        ] {
-            assert_eq!(Needs::of(method, path), needs, "{method} {path}");
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::telemetry::Instruments;
 const MOST: usize = 200;
 
 /// What to send in place of `bytes`, if they are such a refusal.
-pub(super) fn told_better(bytes: &[u8], instruments: &Instruments) -> Option<Vec<u8>> {
+pub(super) fn explained(bytes: &[u8], instruments: &Instruments) -> Option<Vec<u8>> {
     if bytes.len() > MOST || !bytes.starts_with(b"HTTP/1.1 4") {
         return None;
     }
@@ -29,14 +29,14 @@ pub(super) fn told_better(bytes: &[u8], instruments: &Instruments) -> Option<Vec
     };
     let (head, body) = request_id::refuse(problem, instruments).into_parts();
     let (code, reason) = (head.status.as_str(), head.status.canonical_reason()?);
-    let mut told = format!("HTTP/1.1 {code} {reason}\r\nconnection: close\r\n").into_bytes();
+    let mut answer = format!("HTTP/1.1 {code} {reason}\r\nconnection: close\r\n").into_bytes();
     for (name, value) in &head.headers {
         for part in [name.as_str().as_bytes(), b": ", value.as_bytes(), b"\r\n"] {
-            told.extend_from_slice(part);
+            answer.extend_from_slice(part);
         }
     }
     // The rest ends the head.
-    told.extend_from_slice(rest.as_bytes());
-    told.extend_from_slice(body.as_bytes());
-    Some(told)
+    answer.extend_from_slice(rest.as_bytes());
+    answer.extend_from_slice(body.as_bytes());
+    Some(answer)
 }

@@ -40,11 +40,11 @@ impl Socket {
     }
 
     /// Whether something else is sent in place of `bytes`, which then count as written.
-    fn is_told_better(&mut self, bytes: &[u8]) -> bool {
-        let Some(told) = refused_by_hyper::told_better(bytes, &self.instruments) else {
+    fn is_explained(&mut self, bytes: &[u8]) -> bool {
+        let Some(explained) = refused_by_hyper::explained(bytes, &self.instruments) else {
             return false;
         };
-        self.instead = told;
+        self.instead = explained;
         self.traffic.leave_unread();
         true
     }
@@ -106,7 +106,7 @@ impl AsyncWrite for Socket {
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
         ready!(self.poll_instead(context))?;
-        if self.is_told_better(bytes) {
+        if self.is_explained(bytes) {
             return self.counted(Poll::Ready(Ok(bytes.len())));
         }
         let written = Pin::new(&mut self.stream).poll_write(context, bytes);
@@ -120,7 +120,7 @@ impl AsyncWrite for Socket {
     ) -> Poll<io::Result<usize>> {
         ready!(self.poll_instead(context))?;
         if let [bytes] = slices
-            && self.is_told_better(bytes)
+            && self.is_explained(bytes)
         {
             return self.counted(Poll::Ready(Ok(bytes.len())));
         }

@@ -8,9 +8,10 @@ use crate::geometry::geodesy::{LatLon, LatLonBox, TangentPlane, undulation_m};
 use crate::geometry::{Point2, Point3, Rect};
 use crate::scenario::frame::{self, Datum, Frame, MAX_REACH_M, Wgs84};
 
-use super::dataset::{Named, over_grid};
+use super::dataset::Named;
 use super::fault::Faults;
 use super::fields::Fields;
+use super::fitted::{over_dataset, over_grid};
 use super::path::Path;
 use super::ranges::{COORDINATE, LATITUDE, LONGITUDE};
 use super::sketch;
@@ -185,7 +186,7 @@ impl Earth {
         let sketch = sketch::Sketch::of(fields);
         let earth = |area| Self::over(area, datum, sketch.mean_alt);
         let area = given.unwrap_or_else(|| match dataset {
-            Some(dataset) => dataset.within(sketch.area(), &sketch.ends, earth),
+            Some(named) => over_dataset(named, sketch.area(), &sketch.ends, earth),
             None => over_grid(fields, &sketch.ends, earth).unwrap_or_else(|| sketch.area()),
         });
         let earth = earth(area);

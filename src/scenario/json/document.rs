@@ -66,7 +66,7 @@ pub(super) fn document(
         planner(at, &chart, rules, drawn_seed, faults)
     });
     let max_climb_deg = draft.map(|draft| draft.max_climb_deg);
-    let place = place(
+    let layout = layout(
         &fields,
         dataset.as_ref(),
         &chart,
@@ -75,8 +75,8 @@ pub(super) fn document(
         rules,
         faults,
     );
-    let (place, mut planner) = (place?, planner?);
-    let distance = (place.target - place.start).norm();
+    let (layout, mut planner) = (layout?, planner?);
+    let distance = (layout.target - layout.start).norm();
     let limit = rules.limits.path_samples;
     if names_spacing(&fields) {
         check_samples(distance, planner.smoothing.spacing, limit, faults);
@@ -87,11 +87,11 @@ pub(super) fn document(
     Some(Scenario {
         name: name?,
         frame: chart.finish()?,
-        start: place.start,
-        target: place.target,
-        area: place.area,
-        threats: place.threats,
-        terrain: place.terrain,
+        start: layout.start,
+        target: layout.target,
+        area: layout.area,
+        threats: layout.threats,
+        terrain: layout.terrain,
         altitude: altitude?,
         vehicle: draft?.finish(distance, planner.waypoints),
         weights: weights?,
@@ -114,7 +114,7 @@ fn section<T>(
 }
 
 /// Everything that has coordinates.
-struct Place {
+struct Layout {
     start: Point3,
     target: Point3,
     area: Rect,
@@ -122,7 +122,7 @@ struct Place {
     terrain: Terrain,
 }
 
-fn place(
+fn layout(
     fields: &Fields<'_>,
     dataset: Option<&Named<'_>>,
     chart: &Chart,
@@ -130,7 +130,7 @@ fn place(
     max_climb_deg: Option<f64>,
     rules: &Rules,
     faults: &mut Faults,
-) -> Option<Place> {
+) -> Option<Layout> {
     let start = fields.required("start", faults, |at, faults| chart.point3(at, faults));
     let target = fields.required("target", faults, |at, faults| chart.point3(at, faults));
     let given_area = chart.area(fields, [start, target], faults);
@@ -180,7 +180,7 @@ fn place(
     let area = given_area?.unwrap_or_else(|| {
         default_area([start, target], altitude, max_climb_deg, &threats, &terrain)
     });
-    Some(Place {
+    Some(Layout {
         start,
         target,
         area,

@@ -12,6 +12,7 @@ mod document;
 mod ends;
 mod fault;
 mod fields;
+mod fitted;
 mod parameters;
 mod path;
 mod planner;

@@ -87,7 +87,7 @@ impl Field<'_> {
                 .collect();
             let mut legs = self.legs(&radii, least, effort);
             let cost =
-                |legs: &Legs, (event, across): &(Event, f64)| legs.told(*across).max(event.cost);
+                |legs: &Legs, (event, across): &(Event, f64)| legs.known(*across).max(event.cost);
             let cheap = |legs: &Legs| -> Vec<Event> {
                 let cheap = used.iter().filter(|used| cost(legs, used) < proven);
                 cheap.map(|(event, _)| *event).collect()

@@ -21,8 +21,8 @@ impl Peak {
     pub(super) fn of(scenario: &Scenario) -> Option<Self> {
         let below = below_middle(scenario)?;
         let weight = scenario.weights.altitude * scenario.planner.waypoints as f64;
-        let is_told = below[0] * below[1] > 0.0 && weight > 0.0;
-        is_told.then(|| Self {
+        let is_known = below[0] * below[1] > 0.0 && weight > 0.0;
+        is_known.then(|| Self {
             off_middle: below.map(f64::abs),
             weight,
             steepest: steepest(scenario),

@@ -1,6 +1,6 @@
 //! How a plan is claimed to be run.
 
-use std::sync::{Arc, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use async_nats::jetstream::{AckKind, Message};
@@ -145,10 +145,7 @@ impl JetStream {
 
     /// One slot of the node checks for all.
     fn is_patrol_due(&self) -> bool {
-        let mut last = self
-            .last_patrol
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut last = self.last_patrol.lock();
         let due = last.is_none_or(|last| last.elapsed() >= self.patrol());
         if due {
             *last = Some(Instant::now());
@@ -158,10 +155,7 @@ impl JetStream {
 
     /// Where one lost job was found there may be more.
     fn patrol_again(&self) {
-        *self
-            .last_patrol
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner) = None;
+        *self.last_patrol.lock() = None;
     }
 
     /// Begin to run the plan of a job; `None` when there is nothing to run.
@@ -221,7 +215,7 @@ impl JetStream {
         match found {
             Found::Over => answer(id, &job, AckKind::Ack).await,
             Found::Lost(plan) => {
-                (self.options.lost)(&plan);
+                (self.options.on_lost)(&plan);
                 answer(id, &job, AckKind::Ack).await;
             }
             Found::Ours => {}
@@ -271,7 +265,7 @@ impl JetStream {
                         if lost::end(&mut record.plan, record.lost.into(), now_ms)? {
                             record.ended(self.options.retention);
                             found = Found::Lost(Box::new(record.plan.clone()));
-                            return Ok(Some(Change::told(record)));
+                            return Ok(Some(Change::announced(record)));
                         }
                         record.plan.requeue()?;
                         events.push(record.status());
@@ -284,7 +278,7 @@ impl JetStream {
                 found = Found::Run(record.clone());
                 Ok(Some(Change {
                     events,
-                    ..Change::told(record)
+                    ..Change::announced(record)
                 }))
             })
             .await
@@ -333,7 +327,7 @@ impl JetStream {
         let end = Ending::Failed(lost).at((self.options.clock)());
         match self.finish(id, attempt, &end).await {
             Ok(plan) => {
-                (self.options.lost)(&plan);
+                (self.options.on_lost)(&plan);
                 Ok(())
             }
             // It was deleted, or ended, meanwhile.

@@ -1,12 +1,12 @@
 //! A lane's jobs, as the servers deliver them.
 
 use std::collections::HashMap;
-use std::sync::{MutexGuard, PoisonError};
 use std::time::Duration;
 
 use async_nats::jetstream::consumer::{AckPolicy, PullConsumer, pull};
 use async_nats::jetstream::{AckKind, Message};
 use futures_util::StreamExt as _;
+use parking_lot::MutexGuard;
 
 use super::JetStream;
 use super::connect::PATIENCE;
@@ -102,9 +102,7 @@ impl JetStream {
     }
 
     fn consumers(&self) -> MutexGuard<'_, HashMap<Lane, PullConsumer>> {
-        self.consumers
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
+        self.consumers.lock()
     }
 }
 

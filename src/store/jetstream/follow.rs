@@ -31,14 +31,14 @@ pub(super) enum Reading {
 }
 
 impl JetStream {
-    /// Read for ever; report the state of reading to `told`.
-    pub(super) async fn follow(self: Arc<Self>, told: watch::Sender<Reading>) {
+    /// Read for ever; report the state of reading to `reading`.
+    pub(super) async fn follow(self: Arc<Self>, reading: watch::Sender<Reading>) {
         let mut read = 0;
         loop {
-            if let Err(error) = self.read_on(&mut read, &told).await {
+            if let Err(error) = self.read_on(&mut read, &reading).await {
                 tracing::warn!(%error, "plans are no longer followed; trying again");
             }
-            told.send_if_modified(|reading| {
+            reading.send_if_modified(|reading| {
                 let was_current = *reading == Reading::Current;
                 if was_current {
                     *reading = Reading::Broken;
@@ -53,7 +53,7 @@ impl JetStream {
     async fn read_on(
         &self,
         read: &mut u64,
-        told: &watch::Sender<Reading>,
+        reading: &watch::Sender<Reading>,
     ) -> Result<(), StoreError> {
         let what = "the plans' stream";
         let begin = if *read == 0 {
@@ -66,7 +66,7 @@ impl JetStream {
         let all = format!("{}.plans.*", self.servers.namespace);
         let (is_empty, mut messages) = self.read_steps(what, all, begin).await?;
         if is_empty {
-            told.send_replace(Reading::Current);
+            reading.send_replace(Reading::Current);
         }
         while let Some(message) = messages.next().await {
             let message = message.map_err(|error| refused(what, &error))?;
@@ -77,7 +77,7 @@ impl JetStream {
             self.take_in(&message, sequence);
             *read = sequence.max(*read);
             if pending == 0 {
-                told.send_if_modified(|reading| {
+                reading.send_if_modified(|reading| {
                     let news = *reading != Reading::Current;
                     *reading = Reading::Current;
                     news

@@ -14,7 +14,7 @@ const ROOM: usize = 64 << 20;
 /// Bytes assumed for an event that is not a route.
 const SMALL_EVENT: usize = 256;
 
-/// What one step told.
+/// The events of one step.
 #[derive(Debug, Clone)]
 struct Batch {
     /// Id of the newest event up to and including this step.
@@ -23,7 +23,7 @@ struct Batch {
     bytes: usize,
 }
 
-/// What one plan has told.
+/// The events of one plan.
 #[derive(Debug, Clone, Default)]
 pub(super) struct History {
     /// Events up to this one are not here.
@@ -237,7 +237,7 @@ mod tests {
                     mark: Uuid::nil(),
                     state: Arc::new(State::Kept(Box::new(record.clone()))),
                     events,
-                    told: false,
+                    announced: false,
                 }
             })
             .collect()

@@ -1,7 +1,6 @@
 //! Webhooks for ends of plans: each sent by one node at a time.
 
 use std::collections::BTreeSet;
-use std::sync::PoisonError;
 
 use async_nats::jetstream::kv::CreateErrorKind;
 
@@ -116,7 +115,7 @@ impl JetStream {
         }
     }
 
-    fn telling(&self) -> std::sync::MutexGuard<'_, BTreeSet<PlanId>> {
-        self.telling.lock().unwrap_or_else(PoisonError::into_inner)
+    fn telling(&self) -> parking_lot::MutexGuard<'_, BTreeSet<PlanId>> {
+        self.telling.lock()
     }
 }

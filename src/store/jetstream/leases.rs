@@ -1,16 +1,16 @@
 //! The runs of this node: each keeps its job by telling the servers again and again that it is in progress.
 
 use std::collections::HashMap;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use async_nats::jetstream::AckKind;
 use async_nats::jetstream::message::Acker;
+use parking_lot::{Mutex, MutexGuard};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
 use super::record::State;
-use super::told::Told;
+use super::run_steps::RunSteps;
 use crate::job::PlanId;
 
 /// Renewals within the time after which the job would be given to another node.
@@ -28,7 +28,7 @@ struct Held {
     renewing: JoinHandle<()>,
     /// Steps that have been appended, as far as the worker knows.
     appended: u64,
-    told: Told,
+    steps: RunSteps,
 }
 
 /// The delivery by which the job is held.
@@ -36,7 +36,7 @@ pub(super) type Job = std::sync::Arc<Acker>;
 
 impl Leases {
     fn held(&self) -> MutexGuard<'_, HashMap<PlanId, Held>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.lock()
     }
 
     /// Hold a job from now on; returns what tells its run to stop.
@@ -55,7 +55,7 @@ impl Leases {
             job,
             renewing: tokio::spawn(renew(id, jobs, ack_wait / RENEWALS)),
             appended: 0,
-            told: Told::default(),
+            steps: RunSteps::default(),
         };
         if let Some(before) = self.held().insert(id, held) {
             before.renewing.abort();
@@ -104,16 +104,16 @@ impl Leases {
         }
     }
 
-    /// Read or update what a run has told; `None` when it is not held here.
-    pub(super) fn told<T>(
+    /// Read or update the steps of a run; `None` when it is not held here.
+    pub(super) fn steps<T>(
         &self,
         id: PlanId,
         attempt: u64,
-        look: impl FnOnce(&mut Told) -> T,
+        look: impl FnOnce(&mut RunSteps) -> T,
     ) -> Option<T> {
         let mut all = self.held();
         let held = all.get_mut(&id).filter(|held| held.attempt == attempt)?;
-        Some(look(&mut held.told))
+        Some(look(&mut held.steps))
     }
 
     /// Let go of a run; returns its job, if it was held.

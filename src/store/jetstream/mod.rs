@@ -21,22 +21,23 @@ mod nodes;
 mod orphans;
 mod record;
 mod removal;
+mod run_steps;
 mod runs;
 mod settings;
 mod shelf;
 mod steps;
 mod submit;
-mod told;
 mod turns;
 mod view;
 
 use std::collections::{BTreeSet, HashMap};
+use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use async_nats::jetstream::consumer::PullConsumer;
 use async_trait::async_trait;
+use parking_lot::Mutex;
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::Instant;
@@ -133,10 +134,10 @@ impl JetStreamStore {
             end: watch::Sender::new(false),
         });
         store.announce().await?;
-        let (told, mut reading) = watch::channel(Reading::Catching);
+        let (read, mut reading) = watch::channel(Reading::Catching);
         let opened = Self {
             tasks: vec![
-                tokio::spawn(store.clone().follow(told)),
+                tokio::spawn(store.clone().follow(read)),
                 tokio::spawn(store.clone().keep_announcing()),
             ],
             store,
@@ -274,7 +275,7 @@ impl Store for JetStreamStore {
         Ok(page)
     }
 
-    async fn has_told(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
+    async fn has_event(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
         let store = self.open_store()?;
         let has_come_so_far = |standing: &Standing| -> Result<bool, StoreError> {
             let record = standing.record(id, (store.options.clock)())?;

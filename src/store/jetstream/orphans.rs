@@ -1,9 +1,9 @@
 //! Jobs without a record: either the plan is about to be accepted, or it never was.
 
 use std::collections::HashMap;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use parking_lot::{Mutex, MutexGuard};
 use tokio::time::Instant;
 
 use crate::job::PlanId;
@@ -62,7 +62,7 @@ impl Orphans {
     }
 
     fn missed(&self) -> MutexGuard<'_, HashMap<PlanId, Instant>> {
-        self.missed.lock().unwrap_or_else(PoisonError::into_inner)
+        self.missed.lock()
     }
 }
 

@@ -26,7 +26,8 @@ pub(super) struct Step {
     pub(super) events: Vec<Event>,
     /// Whether the new state is an event too, and the end when the plan has ended: both can be derived from the state,
     /// so they are not written twice.
-    pub(super) told: bool,
+    #[serde(rename = "told")]
+    pub(super) announced: bool,
 }
 
 /// The state of a plan.
@@ -180,22 +181,22 @@ impl Step {
         let Change {
             mut state,
             events,
-            told,
+            announced,
         } = change;
         if let State::Kept(record) = &mut state {
-            record.last_event += count(events.len(), told, &record.plan);
+            record.last_event += count(events.len(), announced, &record.plan);
         }
         Self {
             mark: Uuid::new_v4(),
             state: Arc::new(state),
             events,
-            told,
+            announced,
         }
     }
 
     /// Id of its first event; of the next one, when it has none.
     pub(super) fn first_event(&self, record: &Record) -> u64 {
-        record.last_event + 1 - count(self.events.len(), self.told, &record.plan)
+        record.last_event + 1 - count(self.events.len(), self.announced, &record.plan)
     }
 
     /// All its events, with their ids.
@@ -208,7 +209,7 @@ impl Step {
             Some(record.status()),
             status.is_final().then_some(Event::End(status)),
         ];
-        let now = now.into_iter().flatten().filter(|_| self.told);
+        let now = now.into_iter().flatten().filter(|_| self.announced);
         (self.first_event(record)..)
             .zip(self.events.iter().cloned().chain(now))
             .map(|(id, event)| NumberedEvent { id, event })
@@ -227,9 +228,9 @@ impl Step {
     }
 }
 
-/// Number of events of a step with `before` explicit ones, and that of the new state when `told`.
-fn count(before: usize, told: bool, plan: &Plan) -> u64 {
-    before as u64 + u64::from(told) + u64::from(told && plan.status.is_final())
+/// Number of events of a step with `before` explicit ones, and that of the new state when `announced`.
+fn count(before: usize, announced: bool, plan: &Plan) -> u64 {
+    before as u64 + u64::from(announced) + u64::from(announced && plan.status.is_final())
 }
 
 /// Bytes of events as stored in a step.

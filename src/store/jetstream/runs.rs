@@ -6,8 +6,8 @@ use super::JetStream;
 use super::claim::answer;
 use super::history::bytes_of;
 use super::record::{Document, Record, State, length};
+use super::run_steps::{Appended, RunSteps};
 use super::steps::Change;
-use super::told::{Appended, Told};
 use super::view::Standing;
 use crate::job::{Event, Plan, PlanId, Status};
 use crate::store::{End, Ending, StoreError};
@@ -101,16 +101,16 @@ impl JetStream {
     /// Delete the oldest events of a run that tells many. A failure is retried at the next step.
     async fn forget_old_events(&self, id: PlanId, attempt: u64) {
         let kept = self.options.events_kept;
-        let excess = |told: &mut Told| told.excess(kept);
-        let Some(Some(first)) = self.leases.told(id, attempt, excess) else {
+        let excess = |steps: &mut RunSteps| steps.excess(kept);
+        let Some(Some(first)) = self.leases.steps(id, attempt, excess) else {
             return;
         };
         let purge = self.servers.plans.purge();
         let older = purge.filter(self.servers.subject_of(id)).sequence(first);
         match older.await {
             Ok(_) => {
-                let forget = |told: &mut Told| told.forget_before(first);
-                self.leases.told(id, attempt, forget);
+                let forget = |steps: &mut RunSteps| steps.forget_before(first);
+                self.leases.steps(id, attempt, forget);
             }
             Err(error) => tracing::debug!(%error, plan_id = %id, "old events are kept for now"),
         }
@@ -124,7 +124,7 @@ impl JetStream {
         events: &[Event],
     ) -> Result<(), StoreError> {
         let bytes = length(events);
-        let left = self.leases.told(id, attempt, |told| told.bytes_left());
+        let left = self.leases.steps(id, attempt, |steps| steps.bytes_left());
         let left = left.flatten();
         let appended = self
             .plans()
@@ -151,12 +151,12 @@ impl JetStream {
             events: events.len() as u64,
             bytes,
         };
-        self.leases.told(id, attempt, |told| told.push(step));
+        self.leases.steps(id, attempt, |steps| steps.push(step));
         Ok(())
     }
 
     async fn try_to_finish(&self, id: PlanId, attempt: u64, end: &End) -> Result<Plan, StoreError> {
-        let mut parts = parts(&end.told);
+        let mut parts = parts(&end.events);
         let last = parts.pop().unwrap_or_default();
         self.still_own(id, attempt).await?;
         self.append_all(id, attempt, &parts).await?;
@@ -181,7 +181,7 @@ impl JetStream {
                 record.event_bytes += length(last);
                 Ok(Some(Change {
                     events: last.to_vec(),
-                    ..Change::told(record)
+                    ..Change::announced(record)
                 }))
             })
             .await;
@@ -208,7 +208,7 @@ impl JetStream {
                     record.plan.requeue()?;
                     record.plan.queue_position = Some(self.view.known().position(record.place));
                 }
-                Ok(Some(Change::told(record)))
+                Ok(Some(Change::announced(record)))
             })
             .await;
         let standing = released.map_err(|error| lost(error, id))?;
@@ -240,7 +240,7 @@ impl JetStream {
                         return Ok(None);
                     }
                 }
-                Ok(Some(Change::told(record)))
+                Ok(Some(Change::announced(record)))
             })
             .await?;
         if let Some(place) = waited {

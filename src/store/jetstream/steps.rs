@@ -21,16 +21,16 @@ pub(super) struct Change {
     /// Events before that of the new state.
     pub(super) events: Vec<Event>,
     /// Whether the new state is an event too, and the end with it.
-    pub(super) told: bool,
+    pub(super) announced: bool,
 }
 
 impl Change {
-    /// The plan takes this state, and an event tells of it.
-    pub(super) fn told(record: Box<Record>) -> Self {
+    /// The plan takes this state, and an event says so.
+    pub(super) fn announced(record: Box<Record>) -> Self {
         Self {
             state: State::Kept(record),
             events: Vec::new(),
-            told: true,
+            announced: true,
         }
     }
 
@@ -39,7 +39,7 @@ impl Change {
         Self {
             state,
             events: Vec::new(),
-            told: false,
+            announced: false,
         }
     }
 }

@@ -160,7 +160,7 @@ impl JetStream {
         };
         let record = Record::accepted(submission, Queued { place, position }, scenario);
         let plan = record.plan.clone();
-        let change = Change::told(Box::new(record));
+        let change = Change::announced(Box::new(record));
         let begun = self.plans().begin(id, change).await;
         begun.map(|()| plan).map_err(|error| NotAccepted {
             is_certain: !matches!(error, StoreError::Unavailable { .. }),

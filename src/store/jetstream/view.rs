@@ -1,8 +1,9 @@
 //! A node's knowledge of all plans: kept from the plans' stream, and from what the node writes itself, so that whoever
 //! has been answered can read what they were told.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
+use parking_lot::{Mutex, MutexGuard};
 use tokio::sync::watch;
 
 use super::known::Known;
@@ -36,7 +37,7 @@ impl View {
     }
 
     pub(super) fn known(&self) -> MutexGuard<'_, Known> {
-        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+        self.known.lock()
     }
 
     /// Ticks whenever there may be something to claim.

@@ -244,7 +244,7 @@ impl Store for SqliteStore {
             .await
     }
 
-    async fn has_told(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
+    async fn has_event(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
         let page = self.events(id, event.saturating_sub(1), 1).await?;
         Ok(event <= page.forgotten || !page.events.is_empty())
     }
@@ -349,10 +349,10 @@ mod tests {
             })
         };
         let wal = Value::Text("wal".to_owned());
-        assert_eq!(set("journal_mode").await.expect("it is told"), wal);
+        assert_eq!(set("journal_mode").await.expect("a setting"), wal);
         // FULL, on the scale from OFF, 0, to EXTRA, 3.
         let full = Value::Integer(2);
-        assert_eq!(set("synchronous").await.expect("it is told"), full);
+        assert_eq!(set("synchronous").await.expect("a setting"), full);
         store.close().await;
     }
 

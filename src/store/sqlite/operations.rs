@@ -108,7 +108,7 @@ pub(super) fn append(
     if let Some(best) = best {
         keep_incumbent(tx, &row, best)?;
     }
-    tx.tell(&mut row, events)?;
+    tx.add_events(&mut row, events)?;
     row.update_progress(tx.connection)?;
     Ok(())
 }
@@ -120,7 +120,7 @@ pub(super) fn finish(
     end: &End,
 ) -> Result<Plan, StoreError> {
     let mut row = leased(tx, id, attempt)?;
-    tx.tell(&mut row, &end.told)?;
+    tx.add_events(&mut row, &end.events)?;
     end.apply(&mut row.plan)?;
     forget_incumbent(tx, &row)?;
     if let Ending::Result { document, .. } = &end.ending {
@@ -286,7 +286,7 @@ fn forget_incumbent(tx: &Transaction<'_>, row: &PlanRow) -> Result<(), StoreErro
 
 pub(super) fn tell_status(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<(), StoreError> {
     let status = Event::Status(Box::new(row.plan.clone()));
-    tx.tell(row, &[status])
+    tx.add_events(row, &[status])
 }
 
 /// The caller has just ended the plan. Its retention time starts now.
@@ -295,5 +295,5 @@ pub(super) fn tell_end(tx: &mut Transaction<'_>, row: &mut PlanRow) -> Result<()
     let status = Event::Status(Box::new(row.plan.clone()));
     let end = Event::End(row.plan.status);
     webhooks::make_due(tx, row)?;
-    tx.tell(row, &[status, end])
+    tx.add_events(row, &[status, end])
 }

@@ -4,7 +4,8 @@
 //! nothing read before a commit is kept after it. So whoever got an answer about a change also sees that change.
 
 use std::collections::HashMap;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use parking_lot::{Mutex, MutexGuard};
 
 use crate::job::{Plan, PlanId};
 use crate::store::Stats;
@@ -91,7 +92,7 @@ impl Records {
     }
 
     fn lock(&self) -> MutexGuard<'_, Kept> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.lock()
     }
 }
 

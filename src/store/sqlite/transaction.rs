@@ -72,7 +72,11 @@ impl Transaction<'_> {
     }
 
     /// Add to the events of a plan, and delete its oldest when there are too many; the caller writes the row.
-    pub(super) fn tell(&mut self, row: &mut PlanRow, events: &[Event]) -> Result<(), StoreError> {
+    pub(super) fn add_events(
+        &mut self,
+        row: &mut PlanRow,
+        events: &[Event],
+    ) -> Result<(), StoreError> {
         for batch in events.chunks(BATCH) {
             let batch = Batch::of(row, batch)?;
             self.keep(row, &batch)?;

@@ -3,10 +3,11 @@
 
 use std::collections::{HashMap, VecDeque};
 use std::fs::File;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
+use parking_lot::Mutex;
 use rusqlite::Connection;
 use tokio::runtime::Handle;
 use tokio::sync::{oneshot, watch};
@@ -168,11 +169,7 @@ impl Writer {
 impl Drop for Writer {
     fn drop(&mut self) {
         self.send(Message::Leave).ok();
-        let thread = self
-            .thread
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .take();
+        let thread = self.thread.lock().take();
         if let Some(thread) = thread {
             // Its panic, if any, has been reported by the panic hook.
             thread.join().ok();
@@ -217,7 +214,7 @@ impl Desk {
             })
         })??;
         for plan in &ended {
-            (self.options.lost)(plan);
+            (self.options.on_lost)(plan);
         }
         Ok(())
     }
@@ -357,11 +354,11 @@ impl Desk {
         }
         self.queued = tx.queued;
         let effects = tx.effects;
-        self.tell(effects);
+        self.carry_out(effects);
         Ok(result)
     }
 
-    fn tell(&mut self, effects: Vec<Effect>) {
+    fn carry_out(&mut self, effects: Vec<Effect>) {
         for effect in effects {
             match effect {
                 Effect::Changed(id) => self.changes.tick(id),
@@ -376,7 +373,7 @@ impl Desk {
                 Effect::Unleased(id) => {
                     self.leases.remove(&id);
                 }
-                Effect::Ended(plan) => (self.options.lost)(&plan),
+                Effect::Ended(plan) => (self.options.on_lost)(&plan),
             }
         }
     }

@@ -136,7 +136,7 @@ async fn a_plan_whose_document_is_lost_fails_and_does_not_block_the_queue() {
     let ended: Arc<Mutex<Vec<Plan>>> = Arc::default();
     let tell = Arc::clone(&ended);
     let options = Options {
-        lost: Arc::new(move |plan| tell.lock().unwrap().push(plan.clone())),
+        on_lost: Arc::new(move |plan| tell.lock().unwrap().push(plan.clone())),
         ..Options::new(10)
     };
     let store = JetStreamStore::open(node(&address), options).await.unwrap();

@@ -126,7 +126,7 @@ async fn events_are_read_without_loss_or_repeat_from_any_position() {
         }
         assert_eq!(store.events(id, 0, 0).await.unwrap().events, []);
         for (event, told) in [(0, true), (1, true), (317, true), (318, false)] {
-            assert_eq!(store.has_told(id, event).await.unwrap(), told, "{event}");
+            assert_eq!(store.has_event(id, event).await.unwrap(), told, "{event}");
         }
     })
     .await;

@@ -115,8 +115,8 @@ impl Store for FaultyStore {
         self.sound.events(id, after, limit).await
     }
 
-    async fn has_told(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
-        self.sound.has_told(id, event).await
+    async fn has_event(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
+        self.sound.has_event(id, event).await
     }
 
     fn changes(&self, id: PlanId) -> watch::Receiver<u64> {

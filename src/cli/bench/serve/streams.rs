@@ -12,7 +12,7 @@ use super::{Arguments, location, tiny};
 
 /// What one reader received.
 #[derive(Debug, Clone, Copy, Default)]
-struct Told {
+struct Seen {
     events: usize,
     gaps: usize,
     ends: usize,
@@ -58,23 +58,23 @@ async fn follow(arguments: &Arguments, readers: usize) -> anyhow::Result<Vec<Cel
     }
     let took_s = begun.elapsed().as_secs_f64();
     ensure!(
-        all.iter().all(|told| told.ends == 1),
-        "every reader should be told one end"
+        all.iter().all(|seen| seen.ends == 1),
+        "every reader should see one end"
     );
-    let events: usize = all.iter().map(|told| told.events).sum();
+    let events: usize = all.iter().map(|seen| seen.events).sum();
     Ok(vec![
         Cell::count(readers),
         Cell::count(events / readers),
-        Cell::count(all.iter().map(|told| told.gaps).sum()),
+        Cell::count(all.iter().map(|seen| seen.gaps).sum()),
         Cell::Number(events as f64 / took_s, 0),
         Cell::Number(took_s, 1),
     ])
 }
 
-async fn read(address: std::net::SocketAddr, question: Question) -> anyhow::Result<Told> {
+async fn read(address: std::net::SocketAddr, question: Question) -> anyhow::Result<Seen> {
     let mut connection = Connection::open(address).await?;
     let mut body = connection.begin(&question).await?.into_body();
-    let mut told = Told::default();
+    let mut seen = Seen::default();
     let mut text = Vec::new();
     while let Some(frame) = body.frame().await {
         let Ok(data) = frame?.into_data() else {
@@ -87,13 +87,13 @@ async fn read(address: std::net::SocketAddr, question: Question) -> anyhow::Resu
             .map_or(0, |end| end + 1);
         for line in text[..whole].split(|byte| *byte == b'\n') {
             match line.strip_prefix(b"event: ") {
-                Some(b"gap") => told.gaps += 1,
-                Some(b"end") => told.ends += 1,
+                Some(b"gap") => seen.gaps += 1,
+                Some(b"end") => seen.ends += 1,
                 _ => {}
             }
-            told.events += usize::from(line.starts_with(b"id: "));
+            seen.events += usize::from(line.starts_with(b"id: "));
         }
         text.drain(..whole);
     }
-    Ok(told)
+    Ok(seen)
 }

@@ -80,7 +80,7 @@ impl<'a> Legs<'a> {
     }
 
     /// A lower bound for routes that cost `least` or more seen from above, from what is known of legs.
-    pub(super) fn told(&self, least: f64) -> f64 {
+    pub(super) fn known(&self, least: f64) -> f64 {
         let level = self.prices.climbing_at(least);
         let told_apart = self.told_apart.as_ref();
         told_apart.map_or(level, |(_, kinds)| cheapest(kinds, least).0.max(level))

@@ -121,8 +121,8 @@ mod tests {
             (level, [20.0, -10.0], far, 80.0),
             (away, [20.0, 10.0], 0.0, 40.0),
         ] {
-            let told = slopes.at_heights(heights).map(f64::to_bits);
-            assert_eq!(told, [from, to].map(f64::to_bits), "{heights:?}");
+            let answered = slopes.at_heights(heights).map(f64::to_bits);
+            assert_eq!(answered, [from, to].map(f64::to_bits), "{heights:?}");
         }
     }
 }

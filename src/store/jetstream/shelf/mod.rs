@@ -9,9 +9,10 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::io::{self, Write};
 use std::mem;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use parking_lot::Mutex;
 use tokio::runtime::Handle;
 
 use self::opened::Opened;
@@ -64,7 +65,7 @@ impl JetStreamShelf {
     }
 
     fn opened(&self) -> Result<Arc<Opened>, StoreError> {
-        let mut opening = self.opening.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut opening = self.opening.lock();
         if let Some(opened) = &opening.opened {
             return Ok(opened.clone());
         }

@@ -5,7 +5,7 @@ use super::value::{Given, Value, quoted};
 
 /// The store.
 #[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd)]
-pub enum Place {
+pub enum Backend {
     /// A file in the data directory, for one process.
     #[default]
     Sqlite,
@@ -13,7 +13,7 @@ pub enum Place {
     Nats(Address),
 }
 
-impl Place {
+impl Backend {
     const SQLITE: &'static str = "sqlite";
 
     /// Whether several nodes can share it.
@@ -23,7 +23,7 @@ impl Place {
     }
 }
 
-impl Value for Place {
+impl Value for Backend {
     const ALLOWED: &'static str = concat!("sqlite, or ", address::allowed!());
 
     fn read(given: &Given) -> Option<Self> {

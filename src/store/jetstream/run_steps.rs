@@ -1,4 +1,4 @@
-//! What a run has told so far, step by step, so that the oldest steps can be deleted when there are too many events.
+//! The steps that a run has appended so far, so that the oldest steps can be deleted when there are too many events.
 
 use std::collections::VecDeque;
 
@@ -15,15 +15,15 @@ pub(super) struct Appended {
 
 /// The steps of a run that are still kept.
 #[derive(Debug, Default)]
-pub(super) struct Told {
+pub(super) struct RunSteps {
     steps: VecDeque<Appended>,
     events: u64,
     bytes: u64,
-    /// Whether some have been deleted: everything told by earlier runs of the plan goes with them.
+    /// Whether some have been deleted: the events of earlier runs of the plan goes with them.
     has_forgotten: bool,
 }
 
-impl Told {
+impl RunSteps {
     /// Add a step, unless it is there already: a retry appends again what was followed by a failure.
     pub(super) fn push(&mut self, step: Appended) {
         if self
@@ -76,39 +76,39 @@ mod tests {
 
     #[test]
     fn the_newest_events_are_kept_in_whole_steps() {
-        let mut told = Told::default();
+        let mut steps = RunSteps::default();
         for sequence in 1..=7 {
-            assert_eq!(told.excess(20), None);
+            assert_eq!(steps.excess(20), None);
             let step = Appended {
                 number: sequence,
                 sequence: 10 * sequence,
                 events: 4,
                 bytes: 100,
             };
-            told.push(step);
-            told.push(step);
+            steps.push(step);
+            steps.push(step);
         }
-        assert_eq!((told.excess(20), told.bytes_left()), (None, None));
-        told.push(Appended {
+        assert_eq!((steps.excess(20), steps.bytes_left()), (None, None));
+        steps.push(Appended {
             number: 8,
             sequence: 80,
             events: 4,
             bytes: 100,
         });
-        assert_eq!(told.excess(20), Some(40));
-        told.forget_before(40);
-        assert_eq!((told.events, told.bytes_left()), (20, Some(500)));
-        assert_eq!(told.excess(20), None);
+        assert_eq!(steps.excess(20), Some(40));
+        steps.forget_before(40);
+        assert_eq!((steps.events, steps.bytes_left()), (20, Some(500)));
+        assert_eq!(steps.excess(20), None);
         // A single step above the limit is kept whole.
-        told.push(Appended {
+        steps.push(Appended {
             number: 9,
             sequence: 90,
             events: 256,
             bytes: 6_400,
         });
-        assert_eq!(told.excess(20), Some(90));
-        told.forget_before(90);
-        assert_eq!((told.events, told.bytes_left()), (256, Some(6_400)));
-        assert_eq!(told.excess(20), None);
+        assert_eq!(steps.excess(20), Some(90));
+        steps.forget_before(90);
+        assert_eq!((steps.events, steps.bytes_left()), (256, Some(6_400)));
+        assert_eq!(steps.excess(20), None);
     }
 }

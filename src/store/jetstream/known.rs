@@ -196,6 +196,21 @@ impl Known {
         self.queue.range(..(place, PlanId::nil())).count() as u64 + 1
     }
 
+    /// Plans behind `place` in the queue that have been waiting since `accepted_before` or longer, with their places.
+    pub(super) fn waiting(
+        &self,
+        place: u64,
+        accepted_before: i64,
+        at_most: usize,
+    ) -> Vec<(u64, PlanId)> {
+        let behind = self.queue.range((place, PlanId::max())..);
+        let old = behind.filter(|(_, id)| {
+            self.kept(*id)
+                .is_some_and(|record| record.plan.created_ms <= accepted_before)
+        });
+        old.take(at_most).copied().collect()
+    }
+
     /// Queue place of a plan, if the plan exists.
     pub(super) fn place(&self, id: PlanId) -> Option<u64> {
         self.kept(id).map(|record| record.place)

@@ -17,6 +17,7 @@ mod hooks;
 mod known;
 mod lane;
 mod leases;
+mod lost_jobs;
 mod nodes;
 mod orphans;
 mod record;
@@ -51,6 +52,7 @@ use self::connect::Servers;
 use self::follow::Reading;
 use self::lane::Lane;
 use self::leases::Leases;
+use self::lost_jobs::Round;
 use self::orphans::Orphans;
 use self::steps::Plans;
 use self::view::{Standing, View};
@@ -87,6 +89,8 @@ struct JetStream {
     turn: tokio::sync::Mutex<()>,
     last_patrol: Mutex<Option<Instant>>,
     orphans: Orphans,
+    /// The search for missing jobs.
+    round: Mutex<Round>,
     all_slots: AtomicUsize,
     /// Plans whose webhooks this node is sending.
     telling: Mutex<BTreeSet<PlanId>>,
@@ -130,6 +134,7 @@ impl JetStreamStore {
             turn: tokio::sync::Mutex::default(),
             last_patrol: Mutex::default(),
             orphans: Orphans::default(),
+            round: Mutex::default(),
             telling: Mutex::default(),
             end: watch::Sender::new(false),
         });

@@ -92,6 +92,9 @@ impl JetStream {
                 Err(error) => return Err(error),
             }
         }
+        if let Err(error) = self.restore_jobs(now_ms).await {
+            tracing::debug!(%error, "missing jobs were not looked for; trying again");
+        }
         Ok(removed)
     }
 }

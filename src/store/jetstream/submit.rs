@@ -146,9 +146,10 @@ impl JetStream {
     ) -> Result<Plan, NotAccepted> {
         let id = submission.id;
         let scenario = Document::scenario(id, &submission.scenario);
+        let mark = id.to_string();
         let (document, job) = tokio::join!(
             self.servers.write(&scenario, &submission.scenario),
-            self.enqueue(id, lane)
+            self.enqueue(id, lane, &mark)
         );
         let place = match document.and(job) {
             Ok(place) => place,
@@ -168,15 +169,22 @@ impl JetStream {
         })
     }
 
-    /// Its place in the queue's stream. A job written twice because the answer was lost is there once: the servers
-    /// identify it by its plan.
-    async fn enqueue(&self, id: PlanId, lane: &Lane) -> Result<u64, StoreError> {
-        self.servers.outlast(|| self.try_to_enqueue(id, lane)).await
+    /// Write a job; returns its place in the queue's stream. A job written twice because the answer was lost is there
+    /// once: the servers identify it by its `mark`.
+    pub(super) async fn enqueue(
+        &self,
+        id: PlanId,
+        lane: &Lane,
+        mark: &str,
+    ) -> Result<u64, StoreError> {
+        self.servers
+            .outlast(|| self.try_to_enqueue(id, lane, mark))
+            .await
     }
 
-    async fn try_to_enqueue(&self, id: PlanId, lane: &Lane) -> Result<u64, StoreError> {
+    async fn try_to_enqueue(&self, id: PlanId, lane: &Lane, mark: &str) -> Result<u64, StoreError> {
         let what = || format!("job of plan {id}");
-        let job = PublishMessage::build().message_id(id.to_string());
+        let job = PublishMessage::build().message_id(mark);
         let subject = self.job_subject(id, lane);
         let sent = self.servers.context.send_publish(subject, job).await;
         let answered = match sent {

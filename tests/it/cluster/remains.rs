@@ -15,7 +15,7 @@ use noctule::store::jetstream::{JetStreamStore, Settings};
 use noctule::store::{Options, Store, StoreError};
 
 use crate::support::nats;
-use crate::support::patience::in_time;
+use crate::support::patience::{eventually, in_time};
 use crate::support::plans::{failure, history, kind, submission};
 use crate::support::stores::node;
 
@@ -128,6 +128,41 @@ async fn a_job_that_somebody_holds_does_not_keep_the_turn_from_other_owners() {
     let second = submit("other").await;
     let claimed = in_time(store.claim()).await.unwrap();
     assert_eq!(claimed.plan.id, second);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn jobs_that_vanished_from_the_queue_are_put_back_once() {
+    let address = nats::address();
+    let [one, two, other] = [(); 3].map(|()| super::open(&address));
+    let [one, two, other] = [one.await, two.await, other.await];
+    let mut plans = Vec::new();
+    for _ in 0..3 {
+        plans.push(one.submit(submission()).await.unwrap().plan);
+    }
+    let running = one.claim().await.unwrap();
+    let jobs = format!("{}-jobs", nats::namespace(&address));
+    let jobs = client(&address).await.get_stream(jobs).await.unwrap();
+    jobs.purge().await.unwrap();
+    let in_queue = async || jobs.get_info().await.unwrap().state.messages;
+
+    // A job may still be on its way.
+    let waiting = &plans[1..];
+    let accepted = waiting[0].created_ms;
+    other.sweep(accepted + 119_999).await.unwrap();
+    assert_eq!(in_queue().await, 0);
+    let (by_one, by_two) =
+        tokio::join!(one.sweep(accepted + 121_000), two.sweep(accepted + 121_000));
+    assert_eq!((by_one.unwrap(), by_two.unwrap()), (0, 0));
+    assert_eq!(in_queue().await, 2);
+
+    one.finish(&running, failure().at(0)).await.unwrap();
+    for plan in waiting {
+        let lease = in_time(two.claim()).await.unwrap();
+        assert_eq!((lease.plan.id, lease.attempt), (plan.id, 1));
+        two.finish(&lease, failure().at(0)).await.unwrap();
+    }
+    // The servers take their time to remove what is done.
+    eventually(async || in_queue().await == 0).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

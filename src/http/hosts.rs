@@ -4,19 +4,13 @@
 //! it, and so can every page whose name has been made to resolve to it (DNS rebinding); such a page cannot hide that
 //! name, because the browser sends it.
 
-use std::future::ready;
 use std::net::{Ipv4Addr, Ipv6Addr};
 use std::sync::Arc;
 
-use axum::extract::Request;
 use axum::http::uri::Authority;
 use axum::http::{HeaderMap, Uri, Version, header};
-use axum::response::IntoResponse as _;
-use futures_util::FutureExt as _;
 
-use super::auth;
 use super::browser::Origins;
-use super::layer::{Answering, Around, Next};
 use super::problem::Problem;
 
 /// The hosts that this service answers for.
@@ -39,7 +33,12 @@ impl Hosts {
     /// # Errors
     /// Where HTTP requires a host and there is none, or more than one, or an unreadable one; and where the host is not
     /// this service's.
-    fn check(&self, uri: &Uri, version: Version, headers: &HeaderMap) -> Result<(), Problem> {
+    pub(super) fn check(
+        &self,
+        uri: &Uri,
+        version: Version,
+        headers: &HeaderMap,
+    ) -> Result<(), Problem> {
         if version == Version::HTTP_11 && !headers.contains_key(header::HOST) {
             return Err(refused("is missing, must name the host that is asked"));
         }
@@ -92,28 +91,10 @@ fn is_of_this_machine(host: &str, known: &[String]) -> bool {
         || known.iter().any(|known| known == name)
 }
 
-/// The layer before all routes, for what is checked on every address; a single one, because each layer costs every
-/// request.
-#[derive(Clone)]
-pub(super) struct AddressCheck(pub(super) Hosts);
-
-impl Around for AddressCheck {
-    fn answer<S: Next>(&self, request: Request, next: &mut S) -> Answering {
-        let uri = request.uri();
-        let checked = self
-            .0
-            .check(uri, request.version(), request.headers())
-            .and_then(|()| auth::refuse_key_in_url(uri));
-        match checked {
-            Ok(()) => Box::pin(next.run(request).map(Ok)),
-            Err(problem) => Box::pin(ready(Ok(problem.into_response()))),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use axum::http::HeaderValue;
+    use axum::response::IntoResponse as _;
 
     use super::*;
 

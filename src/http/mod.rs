@@ -13,6 +13,7 @@ mod entity_tags;
 mod events;
 mod feed;
 mod ground;
+mod head;
 mod hosts;
 mod idempotency;
 mod layer;
@@ -70,6 +71,7 @@ use crate::scenario::json::Rules;
 use crate::store::{Stats, SteadyClock, Store};
 use crate::telemetry::Instruments;
 use auth::{Access, Gate, Needs, Scope};
+use head::HeadCheck;
 use layer::Layered;
 use problem::Problem;
 
@@ -267,7 +269,7 @@ fn wrap(router: Router, cors: &Origins, hosts: Hosts, instruments: Arc<Instrumen
         .layer(MapResponseLayer::new(unwrap_uncompressed))
         .layer(CompressionLayer::new().compress_when(worth_compressing()))
         .layer(MapResponseLayer::new(note_status))
-        .layer(Layered(hosts::AddressCheck(hosts)));
+        .layer(Layered(HeadCheck(hosts)));
     router.layer(layers)
 }
 

@@ -34,6 +34,7 @@ use self::socket::Socket;
 use self::traffic::Traffic;
 use self::unread::Received;
 use super::Phase;
+use super::head;
 use super::phase::stopping;
 use crate::telemetry::Instruments;
 
@@ -55,8 +56,13 @@ pub struct Settings {
 /// Pause after a failed accept, such as when file descriptors run out.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// Maximum size of what precedes the body in HTTP/1, including what is read at once with the end of it.
-const HEAD_BYTES: usize = 64 * 1024;
+/// Maximum size of what precedes the body in HTTP/1, including what is read at once with the end of it. A longer head
+/// that one read brings whole is refused by [`head`](super::head).
+const HEAD_BYTES: usize = head::MOST_BYTES;
+
+/// In HTTP/2 each header counts 32 bytes more than its text. What is within this and too large after all gets a better
+/// answer from [`head`](super::head) than from hyper, whose own has no body.
+const HTTP2_HEAD_BYTES: u32 = 2 * 64 * 1024;
 
 /// The first bytes of an HTTP/2 connection, RFC 9113 section 3.4.
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
@@ -170,6 +176,7 @@ async fn answer(socket: Socket, router: Router, mut phase: watch::Receiver<Phase
             .http2()
             .timer(TokioTimer::new())
             .keep_alive_interval(times.idle)
+            .max_header_list_size(HTTP2_HEAD_BYTES)
             .max_concurrent_streams(256);
         let connection = builder.serve_connection(socket, service);
         Box::pin(keep(connection, phase, &traffic, times, false)).await;

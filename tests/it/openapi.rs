@@ -265,6 +265,12 @@ async fn every_problem_type_leads_to_its_page() {
         let slug = kind.trim_start_matches("/problems/");
         let page = std::str::from_utf8(&answer.body).expect("UTF-8");
         assert!(page.contains(&format!("<h2>{slug}</h2>")), "{page}");
+        let (_, main) = page.split_once("<main>").expect("the section");
+        for link in main.split("href=\"").skip(1) {
+            let (link, _) = link.split_once('"').expect("an address");
+            let linked = api.get(&format!("/problems/{link}")).await;
+            assert_eq!(linked.status, 200, "{link} on the page of {slug}");
+        }
     }
     let unknown = api.get("/problems/nothing").await;
     unknown.expect_problem(404, "not-found");

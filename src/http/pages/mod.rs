@@ -66,7 +66,8 @@ pub(super) async fn problem(
     };
     let body = format!(
         "<p><a href=\"/docs\">Reference</a></p>\n<main>{}</main>",
-        markdown::html(text)
+        // In the document the other sections are further down; here they are pages beside this one.
+        markdown::html(&text.replace("](#", "]("))
     );
     let title = text.lines().next().unwrap_or_default();
     Ok(html(&page(title.trim_start_matches("## "), &body)))

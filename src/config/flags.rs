@@ -31,11 +31,11 @@ impl Args for Flags {
             .env("NOCTULE_CONFIG")
             .value_name("FILE")
             .value_parser(clap::value_parser!(PathBuf))
-            .help("Read settings from a TOML file; a flag or a variable counts before it");
+            .help("Read settings from a TOML file; flags and variables take precedence over it");
         let print = Arg::new(PRINT_CONFIG)
             .long("print-config")
             .action(ArgAction::SetTrue)
-            .help("Print the settings in effect as TOML, each with where it comes from, and exit");
+            .help("Print the settings in effect as TOML, each with its source, and exit");
         let own = settings::all()
             .into_iter()
             .map(|setting| argument(&setting, &defaults));

@@ -83,13 +83,13 @@ pub const OPTIONS: &[OptionRule] = &[
     OptionRule {
         name: "allow_infeasible",
         allowed: "true or false",
-        meaning: "write a route that breaks constraints in a format for flying, too [default: false]",
+        meaning: "write a route in a format for flying even if it breaks constraints [default: false]",
         set: |options, value| set(&mut options.allow_infeasible, value.parse().ok()),
     },
     OptionRule {
         name: "altitude",
         allowed: "relative, absolute or terrain",
-        meaning: "what altitudes are measured from: the ground at the start, mean sea level, or the ground below [default: relative]",
+        meaning: "what altitudes are measured from: the ground at the start, mean sea level, or the ground below each item [default: relative]",
         set: |options, value| {
             let altitude = match value {
                 "relative" => Some(Altitude::Relative),
@@ -109,7 +109,7 @@ pub const OPTIONS: &[OptionRule] = &[
     OptionRule {
         name: "firmware",
         allowed: "px4 or ardupilot",
-        meaning: "who flies the mission [default: px4]",
+        meaning: "the autopilot that flies the mission [default: px4]",
         set: |options, value| {
             let firmware = match value {
                 "px4" => Some(Firmware::Px4),
@@ -122,19 +122,19 @@ pub const OPTIONS: &[OptionRule] = &[
     OptionRule {
         name: "landing",
         allowed: "true or false",
-        meaning: "end on the ground below the target [default: false]",
+        meaning: "end the mission on the ground below the target [default: false]",
         set: |options, value| set(&mut options.landing, value.parse().ok()),
     },
     OptionRule {
         name: "takeoff",
         allowed: "metres from 0 to 1000",
-        meaning: "climb straight up to this height above the ground first; 0 for a vehicle that is in the air [default: 10]",
+        meaning: "first climb straight up to this height above the ground; 0 for a vehicle that is already in the air [default: 10]",
         set: |options, value| set(&mut options.takeoff_m, metres(value, 0.0..=1000.0)),
     },
     OptionRule {
         name: "tolerance",
         allowed: "metres from 0.01 to 1000",
-        meaning: "how far the mission may leave the path [default: 1]",
+        meaning: "how far the mission may deviate from the path [default: 1]",
         set: |options, value| set(&mut options.tolerance_m, metres(value, 0.01..=1000.0)),
     },
 ];

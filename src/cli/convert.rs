@@ -10,9 +10,9 @@ use crate::import::{self, ImportError, Syntax, Unused};
 
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// GeoJSON, KML, or a plan of QGroundControl; - reads standard input
+    /// GeoJSON, KML or QGroundControl plan, or - for standard input
     file: PathBuf,
-    /// Where the scenario goes [default: standard output]
+    /// File for the scenario [default: standard output]
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
 }

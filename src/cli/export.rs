@@ -15,13 +15,13 @@ use crate::scenario::limits::Limits;
 
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// Result document, as plan and the service write it; - reads standard input
+    /// Result document, as written by plan or the service, or - for standard input
     result: PathBuf,
-    /// The scenario that it was planned for: the file that plan was given, or the answer of
-    /// GET /plans/{id}/scenario. A result names it by its hash, which is compared
+    /// The scenario that the result was planned for: the file given to plan, or the answer of
+    /// GET /plans/{id}/scenario; it must have the hash that the result names
     #[arg(long, value_name = "FILE")]
     scenario: PathBuf,
-    /// Where it goes [default: standard output]
+    /// File to write [default: standard output]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     #[command(flatten)]

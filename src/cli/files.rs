@@ -13,7 +13,7 @@ use crate::export::{self, Format, OPTIONS, Options};
 /// What a result is written as.
 #[derive(Args)]
 pub(super) struct Choice {
-    /// What the result is written as [default: by the extension of --out, else json]
+    /// Format of the result [default: by the extension of --out, else json]
     #[arg(long, value_parser = PossibleValuesParser::new(export::ALL.iter().map(|format| format.name)))]
     format: Option<String>,
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = option, help = help())]
@@ -38,7 +38,10 @@ fn help() -> String {
         .iter()
         .map(|rule| format!("{}: {}, {}", rule.name, rule.allowed, rule.meaning));
     let rows: Vec<_> = rows.collect();
-    format!("An option of the format, once each:\n{}", rows.join("\n"))
+    format!(
+        "An option of the format; each may be given once:\n{}",
+        rows.join("\n")
+    )
 }
 
 impl Choice {
@@ -47,7 +50,7 @@ impl Choice {
         let formats: Vec<&'static Format> = match (&self.format, outs) {
             (Some(_), [_, _, ..]) => {
                 bail!(
-                    "--format names one format, --out more files: each is written by its extension"
+                    "--format names one format, but --out is given several times: without --format, each file has the format of its extension"
                 )
             }
             (Some(name), _) => vec![Format::named(name).expect("clap lets only names through")],

@@ -12,7 +12,7 @@ use crate::scenario::limits::Limits;
 
 #[derive(Args)]
 pub(super) struct Ground {
-    /// Directory of the datasets that the scenario may name, each by its file's name without the extension
+    /// Directory of datasets that the scenario may name, each by its file name without the extension
     #[arg(long, env = "NOCTULE_TERRAIN_DIR", value_name = "DIR")]
     terrain_dir: Option<PathBuf>,
 }

@@ -13,7 +13,7 @@ const TIMEOUT: Duration = Duration::from_secs(3);
 
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// What to ask
+    /// Address to ask
     #[arg(
         long,
         env = "NOCTULE_HEALTHCHECK_URL",

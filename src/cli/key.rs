@@ -11,21 +11,21 @@ use crate::http::auth::{Keys, Scope, fresh_key};
 
 #[derive(Subcommand)]
 pub(super) enum Command {
-    /// Print a new key to stderr, the only place it ever appears, and its entry for the file of keys to stdout
+    /// Print a new key to stderr, the only time it is shown, and its entry for the file of keys to stdout
     New(Arguments),
 }
 
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// What people call it; the owner of its plans unless another is named
+    /// Name of the key, for people; also the owner of its plans unless another is given
     #[arg(long)]
     name: String,
 
-    /// What it may do: read (look at own plans), plan (submit, cancel and delete too), metrics, admin (everything)
+    /// What it may do: read (look at own plans), plan (also submit, cancel and delete), metrics, admin (everything)
     #[arg(long, value_delimiter = ',', default_value = "plan", value_parser = scope)]
     scopes: Vec<Scope>,
 
-    /// Whose plans are its own; keys that replace each other have the same owner
+    /// Owner of its plans; keys that replace each other have the same owner
     #[arg(long)]
     owner: Option<String>,
 
@@ -33,15 +33,15 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "TIME")]
     expires: Option<Timestamp>,
 
-    /// Queued and running plans at once [default: any number]
+    /// Most plans that may be queued and running at once [default: any number]
     #[arg(long, value_name = "N")]
     active_plans: Option<u64>,
 
-    /// Requests a second [default: any number]
+    /// Most requests a second [default: any number]
     #[arg(long, value_name = "RATE")]
     requests_per_second: Option<f64>,
 
-    /// Requests at once, where there is a rate [default: those of a second]
+    /// Most requests at once, if there is a rate [default: those of a second]
     #[arg(long, value_name = "N")]
     burst: Option<u32>,
 }

@@ -28,27 +28,27 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Answer plans over HTTP
+    /// Run the HTTP service
     Serve(crate::config::Flags),
-    /// Plan one scenario here and now, without a server
+    /// Plan one scenario without a server
     Plan(plan::Arguments),
-    /// Write a result that was kept as JSON in another format
+    /// Write a JSON result in another format
     Export(export::Arguments),
-    /// Make a scenario of a GeoJSON, a KML or a plan of QGroundControl
+    /// Convert a GeoJSON, a KML or a QGroundControl plan to a scenario
     Convert(convert::Arguments),
-    /// Measure the algorithms: against each other, against the best known routes, against the clock
+    /// Measure the algorithms, the planner and the service
     #[command(subcommand)]
     Bench(bench::Command),
-    /// Make keys for those who may use a service
+    /// Create keys for those who may use a service
     #[command(subcommand)]
     Key(key::Command),
-    /// Copy the stored plans, or look for damage among them
+    /// Back up the stored plans, or check them for damage
     #[command(subcommand)]
     Store(store::Command),
-    /// Look into a file of elevations
+    /// Inspect a file of elevations
     #[command(subcommand)]
     Terrain(terrain::Command),
-    /// Ask a running service whether it is ready; for containers
+    /// Check whether a running service is ready; for containers
     Healthcheck(healthcheck::Arguments),
 }
 

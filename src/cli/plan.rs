@@ -23,10 +23,10 @@ use crate::scenario::{Scenario, WarmStart};
 
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// Scenario document; - reads standard input
+    /// Scenario document, or - for standard input
     file: PathBuf,
-    /// Where the result goes, by its extension in one of the formats; more than once, each file is
-    /// written of the one plan [default: standard output]
+    /// File for the result, in the format of its extension; may be given several times, to write the
+    /// one plan in several formats [default: standard output]
     #[arg(long, value_name = "FILE")]
     out: Vec<PathBuf>,
     #[command(flatten)]

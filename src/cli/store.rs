@@ -12,15 +12,15 @@ use crate::store::sqlite::upkeep;
 /// Keep or look after the plans of this machine.
 #[derive(Subcommand)]
 pub(super) enum Command {
-    /// Write a compact copy to a new file, also while the service runs; it is restored by putting it
-    /// into an empty data directory as noctule.db
+    /// Write a compact copy to a new file, even while the service runs; to restore it, put it into an
+    /// empty data directory as noctule.db
     Backup {
         #[command(flatten)]
         place: Location,
         /// The new file
         file: PathBuf,
     },
-    /// Look for damage and contradictions, also while the service runs; exits 1 when there are any
+    /// Check for damage and contradictions, even while the service runs; exits with 1 if there are any
     Check {
         #[command(flatten)]
         place: Location,
@@ -32,7 +32,7 @@ pub(super) struct Location {
     /// Directory of the plans [default: noctule in the user's data home]
     #[arg(long, env = "NOCTULE_DATA_DIR", value_name = "DIR")]
     data_dir: Option<PathBuf>,
-    /// As serve takes it; servers of NATS have commands of their own for this
+    /// Same as for serve; NATS servers have their own commands for this
     #[arg(
         long,
         env = "NOCTULE_STORE",

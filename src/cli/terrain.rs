@@ -12,20 +12,20 @@ use super::{exit, files};
 use crate::geometry::geodesy::LatLon;
 use crate::terrain::dem::{self, Dataset, Declared, Degrees, Metadata, SampleType};
 
-/// Look into a file of elevations: `GeoTIFF`, ESRI ASCII grid or SRTM .hgt.
+/// Inspect a file of elevations: `GeoTIFF`, ESRI ASCII grid or SRTM .hgt.
 #[derive(Subcommand)]
 pub(super) enum Command {
-    /// Read all of a file and say what it holds, as JSON; exits 1 when it is damaged
+    /// Read a whole file and describe it as JSON; exits with 1 if it is damaged
     Info {
         #[command(flatten)]
         file: File,
     },
-    /// Print the elevation at each point, metres: bilinear between the samples of the file; `none` outside
+    /// Print the elevation at each point in metres, bilinear between the samples of the file; `none` outside
     /// them and where they hold no data
     Sample {
         #[command(flatten)]
         file: File,
-        /// A point a line, latitude and longitude in degrees; - reads standard input
+        /// File with one point a line, latitude and longitude in degrees, or - for standard input
         #[arg(long, value_name = "FILE")]
         points: PathBuf,
     },
@@ -35,7 +35,7 @@ pub(super) enum Command {
 pub(super) struct File {
     /// The file
     file: PathBuf,
-    /// Its coordinate reference system, where it names none
+    /// Its coordinate reference system, if the file names none
     #[arg(long, value_name = "EPSG:CODE")]
     crs: Option<String>,
 }

@@ -31,19 +31,19 @@ use report::Report;
 
 #[derive(Subcommand)]
 pub(super) enum Command {
-    /// All algorithms from a random start, as in the tables of the TMS-SBA paper
+    /// Compare all algorithms from a random start, as in the tables of the TMS-SBA paper
     Paper(paper::Arguments),
-    /// The planner with its default settings: distance to the best known routes and to the proven bound
+    /// Measure how far the default settings are from the best known routes and the proven bound
     Quality(quality::Arguments),
-    /// The planner with its default settings on random scenarios: distance to the best of many runs and to the proven bound
+    /// Measure on random scenarios how far the default settings are from the best of many runs and the proven bound
     Random(random::Arguments),
-    /// Routes priced in a second, by waypoints, threats and population
+    /// Measure how many routes are priced a second, by waypoints, threats and population
     Speed(speed::Arguments),
-    /// The service under load: requests, refusals, streams and plans a second, beside a bare handler
+    /// Measure the service under load: requests, refusals, streams and plans a second, compared with a bare handler
     Serve(serve::Arguments),
-    /// A NATS system under load: rates beside a bare client, workers that sleep, a day's load
+    /// Measure a NATS system under load: rates compared with a bare client, workers that sleep, a day's load
     Cluster(cluster::Arguments),
-    /// The violation and cost of routes from standard input, for searches outside of this program
+    /// Print the violation and cost of routes from standard input, for searches outside of this program
     Price(price::Arguments),
 }
 

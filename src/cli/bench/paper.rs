@@ -22,13 +22,13 @@ pub(in crate::cli) struct Arguments {
     /// Runs of each setting, with the seeds 1, 2, ...
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     seeds: u64,
-    /// Members of a population; a table also takes a quarter, a half and twice of them
+    /// Members of a population; one table also has a quarter, half and twice as many
     #[arg(long, default_value_t = 200)]
     population: usize,
-    /// Iterations; a table also takes a quarter, a half and twice of them
+    /// Iterations; one table also has a quarter, half and twice as many
     #[arg(long, default_value_t = 200)]
     iterations: usize,
-    /// Free waypoints N; a table also takes a half, twice and three times of them
+    /// Free waypoints N; one table also has half, twice and three times as many
     #[arg(long, default_value_t = 10)]
     waypoints: usize,
 }

@@ -22,7 +22,7 @@ use crate::scenario::limits::Limits;
 pub(in crate::cli) struct Arguments {
     /// Scenario document, or the name of a shipped one
     scenario: PathBuf,
-    /// Take the z of waypoints as their height above the ground below them
+    /// Read the z of waypoints as height above the ground below them
     #[arg(long)]
     above_ground: bool,
 }

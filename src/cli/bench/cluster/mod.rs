@@ -21,31 +21,31 @@ use crate::store::jetstream::Settings;
 
 #[derive(Args)]
 pub(in crate::cli) struct Arguments {
-    /// The servers; everything is written under a namespace of its own, which is removed at the end
+    /// Address of the servers; everything is written under its own namespace, which is removed at the end
     #[arg(long, value_name = "ADDRESS", default_value = "nats://127.0.0.1:4222")]
     store: String,
     /// Copies that the servers keep
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=5))]
     replicas: u8,
-    /// Plans of each measurement of a rate
+    /// Plans in each measurement of a rate
     #[arg(long, default_value_t = 1_000, value_parser = clap::value_parser!(u32).range(10..=1_000_000))]
     plans: u32,
-    /// Measurements of each rate, in turn with those of the bare client; the median counts
+    /// Measurements of each rate, alternating with those of the bare client; the median counts
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=100))]
     rounds: u16,
     /// Time that a job takes, milliseconds
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=60_000))]
     job_ms: u32,
-    /// Workers of the last step; each step before it has half as many
+    /// Workers in the last step; the steps before it have 1, 2, 4, ... workers
     #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=256))]
     workers: u16,
-    /// Workers of one node
+    /// Workers on each node
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=256))]
     slots: u16,
-    /// Plans a day that are offered for a while, for the model of the waiting time
+    /// Plans a day, offered for a while at their peak rate, to compare the waiting time with the model
     #[arg(long, default_value_t = 1_000_000, value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
     daily: u32,
-    /// For so long, seconds
+    /// How long they are offered, seconds
     #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=86_400))]
     time_s: u32,
     #[command(flatten)]

@@ -41,10 +41,10 @@ pub(in crate::cli) struct Arguments {
     /// Runs of each scenario, with the seeds 1, 2, ...
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     seeds: u64,
-    /// Longer runs of each scenario, to know how good a route there is
+    /// Longer runs of each scenario, to find a good route to compare with
     #[arg(long, value_name = "COUNT", default_value_t = 4, value_parser = clap::value_parser!(u8).range(0..=4))]
     longer: u8,
-    /// Directory for the scenario documents
+    /// Directory in which to keep the scenario documents
     #[arg(long, value_name = "DIR")]
     keep: Option<PathBuf>,
 }

@@ -25,16 +25,16 @@ use super::table::{Cell, Table};
 pub(in crate::cli) struct Arguments {
     #[command(flatten)]
     pub(super) common: Common,
-    /// Connections that ask at the same time
+    /// Connections that send requests at the same time
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     connections: u16,
     /// Time of each measurement, milliseconds
     #[arg(long, default_value_t = 2_000, value_parser = clap::value_parser!(u32).range(1..=600_000))]
     time_ms: u32,
-    /// Measurements of each kind, one after the other in turn; the median counts
+    /// Measurements of each kind, taken in turn; the median counts
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1_000))]
     rounds: u16,
-    /// Plans of each scenario, for the rate of planning
+    /// Plans of each scenario, to measure the rate of planning
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     plans: u16,
     /// Readers of one plan's events

@@ -1,25 +1,17 @@
 //! Where a plan lies on the earth: converts local metres to degrees, and altitudes between datums.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use crate::geometry::Point3;
-use crate::scenario::frame::{Frame, Wgs84};
+use crate::geometry::geodesy::LatLon;
+use crate::geometry::geoid::Geoid;
+use crate::geometry::{Point2, Point3};
+use crate::scenario::frame::{Datum, Frame, Wgs84};
 
 /// The conversion for a scenario in degrees.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Chart(Arc<Wgs84>);
-
-/// A point on the earth as the formats write it, rounded to 1 / [`DEGREES`] degrees and millimetres.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Fix {
-    /// Degrees north.
-    pub(super) lat: f64,
-    /// Degrees east, -180..=180.
-    pub(super) lon: f64,
-    /// Above mean sea level (EGM96), metres.
-    pub(super) msl_m: f64,
-    /// Above the WGS 84 ellipsoid, metres.
-    pub(super) ellipsoid_m: f64,
+pub(super) struct Chart {
+    frame: Arc<Wgs84>,
+    /// Needed only for altitudes of the other datum.
+    geoid: OnceLock<Geoid>,
 }
 
 /// Coordinates are rounded to 1 / this degrees: 0.1 mm.
@@ -30,34 +22,53 @@ impl Chart {
     pub(super) fn of(frame: &Frame) -> Option<Self> {
         match frame {
             Frame::Local => None,
-            Frame::Wgs84(wgs84) => Some(Self(wgs84.clone())),
+            Frame::Wgs84(wgs84) => Some(Self {
+                frame: wgs84.clone(),
+                geoid: OnceLock::new(),
+            }),
         }
     }
 
-    /// A point of the local plane on the earth.
-    pub(super) fn fix(&self, point: Point3) -> Fix {
-        let place = self.0.place(point.xy());
-        Fix {
+    /// A point of the local plane in degrees as the formats write them, rounded to 1 / [`DEGREES`]; longitudes in
+    /// -180..=180.
+    pub(super) fn place(&self, point: Point2) -> LatLon {
+        let place = self.frame.place(point);
+        LatLon {
             lat: rounded(place.lat, DEGREES),
             lon: rounded(place.lon, DEGREES),
-            msl_m: rounded(self.0.above_sea(point.z), 1e3),
-            ellipsoid_m: rounded(self.0.above_ellipsoid(point.z), 1e3),
         }
     }
 
-    /// Convert a height of the scenario's frame to metres above mean sea level.
-    pub(super) fn msl_m(&self, z: f64) -> f64 {
-        rounded(self.0.above_sea(z), 1e3)
+    /// Height of a point above mean sea level (EGM96), metres.
+    pub(super) fn above_sea(&self, point: Point3) -> f64 {
+        match self.frame.datum {
+            Datum::Msl => point.z,
+            Datum::Ellipsoid => point.z - self.geoid_m(point.xy()),
+        }
     }
 
-    /// Convert a height of the scenario's frame to metres above the ellipsoid.
-    pub(super) fn ellipsoid_m(&self, z: f64) -> f64 {
-        rounded(self.0.above_ellipsoid(z), 1e3)
+    /// The same, to the millimetre.
+    pub(super) fn msl_m(&self, point: Point3) -> f64 {
+        rounded(self.above_sea(point), 1e3)
     }
 
-    /// Height of mean sea level above the ellipsoid, metres; one value for the whole scenario.
-    pub(super) fn undulation_m(&self) -> f64 {
-        rounded(self.0.undulation_m, 1e3)
+    /// Height of a point above the WGS 84 ellipsoid, to the millimetre.
+    pub(super) fn ellipsoid_m(&self, point: Point3) -> f64 {
+        let height = match self.frame.datum {
+            Datum::Msl => point.z + self.geoid_m(point.xy()),
+            Datum::Ellipsoid => point.z,
+        };
+        rounded(height, 1e3)
+    }
+
+    /// Height of mean sea level above the ellipsoid at a point, to the millimetre.
+    pub(super) fn undulation_m(&self, point: Point2) -> f64 {
+        rounded(self.geoid_m(point), 1e3)
+    }
+
+    fn geoid_m(&self, point: Point2) -> f64 {
+        let geoid = self.geoid.get_or_init(|| self.frame.geoid());
+        geoid.height_m([point.x, point.y])
     }
 }
 

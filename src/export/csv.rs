@@ -3,6 +3,7 @@
 use super::delivery::Passage;
 use super::{Delivery, Options};
 use crate::geometry::Point3;
+use crate::geometry::geodesy::LatLon;
 
 /// Write the path of a plan, or the waypoints if it has no path.
 pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
@@ -40,8 +41,8 @@ fn position(delivery: &Delivery, point: Point3) -> Vec<f64> {
     match &delivery.chart {
         None => vec![point.x, point.y, point.z],
         Some(chart) => {
-            let fix = chart.fix(point);
-            vec![fix.lat, fix.lon, fix.msl_m, fix.ellipsoid_m]
+            let LatLon { lat, lon } = chart.place(point.xy());
+            vec![lat, lon, chart.msl_m(point), chart.ellipsoid_m(point)]
         }
     }
 }

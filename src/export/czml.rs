@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use super::chart::{Chart, rounded};
 use super::outline;
 use super::{Delivery, Options};
+use crate::geometry::geodesy::LatLon;
 use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};
 
@@ -26,13 +27,8 @@ pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
     let chart = delivery.chart();
     let mut positions: Vec<f64> = Vec::with_capacity(4 * course.len());
     for (&point, passage) in course.iter().zip(&passages) {
-        let fix = chart.fix(point);
-        positions.extend([
-            rounded(passage.time_s, 1e3),
-            fix.lon,
-            fix.lat,
-            fix.ellipsoid_m,
-        ]);
+        positions.push(rounded(passage.time_s, 1e3));
+        positions.extend(degrees(chart, point));
     }
     let color = if delivery.result.feasible {
         ROUTE
@@ -78,31 +74,40 @@ pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
 }
 
 fn waypoint(delivery: &Delivery, index: usize) -> Value {
-    let fix = delivery.chart().fix(delivery.waypoints[index]);
     json!({
         "id": format!("waypoint-{index}"),
         "name": delivery.waypoint_name(index),
-        "position": {"cartographicDegrees": [fix.lon, fix.lat, fix.ellipsoid_m]},
+        "position": {"cartographicDegrees": degrees(delivery.chart(), delivery.waypoints[index])},
         "point": {"pixelSize": 5, "color": {"rgba": [255, 255, 255, 255]}},
     })
 }
 
-/// Heights between which a threat without base or top is shown, in the scenario's frame: from the lowest ground below
-/// the route to as far above its highest point, but at least 10 m.
+/// Heights above the ellipsoid between which a threat without base or top is shown: from the lowest ground below the
+/// route to as far above its highest point, but at least 10 m.
 fn shown_heights(delivery: &Delivery) -> (f64, f64) {
+    let chart = delivery.chart();
     let mut lowest = f64::INFINITY;
     let mut highest = f64::NEG_INFINITY;
     for &point in delivery.course() {
-        lowest = lowest.min(point.z - delivery.agl(point));
-        highest = highest.max(point.z);
+        let height = chart.ellipsoid_m(point);
+        lowest = lowest.min(height - delivery.agl(point));
+        highest = highest.max(height);
     }
     (lowest, highest + (highest - lowest).max(10.0))
 }
 
+/// As CZML's `cartographicDegrees`: longitude, latitude, height above the ellipsoid.
+fn degrees(chart: &Chart, point: Point3) -> [f64; 3] {
+    let LatLon { lat, lon } = chart.place(point.xy());
+    [lon, lat, chart.ellipsoid_m(point)]
+}
+
 fn volume(chart: &Chart, index: usize, threat: &Threat, shown: (f64, f64)) -> Value {
-    let base = threat.base.unwrap_or(shown.0);
-    let top = threat.top.unwrap_or(shown.1.max(base + 10.0));
-    let base = base.min(top - 1.0);
+    let middle = outline::middle(threat);
+    let height = |z: f64| chart.ellipsoid_m(Point3::new(middle.x, middle.y, z));
+    let base = threat.base.map_or(shown.0, height);
+    let top = threat.top.map_or(shown.1.max(base + 10.0), height);
+    let (base, top) = (rounded(base.min(top - 1.0), 1e3), rounded(top, 1e3));
     let look = json!({"solidColor": {"color": {"rgba": THREAT}}});
     let mut packet = json!({
         "id": format!("threat-{index}"),
@@ -110,10 +115,9 @@ fn volume(chart: &Chart, index: usize, threat: &Threat, shown: (f64, f64)) -> Va
     });
     match &threat.shape {
         Shape::Cylinder(cylinder) => {
-            let Point2 { coords: middle, .. } = cylinder.center;
-            let fix = chart.fix(Point3::new(middle.x, middle.y, f64::midpoint(base, top)));
-            packet["position"] =
-                json!({"cartographicDegrees": [fix.lon, fix.lat, fix.ellipsoid_m]});
+            let LatLon { lat, lon } = chart.place(middle);
+            let height = rounded(f64::midpoint(base, top), 1e3);
+            packet["position"] = json!({"cartographicDegrees": [lon, lat, height]});
             packet["cylinder"] = json!({
                 "length": rounded(top - base, 1e3),
                 "topRadius": cylinder.radius,
@@ -122,15 +126,15 @@ fn volume(chart: &Chart, index: usize, threat: &Threat, shown: (f64, f64)) -> Va
             });
         }
         Shape::Polygon(_) => {
-            let ring = outline::ring(chart, threat, base);
-            let corners: Vec<f64> = ring
-                .iter()
-                .flat_map(|fix| [fix.lon, fix.lat, fix.ellipsoid_m])
-                .collect();
+            let corner = |corner: Point2| {
+                let LatLon { lat, lon } = chart.place(corner);
+                [lon, lat, base]
+            };
+            let corners: Vec<f64> = outline::ring(threat).into_iter().flat_map(corner).collect();
             packet["polygon"] = json!({
                 "positions": {"cartographicDegrees": corners},
-                "height": chart.ellipsoid_m(base),
-                "extrudedHeight": chart.ellipsoid_m(top),
+                "height": base,
+                "extrudedHeight": top,
                 "material": look,
             });
         }

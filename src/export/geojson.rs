@@ -5,9 +5,10 @@ mod antimeridian;
 use geojson::{Feature, FeatureCollection, GeometryValue, JsonObject};
 use serde_json::{Value, json};
 
-use super::chart::{Fix, rounded};
+use super::chart::{Chart, rounded};
 use super::outline;
 use super::{Delivery, Options};
+use crate::geometry::geodesy::LatLon;
 use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};
 
@@ -57,7 +58,7 @@ fn waypoint(delivery: &Delivery, index: usize) -> Feature {
             "role": "waypoint",
             "name": delivery.waypoint_name(index),
             "index": index,
-            "alt_msl": delivery.chart().fix(point).msl_m,
+            "alt_msl": delivery.chart().msl_m(point),
             "agl": rounded(delivery.agl(point), 1e3),
             "leg_length_m": leg.map(|leg| rounded(leg.length, 1e3)),
             "violations": broken,
@@ -81,9 +82,11 @@ fn violations(delivery: &Delivery, index: usize) -> impl Iterator<Item = &str> {
 
 /// A circle is a ring with its centre and radius as properties, from which the importer restores the circle.
 fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Feature {
-    let ring = outline::ring(delivery.chart(), threat, 0.0);
-    let ring: Vec<_> = ring.iter().map(|fix| vec![fix.lon, fix.lat]).collect();
-    let height = |z: Option<f64>| z.map(|z| delivery.chart().ellipsoid_m(z));
+    let chart = delivery.chart();
+    let ring = outline::ring(threat).into_iter();
+    let ring: Vec<_> = ring.map(|corner| flat(chart, corner)).collect();
+    let middle = outline::middle(threat);
+    let height = |z: Option<f64>| z.map(|z| chart.ellipsoid_m(Point3::new(middle.x, middle.y, z)));
     let mut properties = json!({
         "role": "threat",
         "name": outline::name(threat, index),
@@ -93,9 +96,8 @@ fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Feature {
     });
     match &threat.shape {
         Shape::Cylinder(cylinder) => {
-            let middle = flat(delivery, cylinder.center);
             properties["kind"] = "cylinder".into();
-            properties["center"] = json!([middle.lon, middle.lat]);
+            properties["center"] = flat(chart, cylinder.center).into();
             properties["radius"] = cylinder.radius.into();
             properties["influence"] = cylinder.influence.into();
         }
@@ -107,13 +109,15 @@ fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Feature {
     feature(antimeridian::ring(&ring), properties)
 }
 
-fn flat(delivery: &Delivery, point: Point2) -> Fix {
-    delivery.chart().fix(Point3::new(point.x, point.y, 0.0))
+fn flat(chart: &Chart, point: Point2) -> Vec<f64> {
+    let LatLon { lat, lon } = chart.place(point);
+    vec![lon, lat]
 }
 
 fn position(delivery: &Delivery, point: Point3) -> Vec<f64> {
-    let fix = delivery.chart().fix(point);
-    vec![fix.lon, fix.lat, fix.ellipsoid_m]
+    let mut position = flat(delivery.chart(), point.xy());
+    position.push(delivery.chart().ellipsoid_m(point));
+    position
 }
 
 fn feature(geometry: GeometryValue, properties: Value) -> Feature {

@@ -8,6 +8,7 @@ use super::chart::Chart;
 use super::words::for_xml;
 use super::{Delivery, Options};
 use crate::geometry::Point3;
+use crate::geometry::geodesy::LatLon;
 
 /// Write the path of a plan; without a path, the waypoints form the track.
 pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
@@ -55,11 +56,11 @@ pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
 }
 
 fn mark(chart: &Chart, point: Point3) -> Waypoint {
-    let fix = chart.fix(point);
+    let LatLon { lat, lon } = chart.place(point.xy());
     // GPX longitudes are less than 180, so the 180th meridian is written as -180.
-    let lon = if fix.lon >= 180.0 { -180.0 } else { fix.lon };
-    let mut mark = Waypoint::new(Point::new(lon, fix.lat));
-    mark.elevation = Some(fix.msl_m);
-    mark.geoidheight = Some(chart.undulation_m());
+    let lon = if lon >= 180.0 { -180.0 } else { lon };
+    let mut mark = Waypoint::new(Point::new(lon, lat));
+    mark.elevation = Some(chart.msl_m(point));
+    mark.geoidheight = Some(chart.undulation_m(point.xy()));
     mark
 }

@@ -8,11 +8,12 @@ use kml::types::{
 };
 use kml::{Kml, KmlWriter};
 
-use super::chart::{Fix, rounded};
+use super::chart::{Chart, rounded};
 use super::outline;
 use super::words::for_xml;
 use super::{Delivery, Options};
-use crate::geometry::Point3;
+use crate::geometry::geodesy::LatLon;
+use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};
 
 const NAMESPACE: &str = "http://www.opengis.net/kml/2.2";
@@ -54,7 +55,7 @@ pub(super) fn write(delivery: &Delivery, _: &Options) -> String {
 
 fn path(delivery: &Delivery) -> Placemark {
     let course = delivery.course().iter();
-    let coords = course.map(|&point| coord(delivery.chart().fix(point)));
+    let coords = course.map(|&point| coord(delivery.chart(), point));
     let last = delivery.passages(delivery.course());
     let last = last.last().expect("a course has points");
     let data = [
@@ -83,7 +84,7 @@ fn waypoint(delivery: &Delivery, index: usize) -> Placemark {
         None,
         &[("agl", agl)],
         Geometry::Point(Point {
-            coord: coord(delivery.chart().fix(point)),
+            coord: coord(delivery.chart(), point),
             altitude_mode: AltitudeMode::Absolute,
             ..Point::default()
         }),
@@ -93,19 +94,26 @@ fn waypoint(delivery: &Delivery, index: usize) -> Placemark {
 /// A wall from the threat's top down to the ground, because KML has no floating volume. A threat without top ends at
 /// the highest point of the route.
 fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Placemark {
-    let highest = delivery.course().iter().map(|point| point.z);
-    let top = threat.top.unwrap_or(highest.fold(f64::MIN, f64::max));
-    let ring = outline::ring(delivery.chart(), threat, top);
-    let mut coords: Vec<Coord> = ring.into_iter().map(coord).collect();
+    let chart = delivery.chart();
+    let course = delivery.course().iter();
+    let highest = course
+        .map(|&point| chart.msl_m(point))
+        .fold(f64::MIN, f64::max);
+    let middle = outline::middle(threat);
+    let height = |z: f64| chart.msl_m(Point3::new(middle.x, middle.y, z));
+    let top = threat.top.map_or(highest, height);
+    let corner = |corner: Point2| {
+        let LatLon { lat, lon } = chart.place(corner);
+        Coord::new(lon, lat, Some(top))
+    };
+    let mut coords: Vec<Coord> = outline::ring(threat).into_iter().map(corner).collect();
     coords.push(coords[0]);
-    let height = |z: f64| delivery.chart().msl_m(z).to_string();
     let mut data = Vec::new();
     match &threat.shape {
         Shape::Cylinder(cylinder) => {
-            let center = cylinder.center;
-            let middle = delivery.chart().fix(Point3::new(center.x, center.y, 0.0));
+            let center = chart.place(cylinder.center);
             data.push(("kind", "cylinder".to_owned()));
-            data.push(("center", format!("{},{}", middle.lon, middle.lat)));
+            data.push(("center", format!("{},{}", center.lon, center.lat)));
             data.push(("radius", cylinder.radius.to_string()));
             data.push(("influence", cylinder.influence.to_string()));
         }
@@ -114,8 +122,8 @@ fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Placemark {
             data.push(("margin", polygon.margin().to_string()));
         }
     }
-    data.extend(threat.base.map(|base| ("base", height(base))));
-    data.extend(threat.top.map(|top| ("top", height(top))));
+    data.extend(threat.base.map(|base| ("base", height(base).to_string())));
+    data.extend(threat.top.map(|top| ("top", height(top).to_string())));
     placemark(
         &outline::name(threat, index),
         Some("#threat"),
@@ -133,8 +141,9 @@ fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Placemark {
     )
 }
 
-fn coord(fix: Fix) -> Coord {
-    Coord::new(fix.lon, fix.lat, Some(fix.msl_m))
+fn coord(chart: &Chart, point: Point3) -> Coord {
+    let LatLon { lat, lon } = chart.place(point.xy());
+    Coord::new(lon, lat, Some(chart.msl_m(point)))
 }
 
 fn folder(name: &str, placemarks: impl Iterator<Item = Placemark>) -> Kml {

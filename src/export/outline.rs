@@ -1,22 +1,30 @@
 //! Threats as maps show them: rings in degrees.
 
-use super::chart::{Chart, Fix};
+use crate::geometry::Point2;
 use crate::geometry::ring::twice_area;
-use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};
 
 /// Corners of the ring that represents a circle.
 const CORNERS: u32 = 72;
 
-/// The outline of `threat`, counter-clockwise seen from above, without repeated first corner, at height `z` of the
-/// scenario's frame. A circle's corners lie on the circle.
-pub(super) fn ring(chart: &Chart, threat: &Threat, z: f64) -> Vec<Fix> {
-    let corners = match &threat.shape {
+/// The outline of `threat` on the local plane, counter-clockwise seen from above, without repeated first corner. A
+/// circle's corners lie on the circle.
+pub(super) fn ring(threat: &Threat) -> Vec<Point2> {
+    match &threat.shape {
         Shape::Cylinder(cylinder) => circle(cylinder.center, cylinder.radius),
         Shape::Polygon(polygon) => counterclockwise(polygon.vertices()),
-    };
-    let fix = |corner: Point2| chart.fix(Point3::new(corner.x, corner.y, z));
-    corners.into_iter().map(fix).collect()
+    }
+}
+
+/// Where a threat's base and top are converted to another datum.
+pub(super) fn middle(threat: &Threat) -> Point2 {
+    match &threat.shape {
+        Shape::Cylinder(cylinder) => cylinder.center,
+        Shape::Polygon(polygon) => {
+            let bounds = polygon.bounds();
+            nalgebra::center(&bounds.min, &bounds.max)
+        }
+    }
 }
 
 /// Display name of the threat at `index`.

@@ -6,6 +6,8 @@ use uuid::Uuid;
 use super::document::{Origin, Position, ResultDocument, Timing};
 use super::*;
 use crate::digest::sha256_hex;
+use crate::geometry::Vector2;
+use crate::geometry::geodesy::{LatLon, undulation_m};
 use crate::planner;
 use crate::scenario::limits::Limits;
 use crate::scenario::{Frame, Scenario, json};
@@ -132,26 +134,41 @@ fn the_result_itself_is_not_touched() {
     assert_eq!(write(&plan, "json", &[]).as_ref(), Ok(&plan.0));
 }
 
+/// Ground at a constant height above mean sea level, as a grid of heights above the ellipsoid.
+fn level_with_the_sea(document: &Value, height_m: f64) -> Value {
+    let scenario = accepted(document);
+    let plane = &scenario.frame.wgs84().expect("degrees").plane;
+    let origin = plane.local(LatLon {
+        lat: 47.39,
+        lon: 8.53,
+    });
+    let elevation = |node: u32| {
+        let (column, row) = (f64::from(node % 10), f64::from(node / 10));
+        let at = origin + Vector2::new(500.0 * column, 500.0 * row);
+        height_m + undulation_m(plane.geodetic(at))
+    };
+    json!({
+        "kind": "grid", "origin": {"lat": 47.39, "lon": 8.53}, "cell": 500, "columns": 10, "rows": 10,
+        "elevations": (0..100).map(elevation).collect::<Vec<_>>(),
+    })
+}
+
 #[test]
 fn the_same_altitudes_come_out_of_either_datum() {
     let above_sea = scenario();
-    let undulation = accepted(&above_sea)
-        .frame
-        .wgs84()
-        .expect("degrees")
-        .undulation_m;
     let mut above_ellipsoid = above_sea.clone();
     above_ellipsoid["altitude_datum"] = "ellipsoid".into();
-    for pointer in [
-        "/start/alt",
-        "/target/alt",
-        "/terrain/elevation",
-        "/threats/1/top",
-    ] {
-        let height = above_ellipsoid.pointer_mut(pointer).expect("a height");
-        *height = (height.as_f64().expect("a number") + undulation).into();
+    let raise = |height: &Value, lat: f64, lon: f64| -> Value {
+        (height.as_f64().expect("a number") + undulation_m(LatLon { lat, lon })).into()
+    };
+    for end in ["start", "target"] {
+        let [lat, lon] = ["lat", "lon"].map(|name| above_sea[end][name].as_f64().expect("degrees"));
+        above_ellipsoid[end]["alt"] = raise(&above_sea[end]["alt"], lat, lon);
     }
-    let around = AROUND.map(|(lat, lon, alt)| (lat, lon, alt + undulation));
+    // In the middle of the polygon.
+    above_ellipsoid["threats"][1]["top"] = raise(&above_sea["threats"][1]["top"], 47.40275, 8.551);
+    above_ellipsoid["terrain"] = level_with_the_sea(&above_sea, 488.0);
+    let around = AROUND.map(|(lat, lon, alt)| (lat, lon, alt + undulation_m(LatLon { lat, lon })));
     let (one, other) = (plan(&above_sea, &AROUND), plan(&above_ellipsoid, &around));
     for format in ["geojson", "kml", "czml", "gpx", "qgc", "wpl", "csv"] {
         let numbers = |text: String| -> Vec<f64> {

@@ -4,6 +4,7 @@
 
 pub mod bspline;
 pub mod geodesy;
+pub mod geoid;
 pub mod lane;
 mod quadratic;
 mod rect;

@@ -39,12 +39,16 @@ impl Route {
             return Err("that plan's route is too far from this scenario's area");
         }
         let datum = &self.frame.as_ref().ok_or(ANOTHER)?.altitude_datum;
-        let lift = match (datum.as_str(), wgs84.datum) {
-            ("msl", Datum::Ellipsoid) => wgs84.undulation_m,
-            ("ellipsoid", Datum::Msl) => -wgs84.undulation_m,
-            _ => 0.0,
+        let up = match (datum.as_str(), wgs84.datum) {
+            ("msl", Datum::Ellipsoid) => 1.0,
+            ("ellipsoid", Datum::Msl) => -1.0,
+            _ => return Ok(points),
         };
-        let lifted = |point: Point3| Point3::new(point.x, point.y, point.z + lift);
+        let geoid = wgs84.geoid();
+        let lifted = |point: Point3| {
+            let undulation_m = geoid.height_m([point.x, point.y]);
+            Point3::new(point.x, point.y, point.z + up * undulation_m)
+        };
         Ok(points.into_iter().map(lifted).collect())
     }
 }

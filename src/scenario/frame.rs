@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::geometry::geodesy::{LatLon, LatLonBox, TangentPlane};
+use crate::geometry::geoid::Geoid;
 use crate::geometry::{Point2, Point3};
 
 /// Meaning of the coordinates in a request and its result.
@@ -23,8 +24,7 @@ pub struct Wgs84 {
     pub datum: Datum,
     /// Tangent plane at the middle of `area`.
     pub plane: TangentPlane,
-    /// Height of mean sea level (EGM96) above the ellipsoid at the middle of `area`, metres; one value for the whole
-    /// scenario.
+    /// Height of mean sea level (EGM96) above the ellipsoid at the middle of `area`, metres.
     pub undulation_m: f64,
     /// Where the request keeps free waypoints. `Scenario::area` is the largest rectangle of the plane inside it.
     pub area: LatLonBox,
@@ -121,22 +121,21 @@ impl Wgs84 {
         self.plane.origin().distance_m(place) <= MAX_REACH_M
     }
 
-    /// Convert an altitude of the request to metres above mean sea level.
+    /// The geoid over the area, in coordinates of the plane. Takes some milliseconds, a tenth of a second for the
+    /// largest areas.
     #[must_use]
-    pub fn above_sea(&self, alt: f64) -> f64 {
-        match self.datum {
-            Datum::Msl => alt,
-            Datum::Ellipsoid => alt - self.undulation_m,
-        }
-    }
-
-    /// Convert an altitude of the request to metres above the ellipsoid.
-    #[must_use]
-    pub fn above_ellipsoid(&self, alt: f64) -> f64 {
-        match self.datum {
-            Datum::Msl => alt + self.undulation_m,
-            Datum::Ellipsoid => alt,
-        }
+    pub fn geoid(&self) -> Geoid {
+        let LatLonBox { min, max } = self.area;
+        let middle = self.plane.origin();
+        // Parallels and meridians are curved on the plane.
+        let places = [min.lat, middle.lat, max.lat].into_iter().flat_map(|lat| {
+            let longitudes = [min.lon, middle.lon, max.lon];
+            longitudes.map(|lon| self.plane.local(LatLon { lat, lon }))
+        });
+        let around = |(min, max): (Point2, Point2), at: Point2| (min.inf(&at), max.sup(&at));
+        let (min, max) = places.fold((Point2::origin(), Point2::origin()), around);
+        let place = |[x, y]: [f64; 2]| self.plane.geodetic(Point2::new(x, y));
+        Geoid::over([min.x, min.y], [max.x, max.y], place)
     }
 }
 

@@ -4,6 +4,7 @@ use super::reduce::{Shape, reduce};
 use crate::cost::{Model, Tolerance};
 use crate::export::chart::{Chart, rounded};
 use crate::export::{Altitude, Delivery, ExportError, Firmware, Options};
+use crate::geometry::geodesy::LatLon;
 use crate::geometry::{Point3, Segment};
 use crate::planner::keeps_limits;
 
@@ -140,18 +141,22 @@ impl Scribe<'_> {
     }
 
     fn place(&self, point: Point3, frame: u8) -> Place {
-        let fix = self.chart.fix(point);
+        let LatLon { lat, lon } = self.chart.place(point.xy());
+        let msl_m = self.chart.msl_m(point);
         let agl_m = rounded(self.delivery.agl(point), 1e3);
         let altitude_m = match frame {
-            FRAME_RELATIVE => rounded(point.z - self.home.z, 1e3),
+            FRAME_RELATIVE => {
+                let above_home = self.chart.above_sea(point) - self.chart.above_sea(self.home);
+                rounded(above_home, 1e3)
+            }
             FRAME_TERRAIN => agl_m,
-            _ => fix.msl_m,
+            _ => msl_m,
         };
         Place {
-            lat: rounded(fix.lat, DEGREES),
-            lon: rounded(fix.lon, DEGREES),
+            lat: rounded(lat, DEGREES),
+            lon: rounded(lon, DEGREES),
             altitude_m,
-            msl_m: fix.msl_m,
+            msl_m,
             agl_m,
         }
     }

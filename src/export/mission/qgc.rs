@@ -6,6 +6,7 @@ use super::items::{Item, Mission, Place, mission};
 use crate::cost::Tolerance;
 use crate::export::chart::Chart;
 use crate::export::{Altitude, Delivery, ExportError, Firmware, Options, outline};
+use crate::geometry::geodesy::LatLon;
 use crate::geometry::{Point3, Segment};
 use crate::threat::{Shape, Threat};
 
@@ -117,7 +118,7 @@ fn fence(delivery: &Delivery, chart: &Chart, mission: &Mission) -> (Value, Vec<V
         }
         match &threat.shape {
             Shape::Cylinder(cylinder) => {
-                let at = chart.fix(Point3::new(cylinder.center.x, cylinder.center.y, 0.0));
+                let at = chart.place(cylinder.center);
                 circles.push(json!({
                     "version": 1,
                     "inclusion": false,
@@ -125,8 +126,11 @@ fn fence(delivery: &Delivery, chart: &Chart, mission: &Mission) -> (Value, Vec<V
                 }));
             }
             Shape::Polygon(_) => {
-                let ring = outline::ring(chart, threat, 0.0);
-                let corners: Vec<_> = ring.iter().map(|corner| [corner.lat, corner.lon]).collect();
+                let corners = outline::ring(threat).into_iter().map(|corner| {
+                    let LatLon { lat, lon } = chart.place(corner);
+                    [lat, lon]
+                });
+                let corners: Vec<_> = corners.collect();
                 polygons.push(json!({"version": 1, "inclusion": false, "polygon": corners}));
             }
         }

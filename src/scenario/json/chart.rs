@@ -262,12 +262,9 @@ impl Earth {
         &self.plane
     }
 
-    /// Altitude of mean sea level, metres; dataset elevations are relative to it.
-    pub(super) fn sea_level_m(&self) -> f64 {
-        match self.datum {
-            Datum::Msl => 0.0,
-            Datum::Ellipsoid => self.undulation_m,
-        }
+    /// The datum of altitudes.
+    pub(super) fn datum(&self) -> Datum {
+        self.datum
     }
 
     /// The largest rectangle of the plane inside the area, whose parallels and meridians are curved on the plane.

@@ -3,6 +3,7 @@
 use crate::digest;
 use crate::geometry::geodesy::{LatLon, TangentPlane};
 use crate::geometry::{Point2, Point3, Rect};
+use crate::scenario::frame::Datum;
 use crate::scenario::limits::Limits;
 use crate::terrain::dem::{Dataset, Degrees, DemError};
 use crate::terrain::{DatasetError, Datasets, Found, Terrain};
@@ -125,9 +126,11 @@ pub(super) fn ground(fields: &Fields<'_>, site: &Site<'_>, faults: &mut Faults) 
         refuse(&error, fields, &name, Some(&found.sha256), faults);
         return None;
     }
-    let dem = dem
-        .lifted(earth.sea_level_m())
-        .named(name, found.sha256.as_str());
+    let dem = match earth.datum() {
+        Datum::Msl => dem,
+        Datum::Ellipsoid => dem.above_ellipsoid(earth.plane().origin()),
+    };
+    let dem = dem.named(name, found.sha256.as_str());
     Some((Terrain::Dem(dem.into()), area))
 }
 

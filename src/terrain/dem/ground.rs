@@ -10,7 +10,8 @@ use super::fit::Fit;
 use super::slabs::Slabs;
 use super::way::{Way, greater, lesser};
 use super::{DemError, Raster};
-use crate::geometry::geodesy::TangentPlane;
+use crate::geometry::geodesy::{LatLon, TangentPlane};
+use crate::geometry::geoid::Geoid;
 use crate::geometry::{Point2, Point3, Rect, Segment};
 use crate::terrain::HeightRange;
 use crate::terrain::cells::{Cells, Place, share_of_way};
@@ -82,7 +83,7 @@ impl Dem {
         let slabs = Slabs::of(&raster);
         // Over a deviation of d cells the ground rises by at most d times this.
         let steepest = steepest(&raster);
-        let chord_m = (8.0 * CHORD_M / (bend * steepest).max(1e-30)).sqrt();
+        let chord_m = chord_m(bend, steepest);
         Ok(Self {
             name: String::new(),
             sha256: String::new(),
@@ -106,20 +107,29 @@ impl Dem {
         }
     }
 
-    /// The same, raised by a number of metres, for another datum.
+    /// The same ground with elevations above the ellipsoid, where they were above mean sea level. `near` stands for
+    /// places that its reference system does not have.
     #[must_use]
     #[expect(
         clippy::cast_possible_truncation,
         reason = "rounding to single precision is what is wanted"
     )]
-    pub fn lifted(mut self, metres: f64) -> Self {
-        if metres != 0.0 {
-            for elevation in &mut self.raster.elevations {
-                *elevation = (f64::from(*elevation) + metres) as f32;
-            }
-            self.slabs = Slabs::of(&self.raster);
-            self.steepest = steepest(&self.raster);
+    pub fn above_ellipsoid(mut self, near: LatLon) -> Self {
+        let raster = &mut self.raster;
+        let lattice = &raster.lattice;
+        let last = [(lattice.columns - 1) as f64, (lattice.rows - 1) as f64];
+        let geoid = Geoid::over([0.0; 2], last, |cells| {
+            lattice.geodetic(cells).unwrap_or(near)
+        });
+        let columns = lattice.columns;
+        for (index, elevation) in raster.elevations.iter_mut().enumerate() {
+            let cells = [(index % columns) as f64, (index / columns) as f64];
+            *elevation = (f64::from(*elevation) + geoid.height_m(cells)) as f32;
         }
+        self.slabs = Slabs::of(&self.raster);
+        self.steepest = steepest(&self.raster);
+        // Chords are as long as the steepest rise allows.
+        self.chord_m = chord_m(self.bend, self.steepest);
         self
     }
 
@@ -368,6 +378,11 @@ fn widened(area: Rect, margin: f64, known: impl Fn(Rect) -> bool) -> Rect {
         }
     }
     rect
+}
+
+/// Longest chord over which the ground deviates by at most [`CHORD_M`], metres.
+fn chord_m(bend: f64, steepest: f64) -> f64 {
+    (8.0 * CHORD_M / (bend * steepest).max(1e-30)).sqrt()
 }
 
 /// Greatest rise over one cell along a row plus the greatest along a column, metres.

@@ -1,6 +1,7 @@
 //! Documents in degrees: projected onto a plane, written back unchanged, refused where no plane fits.
 
 use noctule::geometry::Point2;
+use noctule::geometry::geodesy::undulation_m;
 use noctule::scenario::frame::{Datum, Wgs84};
 use noctule::scenario::{Scenario, json};
 use proptest::prelude::*;
@@ -139,8 +140,13 @@ fn altitudes_are_above_the_named_datum() {
     let earth = earth(&scenario);
     assert_eq!(earth.datum, Datum::Ellipsoid);
     assert!((-31.5..-30.0).contains(&earth.undulation_m));
-    assert!((earth.above_sea(100.0) - (100.0 - earth.undulation_m)).abs() < 1e-12);
-    assert!((earth.above_ellipsoid(100.0) - 100.0).abs() < 1e-12);
+    // The geoid where the plane touches, and where the route begins.
+    let geoid = earth.geoid();
+    assert!((geoid.height_m([0.0, 0.0]) - earth.undulation_m).abs() < 1e-3);
+    let there = undulation_m(earth.place(scenario.start.xy()));
+    let start = geoid.height_m([scenario.start.x, scenario.start.y]);
+    assert!((start - there).abs() < 1e-3);
+    assert!((start - earth.undulation_m).abs() > 1e-2, "it slopes");
 }
 
 #[test]

@@ -160,9 +160,10 @@ pub trait Store: Send + Sync + 'static {
     /// Expired tombstones and idempotency keys are removed too.
     async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError>;
 
-    /// Webhooks of ended plans that are due, the longest due first, at most `limit`. A submission's webhook is due as
-    /// soon as its plan has ended: it is stored in the same step as the submission and made due in the same step as the
-    /// end. It is removed with its plan.
+    /// Webhooks of ended plans that are due, at most `limit`: first the longest due of each owner, then each owner's
+    /// next, so that an owner with many does not hold up the others. A submission's webhook is due as soon as its plan
+    /// has ended: it is stored in the same step as the submission and made due in the same step as the end. It is
+    /// removed with its plan.
     async fn due_webhooks(&self, now_ms: i64, limit: usize) -> Result<Vec<Webhook>, StoreError>;
 
     /// A plan's webhook has been tried; it is due again at `next_ms`, or done with. It is no error if it no longer

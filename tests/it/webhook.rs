@@ -10,7 +10,8 @@ use axum::body::Bytes;
 use axum::extract::State;
 use axum::http::{HeaderMap, Method, StatusCode, Uri};
 use noctule::digest::sha256_hex;
-use noctule::http::webhook::{Secret, Sender, Settings};
+use noctule::http::webhook::{Secrets, Sender, Settings};
+use noctule::job::Submission;
 use noctule::store::wall_clock;
 use serde_json::{Value, json};
 use tokio::net::TcpListener;
@@ -20,6 +21,7 @@ use crate::support::api::{Answer, Api};
 use crate::support::description::check_schema;
 use crate::support::faulty_store::FaultyStore;
 use crate::support::patience::{eventually, in_time};
+use crate::support::plans::submission;
 use crate::support::process::Service;
 use crate::support::run;
 use crate::support::scenario;
@@ -28,7 +30,7 @@ const SECRET: &str = "whsec_MDEyMzQ1Njc4OWFiY2RlZjAxMjM0NTY3ODlhYmNkZWY=";
 
 fn settings(allow_private: bool) -> Settings {
     Settings {
-        secret: Secret::read(SECRET).expect("a secret"),
+        secrets: Secrets::read(SECRET).expect("a secret"),
         allow_private,
     }
 }
@@ -156,6 +158,41 @@ async fn submit(api: &Api, url: &str) -> Answer {
 /// Submits a plan with `url` as its webhook; the plan's address.
 async fn accepted(api: &Api, url: &str) -> String {
     submit(api, url).await.header("location").to_owned()
+}
+
+/// A plan of `owner` that has ended, and whose webhook is due.
+async fn ended(api: &Api, owner: &str, url: &str, at_ms: i64) {
+    let submission = Submission {
+        owner: Some(owner.to_owned()),
+        webhook: Some(url.to_owned()),
+        ..submission()
+    };
+    let accepted = api.store.submit(submission).await.expect("accepted");
+    let cancelled = api.store.request_cancel(accepted.plan.id, at_ms).await;
+    cancelled.expect("it waited");
+}
+
+#[tokio::test]
+async fn receivers_that_do_not_answer_hold_up_their_owner_alone() {
+    let api = Api::with_webhooks(settings(true));
+    // Connections are made, and nobody takes them.
+    let silent = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+    let url = format!("http://{}/", silent.local_addr().expect("bound"));
+    for owner in ["slow", "slower"] {
+        for at_ms in 0..200 {
+            ended(&api, owner, &url, at_ms).await;
+        }
+    }
+    let _sender = sender(&api, true);
+    // Their tries have begun.
+    let mut taken = Vec::new();
+    for _ in 0..80 {
+        taken.push(in_time(silent.accept()).await.expect("a connection"));
+    }
+    let mut receiver = Receiver::new(&[]).await;
+    ended(&api, "quick", &receiver.url, 1_000).await;
+    let heard = receiver.next().await;
+    assert_eq!(heard.headers["webhook-signature"], signature(&heard));
 }
 
 #[tokio::test]

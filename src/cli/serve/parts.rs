@@ -9,7 +9,7 @@ use super::{backend, datasets, slots};
 use crate::cli::access;
 use crate::config::{self, Config};
 use crate::http::auth::Access;
-use crate::http::webhook::{self, Secret};
+use crate::http::webhook::{self, Secrets};
 use crate::http::{Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains};
 use crate::planner;
 use crate::store::measured::MeasuredStore;
@@ -85,9 +85,9 @@ fn webhooks(config: &config::Webhook) -> anyhow::Result<Option<webhook::Settings
     };
     let place = || format!("the webhook secret of {}", path.display());
     let text = std::fs::read_to_string(path).with_context(place)?;
-    let secret = Secret::read(&text).map_err(|allowed| anyhow!("{} {allowed}", place()))?;
+    let secrets = Secrets::read(&text).map_err(|allowed| anyhow!("{} {allowed}", place()))?;
     Ok(Some(webhook::Settings {
-        secret,
+        secrets,
         allow_private: config.allow_private,
     }))
 }

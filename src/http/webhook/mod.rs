@@ -17,15 +17,15 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use futures_util::FutureExt as _;
 use jiff::Timestamp;
 use serde::Serialize;
-use tokio::task::{JoinHandle, JoinSet};
+use tokio::task::{self, JoinHandle, JoinSet};
 use tokio::time::MissedTickBehavior;
 
-pub use secret::Secret;
+pub use secret::Secrets;
 
 use super::params;
 use super::problem::Problem;
 use super::status::StatusDocument;
-use crate::job::PlanId;
+use crate::job::{Owner, PlanId};
 use crate::store::{Clock, Store, StoreError, Webhook};
 use address::Target;
 use client::Client;
@@ -38,8 +38,9 @@ const WEBHOOK_SIGNATURE: HeaderName = HeaderName::from_static("webhook-signature
 /// How often the store is asked for due webhooks.
 const LOOK: Duration = Duration::from_millis(500);
 
-/// Webhooks in flight at once.
-const AT_ONCE: usize = 64;
+/// Webhooks in flight at once. An owner has at most as many as there are places left, 64 if nobody else has any, so
+/// that receivers who do not answer hold up their owner and not the others.
+const AT_ONCE: usize = 128;
 
 /// Pauses between attempts to record the outcome: the first, and the longest.
 const WRITING_PAUSES: [Duration; 2] = [Duration::from_millis(250), Duration::from_secs(60)];
@@ -47,8 +48,8 @@ const WRITING_PAUSES: [Duration; 2] = [Duration::from_millis(250), Duration::fro
 /// How webhooks are sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Settings {
-    /// The secret shared with receivers.
-    pub secret: Secret,
+    /// The secrets shared with receivers.
+    pub secrets: Secrets,
     /// Whether receivers may be outside the public internet, and without TLS.
     pub allow_private: bool,
 }
@@ -111,7 +112,7 @@ struct Delivery {
 async fn deliver_all(delivery: Arc<Delivery>) {
     let mut looks = tokio::time::interval(LOOK);
     looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let mut on_their_way = HashMap::new();
+    let mut on_their_way: HashMap<task::Id, (PlanId, Option<Owner>)> = HashMap::new();
     let mut tasks = JoinSet::new();
     loop {
         tokio::select! {
@@ -132,11 +133,13 @@ async fn deliver_all(delivery: Arc<Delivery>) {
             }
         };
         for webhook in due {
-            let id = webhook.plan.id;
-            if tasks.len() < AT_ONCE && !on_their_way.values().any(|other| *other == id) {
+            let (id, owner) = (webhook.plan.id, webhook.plan.owner.clone());
+            let is_on_its_way = on_their_way.values().any(|(other, _)| *other == id);
+            let of_owner = on_their_way.values().filter(|(_, other)| *other == owner);
+            if !is_on_its_way && of_owner.count() < AT_ONCE - tasks.len() {
                 let delivery = delivery.clone();
                 let task = tasks.spawn(async move { delivery.deliver(webhook).await });
-                on_their_way.insert(task.id(), id);
+                on_their_way.insert(task.id(), (id, owner));
             }
         }
     }
@@ -186,7 +189,7 @@ impl Delivery {
         let id = webhook.plan.id.to_string();
         let body = Message::of(webhook).to_json();
         let timestamp_s = Timestamp::now().as_second();
-        let signature = self.settings.secret.sign(&id, timestamp_s, &body);
+        let signature = self.settings.secrets.sign(&id, timestamp_s, &body);
         let mut headers = HeaderMap::new();
         headers.insert(
             header::CONTENT_TYPE,

@@ -8,7 +8,7 @@ use super::lane::{Lane, Version};
 use super::record::{Placed, Record, State};
 use super::turns::{self, Lanes};
 use super::view::Standing;
-use crate::job::{Plan, PlanId, Status};
+use crate::job::{Owner, Plan, PlanId, Status};
 use crate::store::{DatasetUse, ListQuery, Stats, StoreError, TOMBSTONE_MS};
 
 /// Number of runs in the mean time.
@@ -396,10 +396,20 @@ impl Known {
         graves.map(|(_, id)| *id).collect()
     }
 
-    /// Webhooks due at this time, the longest due first.
+    /// Webhooks due at this time: the longest due of each owner first, then each owner's next.
     pub(super) fn due(&self, now_ms: i64, at_most: usize) -> Vec<PlanId> {
-        let due = self.due.range(..=(now_ms, PlanId::max())).take(at_most);
-        due.map(|(_, id)| *id).collect()
+        let mut turns: HashMap<Option<&Owner>, usize> = HashMap::new();
+        let due = self.due.range(..=(now_ms, PlanId::max()));
+        let mut due: Vec<_> = due
+            .map(|(at, id)| {
+                let owner = self.kept(*id).and_then(|record| record.plan.owner.as_ref());
+                let turn = turns.entry(owner).or_default();
+                *turn += 1;
+                (*turn, *at, *id)
+            })
+            .collect();
+        due.sort_unstable();
+        due.into_iter().take(at_most).map(|(_, _, id)| id).collect()
     }
 }
 

@@ -37,8 +37,10 @@ pub(super) fn due(
 ) -> Result<Vec<Webhook>, StoreError> {
     let limit = i64::try_from(limit).unwrap_or(i64::MAX);
     let mut statement = connection.prepare_cached(
-        "SELECT id, url, tries FROM webhooks JOIN plans ON seq = plan_seq \
-         WHERE due_ms <= ?1 ORDER BY due_ms LIMIT ?2",
+        "SELECT id, url, tries FROM ( \
+           SELECT id, url, tries, due_ms, row_number() OVER (PARTITION BY owner ORDER BY due_ms) AS turn \
+           FROM webhooks JOIN plans ON seq = plan_seq WHERE due_ms <= ?1 \
+         ) ORDER BY turn, due_ms LIMIT ?2",
     )?;
     let rows = statement.query_map([now_ms, limit], |row| {
         Ok((row.get(0)?, row.get(1)?, row.get(2)?))

@@ -68,6 +68,32 @@ async fn a_webhook_is_due_at_the_end_and_after_a_restart() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn owners_take_turns_with_their_webhooks() {
+    on_every_backend(10, async |store| {
+        for (owner, url, ended_ms) in [
+            ("one", "a", 1),
+            ("one", "b", 2),
+            ("one", "c", 3),
+            ("two", "d", 4),
+        ] {
+            let submission = Submission {
+                owner: Some(owner.to_owned()),
+                ..with_webhook(url)
+            };
+            let id = store.submit(submission).await.unwrap().plan.id;
+            store.request_cancel(id, ended_ms).await.unwrap();
+        }
+        let due = store.due_webhooks(i64::MAX, 2).await.unwrap();
+        assert_eq!(told(&due), [("a", 0), ("d", 0)]);
+        let due = store.due_webhooks(i64::MAX, 10).await.unwrap();
+        assert_eq!(told(&due), [("a", 0), ("d", 0), ("b", 0), ("c", 0)]);
+        let due = store.due_webhooks(3, 10).await.unwrap();
+        assert_eq!(told(&due), [("a", 0), ("b", 0), ("c", 0)]);
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_rerun_plan_has_one_webhook_and_a_deleted_plan_has_none() {
     on_every_backend(10, async |store| {
         let id = store.submit(with_webhook("a")).await.unwrap().plan.id;

@@ -36,11 +36,32 @@ impl Readiness {
             return answer.said.clone();
         }
         let said = ask.await;
+        log_news(last.as_ref(), &said);
         *last = Some(Answer {
             came: Instant::now(),
             said: said.clone(),
         });
         said
+    }
+}
+
+/// Whoever asks may do so every second, so only what is new is logged.
+fn log_news(last: Option<&Answer>, now: &Result<(), StoreError>) {
+    let last = last.map_or(&Ok(()), |answer| &answer.said);
+    if !is_news(last, now) {
+        return;
+    }
+    match now {
+        Ok(()) => tracing::info!("the store is ready again"),
+        Err(error) => tracing::error!(%error, "the store is not ready"),
+    }
+}
+
+fn is_news(last: &Result<(), StoreError>, now: &Result<(), StoreError>) -> bool {
+    match (last, now) {
+        (Ok(()), Ok(())) => false,
+        (Err(last), Err(now)) => last.to_string() != now.to_string(),
+        _ => true,
     }
 }
 
@@ -53,6 +74,21 @@ mod tests {
     use tokio::sync::oneshot;
 
     use super::*;
+
+    #[test]
+    fn a_trouble_that_lasts_is_news_once() {
+        let away = || Err(StoreError::unavailable("the disk is away"));
+        let full = || Err(StoreError::unavailable("the disk is full"));
+        for (last, now, expected) in [
+            (Ok(()), Ok(()), false),
+            (Ok(()), away(), true),
+            (away(), away(), false),
+            (away(), full(), true),
+            (full(), Ok(()), true),
+        ] {
+            assert_eq!(is_news(&last, &now), expected, "{last:?} {now:?}");
+        }
+    }
 
     #[tokio::test(start_paused = true)]
     async fn concurrent_callers_share_one_answer() {

@@ -26,7 +26,8 @@ pub(super) async fn readyz(
         let retry_after_s = retry::for_room(&state.store.stats().await?, state.capacity);
         return Err(Problem::Draining { retry_after_s });
     }
-    state.readiness.shared(state.store.health()).await?;
+    let health = state.readiness.shared(state.store.health()).await;
+    health.map_err(|error| Problem::store_unavailable(&error))?;
     Ok(state.clock.jump_ms().map_or_else(ok, |jump_ms| {
         let warning = format!("the clock jumped by {jump_ms} ms and is not believed for now");
         Json(json!({"status": "ok", "warnings": [warning]})).into_response()

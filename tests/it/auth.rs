@@ -12,6 +12,7 @@ use tower::ServiceExt as _;
 use crate::support::api::{Answer, Api};
 use crate::support::description::DESCRIPTION;
 use crate::support::keys::{bearer, entry, post, send};
+use crate::support::patience::in_time;
 use crate::support::{run, scenario};
 
 /// Alice and Bob may plan, Rita may read Alice's plans, Max may read the metrics, Ada may do everything.
@@ -320,6 +321,21 @@ async fn a_ticket_opens_the_events_of_one_plan_and_nothing_else() {
         .replace(Keys::read(&without_rita.join("[[key]]")).expect("keys"));
     let dead = api.get(&format!("{plan}/events{query}")).await;
     dead.expect_problem(401, "unauthorized");
+}
+
+#[tokio::test]
+async fn a_long_poll_ends_with_its_key() {
+    let api = Api::with_keys(&house());
+    let plan = submit(&api, "of alice").await;
+    let bearer = bearer("of alice");
+    let headers = [("authorization", &*bearer), ("prefer", "wait=30")];
+    let polled = api.send(Method::GET, &plan, &headers, "");
+    let withdrawn = async {
+        let others = entry("bob", "of bob", "plan", "");
+        api.state.access.replace(Keys::read(&others).expect("keys"));
+    };
+    let (polled, ()) = in_time(async { tokio::join!(polled, withdrawn) }).await;
+    polled.expect_problem(401, "unauthorized");
 }
 
 /// A page may open its stream on any node, and a restarted node counts as another one.

@@ -13,6 +13,7 @@ use tokio::time::Instant;
 pub(super) use list::{MAX_PAGE, list};
 pub(super) use submit::submit;
 
+use super::auth::Unauthorized;
 use super::caller::Caller;
 use super::entity_tags::EntityTags;
 use super::params::{Id, NoParams};
@@ -43,6 +44,12 @@ pub(super) async fn show(
             let is_news = |known: &EntityTags| !known.contain(&etag(plan));
             plan.status.is_final() || known.as_ref().is_some_and(is_news)
         });
+        let changed = async {
+            tokio::select! {
+                changed = changed => changed,
+                () = state.access.withdrawn(caller.key) => Err(Problem::Unauthorized(Unauthorized::NoKey)),
+            }
+        };
         // Few requests wait, so the future is boxed to keep the others' small.
         plan = Box::pin(changed).await?;
     }

@@ -28,16 +28,23 @@ impl From<StoreError> for Problem {
             },
             error @ (StoreError::Unavailable { .. } | StoreError::InUse(_)) => {
                 tracing::error!(%error, "the store did not answer");
-                Self::StoreUnavailable(match error {
-                    StoreError::Unavailable { trouble, .. } => Some(trouble),
-                    _ => None,
-                })
+                Self::store_unavailable(&error)
             }
             error @ StoreError::LeaseLost(_) => {
                 tracing::error!(%error, "a handler met an error that only workers meet");
                 Self::Internal
             }
         }
+    }
+}
+
+impl Problem {
+    /// For a store that does not answer, which has been logged already.
+    pub(in crate::http) fn store_unavailable(error: &StoreError) -> Self {
+        Self::StoreUnavailable(match error {
+            StoreError::Unavailable { trouble, .. } => Some(*trouble),
+            _ => None,
+        })
     }
 }
 

@@ -21,7 +21,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     name: String,
 
-    /// What it may do: read (look at own plans), plan (also submit, cancel and delete), metrics, admin (everything)
+    /// What it may do: read (look at own plans), plan (also submit, cancel and delete plans, and upload datasets), metrics, admin (everything)
     #[arg(long, value_delimiter = ',', default_value = "plan", value_parser = scope)]
     scopes: Vec<Scope>,
 

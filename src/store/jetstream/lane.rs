@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::digest::sha256_hex;
 use crate::job::Submission;
 
-/// From this [`Submission::work`] on a plan is large: about a second of it.
+/// From this [`Submission::work`] on a plan is large: ten times the default, and some tenths of a second.
 const LARGE: u64 = 4_000_000;
 
 /// A version of the program, as `major.minor.patch` orders them.

@@ -159,14 +159,24 @@ impl Draft {
         }
     }
 
-    /// Build the document.
-    pub(super) fn finish(mut self) -> Result<Conversion, ImportError> {
+    /// The refusal of the file, with what it contains instead of a scenario.
+    pub(super) fn refused(mut self, detail: String) -> ImportError {
+        self.count_the_rest();
+        let unused = self.unused;
+        ImportError::NoScenario { detail, unused }
+    }
+
+    fn count_the_rest(&mut self) {
         if self.more_unused > 0 {
             self.unused.push(Unused {
                 place: String::new(),
                 reason: format!("{} more are not listed", self.more_unused),
             });
         }
+    }
+
+    /// Build the document.
+    pub(super) fn finish(mut self) -> Result<Conversion, ImportError> {
         let (Some(start), Some(target)) = (self.start, self.target) else {
             let missing: Vec<_> = [("start", self.start), ("target", self.target)]
                 .into_iter()
@@ -177,9 +187,9 @@ impl Draft {
                 "{} in the file: a point of that name makes one",
                 missing.join(" and ")
             );
-            let unused = self.unused;
-            return Err(ImportError::NoScenario { detail, unused });
+            return Err(self.refused(detail));
         };
+        self.count_the_rest();
         let elevation = self.elevation.unwrap_or(f64::INFINITY);
         let elevation = elevation.min(start.1).min(target.1);
         self.assume(

@@ -106,7 +106,7 @@ impl Syntax {
 ///
 /// # Errors
 /// [`ImportError::NotJson`] and [`ImportError::NotXml`] when `text` does not have that syntax,
-/// [`ImportError::NoScenario`] when it does but has no start or no target.
+/// [`ImportError::NoScenario`] when it does but has no start or no target, or one whose altitude is not known.
 pub fn convert(text: &[u8], syntax: Syntax) -> Result<Conversion, ImportError> {
     let text = without_mark(text);
     if text.starts_with(b"PK\x03\x04") {

@@ -25,7 +25,8 @@ const FIXED_WING: u64 = 1;
 struct Stop {
     at: String,
     place: Place,
-    alt: f64,
+    /// Above mean sea level, metres; else why it is not known, which matters at the ends alone.
+    alt: Result<f64, String>,
     /// On the ground, at the start or the end of the mission.
     on_ground: bool,
 }
@@ -49,7 +50,9 @@ pub(super) fn convert(document: &Value) -> Result<Conversion, ImportError> {
     }
     draft.cruise_speed = speed(mission);
     let stops = stops(&mut draft, items, home);
-    ends(&mut draft, home, &stops);
+    if let Err(reason) = ends(&mut draft, home, &stops) {
+        return Err(draft.refused(reason));
+    }
     fences(&mut draft, &document["geoFence"]);
     let rally = document["rallyPoints"]["points"].as_array();
     for index in 0..rally.map_or(0, Vec::len) {
@@ -126,16 +129,10 @@ fn stop(at: &str, item: &Value, command: u64, home: Option<(Place, f64)>) -> Res
         (None, Some((place, _))) if on_ground => place,
         (None, _) => return Err("an item without a place".to_owned()),
     };
-    let height = param(6).unwrap_or(0.0);
-    let alt = match item["frame"].as_u64() {
-        _ if on_ground => home_alt,
-        Some(0 | 5) => height,
-        Some(3 | 6) => home_alt + height,
-        Some(10 | 11) => return Err(
-            "an altitude above terrain, which is not known here: as an end it must be relative or absolute"
-                .to_owned(),
-        ),
-        _ => return Err(format!("frame is {}, must be 0, 3, 5 or 6", item["frame"])),
+    let alt = if on_ground {
+        Ok(home_alt)
+    } else {
+        altitude(item, home_alt)
     };
     Ok(Stop {
         at: at.to_owned(),
@@ -145,30 +142,62 @@ fn stop(at: &str, item: &Value, command: u64, home: Option<(Place, f64)>) -> Res
     })
 }
 
+/// Metres above mean sea level of an item in the air. Beside a height above terrain, a ground station keeps the
+/// altitude that it amounts to; it is null while the ground is not known.
+fn altitude(item: &Value, home_alt: f64) -> Result<f64, String> {
+    let height = &item["params"][6];
+    let number = height.as_f64();
+    let number = || number.ok_or_else(|| format!("has the altitude {height}, must be a number"));
+    match item["frame"].as_u64() {
+        Some(0 | 5) => number(),
+        Some(3 | 6) => Ok(home_alt + number()?),
+        Some(frame @ (10 | 11)) => {
+            let above_sea = &item["AMSLAltAboveTerrain"];
+            above_sea.as_f64().ok_or_else(|| {
+                format!(
+                    "is {height} m above terrain (frame {frame}), and AMSLAltAboveTerrain is {above_sea}, must be its altitude above sea"
+                )
+            })
+        }
+        _ => Err(format!(
+            "has frame {}, must be 0, 3, 5, 6, 10 or 11",
+            item["frame"]
+        )),
+    }
+}
+
 /// The mission's first and last stop; a single stop is the target, reached from home.
-fn ends(draft: &mut Draft, home: Option<(Place, f64)>, stops: &[Stop]) {
-    let set = |draft: &mut Draft, end: &str, stop: &Stop| {
+///
+/// # Errors
+/// When the altitude of one of them is not known: without it, the next stop would be taken for the end.
+fn ends(draft: &mut Draft, home: Option<(Place, f64)>, stops: &[Stop]) -> Result<(), String> {
+    let set = |draft: &mut Draft, end: &str, stop: &Stop| -> Result<(), String> {
+        let Stop { at, place, .. } = stop;
+        let alt = stop.alt.clone();
+        let alt = alt.map_err(|reason| format!("the {end}, {at}, {reason}"))?;
         if stop.on_ground && home.is_some() {
             let pointer = format!("/{end}/alt");
-            draft.assume(&pointer, format!("{}, on the ground as home is", stop.alt));
+            draft.assume(&pointer, format!("{alt}, on the ground as home is"));
         }
-        draft.end(end, &stop.at, stop.place, stop.alt);
+        draft.end(end, at, *place, alt);
+        Ok(())
     };
     match (stops, home) {
         ([], _) => {}
         ([only], Some((place, alt))) => {
             draft.end("start", "/mission/plannedHomePosition", place, alt);
-            set(draft, "target", only);
+            set(draft, "target", only)?;
         }
-        ([only], None) => set(draft, "target", only),
+        ([only], None) => set(draft, "target", only)?,
         ([first, between @ .., last], _) => {
-            set(draft, "start", first);
-            set(draft, "target", last);
+            set(draft, "start", first)?;
+            set(draft, "target", last)?;
             for stop in between {
                 draft.leave(&stop.at, "a stop on the way: a plan finds its own");
             }
         }
     }
+    Ok(())
 }
 
 fn fences(draft: &mut Draft, fence: &Value) {

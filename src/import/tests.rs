@@ -330,6 +330,78 @@ fn missions_and_fences_of_a_plan() {
     );
 }
 
+/// Beside a height above terrain, a ground station keeps the altitude above sea that it amounts to.
+#[test]
+fn ends_above_terrain_are_at_their_altitude_above_sea() {
+    let item = |frame: u8, lat: f64, height: Value, above_sea: Value| {
+        json!({"type": "SimpleItem", "command": 16, "frame": frame, "AMSLAltAboveTerrain": above_sea,
+               "params": [0, 0, 0, null, lat, 8.5, height]})
+    };
+    let converted = |items: Value| {
+        let plan = json!({
+            "fileType": "Plan",
+            "mission": {"plannedHomePosition": [47.2, 8.5, 480], "items": items},
+        });
+        convert(plan.to_string().as_bytes(), Syntax::Json)
+    };
+    let check = |items: Value, start: Value, target: Value| {
+        let found = converted(items).expect("a scenario");
+        assert_eq!(found.scenario["start"], start);
+        assert_eq!(found.scenario["target"], target);
+        let between = "a stop on the way: a plan finds its own";
+        assert!(
+            found.unused.iter().all(|unused| unused.reason == between),
+            "{:?}",
+            found.unused
+        );
+    };
+    check(
+        json!([
+            item(10, 47.3, json!(60), json!(541.5)),
+            item(10, 47.4, json!(60), json!(null)),
+            item(11, 47.5, json!(40), json!(652.25)),
+        ]),
+        json!({"lat": 47.3, "lon": 8.5, "alt": 541.5}),
+        json!({"lat": 47.5, "lon": 8.5, "alt": 652.25}),
+    );
+    check(
+        json!([item(10, 47.5, json!(40), json!(652.25))]),
+        json!({"lat": 47.2, "lon": 8.5, "alt": 480.0}),
+        json!({"lat": 47.5, "lon": 8.5, "alt": 652.25}),
+    );
+    // In the other frames it is left aside: there, some files have what it was before.
+    check(
+        json!([
+            item(3, 47.3, json!(60), json!(1)),
+            item(0, 47.5, json!(530), json!(1))
+        ]),
+        json!({"lat": 47.3, "lon": 8.5, "alt": 540.0}),
+        json!({"lat": 47.5, "lon": 8.5, "alt": 530.0}),
+    );
+    let known = item(0, 47.3, json!(500), json!(null));
+    for (items, expected) in [
+        (
+            json!([known, item(10, 47.5, json!(40), json!(null))]),
+            "the target, /mission/items/1, is 40 m above terrain (frame 10), and AMSLAltAboveTerrain is null, must be its altitude above sea",
+        ),
+        (
+            json!([item(11, 47.5, json!(40), json!("high")), known]),
+            "the start, /mission/items/0, is 40 m above terrain (frame 11), and AMSLAltAboveTerrain is \"high\", must be its altitude above sea",
+        ),
+        (
+            json!([known, item(0, 47.5, json!(null), json!(null))]),
+            "the target, /mission/items/1, has the altitude null, must be a number",
+        ),
+        (
+            json!([known, item(7, 47.5, json!(40), json!(null))]),
+            "the target, /mission/items/1, has frame 7, must be 0, 3, 5, 6, 10 or 11",
+        ),
+    ] {
+        let refused = converted(items).expect_err(expected);
+        assert_eq!(refused.to_string(), expected);
+    }
+}
+
 #[test]
 fn speeds_of_a_plan() {
     let check = |params: Value, expected: Result<f64, &str>| {

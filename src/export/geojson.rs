@@ -83,8 +83,8 @@ fn violations(delivery: &Delivery, index: usize) -> impl Iterator<Item = &str> {
 /// A circle is a ring with its centre and radius as properties, from which the importer restores the circle.
 fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Feature {
     let chart = delivery.chart();
-    let ring = outline::ring(threat).into_iter();
-    let ring: Vec<_> = ring.map(|corner| flat(chart, corner)).collect();
+    let ring = outline::ring_in_degrees(chart, threat);
+    let ring: Vec<_> = ring.iter().map(|at| vec![at.lon, at.lat]).collect();
     let middle = outline::middle(threat);
     let height = |z: Option<f64>| z.map(|z| chart.ellipsoid_m(Point3::new(middle.x, middle.y, z)));
     let mut properties = json!({

@@ -1,5 +1,6 @@
 //! Joins polygons that a file has cut along the 180th meridian, as RFC 7946 section 3.1.9 asks. Otherwise the halves
-//! would leave a gap of zero width between them, through which a route could pass.
+//! would leave a gap of zero width between them, through which a route could pass. A polygon round a pole, which is cut
+//! along the meridian and over the pole, is joined to itself.
 
 use std::collections::HashMap;
 use std::iter::successors;
@@ -23,7 +24,7 @@ pub(super) fn joined(rings: &[Vec<Corner>]) -> Vec<(usize, Vec<Corner>)> {
         .flat_map(|(index, ring)| chains(index, &counterclockwise(ring)))
         .collect();
     let follower = followers(&chains);
-    let whole = whole(rings.len(), &chains, &follower);
+    let mut whole = whole(rings.len(), &chains, &follower);
     let mut made: Vec<(usize, Vec<Corner>)> = Vec::new();
     let mut told = vec![false; chains.len()];
     for first in 0..chains.len() {
@@ -38,7 +39,12 @@ pub(super) fn joined(rings: &[Vec<Corner>]) -> Vec<(usize, Vec<Corner>)> {
             ring.extend(&chains[index].corners[1..]);
             next = follower[index];
         }
-        made.push((chains[first].ring, ring));
+        if ring.len() > 2 {
+            made.push((chains[first].ring, ring));
+        } else {
+            // A band as wide as the earth, which has no other corners.
+            whole[chains[first].ring] = false;
+        }
     }
     let others = rings.iter().cloned().enumerate();
     made.extend(others.filter(|(index, _)| !whole[*index]));
@@ -64,12 +70,15 @@ fn counterclockwise(ring: &[Corner]) -> Vec<Corner> {
     ring
 }
 
-/// A ring without its edges along the meridian; empty if it has no such edge.
+/// A ring without its edges along the meridian, and along it over a pole; empty if it has no such edge.
 fn chains(ring: usize, corners: &[Corner]) -> Vec<Chain> {
     let n = corners.len();
     let is_cut = |index: usize| {
         let (here, next) = (corners[index % n], corners[(index + 1) % n]);
-        here[0].abs() >= 180.0 && here[0].total_cmp(&next[0]).is_eq()
+        let is_at_pole = here[1].abs() >= 90.0 && next[1].abs() >= 90.0;
+        here[0].abs() >= 180.0
+            && next[0].abs() >= 180.0
+            && (is_at_pole || here[0].total_cmp(&next[0]).is_eq())
     };
     let Some(cut) = (0..n).find(|index| is_cut(*index)) else {
         return Vec::new();
@@ -236,5 +245,30 @@ mod tests {
         check(&[&body, &arms], &[(0, &expected)]);
         let apart: [&[Corner]; 3] = [&arms[..4], &body, &arms[4..]];
         assert_eq!(joined(&apart.map(<[Corner]>::to_vec)).len(), 1);
+    }
+
+    /// Our own exports close a ring round a pole over it.
+    #[test]
+    fn a_ring_round_a_pole_is_not_cut() {
+        let cap = [
+            [-180.0, 88.0],
+            [-120.0, 88.0],
+            [0.0, 89.0],
+            [120.0, 88.0],
+            [180.0, 88.0],
+            [180.0, 90.0],
+            [-180.0, 90.0],
+            [-180.0, 88.0],
+        ];
+        check(&[&cap], &[(0, &cap[1..5])]);
+        let south = cap.map(|[lon, lat]| [-lon, -lat]);
+        check(&[&south], &[(0, &south[1..5])]);
+    }
+
+    /// A band that is as wide as the earth has no corners but those of its cuts.
+    #[test]
+    fn a_band_all_round_is_as_it_was() {
+        let band = [[-180.0, 80.0], [180.0, 80.0], [180.0, 90.0], [-180.0, 90.0]];
+        check(&[&band], &[(0, &band)]);
     }
 }

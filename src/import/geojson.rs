@@ -86,7 +86,9 @@ fn geometry(draft: &mut Draft, at: &str, facts: &Facts, value: &GeometryValue) {
         GeometryValue::Point { coordinates } => point(draft, at, facts, coordinates),
         GeometryValue::Polygon { coordinates } => {
             if let Some(ring) = outer(draft, at, coordinates) {
-                draft.polygon(at, facts, &ring);
+                for (_, ring) in antimeridian::joined(&[ring]) {
+                    draft.polygon(at, facts, &ring);
+                }
             }
         }
         GeometryValue::MultiPolygon { coordinates } => polygons(draft, at, facts, coordinates),

@@ -221,6 +221,29 @@ fn a_file_without_ends_is_no_scenario() {
     );
 }
 
+/// As our own exports write a triangle round a pole.
+#[test]
+fn a_polygon_closed_over_a_pole_is_a_ring_round_it() {
+    let mut features = ends();
+    features.push(feature(
+        json!({"name": "ice"}),
+        json!({"type": "Polygon", "coordinates": [
+            [[-180, 88], [-120, 88], [0, 89], [120, 88], [180, 88], [180, 90], [-180, 90], [-180, 88]]]}),
+    ));
+    let found = geojson(&features.into()).expect("a scenario");
+    let corner = |lat: f64, lon: f64| json!({"lat": lat, "lon": lon});
+    assert_eq!(
+        found.scenario["threats"][0]["vertices"],
+        json!([
+            corner(88.0, -120.0),
+            corner(89.0, 0.0),
+            corner(88.0, 120.0),
+            corner(88.0, 180.0)
+        ])
+    );
+    assert_eq!(unused(&found), [""; 0]);
+}
+
 const KML: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <kml xmlns="http://www.opengis.net/kml/2.2"><Document><name>flight</name>
 <NetworkLink><Link><href>http://localhost/</href></Link></NetworkLink>

@@ -1,4 +1,4 @@
-//! Cuts geometries that cross the 180th meridian, as RFC 7946 section 3.1.9 asks.
+//! Cuts geometries that cross the 180th meridian, as RFC 7946 section 3.1.9 asks, and closes rings round a pole.
 //!
 //! Positions are degrees east, north and optionally a height. Consecutive positions are less than 180 degrees of
 //! longitude apart, so a larger step crosses the meridian.
@@ -33,59 +33,176 @@ pub(super) fn line(places: &[Place]) -> GeometryValue {
     }
 }
 
-/// The same line, with positions exactly on the meridian moved to the side of their predecessor: crossing to the
-/// other side and back would be a step of length zero.
+/// The same line, with positions exactly on the meridian moved to the side of their predecessor, or at the beginning
+/// to the side of the first position beside it: crossing to the other side and back would be a step of length zero,
+/// and a line that begins by crossing would have a piece without length.
 fn on_one_side(places: &[Place]) -> Vec<Place> {
     let mut places = places.to_vec();
-    for index in 1..places.len() {
-        let before = places[index - 1][0];
-        if places[index][0].abs() >= 180.0 {
-            places[index][0] = 180.0_f64.copysign(before);
+    let beside = places.iter().map(|place| place[0]);
+    let beside = beside.into_iter().find(|lon| lon.abs() < 180.0);
+    let mut before = beside.unwrap_or(places[0][0]);
+    for place in &mut places {
+        if place[0].abs() >= 180.0 {
+            place[0] = 180.0_f64.copysign(before);
         }
+        before = place[0];
     }
     places
 }
 
-/// A ring, without repeated first corner; in two halves if it crosses.
-pub(super) fn ring(corners: &[Place]) -> GeometryValue {
-    let around = corners.iter().zip(corners.iter().cycle().skip(1));
-    if !around.clone().any(|(here, next)| crosses(here, next)) {
-        return GeometryValue::new_polygon([closed(corners.to_vec())]);
-    }
-    // Degrees east, continued beyond 180.
-    let unrolled: Vec<Place> = corners
-        .iter()
-        .map(|corner| {
-            let mut corner = corner.clone();
-            corner[0] = corner[0].rem_euclid(360.0);
-            corner
-        })
-        .collect();
-    let west = half(&unrolled, |lon| 180.0 - lon);
-    let mut east = half(&unrolled, |lon| lon - 180.0);
-    for corner in &mut east {
-        corner[0] -= 360.0;
-    }
-    let halves = [west, east].into_iter().filter(|half| half.len() > 2);
-    GeometryValue::new_multi_polygon(halves.map(|half| [closed(half)]))
+/// A corner of a ring. Its degrees east continue beyond 180.
+#[derive(Debug, Clone, PartialEq)]
+struct Corner {
+    place: Place,
+    /// Turns round the earth, eastward, beyond the first corner.
+    turns: f64,
 }
 
-/// The part of a ring where `inside` of its degrees east is not negative: Sutherland-Hodgman clipping at one line.
-fn half(corners: &[Place], inside: impl Fn(f64) -> f64) -> Vec<Place> {
-    let mut kept = Vec::new();
-    for (here, next) in corners.iter().zip(corners.iter().cycle().skip(1)) {
-        let (from, to) = (inside(here[0]), inside(next[0]));
-        if from >= 0.0 {
-            kept.push(here.clone());
+impl Corner {
+    /// Degrees east, continued.
+    fn lon(&self) -> f64 {
+        self.place[0] + 360.0 * self.turns
+    }
+
+    /// The corner where the edge to `next` meets a meridian, given in degrees east, continued; `None` if the edge
+    /// stays on one side, or only ends on it.
+    fn cut(&self, next: &Self, meridian: f64) -> Option<Self> {
+        let (from, to) = (meridian - self.lon(), meridian - next.lon());
+        if from * to >= 0.0 {
+            return None;
         }
-        if from * to < 0.0 {
-            let share = from / (from - to);
-            let mut at = between(here, next, share);
-            at[0] = 180.0;
-            kept.push(at);
+        let mut place = between(&self.place, &next.place, from / (from - to));
+        place[0] = 180.0;
+        let turns = (meridian - 180.0) / 360.0;
+        Some(Self { place, turns })
+    }
+}
+
+/// A counter-clockwise ring, without repeated first corner; in several parts if it crosses. A ring round a pole is
+/// closed along the meridian and over the pole.
+pub(super) fn ring(corners: &[Place]) -> GeometryValue {
+    let (mut corners, way) = unrolled(corners);
+    if way.abs() > 0.0 {
+        corners = over_a_pole(&corners, way);
+    }
+    let (west, east) = strips(&corners);
+    for corner in &mut corners {
+        corner.turns -= west;
+    }
+    if west >= east {
+        return GeometryValue::new_polygon([closed(&corners, 0.0)]);
+    }
+    let parts = (0..)
+        .map(f64::from)
+        .take_while(|strip| *strip <= east - west);
+    let parts = parts.map(|strip| (strip, part(&corners, strip)));
+    let parts = parts.filter(|(_, part)| part.len() > 2);
+    GeometryValue::new_multi_polygon(parts.map(|(strip, part)| [closed(&part, strip)]))
+}
+
+/// The corners with continued degrees, and the turns that the ring makes round the earth: 0, or 1 round the north pole
+/// and -1 round the south pole.
+fn unrolled(places: &[Place]) -> (Vec<Corner>, f64) {
+    let mut turns = 0.0;
+    let mut corners = Vec::with_capacity(places.len());
+    for (here, next) in places.iter().zip(places.iter().cycle().skip(1)) {
+        let place = here.clone();
+        corners.push(Corner { place, turns });
+        if crosses(here, next) {
+            turns += 1.0_f64.copysign(here[0] - next[0]);
         }
     }
+    (corners, turns)
+}
+
+/// A ring that makes `way` turns, 1 or -1, round the earth: from the 180th meridian once round to the same meridian,
+/// and back over the pole. It begins where it meets this meridian nearest to the pole, so that nothing of the ring
+/// lies between.
+fn over_a_pole(corners: &[Corner], way: f64) -> Vec<Corner> {
+    let n = corners.len();
+    let later = |index: usize| Corner {
+        turns: corners[index % n].turns + if index < n { 0.0 } else { way },
+        ..corners[index % n].clone()
+    };
+    // Where the ring meets the meridian, and the indices of the corners from there round to the same place.
+    let met = (0..n).filter_map(|index| {
+        let (here, next) = (later(index), later(index + 1));
+        let meridian = meridian_west_of(here.lon().max(next.lon()));
+        if here.lon().total_cmp(&meridian).is_eq() {
+            return Some((here, index + 1..index + n));
+        }
+        Some((here.cut(&next, meridian)?, index + 1..index + n + 1))
+    });
+    let nearest = met.max_by(|(one, _), (other, _)| {
+        let [one, other] = [one, other].map(|corner| corner.place[1].abs());
+        one.total_cmp(&other)
+    });
+    let (first, rest) = nearest.expect("a ring round a pole meets every meridian");
+    let last = Corner {
+        turns: first.turns + way,
+        ..first.clone()
+    };
+    let pole = |corner: &Corner| {
+        let mut pole = corner.clone();
+        pole.place[1] = 90.0 * way;
+        pole
+    };
+    let over = [pole(&last), pole(&first)];
+    let mut round = vec![first];
+    round.extend(rest.map(later));
+    round.push(last);
+    round.extend(over);
+    round
+}
+
+/// The 180th meridian at `lon` or next to the west of it, in continued degrees.
+fn meridian_west_of(lon: f64) -> f64 {
+    360.0 * ((lon - 180.0) / 360.0).floor() + 180.0
+}
+
+/// The first and the last turn round the earth, counted at the 180th meridian, in which a ring has an area.
+fn strips(corners: &[Corner]) -> (f64, f64) {
+    let lons = corners.iter().map(Corner::lon);
+    let (west, east) = lons.fold((f64::INFINITY, f64::NEG_INFINITY), |(west, east), lon| {
+        (west.min(lon), east.max(lon))
+    });
+    (
+        ((west + 180.0) / 360.0).floor(),
+        ((east + 180.0) / 360.0).ceil() - 1.0,
+    )
+}
+
+/// The part of a ring in one turn round the earth: Sutherland-Hodgman clipping at both ends of it.
+fn part(corners: &[Corner], strip: f64) -> Vec<Corner> {
+    let (west, east) = (360.0 * strip - 180.0, 360.0 * strip + 180.0);
+    let part = clipped(corners, west, |lon| lon >= west);
+    let part = clipped(&part, east, |lon| lon <= east);
+    without_spurs(&part, &[west, east])
+}
+
+fn clipped(corners: &[Corner], meridian: f64, inside: impl Fn(f64) -> bool) -> Vec<Corner> {
+    let mut kept = Vec::new();
+    for (here, next) in corners.iter().zip(corners.iter().cycle().skip(1)) {
+        if inside(here.lon()) {
+            kept.push(here.clone());
+        }
+        kept.extend(here.cut(next, meridian));
+    }
     kept
+}
+
+/// The ring without corners in the middle of a way along one of `meridians`: where a ring only touches the meridian,
+/// the part beyond would go there and back.
+fn without_spurs(corners: &[Corner], meridians: &[f64]) -> Vec<Corner> {
+    let n = corners.len();
+    let is_along = |index: usize| {
+        let around = [index + n - 1, index, index + 1].map(|index| corners[index % n].lon());
+        meridians
+            .iter()
+            .any(|meridian| around.iter().all(|lon| lon.total_cmp(meridian).is_eq()))
+    };
+    let kept = (0..n).filter(|index| !is_along(*index));
+    kept.map(|index| corners[index].clone()).collect()
 }
 
 fn crosses(one: &Place, other: &Place) -> bool {
@@ -106,9 +223,15 @@ fn push(pieces: &mut [Vec<Position>], mut place: Place, lon: f64) {
     piece.push(place.into());
 }
 
-fn closed(mut ring: Vec<Place>) -> Vec<Position> {
-    ring.push(ring[0].clone());
-    ring.into_iter().map(Into::into).collect()
+/// The positions of a ring that lies in one turn round the earth.
+fn closed(corners: &[Corner], strip: f64) -> Vec<Position> {
+    let around = corners.iter().chain(corners.first());
+    let position = |corner: &Corner| {
+        let mut place = corner.place.clone();
+        place[0] += 360.0 * (corner.turns - strip);
+        place.into()
+    };
+    around.map(position).collect()
 }
 
 #[cfg(test)]
@@ -158,6 +281,87 @@ mod tests {
         check(
             &line(&[vec![179.0, 1.0], vec![-180.0, 2.0], vec![-179.0, 3.0]]),
             r#"{"type":"MultiLineString","coordinates":[[[179.0,1.0],[180.0,2.0],[180.0,2.0]],[[-180.0,2.0],[-179.0,3.0]]]}"#,
+        );
+    }
+
+    #[test]
+    fn what_only_touches_the_meridian_is_whole() {
+        check(
+            &line(&[vec![180.0, 1.0], vec![180.0, 2.0], vec![-179.0, 3.0]]),
+            r#"{"type":"LineString","coordinates":[[-180.0,1.0],[-180.0,2.0],[-179.0,3.0]]}"#,
+        );
+        check(
+            &line(&[vec![-180.0, 1.0], vec![179.0, 2.0], vec![-179.0, 4.0]]),
+            r#"{"type":"MultiLineString","coordinates":[[[180.0,1.0],[179.0,2.0],[180.0,3.0]],[[-180.0,3.0],[-179.0,4.0]]]}"#,
+        );
+        check(
+            &ring(&[
+                vec![179.0, 0.0],
+                vec![180.0, 0.0],
+                vec![180.0, 1.0],
+                vec![-180.0, 2.0],
+                vec![179.0, 2.0],
+            ]),
+            r#"{"type":"Polygon","coordinates":[[[179.0,0.0],[180.0,0.0],[180.0,1.0],[180.0,2.0],[179.0,2.0],[179.0,0.0]]]}"#,
+        );
+        check(
+            &ring(&[vec![180.0, 0.0], vec![-179.0, 1.0], vec![-180.0, 2.0]]),
+            r#"{"type":"Polygon","coordinates":[[[-180.0,0.0],[-179.0,1.0],[-180.0,2.0],[-180.0,0.0]]]}"#,
+        );
+    }
+
+    /// Beyond the meridian, the corner that touches it has no area.
+    #[test]
+    fn halves_have_no_spurs() {
+        check(
+            &ring(&[
+                vec![179.0, 0.0],
+                vec![-179.0, 2.0],
+                vec![179.0, 4.0],
+                vec![180.0, 5.0],
+                vec![179.0, 6.0],
+            ]),
+            r#"{"type":"MultiPolygon","coordinates":[[[[179.0,0.0],[180.0,1.0],[180.0,3.0],[179.0,4.0],[180.0,5.0],[179.0,6.0],[179.0,0.0]]],[[[-180.0,1.0],[-179.0,2.0],[-180.0,3.0],[-180.0,1.0]]]]}"#,
+        );
+    }
+
+    #[test]
+    fn a_ring_round_a_pole_is_closed_over_it() {
+        check(
+            &ring(&[vec![0.0, 89.0], vec![120.0, 88.0], vec![-120.0, 88.0]]),
+            r#"{"type":"Polygon","coordinates":[[[-180.0,88.0],[-120.0,88.0],[0.0,89.0],[120.0,88.0],[180.0,88.0],[180.0,90.0],[-180.0,90.0],[-180.0,88.0]]]}"#,
+        );
+        check(
+            &ring(&[vec![0.0, -89.0], vec![-120.0, -88.0], vec![120.0, -88.0]]),
+            r#"{"type":"Polygon","coordinates":[[[180.0,-88.0],[120.0,-88.0],[0.0,-89.0],[-120.0,-88.0],[-180.0,-88.0],[-180.0,-90.0],[180.0,-90.0],[180.0,-88.0]]]}"#,
+        );
+        // A corner on the meridian, written either way.
+        for side in [180.0, -180.0] {
+            check(
+                &ring(&[
+                    vec![0.0, 89.0],
+                    vec![90.0, 89.0],
+                    vec![side, 88.0],
+                    vec![-90.0, 89.0],
+                ]),
+                r#"{"type":"Polygon","coordinates":[[[-180.0,88.0],[-90.0,89.0],[0.0,89.0],[90.0,89.0],[180.0,88.0],[180.0,90.0],[-180.0,90.0],[-180.0,88.0]]]}"#,
+            );
+        }
+    }
+
+    /// The ring crosses the meridian three times: an arm of it reaches back across.
+    #[test]
+    fn an_arm_of_a_ring_round_a_pole_is_cut_off() {
+        check(
+            &ring(&[
+                vec![0.0, 80.0],
+                vec![120.0, 80.0],
+                vec![-170.0, 70.0],
+                vec![-170.0, 72.0],
+                vec![170.0, 82.0],
+                vec![-120.0, 87.0],
+            ]),
+            r#"{"type":"MultiPolygon","coordinates":[[[[-180.0,82.71428571428571],[-120.0,87.0],[0.0,80.0],[120.0,80.0],[180.0,71.42857142857143],[180.0,77.0],[170.0,82.0],[180.0,82.71428571428571],[180.0,90.0],[-180.0,90.0],[-180.0,82.71428571428571]]],[[[-180.0,71.42857142857143],[-170.0,70.0],[-170.0,72.0],[-180.0,77.0],[-180.0,71.42857142857143]]]]}"#,
         );
     }
 

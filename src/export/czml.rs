@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::chart::{Chart, rounded};
+use super::options::Digit;
 use super::outline;
 use super::{Delivery, Options};
 use crate::geometry::geodesy::LatLon;
@@ -22,12 +23,14 @@ pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
     let course = delivery.course();
     let passages = delivery.passages(course);
     let duration_s = passages[passages.len() - 1].time_s;
-    let (begin, end) = (options.epoch, options.instant(duration_s));
+    let begin = options.epoch;
+    let end = options.instant(duration_s, Digit::Microsecond);
     let interval = format!("{begin}/{end}");
     let chart = delivery.chart();
     let mut positions: Vec<f64> = Vec::with_capacity(4 * course.len());
     for (&point, passage) in course.iter().zip(&passages) {
-        positions.push(rounded(passage.time_s, 1e3));
+        // A fast vehicle passes several samples in a millisecond.
+        positions.push(rounded(passage.time_s, 1e6));
         positions.extend(degrees(chart, point));
     }
     let color = if delivery.result.feasible {
@@ -55,6 +58,8 @@ pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
             "position": {
                 "epoch": begin.to_string(),
                 "interpolationAlgorithm": "LINEAR",
+                // The viewer's end of the interval may lie a rounding error after the last sample.
+                "forwardExtrapolationType": "HOLD",
                 "cartographicDegrees": positions,
             },
             "point": {"pixelSize": 10, "color": {"rgba": color}},

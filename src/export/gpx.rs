@@ -5,6 +5,7 @@ use gpx::{Gpx, GpxVersion, Metadata, Track, TrackSegment, Waypoint};
 use time::OffsetDateTime;
 
 use super::chart::Chart;
+use super::options::Digit;
 use super::words::for_xml;
 use super::{Delivery, Options};
 use crate::geometry::Point3;
@@ -16,8 +17,8 @@ pub(super) fn write(delivery: &Delivery, options: &Options) -> String {
     let course = delivery.course();
     let passages = delivery.passages(course);
     let track = course.iter().zip(passages).map(|(&at, passage)| {
-        let instant = options.instant(passage.time_s).as_nanosecond();
-        let time = OffsetDateTime::from_unix_timestamp_nanos(instant);
+        let instant = options.instant(passage.time_s, Digit::Millisecond);
+        let time = OffsetDateTime::from_unix_timestamp_nanos(instant.as_nanosecond());
         let mut point = mark(chart, at);
         point.time = Some(
             time.expect("both kinds of instants end with year 9999")

@@ -44,6 +44,15 @@ pub enum Altitude {
     Terrain,
 }
 
+/// The last digit of an instant in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Digit {
+    /// As most readers know it.
+    Millisecond,
+    /// As fine as the samples of the fastest vehicle need.
+    Microsecond,
+}
+
 /// Default epoch: no result knows when it will be flown.
 const EPOCH: Timestamp = Timestamp::constant(946_684_800, 0);
 
@@ -187,16 +196,20 @@ impl Options {
         Ok(options)
     }
 
-    /// The instant `time_s` seconds after the epoch, to a millisecond.
-    pub(super) fn instant(&self, time_s: f64) -> Timestamp {
+    /// The instant `time_s` seconds after the epoch, to a millisecond or a microsecond.
+    pub(super) fn instant(&self, time_s: f64, digit: Digit) -> Timestamp {
+        let (parts, unit) = match digit {
+            Digit::Millisecond => (1e3, Unit::Millisecond),
+            Digit::Microsecond => (1e6, Unit::Microsecond),
+        };
         // Beyond the range of instants, and well within the range of a duration.
-        let millis = (time_s.min(1e12) * 1e3).round();
-        let since = SignedDuration::from_secs_f64(millis / 1e3);
+        let count = (time_s.min(1e12) * parts).round();
+        let since = SignedDuration::from_secs_f64(count / parts);
         let rounded = self
             .epoch
             .saturating_add(since)
             .ok()
-            .and_then(|instant| instant.round(Unit::Millisecond).ok());
+            .and_then(|instant| instant.round(unit).ok());
         rounded.unwrap_or(Timestamp::MAX)
     }
 }

@@ -431,3 +431,26 @@ fn a_long_edge_beside_a_pole_has_corners_between() {
     let middle = 90.0 - 0.5 * libm::cos(80_f64.to_radians());
     assert!((highest - middle).abs() < 1e-3, "{highest} {middle}");
 }
+
+#[test]
+fn samples_closer_than_a_millisecond_have_times_of_their_own() {
+    let mut document = scenario();
+    document["vehicle"]["cruise_speed"] = 1000.into();
+    document["planner"]["smoothing"]["spacing"] = 0.5.into();
+    let plan = plan(&document, &AROUND);
+    let text = write(&plan, "czml", &[]).expect("a plan");
+    let read: Value = serde_json::from_str(&text).expect("JSON");
+    let samples = read[1]["position"]["cartographicDegrees"].as_array();
+    let samples = samples.expect("numbers").chunks(4);
+    let times: Vec<f64> = samples.filter_map(|sample| sample[0].as_f64()).collect();
+    for pair in times.windows(2) {
+        assert!(pair[0] < pair[1], "{pair:?}");
+    }
+    // The vehicle is there until its last sample, and no longer.
+    let interval = read[1]["availability"].as_str().expect("an interval");
+    let (_, end) = interval.split_once('/').expect("two instants");
+    let end: jiff::Timestamp = end.parse().expect("an instant");
+    let duration_s = end.duration_since(Options::default().epoch).as_secs_f64();
+    let last = times[times.len() - 1];
+    assert!((duration_s - last).abs() < 1e-9, "{duration_s} {last}");
+}

@@ -82,7 +82,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         match chosen.format.write(&input, &chosen.options) {
             Ok(document) => files::write(outs.get(position).copied(), &document)?,
             Err(error) => {
-                eprintln!("{}: {error}", arguments.file.display());
+                let unwritten = outs.get(position).copied().unwrap_or(&arguments.file);
+                eprintln!("{}: {error}", unwritten.display());
                 code = export::code(&error);
             }
         }

@@ -386,19 +386,52 @@ mod tests {
         assert!(detail.contains("CHECK"), "{detail}");
     }
 
+    /// A store in `directory` whose file may have this many pages of 4 KiB.
+    fn of_pages(directory: &Path, pages: u32) -> SqliteStore {
+        let lock = lock(directory).expect("nobody else has it");
+        let file = directory.join(DATABASE);
+        let connection = open_database(&file).expect("the directory can be written");
+        connection
+            .pragma_update(None, "max_page_count", pages)
+            .expect("the file is smaller");
+        SqliteStore::assemble(connection, lock, file, Options::new(1_000))
+            .expect("the tables are there")
+    }
+
+    #[tokio::test]
+    async fn a_full_store_is_unwell_until_a_plan_fits_again() {
+        let directory = tempfile::TempDir::new().expect("a temporary directory");
+        let store = of_pages(directory.path(), 400);
+        store.health().await.expect("there is room");
+        let mut accepted = Vec::new();
+        while let Ok(submitted) = store.submit(submission(100_000)).await {
+            accepted.push(submitted.plan.id);
+        }
+        for _ in 0..3 {
+            let unwell = store.health().await;
+            let Err(StoreError::Unavailable { trouble, .. }) = unwell else {
+                panic!("no plan fits, though a row does");
+            };
+            assert_eq!(trouble, Trouble::Full);
+        }
+        for id in &accepted[..7] {
+            store.delete(*id, 0).await.expect("deleting makes room");
+        }
+        for _ in 0..3 {
+            store.health().await.expect("there is room again");
+        }
+        // What the check has written is not in the way of plans.
+        for _ in 0..6 {
+            let submitted = store.submit(submission(100_000)).await;
+            submitted.expect("a plan fits");
+        }
+        store.close().await;
+    }
+
     #[tokio::test]
     async fn a_full_disk_refuses_what_does_not_fit_and_damages_nothing() {
         let directory = tempfile::TempDir::new().expect("a temporary directory");
-        let lock = lock(directory.path()).expect("nobody else has it");
-        let file = directory.path().join(DATABASE);
-        let connection = open_database(&file).expect("the directory can be written");
-        connection
-            .pragma_update(None, "max_page_count", 200)
-            .expect("the file is smaller");
-        let options = Options::new(1_000);
-        let store =
-            SqliteStore::assemble(connection, lock, file, options).expect("the tables are there");
-
+        let store = of_pages(directory.path(), 200);
         let mut accepted = Vec::new();
         let refusal = loop {
             match store.submit(submission(20_000)).await {

@@ -13,6 +13,9 @@ use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Status, Submission};
 use crate::store::{End, Ending, Lease, StoreError, Submitted, Tombstone, lost};
 
+/// More than the documents of nearly all plans.
+const BALLAST_BYTES: i64 = 512 << 10;
+
 pub(super) fn submit(
     tx: &mut Transaction<'_>,
     submission: &Submission,
@@ -228,10 +231,14 @@ pub(super) fn delete(tx: &mut Transaction<'_>, id: PlanId, now_ms: i64) -> Resul
     Ok(())
 }
 
+/// A write that shows whether others would succeed. Where one has found the disk full, it is as large as a plan: a row
+/// still fits into what is left of the log when no plan does.
 pub(super) fn touch(tx: &mut Transaction<'_>) -> Result<(), StoreError> {
+    let ballast_bytes = if tx.found_full { BALLAST_BYTES } else { 0 };
     tx.connection
-        .prepare_cached("UPDATE health SET checked_ms = ?1")?
-        .execute([tx.now_ms()])?;
+        .prepare_cached("UPDATE health SET checked_ms = ?1, ballast = zeroblob(?2)")?
+        .execute([tx.now_ms(), ballast_bytes])?;
+    tx.found_full = false;
     Ok(())
 }
 

@@ -121,6 +121,9 @@ ALTER TABLE plans ADD COLUMN lost INTEGER NOT NULL DEFAULT 0; -- runs that ended
     "
 ALTER TABLE plans ADD COLUMN place INTEGER; -- in the queue as it was accepted; NULL where events has event 1
 ",
+    "
+ALTER TABLE health ADD COLUMN ballast BLOB; -- as large as a plan once the disk was found full, to see whether one fits
+",
 ];
 
 /// Bring the file up to this version; refuse files of a newer one.

@@ -23,6 +23,8 @@ pub(super) struct Transaction<'a> {
     pub(super) effects: Vec<Effect>,
     /// The failure that makes a commit impossible.
     pub(super) spoiled: Option<StoreError>,
+    /// The disk was found full, and nothing as large as a plan has been written since.
+    pub(super) found_full: bool,
 }
 
 /// A notification to send once a change is durable.

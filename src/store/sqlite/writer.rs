@@ -19,7 +19,7 @@ use super::transaction::{Effect, Transaction};
 use super::{operations, removal};
 use crate::job::PlanId;
 use crate::store::changes::Changes;
-use crate::store::{Lease, Options, StoreError};
+use crate::store::{Lease, Options, StoreError, Trouble};
 
 /// Operations in one transaction, at most.
 const BATCH: usize = 256;
@@ -110,6 +110,7 @@ impl Writer {
             leases: HashMap::new(),
             queued: 0,
             void_attempt: 0,
+            found_full: false,
         };
         desk.recover()?;
         let thread = std::thread::Builder::new()
@@ -194,6 +195,8 @@ struct Desk {
     queued: u64,
     /// The greatest attempt whose lease was handed out but whose claim was not committed.
     void_attempt: u64,
+    /// The disk was found full, and nothing as large as a plan has been written since.
+    found_full: bool,
 }
 
 impl Desk {
@@ -324,6 +327,17 @@ impl Desk {
         &mut self,
         work: impl FnOnce(&mut Transaction<'_>, &mut VecDeque<Claimer>) -> T,
     ) -> Result<T, StoreError> {
+        let committed = self.try_to_commit(work);
+        if let Err(StoreError::Unavailable { trouble, .. }) = &committed {
+            self.found_full |= *trouble == Trouble::Full;
+        }
+        committed
+    }
+
+    fn try_to_commit<T>(
+        &mut self,
+        work: impl FnOnce(&mut Transaction<'_>, &mut VecDeque<Claimer>) -> T,
+    ) -> Result<T, StoreError> {
         self.connection
             .prepare_cached("BEGIN IMMEDIATE")?
             .execute([])?;
@@ -334,6 +348,7 @@ impl Desk {
             void_attempt: self.void_attempt,
             effects: Vec::new(),
             spoiled: None,
+            found_full: self.found_full,
         };
         let result = work(&mut tx, &mut self.waiting);
         let changed = tx.effects.iter().filter_map(|effect| match effect {
@@ -353,6 +368,7 @@ impl Desk {
             return Err(error);
         }
         self.queued = tx.queued;
+        self.found_full = tx.found_full;
         let effects = tx.effects;
         self.carry_out(effects);
         Ok(result)

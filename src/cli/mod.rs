@@ -2,6 +2,7 @@
 
 mod access;
 mod bench;
+mod config;
 mod convert;
 mod export;
 mod files;

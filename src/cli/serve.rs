@@ -12,15 +12,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use axum::Router;
 use tokio::net::{TcpListener, TcpSocket};
 use tokio::sync::watch;
 
 use self::ending::{Running, Signals};
 use self::parts::Callers;
-use super::{access, files};
-use crate::config::{self, Config, Flags};
+use super::{access, config, files};
+use crate::config::{Config, Flags};
 use crate::http::webhook::Sender;
 use crate::http::{self, Parts, Phase};
 use crate::job::{Failure, FailureKind};
@@ -38,8 +38,7 @@ const LAST_ANSWERS: Duration = Duration::from_secs(5);
 
 /// Serve until a signal, or print the configuration.
 pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
-    let loaded = config::load(flags, |name| std::env::var_os(name))
-        .map_err(|faults| anyhow!("wrong configuration\n  {}", faults.join("\n  ")))?;
+    let loaded = config::of_environment(flags)?;
     if flags.print_config {
         let mut text = Vec::new();
         loaded.write_toml(&mut text)?;

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 
-use super::{exit, files};
-use crate::config::Config;
+use super::{config, exit, files};
+use crate::config::Flags;
 use crate::store::sqlite::upkeep;
 
 /// Keep or look after the plans of this machine.
@@ -29,6 +29,9 @@ pub(super) enum Command {
 
 #[derive(Args)]
 pub(super) struct Location {
+    /// Same as for serve: read where the plans are from a TOML file
+    #[arg(long, env = "NOCTULE_CONFIG", value_name = "FILE")]
+    config: Option<PathBuf>,
     /// Directory of the plans [default: noctule in the user's data home]
     #[arg(long, env = "NOCTULE_DATA_DIR", value_name = "DIR")]
     data_dir: Option<PathBuf>,
@@ -43,18 +46,21 @@ pub(super) struct Location {
 }
 
 impl Location {
+    /// The directory of the service with the same flags, variables and file.
     fn data_dir(self, instead: &str) -> anyhow::Result<PathBuf> {
+        let config = config::of_environment(&Flags::with_file(self.config))?.config;
+        let is_shared = match &self.store {
+            Some(store) => !["", "sqlite"].contains(&store.as_str()),
+            None => config.store.is_shared(),
+        };
         // A store that is not a file has its own tools.
-        if self
-            .store
-            .is_some_and(|store| !["", "sqlite"].contains(&store.as_str()))
-        {
+        if is_shared {
             bail!(
                 "the plans are on NATS servers, and this looks after a file of one machine: {instead}"
             );
         }
         self.data_dir
-            .or(Config::default().data_dir)
+            .or(config.data_dir)
             .context("the user has no home; name a directory with --data-dir")
     }
 }
@@ -63,16 +69,25 @@ pub(super) fn run(command: Command) -> anyhow::Result<u8> {
     match command {
         Command::Backup { place, file } => {
             let instead = "nats stream backup, or nats account backup, copies what they keep (docs/OPERATIONS.md)";
-            upkeep::backup(&place.data_dir(instead)?, &file)?;
-            files::print(&format!("written to {}\n", file.display()))?;
+            let data_dir = place.data_dir(instead)?;
+            upkeep::backup(&data_dir, &file)?;
+            files::print(&format!(
+                "the plans of {} are written to {}\n",
+                data_dir.display(),
+                file.display()
+            ))?;
             Ok(exit::DONE)
         }
         Command::Check { place } => {
             let instead = "nats server check jetstream, and nats stream report, say how they are (docs/OPERATIONS.md)";
-            let findings = upkeep::check(&place.data_dir(instead)?)?;
+            let data_dir = place.data_dir(instead)?;
+            let findings = upkeep::check(&data_dir)?;
             let (plans, faults) = (findings.plans, findings.faults.len());
             let mut lines = findings.faults;
-            lines.push(format!("{plans} plans, {faults} faults\n"));
+            lines.push(format!(
+                "{plans} plans, {faults} faults in {}\n",
+                data_dir.display()
+            ));
             files::print(&lines.join("\n"))?;
             Ok(if faults == 0 {
                 exit::DONE

@@ -19,6 +19,17 @@ pub struct Flags {
     pub(super) given: Vec<(&'static str, String)>,
 }
 
+impl Flags {
+    /// No flag but the one that names the file.
+    #[must_use]
+    pub fn with_file(config: Option<PathBuf>) -> Self {
+        Self {
+            config: config.filter(|path| !path.as_os_str().is_empty()),
+            ..Self::default()
+        }
+    }
+}
+
 /// Ids of the two flags that are not settings. No setting's key has a dash.
 const CONFIG: &str = "config-file";
 const PRINT_CONFIG: &str = "print-config";

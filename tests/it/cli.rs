@@ -1,6 +1,7 @@
 //! The command line: exit codes, faults, and where results are written.
 
 use std::fs;
+use std::path::Path;
 
 use serde_json::{Value, json};
 
@@ -249,4 +250,59 @@ fn an_empty_environment_variable_counts_as_unset() {
     );
     let told = String::from_utf8_lossy(&elsewhere.stderr);
     assert!(told.contains("there is no store at"), "{told}");
+}
+
+/// A copy of another store than the service's would be no backup.
+#[test]
+fn the_store_is_looked_for_where_the_service_keeps_it() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let path = |name: &str| {
+        let path = directory.path().join(name);
+        path.to_str().expect("UTF-8").to_owned()
+    };
+    let (here, elsewhere) = (path("here"), path("elsewhere"));
+    for data_dir in [&here, &elsewhere] {
+        drop(Service::start(Path::new(data_dir), &[]));
+    }
+    fs::write(path("own.toml"), format!("data_dir = '{here}'\n")).expect("written");
+    fs::write(path("shared.toml"), "store = \"nats://a:4222\"\n").expect("written");
+    let (own, shared) = (path("own.toml"), path("shared.toml"));
+    let found = |data_dir: &str| Ok::<_, &str>(format!("0 plans, 0 faults in {data_dir}\n"));
+    for (variables, arguments, expected) in [
+        (&[("NOCTULE_CONFIG", &*own)][..], &[][..], found(&here)),
+        (&[], &["--config", &*own], found(&here)),
+        (
+            &[("NOCTULE_CONFIG", &own), ("NOCTULE_DATA_DIR", &elsewhere)],
+            &[],
+            found(&elsewhere),
+        ),
+        (
+            &[("NOCTULE_CONFIG", &own)],
+            &["--data-dir", &elsewhere],
+            found(&elsewhere),
+        ),
+        (
+            &[("NOCTULE_CONFIG", &shared)],
+            &["--data-dir", &here],
+            Err("the plans are on NATS servers"),
+        ),
+        (
+            &[("NOCTULE_CONFIG", &shared)],
+            &["--data-dir", &here, "--store", "sqlite"],
+            found(&here),
+        ),
+        (
+            &[("NOCTULE_WORKERS", "no")],
+            &["--data-dir", &here],
+            Err("NOCTULE_WORKERS is \"no\", must be a whole number"),
+        ),
+    ] {
+        let ended = run_with(variables, &[&["store", "check"], arguments].concat(), "");
+        let told = String::from_utf8(ended.stdout).expect("UTF-8");
+        let refused = String::from_utf8(ended.stderr).expect("UTF-8");
+        match expected {
+            Ok(expected) => assert_eq!((told, refused), (expected, String::new())),
+            Err(expected) => assert!(refused.contains(expected), "{refused}"),
+        }
+    }
 }

@@ -110,7 +110,8 @@ async fn a_damaged_file_is_reported_and_its_backup_can_be_restored() {
     let again = run(&["store", "backup", "--data-dir", paths[0], paths[1]], "");
     assert_eq!(again.status.code(), Some(1), "nothing is overwritten");
     let checked = run(&["store", "check", "--data-dir", paths[0]], "");
-    assert_eq!(checked.stdout, b"1 plans, 0 faults\n", "{checked:?}");
+    let expected = format!("1 plans, 0 faults in {}\n", paths[0]);
+    assert_eq!(checked.stdout, expected.as_bytes(), "{checked:?}");
     let result = service.bytes(&format!("{address}/result")).await;
     service.kill();
 

@@ -11,6 +11,7 @@ mod file;
 mod filter;
 mod flags;
 mod layers;
+mod origin;
 mod print;
 mod setting;
 mod settings;
@@ -26,6 +27,7 @@ pub use collector::{Endpoint, Headers};
 pub use filter::Filter;
 pub use flags::Flags;
 pub use layers::{Loaded, load};
+pub use origin::Origin;
 pub use value::LogFormat;
 
 use crate::scenario::limits::Limits;
@@ -60,7 +62,7 @@ pub struct Config {
     /// Whether it may be reachable from other machines without keys.
     pub allow_anonymous: bool,
     /// Origins of pages on other sites that may use it.
-    pub cors_origins: Vec<String>,
+    pub cors_origins: Vec<Origin>,
     /// The log filter.
     pub log: Filter,
     /// How log lines are written.

@@ -422,6 +422,12 @@ mod tests {
             ),
         );
         check("log_format", "xml", Err("text or json"));
+        check("cors_origins", "https://a.example, http://b", Ok(()));
+        check(
+            "cors_origins",
+            "https://a.example, *",
+            Err("a list of exact origins such as https://plans.example or http://localhost:5173"),
+        );
         check("role", "boss", Err("all, api or worker"));
         check("store_replicas", "2", Err("1, 3 or 5"));
         check(

@@ -97,6 +97,7 @@ mod tests {
     use axum::response::IntoResponse as _;
 
     use super::*;
+    use crate::config::Origin;
 
     #[test]
     fn host_names_that_others_control_are_rejected() {
@@ -132,8 +133,8 @@ mod tests {
                 headers.append(header::HOST, value);
             }
             let uri = uri.parse().expect("an address");
-            let origins = Origins::read(&["https://plans.example:8443".to_owned()]);
-            let hosts = Hosts::of_this_machine(&origins.expect("an origin"));
+            let origin = Origin::read("https://plans.example:8443").expect("an origin");
+            let hosts = Hosts::of_this_machine(&Origins::new(&[origin]));
             let problem = hosts.check(&uri, version, &headers).err();
             let status = problem.map(|problem| problem.into_response().status().as_u16());
             assert_eq!(status, expected, "{version:?} {uri} {headers:?}");

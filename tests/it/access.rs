@@ -150,7 +150,7 @@ fn a_service_with_no_or_broken_keys_refuses_to_listen_on_every_address() {
         (
             &[],
             &["--allow-anonymous", "--cors-origins", "https://a.example,*"],
-            "\"*\" is no origin",
+            "--cors-origins is \"https://a.example,*\", must be a list of exact origins such as",
         ),
     ] {
         let refused = run_with(variables, &[&serve[..], arguments].concat(), "");

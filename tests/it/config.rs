@@ -71,7 +71,11 @@ fn the_greatest_count_of_a_flag_is_accepted_in_a_file_too() {
 fn wrong_settings_are_refused_before_the_store_is_opened() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let file = directory.path().join("noctule.toml");
-    fs::write(&file, "quue = 5\n\n[limits]\nthreats = \"many\"\n").expect("written");
+    fs::write(
+        &file,
+        "quue = 5\ncors_origins = ['*']\n[limits]\nthreats = \"many\"\n",
+    )
+    .expect("written");
     let data_dir = directory.path().join("data");
     let (file, data_dir) = (
         file.to_str().expect("UTF-8"),
@@ -87,6 +91,8 @@ fn wrong_settings_are_refused_before_the_store_is_opened() {
             data_dir,
             "--grace",
             "2h",
+            "--cors-origins",
+            "https://plans.example",
         ],
         "",
     );
@@ -95,6 +101,9 @@ fn wrong_settings_are_refused_before_the_store_is_opened() {
     let text = String::from_utf8(refused.stderr).expect("UTF-8");
     for part in [
         &format!("{file}:1: quue is unknown, must be one of listen, data_dir,"),
+        &format!(
+            "{file}:2: cors_origins is [\"*\"], must be a list of exact origins such as https://"
+        ),
         &format!("{file}:4: limits.threats is \"many\", must be a whole number from 1"),
         "NOCTULE_WORKERS is \"-1\", must be a whole number from 1 to 4096",
         "--grace is \"2h\", must be seconds",

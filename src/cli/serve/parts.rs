@@ -28,8 +28,7 @@ pub(super) struct Callers {
 impl Callers {
     pub(super) fn read(config: &Config) -> anyhow::Result<Self> {
         let access = access::open(config)?;
-        let cors = Origins::read(&config.cors_origins)
-            .map_err(|fault| anyhow!("cors_origins: {fault}"))?;
+        let cors = Origins::new(&config.cors_origins);
         Ok(Self {
             hosts: access::hosts(config, &access, &cors),
             access,

@@ -10,6 +10,7 @@ use axum::http::{HeaderMap, Method, Request, StatusCode};
 use bytes::Bytes;
 use http_body_util::BodyExt as _;
 use noctule::catalogue::Directories;
+use noctule::config::Origin;
 use noctule::http::auth::{Access, Keys, Settings};
 use noctule::http::webhook;
 use noctule::http::{self, Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains};
@@ -145,7 +146,8 @@ impl Api {
         let queue = usize::try_from(queue).expect("a small number");
         let instruments = Arc::new(Instruments::default());
         let store = Arc::new(MeasuredStore::new(store, instruments.clone()));
-        let origins: Vec<String> = origins.iter().map(ToString::to_string).collect();
+        let origins = origins.iter().map(|text| Origin::read(text));
+        let origins: Option<Vec<Origin>> = origins.collect();
         let (phase, watched) = watch::channel(Phase::Serving);
         let uploads = place.path().join("terrains");
         let catalogue = Arc::new(Directories::new(uploads.clone(), None));
@@ -164,7 +166,7 @@ impl Api {
             body_timeout: Duration::from_secs(30),
             access,
             webhooks: None,
-            cors: Origins::read(&origins).expect("origins"),
+            cors: Origins::new(&origins.expect("origins")),
             hosts: Hosts::any(),
             phase: watched,
             instruments,

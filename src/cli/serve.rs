@@ -26,7 +26,7 @@ use crate::http::{self, Parts, Phase};
 use crate::job::{Failure, FailureKind};
 use crate::planner;
 use crate::scenario::json::{self, Refusal, Rules};
-use crate::telemetry;
+use crate::telemetry::{self, Instruments};
 use crate::worker::{self, Engine, Pool, Sweeper, Unplanned};
 
 /// Callers that may wait to be accepted; the Linux limit since 5.4. With more, some may be left waiting for an answer
@@ -49,25 +49,26 @@ pub(super) fn run(flags: &Flags) -> anyhow::Result<()> {
 
 /// Serve until a signal.
 pub(super) fn start(config: &Config) -> anyhow::Result<()> {
-    let log = telemetry::log::init(config);
+    let instruments = Arc::new(Instruments::default());
+    let log = telemetry::log::init(config, &instruments.metrics)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
         .build()?;
-    let served = runtime.block_on(serve(config));
+    let served = runtime.block_on(serve(config, instruments));
     // Everything still running has been given back to the queue, or has hardly begun; the process does not wait for it.
     runtime.shutdown_background();
     log.close();
     served
 }
 
-async fn serve(config: &Config) -> anyhow::Result<()> {
+async fn serve(config: &Config, instruments: Arc<Instruments>) -> anyhow::Result<()> {
     let signals = Signals::new()?;
     let max_connections = descriptors::connections(config.http.max_connections);
     let callers = Callers::read(config)?;
     let listener =
         listen(config.listen).with_context(|| format!("cannot listen on {}", config.listen))?;
     let (phase, watched) = watch::channel(Phase::Serving);
-    let parts = parts::open(config, callers, watched.clone()).await?;
+    let parts = parts::open(config, callers, instruments, watched.clone()).await?;
     let store = parts.store.clone();
     let pool = pool(&parts);
     let sweeper = sweeper(&parts);

@@ -4,6 +4,8 @@
 
 use std::io::IsTerminal as _;
 use std::panic::PanicHookInfo;
+use std::sync::OnceLock;
+use std::time::Duration;
 
 use tracing::{Level, Metadata};
 use tracing_subscriber::filter::filter_fn;
@@ -11,8 +13,15 @@ use tracing_subscriber::layer::SubscriberExt as _;
 use tracing_subscriber::util::SubscriberInitExt as _;
 use tracing_subscriber::{Layer as _, fmt};
 
+use super::Metrics;
+use super::lines::Lines;
 use super::otlp::Exporter;
 use crate::config::{Config, LogFormat};
+
+/// Time for writing the remaining lines at the end; a reader that takes longer is not waited for.
+const LAST_LINES: Duration = Duration::from_secs(1);
+
+static LINES: OnceLock<Lines> = OnceLock::new();
 
 /// What must be closed at the end of the program.
 #[must_use = "what is left is sent when it is closed"]
@@ -24,15 +33,29 @@ impl Log {
         if let Some(exporter) = self.0 {
             exporter.close();
         }
+        flush();
+    }
+}
+
+/// Write the lines that still wait, if that does not take long. What ends the process otherwise than by closing the
+/// log calls this first.
+pub fn flush() {
+    if let Some(lines) = LINES.get() {
+        lines.flush(LAST_LINES);
     }
 }
 
 /// Start writing log lines, and exporting traces if there is a collector. Panics are logged too.
 ///
+/// # Errors
+/// When there can be no thread that writes.
+///
 /// # Panics
 /// When called twice.
-pub fn init(config: &Config) -> Log {
-    let lines = fmt::layer().with_writer(std::io::stderr);
+pub fn init(config: &Config, metrics: &Metrics) -> std::io::Result<Log> {
+    let lines = Lines::to(std::io::stderr(), metrics.lines_dropped())?;
+    let lines = LINES.get_or_init(|| lines);
+    let lines = fmt::layer().with_writer(move || lines.clone());
     let lines = match config.log_format {
         LogFormat::Text => lines.with_ansi(std::io::stderr().is_terminal()).boxed(),
         LogFormat::Json => lines
@@ -57,7 +80,7 @@ pub fn init(config: &Config) -> Log {
         .with(traces)
         .init();
     std::panic::set_hook(Box::new(log_panic));
-    Log(exporter)
+    Ok(Log(exporter))
 }
 
 /// The program's own spans and their usual lines, whatever the log filter says.

@@ -1,5 +1,6 @@
 //! What the operator sees: log lines, metrics, traces, and which request a plan came from.
 
+mod lines;
 pub mod log;
 pub mod metrics;
 mod origins;

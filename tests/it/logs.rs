@@ -2,6 +2,7 @@
 
 use std::fs::{self, File};
 use std::path::Path;
+use std::process::Stdio;
 
 use serde_json::{Value, json};
 
@@ -183,6 +184,21 @@ async fn a_failed_webhook_is_logged_with_its_plan() {
     };
     eventually(async || tried().is_some()).await;
     assert_eq!(tried().expect("told")["plan_id"], accepted["id"]);
+}
+
+#[tokio::test]
+async fn a_log_that_nobody_reads_stops_nothing() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    // The pipe is full after some hundred lines.
+    let arguments = ["--log", "trace"];
+    let service = Service::start_with_log(directory.path(), &arguments, Stdio::piped());
+    for _ in 0..500 {
+        service.bytes("/version").await;
+    }
+    let address = service.submit(&scenario()).await;
+    service.ended(&address).await;
+    service.signal("TERM");
+    assert!(service.exit().await.success());
 }
 
 /// Searching the log for a plan takes one field name.

@@ -14,6 +14,7 @@ use crate::cli::exit;
 use crate::http::Phase;
 use crate::http::webhook::Sender;
 use crate::store::Store;
+use crate::telemetry;
 use crate::worker::{Pool, Sweeper};
 
 /// Time for the store to close even where the grace period leaves none: runs that are not given back count as lost.
@@ -67,6 +68,7 @@ fn leave_on_another(mut signals: Signals) {
     tokio::spawn(async move {
         signals.next().await;
         tracing::warn!("a second signal, leaving at once");
+        telemetry::log::flush();
         std::process::exit(exit::FAILED.into());
     });
 }

@@ -42,9 +42,9 @@ impl Callers {
 pub(super) async fn open(
     config: &Config,
     callers: Callers,
+    instruments: Arc<Instruments>,
     phase: watch::Receiver<Phase>,
 ) -> anyhow::Result<Parts> {
-    let instruments = Arc::new(Instruments::default());
     let clock = SteadyClock::following(store::wall_clock());
     instruments.metrics.began(clock.now_ms());
     let store = backend::open(config, clock.clock(), &instruments).await?;

@@ -53,6 +53,7 @@ pub struct Metrics {
     terrain_copies: Level,
     terrain_fetches: Family<Fetch, Counter>,
     terrain_fetched: Counter,
+    lines_dropped: Counter,
 }
 
 /// A gauge read on request; NaN when it cannot be read.
@@ -203,6 +204,12 @@ impl Metrics {
         let outcome = FETCHES[usize::from(!wholly)];
         self.terrain_fetches.get_or_create(&Fetch { outcome }).inc();
         self.terrain_fetched.inc_by(bytes);
+    }
+
+    /// Where log lines are counted that could not be written.
+    #[must_use]
+    pub fn lines_dropped(&self) -> Counter {
+        self.lines_dropped.clone()
     }
 
     /// The number and total size of datasets, and the bytes of copies on this node.

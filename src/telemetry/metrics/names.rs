@@ -98,6 +98,10 @@ impl Default for Metrics {
                 "Length of what was copied to this node",
                 Unit::Bytes,
             ),
+            lines_dropped: new.add(
+                "log_lines_dropped",
+                "Log lines dropped because stderr was not read",
+            ),
             registry,
         }
         .with_all_series()

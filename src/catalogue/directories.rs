@@ -60,26 +60,31 @@ impl Directories {
     #[must_use]
     pub fn with_grace(uploads: PathBuf, mounted: Option<Mounted>, grace: Duration) -> Self {
         let directory = uploads;
-        Self::at(Location::Own { directory, grace }, mounted)
+        let own = Self::at(Location::Own { directory, grace }, mounted);
+        own.reach();
+        own
     }
 
-    /// Uploads on a shelf shared with other nodes. Mounted files belong to this node: plans over them can only be run
-    /// by nodes that mount the same files.
+    /// Uploads on a shelf shared with other nodes, which is reached when it is first needed. Mounted files belong to
+    /// this node: plans over them can only be run by nodes that mount the same files.
     #[must_use]
     pub fn shared(sharing: Sharing, mounted: Option<Mounted>) -> Self {
         Self::at(Location::Shared(sharing), mounted)
     }
 
+    /// Reach the uploads now, so that later callers need not wait for it.
+    pub fn reach(&self) {
+        if let Err(error) = self.uploaded() {
+            tracing::error!(%error, "uploaded datasets cannot be reached; trying again when they are asked for");
+        }
+    }
+
     fn at(location: Location, mounted: Option<Mounted>) -> Self {
-        let directories = Self {
+        Self {
             location,
             mounted,
             uploaded: Mutex::default(),
-        };
-        if let Err(error) = directories.uploaded() {
-            tracing::error!(%error, "uploaded datasets cannot be reached; trying again when they are asked for");
         }
-        directories
     }
 
     fn uploaded(&self) -> Result<Arc<dyn Uploads>, CatalogueError> {

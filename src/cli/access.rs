@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use crate::config::Config;
 use crate::http::auth::{Access, Keys, Settings};
@@ -59,9 +59,13 @@ pub(super) fn hosts(config: &Config, access: &Access, cors: &Origins) -> Hosts {
     }
 }
 
+/// From now on SIGHUP does not end the process.
+pub(super) fn hangups() -> std::io::Result<Signal> {
+    signal(SignalKind::hangup())
+}
+
 /// Read the file of keys again whenever SIGHUP comes. One that is wrong changes nothing.
-pub(super) fn reload_on_hangup(config: &Config, access: Access) -> std::io::Result<()> {
-    let mut hangups = signal(SignalKind::hangup())?;
+pub(super) fn reload_on_hangup(mut hangups: Signal, config: &Config, access: Access) {
     let path = config.keys_file.clone();
     tokio::spawn(async move {
         while hangups.recv().await.is_some() {
@@ -80,7 +84,6 @@ pub(super) fn reload_on_hangup(config: &Config, access: Access) -> std::io::Resu
             }
         }
     });
-    Ok(())
 }
 
 fn read(path: &Path) -> anyhow::Result<Keys> {

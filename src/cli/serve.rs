@@ -62,18 +62,26 @@ pub(super) fn start(config: &Config) -> anyhow::Result<()> {
 }
 
 async fn serve(config: &Config, instruments: Arc<Instruments>) -> anyhow::Result<()> {
-    let signals = Signals::new()?;
+    // Before anything that takes time: until they are awaited, signals end the process.
+    let mut signals = Signals::new()?;
+    let hangups = access::hangups()?;
     let max_connections = descriptors::connections(config.http.max_connections);
     let callers = Callers::read(config)?;
     let listener =
         listen(config.listen).with_context(|| format!("cannot listen on {}", config.listen))?;
     let (phase, watched) = watch::channel(Phase::Serving);
-    let parts = parts::open(config, callers, instruments, watched.clone()).await?;
+    let parts = tokio::select! {
+        parts = parts::open(config, callers, instruments, watched.clone()) => parts?,
+        signal = signals.next() => {
+            tracing::info!(signal, "leaving before the service has begun");
+            return Ok(());
+        }
+    };
     let store = parts.store.clone();
     let pool = pool(&parts);
     let sweeper = sweeper(&parts);
     let sender = sender(config, &parts);
-    access::reload_on_hangup(config, parts.access.clone())?;
+    access::reload_on_hangup(hangups, config, parts.access.clone());
     announce(&listener)?;
     let settings = http::server::Settings {
         head_timeout: config.http.head_timeout,

@@ -9,6 +9,7 @@ use std::time::Duration;
 use async_trait::async_trait;
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
+use tokio::time::timeout;
 
 use super::{
     DatasetUse, End, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Trouble,
@@ -23,6 +24,9 @@ pub type Open = Arc<dyn Fn(bool) -> Result<Arc<dyn Store>, StoreError> + Send + 
 /// Pause between attempts to open it.
 const PAUSE: Duration = Duration::from_secs(1);
 
+/// How long the start waits for the first attempt, which usually succeeds at once.
+const FIRST: Duration = Duration::from_secs(5);
+
 /// Its state: open, or why not.
 type State = Result<Arc<dyn Store>, StoreError>;
 
@@ -35,23 +39,29 @@ pub struct Reopening {
 }
 
 impl Reopening {
-    /// Try to open it, and go on trying.
+    /// Try to open it, and go on trying. Returns after the first attempt, or while that is taking long.
     ///
     /// # Panics
     /// Outside a tokio runtime.
     pub async fn start(open: Open) -> Self {
+        Self::start_within(open, FIRST).await
+    }
+
+    async fn start_within(open: Open, patience: Duration) -> Self {
         let (damaged, reports) = watch::channel(None);
-        let first = try_to_open(&open, false).await;
-        if let Err(error) = &first {
-            tracing::error!(%error, "the store cannot be opened; trying again every second");
-        }
-        let (opened, state) = watch::channel(first);
+        let (opened, state) =
+            watch::channel(Err(StoreError::unavailable("the store is being opened")));
         let opener = tokio::spawn(keep_open(open, opened, reports));
-        Self {
+        let mut first = state.clone();
+        let reopening = Self {
             state,
             damaged,
             opener,
+        };
+        if timeout(patience, first.changed()).await.is_err() {
+            tracing::warn!("opening the store takes long; the service begins without it");
         }
+        reopening
     }
 
     fn store(&self) -> State {
@@ -107,16 +117,16 @@ async fn keep_open(
     mut reports: watch::Receiver<Option<Arc<dyn Store>>>,
 ) {
     let mut suspicious = false;
+    let mut opened = try_to_open(&open, suspicious).await;
+    if let Err(error) = &opened {
+        tracing::error!(%error, "the store cannot be opened; trying again every second");
+    }
     loop {
-        let now = state.borrow().clone();
-        if let Ok(store) = now {
-            if reports.changed().await.is_err() {
+        suspicious &= opened.is_err();
+        drop(state.send_replace(opened.clone()));
+        if let Ok(store) = opened {
+            if !is_reported(&store, &mut reports).await {
                 return;
-            }
-            let reported = reports.borrow_and_update().clone();
-            // A late report about a store that has since been replaced is ignored.
-            if reported.is_none_or(|reported| !Arc::ptr_eq(&reported, &store)) {
-                continue;
             }
             tracing::error!("the store is damaged; it is opened again once it is sound");
             let checking = Err(StoreError::Unavailable {
@@ -129,10 +139,21 @@ async fn keep_open(
         } else {
             tokio::time::sleep(PAUSE).await;
         }
-        let opened = try_to_open(&open, suspicious).await;
-        suspicious &= opened.is_err();
-        drop(state.send_replace(opened));
+        opened = try_to_open(&open, suspicious).await;
     }
+}
+
+/// Wait until this store is reported as damaged; `false` when nobody is left to report it.
+async fn is_reported(
+    store: &Arc<dyn Store>,
+    reports: &mut watch::Receiver<Option<Arc<dyn Store>>>,
+) -> bool {
+    // A late report about a store that has since been replaced is ignored.
+    let this = |reported: &Option<Arc<dyn Store>>| {
+        let reported = reported.as_ref();
+        reported.is_some_and(|reported| Arc::ptr_eq(reported, store))
+    };
+    reports.wait_for(this).await.is_ok()
 }
 
 #[async_trait]
@@ -263,5 +284,36 @@ impl Store for Reopening {
         if let Ok(store) = self.store() {
             store.close().await;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use parking_lot::Mutex;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn the_start_does_not_wait_for_a_store_that_does_not_answer() {
+        let (answer, answers) = channel::<()>();
+        let answers = Mutex::new(answers);
+        let open: Open = Arc::new(move |_| {
+            answers.lock().recv().ok();
+            Err(StoreError::unavailable("it answers at last"))
+        });
+        let store = Reopening::start_within(open, Duration::from_millis(1)).await;
+        let said = store.health().await.expect_err("it is not open");
+        assert_eq!(
+            said.to_string(),
+            "store unavailable: the store is being opened"
+        );
+        let mut state = store.state.clone();
+        state.mark_unchanged();
+        answer.send(()).expect("it waits");
+        state.changed().await.expect("it goes on trying");
+        let said = store.health().await.expect_err("it is not open");
+        assert_eq!(said.to_string(), "store unavailable: it answers at last");
     }
 }

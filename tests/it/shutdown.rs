@@ -1,5 +1,7 @@
 //! SIGTERM on the real binary: nothing is lost, streams end, and the process exits in time.
 
+use std::fs::{self, File};
+use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
 use futures_util::future::join_all;
@@ -7,6 +9,7 @@ use reqwest::Method;
 use serde_json::Value;
 
 use crate::support::lives::{a_run_of, await_run, life, running, running_at};
+use crate::support::patience::in_time;
 use crate::support::process::Service;
 use crate::support::sse::{Block, events};
 use crate::support::stores::{Place, for_every_backend};
@@ -147,4 +150,28 @@ async fn open_streams_do_not_delay_the_exit() {
     let status: Value = serde_json::from_slice(&service.bytes(&address).await).expect("JSON");
     let status = status["status"].as_str().expect("text");
     assert!(["queued", "running"].contains(&status), "{status}");
+}
+
+/// The store is on a server that accepts connections and never says anything.
+#[tokio::test]
+async fn a_service_that_is_starting_ends_at_the_first_signal_and_outlives_a_hangup() {
+    let server = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let store = format!("nats://{}", server.local_addr().expect("bound"));
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let log = directory.path().join("log");
+    let file = File::create(&log).expect("a file");
+    let service = Service::starting(directory.path(), &["--store", &store], file);
+    let accepted = tokio::task::spawn_blocking(move || (server.accept(), server));
+    let connected = in_time(accepted).await.expect("no panic");
+    service.signal("HUP");
+    service.signal("TERM");
+    let status = service.exit().await;
+    let log = fs::read_to_string(&log).expect("UTF-8");
+    assert!(status.success(), "{status}: {log}");
+    assert!(
+        log.contains("leaving before the service has begun"),
+        "{log}"
+    );
+    assert!(!log.contains("panicked"), "{log}");
+    drop(connected);
 }

@@ -47,8 +47,11 @@ pub(super) async fn open(
 ) -> anyhow::Result<Parts> {
     let clock = SteadyClock::following(store::wall_clock());
     instruments.metrics.began(clock.now_ms());
-    let store = backend::open(config, clock.clock(), &instruments).await?;
-    let catalogue = datasets::open(config, &instruments).await?;
+    // Side by side, for servers that do not answer are waited for twice otherwise.
+    let (store, catalogue) = tokio::try_join!(
+        backend::open(config, clock.clock(), &instruments),
+        datasets::open(config, &instruments),
+    )?;
     let rules = planner::rules(config.limits).with_datasets(catalogue.clone());
     let Callers {
         access,

@@ -135,13 +135,36 @@ impl Service {
     }
 
     fn start_as(
+        command: Command,
+        listen: &str,
+        data_dir: &Path,
+        arguments: &[&str],
+        log: impl Into<Stdio>,
+    ) -> Self {
+        let mut service = Self::starting_as(command, listen, data_dir, arguments, log);
+        let mut line = String::new();
+        let stdout = service.child.stdout.take().expect("piped");
+        BufReader::new(stdout).read_line(&mut line).expect("a line");
+        let url = line.trim().strip_prefix("listening on ");
+        service.url = url
+            .unwrap_or_else(|| panic!("not listening: {line:?}"))
+            .to_owned();
+        service
+    }
+
+    /// Without waiting until it listens: it has no address yet.
+    pub(crate) fn starting(data_dir: &Path, arguments: &[&str], log: impl Into<Stdio>) -> Self {
+        Self::starting_as(noctule(), LOOPBACK, data_dir, arguments, log)
+    }
+
+    fn starting_as(
         mut command: Command,
         listen: &str,
         data_dir: &Path,
         arguments: &[&str],
         log: impl Into<Stdio>,
     ) -> Self {
-        let mut child = command
+        let child = command
             .args(["serve", "--listen", listen, "--data-dir"])
             .arg(data_dir)
             .args(arguments)
@@ -150,14 +173,8 @@ impl Service {
             .stderr(log)
             .spawn()
             .expect("the binary starts");
-        let mut line = String::new();
-        let stdout = child.stdout.take().expect("piped");
-        BufReader::new(stdout).read_line(&mut line).expect("a line");
-        let url = line.trim().strip_prefix("listening on ");
         Self {
-            url: url
-                .unwrap_or_else(|| panic!("not listening: {line:?}"))
-                .to_owned(),
+            url: String::new(),
             child,
             client: Client::builder()
                 .no_proxy()

@@ -44,6 +44,8 @@ pub(super) struct Servers {
     pub(super) documents: kv::Store,
     /// Documents that are too long for a message.
     pub(super) objects: ObjectStore,
+    /// The underlying stream of `objects`.
+    pub(super) chunks: Stream,
     /// Idempotency keys.
     pub(super) keys: kv::Store,
     /// Which nodes there are.
@@ -126,6 +128,7 @@ impl Servers {
             jobs: make.stream(jobs(options)).await?,
             documents: make.bucket("documents", Duration::ZERO).await?,
             objects: make.objects("objects").await?,
+            chunks: make.beneath(&make.name("objects")).await?,
             keys: make.bucket("keys", kept).await?,
             nodes: make.bucket("nodes", ALIVE).await?,
             tellers: make.bucket("tellers", TELLING).await?,

@@ -1,6 +1,6 @@
 //! Scenarios and results: beside the steps, so that a step stays small.
 
-use async_nats::jetstream::object_store::{DeleteErrorKind, GetErrorKind};
+use async_nats::jetstream::object_store::{DeleteErrorKind, GetErrorKind, InfoErrorKind};
 use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use bytes::Bytes;
 use tokio::io::AsyncReadExt as _;
@@ -121,22 +121,47 @@ impl Servers {
         id: PlanId,
         objects: &[String],
     ) -> Result<(), StoreError> {
-        let what = || format!("documents of plan {id}");
-        let subjects = format!("{}{id}.>", self.documents.prefix);
-        self.documents
-            .stream
-            .purge()
-            .filter(subjects)
-            .await
-            .map_err(|error| failed(&what(), &error))?;
+        self.purge_documents(id).await?;
         for key in objects {
             match self.objects.delete(key).await {
                 Err(error) if error.kind() != DeleteErrorKind::NotFound => {
-                    return Err(failed(&what(), &error));
+                    return Err(failed(&documents_of(id), &error));
                 }
                 _ => {}
             }
         }
         Ok(())
     }
+
+    /// As [`Servers::remove_documents`], without writing anything: the heads of objects stay.
+    pub(super) async fn empty_documents(
+        &self,
+        id: PlanId,
+        objects: &[String],
+    ) -> Result<(), StoreError> {
+        self.purge_documents(id).await?;
+        for key in objects {
+            let object = match self.objects.info(key).await {
+                Ok(object) => object,
+                Err(error) if error.kind() == InfoErrorKind::NotFound => continue,
+                Err(error) => return Err(failed(&documents_of(id), &error)),
+            };
+            let chunks = format!("$O.{}.C.{}", object.bucket, object.nuid);
+            let purged = self.chunks.purge().filter(chunks).await;
+            purged.map_err(|error| failed(&documents_of(id), &error))?;
+        }
+        Ok(())
+    }
+
+    /// Remove those documents of a plan that are no objects.
+    async fn purge_documents(&self, id: PlanId) -> Result<(), StoreError> {
+        let subjects = format!("{}{id}.>", self.documents.prefix);
+        let purged = self.documents.stream.purge().filter(subjects).await;
+        purged.map_err(|error| failed(&documents_of(id), &error))?;
+        Ok(())
+    }
+}
+
+fn documents_of(id: PlanId) -> String {
+    format!("documents of plan {id}")
 }

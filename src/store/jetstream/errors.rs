@@ -44,6 +44,15 @@ pub(super) fn passes(error: &StoreError) -> bool {
     .any(|sign| detail.contains(sign))
 }
 
+/// Whether the servers refused a write because they have no room for it: it has certainly not been written. (When a disk
+/// is full before their limit is reached, a server that does not lead the stream may have written it.)
+pub(super) fn lacks_room(error: &StoreError) -> bool {
+    matches!(
+        error,
+        StoreError::Unavailable { trouble: Trouble::Full, detail } if !detail.contains("no space")
+    )
+}
+
 /// Whether a write was refused because what it builds on has been overwritten. The servers have two codes for it, of
 /// which the client knows one.
 pub(super) fn is_outrun(error: &(impl Error + 'static)) -> bool {
@@ -57,6 +66,7 @@ fn described(detail: String) -> StoreError {
         "no space",
         "maximum bytes",
         "limit exceeded",
+        "limits exceeded",
     ]
     .iter()
     .any(|sign| detail.contains(sign));

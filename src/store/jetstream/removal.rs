@@ -1,9 +1,10 @@
 //! Plans that are removed, and what remains of them.
 
 use super::JetStream;
-use super::errors::failed;
+use super::errors::{failed, lacks_room};
 use super::record::{Grave, State};
 use super::steps::Change;
+use super::view::Standing;
 use crate::job::PlanId;
 use crate::store::{SWEEP, StoreError};
 
@@ -17,13 +18,39 @@ impl JetStream {
 
     /// Remove a plan and all that belongs to it, except its tombstone.
     async fn bury(&self, id: PlanId, now_ms: i64, expired: bool) -> Result<(), StoreError> {
-        let mut remains: Option<(u64, Vec<String>)> = None;
+        let mut buried = self.write_grave(id, now_ms, expired).await;
+        if matches!(&buried, Err(error) if lacks_room(error)) {
+            self.make_room(id).await?;
+            buried = self.write_grave(id, now_ms, expired).await;
+        }
+        let (standing, Remains { place, objects }) = buried?;
+        self.withdraw(id, place).await;
+        self.servers.remove_documents(id, &objects).await?;
+        // Last: while steps remain, documents may remain too.
+        let steps = self.servers.plans.purge();
+        let steps = steps.filter(self.servers.subject_of(id));
+        let purged = steps.sequence(standing.sequence).await;
+        purged.map_err(|error| failed(&format!("steps of plan {id}"), &error))?;
+        Ok(())
+    }
+
+    /// Mark a plan as removed; returns its state from then on, and what is left of it.
+    async fn write_grave(
+        &self,
+        id: PlanId,
+        now_ms: i64,
+        expired: bool,
+    ) -> Result<(Standing, Remains), StoreError> {
+        let mut remains = Remains::default();
         let standing = self
             .plans()
             .change(id, |standing| {
                 let record = standing.record(id, now_ms)?;
                 let objects = record.objects();
-                remains = Some((record.place, objects.clone()));
+                remains = Remains {
+                    place: record.place,
+                    objects: objects.clone(),
+                };
                 let grave = Grave {
                     owner: record.plan.owner.clone(),
                     expired,
@@ -33,14 +60,19 @@ impl JetStream {
                 Ok(Some(Change::silent(State::Buried(grave))))
             })
             .await?;
-        if let Some((place, objects)) = remains {
-            self.withdraw(id, place).await;
-            self.servers.remove_documents(id, &objects).await?;
-        }
-        // Last: while steps remain, documents may remain too.
-        let steps = self.servers.plans.purge();
-        let steps = steps.filter(self.servers.subject_of(id));
-        let purged = steps.sequence(standing.sequence).await;
+        Ok((standing, remains))
+    }
+
+    /// Full servers take nothing, not even a plan's removal, but they do remove: what goes with the plan goes first, all
+    /// but its newest step, by which other writers and nodes know it.
+    async fn make_room(&self, id: PlanId) -> Result<(), StoreError> {
+        let standing = self.plans().standing(id).await?;
+        let State::Kept(record) = &*standing.state else {
+            return Ok(());
+        };
+        self.servers.empty_documents(id, &record.objects()).await?;
+        let steps = self.servers.plans.purge().keep(1);
+        let purged = steps.filter(self.servers.subject_of(id)).await;
         purged.map_err(|error| failed(&format!("steps of plan {id}"), &error))?;
         Ok(())
     }
@@ -84,17 +116,32 @@ impl JetStream {
             self.forget_tombstone(id).await?;
         }
         let mut removed = 0;
+        let mut refused = None;
         for id in going {
             match self.bury(id, now_ms, true).await {
                 Ok(()) => removed += 1,
                 // Another node was faster.
                 Err(StoreError::Gone(_) | StoreError::NotFound(_)) => {}
+                // This one freed too little; with the next one it may be enough.
+                Err(error) if lacks_room(&error) => refused = Some(error),
                 Err(error) => return Err(error),
             }
+        }
+        if let Some(error) = refused.filter(|_| removed == 0) {
+            return Err(error);
         }
         if let Err(error) = self.restore_jobs(now_ms).await {
             tracing::debug!(%error, "missing jobs were not looked for; trying again");
         }
         Ok(removed)
     }
+}
+
+/// What is left of a plan that has been marked as removed.
+#[derive(Debug, Default)]
+struct Remains {
+    /// Its job's place in the queue's stream.
+    place: u64,
+    /// Keys of its documents that may be in the object store.
+    objects: Vec<String>,
 }

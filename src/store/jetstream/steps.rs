@@ -7,7 +7,7 @@ use bytes::Bytes;
 
 use super::connect::Servers;
 use super::election::Election;
-use super::errors::{failed, is_outrun};
+use super::errors::{failed, is_outrun, lacks_room};
 use super::leases::Leases;
 use super::record::{Placed, Record, State, Step};
 use super::view::{Standing, View};
@@ -139,16 +139,19 @@ impl Plans<'_> {
             let mark = step.mark;
             let expected = standing.as_ref().map_or(0, |standing| standing.sequence);
             let payload = step.write()?;
+            let mut unanswered = None;
             let newest = loop {
                 match self.publish(id, expected, payload.clone()).await {
                     Ok(sequence) => break Some(Placed { sequence, step }),
                     Err(PublishError::Outrun) => break self.newest(id).await?,
-                    Err(PublishError::Hopeless(error)) => return Err(error),
+                    // While it may have been written earlier, nobody may be told that it was refused.
+                    Err(PublishError::Hopeless(error)) => return Err(unanswered.unwrap_or(error)),
                     // It may have been written. Written again, it is refused, and recognised by its mark.
                     Err(PublishError::Unanswered(error)) => {
                         if !election.goes_on().await {
                             return Err(error);
                         }
+                        unanswered = Some(error);
                     }
                 }
             };
@@ -182,15 +185,17 @@ impl Plans<'_> {
             Ok(answer) => answer.await,
             Err(error) => Err(error),
         };
-        answered
-            .map(|ack| ack.sequence)
-            .map_err(|error| match error.kind() {
-                _ if is_outrun(&error) => PublishError::Outrun,
-                PublishErrorKind::MaxPayloadExceeded => {
-                    PublishError::Hopeless(failed(&what(), &error))
-                }
-                _ => PublishError::Unanswered(failed(&what(), &error)),
-            })
+        answered.map(|ack| ack.sequence).map_err(|error| {
+            if is_outrun(&error) {
+                return PublishError::Outrun;
+            }
+            let refusal = failed(&what(), &error);
+            if error.kind() == PublishErrorKind::MaxPayloadExceeded || lacks_room(&refusal) {
+                PublishError::Hopeless(refusal)
+            } else {
+                PublishError::Unanswered(refusal)
+            }
+        })
     }
 }
 
@@ -199,6 +204,6 @@ enum PublishError {
     Outrun,
     /// It may have been written.
     Unanswered(StoreError),
-    /// It can never be written.
+    /// It is not written, and would not be if it were tried again soon.
     Hopeless(StoreError),
 }

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use tokio::time::{Instant, timeout};
 
 use super::JetStream;
-use super::errors::{failed, is_outrun};
+use super::errors::{failed, is_outrun, lacks_room};
 use super::lane::Lane;
 use super::record::{Document, Queued, Record};
 use super::steps::Change;
@@ -159,14 +159,23 @@ impl JetStream {
                 return Err(NotAccepted::certainly(error));
             }
         };
+        let objects = [scenario.key.clone()];
         let record = Record::accepted(submission, Queued { place, position }, scenario);
         let plan = record.plan.clone();
         let change = Change::announced(Box::new(record));
-        let begun = self.plans().begin(id, change).await;
-        begun.map(|()| plan).map_err(|error| NotAccepted {
-            is_certain: !matches!(error, StoreError::Unavailable { .. }),
-            error,
-        })
+        match self.plans().begin(id, change).await {
+            Ok(()) => Ok(plan),
+            Err(error) if lacks_room(&error) => {
+                // What was written before it must not take up the room that smaller plans and the ends of runs need.
+                self.withdraw(id, place).await;
+                let _ = self.servers.remove_documents(id, &objects).await;
+                Err(NotAccepted::certainly(error))
+            }
+            Err(error) => Err(NotAccepted {
+                is_certain: !matches!(error, StoreError::Unavailable { .. }),
+                error,
+            }),
+        }
     }
 
     /// Write a job; returns its place in the queue's stream. A job written twice because the answer was lost is there

@@ -6,6 +6,7 @@ mod outages;
 mod partition;
 mod processes;
 mod remains;
+mod room;
 mod servers;
 
 use std::ops::Deref;

@@ -62,7 +62,19 @@ struct Running {
 impl NatsServer {
     /// A single server; returns when it is ready.
     pub(crate) fn start() -> Self {
-        let mut server = Self::new("", "sync_interval: always");
+        Self::started("max_file_store: 16GB, sync_interval: always", "")
+    }
+
+    /// A single server that stores no more than this many bytes, and may exceed them by one message.
+    pub(crate) fn with_room(bytes: usize) -> Self {
+        Self::started(
+            &format!("max_file_store: {bytes}, sync_interval: always"),
+            "",
+        )
+    }
+
+    fn started(storage: &str, rest: &str) -> Self {
+        let mut server = Self::new(rest, storage);
         server.restart();
         server
     }
@@ -75,13 +87,13 @@ impl NatsServer {
         server
     }
 
-    /// Not started yet; `cluster` may make it part of a cluster.
-    fn new(cluster: &str, storage: &str) -> Self {
+    /// Not started yet; `rest` may make it part of a cluster.
+    fn new(rest: &str, storage: &str) -> Self {
         let directory = TempDir::new().expect("a temporary directory");
         let (port, monitor) = (free_port(), free_port());
         let config = format!(
             "server_name: n{port}\nlisten: \"127.0.0.1:{port}\"\nhttp: \"127.0.0.1:{monitor}\"\n\
-             jetstream {{ store_dir: \"{}\", max_memory_store: 64MB, max_file_store: 16GB, {storage} }}\n{cluster}\n",
+             jetstream {{ store_dir: \"{}\", max_memory_store: 64MB, {storage} }}\n{rest}\n",
             directory.path().display()
         );
         std::fs::write(directory.path().join("server.conf"), config).expect("written");
@@ -207,7 +219,7 @@ impl Cluster {
             let cluster = format!(
                 "cluster {{ name: three, listen: \"127.0.0.1:{port}\", routes: [{routes}] }}"
             );
-            NatsServer::new(&cluster, "sync_interval: 2m")
+            NatsServer::new(&cluster, "max_file_store: 16GB, sync_interval: 2m")
         });
         let mut servers = Vec::from(servers);
         servers.iter_mut().for_each(NatsServer::launch);

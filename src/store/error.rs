@@ -76,6 +76,8 @@ pub enum Trouble {
     Damaged,
     /// The file was written by a newer version of the program.
     Newer,
+    /// What it keeps on the servers is no longer there.
+    Vanished,
     /// See the log.
     Other,
 }

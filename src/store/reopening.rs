@@ -1,4 +1,4 @@
-//! A store that is opened as soon as it can be, and again when it turns out to be damaged.
+//! A store that is opened as soon as it can be, and again when it turns out to be damaged, or not to be there any more.
 //!
 //! A service whose store cannot be opened does not exit: whatever restarts it would only do so for ever. It answers,
 //! says that it is not ready and why, and accepts plans once the cause is gone.
@@ -33,9 +33,17 @@ type State = Result<Arc<dyn Store>, StoreError>;
 /// See the module's documentation.
 pub struct Reopening {
     state: watch::Receiver<State>,
-    /// Which store was found to be damaged.
-    damaged: watch::Sender<Option<Arc<dyn Store>>>,
+    /// Which store was found to be damaged or missing.
+    lost: watch::Sender<Option<Lost>>,
     opener: JoinHandle<()>,
+}
+
+/// A store that is of no use until it is opened again.
+#[derive(Clone)]
+struct Lost {
+    store: Arc<dyn Store>,
+    trouble: Trouble,
+    detail: String,
 }
 
 impl Reopening {
@@ -48,14 +56,14 @@ impl Reopening {
     }
 
     async fn start_within(open: Open, patience: Duration) -> Self {
-        let (damaged, reports) = watch::channel(None);
+        let (lost, reports) = watch::channel(None);
         let (opened, state) =
             watch::channel(Err(StoreError::unavailable("the store is being opened")));
         let opener = tokio::spawn(keep_open(open, opened, reports));
         let mut first = state.clone();
         let reopening = Self {
             state,
-            damaged,
+            lost,
             opener,
         };
         if timeout(patience, first.changed()).await.is_err() {
@@ -77,18 +85,22 @@ impl Reopening {
             .clone()
     }
 
-    /// Pass an answer on, and have the store reopened when the answer says that it is damaged.
+    /// Pass an answer on, and have the store reopened when the answer says that it is damaged or missing.
     fn heed<T>(
         &self,
         store: &Arc<dyn Store>,
         answer: Result<T, StoreError>,
     ) -> Result<T, StoreError> {
         if let Err(StoreError::Unavailable {
-            trouble: Trouble::Damaged,
-            ..
+            trouble: trouble @ (Trouble::Damaged | Trouble::Vanished),
+            detail,
         }) = &answer
         {
-            self.damaged.send_replace(Some(Arc::clone(store)));
+            self.lost.send_replace(Some(Lost {
+                store: Arc::clone(store),
+                trouble: *trouble,
+                detail: detail.clone(),
+            }));
         }
         answer
     }
@@ -114,7 +126,7 @@ async fn try_to_open(open: &Open, suspicious: bool) -> State {
 async fn keep_open(
     open: Open,
     state: watch::Sender<State>,
-    mut reports: watch::Receiver<Option<Arc<dyn Store>>>,
+    mut reports: watch::Receiver<Option<Lost>>,
 ) {
     let mut suspicious = false;
     let mut opened = try_to_open(&open, suspicious).await;
@@ -125,17 +137,26 @@ async fn keep_open(
         suspicious &= opened.is_err();
         drop(state.send_replace(opened.clone()));
         if let Ok(store) = opened {
-            if !is_reported(&store, &mut reports).await {
+            let Some(lost) = report_of(&store, &mut reports).await else {
                 return;
-            }
-            tracing::error!("the store is damaged; it is opened again once it is sound");
-            let checking = Err(StoreError::Unavailable {
-                trouble: Trouble::Damaged,
-                detail: "damage was found; the file is being checked".to_owned(),
+            };
+            let detail = if lost.trouble == Trouble::Damaged {
+                tracing::error!("the store is damaged; it is opened again once it is sound");
+                suspicious = true;
+                "damage was found; the file is being checked".to_owned()
+            } else {
+                tracing::error!(
+                    detail = lost.detail,
+                    "the store has lost what it kept; what is missing is made again, empty"
+                );
+                lost.detail
+            };
+            let reopening = Err(StoreError::Unavailable {
+                trouble: lost.trouble,
+                detail,
             });
-            drop(state.send_replace(checking));
+            drop(state.send_replace(reopening));
             store.close().await;
-            suspicious = true;
         } else {
             tokio::time::sleep(PAUSE).await;
         }
@@ -143,17 +164,17 @@ async fn keep_open(
     }
 }
 
-/// Wait until this store is reported as damaged; `false` when nobody is left to report it.
-async fn is_reported(
+/// Wait until this store is reported as damaged or missing; `None` when nobody is left to report it.
+async fn report_of(
     store: &Arc<dyn Store>,
-    reports: &mut watch::Receiver<Option<Arc<dyn Store>>>,
-) -> bool {
+    reports: &mut watch::Receiver<Option<Lost>>,
+) -> Option<Lost> {
     // A late report about a store that has since been replaced is ignored.
-    let this = |reported: &Option<Arc<dyn Store>>| {
+    let this = |reported: &Option<Lost>| {
         let reported = reported.as_ref();
-        reported.is_some_and(|reported| Arc::ptr_eq(reported, store))
+        reported.is_some_and(|lost| Arc::ptr_eq(&lost.store, store))
     };
-    reports.wait_for(this).await.is_ok()
+    reports.wait_for(this).await.ok()?.clone()
 }
 
 #[async_trait]

@@ -163,6 +163,9 @@ impl Problem {
                     Some(Trouble::ReadOnly) => "the data directory cannot be written",
                     Some(Trouble::Damaged) => "the store's file is damaged",
                     Some(Trouble::Newer) => "the store was written by a newer version",
+                    Some(Trouble::Vanished) => {
+                        "what the store keeps on the NATS servers is missing there"
+                    }
                     Some(Trouble::Other) => "the store does not answer",
                     None => "another process uses the data directory",
                 };

@@ -53,6 +53,17 @@ pub(super) fn lacks_room(error: &StoreError) -> bool {
     )
 }
 
+/// Whether a stream is no longer on the servers.
+pub(super) fn is_vanished(error: &StoreError) -> bool {
+    matches!(
+        error,
+        StoreError::Unavailable {
+            trouble: Trouble::Vanished,
+            ..
+        }
+    )
+}
+
 /// Whether a write was refused because what it builds on has been overwritten. The servers have two codes for it, of
 /// which the client knows one.
 pub(super) fn is_outrun(error: &(impl Error + 'static)) -> bool {
@@ -70,8 +81,12 @@ fn described(detail: String) -> StoreError {
     ]
     .iter()
     .any(|sign| detail.contains(sign));
-    StoreError::Unavailable {
-        trouble: if full { Trouble::Full } else { Trouble::Other },
-        detail,
-    }
+    let trouble = if full {
+        Trouble::Full
+    } else if detail.contains("stream not found") {
+        Trouble::Vanished
+    } else {
+        Trouble::Other
+    };
+    StoreError::Unavailable { trouble, detail }
 }

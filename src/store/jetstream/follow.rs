@@ -31,20 +31,29 @@ pub(super) enum Reading {
 }
 
 impl JetStream {
-    /// Read for ever; report the state of reading to `reading`.
+    /// Read until the stream vanishes; report the state of reading to `reading`.
     pub(super) async fn follow(self: Arc<Self>, reading: watch::Sender<Reading>) {
         let mut read = 0;
         loop {
-            if let Err(error) = self.read_on(&mut read, &reading).await {
-                tracing::warn!(%error, "plans are no longer followed; trying again");
-            }
-            reading.send_if_modified(|reading| {
+            let ended = self.read_on(&mut read, &reading).await;
+            let broken = reading.send_if_modified(|reading| {
                 let was_current = *reading == Reading::Current;
                 if was_current {
                     *reading = Reading::Broken;
                 }
                 was_current
             });
+            if let Err(error) = ended {
+                if self.heed_vanished(&error) {
+                    return;
+                }
+                // Once for each interruption.
+                if broken {
+                    tracing::warn!(%error, "plans are no longer followed; trying again");
+                } else {
+                    tracing::debug!(%error, "plans are not followed yet; trying again");
+                }
+            }
             tokio::time::sleep(PAUSE).await;
         }
     }

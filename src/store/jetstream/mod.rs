@@ -27,6 +27,7 @@ mod runs;
 mod settings;
 mod shelf;
 mod steps;
+mod streams;
 mod submit;
 mod turns;
 mod view;
@@ -96,6 +97,8 @@ struct JetStream {
     telling: Mutex<BTreeSet<PlanId>>,
     /// Becomes true when the store is closed.
     end: watch::Sender<bool>,
+    /// Becomes true when a stream has vanished from the servers.
+    vanished: watch::Sender<bool>,
 }
 
 impl JetStream {
@@ -137,6 +140,7 @@ impl JetStreamStore {
             round: Mutex::default(),
             telling: Mutex::default(),
             end: watch::Sender::new(false),
+            vanished: watch::Sender::new(false),
         });
         store.announce().await?;
         let (read, mut reading) = watch::channel(Reading::Catching);
@@ -163,6 +167,9 @@ impl JetStreamStore {
     fn open_store(&self) -> Result<&Arc<JetStream>, StoreError> {
         if *self.store.end.borrow() {
             return Err(closed());
+        }
+        if *self.store.vanished.borrow() {
+            return Err(streams::vanished());
         }
         Ok(&self.store)
     }
@@ -193,7 +200,15 @@ impl Store for JetStreamStore {
     }
 
     async fn claim(&self) -> Result<Lease, StoreError> {
-        self.open_store()?.claim().await
+        let store = self.open_store()?;
+        let mut vanished = store.vanished.subscribe();
+        let lease = tokio::select! {
+            lease = store.claim() => lease,
+            _ = vanished.wait_for(|vanished| *vanished) => Err(streams::vanished()),
+        };
+        lease.inspect_err(|error| {
+            store.heed_vanished(error);
+        })
     }
 
     async fn append(&self, lease: &Lease, events: Vec<Event>) -> Result<(), StoreError> {
@@ -326,6 +341,7 @@ impl Store for JetStreamStore {
         if !store.servers.is_connected() {
             return Err(StoreError::unavailable("no NATS server answers"));
         }
+        store.look_at_streams().await?;
         store.announce().await?;
         if *self.reading.borrow() != Reading::Current {
             return Err(StoreError::unavailable(
@@ -338,6 +354,14 @@ impl Store for JetStreamStore {
     async fn close(&self) {
         let was_open = !self.store.end.send_replace(true);
         if !was_open {
+            return;
+        }
+        if *self.store.vanished.borrow() {
+            // Nothing can be given back now; others get it when its lease ends.
+            for (id, attempt) in self.store.leases.all() {
+                self.store.leases.let_go(id, attempt);
+            }
+            self.tasks.iter().for_each(JoinHandle::abort);
             return;
         }
         let mut runs = self.store.leases.all();

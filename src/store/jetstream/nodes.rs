@@ -46,6 +46,9 @@ impl JetStream {
                 tracing::debug!(%error, "nodes were not counted");
             }
             tokio::time::sleep(self.next_announcement()).await;
+            if let Err(error) = self.look_at_streams().await {
+                tracing::debug!(%error, "not all streams are there");
+            }
             if let Err(error) = self.announce().await {
                 tracing::debug!(%error, "this node was not announced");
             }

@@ -8,6 +8,7 @@ mod processes;
 mod remains;
 mod room;
 mod servers;
+mod vanished;
 
 use std::ops::Deref;
 use std::sync::Arc;

@@ -166,6 +166,13 @@ impl NatsServer {
         running.guardian.wait().expect("reaped");
     }
 
+    /// Removes all that it has stored, while it is not running.
+    pub(crate) fn empty(&self) {
+        assert!(self.running.is_none(), "it runs");
+        let stored = self.directory.path().join("jetstream");
+        std::fs::remove_dir_all(stored).expect("removed");
+    }
+
     /// Pauses it in the middle of whatever it does, until [`NatsServer::resume`].
     pub(crate) fn pause(&self) {
         self.signal("STOP");

@@ -17,7 +17,7 @@ use tokio::runtime::Handle;
 
 use self::opened::Opened;
 use super::election::outlast;
-use super::errors::passes;
+use super::errors::{is_vanished, passes};
 use super::settings::Settings;
 use crate::catalogue::{Changes, Shelf, Source};
 use crate::store::{StoreError, Trouble};
@@ -112,6 +112,10 @@ impl JetStreamShelf {
             let late = StoreError::unavailable("the NATS servers take too long");
             Err(late.into())
         });
+        if matches!(&done, Err(Failure::Servers(error)) if is_vanished(error)) {
+            // They are made again when something is asked for next.
+            self.opening.lock().opened = None;
+        }
         done.map_err(|failure| match failure {
             Failure::Servers(error) => unavailable(error),
             Failure::File(error) => error,

@@ -1,0 +1,113 @@
+//! Streams and buckets that vanish beneath an open store.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use noctule::config::Address;
+use noctule::job::PlanId;
+use noctule::store::jetstream::{JetStreamStore, Settings};
+use noctule::store::reopening::{Open, Reopening};
+use noctule::store::{Options, Store, StoreError, Trouble};
+use tokio::runtime::Handle;
+
+use crate::support::nats::{self, Cluster, NatsServer, namespace};
+use crate::support::patience::{eventually, in_time};
+use crate::support::plans::{failure, kind, submission};
+use crate::support::stores::node;
+
+/// A store as the service has it.
+async fn reopening(settings: Settings) -> Reopening {
+    let runtime = Handle::current();
+    let open: Open = Arc::new(move |_| {
+        let opened = JetStreamStore::open(settings.clone(), Options::new(100));
+        Ok(Arc::new(runtime.block_on(opened)?))
+    });
+    let store = Reopening::start(open).await;
+    eventually(async || store.health().await.is_ok()).await;
+    store
+}
+
+/// Plans are accepted and run.
+async fn works(store: &Reopening) -> PlanId {
+    let id = store.submit(submission()).await.unwrap().plan.id;
+    let lease = in_time(store.claim()).await.unwrap();
+    assert_eq!(lease.plan.id, id);
+    store.finish(&lease, failure().at(0)).await.unwrap();
+    id
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn servers_that_lost_everything_take_plans_again() {
+    let mut server = NatsServer::start();
+    let store = reopening(node(&server.address())).await;
+    let lost = works(&store).await;
+    server.kill();
+    server.empty();
+    server.restart();
+    // Nobody asks about the store's health.
+    eventually(async || kind(store.get(lost).await) == Err("not found")).await;
+    eventually(async || store.health().await.is_ok()).await;
+    works(&store).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stream_or_bucket_that_was_removed_is_reported_and_made_again() {
+    let address = nats::address();
+    let store = reopening(node(&address)).await;
+    let servers = Address::read(&address).unwrap().servers;
+    let client = async_nats::connect(servers).await.unwrap();
+    let client = async_nats::jetstream::new(client);
+    let namespace = namespace(&address);
+    for (before, name) in [
+        ("", "plans"),
+        ("", "jobs"),
+        ("KV_", "documents"),
+        ("OBJ_", "objects"),
+        ("KV_", "keys"),
+        ("KV_", "tellers"),
+    ] {
+        let stream = format!("{before}{namespace}-{name}");
+        client.delete_stream(&stream).await.unwrap();
+        let Err(StoreError::Unavailable { trouble, detail }) = store.health().await else {
+            panic!("{name} is not missed")
+        };
+        assert_eq!(trouble, Trouble::Vanished, "{name}: {detail}");
+        eventually(async || store.health().await.is_ok()).await;
+        client.get_stream(&stream).await.unwrap();
+        works(&store).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_node_is_not_ready_without_the_server_that_keeps_the_queue() {
+    let mut cluster = Cluster::start().await;
+    // Announcements, and everything but the queue, may be on other servers.
+    let (store, queue, address) = loop {
+        let address = cluster.address();
+        let settings = Settings {
+            replicas: 1,
+            ..node(&address)
+        };
+        let store = reopening(settings).await;
+        let namespace = namespace(&address);
+        let queue = cluster.leader_of(&format!("{namespace}-jobs")).await;
+        let nodes = cluster.leader_of(&format!("KV_{namespace}-nodes")).await;
+        if queue != nodes {
+            break (store, queue, address);
+        }
+    };
+    cluster.servers[queue].kill();
+    let queue_is_missed = async || match store.health().await {
+        Err(error) => error
+            .to_string()
+            .contains(&format!("stream {}-jobs", namespace(&address))),
+        Ok(()) => false,
+    };
+    let missed = tokio::time::timeout(Duration::from_secs(90), eventually(queue_is_missed));
+    missed.await.expect("the queue is missed");
+    cluster.servers[queue].restart();
+    eventually(async || store.health().await.is_ok()).await;
+    works(&store).await;
+}

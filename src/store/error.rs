@@ -78,6 +78,10 @@ pub enum Trouble {
     Newer,
     /// What it keeps on the servers is no longer there.
     Vanished,
+    /// The file with the credentials for the servers cannot be read.
+    NoCredentials,
+    /// The servers let nobody in with these credentials, or without any.
+    Forbidden,
     /// See the log.
     Other,
 }

@@ -166,6 +166,10 @@ impl Problem {
                     Some(Trouble::Vanished) => {
                         "what the store keeps on the NATS servers is missing there"
                     }
+                    Some(Trouble::NoCredentials) => {
+                        "the credentials for the NATS servers cannot be read"
+                    }
+                    Some(Trouble::Forbidden) => "the NATS servers refuse the credentials",
                     Some(Trouble::Other) => "the store does not answer",
                     None => "another process uses the data directory",
                 };

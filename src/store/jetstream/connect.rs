@@ -7,14 +7,14 @@ use async_nats::connection::State as Connection;
 use async_nats::jetstream::object_store::ObjectStore;
 use async_nats::jetstream::stream::{Config, DiscardPolicy, RetentionPolicy, StorageType, Stream};
 use async_nats::jetstream::{self, Context, kv, object_store};
-use async_nats::{Client, ConnectOptions, Event};
+use async_nats::{Client, ConnectErrorKind, ConnectOptions, Event};
 
 use super::election::{Election, outlast};
-use super::errors::{failed, passes};
+use super::errors::{failed, failed_by, passes};
 use super::lane::Version;
 use super::settings::Settings;
 use crate::job::PlanId;
-use crate::store::{IDEMPOTENCY_MS, Options, StoreError};
+use crate::store::{IDEMPOTENCY_MS, Options, StoreError, Trouble};
 
 /// The oldest server version that provides what the store promises.
 const OLDEST_SERVER: &str = "2.12.0";
@@ -78,16 +78,24 @@ pub(super) async fn connect(settings: &Settings) -> Result<Client, StoreError> {
             }
         });
     if let Some(file) = &settings.credentials {
-        options = options
-            .credentials_file(file)
-            .await
-            .map_err(|error| failed(&format!("credentials {}", file.display()), &error))?;
+        options = options.credentials_file(file).await.map_err(|error| {
+            let what = format!("credentials {}", file.display());
+            failed_by(Trouble::NoCredentials, &what, &error)
+        })?;
     }
     let servers = settings.address.servers.join(",");
     let client = options
         .connect(&settings.address.servers)
         .await
-        .map_err(|error| failed(&format!("NATS servers {servers}"), &error))?;
+        .map_err(|error| {
+            let what = format!("NATS servers {servers}");
+            match error.kind() {
+                ConnectErrorKind::AuthorizationViolation | ConnectErrorKind::Authentication => {
+                    failed_by(Trouble::Forbidden, &what, &error)
+                }
+                _ => failed(&what, &error),
+            }
+        })?;
     check_version(&client.server_info().version)?;
     Ok(client)
 }

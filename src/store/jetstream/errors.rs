@@ -7,6 +7,22 @@ use crate::store::{StoreError, Trouble};
 
 /// An error for a step that failed, with the message of the server or client.
 pub(super) fn failed(what: &str, error: &(impl Error + 'static)) -> StoreError {
+    described(said(what, error))
+}
+
+/// As [`failed`], for a failure whose kind is known.
+pub(super) fn failed_by(
+    trouble: Trouble,
+    what: &str,
+    error: &(impl Error + 'static),
+) -> StoreError {
+    StoreError::Unavailable {
+        trouble,
+        detail: said(what, error),
+    }
+}
+
+fn said(what: &str, error: &(impl Error + 'static)) -> String {
     let mut detail = format!("{what}: {error}");
     let mut source = error.source();
     while let Some(cause) = source {
@@ -16,7 +32,7 @@ pub(super) fn failed(what: &str, error: &(impl Error + 'static)) -> StoreError {
         }
         source = cause.source();
     }
-    described(detail)
+    detail
 }
 
 /// As [`failed`], for an error that has no source.

@@ -1,6 +1,7 @@
 //! Failures with several servers and several processes.
 
 mod chaos;
+mod credentials;
 mod nodes;
 mod outages;
 mod partition;

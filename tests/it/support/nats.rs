@@ -73,6 +73,12 @@ impl NatsServer {
         )
     }
 
+    /// A single server that lets in nobody without this password.
+    pub(crate) fn with_password(password: &str) -> Self {
+        let users = format!("authorization {{ user: \"u\", password: \"{password}\" }}");
+        Self::started("max_file_store: 16GB, sync_interval: always", &users)
+    }
+
     fn started(storage: &str, rest: &str) -> Self {
         let mut server = Self::new(rest, storage);
         server.restart();

@@ -146,9 +146,8 @@ impl Service {
         let stdout = service.child.stdout.take().expect("piped");
         BufReader::new(stdout).read_line(&mut line).expect("a line");
         let url = line.trim().strip_prefix("listening on ");
-        service.url = url
-            .unwrap_or_else(|| panic!("not listening: {line:?}"))
-            .to_owned();
+        url.unwrap_or_else(|| panic!("not listening: {line:?}"))
+            .clone_into(&mut service.url);
         service
     }
 

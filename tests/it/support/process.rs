@@ -146,8 +146,7 @@ impl Service {
         let stdout = service.child.stdout.take().expect("piped");
         BufReader::new(stdout).read_line(&mut line).expect("a line");
         let url = line.trim().strip_prefix("listening on ");
-        url.unwrap_or_else(|| panic!("not listening: {line:?}"))
-            .clone_into(&mut service.url);
+        service.url = url.map_or_else(|| panic!("not listening: {line:?}"), str::to_owned);
         service
     }
 

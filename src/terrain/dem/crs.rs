@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use proj4rs::Proj;
 
-use super::DemError;
+use super::{DemError, heights};
 use crate::geometry::geodesy::LatLon;
 
 /// WGS 84 as a PROJ string.
@@ -73,6 +73,11 @@ impl Crs {
         let definition = crs_definitions::from_code(code)
             .ok_or_else(|| unusable("its definition is not known".into()))?
             .proj4;
+        if heights::are_above_ellipsoid(code) {
+            return Err(unusable(
+                "its heights are above the ellipsoid, must be above sea level; EPSG:4326+5773 has such heights".into(),
+            ));
+        }
         let words: Vec<&str> = definition.split_whitespace().collect();
         let says = |word: &str| words.contains(&word);
         let shift = |name: &str| words.iter().any(|word| word.starts_with(name));
@@ -81,6 +86,13 @@ impl Crs {
             || ((says("+ellps=GRS80") || says("+ellps=WGS84"))
                 && !shift("+datum=")
                 && words.iter().all(|word| is_null_shift(word)));
+        if let Some(unit) = words.iter().find_map(|word| word.strip_prefix("+vunits="))
+            && unit != "m"
+        {
+            return Err(unusable(format!(
+                "its heights are in the unit {unit:?}, must be in metres"
+            )));
+        }
         let degrees = says("+proj=longlat");
         if degrees && modern && !shift("+pm=") && !shift("+axis=") {
             return Ok(Self { code, plane: None });

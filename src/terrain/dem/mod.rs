@@ -11,6 +11,7 @@ mod error;
 mod fit;
 mod geotiff;
 mod ground;
+mod heights;
 mod hgt;
 mod lattice;
 mod raster;

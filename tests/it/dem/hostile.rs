@@ -14,6 +14,18 @@ fn deflated(bytes: &[u8]) -> Vec<u8> {
     encoder.finish().expect("memory")
 }
 
+/// Geo keys of degrees with a vertical reference system and, where given, a unit.
+fn vertical(code: u16, unit: Option<u16>) -> Value {
+    let mut keys = vec![
+        1, 1, 0, 3, 1024, 0, 1, 2, 2048, 0, 1, 4326, 4096, 0, 1, code,
+    ];
+    if let Some(unit) = unit {
+        keys[3] += 1;
+        keys.extend([4099, 0, 1, unit]);
+    }
+    Value::Short(keys)
+}
+
 /// Wrong files, and what the refusal must say.
 fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
     use Value::{Ascii, Double, Long, Raw, Short};
@@ -69,6 +81,13 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("undeclared.tif", samples(-32768.0), "is it a no-data value that the file does not declare?"),
         ("scaled.tif", right().with(tiff::GDAL_METADATA, Ascii("<GDALMetadata><Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.1</Item></GDALMetadata>")).bytes(), "scaled or shifted"),
         ("feet.tif", right().with(tiff::KEYS, Short(vec![1, 1, 0, 3, 1024, 0, 1, 2, 2048, 0, 1, 4326, 4099, 0, 1, 9002])).bytes(), "EPSG:9002"),
+        ("feet-by-name.tif", right().with(tiff::GDAL_METADATA, Ascii("<GDALMetadata><Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">ft</Item></GDALMetadata>")).bytes(), "in the unit \"ft\""),
+        ("survey-feet.tif", right().with(tiff::KEYS, vertical(6360, None)).bytes(), "the vertical reference system EPSG:6360"),
+        ("depths.tif", right().with(tiff::KEYS, vertical(5715, None)).bytes(), "the vertical reference system EPSG:5715"),
+        ("own-heights.tif", right().with(tiff::KEYS, vertical(32_767, Some(32_767))).bytes(), "neither an EPSG code nor a known unit"),
+        ("old-heights.tif", right().with(tiff::KEYS, vertical(5103, None)).bytes(), "the vertical reference system EPSG:5103"),
+        ("ellipsoid.tif", right().with(tiff::KEYS, vertical(4979, None)).bytes(), "above the ellipsoid (EPSG:4979)"),
+        ("old-ellipsoid.tif", right().with(tiff::KEYS, vertical(5030, Some(9001))).bytes(), "above the ellipsoid (EPSG:5030)"),
         ("no-data.tif", right().with(tiff::NO_DATA, Ascii("none")).bytes(), "no-data value is \"none\""),
         // Without a usable position.
         ("nowhere.tif", right().without(tiff::TIE_POINT).bytes(), "not a GeoTIFF|no georeferenced image"),
@@ -87,6 +106,8 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("mixed-crs.tif", right().with(tiff::KEYS, tiff::keys(1, 3072, 4326)).bytes(), "which it is not"),
         ("earth-centred.tif", right().with(tiff::KEYS, tiff::keys(3, 2048, 4978)).bytes(), "earth-centred"),
         ("bad-keys.tif", right().with(tiff::KEYS, Short(vec![9, 1, 0, 0])).bytes(), "geo keys"),
+        ("ellipsoid-crs.tif", right().with(tiff::KEYS, tiff::keys(2, 2048, 4979)).bytes(), "its heights are above the ellipsoid"),
+        ("feet-crs.tif", right().with(tiff::KEYS, tiff::keys(1, 3072, 8713)).bytes(), "its heights are in the unit \"us-ft\""),
         // Text grids.
         ("header.asc", asc("ncols 3\nnrows 2\n"), "ends in its header"),
         ("unplaced.asc", asc("ncols 3\nnrows 2\ncellsize 1\n1 2 3 4 5 6"), "neither xllcorner nor xllcenter"),
@@ -143,6 +164,30 @@ fn wrong_files_are_refused_in_little_memory() {
         let reason = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{name}: {reason}");
         assert!(!reason.contains("panicked"), "{name}: {reason}");
+    }
+}
+
+#[test]
+fn stated_heights_in_metres_above_sea_level_are_read() {
+    use Value::Ascii;
+    let unit = |text: &'static str| Tiff::right().with(tiff::GDAL_METADATA, Ascii(text)).bytes();
+    let keyed = |code, unit| Tiff::right().with(tiff::KEYS, vertical(code, unit)).bytes();
+    let files = [
+        keyed(5703, None),
+        keyed(3855, Some(9001)),
+        keyed(5773, Some(32_767)),
+        keyed(32_767, Some(9001)),
+        keyed(5103, Some(9001)),
+        keyed(0, None),
+        unit("<Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">m</Item>"),
+        unit("<Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">Metre</Item>"),
+        unit("<Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\"></Item>"),
+    ];
+    for (idx, bytes) in files.iter().enumerate() {
+        let (_directory, path) = file("right.tif", bytes);
+        if let Err(error) = open(&path) {
+            panic!("file {idx}: {error}");
+        }
     }
 }
 

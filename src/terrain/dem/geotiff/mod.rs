@@ -3,6 +3,7 @@
 //! `tiff-reader` decodes the bytes, with limits on the size of headers and blocks. Uncompressed strips are read a few
 //! rows at a time, because some writers make the whole file one strip.
 
+mod heights;
 mod place;
 mod samples;
 
@@ -14,7 +15,8 @@ use tiff_reader::source::{FileSource, TiffSource};
 use tiff_reader::{Ifd, OpenOptions, ParseBudgets, TiffError, TiffFile};
 
 use super::{Crs, DemError, Format, MOST_SAMPLES, SampleType};
-use place::{check_heights, crs, keys, no_data, nodes};
+use heights::check_heights;
+use place::{crs, keys, no_data, nodes};
 pub(super) use samples::Layout;
 use samples::layout;
 

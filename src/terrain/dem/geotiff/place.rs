@@ -1,4 +1,4 @@
-//! What the tags of an image say about its position, its unit and its no-data value.
+//! What the tags of an image say about its position and its no-data value.
 
 use geotiff_core::geokeys::{self, GeoKeyDirectory};
 use geotiff_core::tags;
@@ -6,9 +6,6 @@ use tiff_reader::{Ifd, TagValue};
 
 use super::{malformed, unsupported};
 use crate::terrain::dem::{Crs, DemError};
-
-/// A tag that no library defines.
-const GDAL_METADATA: u16 = 42112;
 
 /// The geo keys of an image; a missing directory counts as an empty one.
 pub(super) fn keys(ifd: &Ifd) -> Result<GeoKeyDirectory, DemError> {
@@ -28,39 +25,6 @@ pub(super) fn keys(ifd: &Ifd) -> Result<GeoKeyDirectory, DemError> {
         .as_u16_slice()
         .and_then(|directory| GeoKeyDirectory::parse(directory, doubles, text))
         .ok_or_else(|| malformed("its directory of geo keys cannot be read"))
-}
-
-/// Refuse elevations in units other than metres.
-pub(super) fn check_heights(ifd: &Ifd, keys: &GeoKeyDirectory) -> Result<(), DemError> {
-    const METRE: u16 = 9001;
-    if let Some(unit) = keys.get_short(geokeys::VERTICAL_UNITS)
-        && ![METRE, 0, 32767].contains(&unit)
-    {
-        return Err(unsupported(
-            format!("its elevations are in the unit EPSG:{unit}"),
-            "metres (EPSG:9001)",
-        ));
-    }
-    let scaled = ifd
-        .tag(GDAL_METADATA)
-        .and_then(|tag| tag.value.as_str())
-        .is_some_and(|text| {
-            [("role=\"scale\">", 1.0), ("role=\"offset\">", 0.0)]
-                .iter()
-                .any(|(role, neutral)| {
-                    let value = text
-                        .split_once(role)
-                        .and_then(|(_, rest)| rest.split('<').next());
-                    value.is_some_and(|value| value.trim().parse() != Ok(*neutral))
-                })
-        });
-    if scaled {
-        return Err(unsupported(
-            "its samples are to be scaled or shifted (GDAL_METADATA)",
-            "elevations in metres as they are",
-        ));
-    }
-    Ok(())
 }
 
 /// Position of the first node, and the steps to the next column and row.

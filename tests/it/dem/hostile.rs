@@ -1,18 +1,11 @@
 //! Malformed and malicious files: each is refused for its actual fault, at little cost.
 
-use std::io::Write;
 use std::process::Command;
 
 use noctule::terrain::dem::{self, Declared, Format};
 
 use super::tiff::{self, Tiff, Value};
-use super::{file, open, tile};
-
-fn deflated(bytes: &[u8]) -> Vec<u8> {
-    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
-    encoder.write_all(bytes).expect("memory");
-    encoder.finish().expect("memory")
-}
+use super::{deflated, file, open, tile};
 
 /// Geo keys of degrees with a vertical reference system and, where given, a unit.
 fn vertical(code: u16, unit: Option<u16>) -> Value {

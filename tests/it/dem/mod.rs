@@ -2,9 +2,11 @@
 
 mod fuzz;
 mod hostile;
+mod masks;
 mod right;
 mod tiff;
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
@@ -20,6 +22,13 @@ fn file(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
 
 fn open(path: &Path) -> Result<Dataset, DemError> {
     dem::open(path, Declared::default())
+}
+
+/// What a zlib encoder makes of these bytes.
+fn deflated(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+    encoder.write_all(bytes).expect("memory");
+    encoder.finish().expect("memory")
 }
 
 /// An SRTM tile with the same value everywhere.

@@ -31,6 +31,12 @@ pub(super) const OFFSETS: u16 = 273;
 pub(super) const BANDS: u16 = 277;
 pub(super) const ROWS_PER_STRIP: u16 = 278;
 pub(super) const COUNTS: u16 = 279;
+pub(super) const SUBFILE: u16 = 254;
+pub(super) const PHOTOMETRIC: u16 = 262;
+pub(super) const TILE_WIDTH: u16 = 322;
+pub(super) const TILE_HEIGHT: u16 = 323;
+pub(super) const TILE_OFFSETS: u16 = 324;
+pub(super) const TILE_COUNTS: u16 = 325;
 pub(super) const SAMPLE_FORMAT: u16 = 339;
 pub(super) const SCALE: u16 = 33550;
 pub(super) const TIE_POINT: u16 = 33922;
@@ -95,11 +101,44 @@ impl Tiff {
 
     pub(super) fn bytes(&self) -> Vec<u8> {
         let mut file = b"II*\0\x08\0\0\0".to_vec();
+        file.extend(self.directory(8));
+        assert!(
+            file.len() <= DATA as usize,
+            "{} bytes of headers",
+            file.len()
+        );
+        file.resize(DATA as usize, 0);
+        file.extend(&self.data);
+        file
+    }
+
+    /// A file of this image and then `second`, whose offsets count from its own beginning.
+    pub(super) fn followed_by(mut self, mut second: Self) -> Vec<u8> {
+        self.data.resize(self.data.len().next_multiple_of(4), 0);
+        let at = DATA + u32::try_from(self.data.len()).expect("a small file");
+        self.next = at;
+        for (tag, value) in &mut second.tags {
+            if let (OFFSETS | TILE_OFFSETS, Long(offsets)) = (*tag, value) {
+                for offset in offsets {
+                    *offset += at;
+                }
+            }
+        }
+        let mut file = self.bytes();
+        file.extend(second.directory(at as usize));
+        file.resize((at + DATA) as usize, 0);
+        file.extend(second.data);
+        file
+    }
+
+    /// The tags and their values, `at` bytes from the beginning of the file.
+    fn directory(&self, at: usize) -> Vec<u8> {
+        let mut file = Vec::new();
         let entries = u16::try_from(self.tags.len()).expect("few tags");
         file.extend(entries.to_le_bytes());
         // Values that do not fit into their entries.
         let mut values = Vec::new();
-        let values_at = 8 + 2 + 12 * self.tags.len() + 4;
+        let values_at = at + 2 + 12 * self.tags.len() + 4;
         for (tag, value) in &self.tags {
             let (kind, count, bytes) = match value {
                 Short(values) => (
@@ -147,13 +186,6 @@ impl Tiff {
         }
         file.extend(self.next.to_le_bytes());
         file.extend(values);
-        assert!(
-            file.len() <= DATA as usize,
-            "{} bytes of headers",
-            file.len()
-        );
-        file.resize(DATA as usize, 0);
-        file.extend(&self.data);
         file
     }
 }

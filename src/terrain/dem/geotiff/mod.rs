@@ -4,6 +4,7 @@
 //! rows at a time, because some writers make the whole file one strip.
 
 mod heights;
+mod mask;
 mod place;
 mod samples;
 
@@ -16,6 +17,7 @@ use tiff_reader::{Ifd, OpenOptions, ParseBudgets, TiffError, TiffFile};
 
 use super::{Crs, DemError, Format, MOST_SAMPLES, SampleType};
 use heights::check_heights;
+use mask::{is_mask, is_reduced};
 use place::{crs, keys, no_data, nodes};
 pub(super) use samples::Layout;
 use samples::layout;
@@ -147,17 +149,11 @@ fn refusal(error: &TiffError) -> DemError {
     }
 }
 
-/// The full-resolution image: the first that is georeferenced and not an overview.
+/// The full-resolution image: the first that is georeferenced and neither an overview nor a mask.
 fn base_image(images: &[Ifd]) -> Option<usize> {
-    let reduced = |ifd: &Ifd| {
-        let flags = ifd
-            .tag(tags::TAG_NEW_SUBFILE_TYPE)
-            .and_then(|tag| tag.value.as_u64());
-        // Overviews and masks.
-        flags.is_some_and(|flags| flags & 5 != 0)
-    };
     images.iter().position(|ifd| {
-        !reduced(ifd)
+        !is_reduced(ifd)
+            && !is_mask(ifd)
             && (ifd.tag(tags::TAG_MODEL_TRANSFORMATION).is_some()
                 || ifd.tag(tags::TAG_MODEL_TIEPOINT).is_some())
     })

@@ -5,8 +5,9 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::Arc;
 
-use tiff_reader::{ByteOrder, TiffFile};
+use tiff_reader::{ByteOrder, RasterLayout, TiffFile};
 
+use super::mask::{Band, mask};
 use super::{LARGEST_BLOCK, malformed, refusal, tiff, unsupported};
 use crate::terrain::dem::raster::{NoData, Span, Visit};
 use crate::terrain::dem::{DemError, SampleType};
@@ -30,6 +31,8 @@ pub(in crate::terrain::dem) struct Layout {
     blocks: Arc<[[u64; 2]]>,
     /// Uncompressed strips.
     plain: bool,
+    /// Says which samples have no data.
+    mask: Option<Box<Layout>>,
 }
 
 /// How the samples are stored.
@@ -38,11 +41,7 @@ pub(super) fn layout(
     image: usize,
     no_data: Option<f64>,
 ) -> Result<Layout, DemError> {
-    const PLAIN: u16 = 1;
-    const JPEG: [u16; 2] = [6, 7];
-    const LERC: u16 = 34887;
-    let ifd = &file.ifds()[image];
-    let shape = ifd.raster_layout().map_err(|error| refusal(&error))?;
+    let shape = shape(file, image)?;
     if shape.samples_per_pixel != 1 {
         return Err(unsupported(
             format!("the image has {} bands", shape.samples_per_pixel),
@@ -65,6 +64,44 @@ pub(super) fn layout(
             ));
         }
     };
+    let mut layout = blocks(file, image, shape, sample, no_data)?;
+    layout.mask = mask(file, image)?.map(Box::new);
+    Ok(layout)
+}
+
+/// How a mask is stored; its samples that are 0 read as no data.
+pub(super) fn mask_layout(file: &TiffFile, image: usize) -> Result<Layout, DemError> {
+    let shape = shape(file, image)?;
+    let bits = shape.bits_per_sample;
+    if shape.samples_per_pixel != 1 || shape.sample_format != 1 || ![1, 8].contains(&bits) {
+        return Err(unsupported(
+            format!(
+                "its mask has {} bands of {bits} bits",
+                shape.samples_per_pixel
+            ),
+            "one band of 1 or 8 bits",
+        ));
+    }
+    blocks(file, image, shape, SampleType::U8, Some(0.0))
+}
+
+fn shape(file: &TiffFile, image: usize) -> Result<RasterLayout, DemError> {
+    let ifd = &file.ifds()[image];
+    ifd.raster_layout().map_err(|error| refusal(&error))
+}
+
+/// Where the strips or tiles are.
+fn blocks(
+    file: &TiffFile,
+    image: usize,
+    shape: RasterLayout,
+    sample: SampleType,
+    no_data: Option<f64>,
+) -> Result<Layout, DemError> {
+    const PLAIN: u16 = 1;
+    const JPEG: [u16; 2] = [6, 7];
+    const LERC: u16 = 34887;
+    let ifd = &file.ifds()[image];
     let compression = ifd.compression();
     if JPEG.contains(&compression) || compression == LERC {
         return Err(unsupported(
@@ -95,8 +132,11 @@ pub(super) fn layout(
             counts.len()
         )));
     }
-    let plain =
-        compression == PLAIN && !ifd.is_tiled() && ifd.fill_order() == 1 && shape.predictor == 1;
+    let plain = compression == PLAIN
+        && !ifd.is_tiled()
+        && ifd.fill_order() == 1
+        && shape.predictor == 1
+        && shape.bits_per_sample >= 8;
     let bytes = block[0]
         .saturating_mul(block[1])
         .saturating_mul(shape.bytes_per_sample);
@@ -131,11 +171,46 @@ pub(super) fn layout(
         block,
         blocks: blocks.into(),
         plain,
+        mask: None,
     })
 }
 
 impl Layout {
     pub(in crate::terrain::dem) fn read(
+        &self,
+        path: &Path,
+        span: &Span,
+        visit: &mut Visit<'_>,
+    ) -> Result<(), DemError> {
+        let Some(mask) = &self.mask else {
+            return self.read_samples(path, span, visit);
+        };
+        let height = if self.plain { 1 } else { self.block[1] };
+        let last = span.rows.end.next_multiple_of(height).min(self.rows);
+        let mut band = Band::new(mask, path, span, last);
+        let mut shown = Vec::new();
+        self.read_samples(path, span, &mut |row, column, samples| {
+            let start = row - row % height;
+            band.reach(start..(start + height).min(self.rows))?;
+            shown.clear();
+            shown.extend(samples.iter().enumerate().map(|(idx, sample)| {
+                if band.shows(row, column + idx) {
+                    *sample
+                } else {
+                    f32::NAN
+                }
+            }));
+            visit(row, column, &shown)
+        })
+    }
+
+    /// Rows of a strip or tile.
+    pub(super) fn block_rows(&self) -> usize {
+        self.block[1]
+    }
+
+    /// Read the samples, whether or not a mask hides them.
+    fn read_samples(
         &self,
         path: &Path,
         span: &Span,

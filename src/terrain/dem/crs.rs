@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use proj4rs::Proj;
 
-use super::{DemError, heights};
+use super::{DemError, heights, shifts};
 use crate::geometry::geodesy::LatLon;
 
 /// WGS 84 as a PROJ string.
@@ -78,7 +78,15 @@ impl Crs {
                 "its heights are above the ellipsoid, must be above sea level; EPSG:4326+5773 has such heights".into(),
             ));
         }
-        let words: Vec<&str> = definition.split_whitespace().collect();
+        if let Some(reason) = shifts::refusal(code) {
+            return Err(unusable(reason.into()));
+        }
+        let mended = shifts::mended(code);
+        let words: Vec<&str> = definition
+            .split_whitespace()
+            .filter(|word| mended.is_none() || !word.starts_with("+towgs84="))
+            .chain(mended)
+            .collect();
         let says = |word: &str| words.contains(&word);
         let shift = |name: &str| words.iter().any(|word| word.starts_with(name));
         let modern = says("+datum=WGS84")
@@ -102,7 +110,7 @@ impl Crs {
         }
         let proj =
             |text: &str| Proj::from_proj_string(text).map_err(|error| unusable(error.to_string()));
-        let own = proj(definition)?;
+        let own = proj(&words.join(" "))?;
         if own.is_geocent() {
             return Err(unusable(
                 "it is earth-centred, must be geographic or projected".into(),
@@ -129,10 +137,24 @@ impl Crs {
         let Some(plane) = &self.plane else {
             return Some([place.lon, place.lat]);
         };
+        plane.east_north(place)
+    }
+
+    /// The place at `[east, north]`; `None` outside the system's domain.
+    pub(super) fn geodetic(&self, [east, north]: [f64; 2]) -> Option<LatLon> {
+        let Some(plane) = &self.plane else {
+            return finite([east, north]).map(|[lon, lat]| LatLon { lat, lon });
+        };
+        plane.geodetic([east, north])
+    }
+}
+
+impl Plane {
+    fn east_north(&self, place: LatLon) -> Option<[f64; 2]> {
         let mut point = (place.lon.to_radians(), place.lat.to_radians(), 0.0);
-        proj4rs::transform::transform(&plane.wgs84, &plane.own, &mut point).ok()?;
+        proj4rs::transform::transform(&self.wgs84, &self.own, &mut point).ok()?;
         let scale = |value: f64| {
-            if plane.degrees {
+            if self.degrees {
                 value.to_degrees()
             } else {
                 value
@@ -141,20 +163,16 @@ impl Crs {
         finite([scale(point.0), scale(point.1)])
     }
 
-    /// The place at `[east, north]`; `None` outside the system's domain.
-    pub(super) fn geodetic(&self, [east, north]: [f64; 2]) -> Option<LatLon> {
-        let Some(plane) = &self.plane else {
-            return finite([east, north]).map(|[lon, lat]| LatLon { lat, lon });
-        };
+    fn geodetic(&self, [east, north]: [f64; 2]) -> Option<LatLon> {
         let scale = |value: f64| {
-            if plane.degrees {
+            if self.degrees {
                 value.to_radians()
             } else {
                 value
             }
         };
         let mut point = (scale(east), scale(north), 0.0);
-        proj4rs::transform::transform(&plane.own, &plane.wgs84, &mut point).ok()?;
+        proj4rs::transform::transform(&self.own, &self.wgs84, &mut point).ok()?;
         finite([point.0.to_degrees(), point.1.to_degrees()]).map(|[lon, lat]| LatLon { lat, lon })
     }
 }
@@ -185,5 +203,67 @@ impl fmt::Display for Crs {
 impl fmt::Debug for Crs {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{self}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where PROJ 9.5 puts places in systems whose definitions were wrong, and in some whose definitions never were.
+    #[test]
+    fn places_lie_where_proj_puts_them() {
+        for (code, lon, lat, expected) in [
+            (2039, 35.0, 32.0, [200_137.81, 656_336.67]),
+            (6991, 35.0, 32.0, [200_137.81, 656_336.67]),
+            (3844, 25.0, 46.0, [500_120.37, 500_031.31]),
+            (31_281, 10.5, 47.3, [12_628.81, 5_240_143.28]),
+            (31_290, 16.0, 48.2, [725_310.17, 5_340_231.53]),
+            (5562, 24.0, 49.8, [4_716_084.68, 5_523_049.3]),
+            (3912, 14.5, 46.0, [461_642.64, 95_212.0]),
+            (30_731, 3.0, 30.0, [500_068.96, 3_318_479.5]),
+            (2059, 54.0, 32.0, [783_411.85, 3_544_542.68]),
+            (24_047, 100.0, 15.0, [608_027.57, 1_658_216.04]),
+            (27_700, -2.0, 54.0, [400_097.65, 455_996.5]),
+            (28_992, 5.0, 52.0, [128_410.09, 445_806.51]),
+            (31_256, 16.0, 48.2, [-24_689.83, 340_231.53]),
+        ] {
+            let crs = Crs::epsg(code).expect("it is known");
+            let found = crs.east_north(LatLon { lat, lon }).expect("it is near");
+            for (found, expected) in found.iter().zip(expected) {
+                // The registry has a shift of its own for the plane of IG05/12, the opposite of the other's.
+                assert!(
+                    (found - expected).abs() < 0.05,
+                    "EPSG:{code}: {found} {expected}"
+                );
+            }
+        }
+        let crs = Crs::epsg(4688).expect("it is known");
+        let place = LatLon {
+            lat: -10.48,
+            lon: -138.65,
+        };
+        let [lon, lat] = crs.east_north(place).expect("it is near");
+        assert!(
+            (lon + 138.648_404_5).abs() < 5e-7 && (lat + 10.480_935_7).abs() < 5e-7,
+            "{lon} {lat}"
+        );
+    }
+
+    #[test]
+    fn systems_that_are_not_known_well_enough_are_refused() {
+        for (code, reason) in [
+            (5514, "is not known well enough"),
+            (2319, "is not known well enough"),
+            (31_277, "is not known well enough"),
+            (3973, "is not known well enough"),
+            (4807, "its coordinates are in grads"),
+            (4979, "above the ellipsoid"),
+            (8713, "in the unit \"us-ft\""),
+            (4267, "NAD grid not available"),
+        ] {
+            let error = Crs::epsg(code).expect_err("it is refused").to_string();
+            assert!(error.contains(reason), "{error}");
+        }
     }
 }

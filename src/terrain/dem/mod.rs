@@ -15,6 +15,7 @@ mod heights;
 mod hgt;
 mod lattice;
 mod raster;
+mod shifts;
 mod slabs;
 mod way;
 

@@ -132,6 +132,12 @@ impl Crs {
         self.plane.as_ref().is_none_or(|plane| plane.degrees)
     }
 
+    /// The length of the unit of coordinates on a map, metres; `None` for degrees.
+    pub(super) fn metres(&self) -> Option<f64> {
+        let plane = self.plane.as_ref().filter(|plane| !plane.degrees)?;
+        Some(plane.own.to_meter())
+    }
+
     /// East and north of `place`, in the system's unit; `None` outside its domain.
     pub(super) fn east_north(&self, place: LatLon) -> Option<[f64; 2]> {
         let Some(plane) = &self.plane else {

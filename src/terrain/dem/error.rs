@@ -50,7 +50,7 @@ pub enum DemError {
     },
     /// Neither the file nor the caller states the coordinate reference system.
     #[error(
-        "the file names no coordinate reference system, and its extent does not fit into degrees; state `crs`, such as EPSG:32616"
+        "the file names no coordinate reference system; state `crs`, such as EPSG:32616, or EPSG:4326 for degrees"
     )]
     NoCrs,
     /// A reference system that cannot be used.

@@ -19,6 +19,18 @@ fn vertical(code: u16, unit: Option<u16>) -> Value {
     Value::Short(keys)
 }
 
+/// On a map that is said to be drawn in a unit.
+fn map(code: u16, unit: u16) -> Tiff {
+    let keys = vec![
+        1, 1, 0, 3, 1024, 0, 1, 1, 3072, 0, 1, code, 3076, 0, 1, unit,
+    ];
+    let corner = vec![0.0, 0.0, 0.0, 500_000.0, 5_000_000.0, 0.0];
+    Tiff::right()
+        .with(tiff::KEYS, Value::Short(keys))
+        .with(tiff::TIE_POINT, Value::Double(corner))
+        .with(tiff::SCALE, Value::Double(vec![10.0, 10.0, 0.0]))
+}
+
 /// Wrong files, and what the refusal must say.
 fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
     use Value::{Ascii, Double, Long, Raw, Short};
@@ -92,7 +104,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("rotated.tif", right().with(tiff::TRANSFORMATION, Double(vec![0.01, 0.002, 0.0, 8.0, 0.002, -0.01, 0.0, 45.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])).bytes(), "rotated"),
         ("beyond.tif", right().with(tiff::TIE_POINT, Double(vec![0.0, 0.0, 0.0, 8.0, 95.0, 0.0])).bytes(), "which EPSG:4326 does not"),
         ("round.tif", right().with(tiff::SCALE, Double(vec![200.0, 0.01, 0.0])).bytes(), "which EPSG:4326 does not"),
-        ("no-crs.tif", right().without(tiff::KEYS).bytes(), "names no coordinate reference system"),
+        ("no-crs.tif", right().without(tiff::KEYS).bytes(), "names no coordinate reference system; state `crs`, such as EPSG:32616, or EPSG:4326 for degrees"),
         ("own-crs.tif", right().with(tiff::KEYS, tiff::keys(1, 3072, 32_767)).bytes(), "without an EPSG code"),
         ("unknown-crs.tif", right().with(tiff::KEYS, tiff::keys(1, 3072, 9)).bytes(), "EPSG:9 cannot be used"),
         ("shifted-crs.tif", right().with(tiff::KEYS, tiff::keys(2, 2048, 4267)).bytes(), "EPSG:4267 cannot be used"),
@@ -101,6 +113,8 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("bad-keys.tif", right().with(tiff::KEYS, Short(vec![9, 1, 0, 0])).bytes(), "geo keys"),
         ("ellipsoid-crs.tif", right().with(tiff::KEYS, tiff::keys(2, 2048, 4979)).bytes(), "its heights are above the ellipsoid"),
         ("feet-crs.tif", right().with(tiff::KEYS, tiff::keys(1, 3072, 8713)).bytes(), "its heights are in the unit \"us-ft\""),
+        ("feet-map.tif", map(32_632, 9002).bytes(), "in the unit EPSG:9002, but EPSG:32632 has one of 1 m"),
+        ("other-feet-map.tif", map(2264, 9002).bytes(), "in the unit EPSG:9002, but EPSG:2264"),
         // Text grids.
         ("header.asc", asc("ncols 3\nnrows 2\n"), "ends in its header"),
         ("unplaced.asc", asc("ncols 3\nnrows 2\ncellsize 1\n1 2 3 4 5 6"), "neither xllcorner nor xllcenter"),
@@ -181,6 +195,27 @@ fn stated_heights_in_metres_above_sea_level_are_read() {
         if let Err(error) = open(&path) {
             panic!("file {idx}: {error}");
         }
+    }
+}
+
+/// Its own unit is stated, or no model is.
+#[test]
+fn stated_reference_systems_are_read() {
+    let keyed = |keys: Vec<u16>| Tiff::right().with(tiff::KEYS, Value::Short(keys));
+    let mut on_map = map(32_632, 0);
+    on_map = on_map.with(
+        tiff::KEYS,
+        Value::Short(vec![1, 1, 0, 1, 3072, 0, 1, 32_632]),
+    );
+    for (tiff, expected) in [
+        (map(32_632, 9001), "EPSG:32632"),
+        (map(2264, 9003), "EPSG:2264"),
+        (on_map, "EPSG:32632"),
+        (keyed(vec![1, 1, 0, 1, 2048, 0, 1, 4258]), "EPSG:4258"),
+    ] {
+        let (_directory, path) = file("right.tif", &tiff.bytes());
+        let dataset = open(&path).unwrap_or_else(|error| panic!("{expected}: {error}"));
+        assert_eq!(dataset.metadata().lattice.crs.to_string(), expected);
     }
 }
 

@@ -27,6 +27,8 @@ struct Plane {
     wgs84: Proj,
     /// Whether its coordinates are degrees.
     degrees: bool,
+    /// How far east the earth's whole circumference reaches, if that is the same at every latitude; in its own unit.
+    turn: Option<f64>,
 }
 
 impl Crs {
@@ -116,13 +118,18 @@ impl Crs {
                 "it is earth-centred, must be geographic or projected".into(),
             ));
         }
+        let mut plane = Plane {
+            own,
+            wgs84: proj(WGS84)?,
+            degrees,
+            turn: Some(360.0),
+        };
+        if !degrees {
+            plane.turn = plane.circumference(&words);
+        }
         Ok(Self {
             code,
-            plane: Some(Arc::new(Plane {
-                own,
-                wgs84: proj(WGS84)?,
-                degrees,
-            })),
+            plane: Some(Arc::new(plane)),
         })
     }
 
@@ -136,6 +143,12 @@ impl Crs {
     pub(super) fn metres(&self) -> Option<f64> {
         let plane = self.plane.as_ref().filter(|plane| !plane.degrees)?;
         Some(plane.own.to_meter())
+    }
+
+    /// How far east of a place the same place lies once more: 360 degrees, or the width of the whole earth on a map
+    /// whose meridians are straight, parallel and evenly spaced. `None` on all other maps.
+    pub(super) fn turn(&self) -> Option<f64> {
+        self.plane.as_ref().map_or(Some(360.0), |plane| plane.turn)
     }
 
     /// East and north of `place`, in the system's unit; `None` outside its domain.
@@ -180,6 +193,30 @@ impl Plane {
         let mut point = (scale(east), scale(north), 0.0);
         proj4rs::transform::transform(&self.own, &self.wgs84, &mut point).ok()?;
         finite([point.0.to_degrees(), point.1.to_degrees()]).map(|[lon, lat]| LatLon { lat, lon })
+    }
+
+    /// [`Crs::turn`] of a map with the definition `words`.
+    fn circumference(&self, words: &[&str]) -> Option<f64> {
+        let middle = words
+            .iter()
+            .find_map(|word| word.strip_prefix("+lon_0="))
+            .map_or(Some(0.0), |lon| lon.parse::<f64>().ok())?;
+        let east = |lat: f64, degrees: f64| {
+            let lon = (middle + degrees + 180.0).rem_euclid(360.0) - 180.0;
+            Some(self.east_north(LatLon { lat, lon })?[0])
+        };
+        let quarter = east(0.0, 90.0)? - east(0.0, 0.0)?;
+        for lat in [-60.0, 0.0, 60.0] {
+            for degrees in [-135.0, -45.0, 45.0, 135.0] {
+                let expected = quarter * degrees / 90.0;
+                let found = east(lat, degrees)? - east(0.0, 0.0)?;
+                // A tenth of a metre; a shift of datum bends meridians by more.
+                if (found - expected).abs() > 1e-8 * quarter.abs() {
+                    return None;
+                }
+            }
+        }
+        (quarter > 0.0).then_some(4.0 * quarter)
     }
 }
 

@@ -11,6 +11,9 @@ pub(super) const LOOKS: usize = 32;
 /// Rounding tolerance: positions outside by at most this count as inside, cells.
 const HAIR: f64 = 1e-9;
 
+/// Rounding tolerance of a pole's position, cells.
+const HAIR_OF_POLE: f64 = 1e-3;
+
 /// Nodes, one for each sample, at `first + [column * step[0], row * step[1]]`.
 ///
 /// A node is where its sample applies: the centre of a pixel where pixels are areas, the pixel itself where they are
@@ -53,7 +56,7 @@ impl Lattice {
         })
     }
 
-    /// The same in degrees; `None` outside the domain of the reference system.
+    /// The same in degrees, with the west from -180 to below 180; `None` outside the domain of the reference system.
     #[must_use]
     pub fn degrees(&self) -> Option<Degrees> {
         let mut found: Option<Degrees> = None;
@@ -64,7 +67,7 @@ impl Lattice {
             }
             // Neighbours on the edge are close, so each longitude is unwrapped towards those found so far.
             let lon = found.map_or(at.lon, |found| {
-                near(at.lon, 0.5 * (found.west + found.east))
+                near(at.lon, 0.5 * (found.west + found.east), 360.0)
             });
             let found = found.get_or_insert(Degrees {
                 west: lon,
@@ -79,15 +82,49 @@ impl Lattice {
                 north: found.north.max(at.lat),
             };
         }
-        found
+        let mut found = found?;
+        for lat in [-90.0, 90.0] {
+            if self.surrounds_pole(lat) {
+                // Every meridian ends there.
+                (found.west, found.east) = (-180.0, 180.0);
+                (found.south, found.north) = (found.south.min(lat), found.north.max(lat));
+            }
+        }
+        let turns = 360.0 * ((found.west + 180.0) / 360.0).floor();
+        Some(Degrees {
+            west: found.west - turns,
+            east: found.east - turns,
+            ..found
+        })
+    }
+
+    /// Whether the pole at `lat` lies within the outermost nodes, on a map on which it is a point.
+    fn surrounds_pole(&self, lat: f64) -> bool {
+        if self.crs.is_geographic() {
+            return false;
+        }
+        let last = [self.columns - 1, self.rows - 1].map(|last| last as f64);
+        let cells = [-120.0, 0.0, 120.0].map(|lon| self.cells(LatLon { lat, lon }));
+        let [Some(a), Some(b), Some(c)] = cells else {
+            return false;
+        };
+        let together = |axis: usize| {
+            (a[axis] - b[axis]).abs() < HAIR_OF_POLE && (c[axis] - b[axis]).abs() < HAIR_OF_POLE
+        };
+        let inside = |axis: usize| 0.0 < b[axis] && b[axis] < last[axis];
+        // Some formulas give any place a position, however far it is from where they hold.
+        let returns = self
+            .geodetic(b)
+            .is_some_and(|place| (place.lat - lat).abs() < 1e-6);
+        (0..2).all(|axis| together(axis) && inside(axis)) && returns
     }
 
     /// `place` in columns and rows; `None` outside the domain of the reference system.
     pub(super) fn cells(&self, place: LatLon) -> Option<[f64; 2]> {
         let mut at = self.crs.east_north(place)?;
-        if self.crs.is_geographic() {
+        if let Some(turn) = self.crs.turn() {
             let [[west, east], _] = self.extent();
-            at[0] = near(at[0], 0.5 * (west + east));
+            at[0] = near(at[0], 0.5 * (west + east), turn);
         }
         Some([0, 1].map(|axis| (at[axis] - self.first[axis]) / self.step[axis]))
     }
@@ -166,7 +203,110 @@ impl Lattice {
     }
 }
 
-/// `lon` plus the whole turns that bring it nearest to `middle`.
-fn near(lon: f64, middle: f64) -> f64 {
-    lon + 360.0 * ((middle - lon) / 360.0).round()
+/// `east` plus the whole turns that bring it nearest to `middle`.
+fn near(east: f64, middle: f64, turn: f64) -> f64 {
+    east + turn * ((middle - east) / turn).round()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hundred cells from `first` to the opposite of it across `middle`.
+    fn around(code: u16, middle: [f64; 2], half: f64) -> Lattice {
+        Lattice {
+            crs: Crs::epsg(code).expect("it is known"),
+            columns: 101,
+            rows: 101,
+            first: [middle[0] - half, middle[1] + half],
+            step: [half / 50.0, -half / 50.0],
+        }
+    }
+
+    /// West, south, east and north.
+    fn check(lattice: &Lattice, expected: [f64; 4]) {
+        let found = lattice.degrees().expect("it lies on the earth");
+        let found = [found.west, found.south, found.east, found.north];
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 0.01, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn a_pole_within_reaches_all_around() {
+        // A square of 1000 km around either pole: its corners are 707 km away.
+        check(
+            &around(3031, [0.0, 0.0], 500_000.0),
+            [-180.0, -90.0, 180.0, -83.50],
+        );
+        check(
+            &around(3413, [0.0, 0.0], 500_000.0),
+            [-180.0, 83.48, 180.0, 90.0],
+        );
+        // Beside it, towards 45 degrees west.
+        let beside = around(3413, [0.0, -1_000_000.0], 500_000.0);
+        check(&beside, [-90.0, 75.48, 0.0, 85.39]);
+        // The pole of the other hemisphere and those of upright maps are not points within.
+        check(
+            &around(32_632, [500_000.0, 5_000_000.0], 1000.0),
+            [8.987, 45.144, 9.013, 45.162],
+        );
+    }
+
+    #[test]
+    fn the_west_is_a_longitude() {
+        // The edge of this one runs twice across the antimeridian.
+        let found = around(3413, [-700_000.0, 700_000.0], 300_000.0)
+            .degrees()
+            .expect("it lies on the earth");
+        assert!(
+            (-180.0..180.0).contains(&found.west) && found.east > found.west,
+            "{found:?}"
+        );
+        check(
+            &around(4326, [190.5, 10.0], 0.5),
+            [-170.0, 9.5, -169.0, 10.5],
+        );
+    }
+
+    #[test]
+    fn a_map_goes_on_beyond_the_antimeridian() {
+        for code in [3857, 3395, 4087, 6933, 3832] {
+            let crs = Crs::epsg(code).expect("it is known");
+            let lon = if code == 3832 { -30.0 } else { 180.0 };
+            let [east, north] = crs
+                .east_north(LatLon {
+                    lat: 10.0,
+                    lon: lon - 1e-9,
+                })
+                .expect("it is on the map");
+            let lattice = around(code, [east, north], 20_000.0);
+            let reach = lattice.degrees().expect("it lies on the earth");
+            assert!(
+                reach.west < lon && lon < reach.east,
+                "EPSG:{code}: {reach:?}"
+            );
+            for lon in [
+                reach.west,
+                reach.east,
+                reach.east - 360.0,
+                reach.west + 360.0,
+            ] {
+                let place = LatLon { lat: 10.0, lon };
+                let cells = lattice.cells(place).expect("it is on the map");
+                assert!(
+                    (-1e-6..=100.000_001).contains(&cells[0]),
+                    "EPSG:{code}: {lon} at {cells:?}"
+                );
+            }
+        }
+        // Meridians that meet, and those that are bent.
+        for code in [3031, 3413, 2154, 32_632, 3035, 27_700] {
+            assert_eq!(
+                Crs::epsg(code).expect("it is known").turn(),
+                None,
+                "EPSG:{code}"
+            );
+        }
+    }
 }

@@ -17,6 +17,12 @@ const DEFAULT_NO_DATA: f64 = -9999.0;
 /// Longest header, bytes.
 const LONGEST_HEADER: u64 = 4096;
 
+/// What some programs put before a text to say that it is UTF-8.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// What some programs put after a text to say that it ends.
+const END_OF_TEXT: u8 = 0x1a;
+
 /// Longest number, bytes.
 const LONGEST_WORD: usize = 64;
 
@@ -50,6 +56,7 @@ pub(super) struct Layout {
 
 /// Whether a file that begins like this may be an ASCII grid.
 pub(super) fn is_grid(beginning: &[u8]) -> bool {
+    let beginning = beginning.strip_prefix(BYTE_ORDER_MARK).unwrap_or(beginning);
     let mut words = beginning
         .split(u8::is_ascii_whitespace)
         .filter(|word| !word.is_empty());
@@ -70,7 +77,15 @@ pub(super) fn open(path: &Path, len: u64) -> Result<Layout, DemError> {
         .take(LONGEST_HEADER)
         .read_to_end(&mut text)?;
     let mut values = [None; KEYS.len()];
-    let mut words = Words { text: &text, at: 0 };
+    let mark = if text.starts_with(BYTE_ORDER_MARK) {
+        BYTE_ORDER_MARK.len()
+    } else {
+        0
+    };
+    let mut words = Words {
+        text: &text,
+        at: mark,
+    };
     loop {
         let start = words.at;
         let Some(word) = words.next() else {
@@ -259,6 +274,11 @@ impl Layout {
     }
 }
 
+/// Whether a byte separates numbers.
+fn is_blank(byte: u8) -> bool {
+    byte.is_ascii_whitespace() || byte == END_OF_TEXT
+}
+
 /// The words of a file, one at a time.
 struct Numbers {
     file: BufReader<File>,
@@ -277,13 +297,13 @@ impl Numbers {
             let skipped = if self.word.is_empty() {
                 buffer
                     .iter()
-                    .position(|byte| !byte.is_ascii_whitespace())
+                    .position(|byte| !is_blank(*byte))
                     .unwrap_or(buffer.len())
             } else {
                 0
             };
             let rest = &buffer[skipped..];
-            let end = rest.iter().position(u8::is_ascii_whitespace);
+            let end = rest.iter().position(|byte| is_blank(*byte));
             let part = &rest[..end.unwrap_or(rest.len())];
             // One byte more than allowed, so that the word is recognised as too long.
             let room = (LONGEST_WORD + 1).saturating_sub(self.word.len());

@@ -168,6 +168,18 @@ fn a_text_grid_outside_degrees_needs_a_reference_system() {
     ));
 }
 
+/// Some editors put a mark before a text, and some programs one after it.
+#[test]
+fn marks_around_a_text_grid_are_no_part_of_it() {
+    let text = "\u{feff}ncols 3\r\nnrows 2\r\nxllcenter 8\r\nyllcenter 40\r\ncellsize 0.5\r\n1 2 3\r\n4 5 6";
+    for end in ["", "\u{1a}", "\r\n\u{1a}", "\r\n\u{1a}\u{1a}\r\n"] {
+        let (_directory, path) = file("marked.asc", format!("{text}{end}").as_bytes());
+        let survey = open(&path).and_then(|dataset| dataset.survey());
+        let survey = survey.unwrap_or_else(|error| panic!("{end:?}: {error}"));
+        assert_eq!((survey.min, survey.max), (1.0, 6.0));
+    }
+}
+
 #[test]
 fn ground_cut_out_of_a_file_agrees_with_its_samples() {
     let path =

@@ -95,10 +95,23 @@ pub fn run() -> ExitCode {
         Command::Healthcheck(arguments) => healthcheck::run(&arguments).map(|()| exit::DONE),
     };
     done.unwrap_or_else(|error| {
-        eprintln!("noctule: {error:#}");
+        eprintln!("noctule: {}", reason(&error));
         exit::FAILED
     })
     .into()
+}
+
+/// An error and its causes, without those that the text before already ends in.
+fn reason(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if text.is_empty() {
+            text = cause;
+        } else if !text.ends_with(&cause) {
+            text = format!("{text}: {cause}");
+        }
+    }
+    text
 }
 
 /// An empty variable counts as unset, whichever command reads it.
@@ -116,4 +129,21 @@ fn heeding_variables(command: clap::Command) -> clap::Command {
             }
         })
         .mut_subcommands(heeding_variables)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::terrain::dem::DemError;
+
+    #[test]
+    fn a_reason_is_told_once() {
+        let missing = || std::io::Error::other("no such file");
+        let error = anyhow::Error::new(missing()).context("the file cannot be read: no such file");
+        assert_eq!(reason(&error), "the file cannot be read: no such file");
+        let error = anyhow::Error::new(DemError::from(missing())).context("hills.tif");
+        let expected = "hills.tif: the file cannot be read: no such file";
+        assert_eq!(reason(&error), expected);
+        assert_eq!(format!("{error:#}"), expected);
+    }
 }

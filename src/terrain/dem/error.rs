@@ -6,9 +6,9 @@ use crate::geometry::geodesy::LatLon;
 /// Why a dataset cannot be used, or not at some place.
 #[derive(Debug, thiserror::Error)]
 pub enum DemError {
-    /// The operating system's error.
+    /// The operating system's error; not a source, because the message has all of it.
     #[error("the file cannot be read: {0}")]
-    Io(#[from] std::io::Error),
+    Io(std::io::Error),
     /// The format is not recognised.
     #[error(
         "the file is none of GeoTIFF, ESRI ASCII grid and SRTM .hgt (1201 x 1201 or 3601 x 3601 samples)"
@@ -101,6 +101,12 @@ pub enum DemError {
         /// From the left, starting at 0.
         column: usize,
     },
+}
+
+impl From<std::io::Error> for DemError {
+    fn from(error: std::io::Error) -> Self {
+        Self::Io(error)
+    }
 }
 
 impl DemError {

@@ -56,7 +56,8 @@ pub(super) fn start(config: &Config) -> anyhow::Result<()> {
         .build()?;
     let served = runtime.block_on(serve(config, instruments));
     // Everything still running has been given back to the queue, or has hardly begun; the process does not wait for it.
-    runtime.shutdown_background();
+    // Nor is the runtime shut down, under which a store that is still being opened would panic.
+    std::mem::forget(runtime);
     log.close();
     served
 }

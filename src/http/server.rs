@@ -57,11 +57,11 @@ pub struct Settings {
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
 /// Maximum size of what precedes the body in HTTP/1, including what is read at once with the end of it. A longer head
-/// that one read brings whole is refused by [`head`](super::head).
+/// that one read brings whole is refused by [`head`].
 const HEAD_BYTES: usize = head::MOST_BYTES;
 
 /// In HTTP/2 each header counts 32 bytes more than its text. What is within this and too large after all gets a better
-/// answer from [`head`](super::head) than from hyper, whose own has no body.
+/// answer from [`head`] than from hyper, whose own has no body.
 const HTTP2_HEAD_BYTES: u32 = 2 * 64 * 1024;
 
 /// The first bytes of an HTTP/2 connection, RFC 9113 section 3.4.

@@ -5,6 +5,7 @@ use serde::Deserialize;
 
 use super::AppState;
 use super::caller::Caller;
+use super::off_thread;
 use super::problem::Problem;
 use crate::export::document::{FrameDocument, Position};
 use crate::geometry::Point3;
@@ -87,7 +88,10 @@ pub(super) async fn resolve(
         tracing::error!(warm_start_plan_id = %plan, %error, "a stored result cannot be read");
         Problem::Internal
     })?;
-    let points = route.within(&scenario.frame).map_err(unknown)?;
+    let frame = scenario.frame.clone();
+    // Another datum needs the geoid, which takes its time.
+    let points = off_thread::run(move || route.within(&frame)).await?;
+    let points = points.map_err(unknown)?;
     scenario.planner.warm_start = Some(WarmStart::Waypoints(points));
     Ok(())
 }

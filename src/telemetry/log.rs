@@ -97,5 +97,10 @@ fn log_panic(panic: &PanicHookInfo) {
         .unwrap_or("no message");
     let place = panic.location().map(ToString::to_string);
     let thread = std::thread::current().name().map(ToOwned::to_owned);
+    let is_the_last = thread.as_deref() == Some("main");
     tracing::error!(message, place, thread, "panicked");
+    if is_the_last {
+        // The process ends without closing the log.
+        flush();
+    }
 }

@@ -1,6 +1,6 @@
 //! The only way to change a plan: a step that is written if nobody was faster.
 
-use async_nats::jetstream::context::PublishErrorKind;
+use async_nats::jetstream::context::{self, PublishErrorKind};
 use async_nats::jetstream::message::PublishMessage;
 use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use bytes::Bytes;
@@ -185,20 +185,13 @@ impl Plans<'_> {
             Ok(answer) => answer.await,
             Err(error) => Err(error),
         };
-        answered.map(|ack| ack.sequence).map_err(|error| {
-            if is_outrun(&error) {
-                return PublishError::Outrun;
-            }
-            let refusal = failed(&what(), &error);
-            if error.kind() == PublishErrorKind::MaxPayloadExceeded || lacks_room(&refusal) {
-                PublishError::Hopeless(refusal)
-            } else {
-                PublishError::Unanswered(refusal)
-            }
-        })
+        answered
+            .map(|ack| ack.sequence)
+            .map_err(|error| PublishError::of(&what(), &error))
     }
 }
 
+#[derive(Debug)]
 enum PublishError {
     /// The plan has changed meanwhile.
     Outrun,
@@ -206,4 +199,54 @@ enum PublishError {
     Unanswered(StoreError),
     /// It is not written, and would not be if it were tried again soon.
     Hopeless(StoreError),
+}
+
+impl PublishError {
+    fn of(what: &str, error: &context::PublishError) -> Self {
+        if is_outrun(error) {
+            return Self::Outrun;
+        }
+        let refusal = failed(what, error);
+        if error.kind() == PublishErrorKind::MaxPayloadExceeded || lacks_room(&refusal) {
+            Self::Hopeless(refusal)
+        } else {
+            Self::Unanswered(refusal)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_may_have_been_written_is_tried_again() {
+        let of = |kind, said: &str| {
+            let source = std::io::Error::other(said.to_owned());
+            PublishError::of("a step", &context::PublishError::with_source(kind, source))
+        };
+        let other = PublishErrorKind::Other;
+        assert!(matches!(
+            of(other, "wrong last sequence: 7"),
+            PublishError::Outrun
+        ));
+        for said in [
+            "insufficient storage resources available",
+            "maximum bytes exceeded",
+        ] {
+            assert!(
+                matches!(of(other, said), PublishError::Hopeless(_)),
+                "{said}"
+            );
+        }
+        for (kind, said) in [
+            (PublishErrorKind::TimedOut, ""),
+            (other, "write: no space left on device"),
+        ] {
+            assert!(
+                matches!(of(kind, said), PublishError::Unanswered(_)),
+                "{said}"
+            );
+        }
+    }
 }

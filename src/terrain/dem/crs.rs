@@ -258,6 +258,7 @@ mod tests {
     fn places_lie_where_proj_puts_them() {
         for (code, lon, lat, expected) in [
             (2039, 35.0, 32.0, [200_137.81, 656_336.67]),
+            // The registry has a shift of its own for this plane, the opposite of the other one's.
             (6991, 35.0, 32.0, [200_137.81, 656_336.67]),
             (3844, 25.0, 46.0, [500_120.37, 500_031.31]),
             (31_281, 10.5, 47.3, [12_628.81, 5_240_143.28]),
@@ -274,7 +275,6 @@ mod tests {
             let crs = Crs::epsg(code).expect("it is known");
             let found = crs.east_north(LatLon { lat, lon }).expect("it is near");
             for (found, expected) in found.iter().zip(expected) {
-                // The registry has a shift of its own for the plane of IG05/12, the opposite of the other's.
                 assert!(
                     (found - expected).abs() < 0.05,
                     "EPSG:{code}: {found} {expected}"

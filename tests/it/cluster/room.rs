@@ -93,11 +93,8 @@ async fn plans_can_be_deleted_from_full_servers_and_make_room() {
         Some(Trouble::Full)
     );
     assert_eq!(trouble(store.health().await), Some(Trouble::Full));
-    // An answer that is certain is not waited for again.
-    let began = std::time::Instant::now();
     let cancelled = store.request_cancel(stays, 0).await;
     assert_eq!(trouble(cancelled), Some(Trouble::Full));
-    assert!(began.elapsed().as_secs() < 9, "{:?}", began.elapsed());
 
     for id in [large, waiting, running] {
         store.delete(id, now_ms()).await.unwrap();

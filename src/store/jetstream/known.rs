@@ -85,11 +85,11 @@ impl Known {
         self.histories.take(id);
     }
 
-    /// Store a history read from the stream, unless the plan has told more meanwhile: those events found no history to
-    /// be added to, and would be missing from this one for good.
+    /// Store a history read from the stream, unless the plan has more events meanwhile: those found no history to be
+    /// added to, and would be missing from this one for good.
     pub(super) fn keep_history(&mut self, id: PlanId, history: History) {
-        let told = self.kept(id).map(|record| record.last_event);
-        if told.is_some_and(|last| last <= history.last()) {
+        let last = self.kept(id).map(|record| record.last_event);
+        if last.is_some_and(|last| last <= history.last()) {
             self.histories.put(id, history);
         }
     }

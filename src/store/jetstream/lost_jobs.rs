@@ -37,8 +37,14 @@ pub(super) struct Round {
 impl JetStream {
     /// Look at some of the plans that have long been waiting, in turn, and put back the jobs that are missing.
     pub(super) async fn restore_jobs(&self, now_ms: i64) -> Result<(), StoreError> {
-        for id in self.next_waiting(now_ms) {
-            self.restore_job(id).await?;
+        let waiting = self.next_waiting(now_ms);
+        let mut missing = 0;
+        for id in &waiting {
+            missing += usize::from(self.restore_job(*id).await?);
+        }
+        if missing > 0 && missing == waiting.len() {
+            // Where all were missing there may be more: the whole queue was lost.
+            self.round.lock().last = None;
         }
         Ok(())
     }
@@ -60,12 +66,13 @@ impl JetStream {
         waiting.into_iter().map(|(_, id)| id).collect()
     }
 
-    async fn restore_job(&self, id: PlanId) -> Result<(), StoreError> {
+    /// True when the job was missing.
+    async fn restore_job(&self, id: PlanId) -> Result<bool, StoreError> {
         let Some(waiting) = self.waiting_on_servers(id).await? else {
-            return Ok(());
+            return Ok(false);
         };
         if self.has_job(id, &waiting.lane).await? {
-            return Ok(());
+            return Ok(false);
         }
         let missing = waiting.place;
         // Nodes that find this at the same time put back one job: the servers identify it by the one that is missing.
@@ -86,7 +93,7 @@ impl JetStream {
         });
         moved.await?;
         tracing::warn!(plan_id = %id, "the job of a waiting plan was missing from the queue; it is back, at the end");
-        Ok(())
+        Ok(true)
     }
 
     /// The record of a plan that waits, as the servers have it.

@@ -39,6 +39,7 @@ use std::time::Duration;
 
 use async_nats::jetstream::consumer::PullConsumer;
 use async_trait::async_trait;
+use futures_util::future::join_all;
 use parking_lot::Mutex;
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
@@ -66,6 +67,9 @@ use crate::job::{Event, Idempotency, Owner, Plan, PlanId, Submission};
 
 /// At the start, existing data must be read within this time.
 const PATIENCE: Duration = Duration::from_secs(60);
+
+/// How long a node whose streams have vanished tries to give back what it runs.
+const GIVING_BACK: Duration = Duration::from_secs(3);
 
 /// The store for several machines.
 ///
@@ -357,7 +361,16 @@ impl Store for JetStreamStore {
             return;
         }
         if *self.store.vanished.borrow() {
-            // Nothing can be given back now; others get it when its lease ends.
+            // A plan whose record is still there is queued again. Its job may be gone: all at once, for servers that
+            // have lost it do not answer.
+            let runs = self.store.leases.all().into_iter();
+            let releases = runs.map(|(id, attempt)| self.store.release(id, attempt));
+            let released = tokio::time::timeout(GIVING_BACK, join_all(releases));
+            if released.await.is_err() {
+                tracing::debug!(
+                    "not all runs were given back; they are left to the end of their leases"
+                );
+            }
             for (id, attempt) in self.store.leases.all() {
                 self.store.leases.let_go(id, attempt);
             }

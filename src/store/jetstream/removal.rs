@@ -1,6 +1,7 @@
 //! Plans that are removed, and what remains of them.
 
 use super::JetStream;
+use super::connect::plan_of;
 use super::errors::{failed, lacks_room};
 use super::record::{Grave, State};
 use super::steps::Change;
@@ -18,13 +19,23 @@ impl JetStream {
 
     /// Remove a plan and all that belongs to it, except its tombstone.
     async fn bury(&self, id: PlanId, now_ms: i64, expired: bool) -> Result<(), StoreError> {
+        let is_refused =
+            |buried: &Result<_, StoreError>| matches!(buried, Err(error) if lacks_room(error));
         let mut buried = self.write_grave(id, now_ms, expired).await;
-        if matches!(&buried, Err(error) if lacks_room(error)) {
-            self.make_room(id).await?;
+        // Full servers take nothing, not even a plan's removal, but they do remove. Old events go first: they may be
+        // enough, and a plan that stays after all can do without them.
+        if is_refused(&buried) {
+            self.remove_old_steps(id).await?;
+            buried = self.write_grave(id, now_ms, expired).await;
+        }
+        if is_refused(&buried) {
+            self.empty_documents(id).await?;
             buried = self.write_grave(id, now_ms, expired).await;
         }
         let (standing, Remains { place, objects }) = buried?;
-        self.withdraw(id, place).await;
+        if let Some(place) = place {
+            self.withdraw(id, place).await;
+        }
         self.servers.remove_documents(id, &objects).await?;
         // Last: while steps remain, documents may remain too.
         let steps = self.servers.plans.purge();
@@ -48,7 +59,7 @@ impl JetStream {
                 let record = standing.record(id, now_ms)?;
                 let objects = record.objects();
                 remains = Remains {
-                    place: record.place,
+                    place: (!record.plan.status.is_final()).then_some(record.place),
                     objects: objects.clone(),
                 };
                 let grave = Grave {
@@ -63,18 +74,20 @@ impl JetStream {
         Ok((standing, remains))
     }
 
-    /// Full servers take nothing, not even a plan's removal, but they do remove: what goes with the plan goes first, all
-    /// but its newest step, by which other writers and nodes know it.
-    async fn make_room(&self, id: PlanId) -> Result<(), StoreError> {
-        let standing = self.plans().standing(id).await?;
-        let State::Kept(record) = &*standing.state else {
-            return Ok(());
-        };
-        self.servers.empty_documents(id, &record.objects()).await?;
+    /// Remove all steps of a plan but the newest, by which other writers and nodes know it.
+    async fn remove_old_steps(&self, id: PlanId) -> Result<(), StoreError> {
         let steps = self.servers.plans.purge().keep(1);
         let purged = steps.filter(self.servers.subject_of(id)).await;
         purged.map_err(|error| failed(&format!("steps of plan {id}"), &error))?;
         Ok(())
+    }
+
+    async fn empty_documents(&self, id: PlanId) -> Result<(), StoreError> {
+        let standing = self.plans().standing(id).await?;
+        let State::Kept(record) = &*standing.state else {
+            return Ok(());
+        };
+        self.servers.empty_documents(id, &record.objects()).await
     }
 
     /// Remove a tombstone, and what an interrupted removal has left.
@@ -96,7 +109,13 @@ impl JetStream {
     ///
     /// (To purge its subject would also make the servers forget which jobs were given back.)
     pub(super) async fn withdraw(&self, id: PlanId, place: u64) {
-        if let Err(error) = self.servers.jobs.delete_message(place).await {
+        let jobs = &self.servers.jobs;
+        // In a queue that was made again, the place may be another plan's.
+        let there = jobs.get_raw_message(place).await;
+        if !there.is_ok_and(|job| plan_of(&job.subject) == Some(id)) {
+            return;
+        }
+        if let Err(error) = jobs.delete_message(place).await {
             tracing::debug!(%error, plan_id = %id, "a job is left in the queue");
         }
     }
@@ -140,8 +159,8 @@ impl JetStream {
 /// What is left of a plan that has been marked as removed.
 #[derive(Debug, Default)]
 struct Remains {
-    /// Its job's place in the queue's stream.
-    place: u64,
+    /// Its job's place in the queue's stream, unless it had ended.
+    place: Option<u64>,
     /// Keys of its documents that may be in the object store.
     objects: Vec<String>,
 }

@@ -19,7 +19,7 @@ pub(super) struct RunSteps {
     steps: VecDeque<Appended>,
     events: u64,
     bytes: u64,
-    /// Whether some have been deleted: the events of earlier runs of the plan goes with them.
+    /// Whether some have been deleted: the events of earlier runs of the plan go with them.
     has_forgotten: bool,
 }
 

@@ -44,9 +44,14 @@ impl Servers {
 }
 
 async fn look_at(stream: &Stream) -> Result<(), StoreError> {
-    let name = &stream.cached_info().config.name;
+    let known = stream.cached_info();
+    let name = &known.config.name;
     let info = stream.get_info().await;
     let info = info.map_err(|error| failed(&format!("stream {name}"), &error))?;
+    if info.created != known.created {
+        // Another node has made it again, empty; what is known of the old one is of no use.
+        return Err(vanished());
+    }
     if info.cluster.is_some_and(|servers| servers.leader.is_none()) {
         return Err(StoreError::unavailable(format!(
             "no server leads stream {name}"

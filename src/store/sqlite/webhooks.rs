@@ -35,14 +35,15 @@ pub(super) fn due(
     now_ms: i64,
     limit: usize,
 ) -> Result<Vec<Webhook>, StoreError> {
-    let limit = i64::try_from(limit).unwrap_or(i64::MAX);
+    let [each, limit] =
+        [limit.div_ceil(2), limit].map(|most| i64::try_from(most).unwrap_or(i64::MAX));
     let mut statement = connection.prepare_cached(
         "SELECT id, url, tries FROM ( \
            SELECT id, url, tries, due_ms, row_number() OVER (PARTITION BY owner ORDER BY due_ms) AS turn \
            FROM webhooks JOIN plans ON seq = plan_seq WHERE due_ms <= ?1 \
-         ) ORDER BY turn, due_ms LIMIT ?2",
+         ) WHERE turn <= ?2 ORDER BY turn, due_ms LIMIT ?3",
     )?;
-    let rows = statement.query_map([now_ms, limit], |row| {
+    let rows = statement.query_map([now_ms, each, limit], |row| {
         Ok((row.get(0)?, row.get(1)?, row.get(2)?))
     })?;
     let mut due = Vec::new();

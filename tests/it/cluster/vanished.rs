@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use noctule::config::Address;
-use noctule::job::PlanId;
+use noctule::job::{PlanId, Status};
 use noctule::store::jetstream::{JetStreamStore, Settings};
 use noctule::store::reopening::{Open, Reopening};
 use noctule::store::{Options, Store, StoreError, Trouble};
@@ -78,6 +78,74 @@ async fn a_stream_or_bucket_that_was_removed_is_reported_and_made_again() {
         client.get_stream(&stream).await.unwrap();
         works(&store).await;
     }
+}
+
+/// Remove a stream from the servers.
+async fn remove(address: &str, name: &str) {
+    let servers = Address::read(address).unwrap().servers;
+    let client = async_nats::connect(servers).await.unwrap();
+    let stream = format!("{}-{name}", namespace(address));
+    let client = async_nats::jetstream::new(client);
+    client.delete_stream(&stream).await.unwrap();
+}
+
+/// The store notices that a stream has vanished, and is opened again.
+async fn notices(store: &Reopening) {
+    let missed = store.health().await;
+    let Err(StoreError::Unavailable { trouble, .. }) = missed else {
+        panic!("nothing is missed")
+    };
+    assert_eq!(trouble, Trouble::Vanished);
+    eventually(async || store.health().await.is_ok()).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stream_that_another_node_has_made_again_is_read_anew() {
+    let address = nats::address();
+    let [one, other] = [
+        reopening(node(&address)).await,
+        reopening(node(&address)).await,
+    ];
+    let lost = works(&one).await;
+    eventually(async || other.get(lost).await.is_ok()).await;
+    remove(&address, "plans").await;
+    notices(&one).await;
+    eventually(async || {
+        let ready = other.health().await.is_ok();
+        ready && kind(other.get(lost).await) == Err("not found")
+    })
+    .await;
+    let id = one.submit(submission()).await.unwrap().plan.id;
+    assert_eq!(in_time(other.claim()).await.unwrap().plan.id, id);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_run_whose_job_has_vanished_is_given_back_and_run_again() {
+    let address = nats::address();
+    let store = reopening(node(&address)).await;
+    let plan = store.submit(submission()).await.unwrap().plan;
+    let lease = in_time(store.claim()).await.unwrap();
+    remove(&address, "jobs").await;
+    notices(&store).await;
+    let late = store.finish(&lease, failure().at(0)).await;
+    assert_eq!(kind(late), Err("lease lost"));
+    assert_eq!(store.get(plan.id).await.unwrap().status, Status::Queued);
+    store.sweep(plan.created_ms + 121_000).await.unwrap();
+    let again = in_time(store.claim()).await.unwrap();
+    assert_eq!((again.plan.id, again.attempt), (plan.id, 2));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn removing_a_plan_of_a_former_queue_leaves_the_jobs_of_others() {
+    let address = nats::address();
+    let store = reopening(node(&address)).await;
+    let former = store.submit(submission()).await.unwrap().plan.id;
+    remove(&address, "jobs").await;
+    notices(&store).await;
+    // It has the place that the former had.
+    let id = store.submit(submission()).await.unwrap().plan.id;
+    store.delete(former, 0).await.unwrap();
+    assert_eq!(in_time(store.claim()).await.unwrap().plan.id, id);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import xml.etree.ElementTree as xml
 
 EXPORTS = pathlib.Path(os.environ["NOCTULE_EXPORTS"])
 NAMES = sorted(path.stem for path in EXPORTS.glob("*.svg"))
@@ -17,28 +18,29 @@ class Route:
         self.result = json.loads(self.file("json").read_text())
         scenario = pathlib.Path(__file__).parent / "scenarios" / f"{name}.json"
         self.scenario = json.loads(scenario.read_text())
-        self.undulation = self.result["frame"]["undulation"]
         self.above_sea = self.result["frame"]["altitude_datum"] == "msl"
 
     def file(self, extension):
         return EXPORTS / f"{self.name}.{extension}"
 
-    def msl(self, altitude):
-        return altitude if self.above_sea else altitude - self.undulation
-
-    def ellipsoid(self, altitude):
-        return altitude + self.undulation if self.above_sea else altitude
+    def geoid(self, kind):
+        """Heights of the geoid that the GPX states at its points of this kind, metres."""
+        namespace = "{http://www.topografix.com/GPX/1/1}"
+        points = xml.parse(self.file("gpx")).getroot().iter(namespace + kind)
+        return [float(point.find(namespace + "geoidheight").text) for point in points]
 
     def path(self, datum):
         """(longitude, latitude, altitude) of each sample."""
-        height = getattr(self, datum)
-        points = self.result["path"]["points"]
-        return [(point["lon"], point["lat"], height(point["alt"])) for point in points]
+        return self._above(datum, self.result["path"]["points"], "trkpt")
 
     def waypoints(self, datum):
-        height = getattr(self, datum)
-        points = self.result["waypoints"]
-        return [(point["lon"], point["lat"], height(point["alt"])) for point in points]
+        return self._above(datum, self.result["waypoints"], "wpt")
+
+    def _above(self, datum, points, kind):
+        geoid = self.geoid(kind)
+        assert len(geoid) == len(points), (len(geoid), len(points))
+        up = (datum == "ellipsoid") - (not self.above_sea)
+        return [(point["lon"], point["lat"], point["alt"] + up * height) for point, height in zip(points, geoid)]
 
 
 def routes():

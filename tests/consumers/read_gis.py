@@ -61,6 +61,14 @@ class Maps(unittest.TestCase):
                     done = subprocess.run(command, check=True, capture_output=True, text=True)
                     self.assertEqual(done.stderr.strip(), "")
 
+    def test_the_geoid_slopes_gently_from_the_origin(self):
+        for route in routes():
+            with self.subTest(route.name):
+                frame = route.result["frame"]
+                for point, height in zip(route.result["path"]["points"], route.geoid("trkpt")):
+                    slope = 3e-4 * distance(frame["origin"], (point["lon"], point["lat"]))
+                    self.assertLessEqual(abs(height - frame["undulation"]), slope + 1e-3)
+
     def test_geojson(self):
         for route in routes():
             with self.subTest(route.name):

@@ -52,7 +52,7 @@ use axum::body::Body;
 use axum::handler::Handler;
 use axum::http::{StatusCode, Uri, header};
 use axum::response::Response;
-use axum::routing::{self, MethodRouter};
+use axum::routing::{self, MethodFilter, MethodRouter};
 use tokio::sync::watch;
 use tower::ServiceBuilder;
 use tower::util::MapResponseLayer;
@@ -149,6 +149,9 @@ pub struct Route {
     guarded: Box<dyn FnOnce(Layered<Gate>) -> MethodRouter<AppState>>,
 }
 
+/// A method by its name, and as the router has it.
+type Verb = (&'static str, MethodFilter);
+
 /// All routes, each with what it requires of its caller.
 #[must_use]
 pub fn routes() -> Vec<Route> {
@@ -156,39 +159,48 @@ pub fn routes() -> Vec<Route> {
     const READ: Needs = Needs::Scope(Scope::Read);
     const PLAN: Needs = Needs::Scope(Scope::Plan);
     const METRICS: Needs = Needs::Scope(Scope::Metrics);
+    const GET: Verb = ("GET", MethodFilter::GET);
+    const POST: Verb = ("POST", MethodFilter::POST);
+    const PUT: Verb = ("PUT", MethodFilter::PUT);
+    const DELETE: Verb = ("DELETE", MethodFilter::DELETE);
     vec![
-        post("/plans", PLAN, plans::submit),
-        get("/plans", READ, plans::list),
-        get("/plans/{id}", READ, plans::show),
-        delete("/plans/{id}", PLAN, plans::delete),
-        post("/plans/{id}/cancel", PLAN, plans::cancel),
-        get("/plans/{id}/result", READ, documents::result),
-        get("/plans/{id}/scenario", READ, documents::scenario),
-        get("/plans/{id}/events", Ticket, events::follow),
-        post("/plans/{id}/tickets", READ, tickets::issue),
-        post("/scenarios:convert", PLAN, scenarios::convert),
-        get("/terrains", READ, terrains::list),
-        get("/terrains/{name}", READ, terrains::show),
+        on(POST, "/plans", PLAN, plans::submit),
+        on(GET, "/plans", READ, plans::list),
+        on(GET, "/plans/{id}", READ, plans::show),
+        on(DELETE, "/plans/{id}", PLAN, plans::delete),
+        on(POST, "/plans/{id}/cancel", PLAN, plans::cancel),
+        on(GET, "/plans/{id}/result", READ, documents::result),
+        on(GET, "/plans/{id}/scenario", READ, documents::scenario),
+        on(GET, "/plans/{id}/events", Ticket, events::follow),
+        on(POST, "/plans/{id}/tickets", READ, tickets::issue),
+        on(POST, "/scenarios:convert", PLAN, scenarios::convert),
+        on(GET, "/terrains", READ, terrains::list),
+        on(GET, "/terrains/{name}", READ, terrains::show),
         // The handler decides who may change a dataset.
-        put("/terrains/{name}", PLAN, terrains::put),
-        delete("/terrains/{name}", PLAN, terrains::delete),
-        get("/terrains/{name}/elevations", READ, terrains::elevations),
-        post("/scenarios:ground", PLAN, ground::sample),
-        get("/scenarios", Nothing, shipped::list),
-        get("/scenarios/{name}", Nothing, shipped::show),
-        get("/algorithms", Nothing, service::algorithms),
-        get("/limits", Nothing, service::limits),
-        get("/version", Nothing, service::version),
-        get("/livez", Nothing, service::livez),
-        get("/readyz", Nothing, service::readyz),
-        get("/metrics", METRICS, metrics::show),
-        get("/openapi.yaml", Nothing, pages::openapi_yaml),
-        get("/openapi.json", Nothing, pages::openapi_json),
-        get("/", Nothing, pages::front::front),
-        get("/page/{file}", Nothing, pages::front::file),
-        get("/page/vendor/{file}", Nothing, pages::front::vendored),
-        get("/docs", Nothing, pages::docs),
-        get("/problems/{slug}", Nothing, pages::problem),
+        on(PUT, "/terrains/{name}", PLAN, terrains::put),
+        on(DELETE, "/terrains/{name}", PLAN, terrains::delete),
+        on(
+            GET,
+            "/terrains/{name}/elevations",
+            READ,
+            terrains::elevations,
+        ),
+        on(POST, "/scenarios:ground", PLAN, ground::sample),
+        on(GET, "/scenarios", Nothing, shipped::list),
+        on(GET, "/scenarios/{name}", Nothing, shipped::show),
+        on(GET, "/algorithms", Nothing, service::algorithms),
+        on(GET, "/limits", Nothing, service::limits),
+        on(GET, "/version", Nothing, service::version),
+        on(GET, "/livez", Nothing, service::livez),
+        on(GET, "/readyz", Nothing, service::readyz),
+        on(GET, "/metrics", METRICS, metrics::show),
+        on(GET, "/openapi.yaml", Nothing, pages::openapi_yaml),
+        on(GET, "/openapi.json", Nothing, pages::openapi_json),
+        on(GET, "/", Nothing, pages::front::front),
+        on(GET, "/page/{file}", Nothing, pages::front::file),
+        on(GET, "/page/vendor/{file}", Nothing, pages::front::vendored),
+        on(GET, "/docs", Nothing, pages::docs),
+        on(GET, "/problems/{slug}", Nothing, pages::problem),
     ]
 }
 
@@ -273,46 +285,18 @@ fn wrap(router: Router, cors: &Origins, hosts: Hosts, instruments: Arc<Instrumen
     router.layer(layers)
 }
 
-fn get<H: Handler<T, AppState>, T: 'static>(path: &'static str, needs: Needs, handler: H) -> Route {
-    row("GET", path, needs, |gate| routing::get(handler.layer(gate)))
-}
-
-fn post<H: Handler<T, AppState>, T: 'static>(
+/// A row. The gate wraps the handler: as a layer of the route it would be one more box allocated for each request.
+fn on<H: Handler<T, AppState>, T: 'static>(
+    (method, filter): Verb,
     path: &'static str,
     needs: Needs,
     handler: H,
-) -> Route {
-    row("POST", path, needs, |gate| {
-        routing::post(handler.layer(gate))
-    })
-}
-
-fn put<H: Handler<T, AppState>, T: 'static>(path: &'static str, needs: Needs, handler: H) -> Route {
-    row("PUT", path, needs, |gate| routing::put(handler.layer(gate)))
-}
-
-fn delete<H: Handler<T, AppState>, T: 'static>(
-    path: &'static str,
-    needs: Needs,
-    handler: H,
-) -> Route {
-    row("DELETE", path, needs, |gate| {
-        routing::delete(handler.layer(gate))
-    })
-}
-
-/// The gate wraps the handler: as a layer of the route it would be one more box allocated for each request.
-fn row(
-    method: &'static str,
-    path: &'static str,
-    needs: Needs,
-    guarded: impl FnOnce(Layered<Gate>) -> MethodRouter<AppState> + 'static,
 ) -> Route {
     Route {
         method,
         path,
         needs,
-        guarded: Box::new(guarded),
+        guarded: Box::new(move |gate| routing::on(filter, handler.layer(gate))),
     }
 }
 

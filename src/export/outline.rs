@@ -1,9 +1,9 @@
 //! Threats as maps show them: rings in degrees.
 
 use super::chart::Chart;
-use crate::geometry::Point2;
 use crate::geometry::geodesy::LatLon;
 use crate::geometry::ring::{edges, twice_area};
+use crate::geometry::{Point2, Rect};
 use crate::threat::{Shape, Threat};
 
 /// Corners of the ring that represents a circle.
@@ -51,13 +51,8 @@ pub(super) fn ring(threat: &Threat) -> Vec<Point2> {
 
 /// Where a threat's base and top are converted to another datum.
 pub(super) fn middle(threat: &Threat) -> Point2 {
-    match &threat.shape {
-        Shape::Cylinder(cylinder) => cylinder.center,
-        Shape::Polygon(polygon) => {
-            let bounds = polygon.bounds();
-            nalgebra::center(&bounds.min, &bounds.max)
-        }
-    }
+    let Rect { min, max } = threat.extent();
+    nalgebra::center(&min, &max)
 }
 
 /// Display name of the threat at `index`.

@@ -1,5 +1,7 @@
 //! Every format of one plan, and refusals.
 
+mod edges;
+
 use serde_json::{Value, json};
 use uuid::Uuid;
 
@@ -300,136 +302,6 @@ fn words_of_callers_stay_words() {
         let text = write(&plan, format, &[]).expect("a plan");
         serde_json::from_str::<Value>(&text).expect("JSON");
     }
-}
-
-#[test]
-fn across_the_date_line_a_line_is_cut() {
-    let document = json!({
-        "frame": "wgs84",
-        "start": {"lat": -16.80, "lon": 179.99, "alt": 30},
-        "target": {"lat": -16.80, "lon": -179.99, "alt": 30},
-        "threats": [{"kind": "cylinder", "center": {"lat": -16.79, "lon": 180}, "radius": 500}],
-        "altitude": {"min": 10, "max": 100},
-        "planner": {"smoothing": {"degree": 1, "spacing": 700}},
-    });
-    let plan = plan(&document, &[(-16.80, 179.998, 40.0)]);
-    let text = write(&plan, "geojson", &[]).expect("a plan");
-    let read: Value = serde_json::from_str(&text).expect("JSON");
-    assert_eq!(read["features"][0]["geometry"]["type"], "MultiLineString");
-    let threat = read["features"]
-        .as_array()
-        .expect("features")
-        .last()
-        .expect("a threat");
-    assert_eq!(threat["geometry"]["type"], "MultiPolygon");
-    let pieces = &read["features"][0]["geometry"]["coordinates"];
-    let first = pieces[0]
-        .as_array()
-        .expect("a line")
-        .last()
-        .expect("its end");
-    assert_eq!(first[0], 180.0);
-    assert_eq!(pieces[1][0][0], -180.0);
-    assert_eq!(first[1], pieces[1][0][1]);
-}
-
-#[test]
-fn along_the_date_line_a_line_is_whole() {
-    let document = json!({
-        "frame": "wgs84",
-        "start": {"lat": -16.80, "lon": 180, "alt": 30},
-        "target": {"lat": -16.82, "lon": -180, "alt": 30},
-        "altitude": {"min": 10, "max": 100},
-        "planner": {"smoothing": {"degree": 1, "spacing": 700}},
-    });
-    let plan = plan(&document, &[(-16.81, 180.0, 40.0)]);
-    let text = write(&plan, "geojson", &[]).expect("a plan");
-    let read: Value = serde_json::from_str(&text).expect("JSON");
-    let path = &read["features"][0]["geometry"];
-    assert_eq!(path["type"], "LineString");
-    for position in path["coordinates"].as_array().expect("a line") {
-        assert_eq!(position[0], 180.0, "{path}");
-    }
-    // A longitude of GPX is less than 180.
-    let text = write(&plan, "gpx", &[]).expect("a plan");
-    assert!(text.contains("lon=\"-180"), "{text}");
-    assert!(!text.contains("lon=\"180"), "{text}");
-}
-
-/// The exported threats of a flight beside a pole.
-fn threats_near_a_pole(threats: &Value) -> Vec<Value> {
-    let document = json!({
-        "frame": "wgs84",
-        "start": {"lat": 88.5, "lon": 10, "alt": 80},
-        "target": {"lat": 88.6, "lon": 14, "alt": 80},
-        "area": {"min": {"lat": 88.3, "lon": 5}, "max": {"lat": 88.8, "lon": 20}},
-        "threats": threats,
-        "altitude": {"min": 20, "max": 150},
-        "planner": {"smoothing": {"degree": 1, "spacing": 1000}},
-    });
-    let plan = plan(&document, &[(88.55, 12.0, 85.0)]);
-    let text = write(&plan, "geojson", &[]).expect("a plan");
-    let mut read: Value = serde_json::from_str(&text).expect("JSON");
-    let features = read["features"].as_array_mut().expect("features");
-    features.retain(|feature| feature["properties"]["role"] == "threat");
-    features
-        .iter_mut()
-        .map(|feature| feature["geometry"].take())
-        .collect()
-}
-
-/// Degrees east and north of a ring's corners.
-fn corners(ring: &Value) -> Vec<[f64; 2]> {
-    let corner =
-        |corner: &Value| [0, 1].map(|index: usize| corner[index].as_f64().expect("a number"));
-    ring.as_array()
-        .expect("a ring")
-        .iter()
-        .map(corner)
-        .collect()
-}
-
-#[test]
-#[expect(
-    clippy::float_cmp,
-    reason = "a ring is closed by its very first corner"
-)]
-fn a_threat_over_a_pole_is_a_polygon_over_all_longitudes() {
-    let threats = threats_near_a_pole(&json!([
-        {"kind": "cylinder", "center": {"lat": 89.9, "lon": 12}, "radius": 30000},
-        {"kind": "cylinder", "center": {"lat": 89.5, "lon": 100}, "radius": 60000},
-        {"kind": "polygon", "vertices": [
-            {"lat": 89.5, "lon": 0}, {"lat": 89.5, "lon": 120}, {"lat": 89.5, "lon": -120}]},
-    ]));
-    for threat in &threats {
-        assert_eq!(threat["type"], "Polygon", "{threat}");
-        let ring = corners(&threat["coordinates"][0]);
-        let n = ring.len();
-        assert_eq!(ring[0], ring[n - 1]);
-        assert_eq!(ring[n - 3..n - 1], [[180.0, 90.0], [-180.0, 90.0]]);
-        // Eastward all round, then back over the pole.
-        let lons: Vec<f64> = ring[..n - 3].iter().map(|corner| corner[0]).collect();
-        assert!(lons.is_sorted(), "{lons:?}");
-        assert_eq!((lons[0], lons[lons.len() - 1]), (-180.0, 180.0));
-    }
-}
-
-/// Straight on the plane is far from straight in degrees: without corners between, these would be lines along one
-/// parallel, and the triangle would have no area.
-#[test]
-fn a_long_edge_beside_a_pole_has_corners_between() {
-    let threats = threats_near_a_pole(&json!([
-        {"kind": "polygon", "vertices": [
-            {"lat": 89.5, "lon": 0}, {"lat": 89.5, "lon": 80}, {"lat": 89.5, "lon": 160}]},
-    ]));
-    let ring = corners(&threats[0]["coordinates"][0]);
-    for step in ring.windows(2) {
-        assert!((step[1][0] - step[0][0]).abs() <= 30.0, "{ring:?}");
-    }
-    // The middle of the edge from 160 to 0 degrees east is nearest to the pole.
-    let highest = ring.iter().map(|corner| corner[1]).fold(0.0, f64::max);
-    let middle = 90.0 - 0.5 * libm::cos(80_f64.to_radians());
-    assert!((highest - middle).abs() < 1e-3, "{highest} {middle}");
 }
 
 #[test]

@@ -1,0 +1,264 @@
+//! GeoJSON.
+
+use serde_json::{Value, json};
+
+use super::super::*;
+use super::unused;
+
+pub(super) fn geojson(features: &Value) -> Result<Conversion, ImportError> {
+    let document = json!({"type": "FeatureCollection", "name": "flight", "features": features});
+    convert(document.to_string().as_bytes(), Syntax::Json)
+}
+
+#[expect(
+    clippy::needless_pass_by_value,
+    reason = "read better where they are called"
+)]
+fn feature(properties: Value, geometry: Value) -> Value {
+    json!({"type": "Feature", "properties": properties, "geometry": geometry})
+}
+
+#[expect(
+    clippy::needless_pass_by_value,
+    reason = "reads better where it is called"
+)]
+pub(super) fn point(name: &str, coordinates: Value) -> Value {
+    feature(
+        json!({"name": name}),
+        json!({"type": "Point", "coordinates": coordinates}),
+    )
+}
+
+fn ends() -> Vec<Value> {
+    vec![
+        point("Start", json!([8.5, 47.3, 500])),
+        point(" target", json!([8.6, 47.4, 520.5])),
+    ]
+}
+
+#[test]
+fn points_circles_and_polygons_of_geojson() {
+    let mut features = ends();
+    features.push(feature(
+        json!({"name": "radar", "radius": 150, "influence": 250, "base": 480, "top": 900, "fill": "#f00"}),
+        json!({"type": "Point", "coordinates": [8.55, 47.35]}),
+    ));
+    features.push(feature(
+        json!({"name": "town", "margin": 20}),
+        json!({"type": "Polygon", "coordinates": [
+            [[8.51, 47.31], [8.52, 47.31], [8.52, 47.32], [8.51, 47.31]],
+            [[8.515, 47.311], [8.516, 47.311], [8.516, 47.312], [8.515, 47.311]]]}),
+    ));
+    features.push(feature(
+        json!(null),
+        json!({"type": "GeometryCollection", "geometries": [
+            {"type": "MultiPolygon", "coordinates": [[[[8.53, 47.31], [8.54, 47.31], [8.54, 47.32], [8.53, 47.31]]]]},
+            {"type": "LineString", "coordinates": [[8.5, 47.3], [8.6, 47.4]]}]}),
+    ));
+    let found = geojson(&features.into()).expect("a scenario");
+    assert_eq!(
+        found.scenario,
+        json!({
+            "name": "flight",
+            "frame": "wgs84",
+            "altitude_datum": "ellipsoid",
+            "start": {"lat": 47.3, "lon": 8.5, "alt": 500.0},
+            "target": {"lat": 47.4, "lon": 8.6, "alt": 520.5},
+            "threats": [
+                {"kind": "cylinder", "name": "radar", "center": {"lat": 47.35, "lon": 8.55}, "radius": 150.0,
+                 "influence": 250.0, "base": 480.0, "top": 900.0},
+                {"kind": "polygon", "name": "town", "vertices": [{"lat": 47.31, "lon": 8.51}, {"lat": 47.31, "lon": 8.52},
+                 {"lat": 47.32, "lon": 8.52}], "margin": 20.0, "base": null, "top": null},
+                {"kind": "polygon", "name": null, "vertices": [{"lat": 47.31, "lon": 8.53}, {"lat": 47.31, "lon": 8.54},
+                 {"lat": 47.32, "lon": 8.54}], "margin": 0.0, "base": null, "top": null}],
+            "terrain": {"kind": "flat", "elevation": 500.0},
+            "altitude": {"min": 0.0, "max": 120.0},
+        })
+    );
+    assert_eq!(
+        unused(&found),
+        [
+            "/features/2: said and not used: fill",
+            "/features/3: hole 0: the hole of a polygon: all of it is kept clear of",
+            "/features/4/geometry/geometries/1: a line: points and polygons make a scenario",
+        ]
+    );
+    let assumed: Vec<_> = found
+        .assumed
+        .iter()
+        .map(|assumed| assumed.pointer.as_str())
+        .collect();
+    assert_eq!(assumed, ["/altitude", "/terrain"]);
+}
+
+#[test]
+fn what_a_feature_gets_wrong_is_listed() {
+    let circle = |properties| {
+        feature(
+            properties,
+            json!({"type": "Point", "coordinates": [8.5, 47.3]}),
+        )
+    };
+    for (wrong, reason) in [
+        (circle(json!({"radius": -3})), "radius is -3, must be > 0"),
+        (
+            circle(json!({"radius": "wide"})),
+            "radius is \"wide\", must be a number",
+        ),
+        (
+            circle(json!({"radius": 5, "influence": 2})),
+            "influence is 2, must be >= the radius, 5",
+        ),
+        (
+            circle(json!({"radius": 5, "base": 9, "top": 9})),
+            "base is 9, must be < the top, 9",
+        ),
+        (
+            circle(json!({"name": "hut"})),
+            "a point that is not named start or target and has no radius",
+        ),
+        (
+            circle(json!({"role": "waypoint", "name": "P1"})),
+            "a waypoint of a route: a plan finds its own",
+        ),
+        (
+            point("start", json!([8.5, 47.3])),
+            "another point is the start already",
+        ),
+        (
+            point("radar", json!([190, 47.3])),
+            "longitude is 190, must be from -180 to 180",
+        ),
+        (
+            point("radar", json!([8.5, 97])),
+            "latitude is 97, must be from -90 to 90",
+        ),
+        (
+            feature(
+                json!({}),
+                json!({"type": "Polygon", "coordinates": [[[1, 1], [2, 2], [1, 1]]]}),
+            ),
+            "a polygon of 2 corners, must have three or more",
+        ),
+        (
+            feature(json!({}), json!({"type": "Polygon", "coordinates": []})),
+            "a polygon without a ring",
+        ),
+        (
+            feature(
+                json!({}),
+                json!({"type": "Polygon", "coordinates": [[[1], [2], [3]]]}),
+            ),
+            "a corner that is not longitude and latitude",
+        ),
+        (
+            feature(json!({}), json!(null)),
+            "a feature without geometry",
+        ),
+    ] {
+        let mut features = ends();
+        features.push(wrong);
+        let found = geojson(&features.into()).expect("the rest is a scenario");
+        assert_eq!(unused(&found), [format!("/features/2: {reason}")]);
+        assert_eq!(found.scenario["threats"], json!([]));
+    }
+    for broken in [
+        json!(3),
+        json!({"type": "Feature", "geometry": {"type": "Point", "coordinates": ["x"]}, "properties": {}}),
+        json!({"type": "Feature", "geometry": {"type": "Blob"}, "properties": {}}),
+        json!({"type": "Feature", "geometry": {"type": "Point", "coordinates": [1]}, "properties": {}}),
+        json!({"type": "Feature", "geometry": {"type": "MultiPolygon", "coordinates": [[[[1, 1], [2], []]]]}, "properties": {}}),
+    ] {
+        let mut features = ends();
+        features.push(broken.clone());
+        let found = geojson(&features.into()).expect("the rest is a scenario");
+        assert_eq!(found.unused.len(), 1, "{broken}");
+    }
+}
+
+#[test]
+fn a_file_without_ends_is_no_scenario() {
+    let check = |text: &str, expected: &str| {
+        let refused = convert(text.as_bytes(), Syntax::of(text.as_bytes())).expect_err(text);
+        assert_eq!(refused.to_string(), expected);
+    };
+    check(
+        r#"{"type": "FeatureCollection", "features": []}"#,
+        "no start and no target in the file: a point of that name makes one",
+    );
+    check(
+        &point("start", json!([1, 2, 3])).to_string(),
+        "no target in the file: a point of that name makes one",
+    );
+    check(
+        r#"{"type": "FeatureCollection"}"#,
+        "a FeatureCollection has features, a list; this one has none",
+    );
+    check(
+        "[]",
+        "type is missing, must be FeatureCollection; a plan of QGroundControl has fileType Plan",
+    );
+    check(
+        r#"{"type": "FeatureCollection", "features": [], "crs": {"type": "name", "properties": {"name": "EPSG:2056"}}}"#,
+        "crs is EPSG:2056, must be longitude and latitude of WGS 84",
+    );
+    check("{\"type\":\n oops}", "line 2, column 2: expected value");
+    check("", "line 1, column 1: EOF while parsing a value");
+    check(
+        "PK\u{3}\u{4}...",
+        "a zip archive, as KMZ is: unpack it and take the doc.kml in it",
+    );
+    check("<gpx/>", "the root element is gpx, must be kml");
+    check("<kml>", "the root node was opened but never closed");
+    check(
+        r#"{"fileType": "Plan", "mission": {}}"#,
+        "a plan has mission.items, a list; this one has none",
+    );
+}
+
+/// As our own exports write a triangle round a pole.
+#[test]
+fn a_polygon_closed_over_a_pole_is_a_ring_round_it() {
+    let mut features = ends();
+    features.push(feature(
+        json!({"name": "ice"}),
+        json!({"type": "Polygon", "coordinates": [
+            [[-180, 88], [-120, 88], [0, 89], [120, 88], [180, 88], [180, 90], [-180, 90], [-180, 88]]]}),
+    ));
+    let found = geojson(&features.into()).expect("a scenario");
+    let corner = |lat: f64, lon: f64| json!({"lat": lat, "lon": lon});
+    assert_eq!(
+        found.scenario["threats"][0]["vertices"],
+        json!([
+            corner(88.0, -120.0),
+            corner(89.0, 0.0),
+            corner(88.0, 120.0),
+            corner(88.0, 180.0)
+        ])
+    );
+    assert_eq!(unused(&found), [""; 0]);
+}
+
+#[test]
+fn what_is_said_of_many_shapes_is_short() {
+    let polygons = vec![json!([[[1, 1], [2, 1], [2, 2]]]); 1000];
+    let check = |properties: Value, expected: &str| {
+        let mut features = ends();
+        let coordinates = polygons.clone();
+        features.push(feature(
+            properties,
+            json!({"type": "MultiPolygon", "coordinates": coordinates}),
+        ));
+        let found = geojson(&features.into()).expect("a scenario");
+        let answer = serde_json::to_string(&found).expect("JSON");
+        assert!(answer.contains(expected), "{}", &answer[..2000]);
+        assert!(answer.len() < 1_000_000, "{}", answer.len());
+    };
+    let long = "x".repeat(100_000);
+    check(json!({"name": long}), &"x".repeat(200));
+    check(json!({"margin": long}), "must be a number");
+    check(json!({"margin": vec![1; 10_000]}), "must be a number");
+    check(json!({&long: 1}), "said and not used");
+    let many: serde_json::Map<_, _> = (0..10_000).map(|n| (format!("n{n}"), json!(n))).collect();
+    check(many.into(), "9990 more");
+}

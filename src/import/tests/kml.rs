@@ -1,0 +1,57 @@
+//! KML.
+
+use serde_json::json;
+
+use super::super::*;
+use super::unused;
+
+const KML: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
+<kml xmlns="http://www.opengis.net/kml/2.2"><Document><name>flight</name>
+<NetworkLink><Link><href>http://localhost/</href></Link></NetworkLink>
+<Folder>
+<Placemark><name>start</name><Point><altitudeMode>absolute</altitudeMode><coordinates> 8.5,47.3,500 </coordinates></Point></Placemark>
+<Placemark><name>Target</name><Point><coordinates>8.6,47.4,33</coordinates></Point></Placemark>
+<Placemark><name>radar</name>
+<ExtendedData><Data name="radius"><value>150</value></Data><Data name="colour"><value>red</value></Data></ExtendedData>
+<Point><coordinates>8.55,47.35</coordinates></Point></Placemark>
+<Placemark><name>town</name><ExtendedData><SchemaData><SimpleData name="margin">20</SimpleData></SchemaData></ExtendedData>
+<MultiGeometry><Polygon><outerBoundaryIs><LinearRing><coordinates>
+8.51,47.31 8.52,47.31 8.52,47.32 8.51,47.31</coordinates></LinearRing></outerBoundaryIs><innerBoundaryIs/></Polygon>
+<LineString><coordinates>8.5,47.3 8.6,47.4</coordinates></LineString></MultiGeometry></Placemark>
+<Placemark><name>odd</name><Point><coordinates>8.5;47.3</coordinates></Point></Placemark>
+<Placemark><name>empty</name></Placemark>
+</Folder></Document></kml>"#;
+
+#[test]
+fn placemarks_of_kml() {
+    let found = convert(KML.as_bytes(), Syntax::of(KML.as_bytes())).expect("a scenario");
+    assert_eq!(
+        found.scenario,
+        json!({
+            "name": "flight",
+            "frame": "wgs84",
+            "altitude_datum": "msl",
+            "start": {"lat": 47.3, "lon": 8.5, "alt": 500.0},
+            "target": {"lat": 47.4, "lon": 8.6, "alt": 0.0},
+            "threats": [
+                {"kind": "cylinder", "name": "radar", "center": {"lat": 47.35, "lon": 8.55}, "radius": 150.0,
+                 "influence": 150.0, "base": null, "top": null},
+                {"kind": "polygon", "name": "town", "vertices": [{"lat": 47.31, "lon": 8.51}, {"lat": 47.31, "lon": 8.52},
+                 {"lat": 47.32, "lon": 8.52}], "margin": 20.0, "base": null, "top": null}],
+            "terrain": {"kind": "flat", "elevation": 0.0},
+            "altitude": {"min": 0.0, "max": 120.0},
+        })
+    );
+    assert_eq!(
+        unused(&found),
+        [
+            "line 3: a NetworkLink, which is not read",
+            "line 7: radar: said and not used: colour",
+            "line 10: town: hole 0: the hole of a polygon: all of it is kept clear of",
+            "line 10: town: a line: points and polygons make a scenario",
+            "line 14: odd: coordinates are \"8.5;47.3\", must be longitude,latitude,altitude",
+            "line 15: empty: a placemark without geometry",
+        ]
+    );
+    assert_eq!(found.assumed[0].pointer, "/target/alt");
+}

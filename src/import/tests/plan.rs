@@ -1,0 +1,169 @@
+//! Plans of QGroundControl.
+
+use serde_json::{Value, json};
+
+use super::super::*;
+use super::unused;
+
+#[test]
+fn missions_and_fences_of_a_plan() {
+    let item = |command: u16, frame: u8, lat: f64, lon: f64, alt: f64| {
+        json!({"type": "SimpleItem", "command": command, "frame": frame,
+               "params": [0, 0, 0, null, lat, lon, alt]})
+    };
+    let plan = json!({
+        "fileType": "Plan", "version": 1,
+        "mission": {
+            "vehicleType": 2, "cruiseSpeed": 20, "hoverSpeed": 5, "plannedHomePosition": [47.3, 8.5, 480],
+            "items": [
+                item(22, 3, 0.0, 0.0, 15.0),
+                {"type": "SimpleItem", "command": 178, "frame": 2, "params": [1, 12, -1, 0, 0, 0, 0]},
+                item(16, 3, 47.35, 8.55, 40.0),
+                {"type": "ComplexItem", "complexItemType": "survey"},
+                item(20, 2, 0.0, 0.0, 0.0),
+                item(16, 0, 47.4, 8.6, 530.0),
+            ]},
+        "geoFence": {
+            "circles": [
+                {"inclusion": false, "circle": {"center": [47.35, 8.56], "radius": 200}},
+                {"inclusion": true, "circle": {"center": [47.35, 8.55], "radius": 20000}},
+                {"inclusion": false, "circle": {"center": [47.35], "radius": 200}}],
+            "polygons": [{"inclusion": false, "polygon": [[47.31, 8.51], [47.31, 8.52], [47.32, 8.52]]}]},
+        "rallyPoints": {"points": [[47.3, 8.5, 10]]},
+    });
+    let found = convert(plan.to_string().as_bytes(), Syntax::Json).expect("a scenario");
+    assert_eq!(
+        found.scenario,
+        json!({
+            "name": null,
+            "frame": "wgs84",
+            "altitude_datum": "msl",
+            "start": {"lat": 47.3, "lon": 8.5, "alt": 480.0},
+            "target": {"lat": 47.4, "lon": 8.6, "alt": 530.0},
+            "threats": [
+                {"kind": "cylinder", "name": null, "center": {"lat": 47.35, "lon": 8.56}, "radius": 200.0,
+                 "influence": 200.0, "base": null, "top": null},
+                {"kind": "polygon", "name": null, "vertices": [{"lat": 47.31, "lon": 8.51}, {"lat": 47.31, "lon": 8.52},
+                 {"lat": 47.32, "lon": 8.52}], "margin": 0.0, "base": null, "top": null}],
+            "terrain": {"kind": "flat", "elevation": 480.0},
+            "altitude": {"min": 0.0, "max": 120.0},
+            "vehicle": {"cruise_speed": 12.0},
+        })
+    );
+    assert_eq!(
+        unused(&found),
+        [
+            "/mission/items/3: a complex item (survey), which is not read",
+            "/mission/items/4: command 20, which no scenario has",
+            "/mission/items/2: a stop on the way: a plan finds its own",
+            "/geoFence/circles/1: a fence to stay within, where a scenario has a box, its area",
+            "/geoFence/circles/2: a circle without center",
+            "/rallyPoints/points/0: a rally point, which no scenario has",
+        ]
+    );
+}
+
+/// Beside a height above terrain, a ground station keeps the altitude above sea that it amounts to.
+#[test]
+fn ends_above_terrain_are_at_their_altitude_above_sea() {
+    let item = |frame: u8, lat: f64, height: Value, above_sea: Value| {
+        json!({"type": "SimpleItem", "command": 16, "frame": frame, "AMSLAltAboveTerrain": above_sea,
+               "params": [0, 0, 0, null, lat, 8.5, height]})
+    };
+    let converted = |items: Value| {
+        let plan = json!({
+            "fileType": "Plan",
+            "mission": {"plannedHomePosition": [47.2, 8.5, 480], "items": items},
+        });
+        convert(plan.to_string().as_bytes(), Syntax::Json)
+    };
+    let check = |items: Value, start: Value, target: Value| {
+        let found = converted(items).expect("a scenario");
+        assert_eq!(found.scenario["start"], start);
+        assert_eq!(found.scenario["target"], target);
+        let between = "a stop on the way: a plan finds its own";
+        assert!(
+            found.unused.iter().all(|unused| unused.reason == between),
+            "{:?}",
+            found.unused
+        );
+    };
+    check(
+        json!([
+            item(10, 47.3, json!(60), json!(541.5)),
+            item(10, 47.4, json!(60), json!(null)),
+            item(11, 47.5, json!(40), json!(652.25)),
+        ]),
+        json!({"lat": 47.3, "lon": 8.5, "alt": 541.5}),
+        json!({"lat": 47.5, "lon": 8.5, "alt": 652.25}),
+    );
+    check(
+        json!([item(10, 47.5, json!(40), json!(652.25))]),
+        json!({"lat": 47.2, "lon": 8.5, "alt": 480.0}),
+        json!({"lat": 47.5, "lon": 8.5, "alt": 652.25}),
+    );
+    // In the other frames it is left aside: there, some files have what it was before.
+    check(
+        json!([
+            item(3, 47.3, json!(60), json!(1)),
+            item(0, 47.5, json!(530), json!(1))
+        ]),
+        json!({"lat": 47.3, "lon": 8.5, "alt": 540.0}),
+        json!({"lat": 47.5, "lon": 8.5, "alt": 530.0}),
+    );
+    let known = item(0, 47.3, json!(500), json!(null));
+    for (items, expected) in [
+        (
+            json!([known, item(10, 47.5, json!(40), json!(null))]),
+            "the target, /mission/items/1, is 40 m above terrain (frame 10), and AMSLAltAboveTerrain is null, must be its altitude above sea",
+        ),
+        (
+            json!([item(11, 47.5, json!(40), json!("high")), known]),
+            "the start, /mission/items/0, is 40 m above terrain (frame 11), and AMSLAltAboveTerrain is \"high\", must be its altitude above sea",
+        ),
+        (
+            json!([known, item(0, 47.5, json!(null), json!(null))]),
+            "the target, /mission/items/1, has the altitude null, must be a number",
+        ),
+        (
+            json!([known, item(7, 47.5, json!(40), json!(null))]),
+            "the target, /mission/items/1, has frame 7, must be 0, 3, 5, 6, 10 or 11",
+        ),
+    ] {
+        let refused = converted(items).expect_err(expected);
+        assert_eq!(refused.to_string(), expected);
+    }
+}
+
+#[test]
+fn speeds_of_a_plan() {
+    let check = |params: Value, expected: Result<f64, &str>| {
+        let plan = json!({
+            "fileType": "Plan",
+            "mission": {"hoverSpeed": 5, "plannedHomePosition": [47.3, 8.5, 480], "items": [
+                {"type": "SimpleItem", "command": 178, "frame": 2, "params": params},
+                {"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, null, 47.4, 8.6, 30]}]},
+        });
+        let found = convert(plan.to_string().as_bytes(), Syntax::Json).expect("a scenario");
+        let (speed, reasons) = match expected {
+            Ok(speed) => (speed, vec![]),
+            Err(reason) => (5.0, vec![format!("/mission/items/0: {reason}")]),
+        };
+        assert_eq!(found.scenario["vehicle"]["cruise_speed"], speed, "{params}");
+        assert_eq!(unused(&found), reasons);
+    };
+    check(json!([0, 12, -1, 0, 0, 0, 0]), Ok(12.0));
+    check(json!([1.0, 12.5, -1, 0, 0, 0, 0]), Ok(12.5));
+    for kind in [json!(2), json!(3), json!(null)] {
+        let reason = format!("a speed of type {kind}, must be 0 (air) or 1 (ground)");
+        check(json!([kind, 12, -1, 0, 0, 0, 0]), Err(&reason));
+    }
+    check(
+        json!([1, -1, 50, 0, 0, 0, 0]),
+        Err("speed is -1, must be > 0"),
+    );
+    check(
+        json!([]),
+        Err("a speed of type null, must be 0 (air) or 1 (ground)"),
+    );
+}

@@ -1,6 +1,9 @@
 //! Log lines on their way to stderr: queued for a thread of their own, so that nothing waits for whoever reads them.
 //!
 //! When the reader stops reading, the queue fills up; lines that find no room are dropped and counted.
+//!
+//! `tracing-appender` 0.2 does nearly the same. But where the queue is full at the end, it gives up after a tenth of a
+//! second and prints so to stdout, where our users read the address.
 
 use std::io::{self, Write};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};

@@ -17,6 +17,10 @@ const WAITING: usize = 8_192;
 /// Lines that are written in one go, as long as so many wait.
 const TOGETHER: usize = 256;
 
+/// Pause of the writing thread when nothing waits any more: a thread that sleeps need not be woken for each line, which
+/// under load would cost requests more than writing it.
+const BREATH: Duration = Duration::from_millis(5);
+
 /// Pause between attempts to queue a request for a flush.
 const PAUSE: Duration = Duration::from_millis(5);
 
@@ -88,7 +92,9 @@ fn write(lines: &Receiver<Message>, mut out: impl Write) {
     while let Ok(first) = lines.recv() {
         let mut text = Vec::new();
         let mut flushes = Vec::new();
+        let mut taken = 0;
         for message in std::iter::once(first).chain(lines.try_iter().take(TOGETHER - 1)) {
+            taken += 1;
             match message {
                 Message::Line(line) => text.extend(line),
                 Message::Flush(done) => flushes.push(done),
@@ -98,6 +104,9 @@ fn write(lines: &Receiver<Message>, mut out: impl Write) {
         out.flush().ok();
         for done in flushes {
             done.send(()).ok();
+        }
+        if taken < TOGETHER {
+            std::thread::sleep(BREATH);
         }
     }
 }

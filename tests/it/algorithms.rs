@@ -1,5 +1,7 @@
 //! The search algorithms that a request may name: each is listed everywhere and plans correctly.
 
+use std::collections::BTreeMap;
+
 use noctule::optimizer;
 use noctule::planner::{self, Nobody, Outcome};
 use noctule::scenario::json::{self, COMMON, CommonParameter, Takes};
@@ -120,6 +122,35 @@ async fn every_algorithm_is_listed_with_its_source() {
             "docs/EQUATIONS.md has no {heading}"
         );
     }
+}
+
+/// Every constant of every algorithm is described, within the widest range that any allows it.
+#[test]
+fn the_description_lists_the_constants() {
+    let planner = &DESCRIPTION["components"]["schemas"]["Planner"]["properties"];
+    let described = planner["parameters"]["properties"].as_object();
+    let mut described = described.expect("properties").clone();
+    for common in ["quadrature", "gap", "threads"] {
+        assert!(described.remove(common).is_some(), "{common}");
+    }
+    let mut ranges: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
+    for constant in optimizer::ALL
+        .iter()
+        .flat_map(|algorithm| algorithm.parameters)
+    {
+        let range = ranges
+            .entry(constant.name)
+            .or_insert((constant.min, constant.max));
+        *range = (range.0.min(constant.min), range.1.max(constant.max));
+    }
+    let described: BTreeMap<&str, (f64, f64)> = described
+        .iter()
+        .map(|(name, schema)| {
+            let number = |key: &str| schema[key].as_f64().expect("a number");
+            (name.as_str(), (number("minimum"), number("maximum")))
+        })
+        .collect();
+    assert_eq!(described, ranges);
 }
 
 /// Each algorithm accepts every common parameter over exactly its listed range, and uses the listed default

@@ -152,6 +152,8 @@ async fn a_status_document_is_sent_only_when_it_has_changed() {
         let answer = api.get_with(&address, &[("if-none-match", known)]).await;
         assert_eq!(answer.status, StatusCode::NOT_MODIFIED, "{known}");
         assert_eq!(answer.header("etag"), tag);
+        let seconds: u64 = answer.header("retry-after").parse().expect("seconds");
+        assert!((1..=600).contains(&seconds), "{seconds}");
     }
     let answer = api
         .get_with(&address, &[("if-none-match", "\"other\"")])
@@ -186,6 +188,7 @@ async fn a_status_document_is_sent_only_when_it_has_changed() {
     let asked = Instant::now();
     let answer = api.get_with(&address, &known).await;
     assert_eq!(answer.status, StatusCode::NOT_MODIFIED);
+    assert!(!answer.headers.contains_key("retry-after"));
     assert!(asked.elapsed() < Duration::from_secs(30), "it waited");
 }
 

@@ -289,3 +289,66 @@ fn every_problem_type_is_documented() {
         );
     }
 }
+
+/// Generated clients take a constant without a type for anything, and integers for 32 bits.
+#[test]
+fn constants_and_great_integers_say_their_type() {
+    let mut n_constants = 0;
+    each(&DESCRIPTION, "", &mut |pointer, node| {
+        if let Some(constant) = node.get("const") {
+            n_constants += 1;
+            let kind = if constant.is_boolean() {
+                "boolean"
+            } else {
+                "string"
+            };
+            assert_eq!(node["type"], kind, "{pointer}");
+        }
+        let is_great = node["maximum"]
+            .as_u64()
+            .is_some_and(|maximum| maximum > i32::MAX as u64);
+        if node["type"] == "integer" && is_great {
+            assert_eq!(node["format"], "int64", "{pointer}");
+        }
+    });
+    assert!(n_constants > 10, "{n_constants}");
+}
+
+/// Generated clients send declared defaults, and options of one format are refused by the others.
+#[test]
+fn options_of_formats_declare_no_default() {
+    let parameters = DESCRIPTION["paths"]["/plans/{id}/result"]["get"]["parameters"].as_array();
+    let options = parameters
+        .expect("a list")
+        .iter()
+        .filter(|option| option["in"] == "query" && option["name"] != "partial");
+    let names: Vec<&str> = options
+        .inspect(|option| assert_eq!(option["schema"].get("default"), None, "{option}"))
+        .filter_map(|option| option["name"].as_str())
+        .collect();
+    assert!(
+        names.contains(&"altitude") && names.contains(&"format"),
+        "{names:?}"
+    );
+}
+
+/// Calls `look` with every object of the description and where it is.
+fn each(node: &Value, pointer: &str, look: &mut impl FnMut(&str, &Value)) {
+    match node {
+        Value::Object(fields) => {
+            // The names of properties are no keywords.
+            if !pointer.ends_with("/properties") {
+                look(pointer, node);
+            }
+            for (key, value) in fields.iter().filter(|(key, _)| !key.starts_with("example")) {
+                each(value, &format!("{pointer}/{key}"), look);
+            }
+        }
+        Value::Array(items) => {
+            for (idx, item) in items.iter().enumerate() {
+                each(item, &format!("{pointer}/{idx}"), look);
+            }
+        }
+        _ => {}
+    }
+}

@@ -55,15 +55,17 @@ pub(super) async fn show(
     }
 
     let tag = etag(&plan);
+    let retry_after = retry_after(&state, &plan).await?;
     let mut response = if known.is_some_and(|known| known.contain(&tag)) {
         StatusCode::NOT_MODIFIED.into_response()
     } else {
-        let retry_after = retry_after(&state, &plan).await?;
-        let retry_after = retry_after.map(|seconds| [(header::RETRY_AFTER, seconds)]);
-        (retry_after, StatusDocument::from(plan)).into_response()
+        StatusDocument::from(plan).into_response()
     };
     let headers = response.headers_mut();
     headers.insert(header::ETAG, tag);
+    if let Some(seconds) = retry_after {
+        headers.insert(header::RETRY_AFTER, seconds);
+    }
     // It may be cached, but must be revalidated each time.
     headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
     if let Some(wait) = wait {

@@ -7,7 +7,7 @@ use crate::geometry::Point3;
 use crate::scenario::{Frame, Scenario, json};
 
 /// A plan: its request and its result.
-pub struct Delivery {
+pub(super) struct Delivery {
     pub(super) scenario: Scenario,
     pub(super) result: ResultDocument,
     /// Points of the local plane.
@@ -35,7 +35,7 @@ impl Delivery {
     /// # Errors
     /// [`ExportError::Damaged`] when one cannot be read or its route has no extent, [`ExportError::NoGround`] when
     /// the dataset no longer exists, [`ExportError::Unreachable`] when it is unreachable at present.
-    pub fn read(input: &ResultInput) -> Result<Self, ExportError> {
+    pub(super) fn read(input: &ResultInput) -> Result<Self, ExportError> {
         let scenario = json::read_accepted(input.scenario, input.rules).map_err(|refusal| {
             if let Some(fault) = refusal.unreachable_ground() {
                 return ExportError::Unreachable(fault.detail.clone());

@@ -19,7 +19,7 @@ mod outline;
 mod svg;
 mod words;
 
-pub use delivery::Delivery;
+use delivery::Delivery;
 pub use error::{ExportError, OptionFault};
 pub use file_name::file_name;
 pub use options::{Altitude, Firmware, OPTIONS, OptionRule, Options};
@@ -27,6 +27,7 @@ pub use options::{Altitude, Firmware, OPTIONS, OptionRule, Options};
 use crate::scenario::json::Rules;
 
 /// An export format.
+#[derive(Debug)]
 pub struct Format {
     /// As used in `?format=` and `--format`.
     pub name: &'static str,
@@ -45,6 +46,7 @@ pub struct Format {
 }
 
 /// How a format is written.
+#[derive(Debug)]
 enum Write {
     /// The stored result, byte for byte.
     Stored,

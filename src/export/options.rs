@@ -77,6 +77,7 @@ impl Default for Options {
 }
 
 /// One row of the table of options.
+#[derive(Debug)]
 pub struct OptionRule {
     /// Name in a query.
     pub name: &'static str,

@@ -168,14 +168,13 @@ fn appeal(sources: &[Fitness]) -> Vec<f64> {
         }
     }
     let chance = |source: &Fitness| {
-        if source.is_feasible() {
+        let chance = if source.is_feasible() {
             0.5 + 0.5 * nectar(source) / most_nectar
-        } else if most_violation < f64::INFINITY {
-            0.5 - 0.45 * source.violation / most_violation
         } else {
-            // The run was stopped during this iteration.
-            0.5
-        }
+            0.5 - 0.45 * source.violation / most_violation
+        };
+        // Infinite figures tell sources apart no more: what a stopped run leaves, and what an objective cannot price.
+        if chance.is_nan() { 0.5 } else { chance }
     };
     sources.iter().map(chance).collect()
 }
@@ -220,7 +219,14 @@ mod tests {
         // A cost below zero means even more nectar.
         assert!(super::appeal(&[fitness(0.0, -5.0), fitness(0.0, 0.0)])[1] < 0.7);
         // If nothing could be evaluated, onlookers still choose.
-        assert!(super::appeal(&[Fitness::WORST])[0] > 0.0);
+        for nothing in [
+            Fitness::WORST,
+            fitness(0.0, f64::INFINITY),
+            fitness(0.0, f64::NAN),
+            fitness(f64::NAN, 1.0),
+        ] {
+            assert_eq!(super::appeal(&[nothing; 2]), [0.5; 2], "{nothing:?}");
+        }
     }
 
     /// A flat objective: nothing improves, so all sources are abandoned in turn, one per iteration.

@@ -63,7 +63,8 @@ pub trait Stop {
     fn elapsed_ms(&self) -> f64;
 }
 
-/// No observer, and nobody to stop the run: for planning without an audience.
+/// No observer, and nobody to stop the run: for planning without an audience. It has no clock either, so a time limit
+/// of the scenario does not end the run.
 #[derive(Debug, Clone, Copy)]
 pub struct Nobody;
 
@@ -84,10 +85,11 @@ impl Stop for Nobody {
 /// Plan a route for `scenario`.
 ///
 /// The outcome depends on the scenario alone, unless it sets a time limit or `stop` ends the run; `elapsed_ms` is the
-/// only figure that depends on a clock.
+/// only figure that depends on a clock. A [`WarmStart::Plan`](crate::scenario::WarmStart::Plan) is passed over: whoever
+/// keeps plans replaces it by that plan's waypoints first.
 ///
 /// # Panics
-/// When the scenario names an algorithm that is not in the table; its reader refuses those.
+/// When the scenario is not valid, see [`Scenario`]: for instance when it names an algorithm that is not in the table.
 pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -> Outcome {
     let model = Model::new(scenario);
     let mut log = Log::new(&model, observer, stop);
@@ -142,6 +144,9 @@ pub fn decoder(scenario: &Scenario) -> impl Fn(&[f64]) -> Vec<Point3> + '_ {
 }
 
 /// The path that a vehicle flies along `route`, start to target; `None` where no path keeps every limit.
+///
+/// # Panics
+/// When `route` has fewer than two waypoints.
 #[must_use]
 pub fn smoothed(scenario: &Scenario, route: &[Point3]) -> Option<Path> {
     smoothing::smooth(&Model::new(scenario), route)
@@ -168,7 +173,13 @@ fn why_stop(scenario: &Scenario, stop: &dyn Stop) -> Option<StopReason> {
 }
 
 /// What a run whose best route so far is `route` would deliver if it were cancelled now; its curve
-/// and its count of evaluations are not known here.
+/// and its count of evaluations are not known here. Thus it also prices and certifies a route of one's own.
+///
+/// `route` begins at the start and ends at the target, which is not checked; waypoints that coincide are spread along
+/// their legs.
+///
+/// # Panics
+/// When `route` has fewer than two waypoints.
 #[must_use]
 pub fn so_far(scenario: &Scenario, route: Vec<Point3>) -> Outcome {
     let lower = seeding::lower_bound(scenario);
@@ -189,7 +200,8 @@ fn measured(
     let quadrature = model.scenario.planner.quadrature;
     let cost = model.figures(&route, quadrature);
     let violations = certificate::violations(model, &route);
-    let feasible = violations.is_empty();
+    // What is no number breaks no limit that it is compared to.
+    let feasible = violations.is_empty() && cost.total.is_finite();
     if let Some(last) = convergence.last_mut() {
         // The search aims at half the tolerance; the delivered route is judged by all of it.
         last.best_cost = feasible.then_some(cost.total);

@@ -1,10 +1,11 @@
-//! What a run delivers. Lengths in metres, angles in degrees.
+//! What a run delivers. Lengths are in metres, angles in degrees.
 
 use crate::cost::CostFigures;
 use crate::geometry::Point3;
 use crate::scenario::Frame;
 
-/// The end of a run: the best route, its price, its certificate and how it was found.
+/// The end of a run: the best route, its price, its certificate and how it was found. Here and in what follows, lengths
+/// are in metres and angles in degrees.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// The meaning of the request's coordinates; all coordinates here are in the local plane.
@@ -75,7 +76,7 @@ pub struct Bound {
 /// One straight piece of the route.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
-    /// 3-D length.
+    /// 3-D length, metres.
     pub length: f64,
     /// Heading change at the leg's start, left positive; 0 on the first.
     pub turn_deg: f64,
@@ -88,7 +89,7 @@ pub struct Leg {
 pub struct Path {
     /// Samples of the spline; the polyline through them is free of violations.
     pub points: Vec<Point3>,
-    /// Length of that polyline.
+    /// Length of that polyline, metres.
     pub length: f64,
     /// Degree of the spline.
     pub degree: usize,
@@ -105,15 +106,15 @@ pub struct Path {
 pub struct Measures {
     /// One per threat, in order.
     pub clearance: Vec<Clearance>,
-    /// Least height above ground outside the terminal zones; `None` when the route never leaves them.
+    /// Least height above ground outside the terminal zones, metres; `None` when the route never leaves them.
     pub min_agl: Option<f64>,
-    /// Greatest height above ground outside the terminal zones.
+    /// Greatest height above ground outside the terminal zones, metres.
     pub max_agl: Option<f64>,
-    /// Largest heading change.
+    /// Largest heading change, degrees.
     pub max_turn_deg: f64,
-    /// Steepest leg, up or down.
+    /// Climb of the steepest leg, up or down, degrees.
     pub max_climb_deg: f64,
-    /// Shortest leg.
+    /// Length of the shortest leg, metres.
     pub min_leg: f64,
 }
 

@@ -57,8 +57,8 @@ pub(super) fn smooth(model: &Model, route: &[Point3]) -> Option<Path> {
     let mut tightness: Vec<Tightness> = vec![0; route.len()];
     loop {
         let (control_points, corners) = control_points(route, &tightness, smoothing.degree);
-        if control_points.len() <= smoothing.degree {
-            tighten(&mut tightness, 0..route.len());
+        // A leg alone has no corner to tighten, so its spline has a lower degree.
+        if control_points.len() <= smoothing.degree && tighten(&mut tightness, 0..route.len()) {
             continue;
         }
         let spline = BSpline::clamped_uniform(control_points, smoothing.degree);

@@ -255,6 +255,19 @@ fn a_stop_keeps_the_best_so_far() {
     assert_eq!(outcome.convergence[..], longer.convergence[..6]);
 }
 
+/// A route of one's own: two waypoints have a straight path, and what is no number is not feasible.
+#[test]
+fn routes_from_elsewhere_are_certified() {
+    let mut scenario = scenario();
+    scenario.threats.clear();
+    let straight = so_far(&scenario, route(&[]));
+    let path = straight.path.expect("nothing is in its way");
+    assert_eq!(path.degree, 1);
+    assert!((path.length - straight.legs[0].length).abs() < 1e-9);
+    let unknown = so_far(&scenario, route(&[[500.0, f64::NAN, 100.0]]));
+    assert!(!unknown.feasible && unknown.path.is_none());
+}
+
 #[test]
 fn a_time_limit_stops_the_run() {
     let mut scenario = scenario();

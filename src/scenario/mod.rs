@@ -16,6 +16,10 @@ pub use frame::Frame;
 
 /// A validated planning request: every field is finite and within its range; the start and the target are outside all
 /// threats, on or above ground and inside the area.
+///
+/// [`json::read`] makes sure of that, and everything that takes a scenario relies on it: with a scenario that is not
+/// valid, a search may panic, not end, or deliver wrong figures. Whoever fills in or changes fields in code can check
+/// them by reading what [`json::write`] makes of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// The caller's name for it.

@@ -1,6 +1,7 @@
 //! The ground: its elevation at any point, and the least and greatest height of a leg above it.
 //!
-//! To add a kind, add one file beside `flat.rs` and one variant of [`Terrain`].
+//! To add a kind, add one file beside `flat.rs` and one variant of [`Terrain`]; the compiler then names the places that
+//! read, write, price or draw each kind.
 
 mod cells;
 mod datasets;

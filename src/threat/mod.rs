@@ -1,7 +1,8 @@
 //! What a route must avoid: the shapes of threats, the distance of a leg from them, and its exposure in their soft
 //! zones.
 //!
-//! A new shape needs one file beside `cylinder.rs` and one variant of [`Shape`].
+//! A new shape needs one file beside `cylinder.rs` and one variant of [`Shape`]; the compiler then names the places
+//! that draw, write or bound each shape.
 
 mod cylinder;
 mod polygon;

@@ -1,5 +1,6 @@
 //! Formats over HTTP and on the command line: selection, file names, refusals.
 
+use std::collections::BTreeSet;
 use std::fs;
 
 use axum::http::Method;
@@ -13,6 +14,7 @@ use noctule::store::Ending;
 use serde_json::{Value, json};
 
 use crate::support::api::Api;
+use crate::support::description::DESCRIPTION;
 use crate::support::process;
 
 /// A kilometre over a meadow near Zurich, past a mast.
@@ -478,4 +480,29 @@ fn the_command_line_plans_exports_and_converts() {
     assert!(String::from_utf8_lossy(&refused.stderr).contains("kml needs degrees"));
     let refused = process::run(&["convert", "-"], "<kml/>");
     assert_eq!(refused.status.code(), Some(2));
+}
+
+/// Whatever is exported is described, and offered by the page.
+#[test]
+fn every_format_is_described_and_offered() {
+    let get = &DESCRIPTION["paths"]["/plans/{id}/result"]["get"];
+    let parameters = get["parameters"].as_array().expect("a list");
+    let format = parameters
+        .iter()
+        .find(|parameter| parameter["name"] == "format");
+    let names: BTreeSet<&str> = ALL.iter().map(|format| format.name).collect();
+    let described = format.expect("the parameter")["schema"]["enum"].as_array();
+    let described = described.expect("a list").iter().filter_map(Value::as_str);
+    assert_eq!(described.collect::<BTreeSet<_>>(), names);
+
+    let media_types = get["responses"]["200"]["content"]
+        .as_object()
+        .expect("types");
+    let page = include_str!("../../src/page/format.js");
+    for format in ALL {
+        let media_type = format.media_type.split(';').next().expect("a type");
+        assert!(media_types.contains_key(media_type), "{media_type}");
+        let row = format!("{{ name: '{}', ", format.name);
+        assert!(page.contains(&row), "{row}");
+    }
 }

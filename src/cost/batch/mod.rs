@@ -152,7 +152,7 @@ impl<'s> Pricer<'s> {
     /// As [`Pricer::routes`], for the first `count` of them only; the others are unused.
     ///
     /// # Panics
-    /// With fewer than two points.
+    /// With fewer than two points, or a `count` above [`LANES`].
     #[must_use]
     pub fn first_routes(&self, points: &[PointRow], count: usize) -> Price {
         self.dispatch::<true>(points, &[], count, &mut [])

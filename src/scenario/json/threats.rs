@@ -75,7 +75,8 @@ fn threat(at: At<'_>, chart: &Chart, read_vertices: bool, faults: &mut Faults) -
     let top = fields.nullable("top", COORDINATE, faults);
     let shape = match kind {
         "cylinder" => cylinder(&fields, chart, faults).map(Shape::Cylinder),
-        _ => polygon(&fields, chart, read_vertices, faults).map(Shape::Polygon),
+        "polygon" => polygon(&fields, chart, read_vertices, faults).map(Shape::Polygon),
+        _ => unreachable!("a kind that the table above lacks"),
     };
     let (base, top) = (base?, top?);
     if let (Some(base), Some(top)) = (base, top)

@@ -23,13 +23,15 @@ pub(super) fn write(scenario: &Scenario) -> String {
     String::from_utf8(text).expect("JSON is UTF-8")
 }
 
-/// A number, written `3` rather than `3.0`.
+/// A number, written `3` rather than `3.0`; what is no finite number, as only a scenario made by hand has, is written
+/// `null`, which the reader refuses.
 #[derive(Debug, Clone, Copy)]
 struct Figure(f64);
 
 impl Serialize for Figure {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        whole_or_float(self.0).serialize(serializer)
+        let finite = self.0.is_finite().then(|| whole_or_float(self.0));
+        finite.serialize(serializer)
     }
 }
 

@@ -366,6 +366,9 @@ impl Dataset {
     /// # Errors
     /// [`DemError::Outside`] and [`DemError::NoData`] when not every point of `area` has an elevation,
     /// [`DemError::TooLarge`], or as [`Dataset::survey`].
+    ///
+    /// # Panics
+    /// When `area` or `margin` are not finite, or reach so far that they leave the plane's side of the earth.
     pub fn ground(
         &self,
         plane: &TangentPlane,

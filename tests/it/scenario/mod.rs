@@ -271,6 +271,18 @@ fn values_at_the_edge_of_a_fault_are_accepted() {
     }
 }
 
+/// A program may fill in a scenario by itself and have it checked by way of its document.
+#[test]
+fn numbers_that_are_not_finite_are_written_and_refused() {
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut scenario = read(LEAST).expect("no fault");
+        scenario.start.x = bad;
+        let faults = faults(&json::write(&scenario));
+        let pointers: Vec<&str> = faults.iter().map(|fault| fault.pointer.as_str()).collect();
+        assert_eq!(pointers, ["/start/x"], "{bad}");
+    }
+}
+
 #[test]
 fn a_drawn_seed_stays_below_two_to_the_53() {
     let scenario = json::read(LEAST.as_bytes(), &rules(), u64::MAX).expect("it has no fault");

@@ -231,6 +231,7 @@ fn assemble<T: 'static>(
     let router = routes
         .into_iter()
         .fold(Router::new(), |router, route| {
+            instruments.metrics.served(route.method, route.path);
             let gate = Gate::new(access.clone(), route.needs);
             router.route(route.path, (route.guarded)(Layered(gate)))
         })

@@ -54,6 +54,18 @@ async fn the_queue_metrics_show_the_current_queue() {
     drop(lease);
 }
 
+/// A rate is seen from the first failure on only if the series was there before.
+#[tokio::test]
+async fn failures_of_each_route_are_counted_from_zero() {
+    let reading = read(&Api::new()).await;
+    for route in noctule::http::routes() {
+        let (method, path) = (route.method, route.path);
+        let labels = format!("{{method=\"{method}\",route=\"{path}\",status=\"500\"}}");
+        let failures = reading.value(&format!("noctule_http_requests_total{labels}"));
+        assert!(failures == 0.0, "{labels} is {failures}");
+    }
+}
+
 /// Callers cannot add series, whatever they send.
 #[tokio::test]
 async fn callers_cannot_make_series() {

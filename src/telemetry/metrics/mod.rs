@@ -117,6 +117,15 @@ impl Metrics {
         self.start.set(seconds(at_ms));
     }
 
+    /// A route is served. Its failures are counted from 0: a series that is born at 1 has no rate, so an alert would miss
+    /// the first.
+    pub fn served(&self, method: &'static str, route: &str) {
+        let route = route.to_owned();
+        let answered = Answered { method, route };
+        let status = 500;
+        drop(self.requests.get_or_create(&Request { answered, status }));
+    }
+
     /// A request was answered, or input that is not a request. `route` is the template, `None` when no route has the
     /// path.
     pub fn answered(&self, method: &str, route: Option<&str>, status: u16, took: Duration) {

@@ -24,7 +24,7 @@ pub(super) trait Uploads: Debug + Send + Sync {
     fn entry(&self, name: &str) -> Result<Entry, CatalogueError>;
     fn stage(&self, limit: u64) -> Result<Staged, CatalogueError>;
     fn permit(&self, naming: &Naming) -> Result<(), CatalogueError>;
-    fn keep(&self, file: &Checked, naming: &Naming) -> Result<Kept, CatalogueError>;
+    fn keep(&self, file: &Checked, naming: &Naming, room: u64) -> Result<Kept, CatalogueError>;
     fn removable(&self, naming: &Naming) -> Result<String, CatalogueError>;
     fn remove(&self, naming: &Naming) -> Result<(), CatalogueError>;
     fn has_unnamed(&self) -> bool;
@@ -179,9 +179,9 @@ impl Catalogue for Directories {
         self.uploaded()?.permit(naming)
     }
 
-    fn keep(&self, file: Checked, naming: &Naming) -> Result<Kept, CatalogueError> {
+    fn keep(&self, file: Checked, naming: &Naming, room: u64) -> Result<Kept, CatalogueError> {
         self.check_not_mounted(&naming.name)?;
-        self.uploaded()?.keep(&file, naming)
+        self.uploaded()?.keep(&file, naming, room)
     }
 
     fn removable(&self, naming: &Naming) -> Result<String, CatalogueError> {

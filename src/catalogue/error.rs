@@ -48,6 +48,12 @@ pub enum CatalogueError {
     /// The file exists but cannot be used.
     #[error(transparent)]
     Unreadable(#[from] DemError),
+    /// All uploads together would be longer than they may be.
+    #[error("with this file all uploads would have more than {room} bytes")]
+    Full {
+        /// The greatest sum allowed.
+        room: u64,
+    },
     /// More bytes were sent than a file may have.
     #[error("the file is longer than {limit} bytes")]
     TooLarge {

@@ -67,12 +67,13 @@ pub trait Catalogue: Datasets {
     /// As [`Catalogue::keep`].
     fn permit(&self, naming: &Naming) -> Result<(), CatalogueError>;
 
-    /// Keep a received file under a name, durably and atomically.
+    /// Keep a received file under a name, durably and atomically, where all uploads together need no more than `room`
+    /// bytes with it. Uploads that end at the same moment on several nodes may exceed it.
     ///
     /// # Errors
     /// [`CatalogueError::Mounted`], [`CatalogueError::Exists`], [`CatalogueError::Changed`],
-    /// [`CatalogueError::Owned`], [`CatalogueError::Unavailable`].
-    fn keep(&self, file: Checked, naming: &Naming) -> Result<Kept, CatalogueError>;
+    /// [`CatalogueError::Owned`], [`CatalogueError::Full`], [`CatalogueError::Unavailable`].
+    fn keep(&self, file: Checked, naming: &Naming, room: u64) -> Result<Kept, CatalogueError>;
 
     /// The checksum of the content to which a removable name refers.
     ///
@@ -135,6 +136,14 @@ pub struct Tally {
 }
 
 impl Tally {
+    /// Fails unless `more` bytes find room beside these.
+    fn admit(self, more: u64, room: u64) -> Result<(), CatalogueError> {
+        if self.bytes.saturating_add(more) > room {
+            return Err(CatalogueError::Full { room });
+        }
+        Ok(())
+    }
+
     fn plus(self, other: Self) -> Self {
         Self {
             datasets: self.datasets + other.datasets,

@@ -33,7 +33,8 @@ fn lay(catalogue: &dyn Catalogue, naming: &Naming) -> Result<Kept, CatalogueErro
         let failure = staged.failure();
         return Err(failure.expect("a write that fails says why"));
     }
-    catalogue.keep(staged.check(None, Declaration::default())?, naming)
+    let checked = staged.check(None, Declaration::default())?;
+    catalogue.keep(checked, naming, u64::MAX)
 }
 
 #[cfg(test)]

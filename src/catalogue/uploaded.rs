@@ -95,12 +95,18 @@ impl Uploaded {
         Ok(())
     }
 
-    fn keep_content(&self, state: &mut State, file: &Checked) -> Result<(), CatalogueError> {
+    fn keep_content(
+        &self,
+        state: &mut State,
+        file: &Checked,
+        room: u64,
+    ) -> Result<(), CatalogueError> {
         let path = self.content(&file.sha256);
         if state.contents.contains_key(&file.sha256) && path.is_file() {
             return Ok(());
         }
         let content = Content::of(file);
+        state.tally().admit(content.bytes, room)?;
         self.write(&path.with_extension("json"), &content)?;
         file.staged
             .put(&path)
@@ -146,12 +152,7 @@ impl Uploads for Uploaded {
     }
 
     fn tally(&self) -> Tally {
-        let state = self.lock();
-        Tally {
-            datasets: state.names.len() as u64,
-            bytes: state.contents.values().map(|content| content.bytes).sum(),
-            cached_bytes: 0,
-        }
+        self.lock().tally()
     }
 
     fn stage(&self, limit: u64) -> Result<Staged, CatalogueError> {
@@ -217,12 +218,12 @@ impl Uploads for Uploaded {
         Name::permit(self.lock().names.get(&naming.name), naming)
     }
 
-    fn keep(&self, file: &Checked, naming: &Naming) -> Result<Kept, CatalogueError> {
+    fn keep(&self, file: &Checked, naming: &Naming, room: u64) -> Result<Kept, CatalogueError> {
         let name = naming.name.clone();
         let mut state = self.lock();
         let before = state.names.get(&name).cloned();
         Name::permit(before.as_ref(), naming)?;
-        self.keep_content(&mut state, file)?;
+        self.keep_content(&mut state, file, room)?;
         let kept = Name::kept(before.as_ref(), file);
         if kept == Kept::Unchanged {
             return Ok(kept);
@@ -285,6 +286,14 @@ impl Uploads for Uploaded {
 }
 
 impl State {
+    fn tally(&self) -> Tally {
+        Tally {
+            datasets: self.names.len() as u64,
+            bytes: self.contents.values().map(|content| content.bytes).sum(),
+            cached_bytes: 0,
+        }
+    }
+
     /// Contents without a name; none while a record that cannot be read may name them.
     fn unnamed(&self) -> Vec<String> {
         if !self.unread.is_empty() {

@@ -295,6 +295,13 @@ fn limits() -> Vec<Setting> {
             |c| &mut c.limits.terrain_bytes,
         ),
         row(
+            "limits.terrains_bytes",
+            "BYTES",
+            "Length of all uploaded datasets together",
+            1..,
+            |c| &mut c.limits.terrains_bytes,
+        ),
+        row(
             "limits.peaks",
             "N",
             "Peaks of an analytic terrain",

@@ -16,6 +16,8 @@ pub struct Limits {
     pub terrain_nodes: usize,
     /// Size of an uploaded dataset, bytes; checked while it is received.
     pub terrain_bytes: u64,
+    /// Size of all uploaded datasets together, bytes; checked when one more is to be kept.
+    pub terrains_bytes: u64,
     /// Peaks of an analytic terrain.
     pub peaks: usize,
     /// Free waypoints, N.
@@ -39,6 +41,7 @@ impl Limits {
         polygon_vertices: usize::MAX,
         terrain_nodes: usize::MAX,
         terrain_bytes: u64::MAX,
+        terrains_bytes: u64::MAX,
         peaks: usize::MAX,
         waypoints: usize::MAX,
         population: usize::MAX,
@@ -56,6 +59,7 @@ impl Default for Limits {
             polygon_vertices: 20_000,
             terrain_nodes: 4_000_000,
             terrain_bytes: 1 << 30,
+            terrains_bytes: 1 << 34,
             peaks: 1_000,
             waypoints: 200,
             population: 10_000,

@@ -36,7 +36,7 @@ impl Shared {
     }
 
     /// Make sure that a content is on the shelf and not about to be removed.
-    pub(super) fn shelve(&self, file: &Checked) -> Result<(), CatalogueError> {
+    pub(super) fn shelve(&self, file: &Checked, room: u64) -> Result<(), CatalogueError> {
         let sha256 = &file.sha256;
         loop {
             let view = self.view()?;
@@ -46,13 +46,15 @@ impl Shared {
             if view.contents.contains_key(sha256) {
                 continue;
             }
+            let content = Content::of(file);
+            view.tally().admit(content.bytes, room)?;
             let mut bytes = file
                 .staged
                 .reader()
                 .map_err(|error| CatalogueError::unavailable("read", file.staged.path(), error))?;
             let put = self.shelf.put(&mut bytes).map_err(CatalogueError::shelf)?;
             let content = Shelved {
-                content: Content::of(file),
+                content,
                 headers: Headers::of(&file.metadata),
                 file: put.clone(),
                 unneeded: false,

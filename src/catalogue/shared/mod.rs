@@ -146,12 +146,9 @@ impl Uploads for Shared {
     }
 
     fn tally(&self) -> Tally {
-        let view = self.last_view();
-        let contents = view.contents.values();
         Tally {
-            datasets: view.names.len() as u64,
-            bytes: contents.map(|content| content.content.bytes).sum(),
             cached_bytes: self.cache.bytes(),
+            ..self.last_view().tally()
         }
     }
 
@@ -174,10 +171,10 @@ impl Uploads for Shared {
         Name::permit(self.view()?.names.get(&naming.name), naming)
     }
 
-    fn keep(&self, file: &Checked, naming: &Naming) -> Result<Kept, CatalogueError> {
+    fn keep(&self, file: &Checked, naming: &Naming, room: u64) -> Result<Kept, CatalogueError> {
         // Before sending bytes in vain.
         self.permit(naming)?;
-        self.shelve(file)?;
+        self.shelve(file, room)?;
         let key = name_key(&naming.name);
         let kept = loop {
             let view = self.view()?;
@@ -192,7 +189,7 @@ impl Uploads for Shared {
             }
         };
         // A removal of the content that began before it had the name is either complete now or will see the name.
-        self.shelve(file)?;
+        self.shelve(file, u64::MAX)?;
         if let Err(error) = self.cache.adopt(file) {
             tracing::warn!(%error, "an uploaded dataset is not kept on this node; it will be fetched");
         }

@@ -6,6 +6,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::headers::Headers;
+use crate::catalogue::Tally;
 use crate::catalogue::records::{Content, Name};
 use crate::catalogue::shelf::{Change, Changes};
 
@@ -45,6 +46,15 @@ pub(super) fn content_key(sha256: &str) -> String {
 }
 
 impl View {
+    pub(super) fn tally(&self) -> Tally {
+        let contents = self.contents.values();
+        Tally {
+            datasets: self.names.len() as u64,
+            bytes: contents.map(|content| content.content.bytes).sum(),
+            cached_bytes: 0,
+        }
+    }
+
     /// Apply later changes; those already known have no effect.
     pub(super) fn learn(&mut self, changes: Changes) {
         for change in changes.changes {

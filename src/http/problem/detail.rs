@@ -82,6 +82,9 @@ impl Problem {
             Self::TerrainTooLarge(limit) => {
                 format!("the dataset is longer than {limit} bytes, the limit terrain_bytes of GET /limits")
             }
+            Self::TerrainsFull(room) => {
+                format!("with this dataset, all uploaded ones would be longer than {room} bytes, the limit terrains_bytes of GET /limits; delete some first")
+            }
             Self::UploadStalled(limit) => {
                 let limit = limit.as_secs_f64();
                 format!("nothing came for {limit} s, or less than 8 KiB a second on the whole")

@@ -111,6 +111,7 @@ impl From<CatalogueError> for Problem {
             CatalogueError::Owned { .. } => Self::Forbidden(Scope::Admin),
             CatalogueError::Unreadable(_) => Self::InvalidTerrain(detail),
             CatalogueError::TooLarge { limit } => Self::TerrainTooLarge(limit),
+            CatalogueError::Full { room } => Self::TerrainsFull(room),
             CatalogueError::Unavailable { error, .. } => {
                 tracing::error!(error = detail, "the datasets cannot be reached");
                 Self::StoreUnavailable(Some(match error.kind() {

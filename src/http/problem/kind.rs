@@ -163,6 +163,11 @@ impl Problem {
                 "body-too-large",
                 "The body is too large",
             ),
+            Self::TerrainsFull(_) => (
+                StatusCode::PAYLOAD_TOO_LARGE,
+                "terrains-full",
+                "The datasets have no more room",
+            ),
             Self::UnsupportedMediaType { .. } | Self::UnsupportedCoding(_) => (
                 StatusCode::UNSUPPORTED_MEDIA_TYPE,
                 "unsupported-media-type",

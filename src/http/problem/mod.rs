@@ -55,6 +55,8 @@ pub(super) enum Problem {
     PreconditionFailed(String),
     /// A dataset is too long; the limit in bytes.
     TerrainTooLarge(u64),
+    /// All datasets together would be too long; the limit in bytes.
+    TerrainsFull(u64),
     /// A dataset came too slowly; how long it may pause.
     UploadStalled(Duration),
     /// The maximum number of datasets is being uploaded.

@@ -32,7 +32,7 @@ pub(in crate::http) async fn put(
     permit(&state.terrains, naming.clone()).await?;
     let staged = receive(&state, &headers, body).await?;
     let checked = check(&state.terrains, staged, said).await?;
-    let (kept, entry) = keep(&state.terrains, checked, naming).await?;
+    let (kept, entry) = keep(&state, checked, naming).await?;
     let answer = answer(&state, entry).await?;
     Ok(match kept {
         Kept::Created => created(answer, &uri),
@@ -86,14 +86,16 @@ async fn check(terrains: &Terrains, staged: Staged, said: Said) -> Result<Checke
 
 /// Store it under its name.
 async fn keep(
-    terrains: &Terrains,
+    state: &AppState,
     checked: Checked,
     naming: Naming,
 ) -> Result<(Kept, Entry), Problem> {
     let sha256 = checked.sha256().to_owned();
-    let (kept, entry) = terrains
+    let room = state.rules.limits.terrains_bytes;
+    let (kept, entry) = state
+        .terrains
         .ask(move |catalogue| {
-            let kept = catalogue.keep(checked, &naming)?;
+            let kept = catalogue.keep(checked, &naming, room)?;
             Ok((kept, catalogue.entry(&naming.name)?))
         })
         .await?;

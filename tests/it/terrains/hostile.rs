@@ -13,6 +13,7 @@ use futures_util::StreamExt as _;
 use futures_util::future::join_all;
 use futures_util::stream;
 use noctule::http;
+use noctule::scenario::limits::Limits;
 use serde_json::json;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
@@ -26,9 +27,13 @@ use crate::support::server::Server;
 
 /// A service that limits datasets to `terrain_bytes`.
 fn with_limit(terrain_bytes: u64) -> Api {
+    with_limits(|limits| limits.terrain_bytes = terrain_bytes)
+}
+
+fn with_limits(set: impl FnOnce(&mut Limits)) -> Api {
     let mut api = Api::new();
     let mut rules = (*api.state.rules).clone();
-    rules.limits.terrain_bytes = terrain_bytes;
+    set(&mut rules.limits);
     api.state.rules = Arc::new(rules);
     api.router = http::router(api.state.clone());
     api
@@ -353,4 +358,31 @@ async fn a_full_disk_refuses_the_upload_and_the_service_goes_on() {
     // Only the dataset that ships with the program.
     assert_eq!(kept(&uploads), [2, 1, 0]);
     assert_eq!(upload(tiff([200, 100])).await.status(), 201);
+}
+
+/// All datasets together have a limit, too. Content that is there already needs no more room, whatever its name.
+#[tokio::test]
+async fn datasets_beyond_the_room_for_all_are_refused_and_leave_nothing() {
+    let (first, second) = (hill(100.0), hill(250.0));
+    let room = (first.len() + second.len() - 1) as u64;
+    let api = with_limits(|limits| limits.terrains_bytes = room);
+    let answer = put(&api, "/terrains/first", first.clone()).await;
+    assert_eq!(answer.status, 201, "{answer:?}");
+    let refused = put(&api, "/terrains/second", second.clone()).await;
+    let problem = refused.expect_problem(413, "terrains-full");
+    let detail = problem["detail"].as_str().expect("text");
+    assert!(
+        detail.contains("terrains_bytes") && detail.contains(&room.to_string()),
+        "{detail}"
+    );
+    assert_eq!(kept(&api.uploads()), [2, 1, 0]);
+
+    for (name, status) in [("first", 200), ("again", 201)] {
+        let answer = put(&api, &format!("/terrains/{name}"), first.clone()).await;
+        assert_eq!(answer.status, status, "{answer:?}");
+    }
+    // The old content of a name stays for plans that may be about to be accepted.
+    let refused = put(&api, "/terrains/again", second).await;
+    refused.expect_problem(413, "terrains-full");
+    assert_eq!(kept(&api.uploads()), [2, 2, 0]);
 }

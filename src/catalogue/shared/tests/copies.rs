@@ -102,7 +102,9 @@ fn nodes_with_one_directory_have_a_cache_each() {
         staged.check(None, Declaration::default()).expect("right")
     });
     let checked = checked.expect("there is room");
-    nodes[0].keep(&checked, &naming("hill")).expect("kept");
+    nodes[0]
+        .keep(&checked, &naming("hill"), u64::MAX)
+        .expect("kept");
     for node in &nodes {
         assert_eq!(height(&node.find("hill", None).expect("found")), 9);
     }

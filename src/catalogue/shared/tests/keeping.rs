@@ -10,6 +10,23 @@ use crate::catalogue::{CatalogueError, Claim, Expected, Kept, Naming};
 use crate::terrain::DatasetError;
 
 #[test]
+fn nodes_share_the_room_for_all_files() {
+    let (_, a, b) = two();
+    let (first, second) = (a.checked(100), b.checked(250));
+    let room = first.staged.bytes() + second.staged.bytes() - 1;
+    a.shared
+        .keep(&first, &naming("hill"), room)
+        .expect("room for one");
+    let kept = b.shared.keep(&second, &naming("other"), room);
+    assert!(matches!(kept, Err(CatalogueError::Full { room: told }) if told == room));
+    assert_eq!(a.shared.tally().datasets, 1);
+    let kept = b.shared.keep(&b.checked(100), &naming("other"), room);
+    assert_eq!(kept.expect("the content is there"), Kept::Created);
+    let kept = b.shared.keep(&second, &naming("other"), room + 1);
+    assert_eq!(kept.expect("room for both"), Kept::Replaced);
+}
+
+#[test]
 fn what_one_node_keeps_every_node_finds() {
     let (_, a, b) = two();
     assert!(b.shared.entries().expect("it is there").is_empty());
@@ -56,7 +73,7 @@ fn who_expects_something_else_or_owns_nothing_is_refused_on_every_node() {
     let keep = |node: &Node, height: u32, naming: &Naming| {
         let checked = node.checked(height);
         let sha256 = checked.sha256().to_owned();
-        node.shared.keep(&checked, naming).map(|_| sha256)
+        node.shared.keep(&checked, naming, u64::MAX).map(|_| sha256)
     };
     let first = keep(&a, 1, &naming("ada", Expected::Nothing)).expect("it is new");
     let refused = |error: CatalogueError, expected: &str| {
@@ -95,11 +112,11 @@ fn of_two_replacements_one_is_refused() {
         let (tell, told) = mpsc::channel();
         let theirs = naming.clone();
         let meanwhile = move || {
-            let kept = b.shared.keep(&b.checked(2), &theirs);
+            let kept = b.shared.keep(&b.checked(2), &theirs, u64::MAX);
             tell.send(kept).expect("somebody listens");
         };
         shelf.trouble_in(step, Trouble::Interrupted(Box::new(meanwhile)));
-        let ours = a.shared.keep(&a.checked(3), &naming);
+        let ours = a.shared.keep(&a.checked(3), &naming, u64::MAX);
         let Ok(theirs) = told.try_recv() else {
             assert!(step > 5 && shelf.calm() && ours.is_ok(), "step {step}");
             continue;

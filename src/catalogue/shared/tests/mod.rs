@@ -64,7 +64,8 @@ impl Node {
     }
 
     pub(super) fn keep(&self, name: &str, height: u32) -> Result<Kept, CatalogueError> {
-        self.shared.keep(&self.checked(height), &naming(name))
+        self.shared
+            .keep(&self.checked(height), &naming(name), u64::MAX)
     }
 
     fn find(&self, name: &str) -> Result<Found, DatasetError> {

@@ -2,13 +2,18 @@
 
 import { Refused, Said, ask, onKeyNeeded, send } from './api.js';
 import { Again } from './again.js';
+import { cameraOf } from './camera.js';
 import { Chart } from './chart.js';
-import { atMost, by, calmly, el } from './dom.js';
+import { atMost, by, calmly } from './dom.js';
 import { Draft } from './draft.js';
+import { onDrop } from './dropped.js';
 import { Editor } from './editor.js';
+import { showFigures, showNone, verdict } from './figures.js';
 import { Followed } from './followed.js';
 import { axes, isGeodetic, written } from './frame.js';
 import { readFile } from './import.js';
+import { askForKey } from './key.js';
+import { attempt, say, tell } from './notice.js';
 import { OTHERS, onSchemeChange, palette } from './palette.js';
 import { Plans } from './plans.js';
 import { showResult } from './result.js';
@@ -16,32 +21,22 @@ import { fileName, saveBlob, saveFrom } from './save.js';
 import { World } from './scene.js';
 import { Stage } from './stage.js';
 import { Strip } from './strip.js';
+import { turn } from './tabs.js';
 import { Tools } from './tools.js';
-import { cost, metres, number } from './words.js';
+import { metres, number } from './words.js';
 
 const VALIDATE_MS = 300;
-const TURN = Math.PI / 12;
 const EMPTY = {
   name: 'untitled', frame: 'local', start: { x: 100, y: 100, z: 50 }, target: { x: 900, y: 900, z: 50 },
   area: { min: { x: 0, y: 0 }, max: { x: 1000, y: 1000 } }, threats: [], terrain: { kind: 'flat', elevation: 0 }, altitude: { min: 20, max: 120 },
 };
 
 const draft = new Draft();
-const notice = by('notice');
 let busy = false;
 /** The document that the plan in front was made of. */
 let planned = null;
 
-// -- The key ---------------------------------------------------------------------------------------
-
-onKeyNeeded((why) => new Promise((given) => {
-  const dialog = by('key');
-  by('key-why').textContent = why ?? 'Plans belong to the holder of a key.';
-  by('key-field').value = '';
-  dialog.returnValue = '';
-  dialog.addEventListener('close', () => given(dialog.returnValue === 'use' ? by('key-field').value.trim() : null), { once: true });
-  dialog.showModal();
-}));
+onKeyNeeded(askForKey);
 
 // -- The parts -------------------------------------------------------------------------------------
 
@@ -105,28 +100,6 @@ const plans = new Plans(by('plans'), {
     lift(id);
   },
 }, () => ({ shown: stage.plan?.id ?? null, compared: new Map([...stage.compared].map(([id, other]) => [id, other.color])) }));
-
-// -- Saying ----------------------------------------------------------------------------------------
-
-function say(text) { by('said').textContent = text; }
-
-function tell(text, kind = 'bad') {
-  notice.hidden = !text;
-  notice.className = `notice ${kind}`;
-  notice.replaceChildren(text, el('button', { type: 'button', class: 'quiet', 'aria-label': 'Dismiss', onclick: () => tell('') }, '✕'));
-  if (text) say(text);
-}
-
-async function attempt(act) {
-  try {
-    tell('');
-    await act();
-  } catch (error) {
-    if (error.name === 'AbortError') return;
-    tell(error instanceof TypeError && /fetch/i.test(error.message) ? 'The service cannot be reached.' : error.message);
-    if (!(error instanceof Said)) console.warn(error);
-  }
-}
 
 // -- The scenario ----------------------------------------------------------------------------------
 
@@ -221,9 +194,8 @@ function show(plan) {
   plan?.addEventListener('news', ({ detail }) => plan === stage.plan && heard(plan, detail));
   if (plan) for (const what of ['status', 'search']) heard(plan, what);
   else {
-    by('state').hidden = by('stale').hidden = true;
-    by('cancel').hidden = by('replan').hidden = true;
-    by('figures').replaceChildren(el('p', { class: 'faint' }, 'Press Plan, and watch the swarm look for a route.'));
+    by('stale').hidden = true;
+    showNone();
     showResult(by('result'), {}, {});
   }
   remember();
@@ -245,46 +217,10 @@ function heard(plan, what) {
     if (plan.connected) say('Connected again.');
   }
   if (['incumbent', 'search'].includes(what)) soon();
-  else figures(plan);
+  else showFigures(plan);
 }
 
-const soon = atMost(100, () => stage.plan && figures(stage.plan));
-
-function verdict(plan) {
-  if (!plan.result) return `The plan has ${plan.status.status}.`;
-  const { feasible, cost: price, bound } = plan.result;
-  return feasible ? `A route was found: cost ${cost(price.total)}${bound.gap === null ? '' : `, proven gap ${number(bound.gap * 100, 2)} per cent`}.` : 'No feasible route was found.';
-}
-
-function figures(plan) {
-  const { status, latest, result: end } = plan;
-  const state = by('state');
-  const active = ['queued', 'running'].includes(status?.status) && !plan.lostBecause;
-  const name = end && !end.feasible ? 'infeasible' : status?.status ?? 'opening';
-  state.hidden = false;
-  state.className = `state ${name}`;
-  state.textContent = plan.connected ? name : plan.lostBecause ? 'lost' : 'reconnecting';
-  by('cancel').hidden = !active;
-  by('cancel').disabled = Boolean(status?.cancel_requested);
-  by('replan').hidden = !end;
-  const last = plan.points.at(-1);
-  const best = end?.cost.total ?? last?.best_cost ?? (latest?.feasible ? latest.cost : null) ?? status?.best_cost;
-  const iterations = status?.iterations ?? 0;
-  const iteration = Math.min(last?.iteration ?? status?.iteration ?? 0, iterations);
-  const share = end ? 1 : iterations ? iteration / iterations : 0;
-  const bar = el('progress', { max: 1, value: share, 'aria-label': 'Progress of the search' });
-  by('figures').replaceChildren(
-    el('p', { class: `big ${name}` }, el('b', {}, cost(best ?? null)), el('span', { class: 'faint' }, told(plan, best))),
-    ...(active ? [bar, el('p', { class: 'faint' }, `Iteration ${iteration} of ${iterations}`, last ? `, ${number(last.feasible_fraction * 100, 0)} % of the swarm feasible` : '')] : []));
-}
-
-/** What the figure beside it is. */
-function told({ status, result: end }, best) {
-  if (end && !end.feasible) return 'cost of a route that must not be flown';
-  if (best !== null && best !== undefined) return 'cost of the best route';
-  if (status?.status !== 'queued') return 'no feasible route yet';
-  return status.queue_position ? `waiting, number ${status.queue_position} in the queue` : 'waiting';
-}
+const soon = atMost(100, () => stage.plan && showFigures(stage.plan));
 
 function result(plan) {
   showResult(by('result'), { result: plan.result, scenario: plan.scenario, status: plan.ended ? plan.status : null, refusal: plan.refusal, geodetic: isGeodetic(plan.scenario) }, {
@@ -401,24 +337,7 @@ by('cancel').addEventListener('click', () => attempt(() => stage.plan.cancel()))
 by('undo').addEventListener('click', () => draft.undo());
 by('redo').addEventListener('click', () => draft.redo());
 
-function turn(name) {
-  for (const tab of document.querySelectorAll('[role=tab]')) {
-    const on = tab.id === `tab-${name}`;
-    tab.setAttribute('aria-selected', String(on));
-    tab.tabIndex = on ? 0 : -1;
-    by(tab.getAttribute('aria-controls')).hidden = !on;
-  }
-  if (name === 'plans') plans.look();
-}
-for (const tab of document.querySelectorAll('[role=tab]')) {
-  tab.addEventListener('click', () => turn(tab.id.slice(4)));
-  tab.addEventListener('keydown', (event) => {
-    if (!['ArrowLeft', 'ArrowRight'].includes(event.key)) return;
-    const other = [...document.querySelectorAll('[role=tab]')].find((one) => one !== tab);
-    turn(other.id.slice(4));
-    other.focus();
-  });
-}
+by('plans').addEventListener('turned', () => plans.look());
 
 addEventListener('keydown', (event) => {
   if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== 'z') return;
@@ -429,45 +348,12 @@ addEventListener('keydown', (event) => {
   else draft.undo();
 });
 
-let dragged = 0;
-addEventListener('dragenter', (event) => {
-  if (!event.dataTransfer?.types.includes('Files')) return;
-  dragged += 1;
-  by('drop').hidden = false;
-});
-addEventListener('dragleave', () => {
-  dragged = Math.max(0, dragged - 1);
-  by('drop').hidden = dragged === 0;
-});
-addEventListener('dragover', (event) => event.preventDefault());
-addEventListener('drop', (event) => {
-  event.preventDefault();
-  dragged = 0;
-  by('drop').hidden = true;
-  const [file] = event.dataTransfer.files;
-  if (file) attempt(() => openFile(file));
-});
+onDrop((file) => attempt(() => openFile(file)));
 addEventListener('hashchange', () => attempt(() => recall(location.hash)));
 
 if (world) {
   stage.tools = new Tools({ bar: by('tools'), hint: by('hint'), world, draft, stage, pointed: (pixel) => stage.pointAt(pixel) });
-  const times = el('select', { id: 'exaggeration', 'aria-label': 'Heights are drawn', title: 'Heights', onchange: () => { world.exaggeration = Number(times.value); } },
-    [1, 2, 3, 5].map((value) => el('option', { value }, `heights × ${value}`)));
-  by('camera').append(times,
-    el('button', { type: 'button', onclick: () => world.look('oblique') }, 'Oblique'),
-    el('button', { type: 'button', onclick: () => world.look('above') }, 'Above'),
-    el('button', { type: 'button', 'aria-label': 'Nearer', onclick: () => world.zoom(0.8) }, '+'),
-    el('button', { type: 'button', 'aria-label': 'Farther', onclick: () => world.zoom(1.25) }, '−'),
-    el('button', { type: 'button', 'aria-label': 'Turn left', title: 'Turn left', onclick: () => world.turn(-TURN) }, '⟲'),
-    el('button', { type: 'button', 'aria-label': 'Turn right', title: 'Turn right', onclick: () => world.turn(TURN) }, '⟳'));
-  // Low hills under a wide sky look flat; they are drawn higher, and the box says so.
-  stage.exaggerate = (ground, ceiling) => {
-    const width = Math.max(ground.extent.max.x - ground.extent.min.x, ground.extent.max.y - ground.extent.min.y);
-    const wanted = (0.2 * width) / Math.max(ceiling - ground.least, 1);
-    const value = wanted < 1.5 ? 1 : wanted < 2.5 ? 2 : wanted < 4 ? 3 : 5;
-    times.value = String(value);
-    return value;
-  };
+  stage.exaggerate = cameraOf(world);
 }
 
 // What is shown, for tests and for the curious: to look at, not to change.

@@ -68,18 +68,21 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 38] = [
+static FILES: [File; 44] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
     file!("again.js"),
     file!("api.js"),
     file!("backdrop.js"),
+    file!("camera.js"),
     file!("chart.js"),
     file!("describe.js"),
     file!("dom.js"),
     file!("draft.js"),
+    file!("dropped.js"),
     file!("editor.js"),
+    file!("figures.js"),
     file!("followed.js"),
     file!("form.js"),
     file!("format.js"),
@@ -87,8 +90,10 @@ static FILES: [File; 38] = [
     file!("graphics.js"),
     file!("ground.js"),
     file!("import.js"),
+    file!("key.js"),
     file!("labels.js"),
     file!("main.js"),
+    file!("notice.js"),
     file!("palette.js"),
     file!("plans.js"),
     file!("relief.js"),
@@ -99,6 +104,7 @@ static FILES: [File; 38] = [
     file!("stage.js"),
     file!("stream.js"),
     file!("strip.js"),
+    file!("tabs.js"),
     file!("tools.js"),
     file!("turns.js"),
     file!("volumes.js"),

@@ -1,0 +1,15 @@
+// The dialogue that asks for the key of the service.
+
+import { by } from './dom.js';
+
+/** Promises the key that is given, or null. `why` is what the service said to the one before. */
+export function askForKey(why) {
+  return new Promise((given) => {
+    const dialog = by('key');
+    by('key-why').textContent = why ?? 'Plans belong to the holder of a key.';
+    by('key-field').value = '';
+    dialog.returnValue = '';
+    dialog.addEventListener('close', () => given(dialog.returnValue === 'use' ? by('key-field').value.trim() : null), { once: true });
+    dialog.showModal();
+  });
+}

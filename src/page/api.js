@@ -52,15 +52,27 @@ export async function send(path, { method = 'GET', body, type = 'application/jso
     if (answer.status !== 401) throw new Refused(answer.status, problem);
     // Another request may have brought one meanwhile; else one dialogue for all that wait.
     if (key === used) {
-      if (quiet && declined) throw new Refused(answer.status, problem);
+      if (quiet && declined) throw keyless(answer.status, problem);
       asking ??= keyAsker(used ? problem?.detail : null).finally(() => { asking = null; });
       const given = await asking;
       declined = !given;
-      if (!given) throw new Refused(answer.status, problem);
+      if (!given) throw keyless(answer.status, problem);
       key = given;
     }
   }
 }
+
+/** Each browser has words of its own for a fetch that failed. */
+async function reach(path, options) {
+  try {
+    return await fetch(path, options);
+  } catch (error) {
+    throw error instanceof TypeError ? new Unreachable() : error;
+  }
+}
+
+/** The service says how a program sends a key; a person is asked for one. */
+const keyless = (status, problem) => new Refused(status, { ...problem, detail: 'This needs a key of the service, and none was given.' });
 
 /** The same, as JSON. */
 export async function ask(path, options) {

@@ -2,6 +2,8 @@
 
 import { by } from './dom.js';
 
+by('key-no').addEventListener('click', () => by('key').close(''));
+
 /** Promises the key that is given, or null. `why` is what the service said to the one before. */
 export function askForKey(why) {
   return new Promise((given) => {
@@ -9,7 +11,7 @@ export function askForKey(why) {
     by('key-why').textContent = why ?? 'Plans belong to the holder of a key.';
     by('key-field').value = '';
     dialog.returnValue = '';
-    dialog.addEventListener('close', () => given(dialog.returnValue === 'use' ? by('key-field').value.trim() : null), { once: true });
+    dialog.addEventListener('close', () => given(dialog.returnValue === 'use' ? by('key-field').value.trim() || null : null), { once: true });
     dialog.showModal();
   });
 }

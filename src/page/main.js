@@ -337,7 +337,7 @@ by('cancel').addEventListener('click', () => attempt(() => stage.plan.cancel()))
 by('undo').addEventListener('click', () => draft.undo());
 by('redo').addEventListener('click', () => draft.redo());
 
-by('plans').addEventListener('turned', () => plans.look());
+by('plans').addEventListener('turned', () => plans.look(true));
 
 addEventListener('keydown', (event) => {
   if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== 'z') return;

@@ -34,19 +34,20 @@ export class Plans {
     document.addEventListener('visibilitychange', () => this.#again());
   }
 
-  /** Looks now, and from time to time while the list is in sight. */
-  async look() {
+  /** Looks now, and from time to time while the list is in sight; `asking` for a key if need be. */
+  async look(asking = false) {
     clearTimeout(this.#timer);
     const query = new URLSearchParams({ limit: String(PAGE) });
     if (this.filter.value) query.set('status', this.filter.value);
     if (this.#cursor) query.set('cursor', this.#cursor);
     try {
-      const page = await ask(`/plans?${query}`, { quiet: true });
+      const page = await ask(`/plans?${query}`, { quiet: !asking });
       this.#next = page.links.next ? new URL(page.links.next, location.origin).searchParams.get('cursor') : null;
       this.#show(page.plans);
       this.note.textContent = page.plans.length ? '' : 'None here.';
     } catch (refusal) {
-      this.note.textContent = `The list could not be read: ${refusal.message}`;
+      this.note.textContent = `The list could not be read: ${refusal.message} `;
+      if (refusal.status === 401) this.note.append(el('button', { type: 'button', onclick: () => this.look(true) }, 'Give a key…'));
     }
     this.#again();
   }

@@ -83,6 +83,38 @@ test('the keyboard alone leads from a scenario to a read result', async () => {
   await page.done();
 });
 
+test('Enter uses the key, and after a no what needs one asks again', async (t) => {
+  const directory = mkdtempSync(join(tmpdir(), 'noctule-keys-'));
+  t.after(() => rmSync(directory, { recursive: true, force: true }));
+  const made_ = spawnSync(process.env.NOCTULE_BIN, ['key', 'new', '--name', 'planner', '--scopes', 'plan'], { encoding: 'utf8', cwd: directory });
+  writeFileSync(join(directory, 'keys.toml'), made_.stdout);
+  const key = made_.stderr.trim().split('\n').at(-1);
+  const guarded = await service('--keys-file', join(directory, 'keys.toml'));
+  t.after(guarded.stop);
+  const page = await open(chrome, guarded.url);
+  await page.waitForSelector('#key[open]');
+  await page.keyboard.press('Escape');
+  await drawn(page, FIRST);
+  await page.click('#plan');
+  await page.waitForSelector('#key[open]');
+  await page.click('#key-no');
+  await page.waitForFunction(() => /This needs a key/.test(document.getElementById('notice').textContent));
+  await page.click('#tab-plans');
+  await page.waitForSelector('#key[open]');
+  await page.click('#key-no');
+  await page.click('text="Give a key…"');
+  await page.waitForSelector('#key[open]');
+  await page.keyboard.type(key);
+  await page.keyboard.press('Enter');
+  await page.waitForFunction(() => /None here/.test(document.getElementById('plans').textContent));
+  await page.selectOption('#plans-filter', 'running');
+  await page.click('#tab-scenario');
+  await page.selectOption('#source', 'paper-1');
+  await drawn(page, 3);
+  await plan(page);
+  await page.done();
+});
+
 test('a service with keys is asked with one, kept in memory, and followed with tickets', async (t) => {
   const directory = mkdtempSync(join(tmpdir(), 'noctule-keys-'));
   const made_ = spawnSync(process.env.NOCTULE_BIN, ['key', 'new', '--name', 'planner', '--scopes', 'plan'], { encoding: 'utf8', cwd: directory });

@@ -21,6 +21,11 @@ export function forgetKey() {
 /** Something that a person can understand and do something about. */
 export class Said extends Error {}
 
+/** No answer at all. */
+export class Unreachable extends Said {
+  constructor() { super('The service cannot be reached.'); }
+}
+
 /** A refusal: the problem document, or what stood in its place. */
 export class Refused extends Said {
   constructor(status, problem) {
@@ -37,7 +42,7 @@ export class Refused extends Said {
 export async function send(path, { method = 'GET', body, type = 'application/json', headers = {}, signal, quiet = false } = {}) {
   for (;;) {
     const used = key;
-    const answer = await fetch(path, {
+    const answer = await reach(path, {
       method,
       signal,
       body: body === undefined || typeof body === 'string' || body instanceof Blob ? body : JSON.stringify(body),

@@ -20,9 +20,11 @@ import { showResult } from './result.js';
 import { fileName, saveBlob, saveFrom } from './save.js';
 import { World } from './scene.js';
 import { Stage } from './stage.js';
+import { begunWith, nameShown, named, onStep, stepFrom } from './steps.js';
 import { Strip } from './strip.js';
 import { turn } from './tabs.js';
 import { Tools } from './tools.js';
+import { guard, isKept, keep } from './unsaved.js';
 import { metres, number } from './words.js';
 
 const VALIDATE_MS = 300;
@@ -35,6 +37,10 @@ const draft = new Draft();
 let busy = false;
 /** The document that the plan in front was made of. */
 let planned = null;
+/** Counts what was asked to be shown: an answer that comes after the next question is for nobody. */
+let wishes = 0;
+/** The scenario to begin with. */
+let first = null;
 
 onKeyNeeded(askForKey);
 
@@ -68,7 +74,11 @@ const again = new Again(by('watch'), (iteration, trail) => {
 const editor = new Editor(by('scenario'), draft, {
   load: (name) => attempt(() => load(name)),
   open: (file) => attempt(() => openFile(file)),
-  blank: () => begin(EMPTY),
+  blank: () => {
+    wishes += 1;
+    stepFrom(draft.document);
+    begin(EMPTY);
+  },
   select: (index) => stage.selected !== index && stage.select(index),
   add: (kind) => {
     const { x, y } = stage.middle();
@@ -103,24 +113,33 @@ const plans = new Plans(by('plans'), {
 
 // -- The scenario ----------------------------------------------------------------------------------
 
-async function load(name) {
-  const document_ = await ask(`/scenarios/${encodeURIComponent(name)}`);
+async function load(scenario, step = true) {
+  wishes += 1;
+  const wish = wishes;
+  const document_ = await ask(`/scenarios/${encodeURIComponent(scenario)}`);
+  if (wish !== wishes) return;
+  if (step) stepFrom(draft.document, scenario);
   begin(document_);
-  editor.from(name);
+  editor.from(scenario);
 }
 
-function begin(document_, plan = null) {
+function begin(document_, plan = null, kept = true) {
   // What was laid over one scenario says nothing of another.
   if (!plan) clearCompared();
   show(plan);
   editor.from('');
   draft.replace({ ...document_, planner: { ...document_.planner, warm_start: undefined } });
+  if (kept) keep(draft.document);
   planned = plan ? draft.document : null;
   by('stale').hidden = true;
 }
 
 async function openFile(file) {
+  wishes += 1;
+  const wish = wishes;
   const { document: read, note } = await readFile(file);
+  if (wish !== wishes) return;
+  stepFrom(draft.document);
   begin(read);
   if (note) tell(note, 'note');
 }
@@ -141,7 +160,9 @@ const check = calmly(VALIDATE_MS, async () => {
   }
 });
 
+guard(draft);
 draft.addEventListener('change', () => {
+  by('plan').disabled = false;
   by('undo').disabled = !draft.canUndo;
   by('redo').disabled = !draft.canRedo;
   by('stale').hidden = !stage.plan || draft.document === planned;
@@ -155,19 +176,27 @@ draft.addEventListener('change', () => {
 // -- Planning --------------------------------------------------------------------------------------
 
 async function submit(warm) {
-  if (busy) return;
-  busy = true;
-  by('plan').disabled = by('replan').disabled = true;
+  if (busy || !draft.document) return;
+  occupied(true);
+  wishes += 1;
+  const wish = wishes;
   try {
     const planner = { ...draft.document.planner, ...(warm ? { warm_start: { plan_id: stage.plan.id } } : {}) };
     const before = stage.plan;
     const sent = draft.document;
     const status = await ask('/plans', { method: 'POST', body: { ...draft.document, planner } });
+    keep(sent);
+    if (wish !== wishes) {
+      inList(`“${status.name ?? 'The plan'}” is being planned`);
+      return;
+    }
     if (warm && before) lay(before, `before: ${before.status.name ?? before.id.slice(0, 8)}`);
     const plan = new Followed(status.id, { status });
+    if (before) stepFrom(sent);
     show(plan);
     planned = sent;
     by('stale').hidden = draft.document === sent;
+    if (before && !before.ended && !before.lostBecause) inList(`“${before.status?.name ?? 'The plan before'}” goes on`);
     await plan.open();
     if (!by('plans').hidden) plans.look();
   } catch (error) {
@@ -178,9 +207,19 @@ async function submit(warm) {
     }
     throw error;
   } finally {
-    busy = false;
-    by('plan').disabled = by('replan').disabled = false;
+    occupied(false);
   }
+}
+
+/** Not `disabled`, for a button that is loses the focus. */
+function occupied(yes) {
+  busy = yes;
+  for (const id of ['plan', 'replan']) by(id).setAttribute('aria-disabled', String(yes));
+}
+
+/** Tells of a plan that is not on show. */
+function inList(what) {
+  tell(`${what}, and is in the list of plans.`, 'note', ['Show the list', () => turn('plans')]);
 }
 
 /** Puts a plan in front, or none. */
@@ -303,31 +342,56 @@ async function compare(id, yes, name) {
   stage.drawSearch();
 }
 
-async function open(id) {
+/** Returns whether it is what is wanted still. */
+async function open(id, step = true) {
+  wishes += 1;
+  const wish = wishes;
+  const before = draft.document;
   const plan = stage.compared.get(id)?.plan ?? new Followed(id);
-  await plan.open();
+  try {
+    await plan.open();
+  } catch (refusal) {
+    if (wish === wishes) throw refusal;
+  }
+  if (wish !== wishes) {
+    if (plan !== stage.plan && !stage.compared.has(id)) plan.close();
+    return false;
+  }
+  const edited = draft.document !== before;
+  if (step) stepFrom(draft.document);
   begin(plan.scenario, plan);
   plans.mark();
+  if (edited) tell('The scenario of the plan has replaced what was changed meanwhile; Undo brings that back.', 'note');
+  return true;
 }
 
 // -- The address -----------------------------------------------------------------------------------
 
-function remember() {
-  const query = new URLSearchParams();
-  if (stage.plan) query.set('plan', stage.plan.id);
-  if (stage.compared.size) query.set('with', [...stage.compared.keys()].join(' '));
-  const hash = query.size ? `#${query}` : '';
-  if (hash !== location.hash) history.replaceState(null, '', `${location.pathname}${hash}`);
+function remember() { nameShown(stage.plan?.id, [...stage.compared.keys()]); }
+
+async function recall({ id, others }, step) {
+  if (!(await open(id, step))) return;
+  const wish = wishes;
+  const missing = [];
+  for (const other of others) {
+    if (wish !== wishes) return;
+    await compare(other, true).catch((refusal) => missing.push(refusal.message));
+  }
+  if (missing.length) tell(`Not all plans are laid over this one: ${missing.join('; ')}.`, 'note');
 }
 
-async function recall(hash) {
-  const query = new URLSearchParams(hash.slice(1));
-  const id = query.get('plan');
-  if (!id) return false;
-  await open(id);
-  for (const other of query.get('with')?.split(' ') ?? []) await compare(other, true);
-  return true;
-}
+onStep(() => draft.document, ({ hash, own, draft: before }) => attempt(async () => {
+  const wanted = named(hash);
+  if (wanted) await recall(wanted, false).finally(remember);
+  else if (!own) {
+    remember();
+    if (hash) tell('That address names no plan; what was shown stays.', 'note');
+  } else if (before) {
+    wishes += 1;
+    begin(before, null, isKept(before));
+    if (isKept(before)) editor.from(begunWith());
+  } else await load(begunWith() || first, false);
+}));
 
 // -- Buttons, tabs, keys, files --------------------------------------------------------------------
 
@@ -349,7 +413,6 @@ addEventListener('keydown', (event) => {
 });
 
 onDrop((file) => attempt(() => openFile(file)));
-addEventListener('hashchange', () => attempt(() => recall(location.hash)));
 
 if (world) {
   stage.tools = new Tools({ bar: by('tools'), hint: by('hint'), world, draft, stage, pointed: (pixel) => stage.pointAt(pixel) });
@@ -373,14 +436,34 @@ Object.defineProperty(globalThis, 'noctule', {
 });
 
 const asked = location.hash;
-show(null);
-await attempt(async () => {
-  const [{ scenarios }, { algorithms }] = await Promise.all([ask('/scenarios'), ask('/algorithms')]);
-  editor.menu({ scenarios, algorithms });
-  if (!(await recall(asked).catch((refusal) => {
-    tell(`That plan cannot be opened: ${refusal.message}`);
-    return false;
-  }))) await load(scenarios[0].name);
-});
+
+/** Shows what the address names, or else a scenario. */
+async function start() {
+  const untouched = wishes;
+  try {
+    tell('');
+    by('figures').replaceChildren('Loading…');
+    const [{ scenarios }, { algorithms }] = await Promise.all([ask('/scenarios'), ask('/algorithms')]);
+    first = scenarios[0].name;
+    editor.menu({ scenarios, algorithms });
+    // A file may have been dropped meanwhile.
+    if (wishes !== untouched) return;
+    const wanted = named(asked);
+    const before = scenarios.find((one) => one.name === begunWith()) ?? scenarios[0];
+    const refusal = wanted && await recall(wanted, false).catch((error) => error);
+    if (refusal && !(refusal instanceof Refused)) throw refusal;
+    if (!wanted || refusal) await load(before.name, false);
+    if (refusal) tell(`That plan cannot be opened: ${refusal.message}`, 'bad', refusal.status === 401 ? ['Try again', () => attempt(() => recall(wanted))] : null);
+    else if (asked.length > 1 && !wanted) tell('The address names no plan, so a scenario is shown.', 'note');
+  } catch (error) {
+    by('figures').replaceChildren('Nothing could be loaded.');
+    tell(`The page cannot begin. ${error.message}`, 'bad', ['Try again', start]);
+    if (!(error instanceof Said)) console.warn(error);
+  }
+}
+
+showNone();
+stage.drawSearch();
+await start();
 // Only where the service has datasets, and the caller may see them.
 send('/terrains', { quiet: true }).then((answer) => answer.json()).then(({ terrains }) => editor.menu({ terrains: terrains.map(({ name }) => name) })).catch(() => {});

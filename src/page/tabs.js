@@ -24,3 +24,10 @@ for (const tab of tabs) {
     other.focus();
   });
 }
+
+// It must not change the address, which names what is shown.
+document.querySelector('.skip').addEventListener('click', (event) => {
+  event.preventDefault();
+  turn('scenario');
+  by('scenario').focus();
+});

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
-import { LONG, SMALL, ask, browser, color, FIRST, document_, drawn, fill, made, open, pixels, plan, scene, service } from './support.js';
+import { LONG, SMALL, ask, browser, color, FIRST, document_, drawn, fill, held, made, open, pixels, plan, scene, service } from './support.js';
 
 let site;
 let chrome;
@@ -35,21 +35,6 @@ test('two plans are laid over one another in scene and chart', async () => {
   await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 1);
   await page.done();
 });
-
-/** Holds back responses to matching requests; `release()` lets them through and resolves when the page has them. */
-async function held(page, pattern) {
-  let waiting = [];
-  await page.route(pattern, (route) => (waiting ? waiting.push(route) : route.continue()));
-  return async () => {
-    const all = waiting;
-    waiting = null;
-    await Promise.all(all.map(async (route) => {
-      const answered = page.waitForResponse((response) => response.request() === route.request());
-      await route.continue();
-      await (await answered).finished();
-    }));
-  };
-}
 
 test('what is taken away before it has opened stays away, and what is laid over twice is there once', async () => {
   const named = (name) => made(site.url, { ...SMALL, name });

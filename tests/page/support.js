@@ -46,10 +46,14 @@ export async function service(...settings) {
   return { url, stop };
 }
 
-/** A connection to the service that can be cut: `{url, cut, mend, stop}`. */
+/**
+ * A connection to the service that can be cut: `{url, cut, swallow, mend, stop}`. What is swallowed vanishes without a word to
+ * either end, on connections that were open before.
+ */
 export async function wire(url) {
   const { port } = new URL(url);
   const sockets = new Set();
+  const dead = new Set();
   let whole = true;
   const server = net.createServer((near) => {
     if (!whole) {
@@ -59,7 +63,8 @@ export async function wire(url) {
     const far = net.connect(Number(port), '127.0.0.1');
     for (const [a, b] of [[near, far], [far, near]]) {
       sockets.add(a);
-      a.pipe(b);
+      a.on('data', (bytes) => { if (!dead.has(a)) b.write(bytes); });
+      a.on('end', () => { if (!dead.has(a)) b.end(); });
       a.on('error', () => {});
       a.on('close', () => {
         sockets.delete(a);
@@ -72,7 +77,8 @@ export async function wire(url) {
     whole = false;
     for (const socket of sockets) socket.destroy();
   };
-  return { url: `http://127.0.0.1:${server.address().port}`, cut, mend: () => { whole = true; }, stop: () => { cut(); server.close(); } };
+  const swallow = () => { for (const socket of sockets) dead.add(socket); };
+  return { url: `http://127.0.0.1:${server.address().port}`, cut, swallow, mend: () => { whole = true; }, stop: () => { cut(); server.close(); } };
 }
 
 /** A browser with an empty profile. */
@@ -206,6 +212,21 @@ export async function groundPoint(page, x, y) {
   const z = await page.evaluate(([a, b]) => globalThis.noctule.groundAt(a, b), [x, y]);
   const { x: px, y: py, width } = await around(page, { x, y, z });
   return { x: px + width / 2, y: py + width / 2 };
+}
+
+/** Holds back responses to matching requests; `release()` lets them through and resolves when the page has them. */
+export async function held(page, pattern) {
+  let waiting = [];
+  await page.route(pattern, (route) => (waiting ? waiting.push(route) : route.continue()));
+  return async () => {
+    const all = waiting;
+    waiting = null;
+    await Promise.all(all.map(async (route) => {
+      const answered = page.waitForResponse((response) => response.request() === route.request());
+      await route.continue();
+      await (await answered).finished();
+    }));
+  };
 }
 
 /** Drops a file onto the page. */

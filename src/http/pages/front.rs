@@ -68,7 +68,7 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 44] = [
+static FILES: [File; 46] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
@@ -102,11 +102,13 @@ static FILES: [File; 44] = [
     file!("save.js"),
     file!("scene.js"),
     file!("stage.js"),
+    file!("steps.js"),
     file!("stream.js"),
     file!("strip.js"),
     file!("tabs.js"),
     file!("tools.js"),
     file!("turns.js"),
+    file!("unsaved.js"),
     file!("volumes.js"),
     file!("way.js"),
     file!("words.js"),

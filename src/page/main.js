@@ -4,7 +4,8 @@ import { Refused, Said, ask, onKeyNeeded, send } from './api.js';
 import { Again } from './again.js';
 import { cameraOf } from './camera.js';
 import { Chart } from './chart.js';
-import { atMost, by, calmly } from './dom.js';
+import { checkAsItChanges } from './check.js';
+import { atMost, by } from './dom.js';
 import { Draft } from './draft.js';
 import { onDrop } from './dropped.js';
 import { Editor } from './editor.js';
@@ -27,7 +28,6 @@ import { Tools } from './tools.js';
 import { guard, isKept, keep } from './unsaved.js';
 import { metres, number } from './words.js';
 
-const VALIDATE_MS = 300;
 const EMPTY = {
   name: 'untitled', frame: 'local', start: { x: 100, y: 100, z: 50 }, target: { x: 900, y: 900, z: 50 },
   area: { min: { x: 0, y: 0 }, max: { x: 1000, y: 1000 } }, threats: [], terrain: { kind: 'flat', elevation: 0 }, altitude: { min: 20, max: 120 },
@@ -144,22 +144,7 @@ async function openFile(file) {
   if (note) tell(note, 'note');
 }
 
-let checking = null;
-const check = calmly(VALIDATE_MS, async () => {
-  checking = new AbortController();
-  const { signal } = checking;
-  try {
-    const { scenario } = await ask('/plans?validate_only=true', { method: 'POST', body: draft.document, signal, quiet: true });
-    editor.mark([]);
-    editor.show(scenario);
-    by('plan').removeAttribute('aria-describedby');
-    await stage.sample(scenario, signal);
-  } catch (refusal) {
-    if (refusal.problem?.errors) editor.mark(refusal.problem.errors);
-    else if (refusal instanceof Refused && refusal.status !== 401) tell(refusal.message);
-  }
-});
-
+checkAsItChanges(draft, editor, stage);
 guard(draft);
 draft.addEventListener('change', () => {
   by('plan').disabled = false;
@@ -168,9 +153,6 @@ draft.addEventListener('change', () => {
   by('stale').hidden = !stage.plan || draft.document === planned;
   by('title').textContent = draft.document.name ?? '';
   document.title = draft.document.name ? `${draft.document.name} · Noctule` : 'Noctule';
-  // What is still on its way is about what was.
-  checking?.abort();
-  check();
 });
 
 // -- Planning --------------------------------------------------------------------------------------

@@ -68,7 +68,7 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 46] = [
+static FILES: [File; 47] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
@@ -77,6 +77,7 @@ static FILES: [File; 46] = [
     file!("backdrop.js"),
     file!("camera.js"),
     file!("chart.js"),
+    file!("check.js"),
     file!("describe.js"),
     file!("dom.js"),
     file!("draft.js"),

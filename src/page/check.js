@@ -1,0 +1,36 @@
+// The draft, checked by the service as it changes.
+
+import { Said, Unreachable, ask } from './api.js';
+import { calmly } from './dom.js';
+import { tell, untell } from './notice.js';
+
+const VALIDATE_MS = 300;
+const UNCHECKED = 'The service cannot be reached: what has changed in the scenario is not checked.';
+const MAY_NOT_PLAN = 'This key may look at plans, but may not plan: the scenario is not checked.';
+
+/** Shows faults in `editor`, and has `stage` draw the ground that the service knows. */
+export function checkAsItChanges(draft, editor, stage) {
+  let checking = null;
+  const check = calmly(VALIDATE_MS, async () => {
+    checking = new AbortController();
+    const { signal } = checking;
+    try {
+      const { scenario } = await ask('/plans?validate_only=true', { method: 'POST', body: draft.document, signal, quiet: true });
+      untell(UNCHECKED);
+      editor.mark([]);
+      editor.show(scenario);
+      await stage.sample(scenario, signal);
+    } catch (refusal) {
+      if (refusal.status) untell(UNCHECKED);
+      if (refusal.problem?.errors) editor.mark(refusal.problem.errors);
+      else if (refusal instanceof Unreachable) tell(UNCHECKED);
+      else if (refusal.status === 403) tell(MAY_NOT_PLAN, 'note');
+      else if (refusal instanceof Said && refusal.status !== 401) tell(refusal.message);
+    }
+  });
+  draft.addEventListener('change', () => {
+    // What is still on its way is about what was.
+    checking?.abort();
+    check();
+  });
+}

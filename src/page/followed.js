@@ -66,6 +66,7 @@ export class Followed extends EventTarget {
       this.#stream = follow(this.id, (kind, data) => this.#heard(kind, data), (connected, why) => {
         // What has ended lacks nothing but its history.
         if (this.ended && this.result) return;
+        if (connected === this.connected && (why ?? null) === this.lostBecause) return;
         Object.assign(this, { connected, lostBecause: why ?? null });
         this.#tell('connection');
       }, { aside: this.#aside });

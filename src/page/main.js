@@ -14,7 +14,7 @@ import { Followed } from './followed.js';
 import { axes, isGeodetic, written } from './frame.js';
 import { readFile } from './import.js';
 import { askForKey } from './key.js';
-import { attempt, say, tell } from './notice.js';
+import { attempt, say, tell, untell } from './notice.js';
 import { OTHERS, onSchemeChange, palette } from './palette.js';
 import { Plans } from './plans.js';
 import { showResult } from './result.js';
@@ -222,6 +222,10 @@ function show(plan) {
   remember();
 }
 
+const LOST = 'The connection is lost. It is being resumed; nothing will be missed.';
+/** The plan whose search was said to run. */
+let running = null;
+
 function heard(plan, what) {
   if (what === 'incumbent') stage.redraw();
   if (what === 'search' || what === 'end') stage.drawSearch();
@@ -233,9 +237,13 @@ function heard(plan, what) {
   if (what === 'end' || what === 'status') result(plan);
   if (what === 'end' || what === 'history') again.offer(plan);
   if (what === 'connection') {
-    if (plan.connected) tell('');
-    else tell(plan.lostBecause ?? 'The connection is lost. It is being resumed; nothing will be missed.', 'note');
+    if (plan.connected) untell(LOST);
+    else tell(plan.lostBecause ?? LOST, 'note');
     if (plan.connected) say('Connected again.');
+  }
+  if (what === 'status' && plan.status?.status === 'running' && running !== plan) {
+    running = plan;
+    say('The search is running.');
   }
   if (['incumbent', 'search'].includes(what)) soon();
   else showFigures(plan);

@@ -1,6 +1,7 @@
 // A plan's events, followed to the end: a lost connection is taken up again where it was cut.
 
 import { Refused, ask, eventsAddress } from './api.js';
+import { listen } from './silence.js';
 import { begun, leave, queue } from './turns.js';
 
 /** No eye sees more. */
@@ -14,6 +15,8 @@ const KINDS = ['status', 'convergence', 'incumbent', 'gap', 'end'];
  *
  * The browser itself takes up a connection that broke, with the last id; what it gives up, an answer that is no
  * stream, such as that to a ticket whose time is over, is asked for again here, for as long as there is the plan.
+ *
+ * A page that is not in sight keeps no stream: six of them would leave nothing for the one that is.
  */
 export function follow(id, heard, connected, { rateHz = RATE_HZ, aside = false } = {}) {
   let source = null;
@@ -25,10 +28,18 @@ export function follow(id, heard, connected, { rateHz = RATE_HZ, aside = false }
   /** Counts openings: one that was paused before it had its address is none. */
   let openings = 0;
   const turn = { begin, pause };
+  let asleep = false;
+  const silence = listen(id, () => {
+    // The service says first whether there is the plan.
+    refused = true;
+    again();
+    connected(false);
+  });
 
   async function begin() {
     openings += 1;
     const opening = openings;
+    silence.begin();
     let address;
     try {
       // An EventSource does not say why it was refused.
@@ -60,19 +71,23 @@ export function follow(id, heard, connected, { rateHz = RATE_HZ, aside = false }
     for (const kind of KINDS) {
       source.addEventListener(kind, (event) => {
         last = Number(event.lastEventId) || last;
+        const data = JSON.parse(event.data);
+        silence.heard(kind, data);
         if (kind === 'end') stop();
-        heard(kind, JSON.parse(event.data));
+        heard(kind, data);
       });
     }
   }
 
   function start() {
-    if (aside) queue(turn);
+    if (document.hidden) asleep = true;
+    else if (aside) queue(turn);
     else begin();
   }
 
   function pause() {
     openings += 1;
+    silence.rest();
     clearTimeout(timer);
     source?.close();
   }
@@ -88,6 +103,19 @@ export function follow(id, heard, connected, { rateHz = RATE_HZ, aside = false }
     over = true;
     pause();
     leave(turn);
+    silence.end();
+    document.removeEventListener('visibilitychange', look);
+  }
+
+  function look() {
+    if (document.hidden) {
+      asleep = true;
+      pause();
+      leave(turn);
+    } else if (asleep) {
+      asleep = false;
+      start();
+    }
   }
 
   function forward() {
@@ -95,9 +123,10 @@ export function follow(id, heard, connected, { rateHz = RATE_HZ, aside = false }
     aside = false;
     pause();
     leave(turn);
-    begin();
+    start();
   }
 
+  document.addEventListener('visibilitychange', look);
   start();
   return { stop, forward };
 }

@@ -68,7 +68,7 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 47] = [
+static FILES: [File; 48] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
@@ -102,6 +102,7 @@ static FILES: [File; 47] = [
     file!("routes.js"),
     file!("save.js"),
     file!("scene.js"),
+    file!("silence.js"),
     file!("stage.js"),
     file!("steps.js"),
     file!("stream.js"),

@@ -42,12 +42,20 @@ export class Backdrop {
     renderer.setRenderTarget(null);
   }
 
-  #fit(size) {
-    if (this.#size.equals(size)) return;
-    this.#size.copy(size);
+  /** The context that it was drawn in is gone. */
+  forget() {
+    this.#size.set(0, 0);
     this.#uniforms.picture.value?.dispose();
     this.#depths?.depthTexture.dispose();
     this.#depths?.dispose();
+    this.#depths = this.#uniforms.picture.value = this.#uniforms.depths.value = null;
+    this.mesh.visible = false;
+  }
+
+  #fit(size) {
+    if (this.#size.equals(size)) return;
+    this.forget();
+    this.#size.copy(size);
     this.#depths = new WebGLRenderTarget(size.x, size.y, { depthTexture: new DepthTexture(size.x, size.y) });
     this.#uniforms.picture.value = new FramebufferTexture(size.x, size.y);
     this.#uniforms.depths.value = this.#depths.depthTexture;

@@ -407,6 +407,7 @@ onDrop((file) => attempt(() => openFile(file)));
 if (world) {
   stage.tools = new Tools({ bar: by('tools'), hint: by('hint'), world, draft, stage, pointed: (pixel) => stage.pointAt(pixel) });
   stage.exaggerate = cameraOf(world);
+  world.lapsed = (yes) => stage.tools.say(yes ? 'The browser has let go of the scene, and draws it again as soon as it can. Form, strip and tables have everything.' : null);
 }
 
 // What is shown, for tests and for the curious: to look at, not to change.

@@ -76,7 +76,27 @@ export class World {
       this.repaint?.();
     });
     this.colours = palette();
+    // Tablets take the context from a page that is not in sight, and give it a new one.
+    canvas.addEventListener('webglcontextlost', () => {
+      this.#letGo();
+      this.lapsed?.(true);
+    });
+    canvas.addEventListener('webglcontextrestored', () => {
+      this.lapsed?.(false);
+      this.#stir();
+    });
     this.#resize();
+  }
+
+  /** Lets go of all that was in a context that is lost: to take it out of the next would be wrong, for it never was there. */
+  #letGo() {
+    this.#backdrop.forget();
+    this.#scene.traverse((node) => {
+      node.geometry?.dispose();
+      node.material?.map?.dispose();
+      node.material?.dispose();
+      if (node.isInstancedMesh) node.dispose();
+    });
   }
 
   get exaggeration() { return this.#root.scale.z; }
@@ -295,6 +315,7 @@ export class World {
   }
 
   #render() {
+    if (this.renderer.getContext().isContextLost()) return;
     const start = performance.now();
     this.controls.update();
     if (drawnBySoftware()) this.#renderSparingly(start);

@@ -45,10 +45,15 @@ export class Tools {
     this.#tool = tool;
     this.#corners = [];
     for (const [name, button] of this.#buttons) button.setAttribute('aria-pressed', String(name === tool));
-    this.hint.textContent = TOOLS.find(([name]) => name === tool)[2];
-    this.hint.hidden = tool === 'look';
+    this.say(null);
     this.world.canvas.dataset.tool = tool;
     this.show();
+  }
+
+  /** In place of what the tool says; null for that. */
+  say(text) {
+    this.hint.textContent = text ?? TOOLS.find(([name]) => name === this.#tool)[2];
+    this.hint.hidden = !text && this.#tool === 'look';
   }
 
   /** Draws what can be dragged. */

@@ -64,3 +64,37 @@ test('turning is drawn coarser, its end sharp', async () => {
   assert.equal((await scene(page)).routes[0].name, 'route');
   await page.done();
 });
+
+test('a scene whose context is taken away says so, and comes back as it was', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  await choose(page, 'paper-1');
+  await plan(page);
+  const look = () => page.evaluate(async () => {
+    await new Promise(requestAnimationFrame);
+    document.querySelector('#camera > :nth-child(2)').click();
+    await new Promise(requestAnimationFrame);
+    return document.getElementById('canvas').toDataURL();
+  });
+  await settled(page);
+  const before_ = await look();
+  for (let round = 0; round < 2; round += 1) {
+    await page.evaluate(() => {
+      globalThis.taken = document.getElementById('canvas').getContext('webgl2').getExtension('WEBGL_lose_context');
+      globalThis.taken.loseContext();
+    });
+    await page.waitForFunction(() => /let go of the scene/.test(document.getElementById('hint').textContent));
+    // An edit meanwhile does no harm.
+    await page.click('#add-cylinder');
+    await page.click('#undo');
+    const count = (await scene(page)).frames.count;
+    await page.evaluate(() => globalThis.taken.restoreContext());
+    await page.waitForFunction((drawings) => globalThis.noctule.scene().frames.count > drawings, count);
+    await page.waitForSelector('#hint', { state: 'hidden' });
+    await settled(page);
+    const differing = await difference(page, before_, await look());
+    assert.ok(differing < 2e-5, `${differing} of the pixels differ`);
+    assert.equal((await scene(page)).backdrop, false);
+  }
+  await page.done();
+});

@@ -2,6 +2,7 @@
 
 import { ask, send } from './api.js';
 import { el } from './dom.js';
+import { sure } from './sure.js';
 import { cost, moment, number } from './words.js';
 
 const LOOK_MS = 2000;
@@ -71,8 +72,9 @@ export class Plans {
     this.#rows = plans;
     const { shown, compared } = this.marks();
     const focused = this.body.contains(document.activeElement) ? document.activeElement.dataset.key : null;
+    const row = focused ? document.activeElement.closest('tr').sectionRowIndex : null;
     this.body.replaceChildren(...plans.map((plan) => this.#row(plan, shown === plan.id, compared.get(plan.id))));
-    if (focused) this.body.querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
+    if (focused) (this.body.querySelector(`[data-key="${CSS.escape(focused)}"]`) ?? this.body.rows[Math.min(row, this.body.rows.length - 1)]?.querySelector('button') ?? this.filter).focus();
     this.older.disabled = !this.#next;
     this.newer.disabled = !this.#past.length && !this.#cursor;
   }
@@ -94,6 +96,10 @@ export class Plans {
   }
 
   async #remove(plan) {
+    const active = ['queued', 'running'].includes(plan.status);
+    const why = active ? 'It has not ended. Its search is stopped, and the best route so far is lost, for everybody who has its link.'
+      : 'Its scenario and its result are lost, for everybody who has its link. This cannot be undone.';
+    if (!(await sure(`Remove “${plan.name || 'unnamed'}”?`, why, active ? 'Stop and remove' : 'Remove'))) return;
     try {
       await send(`/plans/${plan.id}`, { method: 'DELETE' });
       this.acts.removed(plan.id);

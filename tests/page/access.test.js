@@ -37,6 +37,10 @@ for (const colorScheme of ['light', 'dark']) {
     await page.click('#tab-plans');
     await page.waitForSelector('.plans tbody tr');
     assert.deepEqual(await serious(page), []);
+    await page.click('.plans [title=Remove]');
+    await page.waitForSelector('#sure[open]');
+    assert.deepEqual(await serious(page), []);
+    await page.click('#sure-no');
     await page.done();
     const broken = await open(chrome, `${site.url}#plan=${await made(site.url, WALLED)}`, { colorScheme });
     await broken.waitForSelector('.verdict.bad');

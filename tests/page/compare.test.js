@@ -144,6 +144,7 @@ test('the list has states, a filter and pages, and lets go', async (t) => {
   await ask(other.url, '/plans', { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify({ ...SMALL, name: 'long', planner: LONG }) });
   await page.waitForFunction(() => /long.*running/s.test(document.querySelector('.plans tbody')?.textContent ?? ''));
   await page.click('.plans [aria-label="Remove long"]');
+  await page.click('#sure-yes');
   await page.waitForFunction(() => document.querySelectorAll('.plans tbody tr').length === 0);
   await page.selectOption('#plans-filter', '');
   await page.click('text="plan 7"').catch(() => page.click('text="plan 21"'));
@@ -168,12 +169,35 @@ test('a running plan that is removed is not shown any longer', async () => {
   await page.waitForSelector('#stale:not([hidden])');
   await page.click('#tab-plans');
   await page.click('.plans tr.chosen button[title=Remove]');
+  await page.click('#sure-yes');
   await page.waitForSelector('#cancel', { state: 'hidden' });
   await page.waitForFunction(() => globalThis.noctule.scene().routes.length === 0);
   assert.ok(await page.isHidden('#state'));
   assert.ok(await page.isHidden('#stale'));
   assert.match(await page.textContent('#figures'), /Press Plan/);
   assert.equal(await page.evaluate(() => location.hash), '');
+  await page.done();
+});
+
+test('a plan is removed only after a yes, and Enter says no', async () => {
+  const page = await running();
+  await page.click('#tab-plans');
+  const id = await page.evaluate(() => new URLSearchParams(location.hash.slice(1)).get('plan'));
+  const there = async () => (await fetch(`${site.url}/plans/${id}`)).status;
+  for (const no of ['Enter', 'Escape']) {
+    await page.focus(`[data-key="remove ${id}"]`);
+    await page.keyboard.press('Enter');
+    await page.waitForSelector('#sure[open]');
+    assert.match(await page.textContent('#sure-why'), /has not ended/);
+    await page.keyboard.press(no);
+    await page.waitForSelector('#sure', { state: 'hidden' });
+    assert.equal(await there(), 200);
+  }
+  await page.keyboard.press('Enter');
+  await page.keyboard.press('Tab');
+  await page.keyboard.press('Enter');
+  await page.waitForSelector('#cancel', { state: 'hidden' });
+  assert.equal(await there(), 410);
   await page.done();
 });
 

@@ -68,7 +68,7 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 48] = [
+static FILES: [File; 49] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
@@ -107,6 +107,7 @@ static FILES: [File; 48] = [
     file!("steps.js"),
     file!("stream.js"),
     file!("strip.js"),
+    file!("sure.js"),
     file!("tabs.js"),
     file!("tools.js"),
     file!("turns.js"),

@@ -53,6 +53,38 @@ test('files are opened and dropped: a scenario, GeoJSON, KML', async () => {
   await page.done();
 });
 
+test('a file that is no scenario is refused in words, and leaves the page as it was', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  const before_ = await document_(page);
+  const { start, target, altitude } = SMALL;
+  for (const wrong of [
+    { threats: {} }, { threats: [null] }, { threats: 'abc' }, { start: 5 }, { start, target, terrain: { kind: 'peaks', peaks: 5 } },
+    { start, target, altitude, threats: [{ kind: 'polygon', vertices: {} }] }, { start, target, threats: [{ kind: 'cylinder', center: 3 }] },
+    { start, target, area: [] }, { start, target, terrain: { kind: 'peaks', peaks: [{ center: 1 }] } },
+  ]) {
+    await drop(page, 'wrong.json', JSON.stringify(wrong), 'application/json');
+    await page.waitForFunction(() => /wrong.json is no scenario: its [a-z ]+ must be/.test(document.getElementById('notice').textContent));
+    await page.click('#notice [aria-label=Dismiss]');
+  }
+  assert.deepEqual(await document_(page), before_);
+  await page.done();
+});
+
+test('what a map has too much of is told briefly', async () => {
+  const page = await open(chrome, site.url);
+  await drawn(page, FIRST);
+  const point = (name, lon) => ({ type: 'Feature', properties: { name }, geometry: { type: 'Point', coordinates: [lon, 36.5, 400] } });
+  const line = (k) => ({ type: 'Feature', properties: { name: `line ${k}` }, geometry: { type: 'LineString', coordinates: [[-84.2, 36.5], [-84.2, 36.51 + k / 1e5]] } });
+  const map = { type: 'FeatureCollection', features: [point('start', -84.23), point('target', -84.16), ...Array.from({ length: 150 }, (_, k) => line(k))] };
+  await drop(page, 'lines.geojson', JSON.stringify(map), 'application/geo+json');
+  await page.waitForFunction(() => /Not used: .* and 147 more \(a line/.test(document.getElementById('notice').textContent));
+  const { height } = await page.locator('#notice').boundingBox();
+  assert.ok(height <= 270, `${height} pixels`);
+  assert.ok((await page.textContent('#notice')).length < 800, await page.textContent('#notice'));
+  await page.done();
+});
+
 test('a scenario is drawn by hand, taken back and done again', async () => {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);

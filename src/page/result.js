@@ -61,14 +61,17 @@ function stopped({ stop_reason: reason, evaluations }) {
 
 function takeaway(result, geodetic, acts) {
   const offered = FORMATS.filter((format) => geodetic || !format.flight);
-  const button = (format) => el('button', { type: 'button', data: { format: format.name }, class: format.main && format.flight ? 'main' : '', onclick: () => acts.save(format) }, format.title);
+  // The service refuses to have a route flown that breaks something.
+  const refused = (format) => Boolean(format.flight) && !format.broken && !result.feasible;
+  const button = (format) => el('button', { type: 'button', data: { format: format.name }, class: format.main && format.flight && result.feasible ? 'main' : '',
+    disabled: refused(format), 'aria-describedby': refused(format) ? 'refused' : undefined, onclick: () => acts.save(format) }, format.title);
   return el('section', { class: 'takeaway', 'aria-labelledby': 'takeaway-head' },
     el('h3', { id: 'takeaway-head' }, 'Take it away'),
     el('p', { class: 'row wrap' }, offered.map(button),
       el('button', { type: 'button', id: 'save-scenario', onclick: () => acts.saveScenario() }, 'Scenario, JSON'),
       el('button', { type: 'button', id: 'save-picture', onclick: () => acts.savePicture() }, 'View, PNG'),
       el('button', { type: 'button', id: 'copy-link', onclick: () => acts.copyLink() }, 'Copy link')),
-    !result.feasible && geodetic && el('p', { class: 'faint' }, 'Flight formats of a route that breaks its constraints are refused by the service.'));
+    !result.feasible && geodetic && el('p', { class: 'faint', id: 'refused' }, 'A route that breaks its constraints is not given out in the formats that fly; the other formats are for looking at it.'));
 }
 
 function costs({ cost: terms, bound }, scenario) {
@@ -102,7 +105,7 @@ function clearances({ checks, path }, scenario) {
     return el('tr', { class: least < 0 ? 'bad' : '' }, el('th', { scope: 'row' }, threatName({ name }, threat)),
       el('td', {}, figure(distance)), path && el('td', {}, figure(flown?.distance)), el('td', { class: 'faint' }, state));
   };
-  const table = (some) => el('table', { class: 'plain' }, el('thead', {}, el('tr', {}, el('th', {}, 'Threat'), el('th', {}, 'Legs'), path && el('th', {}, 'Path'), el('th', {}, ''))), el('tbody', {}, some.map(row)));
+  const table = (some) => el('table', { class: 'plain' }, el('thead', {}, el('tr', {}, el('th', {}, 'Threat'), el('th', {}, 'Legs'), path && el('th', {}, 'Path'), el('th', {}, el('span', { class: 'unseen' }, 'State')))), el('tbody', {}, some.map(row)));
   return el('section', { 'aria-labelledby': 'clearance-head' }, el('h3', { id: 'clearance-head' }, 'Least clearance'), table(rows.slice(0, FEW)),
     rows.length > FEW && el('details', {}, el('summary', {}, `${rows.length - FEW} more, farther off`), table(rows.slice(FEW, 500))));
 }

@@ -3,9 +3,12 @@
 import { by, el } from './dom.js';
 import { Form } from './form.js';
 import { axes, isGeodetic } from './frame.js';
+import { say } from './notice.js';
 import { threatName } from './words.js';
 
 const PAGE = 20;
+/** Of faults at most so many are listed. */
+const MOST_FAULTS = 12;
 
 export class Editor {
   #shape = '';
@@ -49,20 +52,28 @@ export class Editor {
       this.#build(document);
     }
     this.form.sync(defaults);
+    for (const card of this.root.querySelectorAll('.threat')) {
+      const index = Number(card.dataset.index);
+      card.firstElementChild.setAttribute('aria-label', threatName(document.threats?.[index], index));
+    }
     this.#title(document);
   }
 
   /** The service's faults; none where the document is right. */
   mark(faults) {
+    if (faults.length !== this.#faults.length) {
+      say(faults.length === 0 ? 'Nothing is to mend.' : faults.length === 1 ? `One thing to mend: ${faults[0].detail}` : `${faults.length} things to mend.`);
+    }
     this.#faults = faults;
     this.form.mark(faults);
     const list = this.root.querySelector('.faults');
     if (!list) return;
     list.hidden = !faults.length;
     list.replaceChildren(
-      el('h3', {}, faults.length === 1 ? 'One thing to mend' : `${faults.length} things to mend`),
-      el('ul', {}, faults.slice(0, 12).map((fault) =>
-        el('li', {}, el('button', { type: 'button', class: 'link', onclick: () => this.goTo(fault.pointer) }, fault.detail)))),
+      el('h2', {}, faults.length === 1 ? 'One thing to mend' : `${faults.length} things to mend`),
+      el('ul', {}, faults.slice(0, MOST_FAULTS).map((fault) =>
+        el('li', {}, el('button', { type: 'button', class: 'link', onclick: () => this.goTo(fault.pointer) }, fault.detail))),
+      faults.length > MOST_FAULTS && el('li', {}, `and ${faults.length - MOST_FAULTS} more`)),
     );
   }
 
@@ -70,7 +81,7 @@ export class Editor {
   goTo(pointer) {
     const threat = pointer.match(/^\/threats\/(\d+)/);
     if (threat) this.#turnTo(Number(threat[1]));
-    const input = this.form.fieldOf(pointer)?.input;
+    const input = this.form.nearest(pointer)?.input;
     if (!input) return;
     for (let node = input; node; node = node.parentElement) if (node.tagName === 'DETAILS') node.open = true;
     input.focus();
@@ -97,6 +108,7 @@ export class Editor {
   }
 
   #build(document) {
+    const focused = focusIn(this.root);
     const open = new Set([...this.root.querySelectorAll('details[open]')].map((details) => details.dataset.part));
     if (!this.root.childElementCount) open.add('limits');
     this.form.forget(this.root);
@@ -120,6 +132,7 @@ export class Editor {
       section('area', 'Area', this.#area(document)),
     );
     this.mark(this.#faults);
+    focused?.();
   }
 
   #source() {
@@ -133,9 +146,10 @@ export class Editor {
         file.value = '';
       } });
     return el('div', { class: 'source' },
-      el('label', { class: 'field' }, el('span', { class: 'name' }, 'Start from'), choose),
-      el('label', { class: 'button', for: 'file' }, 'Open file…'), file,
-      el('button', { type: 'button', onclick: () => this.acts.blank() }, 'Empty'));
+      el('div', { class: 'field' }, el('label', {}, el('span', { class: 'name' }, 'Start from'), choose)),
+      // Its ring is drawn round what comes after it.
+      file, el('label', { class: 'button', for: 'file' }, 'Open file…'),
+      el('button', { type: 'button', id: 'empty', onclick: () => this.acts.blank() }, 'Empty'));
   }
 
   #ends(document) {
@@ -150,17 +164,22 @@ export class Editor {
     const pages = Math.max(1, Math.ceil(threats.length / PAGE));
     this.#page = Math.min(this.#page, pages - 1);
     const first = this.#page * PAGE;
-    const turn = (by_) => el('button', { type: 'button', disabled: by_ < 0 ? this.#page === 0 : this.#page + 1 >= pages, onclick: () => {
+    const turn = (by_) => el('button', { type: 'button', id: by_ < 0 ? 'earlier' : 'later', disabled: by_ < 0 ? this.#page === 0 : this.#page + 1 >= pages, onclick: () => {
       this.#page += by_;
       this.show();
     } }, by_ < 0 ? 'Earlier' : 'Later');
     return el('section', { class: 'threats', 'aria-labelledby': 'threats-head' },
-      el('h3', { id: 'threats-head' }, 'Threats ', el('span', { class: 'faint' }, String(threats.length))),
+      el('h2', { id: 'threats-head', tabindex: -1 }, 'Threats ', el('span', { class: 'faint' }, String(threats.length))),
       el('ol', { class: 'cards', start: first }, threats.slice(first, first + PAGE).map((threat, k) => this.#threat(document, threat, first + k))),
       pages > 1 && el('p', { class: 'row' }, turn(-1), el('span', { class: 'faint' }, `${first}–${Math.min(first + PAGE, threats.length) - 1}`), turn(1)),
       el('p', { class: 'row' },
-        el('button', { type: 'button', id: 'add-cylinder', onclick: () => this.acts.add('cylinder') }, 'Add a cylinder'),
-        el('button', { type: 'button', id: 'add-polygon', onclick: () => this.acts.add('polygon') }, 'Add a polygon')));
+        el('button', { type: 'button', id: 'add-cylinder', onclick: () => this.#add('cylinder') }, 'Add a cylinder'),
+        el('button', { type: 'button', id: 'add-polygon', onclick: () => this.#add('polygon') }, 'Add a polygon')));
+  }
+
+  #add(kind) {
+    this.acts.add(kind);
+    this.goTo(`/threats/${this.draft.document.threats.length - 1}/name`);
   }
 
   #threat(document, threat, index) {
@@ -171,6 +190,7 @@ export class Editor {
     const remove = el('button', { type: 'button', class: 'quiet', 'aria-label': `Remove ${threatName(threat, index)}`, title: 'Remove', onclick: () => {
       this.draft.set(pointer, undefined);
       by('threats-head')?.scrollIntoView({ block: 'nearest' });
+      (this.root.querySelector(`[data-index="${Math.min(index, this.draft.document.threats.length - 1)}"] .head button`) ?? by('add-cylinder')).focus();
     } }, '✕');
     const body = threat.kind === 'polygon'
       ? [
@@ -186,7 +206,8 @@ export class Editor {
         this.form.number(`${pointer}/center/${first}`, ...label(names[0])), this.form.number(`${pointer}/center/${second}`, ...label(names[1])), limits[0],
         this.form.number(`${pointer}/radius`, 'Core radius', 'm'), this.form.number(`${pointer}/influence`, 'Soft radius', 'm'), limits[1])];
     return el('li', { class: 'threat', data: { index }, value: index, onfocusin: () => this.acts.select(index) },
-      el('div', { class: 'head' }, this.form.text(`${pointer}/name`, `${index}. ${threat.kind === 'polygon' ? 'Polygon' : 'Cylinder'}`, { empty: null }), remove), ...body);
+      el('div', { class: 'parts', role: 'group' },
+        el('div', { class: 'head' }, this.form.text(`${pointer}/name`, `${index}. ${threat.kind === 'polygon' ? 'Polygon' : 'Cylinder'}`, { empty: null }), remove), ...body));
   }
 
   #ground(document) {
@@ -241,6 +262,25 @@ export class Editor {
       this.form.number(`/area/min/${first}`, names[0]), this.form.number(`/area/min/${second}`, names[1]),
       this.form.number(`/area/max/${first}`, names[2]), this.form.number(`/area/max/${second}`, names[3])));
   }
+}
+
+/** What gives the focus back to a part that is built anew; null where it is elsewhere. */
+function focusIn(root) {
+  const node = document.activeElement;
+  if (!root.contains(node)) return null;
+  const card = node.closest('.threat');
+  const [scope, name] = [card ? `[data-index="${card.dataset.index}"] ` : '', node.getAttribute('aria-label')];
+  const selector = node.dataset.pointer ? `[data-pointer="${node.dataset.pointer}"]`
+    : node.id ? `#${node.id}`
+      : node.tagName === 'SUMMARY' ? `[data-part="${node.parentElement.dataset.part}"] > summary`
+        : name ? `${scope}[aria-label="${CSS.escape(name)}"]` : null;
+  const part = node.closest('details')?.dataset.part;
+  return () => {
+    const again = selector && root.querySelector(selector);
+    if (again && !again.disabled) again.focus({ preventScroll: true });
+    // What is gone, or can do no more, leaves it to what is nearest.
+    else (root.querySelector(part ? `[data-part="${part}"] > summary` : '#threats-head') ?? root).focus();
+  };
 }
 
 /** `Latitude °` as name and unit. */

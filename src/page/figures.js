@@ -12,9 +12,10 @@ export function showFigures(plan) {
   state.hidden = false;
   state.className = `state ${name}`;
   state.textContent = plan.connected ? name : plan.lostBecause ? 'lost' : 'reconnecting';
-  by('cancel').hidden = !active;
-  by('cancel').disabled = Boolean(status?.cancel_requested);
-  by('replan').hidden = !end;
+  offer('cancel', active);
+  // Not `disabled`, for that would lose the focus before it is given away.
+  by('cancel').setAttribute('aria-disabled', String(Boolean(status?.cancel_requested)));
+  offer('replan', Boolean(end));
   const last = plan.points.at(-1);
   const best = end?.cost.total ?? last?.best_cost ?? (latest?.feasible ? latest.cost : null) ?? status?.best_cost;
   const iterations = status?.iterations ?? 0;
@@ -29,8 +30,16 @@ export function showFigures(plan) {
 /** Where there is no plan. */
 export function showNone() {
   by('state').hidden = true;
-  by('cancel').hidden = by('replan').hidden = true;
+  offer('cancel', false);
+  offer('replan', false);
   by('figures').replaceChildren(el('p', { class: 'faint' }, 'Press Plan, and watch the swarm look for a route.'));
+}
+
+/** Shows a button or hides it; the focus of one that goes is given to Plan, for it would be lost. */
+function offer(id, yes) {
+  const button = by(id);
+  if (!yes && document.activeElement === button) by('plan').focus();
+  button.hidden = !yes;
 }
 
 /** What the figure beside it is. */
@@ -43,7 +52,7 @@ function told({ status, result: end }, best) {
 
 /** How a plan has ended, in a sentence. */
 export function verdict(plan) {
-  if (!plan.result) return `The plan has ${plan.status.status}.`;
+  if (!plan.result) return plan.status.status === 'cancelled' ? 'The plan was cancelled before a route was found.' : 'The plan has failed.';
   const { feasible, cost: price, bound } = plan.result;
   return feasible ? `A route was found: cost ${cost(price.total)}${bound.gap === null ? '' : `, proven gap ${number(bound.gap * 100, 2)} per cent`}.` : 'No feasible route was found.';
 }

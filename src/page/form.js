@@ -4,6 +4,11 @@ import { at } from './draft.js';
 import { el } from './dom.js';
 
 let gestures = 0;
+const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
+/** `1,000`: a thousand to one reader, one to the other. */
+const EITHER = /^[+-]?[1-9]\d{0,2},\d{3}$/;
+/** Where less than nothing makes sense. Keypads for decimals have no minus on some telephones. */
+const SIGNED = /\/(lat|lon|alt|x|y|z|elevation|base|top)$/;
 
 /** Fields of one draft below one element. */
 export class Form {
@@ -21,21 +26,26 @@ export class Form {
     this.#fields = this.#fields.filter(({ input }) => !part.contains(input));
   }
 
-  /** A labelled number. What cannot be read as one is sent as it is, for the service to say what is wrong with it. */
-  number(pointer, label, unit = '', { empty = undefined, hint } = {}) {
+  /**
+   * A labelled number, with a point or a comma before its decimals. What cannot be read as one, or in two ways, is sent as it
+   * is, for the service to say what is wrong with it.
+   */
+  number(pointer, label, unit = '', { empty = undefined } = {}) {
     const write = (value) => (value === undefined || value === null ? '' : String(value));
     const read = (text) => {
       const plain = text.trim().replace(/^−/, '-');
       if (plain === '') return empty;
-      return Number.isFinite(Number(plain)) ? Number(plain) : text;
+      if (unit !== '°' && EITHER.test(plain)) return text;
+      const pointed = plain.replace(',', '.');
+      return NUMBER.test(pointed) && Number.isFinite(Number(pointed)) ? Number(pointed) : text;
     };
-    const input = el('input', { type: 'text', inputmode: 'decimal', autocomplete: 'off', spellcheck: false });
-    return this.#field(pointer, label, unit, input, write, read, hint);
+    const input = el('input', { type: 'text', inputmode: SIGNED.test(pointer) ? undefined : 'decimal', autocomplete: 'off', spellcheck: false });
+    return this.#field(pointer, label, unit, input, write, read, { empty });
   }
 
   text(pointer, label, { empty = undefined } = {}) {
     const input = el('input', { type: 'text', autocomplete: 'off', spellcheck: false });
-    return this.#field(pointer, label, '', input, (value) => value ?? '', (text) => (text === '' ? empty : text));
+    return this.#field(pointer, label, '', input, (value) => value ?? '', (text) => (text === '' ? empty : text), { empty });
   }
 
   /** One of `options`: `[value, text]`; `chosen` may make a value of the choice. */
@@ -52,7 +62,7 @@ export class Form {
     return el('label', { class: 'tick' }, input, label);
   }
 
-  #field(pointer, label, unit, input, write, read, hint) {
+  #field(pointer, label, unit, input, write, read, { empty } = {}) {
     const fault = el('span', { class: 'fault', id: `fault${pointer.replaceAll('/', '-')}`, hidden: true });
     let gesture = null;
     input.dataset.pointer = pointer;
@@ -63,10 +73,12 @@ export class Form {
       this.sync();
     });
     const show = (value) => {
-      if (document.activeElement !== input || input.tagName === 'SELECT') input.value = write(value);
+      // Not what is being typed, such as `1.`, unless it has been undone.
+      if (document.activeElement !== input || input.tagName === 'SELECT' || read(input.value) !== (value ?? empty)) input.value = write(value);
     };
     this.#fields.push({ pointer, input, fault, show, write });
-    return el('label', { class: 'field' }, el('span', { class: 'name' }, label, unit && el('i', {}, ` ${unit}`)), input, hint && el('small', {}, hint), fault);
+    // The fault describes the field; within the label it would be part of its name, too.
+    return el('div', { class: 'field' }, el('label', {}, el('span', { class: 'name' }, label, unit && el('i', {}, ` ${unit}`)), input), fault);
   }
 
   /** Shows the values of the draft, and for what it leaves open those of `defaults`. */
@@ -106,7 +118,16 @@ export class Form {
     return left;
   }
 
-  /** The field of a pointer; else the first below it; else that of what it is in. */
+  /** The field of a pointer; else the first below it; else the first in what it is in. */
+  nearest(pointer) {
+    for (let at_ = pointer; at_; at_ = at_.slice(0, at_.lastIndexOf('/'))) {
+      const field = this.fieldOf(at_);
+      if (field) return field;
+    }
+    return null;
+  }
+
+  /** The field of a pointer; else the first below it. */
   fieldOf(pointer) {
     const find = (test) => this.#fields.find((field) => field.fault && test(field.pointer));
     return find((own) => own === pointer) ?? find((own) => own.startsWith(`${pointer}/`)) ?? null;

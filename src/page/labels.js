@@ -3,6 +3,8 @@
 import { el } from './dom.js';
 
 const MOST = 30;
+/** Of letters: the style sheet cuts off more. */
+const LONG = 24;
 /** The style sheet lifts the ends' names over their dots. */
 const LIFT = 11;
 
@@ -25,7 +27,7 @@ export class Labels {
     for (const { place, lift, node } of this.#items) {
       const at = onScreen(place);
       const y = at && at.y - lift;
-      const wide = (node.textContent.length * 6.4) / 2 + 6;
+      const wide = (Math.min(node.textContent.length, LONG) * 6.4) / 2 + 6;
       const free = at && taken.every((other) => Math.abs(other.x - at.x) > other.wide + wide || Math.abs(other.y - y) > 18);
       node.hidden = !free;
       if (!free) continue;

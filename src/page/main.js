@@ -14,6 +14,7 @@ import { Followed } from './followed.js';
 import { axes, isGeodetic, written } from './frame.js';
 import { readFile } from './import.js';
 import { askForKey } from './key.js';
+import { keepOrder } from './narrow.js';
 import { attempt, say, tell, untell } from './notice.js';
 import { OTHERS, onSchemeChange, palette } from './palette.js';
 import { Plans } from './plans.js';
@@ -25,6 +26,7 @@ import { begunWith, nameShown, named, onStep, stepFrom } from './steps.js';
 import { Strip } from './strip.js';
 import { turn } from './tabs.js';
 import { Tools } from './tools.js';
+import { onUndoKeys } from './undo.js';
 import { guard, isKept, keep } from './unsaved.js';
 import { metres, number } from './words.js';
 
@@ -43,6 +45,7 @@ let wishes = 0;
 let first = null;
 
 onKeyNeeded(askForKey);
+keepOrder();
 
 // -- The parts -------------------------------------------------------------------------------------
 
@@ -182,12 +185,12 @@ async function submit(warm) {
     await plan.open();
     if (!by('plans').hidden) plans.look();
   } catch (error) {
-    if (error.problem?.errors) {
-      turn('scenario');
-      editor.mark(error.problem.errors);
-      editor.goTo(error.problem.errors[0].pointer);
-    }
-    throw error;
+    const faults = error.problem?.errors;
+    if (!faults) throw error;
+    turn('scenario');
+    editor.mark(faults);
+    editor.goTo(faults[0].pointer);
+    throw new Said(`This cannot be planned yet: ${faults.length === 1 ? 'one thing is' : `${faults.length} things are`} to mend. ${faults[0].detail}`);
   } finally {
     occupied(false);
   }
@@ -387,21 +390,12 @@ onStep(() => draft.document, ({ hash, own, draft: before }) => attempt(async () 
 
 by('plan').addEventListener('click', () => attempt(() => submit(false)));
 by('replan').addEventListener('click', () => attempt(() => submit(true)));
-by('cancel').addEventListener('click', () => attempt(() => stage.plan.cancel()));
+by('cancel').addEventListener('click', () => stage.plan.status?.cancel_requested || attempt(() => stage.plan.cancel()));
 by('undo').addEventListener('click', () => draft.undo());
 by('redo').addEventListener('click', () => draft.redo());
 
 by('plans').addEventListener('turned', () => plans.look(true));
-
-addEventListener('keydown', (event) => {
-  if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== 'z') return;
-  // In a field the browser's own undo takes back letters.
-  if (event.target.matches?.('input[type=text], input[type=password]') && document.activeElement === event.target && event.target.value !== event.target.defaultValue) return;
-  event.preventDefault();
-  if (event.shiftKey) draft.redo();
-  else draft.undo();
-});
-
+onUndoKeys(draft);
 onDrop((file) => attempt(() => openFile(file)));
 
 if (world) {

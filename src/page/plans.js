@@ -28,7 +28,7 @@ export class Plans {
     this.older = el('button', { type: 'button', id: 'plans-older', onclick: () => this.#turn(this.#next, [...this.#past, this.#cursor]) }, 'Older');
     this.newer = el('button', { type: 'button', id: 'plans-newer', onclick: () => this.#turn(this.#past.at(-1) ?? null, this.#past.slice(0, -1)) }, 'Newer');
     root.replaceChildren(
-      el('label', { class: 'field' }, el('span', { class: 'name' }, 'State'), this.filter),
+      el('div', { class: 'field' }, el('label', {}, el('span', { class: 'name' }, 'State'), this.filter)),
       el('table', { class: 'plain plans' }, el('caption', { class: 'unseen' }, 'Plans, newest first'),
         el('thead', {}, el('tr', {}, el('th', {}, 'Plan'), el('th', {}, 'Cost'), el('th', {}, 'Lay over'), el('th', {}, el('span', { class: 'unseen' }, 'Remove')))), this.body),
       this.note, el('p', { class: 'row' }, this.newer, this.older));

@@ -190,7 +190,7 @@ test('faults stand where they are, in the words of the service', async () => {
   assert.match(await page.textContent('.faults'), /One thing to mend.*radius is -3/s);
   await fill(page, '/altitude/max', 'high');
   await page.waitForSelector('[data-pointer="/altitude/max"][aria-invalid=true]');
-  assert.match(await page.textContent('.faults h3'), /2 things to mend/);
+  assert.match(await page.textContent('.faults h2'), /2 things to mend/);
   // Planning anyway moves the focus to the first fault.
   await page.click('#plan');
   await page.waitForFunction(() => document.activeElement?.dataset.pointer?.startsWith('/'));

@@ -68,7 +68,7 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 49] = [
+static FILES: [File; 51] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
@@ -94,6 +94,7 @@ static FILES: [File; 49] = [
     file!("key.js"),
     file!("labels.js"),
     file!("main.js"),
+    file!("narrow.js"),
     file!("notice.js"),
     file!("palette.js"),
     file!("plans.js"),
@@ -111,6 +112,7 @@ static FILES: [File; 49] = [
     file!("tabs.js"),
     file!("tools.js"),
     file!("turns.js"),
+    file!("undo.js"),
     file!("unsaved.js"),
     file!("volumes.js"),
     file!("way.js"),

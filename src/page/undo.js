@@ -1,0 +1,20 @@
+// The keys that undo and redo.
+
+const TEXT = 'input[type=text], input[type=password]';
+
+/** Has them act on `draft`, except where the browser's own take back letters. */
+export function onUndoKeys(draft) {
+  let before = null;
+  addEventListener('focusin', ({ target }) => { before = target.value; });
+  addEventListener('keydown', (event) => {
+    if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+    const key = event.key.toLowerCase();
+    if (key !== 'z' && key !== 'y') return;
+    // In a field those typed since it has the focus.
+    if (event.target.matches?.(TEXT) && event.target.value !== before) return;
+    event.preventDefault();
+    if (key === 'y' || event.shiftKey) draft.redo();
+    else draft.undo();
+    before = event.target.value;
+  });
+}

@@ -4,14 +4,19 @@ import { el } from './dom.js';
 import { axes, written } from './frame.js';
 
 const NEAR_PX = 13;
+/** A finger covers what it is at. */
+const NEAR_TOUCH_PX = 24;
 const STILL_PX = 5;
 const TOOLS = [
-  ['look', 'Look', 'Drag to turn, wheel to zoom. Drag start, target and the dots of a chosen threat to move them.'],
-  ['start', 'Start', 'Click on the ground to place the start.'],
-  ['target', 'Target', 'Click on the ground to place the target.'],
-  ['cylinder', 'Cylinder', 'Click on the ground to place a round threat; drag its dots for its radii.'],
-  ['polygon', 'Polygon', 'Click the corners one after another; Enter or a click on the first one closes it, Escape gives up.'],
+  ['look', 'Look', 'Drag to turn, wheel to zoom. Drag start, target and the dots of a chosen threat to move them.', 'Drag to turn, pinch to zoom. Drag start, target and the dots of a chosen threat to move them.'],
+  ['start', 'Start', 'Click on the ground to place the start.', 'Tap the ground to place the start.'],
+  ['target', 'Target', 'Click on the ground to place the target.', 'Tap the ground to place the target.'],
+  ['cylinder', 'Cylinder', 'Click on the ground to place a round threat; drag its dots for its radii.', 'Tap the ground to place a round threat; drag its dots for its radii.'],
+  ['polygon', 'Polygon', 'Click the corners one after another; Enter or a click on the first one closes it, Escape gives up.',
+    'Tap the corners one after another; a tap on the first one closes it, Look gives up.'],
 ];
+/** What a tool says, to fingers or to a mouse. */
+const help = ([, , mouse, touch]) => (matchMedia('(pointer: coarse)').matches ? touch : mouse);
 
 export class Tools {
   #tool = 'look';
@@ -24,8 +29,9 @@ export class Tools {
   /** `stage` has `frame`, `ground` and `selected`, and `select(index)`; `pointed(place)` hears where the pointer is. */
   constructor({ bar, hint, world, draft, stage, pointed }) {
     Object.assign(this, { hint, world, draft, stage, pointed });
-    for (const [name, title, help] of TOOLS) {
-      const button = el('button', { type: 'button', data: { tool: name }, 'aria-pressed': String(name === 'look'), title: help, onclick: () => this.use(name) }, title);
+    for (const tool of TOOLS) {
+      const [name, title] = tool;
+      const button = el('button', { type: 'button', data: { tool: name }, 'aria-pressed': String(name === 'look'), title: help(tool), onclick: () => this.use(name) }, title);
       this.#buttons.set(name, button);
       bar.append(button);
     }
@@ -52,7 +58,7 @@ export class Tools {
 
   /** In place of what the tool says; null for that. */
   say(text) {
-    this.hint.textContent = text ?? TOOLS.find(([name]) => name === this.#tool)[2];
+    this.hint.textContent = text ?? help(TOOLS.find(([name]) => name === this.#tool));
     this.hint.hidden = !text && this.#tool === 'look';
   }
 
@@ -122,7 +128,7 @@ export class Tools {
     const near = [...this.#handles(), ...this.#ends()].map((handle) => {
       const at = this.world.onScreen(handle.place);
       return { handle, off: at ? Math.hypot(at.x - event.offsetX, at.y - event.offsetY) : Infinity };
-    }).filter(({ off }) => off <= NEAR_PX).sort((a, b) => a.off - b.off)[0];
+    }).filter(({ off }) => off <= reach(event)).sort((a, b) => a.off - b.off)[0];
     if (!near) return;
     const from = this.world.onGround(event.offsetX, event.offsetY);
     if (!from) return;
@@ -149,7 +155,7 @@ export class Tools {
     }
     const still = this.#down && Math.hypot(event.offsetX - this.#down.x, event.offsetY - this.#down.y) <= STILL_PX;
     this.#down = null;
-    if (still) this.#clicked(event.offsetX, event.offsetY);
+    if (still) this.#clicked(event.offsetX, event.offsetY, reach(event));
   }
 
   #drop() {
@@ -159,7 +165,7 @@ export class Tools {
     this.draft.rest();
   }
 
-  #clicked(px, py) {
+  #clicked(px, py, near) {
     if (this.#tool === 'look') {
       this.stage.select(this.world.threatAt(px, py));
       return;
@@ -169,7 +175,7 @@ export class Tools {
     this.#drags += 1;
     if (this.#tool === 'polygon') {
       const first = this.#corners[0] && this.world.onScreen(this.#corners[0]);
-      if (first && Math.hypot(first.x - px, first.y - py) <= NEAR_PX) this.#close();
+      if (first && Math.hypot(first.x - px, first.y - py) <= near) this.#close();
       else {
         this.#corners.push(place);
         this.show();
@@ -187,3 +193,5 @@ export class Tools {
     this.use('look');
   }
 }
+
+const reach = ({ pointerType }) => (pointerType === 'touch' ? NEAR_TOUCH_PX : NEAR_PX);

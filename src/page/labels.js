@@ -21,11 +21,24 @@ export class Labels {
     this.layer.replaceChildren(...this.#items.map((item) => item.node));
   }
 
+  /** Writes those that are shown. */
+  paint(pen, { ink, raised }) {
+    Object.assign(pen, { font: '600 13px sans-serif', textAlign: 'center', textBaseline: 'bottom', lineWidth: 3, strokeStyle: raised, fillStyle: ink });
+    for (const { at, lift, node } of this.#items) {
+      if (node.hidden || !at) continue;
+      const text = node.textContent.length > LONG ? `${node.textContent.slice(0, LONG - 1)}…` : node.textContent;
+      pen.strokeText(text, at.x, at.y - lift);
+      pen.fillText(text, at.x, at.y - lift);
+    }
+  }
+
   /** Puts each where `onScreen` says, and hides those that would cover another. */
   place(onScreen) {
     const taken = [];
-    for (const { place, lift, node } of this.#items) {
+    for (const item of this.#items) {
+      const { place, lift, node } = item;
       const at = onScreen(place);
+      item.at = at;
       const y = at && at.y - lift;
       const wide = (Math.min(node.textContent.length, LONG) * 6.4) / 2 + 6;
       const free = at && taken.every((other) => Math.abs(other.x - at.x) > other.wide + wide || Math.abs(other.y - y) > 18);

@@ -18,6 +18,7 @@ import { keepOrder } from './narrow.js';
 import { attempt, say, tell, untell } from './notice.js';
 import { OTHERS, onSchemeChange, palette } from './palette.js';
 import { Plans } from './plans.js';
+import { onPrint } from './print.js';
 import { showResult } from './result.js';
 import { fileName, saveBlob, saveFrom } from './save.js';
 import { World } from './scene.js';
@@ -397,6 +398,7 @@ by('redo').addEventListener('click', () => draft.redo());
 by('plans').addEventListener('turned', () => plans.look(true));
 onUndoKeys(draft);
 onDrop((file) => attempt(() => openFile(file)));
+onPrint(world);
 
 if (world) {
   stage.tools = new Tools({ bar: by('tools'), hint: by('hint'), world, draft, stage, pointed: (pixel) => stage.pointAt(pixel) });

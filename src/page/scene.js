@@ -298,6 +298,19 @@ export class World {
     return new Promise((done) => { this.canvas.toBlob(done, 'image/png'); });
   }
 
+  /** The view as it is, with its names, onto another canvas. */
+  copy(canvas) {
+    this.#run = 0;
+    this.#unstirred = 0;
+    this.#render();
+    const { width, height, clientWidth } = this.canvas;
+    Object.assign(canvas, { width, height });
+    const pen = canvas.getContext('2d');
+    pen.drawImage(this.canvas, 0, 0);
+    pen.scale(width / clientWidth, width / clientWidth);
+    this.labels.paint(pen, this.colours);
+  }
+
   /** Draws at the next frame. */
   wake() {
     if (this.#asked) return;

@@ -68,7 +68,7 @@ macro_rules! file {
 }
 
 /// Every file there is.
-static FILES: [File; 51] = [
+static FILES: [File; 52] = [
     file!("index.html"),
     file!("page.css"),
     file!("mark.svg"),
@@ -98,6 +98,7 @@ static FILES: [File; 51] = [
     file!("notice.js"),
     file!("palette.js"),
     file!("plans.js"),
+    file!("print.js"),
     file!("relief.js"),
     file!("result.js"),
     file!("routes.js"),

@@ -62,7 +62,7 @@ export class Editor {
   /** The service's faults; none where the document is right. */
   mark(faults) {
     if (faults.length !== this.#faults.length) {
-      say(faults.length === 0 ? 'Nothing is to mend.' : faults.length === 1 ? `One thing to mend: ${faults[0].detail}` : `${faults.length} things to mend.`);
+      say(faults.length === 0 ? 'Nothing is left to mend.' : faults.length === 1 ? `One thing to mend: ${faults[0].detail}` : `${faults.length} things to mend.`);
     }
     this.#faults = faults;
     this.form.mark(faults);

@@ -146,7 +146,7 @@ impl JetStreamStore {
             end: watch::Sender::new(false),
             vanished: watch::Sender::new(false),
         });
-        store.announce().await?;
+        store.servers.outlast(|| store.announce()).await?;
         let (read, mut reading) = watch::channel(Reading::Catching);
         let opened = Self {
             tasks: vec![

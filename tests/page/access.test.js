@@ -6,18 +6,11 @@ import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { after, before, test } from 'node:test';
-import { SMALL, WALLED, FIRST, browser, drawn, made, open, plan, scene, service } from './support.js';
+import { test } from 'node:test';
+import { SMALL, WALLED, FIRST, drawn, made, open, plan, scene, service } from './support.js';
+import { chrome, site } from './together.js';
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
-
-let site;
-let chrome;
-before(async () => { [site, chrome] = await Promise.all([service(), browser()]); });
-after(async () => {
-  await chrome?.close();
-  await site?.stop();
-});
 
 /** The serious findings of axe-core. */
 async function serious(page) {

@@ -1,16 +1,9 @@
 // The address names what is shown; Back and Forward go through it, and nothing drawn is lost on the way.
 
 import assert from 'node:assert/strict';
-import { after, before, test } from 'node:test';
-import { FIRST, SMALL, browser, document_, drawn, fill, held, made, open, plan, scene, service } from './support.js';
-
-let site;
-let chrome;
-before(async () => { [site, chrome] = await Promise.all([service(), browser()]); });
-after(async () => {
-  await chrome?.close();
-  await site?.stop();
-});
+import { test } from 'node:test';
+import { FIRST, SMALL, document_, drawn, fill, held, made, open, plan, scene } from './support.js';
+import { chrome, site } from './together.js';
 
 const named = (name) => made(site.url, { ...SMALL, name });
 const hash = (page) => page.evaluate(() => location.hash);

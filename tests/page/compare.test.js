@@ -2,17 +2,10 @@
 
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
-import { after, before, test } from 'node:test';
+import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
-import { LONG, SMALL, ask, browser, color, FIRST, document_, drawn, fill, held, made, open, pixels, plan, scene, service } from './support.js';
-
-let site;
-let chrome;
-before(async () => { [site, chrome] = await Promise.all([service(), browser()]); });
-after(async () => {
-  await chrome?.close();
-  await site?.stop();
-});
+import { LONG, SMALL, ask, color, FIRST, document_, drawn, fill, held, made, open, pixels, plan, scene, service } from './support.js';
+import { chrome, site } from './together.js';
 
 test('two plans are laid over one another in scene and chart', async () => {
   const first = await made(site.url, { ...SMALL, name: 'one', planner: { ...SMALL.planner, seeding: 'random', polish: false } });

@@ -3,17 +3,10 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { after, before, test } from 'node:test';
+import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
-import { SMALL, ask, browser, FIRST, document_, drawn, drop, fill, groundPoint, open, scene, service, settled } from './support.js';
-
-let site;
-let chrome;
-before(async () => { [site, chrome] = await Promise.all([service(), browser()]); });
-after(async () => {
-  await chrome?.close();
-  await site?.stop();
-});
+import { SMALL, ask, FIRST, document_, drawn, drop, fill, groundPoint, open, scene, service, settled } from './support.js';
+import { chrome, site } from './together.js';
 
 test('a shipped scenario is there at once, and another is one choice away', async () => {
   const page = await open(chrome, site.url);

@@ -1,16 +1,9 @@
 // Problems that users of the page have run into.
 
 import assert from 'node:assert/strict';
-import { after, before, test } from 'node:test';
-import { FIRST, SMALL, WALLED, around, browser, color, document_, drawn, fill, made, open, pixels, plan, scene, service, settled } from './support.js';
-
-let site;
-let chrome;
-before(async () => { [site, chrome] = await Promise.all([service(), browser()]); });
-after(async () => {
-  await chrome?.close();
-  await site?.stop();
-});
+import { test } from 'node:test';
+import { FIRST, SMALL, WALLED, around, color, contrasts, document_, drawn, fill, made, open, pixels, plan, scene, settled } from './support.js';
+import { chrome, site } from './together.js';
 
 const opened = async (id) => {
   const page = await open(chrome, `${site.url}#plan=${id}`);
@@ -143,16 +136,7 @@ test('the name of a chosen threat can be read, light and dark', async () => {
   for (const colorScheme of ['light', 'dark']) {
     await page.emulateMedia({ colorScheme });
     await settled(page);
-    const contrast = await page.evaluate(() => {
-      const node = document.querySelector('#labels .chosen');
-      const { color, backgroundColor } = getComputedStyle(node);
-      const linear = (part) => (part / 255 <= 0.04045 ? part / 255 / 12.92 : ((part / 255 + 0.055) / 1.055) ** 2.4);
-      const [light, dark] = [color, backgroundColor].map((css) => {
-        const [r, g, b] = css.match(/[\d.]+/g).map(Number).map(linear);
-        return 0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05;
-      }).sort((a, b) => b - a);
-      return light / dark;
-    });
+    const [contrast] = await contrasts(page, '#labels .chosen', 'color');
     assert.ok(contrast >= 4.5, `${contrast.toFixed(2)} in ${colorScheme}`);
   }
   await page.done();

@@ -1,16 +1,9 @@
 // The line to the service: it dies without a word, is not there at first, or is shared by many tabs.
 
 import assert from 'node:assert/strict';
-import { after, before, test } from 'node:test';
-import { FIRST, LONG, SMALL, ask, browser, drawn, fill, open, service, wire } from './support.js';
-
-let site;
-let chrome;
-before(async () => { [site, chrome] = await Promise.all([service(), browser()]); });
-after(async () => {
-  await chrome?.close();
-  await site?.stop();
-});
+import { test } from 'node:test';
+import { FIRST, LONG, SMALL, ask, drawn, fill, open, wire } from './support.js';
+import { chrome, site } from './together.js';
 
 /** A plan that runs until it is stopped. */
 async function begun(name) {

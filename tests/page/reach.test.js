@@ -1,16 +1,9 @@
 // Everything can be reached: by keyboard, by name, by fingers, on narrow screens, in colours that the system gives, on paper.
 
 import assert from 'node:assert/strict';
-import { after, before, test } from 'node:test';
-import { FIRST, LONG, SMALL, WALLED, browser, color, document_, drawn, fill, groundPoint, made, open, plan, service, settled } from './support.js';
-
-let site;
-let chrome;
-before(async () => { [site, chrome] = await Promise.all([service(), browser()]); });
-after(async () => {
-  await chrome?.close();
-  await site?.stop();
-});
+import { test } from 'node:test';
+import { FIRST, LONG, SMALL, WALLED, color, contrasts, document_, drawn, fill, groundPoint, made, open, plan, settled } from './support.js';
+import { chrome, site } from './together.js';
 
 const PHONE = { viewport: { width: 360, height: 740 }, hasTouch: true, isMobile: true };
 const focus = (page) => page.evaluate(() => {
@@ -260,15 +253,7 @@ test('where a field is can be seen, light and dark', async () => {
   await drawn(page, FIRST);
   for (const colorScheme of ['light', 'dark']) {
     await page.emulateMedia({ colorScheme });
-    const contrast = await page.locator('[data-pointer="/name"], #source').evaluateAll((nodes) => nodes.map((node) => {
-      const { borderTopColor, backgroundColor } = getComputedStyle(node);
-      const linear = (part) => (part / 255 <= 0.04045 ? part / 255 / 12.92 : ((part / 255 + 0.055) / 1.055) ** 2.4);
-      const [light, dark] = [borderTopColor, backgroundColor].map((css) => {
-        const [r, g, b] = css.match(/[\d.]+/g).map(Number).map(linear);
-        return 0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05;
-      }).sort((a, b) => b - a);
-      return light / dark;
-    }));
+    const contrast = await contrasts(page, '[data-pointer="/name"], #source', 'borderTopColor');
     assert.ok(contrast.length === 2 && contrast.every((ratio) => ratio >= 3), `${contrast} in ${colorScheme}`);
   }
   await page.done();

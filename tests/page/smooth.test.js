@@ -1,16 +1,9 @@
 // On a software renderer, still parts are drawn once and moving ones more coarsely: at rest the picture is the same.
 
 import assert from 'node:assert/strict';
-import { after, before, test } from 'node:test';
-import { browser, choose, difference, drawn, FIRST, open, plan, scene, service, settled } from './support.js';
-
-let site;
-let chrome;
-before(async () => { [site, chrome] = await Promise.all([service(), browser()]); });
-after(async () => {
-  await chrome?.close();
-  await site?.stop();
-});
+import { test } from 'node:test';
+import { choose, difference, drawn, FIRST, open, plan, scene, settled } from './support.js';
+import { chrome, site } from './together.js';
 
 const width = (page) => page.evaluate(() => document.getElementById('canvas').width);
 const rested = (page) => page.waitForFunction(() => document.getElementById('canvas').width === document.getElementById('canvas').clientWidth);

@@ -265,3 +265,14 @@ export const WALLED = {
   ...SMALL, name: 'walled',
   threats: [{ kind: 'polygon', name: 'wall', vertices: [{ x: -500, y: 450 }, { x: 1500, y: 450 }, { x: 1500, y: 550 }, { x: -500, y: 550 }] }],
 };
+
+/** The contrasts (WCAG 2.2) of a colour of each of these nodes, such as `color`, with its background. */
+export const contrasts = (page, selector, name) => page.locator(selector).evaluateAll((nodes, property) => nodes.map((node) => {
+  const style = getComputedStyle(node);
+  const linear = (part) => (part / 255 <= 0.04045 ? part / 255 / 12.92 : ((part / 255 + 0.055) / 1.055) ** 2.4);
+  const [light, dark] = [style[property], style.backgroundColor].map((css) => {
+    const [r, g, b] = css.match(/[\d.]+/g).map(Number).map(linear);
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05;
+  }).sort((a, b) => b - a);
+  return light / dark;
+}), name);

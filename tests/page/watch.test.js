@@ -1,16 +1,9 @@
 // A search is watched and its end read; pointing at a place in one view marks it in the others.
 
 import assert from 'node:assert/strict';
-import { after, before, test } from 'node:test';
-import { LONG, SMALL, WALLED, around, ask, browser, choose, FIRST, color, drawn, made, open, pixels, plan, scene, service, settled, wire } from './support.js';
-
-let site;
-let chrome;
-before(async () => { [site, chrome] = await Promise.all([service(), browser()]); });
-after(async () => {
-  await chrome?.close();
-  await site?.stop();
-});
+import { test } from 'node:test';
+import { LONG, SMALL, WALLED, around, ask, choose, FIRST, color, drawn, made, open, pixels, plan, scene, settled, wire } from './support.js';
+import { chrome, site } from './together.js';
 
 /** Settings that make a shipped scenario last. */
 const LASTING = { '/planner/iterations': LONG.iterations, '/planner/population': LONG.population, '/planner/waypoints': 8 };

@@ -106,7 +106,10 @@ impl Uploaded {
             return Ok(());
         }
         let content = Content::of(file);
-        state.tally().admit(content.bytes, room)?;
+        // What was lost from the disk is counted already.
+        if !state.contents.contains_key(&file.sha256) {
+            state.tally().admit(content.bytes, room)?;
+        }
         self.write(&path.with_extension("json"), &content)?;
         file.staged
             .put(&path)

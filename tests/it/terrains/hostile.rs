@@ -385,4 +385,15 @@ async fn datasets_beyond_the_room_for_all_are_refused_and_leave_nothing() {
     let refused = put(&api, "/terrains/again", second).await;
     refused.expect_problem(413, "terrains-full");
     assert_eq!(kept(&api.uploads()), [2, 2, 0]);
+
+    // What was lost from the disk may be sent again: it has its room.
+    let content = std::fs::read_dir(api.uploads().join("content")).expect("it is there");
+    let files = content.map(|entry| entry.expect("it is there").path());
+    for file in files.filter(|file| file.extension().is_none()) {
+        std::fs::remove_file(file).expect("it was there");
+    }
+    assert_eq!(kept(&api.uploads()), [1, 2, 0]);
+    let answer = put(&api, "/terrains/first", first).await;
+    assert_eq!(answer.status, 200, "{answer:?}");
+    assert_eq!(kept(&api.uploads()), [2, 2, 0]);
 }

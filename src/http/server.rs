@@ -26,6 +26,7 @@ use hyper_util::server::conn::auto;
 use hyper_util::server::graceful::GracefulConnection;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
+use tokio::task::yield_now;
 use tokio::time::Instant;
 use tower::Service as _;
 
@@ -156,7 +157,16 @@ async fn answer(socket: Socket, router: Router, mut phase: watch::Receiver<Phase
         let busy = watched.clone().begin();
         let request = request.map(|body| Received::new(body, watched.clone()));
         let answer = router.borrow_mut().call(request);
-        async move { Ok::<_, Infallible>(busy.answered(answer.await?)) }
+        let traffic = watched.clone();
+        async move {
+            let answer = answer.await?;
+            if traffic.is_unread() {
+                // Before hyper writes the answer's head, let it find out whether what is left of the body is still to
+                // come: if so, the head says that the connection closes, and no caller sends another request on it.
+                yield_now().await;
+            }
+            Ok::<_, Infallible>(busy.answered(answer))
+        }
     });
     if http1 {
         let mut builder = http1::Builder::new();

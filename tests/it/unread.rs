@@ -101,10 +101,25 @@ async fn a_caller_who_is_still_sending_gets_its_answer() {
             answer.starts_with(&format!("HTTP/1.1 {status} ")),
             "{answer}"
         );
-        let (_, problem) = answer.split_once("\r\n\r\n").expect("a head and a body");
+        let (head, problem) = answer.split_once("\r\n\r\n").expect("a head and a body");
+        assert!(head.contains("\r\nconnection: close"), "{head}");
         let problem: Value = serde_json::from_str(problem).expect("JSON");
         assert_eq!(problem["type"], format!("/problems/{slug}"));
     }
+}
+
+/// A short body that has come along is no reason to close the connection.
+#[tokio::test]
+async fn a_refusal_of_a_short_body_leaves_the_connection_open() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let service = Service::start(directory.path(), &[]);
+    let refused = "POST /nowhere HTTP/1.1\r\nhost: localhost\r\ncontent-length: 5\r\n\r\nshort";
+    let last = "GET /livez HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n";
+    let requests = [refused, refused, last].concat();
+    let all = answers(&service, requests.as_bytes()).await;
+    let statuses: Vec<&str> = all.matches("HTTP/1.1 404").collect();
+    assert_eq!(statuses.len(), 2, "{all}");
+    assert!(all.contains("HTTP/1.1 200 OK\r\n"), "{all}");
 }
 
 #[tokio::test]

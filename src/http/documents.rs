@@ -100,8 +100,8 @@ async fn written(
     Ok((headers, document).into_response())
 }
 
-/// A plan without degrees, or without a feasible route, cannot be written in every format; when none of `choices` is
-/// possible, the refusal is that of the first.
+/// A plan without degrees, without a feasible route or without its ground cannot be written in every format; when none
+/// of `choices` is possible, the refusal is that of the first.
 fn write_first(
     choices: &[Choice],
     input: &ResultInput,
@@ -109,7 +109,12 @@ fn write_first(
     let mut refusal = None;
     for (format, options) in choices {
         match format.write(input, options) {
-            Err(error @ (ExportError::NoGeodeticFrame { .. } | ExportError::Infeasible { .. })) => {
+            Err(
+                error @ (ExportError::NoGeodeticFrame { .. }
+                | ExportError::Infeasible { .. }
+                | ExportError::Unflyable(_)
+                | ExportError::NoGround(_)),
+            ) => {
                 refusal.get_or_insert(error);
             }
             written => return written.map(|document| (*format, document)),

@@ -22,6 +22,9 @@ const PAGE: usize = 128;
 /// including their end, and no more, so that nobody holds up the exit.
 const LAST_PAGES: usize = 16;
 
+/// How much later than it happened an event of a run may be read: it is stored together with others.
+const LATE: Duration = Duration::from_millis(100);
+
 /// A comment is due when nothing has been sent to the reader for this long.
 const SILENCE: Duration = Duration::from_secs(15);
 
@@ -52,7 +55,7 @@ pub(super) struct Feed {
     throttle: Throttle,
     changes: watch::Receiver<u64>,
     phase: watch::Receiver<Phase>,
-    /// Since when the throttle has been holding something back.
+    /// Since when the throttle has been holding something back that it may release.
     held_since: Option<Instant>,
     /// When something was last sent to the reader.
     last_sent: Instant,
@@ -136,7 +139,7 @@ impl Feed {
             match self.wait().await {
                 Woken::Changed | Woken::Stopping => {}
                 Woken::WindowClosed => {
-                    self.throttle.flush(&mut out);
+                    self.throttle.release(&mut out);
                     self.held_since = None;
                     return Some(News::Events(out));
                 }
@@ -195,7 +198,7 @@ impl Feed {
         }
         self.held_since = match self.held_since {
             Some(since) if out.is_empty() => Some(since),
-            _ => self.throttle.holds().then(Instant::now),
+            _ => self.throttle.may_release().then(Instant::now),
         };
     }
 
@@ -203,7 +206,7 @@ impl Feed {
         let window_closes = self
             .held_since
             .zip(self.throttle.window_ms())
-            .map(|(since, window_ms)| since + Duration::from_secs_f64(window_ms / 1000.0));
+            .map(|(since, window_ms)| since + Duration::from_secs_f64(window_ms / 1000.0) + LATE);
         let (deadline, woken) = due(self.last_sent, window_closes);
         tokio::select! {
             changed = self.changes.changed() => match changed {

@@ -4,7 +4,8 @@
 use std::future::ready;
 
 use axum::extract::Request;
-use axum::response::IntoResponse as _;
+use axum::http::{HeaderValue, Version, header};
+use axum::response::{IntoResponse as _, Response};
 use futures_util::FutureExt as _;
 
 use super::auth;
@@ -30,9 +31,20 @@ impl Around for HeadCheck {
             .and_then(|()| auth::refuse_key_in_url(uri));
         match checked {
             Ok(()) => Box::pin(next.run(request).map(Ok)),
-            Err(problem) => Box::pin(ready(Ok(problem.into_response()))),
+            Err(problem) => Box::pin(ready(Ok(refused(problem, request.version())))),
         }
     }
+}
+
+/// A head that is too large ends its connection in HTTP/1, as it does where hyper finds out.
+fn refused(problem: Problem, version: Version) -> Response {
+    let closes = matches!(problem, Problem::HeadTooLarge(_)) && version < Version::HTTP_2;
+    let mut answer = problem.into_response();
+    if closes {
+        let close = HeaderValue::from_static("close");
+        answer.headers_mut().insert(header::CONNECTION, close);
+    }
+    answer
 }
 
 /// hyper's limits are not exact: in HTTP/1 it counts only what one read does not bring at once, and HTTP/2 has one on

@@ -1,6 +1,7 @@
 //! Query parameters and plan ids, read strictly: an unknown, duplicate or unreadable parameter is refused, because
 //! ignoring it would give another answer than the one asked for.
 
+use std::borrow::Cow;
 use std::str::FromStr;
 
 use axum::extract::rejection::QueryRejection;
@@ -14,6 +15,9 @@ use super::problem::Problem;
 use crate::job::PlanId;
 use crate::telemetry::spans;
 
+/// Maximum length of what is repeated of a parameter or a header.
+const SHOWN_CHARS: usize = 100;
+
 /// The parameters of one request.
 pub(super) struct Params(Vec<(String, String)>);
 
@@ -23,6 +27,7 @@ impl Params {
         let pairs = pairs_of(uri).map_err(|error| invalid("query", &error.to_string()))?;
         for (position, (name, _)) in pairs.iter().enumerate() {
             if !known.contains(&name.as_str()) {
+                let name = &*begin(name);
                 return Err(invalid(name, &unknown(name, known)));
             }
             if pairs[..position].iter().any(|(earlier, _)| earlier == name) {
@@ -68,7 +73,21 @@ fn pairs_of(uri: &Uri) -> Result<Vec<(String, String)>, QueryRejection> {
 
 /// `value` is not allowed for `name`.
 pub(super) fn refused(name: &str, value: &str, allowed: &str) -> Problem {
+    let value = begin(value);
     invalid(name, &format!("{name} is {value:?}, must be {allowed}"))
+}
+
+/// `name` is needed beside the others.
+pub(super) fn missing(name: &str, allowed: &str) -> Problem {
+    invalid(name, &format!("{name} is missing, must be {allowed}"))
+}
+
+/// What a caller sent, as far as it is repeated to it: its head may have 64 KiB.
+pub(super) fn begin(sent: &str) -> Cow<'_, str> {
+    match sent.char_indices().nth(SHOWN_CHARS) {
+        Some((end, _)) => format!("{}...", &sent[..end]).into(),
+        None => sent.into(),
+    }
 }
 
 fn invalid(name: &str, detail: &str) -> Problem {

@@ -1,6 +1,7 @@
 //! `Prefer: wait=N`, RFC 7240: how long the caller would rather wait than ask again.
 
 use std::convert::Infallible;
+use std::num::IntErrorKind;
 use std::time::Duration;
 
 use axum::extract::OptionalFromRequestParts;
@@ -29,10 +30,8 @@ impl Wait {
             .flat_map(|value| list::split(value, ','))
             .filter_map(|preference| list::split(preference, ';').next()?.split_once('='))
             .find(|(name, _)| name.trim().eq_ignore_ascii_case("wait"))
-            .and_then(|(_, value)| value.trim().trim_matches('"').parse().ok())
-            .map(|seconds: u64| {
-                Self(u8::try_from(seconds).map_or(MAX_WAIT_S, |s| s.min(MAX_WAIT_S)))
-            })
+            .and_then(|(_, value)| seconds(value.trim().trim_matches('"')))
+            .map(|seconds| Self(seconds.min(MAX_WAIT_S)))
     }
 
     pub(super) fn duration(self) -> Duration {
@@ -42,6 +41,15 @@ impl Wait {
     /// The value of `Preference-Applied`.
     pub(super) fn applied(self) -> HeaderValue {
         HeaderValue::from_str(&format!("wait={}", self.0)).expect("digits are visible ASCII")
+    }
+}
+
+/// A number of seconds; one of any length is a number.
+fn seconds(text: &str) -> Option<u8> {
+    match text.parse::<u8>() {
+        Ok(seconds) => Some(seconds),
+        Err(error) if *error.kind() == IntErrorKind::PosOverflow => Some(u8::MAX),
+        Err(_) => None,
     }
 }
 
@@ -65,6 +73,7 @@ mod tests {
             ("Wait=5; foo=bar", Some(5)),
             ("wait=\"7\"", Some(7)),
             ("wait=99", Some(30)),
+            ("wait=18446744073709551616", Some(30)),
             ("wait=0", Some(0)),
             ("wait=-1", None),
             ("wait=soon", None),

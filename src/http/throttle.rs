@@ -2,8 +2,8 @@
 //!
 //! Time is divided into windows by the events' own `elapsed_ms`, so that a reader who resumes gets the same windows. Of
 //! each window the latest convergence and the latest incumbent remain; they are sent in the order of their ids when the
-//! window closes: at the first event beyond it, at a status or the end, or when [`Throttle::flush`] is called because
-//! nothing more comes.
+//! window closes: at the first event beyond it, at a status or the end, or when [`Throttle::release`] is called because
+//! nothing more seems to come. What comes of that window all the same counts for the next.
 
 use crate::job::{Event, NumberedEvent};
 
@@ -12,8 +12,10 @@ use crate::job::{Event, NumberedEvent};
 pub(super) struct Throttle {
     /// `None` lets everything pass.
     window_ms: Option<f64>,
-    /// Which window the held events belong to.
+    /// Which window the last event belongs to.
     window: u64,
+    /// Events of that window have been sent.
+    served: bool,
     convergence: Option<NumberedEvent>,
     incumbent: Option<NumberedEvent>,
 }
@@ -24,6 +26,7 @@ impl Throttle {
         Self {
             window_ms: (rate_hz > 0.0).then(|| 1000.0 / rate_hz),
             window: 0,
+            served: false,
             convergence: None,
             incumbent: None,
         }
@@ -37,6 +40,11 @@ impl Throttle {
     /// Whether events are being held back.
     pub(super) fn holds(&self) -> bool {
         self.convergence.is_some() || self.incumbent.is_some()
+    }
+
+    /// Whether events are held back whose window nothing has been sent of.
+    pub(super) fn may_release(&self) -> bool {
+        self.holds() && !self.served
     }
 
     /// Take the next event; events that may be sent are added to `out`.
@@ -63,14 +71,24 @@ impl Throttle {
         if window == self.window {
             *place = Some(event);
         } else {
-            self.flush(out);
+            if !self.served {
+                self.flush(out);
+            }
+            self.served = false;
             self.window = window;
             self.push(event, out);
         }
     }
 
-    /// Close the window: held events are released.
+    /// Send what is held, as if its window had closed.
+    pub(super) fn release(&mut self, out: &mut Vec<NumberedEvent>) {
+        self.flush(out);
+        self.served = true;
+    }
+
+    /// Send what is held: nothing of its window follows.
     pub(super) fn flush(&mut self, out: &mut Vec<NumberedEvent>) {
+        self.served = false;
         let mut held = [self.convergence.take(), self.incumbent.take()];
         held.sort_by_key(|event| event.as_ref().map(|event| event.id));
         out.extend(held.into_iter().flatten());
@@ -176,6 +194,27 @@ mod tests {
             let rest = read(usize::try_from(*id).expect("small"));
             assert_eq!(rest, whole[position + 1..], "after {id}");
         }
+    }
+
+    #[test]
+    fn what_comes_late_of_a_window_counts_for_the_next() {
+        let mut throttle = Throttle::new(10.0);
+        let mut ids = |release: bool, events: &[NumberedEvent]| {
+            let mut out = Vec::new();
+            for event in events {
+                throttle.push(event.clone(), &mut out);
+            }
+            if release && throttle.may_release() {
+                throttle.release(&mut out);
+            }
+            out.iter().map(|event| event.id).collect::<Vec<_>>()
+        };
+        assert_eq!(ids(true, &[convergence(1, 20.0)]), [1]);
+        let late = [convergence(2, 30.0), incumbent(3, 80.0)];
+        assert_eq!(ids(true, &late), [0; 0], "the window has been served");
+        assert_eq!(ids(false, &[convergence(4, 110.0)]), [0; 0]);
+        assert_eq!(ids(false, &[convergence(5, 210.0)]), [3, 4]);
+        assert_eq!(ids(false, &[end(6)]), [5, 6]);
     }
 
     #[test]

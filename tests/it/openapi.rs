@@ -255,6 +255,7 @@ async fn every_failure_kind_has_a_problem_page_and_is_described() {
 /// The `type` of a problem is a path.
 #[tokio::test]
 async fn every_problem_type_leads_to_its_page() {
+    let problems = include_str!("../../docs/PROBLEMS.md");
     let api = Api::new();
     let types = DESCRIPTION["components"]["schemas"]["Problem"]["properties"]["type"]["enum"]
         .as_array()
@@ -263,6 +264,8 @@ async fn every_problem_type_leads_to_its_page() {
         let answer = api.get(kind).await;
         assert_eq!(answer.status, 200, "{kind}");
         let slug = kind.trim_start_matches("/problems/");
+        let row = format!("| [{slug}](#{slug}) | ");
+        assert!(problems.contains(&row), "no row {row}");
         let page = std::str::from_utf8(&answer.body).expect("UTF-8");
         assert!(page.contains(&format!("<h2>{slug}</h2>")), "{page}");
         let (_, main) = page.split_once("<main>").expect("the section");

@@ -2,6 +2,7 @@
 
 use super::Problem;
 use crate::http::auth::TooMany;
+use crate::http::params::begin;
 use crate::scenario::json::MORE_FAULTS;
 use crate::store::{Tombstone, Trouble};
 
@@ -73,6 +74,9 @@ impl Problem {
             Self::NoSuchTerrain(name) => {
                 format!("there is no dataset {name:?}; GET /terrains lists what there is")
             }
+            Self::TerrainInUse { name, plans: 1 } => {
+                format!("a plan over {name} is queued or running; it can be deleted when that has ended")
+            }
             Self::TerrainInUse { name, plans } => {
                 format!("{plans} plans over {name} are queued or running; it can be deleted when they have ended")
             }
@@ -96,6 +100,7 @@ impl Problem {
                 "the header Allow lists the methods of this resource".to_owned()
             }
             Self::NotAcceptable { asked, available } => {
+                let asked = begin(asked);
                 format!("asked for {asked}; available: {}", available.join(", "))
             }
             Self::BodyTooSlow(limit) => {

@@ -176,9 +176,8 @@ fn area(params: &Params) -> Result<Option<Degrees>, Problem> {
             .zip(sides)
             .find(|(_, side)| side.is_none());
         return match missing {
-            Some((name, _)) if sides.iter().any(Option::is_some) => Err(params::refused(
+            Some((name, _)) if sides.iter().any(Option::is_some) => Err(params::missing(
                 name,
-                "",
                 "given with south, west, north and east, or none of them",
             )),
             _ => Ok(None),

@@ -108,7 +108,10 @@ fn every_code_has_a_case_and_a_row_in_the_docs() {
     ));
     let last = counted.last().expect("there are many").clone();
     examples.insert(last.code, last);
-    let unknown = Fault::unknown_plan("x", "no plan has this id");
+    let unknown = Fault::unknown_plan(
+        "01936f2c-7d1a-7c55-9a53-27b1b44c1a10",
+        "no plan has this id",
+    );
     examples.insert(unknown.code, unknown);
     for (code, meaning) in CODES {
         let Fault {

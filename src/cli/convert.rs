@@ -6,7 +6,8 @@ use clap::Args;
 
 use super::exit;
 use super::files;
-use crate::import::{self, ImportError, Syntax, Unused};
+use crate::import::{self, ImportError, Most, Syntax, Unused};
+use crate::scenario::limits::Limits;
 
 #[derive(Args)]
 pub(super) struct Arguments {
@@ -21,7 +22,12 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let text = files::read(&arguments.file)?;
     let file = arguments.file.display();
-    match import::convert(&text, Syntax::of(&text)) {
+    let limits = Limits::default();
+    let most = Most {
+        threats: limits.threats,
+        polygon_vertices: limits.polygon_vertices,
+    };
+    match import::convert(&text, Syntax::of(&text), most) {
         Ok(conversion) => {
             for assumed in &conversion.assumed {
                 eprintln!("assumed {}: {}", assumed.pointer, assumed.reason);

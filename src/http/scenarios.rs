@@ -8,7 +8,7 @@ use axum::http::HeaderMap;
 use super::params::NoParams;
 use super::problem::Problem;
 use super::{AppState, body, off_thread};
-use crate::import::{self, Conversion};
+use crate::import::{self, Conversion, Most};
 
 /// `POST /scenarios:convert`.
 pub(super) async fn convert(
@@ -18,6 +18,11 @@ pub(super) async fn convert(
     body: Body,
 ) -> Result<Json<Conversion>, Problem> {
     let (text, syntax) = body::read_json_or_xml(&state, &headers, body).await?;
-    let conversion = off_thread::run(move || import::convert(&text, syntax)).await??;
+    let limits = state.rules.limits;
+    let most = Most {
+        threats: limits.threats,
+        polygon_vertices: limits.polygon_vertices,
+    };
+    let conversion = off_thread::run(move || import::convert(&text, syntax, most)).await??;
     Ok(Json(conversion))
 }

@@ -3,7 +3,8 @@
 use serde_json::{Value, json};
 
 use super::facts::{Facts, OF_A_THREAT};
-use super::{Assumed, Conversion, ImportError, Unused};
+use super::threat::{Threat, Threats, circle, polygon};
+use super::{Assumed, Conversion, ImportError, Most, Unused};
 
 /// Most entries in the list of unused parts; the last one counts the rest.
 const MOST_UNUSED: usize = 1000;
@@ -27,7 +28,7 @@ pub(super) struct Draft {
     datum: &'static str,
     start: Option<(Place, f64)>,
     target: Option<(Place, f64)>,
-    threats: Vec<Value>,
+    threats: Threats,
     /// Metres per second.
     pub(super) cruise_speed: Option<f64>,
     /// Elevation of the ground, metres, if the file gives it.
@@ -49,19 +50,19 @@ impl Place {
         Ok(Self { lat, lon })
     }
 
-    fn json(self) -> Value {
+    pub(super) fn json(self) -> Value {
         json!({"lat": self.lat, "lon": self.lon})
     }
 }
 
 impl Draft {
-    pub(super) fn new(datum: &'static str) -> Self {
+    pub(super) fn new(datum: &'static str, most: Most) -> Self {
         Self {
             name: None,
             datum,
             start: None,
             target: None,
-            threats: Vec::new(),
+            threats: Threats::up_to(most),
             cruise_speed: None,
             elevation: None,
             assumed: Vec::new(),
@@ -147,9 +148,9 @@ impl Draft {
         }
     }
 
-    fn threat(&mut self, at: &str, facts: &Facts, threat: Value) {
+    fn threat(&mut self, at: &str, facts: &Facts, threat: Threat) {
         self.leave_beside(at, facts, &OF_A_THREAT);
-        self.threats.push(threat);
+        self.threats.add(threat);
     }
 
     fn leave_beside(&mut self, at: &str, facts: &Facts, used: &[&str]) {
@@ -189,6 +190,9 @@ impl Draft {
             );
             return Err(self.refused(detail));
         };
+        if let Some(excess) = self.threats.excess() {
+            return Err(self.refused(excess));
+        }
         self.count_the_rest();
         let elevation = self.elevation.unwrap_or(f64::INFINITY);
         let elevation = elevation.min(start.1).min(target.1);
@@ -208,7 +212,7 @@ impl Draft {
             "altitude_datum": self.datum,
             "start": end(start),
             "target": end(target),
-            "threats": self.threats,
+            "threats": self.threats.json(),
             "terrain": {"kind": "flat", "elevation": elevation},
             "altitude": {"min": 0.0, "max": CEILING_M},
         });
@@ -221,69 +225,4 @@ impl Draft {
             unused: self.unused,
         })
     }
-}
-
-fn circle(facts: &Facts, center: Place) -> Result<Value, String> {
-    let radius = facts.number("radius")?.unwrap_or_default();
-    if radius <= 0.0 {
-        return Err(format!("radius is {radius}, must be > 0"));
-    }
-    let influence = facts.number("influence")?.unwrap_or(radius);
-    if influence < radius {
-        return Err(format!(
-            "influence is {influence}, must be >= the radius, {radius}"
-        ));
-    }
-    let shape = json!({
-        "kind": "cylinder",
-        "name": facts.name(),
-        "center": center.json(),
-        "radius": radius,
-        "influence": influence,
-    });
-    between_heights(shape, facts)
-}
-
-#[expect(
-    clippy::float_cmp,
-    reason = "a ring is closed by its very first corner"
-)]
-fn polygon(facts: &Facts, ring: &[[f64; 2]]) -> Result<Value, String> {
-    let open = match ring {
-        [first, between @ .., last] if first == last => &ring[..=between.len()],
-        _ => ring,
-    };
-    if open.len() < 3 {
-        let count = open.len();
-        return Err(format!(
-            "a polygon of {count} corners, must have three or more"
-        ));
-    }
-    let corners: Result<Vec<Value>, String> = open
-        .iter()
-        .map(|[lon, lat]| Place::new(*lon, *lat).map(Place::json))
-        .collect();
-    let margin = facts.number("margin")?.unwrap_or(0.0);
-    if margin < 0.0 {
-        return Err(format!("margin is {margin}, must be >= 0"));
-    }
-    let shape = json!({
-        "kind": "polygon",
-        "name": facts.name(),
-        "vertices": corners?,
-        "margin": margin,
-    });
-    between_heights(shape, facts)
-}
-
-fn between_heights(mut shape: Value, facts: &Facts) -> Result<Value, String> {
-    let (base, top) = (facts.number("base")?, facts.number("top")?);
-    if let (Some(base), Some(top)) = (base, top)
-        && base >= top
-    {
-        return Err(format!("base is {base}, must be < the top, {top}"));
-    }
-    shape["base"] = base.into();
-    shape["top"] = top.into();
-    Ok(shape)
 }

@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::antimeridian;
 use super::draft::{Draft, Place};
 use super::facts::Facts;
-use super::{Conversion, ImportError};
+use super::{Conversion, ImportError, Most};
 
 /// Names that older GeoJSON uses for the only reference system of RFC 7946.
 const WGS84: [&str; 3] = [
@@ -17,9 +17,9 @@ const WGS84: [&str; 3] = [
 ];
 
 /// Convert a feature collection, or a feature, to a scenario.
-pub(super) fn convert(mut document: Value) -> Result<Conversion, ImportError> {
+pub(super) fn convert(mut document: Value, most: Most) -> Result<Conversion, ImportError> {
     refuse_other_systems(&document)?;
-    let mut draft = Draft::new("ellipsoid");
+    let mut draft = Draft::new("ellipsoid", most);
     draft.name = document["name"].as_str().map(str::to_owned);
     match document["type"].as_str() {
         Some("FeatureCollection") => {
@@ -118,16 +118,16 @@ fn point(draft: &mut Draft, at: &str, facts: &Facts, position: &Position) {
 }
 
 fn polygons(draft: &mut Draft, at: &str, facts: &Facts, polygons: &[Vec<Vec<Position>>]) {
-    let (mut places, mut outer_rings) = (Vec::new(), Vec::new());
+    let place = |index: usize| format!("{at}/geometry/coordinates/{index}");
+    let (mut indices, mut outer_rings) = (Vec::new(), Vec::new());
     for (index, rings) in polygons.iter().enumerate() {
-        let at = format!("{at}/geometry/coordinates/{index}");
-        if let Some(ring) = outer(draft, &at, rings) {
-            places.push(at);
+        if let Some(ring) = outer(draft, &place(index), rings) {
+            indices.push(index);
             outer_rings.push(ring);
         }
     }
     for (first, ring) in antimeridian::joined(&outer_rings) {
-        draft.polygon(&places[first], facts, &ring);
+        draft.polygon(&place(indices[first]), facts, &ring);
     }
 }
 

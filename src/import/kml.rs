@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 
 use super::draft::{Draft, Place};
 use super::facts::Facts;
-use super::{Conversion, ImportError};
+use super::{Conversion, ImportError, Most};
 
 /// Most XML nodes: elements, texts and comments. The limit on the file's size bounds them too.
 const MOST_NODES: u32 = 2_000_000;
@@ -27,7 +27,7 @@ const NOT_READ: [&str; 6] = [
 ];
 
 /// Convert a KML document to a scenario.
-pub(super) fn convert(text: &[u8]) -> Result<Conversion, ImportError> {
+pub(super) fn convert(text: &[u8], most: Most) -> Result<Conversion, ImportError> {
     let text = std::str::from_utf8(text)
         .map_err(|error| ImportError::NotXml(format!("the file is not UTF-8: {error}")))?;
     let options = ParsingOptions {
@@ -44,7 +44,7 @@ pub(super) fn convert(text: &[u8]) -> Result<Conversion, ImportError> {
             "the root element is {found}, must be kml"
         )));
     }
-    let mut draft = Draft::new("msl");
+    let mut draft = Draft::new("msl", most);
     draft.name = root
         .children()
         .find(|node| is(node, "Document"))

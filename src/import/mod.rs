@@ -10,6 +10,7 @@ mod facts;
 mod geojson;
 mod kml;
 mod plan;
+mod threat;
 
 use serde::Serialize;
 use serde_json::Value;
@@ -45,6 +46,15 @@ pub struct Unused {
     pub reason: String,
 }
 
+/// The most that a scenario may have of what files have many of; one with more would only be refused later.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Most {
+    /// Threats in a scenario.
+    pub threats: usize,
+    /// Vertices of all polygons together.
+    pub polygon_vertices: usize,
+}
+
 /// Syntax of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Syntax {
@@ -73,7 +83,7 @@ pub enum ImportError {
     /// It is well-formed, but contains no scenario.
     #[error("{detail}")]
     NoScenario {
-        /// What is missing.
+        /// What is missing, or too many.
         detail: String,
         /// What it contains instead.
         unused: Vec<Unused>,
@@ -106,21 +116,22 @@ impl Syntax {
 ///
 /// # Errors
 /// [`ImportError::NotJson`] and [`ImportError::NotXml`] when `text` does not have that syntax,
-/// [`ImportError::NoScenario`] when it does but has no start or no target, or one whose altitude is not known.
-pub fn convert(text: &[u8], syntax: Syntax) -> Result<Conversion, ImportError> {
+/// [`ImportError::NoScenario`] when it does but has no start or no target, or one whose altitude is not known, or has
+/// more than `most`.
+pub fn convert(text: &[u8], syntax: Syntax, most: Most) -> Result<Conversion, ImportError> {
     let text = without_mark(text);
     if text.starts_with(b"PK\x03\x04") {
         let found = "a zip archive, as KMZ is: unpack it and take the doc.kml in it";
         return Err(ImportError::NotXml(found.to_owned()));
     }
     match syntax {
-        Syntax::Xml => kml::convert(text),
+        Syntax::Xml => kml::convert(text, most),
         Syntax::Json => {
             let document = json(text)?;
             if document["fileType"] == "Plan" {
-                plan::convert(&document)
+                plan::convert(&document, most)
             } else {
-                geojson::convert(document)
+                geojson::convert(document, most)
             }
         }
     }

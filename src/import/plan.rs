@@ -5,7 +5,7 @@ use serde_json::{Map, Value};
 
 use super::draft::{Draft, Place};
 use super::facts::Facts;
-use super::{Conversion, ImportError};
+use super::{Conversion, ImportError, Most};
 
 /// MAVLink commands (`MAV_CMD`) that have a position: waypoints and similar, then take-offs and landings.
 const WAYPOINTS: [u64; 6] = [16, 17, 18, 19, 31, 82];
@@ -32,14 +32,14 @@ struct Stop {
 }
 
 /// Convert a plan to a scenario.
-pub(super) fn convert(document: &Value) -> Result<Conversion, ImportError> {
+pub(super) fn convert(document: &Value, most: Most) -> Result<Conversion, ImportError> {
     let mission = &document["mission"];
     let Some(items) = mission["items"].as_array() else {
         return Err(ImportError::no_scenario(
             "a plan has mission.items, a list; this one has none",
         ));
     };
-    let mut draft = Draft::new("msl");
+    let mut draft = Draft::new("msl", most);
     let home = home(mission);
     match home {
         Some((_, alt)) => draft.elevation = Some(alt),
@@ -201,7 +201,7 @@ fn ends(draft: &mut Draft, home: Option<(Place, f64)>, stops: &[Stop]) -> Result
 }
 
 fn fences(draft: &mut Draft, fence: &Value) {
-    let list = |name: &str| fence[name].as_array().cloned().unwrap_or_default();
+    let list = |name: &str| fence[name].as_array().map_or(&[][..], Vec::as_slice);
     for (index, circle) in list("circles").iter().enumerate() {
         let at = format!("/geoFence/circles/{index}");
         if excludes(draft, &at, circle) {
@@ -222,9 +222,9 @@ fn fences(draft: &mut Draft, fence: &Value) {
     for (index, polygon) in list("polygons").iter().enumerate() {
         let at = format!("/geoFence/polygons/{index}");
         if excludes(draft, &at, polygon) {
-            let corners = polygon["polygon"].as_array().cloned().unwrap_or_default();
+            let corners = polygon["polygon"].as_array();
             let corner = |corner: &Value| Some([corner[1].as_f64()?, corner[0].as_f64()?]);
-            let ring: Option<Vec<[f64; 2]>> = corners.iter().map(corner).collect();
+            let ring: Option<Vec<[f64; 2]>> = corners.into_iter().flatten().map(corner).collect();
             match ring {
                 Some(ring) => draft.polygon(&at, &Facts::default(), &ring),
                 None => draft.leave(&at, "a corner that is not latitude and longitude"),

@@ -8,6 +8,16 @@ use serde_json::json;
 
 use super::*;
 
+const MOST: Most = Most {
+    threats: 10_000,
+    polygon_vertices: 20_000,
+};
+
+/// Within the limits that a service has by default.
+fn convert(text: &[u8], syntax: Syntax) -> Result<Conversion, ImportError> {
+    super::convert(text, syntax, MOST)
+}
+
 /// The reasons, each with its place.
 fn unused(conversion: &Conversion) -> Vec<String> {
     let line = |unused: &Unused| format!("{}: {}", unused.place, unused.reason);
@@ -69,4 +79,80 @@ fn hostile_files_are_refused_and_soon() {
     };
     assert_eq!(unused.len(), 1001);
     assert_eq!(unused[1000].reason, "2000 more are not listed");
+}
+
+/// What a scenario may have at most, a file may have too; one more is refused.
+#[test]
+fn files_of_too_many_threats_are_refused() {
+    let circles = |many: usize| {
+        let circle = geojson::feature(
+            json!({"radius": 5}),
+            json!({"type": "Point", "coordinates": [8.5, 47.3]}),
+        );
+        geojson::collection(&[geojson::ends(), vec![circle; many]].concat().into())
+    };
+    let parts = |many: usize| {
+        let triangle = json!([[[8.5, 47.3], [8.6, 47.3], [8.6, 47.4], [8.5, 47.3]]]);
+        let coordinates = vec![triangle; many];
+        let parts = geojson::feature(
+            json!({}),
+            json!({"type": "MultiPolygon", "coordinates": coordinates}),
+        );
+        geojson::collection(&[geojson::ends(), vec![parts]].concat().into())
+    };
+    let point = |name: &str, more: &str| {
+        format!(
+            "<Placemark><name>{name}</name>{more}<Point><coordinates>8.5,47.3,9</coordinates></Point></Placemark>"
+        )
+    };
+    let placemarks = |many: usize| {
+        let radius = "<ExtendedData><Data name=\"radius\"><value>5</value></Data></ExtendedData>";
+        let radars = point("radar", radius).repeat(many);
+        format!(
+            "<kml>{}{}{radars}</kml>",
+            point("start", ""),
+            point("target", "")
+        )
+    };
+    let fences = |many: usize| {
+        let item = json!({"type": "SimpleItem", "command": 16, "frame": 0,
+            "params": [0, 0, 0, null, 47.3, 8.5, 30]});
+        let corners = [[47.3, 8.5], [47.3, 8.6], [47.4, 8.6]];
+        let fence = json!({"inclusion": false, "polygon": corners});
+        let plan = json!({"fileType": "Plan", "mission": {"items": [item, item]},
+            "geoFence": {"polygons": vec![fence; many]}});
+        plan.to_string()
+    };
+    let check = |file: &dyn Fn(usize) -> String, most: Most, expected: &str| {
+        let converted =
+            |text: String| super::convert(text.as_bytes(), Syntax::of(text.as_bytes()), most);
+        let read = converted(file(4)).expect("no more than may be");
+        assert_eq!(read.scenario["threats"].as_array().map(Vec::len), Some(4));
+        let refused = converted(file(5)).expect_err(expected);
+        assert_eq!(refused.to_string(), expected);
+    };
+    let threats = Most { threats: 4, ..MOST };
+    for file in [
+        &circles as &dyn Fn(usize) -> String,
+        &parts,
+        &placemarks,
+        &fences,
+    ] {
+        check(
+            file,
+            threats,
+            "the file has 5 threats, must have at most 4 (limit threats)",
+        );
+    }
+    let vertices = Most {
+        polygon_vertices: 12,
+        ..MOST
+    };
+    for file in [&parts as &dyn Fn(usize) -> String, &fences] {
+        check(
+            file,
+            vertices,
+            "the polygons of the file have 15 vertices together, must have at most 12 (limit polygon_vertices)",
+        );
+    }
 }

@@ -2,11 +2,13 @@
 
 use std::collections::BTreeSet;
 use std::fs;
+use std::sync::Arc;
 
 use axum::http::Method;
 use noctule::digest::sha256_hex;
 use noctule::export::ALL;
 use noctule::export::document::{Convergence, Origin, Position, ResultDocument, Timing};
+use noctule::http;
 use noctule::planner;
 use noctule::scenario::json;
 use noctule::scenario::limits::Limits;
@@ -417,6 +419,45 @@ async fn files_that_are_no_scenario_are_refused() {
     answer.expect_problem(413, "body-too-large");
     let answer = api.post("/scenarios:convert?into=kml", &json!({})).await;
     answer.expect_problem(400, "invalid-parameter");
+}
+
+/// A file gets no further than the scenario that it would become: the service's own limits hold, and on the command
+/// line the defaults.
+#[tokio::test]
+async fn files_of_more_threats_than_a_scenario_may_have_are_refused() {
+    let file = |n_circles: usize| {
+        let point = |properties: Value| {
+            json!({"type": "Feature", "properties": properties,
+            "geometry": {"type": "Point", "coordinates": [8.5, 47.4, 500]}})
+        };
+        let mut features = vec![point(json!({"radius": 5})); n_circles];
+        features.extend(["start", "target"].map(|name| point(json!({"name": name}))));
+        json!({"type": "FeatureCollection", "features": features})
+    };
+    let mut api = Api::new();
+    let limits = Limits {
+        threats: 2,
+        ..api.state.rules.limits
+    };
+    api.state.rules = Arc::new(planner::rules(limits));
+    api.router = http::router(api.state.clone());
+    let answer = api.post("/scenarios:convert", &file(2)).await;
+    assert_eq!(answer.status, 200, "{answer:?}");
+    let answer = api.post("/scenarios:convert", &file(3)).await;
+    let problem = answer.expect_problem(422, "no-scenario");
+    assert_eq!(
+        problem["detail"],
+        "the file has 3 threats, must have at most 2 (limit threats)"
+    );
+
+    let read = process::run(&["convert", "-"], &file(10_000).to_string());
+    assert_eq!(read.status.code(), Some(0));
+    let refused = process::run(&["convert", "-"], &file(10_001).to_string());
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        String::from_utf8_lossy(&refused.stderr)
+            .contains("the file has 10001 threats, must have at most 10000 (limit threats)")
+    );
 }
 
 #[test]

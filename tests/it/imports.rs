@@ -1,7 +1,7 @@
 //! Malformed files to convert: they are read or refused. What the readers make of valid files is tested beside
 //! them.
 
-use noctule::import::{ImportError, Syntax, convert};
+use noctule::import::{self, Conversion, ImportError, Most, Syntax};
 use proptest::prelude::*;
 
 use crate::support::patience::at_little_cost;
@@ -42,6 +42,15 @@ const PLAN: &str = r#"{"fileType": "Plan", "version": 1, "groundStation": "QGrou
     "circles": [{"inclusion": false, "circle": {"center": [47.35, 8.56], "radius": 200}}],
     "polygons": [{"inclusion": false, "polygon": [[47.31, 8.51], [47.31, 8.52], [47.32, 8.52]]}]},
   "rallyPoints": {"points": [[47.3, 8.5, 10]]}}"#;
+
+/// Within the limits that a service has by default.
+fn convert(text: &[u8], syntax: Syntax) -> Result<Conversion, ImportError> {
+    let most = Most {
+        threats: 10_000,
+        polygon_vertices: 20_000,
+    };
+    import::convert(text, syntax, most)
+}
 
 #[test]
 fn complete_files_are_read() {

@@ -3,18 +3,22 @@
 use serde_json::{Value, json};
 
 use super::super::*;
-use super::unused;
+use super::{convert, unused};
 
 pub(super) fn geojson(features: &Value) -> Result<Conversion, ImportError> {
-    let document = json!({"type": "FeatureCollection", "name": "flight", "features": features});
-    convert(document.to_string().as_bytes(), Syntax::Json)
+    convert(collection(features).as_bytes(), Syntax::Json)
+}
+
+/// The text of a file with these features.
+pub(super) fn collection(features: &Value) -> String {
+    json!({"type": "FeatureCollection", "name": "flight", "features": features}).to_string()
 }
 
 #[expect(
     clippy::needless_pass_by_value,
     reason = "read better where they are called"
 )]
-fn feature(properties: Value, geometry: Value) -> Value {
+pub(super) fn feature(properties: Value, geometry: Value) -> Value {
     json!({"type": "Feature", "properties": properties, "geometry": geometry})
 }
 
@@ -29,7 +33,7 @@ pub(super) fn point(name: &str, coordinates: Value) -> Value {
     )
 }
 
-fn ends() -> Vec<Value> {
+pub(super) fn ends() -> Vec<Value> {
     vec![
         point("Start", json!([8.5, 47.3, 500])),
         point(" target", json!([8.6, 47.4, 520.5])),

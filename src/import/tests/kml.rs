@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::super::*;
-use super::unused;
+use super::{convert, unused};
 
 const KML: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <kml xmlns="http://www.opengis.net/kml/2.2"><Document><name>flight</name>

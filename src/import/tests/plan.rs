@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::super::*;
-use super::unused;
+use super::{convert, unused};
 
 #[test]
 fn missions_and_fences_of_a_plan() {

@@ -1,0 +1,177 @@
+//! Threats as a file gives them, and how many of them a scenario may have.
+
+use serde_json::{Value, json};
+
+use super::Most;
+use super::draft::Place;
+use super::facts::Facts;
+
+/// A threat of the document.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Threat {
+    name: Option<String>,
+    shape: Shape,
+    /// Metres in the document's datum, as is `top`.
+    base: Option<f64>,
+    top: Option<f64>,
+}
+
+/// Lengths in metres.
+#[derive(Debug, Clone, PartialEq)]
+enum Shape {
+    Cylinder {
+        center: Place,
+        radius: f64,
+        influence: f64,
+    },
+    Polygon {
+        vertices: Vec<Place>,
+        margin: f64,
+    },
+}
+
+/// All threats of a file. Those past the limits are counted, and not kept.
+#[derive(Debug)]
+pub(super) struct Threats {
+    most: Most,
+    kept: Vec<Threat>,
+    n_found: usize,
+    /// Of all polygons together.
+    n_vertices: usize,
+}
+
+impl Threats {
+    pub(super) fn up_to(most: Most) -> Self {
+        Self {
+            most,
+            kept: Vec::new(),
+            n_found: 0,
+            n_vertices: 0,
+        }
+    }
+
+    pub(super) fn add(&mut self, threat: Threat) {
+        self.n_found += 1;
+        if let Shape::Polygon { vertices, .. } = &threat.shape {
+            self.n_vertices += vertices.len();
+        }
+        if self.excess().is_none() {
+            self.kept.push(threat);
+        }
+    }
+
+    /// Which limit they exceed, and by how much.
+    pub(super) fn excess(&self) -> Option<String> {
+        let (n_found, n_vertices, most) = (self.n_found, self.n_vertices, self.most);
+        if n_found > most.threats {
+            Some(format!(
+                "the file has {n_found} threats, must have at most {} (limit threats)",
+                most.threats
+            ))
+        } else if n_vertices > most.polygon_vertices {
+            Some(format!(
+                "the polygons of the file have {n_vertices} vertices together, must have at most {} (limit polygon_vertices)",
+                most.polygon_vertices
+            ))
+        } else {
+            None
+        }
+    }
+
+    /// As in the document.
+    pub(super) fn json(self) -> Value {
+        self.kept.into_iter().map(Threat::json).collect()
+    }
+}
+
+impl Threat {
+    fn json(self) -> Value {
+        let Self {
+            name, base, top, ..
+        } = self;
+        match self.shape {
+            Shape::Cylinder {
+                center,
+                radius,
+                influence,
+            } => json!({
+                "kind": "cylinder",
+                "name": name,
+                "center": center.json(),
+                "radius": radius,
+                "influence": influence,
+                "base": base,
+                "top": top,
+            }),
+            Shape::Polygon { vertices, margin } => json!({
+                "kind": "polygon",
+                "name": name,
+                "vertices": vertices.into_iter().map(Place::json).collect::<Value>(),
+                "margin": margin,
+                "base": base,
+                "top": top,
+            }),
+        }
+    }
+}
+
+/// A circle with the radius in its facts.
+pub(super) fn circle(facts: &Facts, center: Place) -> Result<Threat, String> {
+    let radius = facts.number("radius")?.unwrap_or_default();
+    if radius <= 0.0 {
+        return Err(format!("radius is {radius}, must be > 0"));
+    }
+    let influence = facts.number("influence")?.unwrap_or(radius);
+    if influence < radius {
+        return Err(format!(
+            "influence is {influence}, must be >= the radius, {radius}"
+        ));
+    }
+    let shape = Shape::Cylinder {
+        center,
+        radius,
+        influence,
+    };
+    between_heights(shape, facts)
+}
+
+/// The outer ring of a polygon, closed or not.
+#[expect(
+    clippy::float_cmp,
+    reason = "a ring is closed by its very first corner"
+)]
+pub(super) fn polygon(facts: &Facts, ring: &[[f64; 2]]) -> Result<Threat, String> {
+    let open = match ring {
+        [first, between @ .., last] if first == last => &ring[..=between.len()],
+        _ => ring,
+    };
+    if open.len() < 3 {
+        let count = open.len();
+        return Err(format!(
+            "a polygon of {count} corners, must have three or more"
+        ));
+    }
+    let corners = open.iter().map(|[lon, lat]| Place::new(*lon, *lat));
+    let vertices: Result<Vec<Place>, String> = corners.collect();
+    let margin = facts.number("margin")?.unwrap_or(0.0);
+    if margin < 0.0 {
+        return Err(format!("margin is {margin}, must be >= 0"));
+    }
+    let vertices = vertices?;
+    between_heights(Shape::Polygon { vertices, margin }, facts)
+}
+
+fn between_heights(shape: Shape, facts: &Facts) -> Result<Threat, String> {
+    let (base, top) = (facts.number("base")?, facts.number("top")?);
+    if let (Some(base), Some(top)) = (base, top)
+        && base >= top
+    {
+        return Err(format!("base is {base}, must be < the top, {top}"));
+    }
+    Ok(Threat {
+        name: facts.name().map(str::to_owned),
+        shape,
+        base,
+        top,
+    })
+}

@@ -1,14 +1,15 @@
 //! KML: placemarks named start and target; polygons, and points with a radius, as threats. Heights are above mean sea
 //! level.
 //!
-//! A document type is refused, because its entities can expand without bound; links are not followed.
+//! A document type is refused, because its entities can expand without bound, and so is what would take the parser
+//! long; links are not followed.
 
 use roxmltree::{Document, Node, ParsingOptions};
 use serde_json::{Map, Value};
 
 use super::draft::{Draft, Place};
 use super::facts::Facts;
-use super::{Conversion, ImportError, Most};
+use super::{Conversion, ImportError, Most, xml};
 
 /// Most XML nodes: elements, texts and comments. The limit on the file's size bounds them too.
 const MOST_NODES: u32 = 2_000_000;
@@ -30,6 +31,7 @@ const NOT_READ: [&str; 6] = [
 pub(super) fn convert(text: &[u8], most: Most) -> Result<Conversion, ImportError> {
     let text = std::str::from_utf8(text)
         .map_err(|error| ImportError::NotXml(format!("the file is not UTF-8: {error}")))?;
+    xml::check(text).map_err(ImportError::NotXml)?;
     let options = ParsingOptions {
         allow_dtd: false,
         nodes_limit: MOST_NODES,

@@ -11,6 +11,7 @@ mod geojson;
 mod kml;
 mod plan;
 mod threat;
+mod xml;
 
 use serde::Serialize;
 use serde_json::Value;

@@ -84,6 +84,60 @@ fn long_files_are_read_in_linear_time() {
     );
 }
 
+/// As long as a body may be by default.
+const LONGEST: usize = 8 * 1024 * 1024;
+
+/// `one` again and again, up to the length of a body.
+fn long(begin: &str, one: impl Fn(usize) -> String, end: &str) -> String {
+    let mut text = begin.to_owned();
+    for index in 0.. {
+        let next = one(index);
+        if text.len() + next.len() + end.len() > LONGEST {
+            break;
+        }
+        text.push_str(&next);
+    }
+    text + end
+}
+
+/// What the parser would compare with each other is limited, however it is spread over a file.
+#[test]
+fn namespaces_and_attributes_are_read_in_linear_time() {
+    let prefix = |n: usize| format!(" xmlns:n{n}=\"u{n}\"");
+    let prefixes = |many: usize| (0..many).map(prefix).collect::<Vec<_>>().concat();
+    let refused = |text: String| {
+        let refused = at_little_cost(|| convert(text.as_bytes(), Syntax::Xml));
+        assert!(
+            matches!(refused, Err(ImportError::NotXml(_))),
+            "{refused:?}"
+        );
+    };
+    let child = |_| "<a xmlns:z=\"z\"/>".to_owned();
+    refused(long(&format!("<kml{}>", prefixes(2000)), child, "</kml>"));
+    let attribute = |n: usize| format!(" a{n}=\"\"");
+    refused(long("<kml><a", attribute, "/></kml>"));
+    refused(long("<kml>", |n| format!("<a{}>", prefix(n)), ""));
+    let alike = "x".repeat(1_000_000);
+    let same = |n| format!("<a p:a{n}=\"\" q:a{n}=\"\"/>");
+    refused(long(
+        &format!("<kml xmlns:p=\"{alike}p\" xmlns:q=\"{alike}q\">"),
+        same,
+        "</kml>",
+    ));
+
+    // As much as there may be of each.
+    let read = |text: String| {
+        let read = at_little_cost(|| convert(text.as_bytes(), Syntax::Xml));
+        assert!(
+            matches!(read, Err(ImportError::NoScenario { .. })),
+            "{read:?}"
+        );
+    };
+    read(long(&format!("<kml{}>", prefixes(15)), child, "</kml>"));
+    let attributes = (0..64).map(attribute).collect::<Vec<_>>().concat();
+    read(long("<kml>", |_| format!("<a{attributes}/>"), "</kml>"));
+}
+
 fn use_up(bytes: &[u8]) {
     let _ = at_little_cost(|| convert(bytes, Syntax::of(bytes)));
 }

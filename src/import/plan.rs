@@ -20,6 +20,14 @@ const ALONG: [f64; 2] = [0.0, 1.0];
 /// A fixed wing in MAVLink's `MAV_TYPE`: it flies at its cruise speed, all others at their hover speed.
 const FIXED_WING: u64 = 1;
 
+/// Where the vehicle starts from, and heights of many items count from.
+#[derive(Debug, Clone, Copy)]
+struct Home<'d> {
+    place: Place,
+    /// Metres above mean sea level, if it is a number.
+    alt: &'d Value,
+}
+
 /// An item that has a position.
 #[derive(Debug, Clone)]
 struct Stop {
@@ -29,6 +37,8 @@ struct Stop {
     alt: Result<f64, String>,
     /// On the ground, at the start or the end of the mission.
     on_ground: bool,
+    /// Its altitude counts from home's.
+    from_home: bool,
 }
 
 /// Convert a plan to a scenario.
@@ -41,13 +51,7 @@ pub(super) fn convert(document: &Value, most: Most) -> Result<Conversion, Import
     };
     let mut draft = Draft::new("msl", most);
     let home = home(mission);
-    match home {
-        Some((_, alt)) => draft.elevation = Some(alt),
-        None => draft.assume(
-            "/start/alt",
-            "the home of the mission is taken to be at 0 m",
-        ),
-    }
+    draft.elevation = home.and_then(|home| home.alt.as_f64());
     draft.cruise_speed = speed(mission);
     let stops = stops(&mut draft, items, home);
     if let Err(reason) = ends(&mut draft, home, &stops) {
@@ -62,11 +66,20 @@ pub(super) fn convert(document: &Value, most: Most) -> Result<Conversion, Import
     draft.finish()
 }
 
-fn home(mission: &Value) -> Option<(Place, f64)> {
-    let home = mission["plannedHomePosition"].as_array()?;
-    let number = |index: usize| home.get(index)?.as_f64();
-    let place = Place::new(number(1)?, number(0)?).ok()?;
-    Some((place, number(2).unwrap_or(0.0)))
+fn home(mission: &Value) -> Option<Home<'_>> {
+    let home = &mission["plannedHomePosition"];
+    let place = Place::new(home[1].as_f64()?, home[0].as_f64()?).ok()?;
+    let alt = &home[2];
+    Some(Home { place, alt })
+}
+
+/// Metres above mean sea level; a mission without home is taken to begin at 0 m.
+fn home_altitude(home: Option<Home>) -> Result<f64, String> {
+    let Some(Home { alt, .. }) = home else {
+        return Ok(0.0);
+    };
+    alt.as_f64()
+        .ok_or_else(|| format!("counts from home, whose altitude is {alt}, must be a number"))
 }
 
 fn speed(mission: &Value) -> Option<f64> {
@@ -78,7 +91,7 @@ fn speed(mission: &Value) -> Option<f64> {
     mission[name].as_f64().filter(|speed| *speed > 0.0)
 }
 
-fn stops(draft: &mut Draft, items: &[Value], home: Option<(Place, f64)>) -> Vec<Stop> {
+fn stops(draft: &mut Draft, items: &[Value], home: Option<Home>) -> Vec<Stop> {
     let mut stops = Vec::new();
     for (index, item) in items.iter().enumerate() {
         let at = format!("/mission/items/{index}");
@@ -118,39 +131,43 @@ fn changed_speed(item: &Value) -> Result<f64, String> {
     along.ok_or_else(|| format!("speed is {speed}, must be > 0"))
 }
 
-fn stop(at: &str, item: &Value, command: u64, home: Option<(Place, f64)>) -> Result<Stop, String> {
+fn stop(at: &str, item: &Value, command: u64, home: Option<Home>) -> Result<Stop, String> {
     let param = |index: usize| item["params"][index].as_f64();
-    let home_alt = home.map_or(0.0, |(_, alt)| alt);
     let on_ground = TAKEOFFS.contains(&command) || LANDINGS.contains(&command);
     let somewhere = param(4).zip(param(5)).filter(|place| *place != (0.0, 0.0));
     let place = match (somewhere, home) {
         (Some((lat, lon)), _) => Place::new(lon, lat)?,
         // Without a position, an autopilot takes off and lands where it is.
-        (None, Some((place, _))) if on_ground => place,
+        (None, Some(Home { place, .. })) if on_ground => place,
         (None, _) => return Err("an item without a place".to_owned()),
     };
     let alt = if on_ground {
-        Ok(home_alt)
+        home_altitude(home)
     } else {
-        altitude(item, home_alt)
+        altitude(item, home)
     };
     Ok(Stop {
         at: at.to_owned(),
         place,
         alt,
         on_ground,
+        from_home: on_ground || is_above_home(item),
     })
+}
+
+fn is_above_home(item: &Value) -> bool {
+    matches!(item["frame"].as_u64(), Some(3 | 6))
 }
 
 /// Metres above mean sea level of an item in the air. Beside a height above terrain, a ground station keeps the
 /// altitude that it amounts to; it is null while the ground is not known.
-fn altitude(item: &Value, home_alt: f64) -> Result<f64, String> {
+fn altitude(item: &Value, home: Option<Home>) -> Result<f64, String> {
     let height = &item["params"][6];
     let number = height.as_f64();
     let number = || number.ok_or_else(|| format!("has the altitude {height}, must be a number"));
     match item["frame"].as_u64() {
         Some(0 | 5) => number(),
-        Some(3 | 6) => Ok(home_alt + number()?),
+        _ if is_above_home(item) => Ok(home_altitude(home)? + number()?),
         Some(frame @ (10 | 11)) => {
             let above_sea = &item["AMSLAltAboveTerrain"];
             above_sea.as_f64().ok_or_else(|| {
@@ -169,14 +186,18 @@ fn altitude(item: &Value, home_alt: f64) -> Result<f64, String> {
 /// The mission's first and last stop; a single stop is the target, reached from home.
 ///
 /// # Errors
-/// When the altitude of one of them is not known: without it, the next stop would be taken for the end.
-fn ends(draft: &mut Draft, home: Option<(Place, f64)>, stops: &[Stop]) -> Result<(), String> {
+/// When the altitude of one of them, or of the home that it counts from, is not known: without it, the next stop would be
+/// taken for the end.
+fn ends(draft: &mut Draft, home: Option<Home>, stops: &[Stop]) -> Result<(), String> {
     let set = |draft: &mut Draft, end: &str, stop: &Stop| -> Result<(), String> {
         let Stop { at, place, .. } = stop;
         let alt = stop.alt.clone();
         let alt = alt.map_err(|reason| format!("the {end}, {at}, {reason}"))?;
-        if stop.on_ground && home.is_some() {
-            let pointer = format!("/{end}/alt");
+        let pointer = format!("/{end}/alt");
+        if stop.from_home && home.is_none() {
+            let why = "the file has no home, which is taken to be at 0 m";
+            draft.assume(&pointer, format!("{alt}: {why}"));
+        } else if stop.on_ground {
             draft.assume(&pointer, format!("{alt}, on the ground as home is"));
         }
         draft.end(end, at, *place, alt);
@@ -184,8 +205,12 @@ fn ends(draft: &mut Draft, home: Option<(Place, f64)>, stops: &[Stop]) -> Result
     };
     match (stops, home) {
         ([], _) => {}
-        ([only], Some((place, alt))) => {
-            draft.end("start", "/mission/plannedHomePosition", place, alt);
+        ([only], Some(Home { place, alt })) => {
+            let at = "/mission/plannedHomePosition";
+            let alt = alt.as_f64().ok_or_else(|| {
+                format!("the start, {at}, has the altitude {alt}, must be a number")
+            })?;
+            draft.end("start", at, place, alt);
             set(draft, "target", only)?;
         }
         ([only], None) => set(draft, "target", only)?,

@@ -135,6 +135,76 @@ fn ends_above_terrain_are_at_their_altitude_above_sea() {
     }
 }
 
+/// Whatever counts from an unknown home is not known either.
+#[test]
+fn ends_that_count_from_home_need_its_altitude() {
+    let item = |command: u16, frame: u8, lat: f64| json!({"type": "SimpleItem", "command": command, "frame": frame, "params": [0, 0, 0, null, lat, 8.5, 50]});
+    let converted = |home: &Value, items: &[Value]| {
+        let plan =
+            json!({"fileType": "Plan", "mission": {"plannedHomePosition": home, "items": items}});
+        convert(plan.to_string().as_bytes(), Syntax::Json)
+    };
+    let (takeoff, landing) = (item(22, 3, 47.3), item(21, 3, 47.5));
+    let (above_home, above_sea) = (item(16, 3, 47.4), item(16, 0, 47.5));
+    for home in [
+        json!([47.2, 8.5, null]),
+        json!([47.2, 8.5]),
+        json!([47.2, 8.5, "high"]),
+    ] {
+        let alt = &home[2];
+        let counts = format!("counts from home, whose altitude is {alt}, must be a number");
+        for (items, expected) in [
+            (
+                vec![takeoff.clone(), above_home.clone()],
+                format!("the start, /mission/items/0, {counts}"),
+            ),
+            (
+                vec![above_sea.clone(), above_home.clone()],
+                format!("the target, /mission/items/1, {counts}"),
+            ),
+            (
+                vec![above_sea.clone(), item(16, 6, 47.4)],
+                format!("the target, /mission/items/1, {counts}"),
+            ),
+            (
+                vec![above_sea.clone(), landing.clone()],
+                format!("the target, /mission/items/1, {counts}"),
+            ),
+            (
+                vec![above_sea.clone()],
+                format!(
+                    "the start, /mission/plannedHomePosition, has the altitude {alt}, must be a number"
+                ),
+            ),
+        ] {
+            let refused = converted(&home, &items).expect_err(&expected);
+            assert_eq!(refused.to_string(), expected);
+        }
+        // What lies between the ends is not needed.
+        let items = [above_sea.clone(), above_home.clone(), above_sea.clone()];
+        let found = converted(&home, &items).expect("a scenario");
+        assert_eq!(found.scenario["start"]["alt"], 50.0);
+        assert_eq!(found.scenario["terrain"]["elevation"], 50.0);
+    }
+
+    // Without a home, each end that counts from it is named.
+    let named = |items: &[Value]| {
+        let found = converted(&json!(null), items).expect("a scenario");
+        let ends = found.assumed.into_iter();
+        let ends = ends.filter(|assumed| assumed.pointer.ends_with("/alt"));
+        ends.map(|assumed| format!("{} {}", assumed.pointer, assumed.reason))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(
+        named(&[takeoff, above_home]),
+        [
+            "/start/alt 0: the file has no home, which is taken to be at 0 m",
+            "/target/alt 50: the file has no home, which is taken to be at 0 m"
+        ]
+    );
+    assert_eq!(named(&[above_sea.clone(), above_sea]), [""; 0]);
+}
+
 #[test]
 fn speeds_of_a_plan() {
     let check = |params: Value, expected: Result<f64, &str>| {

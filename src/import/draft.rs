@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::facts::{Facts, OF_A_THREAT};
+use super::facts::{Facts, OF_A_THREAT, begin};
 use super::threat::{Threat, Threats, circle, polygon};
 use super::{Assumed, Conversion, ImportError, Most, Unused};
 
@@ -23,7 +23,7 @@ pub(super) struct Place {
 #[derive(Debug)]
 pub(super) struct Draft {
     /// Name of the scenario.
-    pub(super) name: Option<String>,
+    name: Option<String>,
     /// `msl` or `ellipsoid`.
     datum: &'static str,
     start: Option<(Place, f64)>,
@@ -69,6 +69,11 @@ impl Draft {
             unused: Vec::new(),
             more_unused: 0,
         }
+    }
+
+    /// Name the scenario, if the file does.
+    pub(super) fn call(&mut self, name: Option<&str>) {
+        self.name = name.map(begin);
     }
 
     /// List a part of the file as unused.

@@ -132,6 +132,7 @@ fn short(value: Value) -> Value {
     }
 }
 
-fn begin(text: &str) -> String {
+/// As much of a text as a scenario accepts of a name.
+pub(super) fn begin(text: &str) -> String {
     text.chars().take(LONGEST).collect()
 }

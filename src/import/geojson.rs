@@ -20,7 +20,7 @@ const WGS84: [&str; 3] = [
 pub(super) fn convert(mut document: Value, most: Most) -> Result<Conversion, ImportError> {
     refuse_other_systems(&document)?;
     let mut draft = Draft::new("ellipsoid", most);
-    draft.name = document["name"].as_str().map(str::to_owned);
+    draft.call(document["name"].as_str());
     match document["type"].as_str() {
         Some("FeatureCollection") => {
             let Value::Array(features) = document["features"].take() else {

@@ -47,10 +47,9 @@ pub(super) fn convert(text: &[u8], most: Most) -> Result<Conversion, ImportError
         )));
     }
     let mut draft = Draft::new("msl", most);
-    draft.name = root
-        .children()
-        .find(|node| is(node, "Document"))
-        .and_then(|node| text_of(&node, "name"));
+    let container = root.children().find(|node| is(node, "Document"));
+    let name = container.and_then(|node| text_of(&node, "name"));
+    draft.call(name.as_deref());
     let mut rows = Rows {
         text,
         pos: 0,

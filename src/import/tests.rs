@@ -81,6 +81,29 @@ fn hostile_files_are_refused_and_soon() {
     assert_eq!(unused[1000].reason, "2000 more are not listed");
 }
 
+/// To the most that a scenario accepts, 200 characters.
+#[test]
+fn long_names_are_cut() {
+    let check = |file: &str, expected: &str| {
+        let found = convert(file.as_bytes(), Syntax::of(file.as_bytes())).expect("a scenario");
+        assert_eq!(found.scenario["name"], expected);
+    };
+    for (len, kept) in [(200, 200), (201, 200), (5000, 200)] {
+        let (name, expected) = ("ä".repeat(len), "ä".repeat(kept));
+        let features = geojson::ends();
+        let collection = json!({"type": "FeatureCollection", "name": name, "features": features});
+        check(&collection.to_string(), &expected);
+        let end = |name: &str| {
+            format!(
+                "<Placemark><name>{name}</name><Point><coordinates>8.5,47.3</coordinates></Point></Placemark>"
+            )
+        };
+        let ends = end("start") + &end("target");
+        let kml = format!("<kml><Document><name>{name}</name>{ends}</Document></kml>");
+        check(&kml, &expected);
+    }
+}
+
 /// What a scenario may have at most, a file may have too; one more is refused.
 #[test]
 fn files_of_too_many_threats_are_refused() {

@@ -67,11 +67,12 @@ fn feature(draft: &mut Draft, at: &str, value: JsonValue) {
     let facts = Facts::of(feature.properties.unwrap_or_default());
     match feature.geometry {
         None => draft.leave(at, "a feature without geometry"),
-        Some(shape) => geometry(draft, at, &facts, &shape.value),
+        Some(shape) => geometry(draft, at, &format!("{at}/geometry"), &facts, &shape.value),
     }
 }
 
-fn geometry(draft: &mut Draft, at: &str, facts: &Facts, value: &GeometryValue) {
+/// A geometry. `within` points to it, and so does `at` within a collection; otherwise `at` points to its feature.
+fn geometry(draft: &mut Draft, at: &str, within: &str, facts: &Facts, value: &GeometryValue) {
     // A circle that is drawn as a ring has a `center` and a `radius`.
     if let (GeometryValue::Polygon { .. } | GeometryValue::MultiPolygon { .. }, Some([lon, lat])) =
         (value, facts.center())
@@ -85,17 +86,18 @@ fn geometry(draft: &mut Draft, at: &str, facts: &Facts, value: &GeometryValue) {
     match value {
         GeometryValue::Point { coordinates } => point(draft, at, facts, coordinates),
         GeometryValue::Polygon { coordinates } => {
-            if let Some(ring) = outer(draft, at, coordinates) {
+            let rings_at = format!("{within}/coordinates");
+            if let Some(ring) = outer(draft, at, &rings_at, coordinates) {
                 for (_, ring) in antimeridian::joined(&[ring]) {
                     draft.polygon(at, facts, &ring);
                 }
             }
         }
-        GeometryValue::MultiPolygon { coordinates } => polygons(draft, at, facts, coordinates),
+        GeometryValue::MultiPolygon { coordinates } => polygons(draft, within, facts, coordinates),
         GeometryValue::GeometryCollection { geometries } => {
             for (index, inner) in geometries.iter().enumerate() {
-                let at = format!("{at}/geometry/geometries/{index}");
-                geometry(draft, &at, facts, &inner.value);
+                let at = format!("{within}/geometries/{index}");
+                geometry(draft, &at, &at, facts, &inner.value);
             }
         }
         GeometryValue::LineString { .. } | GeometryValue::MultiLineString { .. } => {
@@ -117,11 +119,12 @@ fn point(draft: &mut Draft, at: &str, facts: &Facts, position: &Position) {
     }
 }
 
-fn polygons(draft: &mut Draft, at: &str, facts: &Facts, polygons: &[Vec<Vec<Position>>]) {
-    let place = |index: usize| format!("{at}/geometry/coordinates/{index}");
+fn polygons(draft: &mut Draft, within: &str, facts: &Facts, polygons: &[Vec<Vec<Position>>]) {
+    let place = |index: usize| format!("{within}/coordinates/{index}");
     let (mut indices, mut outer_rings) = (Vec::new(), Vec::new());
     for (index, rings) in polygons.iter().enumerate() {
-        if let Some(ring) = outer(draft, &place(index), rings) {
+        let at = place(index);
+        if let Some(ring) = outer(draft, &at, &at, rings) {
             indices.push(index);
             outer_rings.push(ring);
         }
@@ -131,14 +134,19 @@ fn polygons(draft: &mut Draft, at: &str, facts: &Facts, polygons: &[Vec<Vec<Posi
     }
 }
 
-/// The outer ring of a polygon.
-fn outer(draft: &mut Draft, at: &str, rings: &[Vec<Position>]) -> Option<Vec<[f64; 2]>> {
+/// The outer ring of a polygon, whose list of rings is at `rings_at`.
+fn outer(
+    draft: &mut Draft,
+    at: &str,
+    rings_at: &str,
+    rings: &[Vec<Position>],
+) -> Option<Vec<[f64; 2]>> {
     let Some((outer, holes)) = rings.split_first() else {
         draft.leave(at, "a polygon without a ring");
         return None;
     };
-    for index in 0..holes.len() {
-        let hole = format!("{at}: hole {index}");
+    for index in 1..=holes.len() {
+        let hole = format!("{rings_at}/{index}");
         draft.leave(hole, "the hole of a polygon: all of it is kept clear of");
     }
     let ring: Option<_> = outer.iter().map(degrees).collect();

@@ -83,7 +83,7 @@ fn points_circles_and_polygons_of_geojson() {
         unused(&found),
         [
             "/features/2: said and not used: fill",
-            "/features/3: hole 0: the hole of a polygon: all of it is kept clear of",
+            "/features/3/geometry/coordinates/1: the hole of a polygon: all of it is kept clear of",
             "/features/4/geometry/geometries/1: a line: points and polygons make a scenario",
         ]
     );
@@ -93,6 +93,51 @@ fn points_circles_and_polygons_of_geojson() {
         .map(|assumed| assumed.pointer.as_str())
         .collect();
     assert_eq!(assumed, ["/altitude", "/terrain"]);
+}
+
+/// Also of shapes within shapes, and where the file is one feature.
+#[test]
+fn places_are_pointers_into_the_file() {
+    let rings = json!([[[1, 1], [2, 1], [2, 2], [1, 1]], [[1, 1]], [[2, 2]]]);
+    let polygon = json!({"type": "Polygon", "coordinates": rings});
+    let many = json!({"type": "MultiPolygon", "coordinates": [rings, [[[1, 1]]], rings]});
+    let line = json!({"type": "LineString", "coordinates": [[1, 1], [2, 2]]});
+    let of = |shapes: &[&Value]| json!({"type": "GeometryCollection", "geometries": shapes});
+    let nested = of(&[&line, &of(&[&polygon, &many])]);
+    let check = |document: Value, expected: &[&str]| {
+        let refused = convert(document.to_string().as_bytes(), Syntax::Json).expect_err("no ends");
+        let ImportError::NoScenario { unused, .. } = refused else {
+            panic!("{refused}");
+        };
+        let places: Vec<_> = unused.iter().map(|unused| unused.place.as_str()).collect();
+        assert_eq!(places, expected);
+        for place in places {
+            assert!(document.pointer(place).is_some(), "{place}");
+        }
+    };
+    check(
+        feature(json!({}), polygon.clone()),
+        &["/geometry/coordinates/1", "/geometry/coordinates/2"],
+    );
+    let features = [feature(json!({}), many.clone()), feature(json!({}), nested)];
+    check(
+        json!({"type": "FeatureCollection", "features": features}),
+        &[
+            "/features/0/geometry/coordinates/0/1",
+            "/features/0/geometry/coordinates/0/2",
+            "/features/0/geometry/coordinates/2/1",
+            "/features/0/geometry/coordinates/2/2",
+            "/features/0/geometry/coordinates/1",
+            "/features/1/geometry/geometries/0",
+            "/features/1/geometry/geometries/1/geometries/0/coordinates/1",
+            "/features/1/geometry/geometries/1/geometries/0/coordinates/2",
+            "/features/1/geometry/geometries/1/geometries/1/coordinates/0/1",
+            "/features/1/geometry/geometries/1/geometries/1/coordinates/0/2",
+            "/features/1/geometry/geometries/1/geometries/1/coordinates/2/1",
+            "/features/1/geometry/geometries/1/geometries/1/coordinates/2/2",
+            "/features/1/geometry/geometries/1/geometries/1/coordinates/1",
+        ],
+    );
 }
 
 #[test]

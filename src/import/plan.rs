@@ -28,6 +28,9 @@ struct Home<'d> {
     alt: &'d Value,
 }
 
+/// Why an inclusion fence is not used.
+const STAY_WITHIN: &str = "a fence to stay within, where a scenario has a box, its area";
+
 /// An item that has a position.
 #[derive(Debug, Clone)]
 struct Stop {
@@ -227,6 +230,10 @@ fn ends(draft: &mut Draft, home: Option<Home>, stops: &[Stop]) -> Result<(), Str
 
 fn fences(draft: &mut Draft, fence: &Value) {
     let list = |name: &str| fence[name].as_array().map_or(&[][..], Vec::as_slice);
+    // Fences of version 1 have one polygon.
+    if !list("polygon").is_empty() {
+        draft.leave("/geoFence/polygon", STAY_WITHIN);
+    }
     for (index, circle) in list("circles").iter().enumerate() {
         let at = format!("/geoFence/circles/{index}");
         if excludes(draft, &at, circle) {
@@ -262,10 +269,7 @@ fn fences(draft: &mut Draft, fence: &Value) {
 fn excludes(draft: &mut Draft, at: &str, fence: &Value) -> bool {
     let excludes = fence["inclusion"] == false;
     if !excludes {
-        draft.leave(
-            at,
-            "a fence to stay within, where a scenario has a box, its area",
-        );
+        draft.leave(at, STAY_WITHIN);
     }
     excludes
 }

@@ -206,6 +206,24 @@ fn ends_that_count_from_home_need_its_altitude() {
 }
 
 #[test]
+fn the_fence_of_an_old_plan_is_listed_as_unused() {
+    let check = |fence: Value, expected: &[&str]| {
+        let item = json!({"type": "SimpleItem", "command": 16, "frame": 0, "params": [0, 0, 0, null, 47.3, 8.5, 50]});
+        let plan =
+            json!({"fileType": "Plan", "mission": {"items": [item, item]}, "geoFence": fence});
+        let found = convert(plan.to_string().as_bytes(), Syntax::Json).expect("a scenario");
+        assert_eq!(unused(&found), expected);
+    };
+    let corners = json!([[47.31, 8.51], [47.31, 8.52], [47.32, 8.52]]);
+    check(
+        json!({"version": 1, "polygon": corners}),
+        &["/geoFence/polygon: a fence to stay within, where a scenario has a box, its area"],
+    );
+    check(json!({"version": 1, "polygon": []}), &[]);
+    check(json!({"version": 2, "circles": [], "polygons": []}), &[]);
+}
+
+#[test]
 fn speeds_of_a_plan() {
     let check = |params: Value, expected: Result<f64, &str>| {
         let plan = json!({

@@ -1,6 +1,8 @@
 //! QGroundControl plans: the mission's ends as start and target, exclusion fences as threats. Altitudes are above
 //! mean sea level.
 
+use std::ops::RangeInclusive;
+
 use serde_json::{Map, Value};
 
 use super::draft::{Draft, Place};
@@ -17,8 +19,10 @@ const CHANGE_SPEED: u64 = 178;
 /// climbs and descents.
 const ALONG: [f64; 2] = [0.0, 1.0];
 
-/// A fixed wing in MAVLink's `MAV_TYPE`: it flies at its cruise speed, all others at their hover speed.
+/// Vehicles of MAVLink's `MAV_TYPE` with wings: fixed wings, and those that take off upright and then fly on wings
+/// (VTOL). They fly at their cruise speed, all others at their hover speed.
 const FIXED_WING: u64 = 1;
+const VTOLS: RangeInclusive<u64> = 19..=25;
 
 /// Where the vehicle starts from, and heights of many items count from.
 #[derive(Debug, Clone, Copy)]
@@ -86,7 +90,9 @@ fn home_altitude(home: Option<Home>) -> Result<f64, String> {
 }
 
 fn speed(mission: &Value) -> Option<f64> {
-    let name = if mission["vehicleType"] == FIXED_WING {
+    let kind = mission["vehicleType"].as_u64();
+    let has_wings = kind.is_some_and(|kind| kind == FIXED_WING || VTOLS.contains(&kind));
+    let name = if has_wings {
         "cruiseSpeed"
     } else {
         "hoverSpeed"

@@ -224,6 +224,27 @@ fn the_fence_of_an_old_plan_is_listed_as_unused() {
 }
 
 #[test]
+fn vehicles_with_wings_fly_at_their_cruise_speed() {
+    let check = |kind: Value, expected: f64| {
+        let item = json!({"type": "SimpleItem", "command": 16, "frame": 0, "params": [0, 0, 0, null, 47.3, 8.5, 50]});
+        let mission =
+            json!({"vehicleType": kind, "cruiseSpeed": 15, "hoverSpeed": 5, "items": [item, item]});
+        let plan = json!({"fileType": "Plan", "mission": mission});
+        let found = convert(plan.to_string().as_bytes(), Syntax::Json).expect("a scenario");
+        let speed = &found.scenario["vehicle"]["cruise_speed"];
+        assert_eq!(*speed, expected, "{kind}");
+    };
+    for kind in [1, 19, 20, 21, 22, 23, 24, 25] {
+        check(kind.into(), 15.0);
+    }
+    for kind in [0, 2, 13, 14, 18, 26] {
+        check(kind.into(), 5.0);
+    }
+    check(json!(null), 5.0);
+    check(json!("vtol"), 5.0);
+}
+
+#[test]
 fn speeds_of_a_plan() {
     let check = |params: Value, expected: Result<f64, &str>| {
         let plan = json!({

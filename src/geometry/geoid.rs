@@ -28,25 +28,27 @@ pub struct Geoid {
 impl Geoid {
     /// Over the rectangle from `min` to `max`, whose `place`s on the earth are given.
     #[must_use]
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the sides of a rectangle on the earth have few nodes"
-    )]
     pub fn over(min: [f64; 2], max: [f64; 2], place: impl Fn([f64; 2]) -> LatLon) -> Self {
-        let middle = [0, 1].map(|axis| f64::midpoint(min[axis], max[axis]));
-        let length_m = |axis: usize| {
-            let end = |value: f64| {
-                let mut end = middle;
-                end[axis] = value;
-                place(end)
-            };
-            let (first, last) = (end(min[axis]), end(max[axis]));
-            let middle = place(middle);
-            first.distance_m(middle) + middle.distance_m(last)
-        };
-        let counts = [0, 1].map(|axis| (length_m(axis) / SPACING_M).ceil() as usize + 1);
-        let counts = counts.map(|count| count.max(LEAST));
+        let counts = counts(min, max, &place);
+        Self::with_nodes(min, max, counts, place)
+    }
+
+    /// For the samples of a raster of two columns and two rows at least, at coordinates (column, row). Where they lie
+    /// farther apart than nodes need to, the nodes are the samples: few samples may span continents.
+    #[must_use]
+    pub fn under_samples(size: [usize; 2], place: impl Fn([f64; 2]) -> LatLon) -> Self {
+        let last = size.map(|count| (count - 1) as f64);
+        let needed = counts([0.0; 2], last, &place);
+        let counts = [0, 1].map(|axis| needed[axis].min(nodes_at_samples(size[axis])));
+        Self::with_nodes([0.0; 2], last, counts, place)
+    }
+
+    fn with_nodes(
+        min: [f64; 2],
+        max: [f64; 2],
+        counts: [usize; 2],
+        place: impl Fn([f64; 2]) -> LatLon,
+    ) -> Self {
         let step = [0, 1].map(|axis| (max[axis] - min[axis]) / (counts[axis] - 1) as f64);
         let node = |index: usize| {
             let (column, row) = (index % counts[0], index / counts[0]);
@@ -112,8 +114,38 @@ impl Geoid {
     }
 }
 
+/// Number of nodes along each side of the rectangle from `min` to `max` that are at most [`SPACING_M`] apart.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "the sides of a rectangle on the earth have few nodes"
+)]
+fn counts(min: [f64; 2], max: [f64; 2], place: impl Fn([f64; 2]) -> LatLon) -> [usize; 2] {
+    let middle = [0, 1].map(|axis| f64::midpoint(min[axis], max[axis]));
+    let length_m = |axis: usize| {
+        let end = |value: f64| {
+            let mut end = middle;
+            end[axis] = value;
+            place(end)
+        };
+        let (first, last) = (end(min[axis]), end(max[axis]));
+        let middle = place(middle);
+        first.distance_m(middle) + middle.distance_m(last)
+    };
+    let counts = [0, 1].map(|axis| (length_m(axis) / SPACING_M).ceil() as usize + 1);
+    counts.map(|count| count.max(LEAST))
+}
+
+/// The least number of evenly spaced nodes of which one lies at each of `samples`.
+fn nodes_at_samples(samples: usize) -> usize {
+    let between = samples - 1;
+    between * (LEAST - 1).div_ceil(between) + 1
+}
+
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+
     use super::*;
 
     /// Degrees as coordinates.
@@ -140,6 +172,38 @@ mod tests {
                 assert!(widest < within, "{lat} {lon} {half}: {widest}");
             }
         }
+    }
+
+    #[test]
+    fn samples_far_apart_are_the_nodes() {
+        // Columns and rows, degrees between them, the most places that are looked at: a millisecond for each.
+        for (size, cell, most) in [
+            ([5, 5], 10.0, 25),
+            ([2, 3], 10.0, 20),
+            ([3, 7], 1.0, 35),
+            ([2, 400], 0.001, 16),
+        ] {
+            let looks = Cell::new(0);
+            let place = |[column, row]: [f64; 2]| {
+                looks.set(looks.get() + 1);
+                degrees([5.0 + column * cell, 40.0 - row * cell])
+            };
+            let geoid = Geoid::under_samples(size, place);
+            // The ends and the middles of two sides are looked at for their lengths.
+            assert!(looks.get() <= most + 6, "{size:?}: {}", looks.get());
+            for index in 0..size[0] * size[1] {
+                let at = [(index % size[0]) as f64, (index / size[0]) as f64];
+                let off = geoid.height_m(at) - undulation_m(place(at));
+                assert!(off.abs() < 0.01, "{size:?} {at:?}: {off}");
+            }
+        }
+    }
+
+    #[test]
+    fn samples_close_together_have_the_nodes_of_their_rectangle() {
+        let place = |[column, row]: [f64; 2]| degrees([85.0 + column * 0.01, 28.0 - row * 0.01]);
+        let geoid = Geoid::under_samples([120, 90], place);
+        assert_eq!(geoid, Geoid::over([0.0; 2], [119.0, 89.0], place));
     }
 
     #[test]

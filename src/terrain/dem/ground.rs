@@ -117,8 +117,7 @@ impl Dem {
     pub fn above_ellipsoid(mut self, near: LatLon) -> Self {
         let raster = &mut self.raster;
         let lattice = &raster.lattice;
-        let last = [(lattice.columns - 1) as f64, (lattice.rows - 1) as f64];
-        let geoid = Geoid::over([0.0; 2], last, |cells| {
+        let geoid = Geoid::under_samples([lattice.columns, lattice.rows], |cells| {
             lattice.geodetic(cells).unwrap_or(near)
         });
         let columns = lattice.columns;

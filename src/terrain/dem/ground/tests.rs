@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::geometry::geodesy::LatLon;
+use crate::geometry::geodesy::{LatLon, undulation_m};
 use crate::terrain::dem::{Crs, Lattice};
 
 /// A raster of 80 x 60 nodes about 100 m apart, and the plane at its centre.
@@ -137,6 +137,41 @@ fn a_hole_is_refused_under_the_area_and_avoided_beside_it() {
     assert!(range.min.is_finite() && range.max.is_finite());
     let edge = dem.elevation(Point2::new(dem.extent().min.x, 450.0));
     assert!((dem.elevation(leg.a.xy()) - edge).abs() < 1e-12);
+}
+
+/// Nodes of the geoid 20 km apart would be two million here, and take half an hour.
+#[test]
+fn a_raster_of_the_whole_earth_is_raised_at_its_samples() {
+    let lattice = Lattice {
+        crs: Crs::wgs84(),
+        columns: 37,
+        rows: 19,
+        first: [-180.0, 90.0],
+        step: [10.0, -10.0],
+    };
+    let raster = Raster {
+        offset: [0, 0],
+        elevations: vec![100.0; lattice.columns * lattice.rows],
+        lattice,
+    };
+    let plane = TangentPlane::at(
+        LatLon {
+            lat: 46.0,
+            lon: 7.0,
+        },
+        0.0,
+    );
+    let dem = Dem::new(raster, &plane, area(), 0.0).expect("the raster is wider");
+    let dem = dem.above_ellipsoid(plane.origin());
+    for [column, row] in [[18, 4], [19, 4], [3, 11], [36, 18]] {
+        let place = LatLon {
+            lat: 90.0 - 10.0 * row as f64,
+            lon: -180.0 + 10.0 * column as f64,
+        };
+        let raised = f64::from(dem.raster().elevations[row * 37 + column]);
+        let off = raised - 100.0 - undulation_m(place);
+        assert!(off.abs() < 1e-4, "{place:?}: {off}");
+    }
 }
 
 #[test]

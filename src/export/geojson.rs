@@ -1,6 +1,6 @@
 //! RFC 7946: path, waypoints and threats as features; heights above the ellipsoid.
 
-mod antimeridian;
+pub(super) mod antimeridian;
 
 use geojson::{Feature, FeatureCollection, GeometryValue, JsonObject};
 use serde_json::{Value, json};

@@ -81,6 +81,19 @@ impl Corner {
 /// A counter-clockwise ring, without repeated first corner; in several parts if it crosses. A ring round a pole is
 /// closed along the meridian and over the pole.
 pub(super) fn ring(corners: &[Place]) -> GeometryValue {
+    let mut parts = parts(corners);
+    for part in &mut parts {
+        part.extend(part.first().cloned());
+    }
+    if parts.len() == 1 {
+        GeometryValue::new_polygon(parts)
+    } else {
+        GeometryValue::new_multi_polygon(parts.into_iter().map(|part| [part]))
+    }
+}
+
+/// The parts of such a ring, each without repeated first corner.
+pub(in crate::export) fn parts(corners: &[Place]) -> Vec<Vec<Position>> {
     let (mut corners, way) = unrolled(corners);
     if way.abs() > 0.0 {
         corners = over_a_pole(&corners, way);
@@ -90,14 +103,14 @@ pub(super) fn ring(corners: &[Place]) -> GeometryValue {
         corner.turns -= west;
     }
     if west >= east {
-        return GeometryValue::new_polygon([closed(&corners, 0.0)]);
+        return vec![positions(&corners, 0.0)];
     }
     let parts = (0..)
         .map(f64::from)
         .take_while(|strip| *strip <= east - west);
     let parts = parts.map(|strip| (strip, part(&corners, strip)));
     let parts = parts.filter(|(_, part)| part.len() > 2);
-    GeometryValue::new_multi_polygon(parts.map(|(strip, part)| [closed(&part, strip)]))
+    parts.map(|(strip, part)| positions(&part, strip)).collect()
 }
 
 /// The corners with continued degrees, and the turns that the ring makes round the earth: 0, or 1 round the north pole
@@ -224,14 +237,13 @@ fn push(pieces: &mut [Vec<Position>], mut place: Place, lon: f64) {
 }
 
 /// The positions of a ring that lies in one turn round the earth.
-fn closed(corners: &[Corner], strip: f64) -> Vec<Position> {
-    let around = corners.iter().chain(corners.first());
+fn positions(corners: &[Corner], strip: f64) -> Vec<Position> {
     let position = |corner: &Corner| {
         let mut place = corner.place.clone();
         place[0] += 360.0 * (corner.turns - strip);
         place.into()
     };
-    around.map(position).collect()
+    corners.iter().map(position).collect()
 }
 
 #[cfg(test)]

@@ -1,13 +1,15 @@
 //! A QGroundControl plan: mission, fences and rally points in one JSON document.
 
+use geojson::Position;
 use serde_json::{Value, json};
 
 use super::items::{Item, Mission, Place, mission};
 use crate::cost::Tolerance;
 use crate::export::chart::Chart;
+use crate::export::geojson::antimeridian;
 use crate::export::{Altitude, Delivery, ExportError, Firmware, Options, outline};
 use crate::geometry::geodesy::LatLon;
-use crate::geometry::{Point3, Segment};
+use crate::geometry::{Point2, Point3, Segment};
 use crate::threat::{Shape, Threat};
 
 /// MAVLink autopilots (`MAV_AUTOPILOT`).
@@ -126,17 +128,27 @@ fn fence(delivery: &Delivery, chart: &Chart, mission: &Mission) -> (Value, Vec<V
                 }));
             }
             Shape::Polygon(_) => {
-                let corners = outline::ring(threat).into_iter().map(|corner| {
-                    let LatLon { lat, lon } = chart.place(corner);
-                    [lat, lon]
-                });
-                let corners: Vec<_> = corners.collect();
-                polygons.push(json!({"version": 1, "inclusion": false, "polygon": corners}));
+                polygons.extend(polygon_fences(&outline::ring(threat), chart));
             }
         }
     }
     let fence = json!({"version": 2, "circles": circles, "polygons": polygons});
     (fence, left_out)
+}
+
+/// A fence for each part of a ring between 180 degrees west and 180 degrees east: PX4 compares longitudes as numbers, and
+/// would take a ring with corners on either side for one round the rest of the earth.
+fn polygon_fences(ring: &[Point2], chart: &Chart) -> Vec<Value> {
+    let corners = ring.iter().map(|corner| {
+        let LatLon { lat, lon } = chart.place(*corner);
+        vec![lon, lat]
+    });
+    let parts = antimeridian::parts(&corners.collect::<Vec<_>>()).into_iter();
+    let fence = |part: Vec<Position>| {
+        let corners: Vec<_> = part.iter().map(|corner| [corner[1], corner[0]]).collect();
+        json!({"version": 1, "inclusion": false, "polygon": corners})
+    };
+    parts.map(fence).collect()
 }
 
 /// Whether `route` would enter the threat if it had neither base nor top, by more than a feasible route may.
@@ -163,7 +175,6 @@ fn is_passed_at_another_height(threat: &Threat, route: &[Point3], tolerance_m: f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point2;
     use crate::threat::Cylinder;
 
     #[test]

@@ -35,6 +35,52 @@ fn across_the_date_line_a_line_is_cut() {
     assert_eq!(first[1], pieces[1][0][1]);
 }
 
+/// Whether PX4 takes a place to be within a fence: its test of a polygon, which compares longitudes as numbers.
+fn is_fenced(fence: &[[f64; 2]], [lat, lon]: [f64; 2]) -> bool {
+    let mut inside = false;
+    for (one, other) in fence.iter().zip(fence.iter().cycle().skip(1)) {
+        let share = (lat - one[0]) / (other[0] - one[0]);
+        if (one[0] > lat) != (other[0] > lat) && lon < one[1] + share * (other[1] - one[1]) {
+            inside = !inside;
+        }
+    }
+    inside
+}
+
+#[test]
+fn across_the_date_line_a_fence_holds() {
+    let corner = |lat: f64, lon: f64| json!({"lat": lat, "lon": lon});
+    let check = |east: f64, n_fences: usize, outside: f64| {
+        let document = json!({
+            "frame": "wgs84",
+            "start": {"lat": -16.80, "lon": 179.99, "alt": 30},
+            "target": {"lat": -16.80, "lon": -179.99, "alt": 30},
+            "threats": [{"kind": "polygon", "vertices": [
+                corner(-16.795, 179.998), corner(-16.795, east), corner(-16.78, east), corner(-16.78, 179.998)]}],
+            "altitude": {"min": 10, "max": 100},
+            "planner": {"smoothing": {"degree": 1, "spacing": 700}},
+        });
+        let plan = plan(&document, &[(-16.80, 179.998, 40.0)]);
+        let text = write(&plan, "qgc", &[]).expect("a plan");
+        let read: Value = serde_json::from_str(&text).expect("JSON");
+        let fences = read["geoFence"]["polygons"].as_array().expect("fences");
+        let fences: Vec<_> = fences
+            .iter()
+            .map(|fence| corners(&fence["polygon"]))
+            .collect();
+        assert_eq!(fences.len(), n_fences, "{fences:?}");
+        let is_fenced = |lon: f64| fences.iter().any(|fence| is_fenced(fence, [-16.79, lon]));
+        assert!(is_fenced(179.999), "{fences:?}");
+        assert_eq!(is_fenced(-179.999), n_fences > 1, "{fences:?}");
+        for lon in [179.99, 179.9, 0.0, -179.9, outside] {
+            assert!(!is_fenced(lon), "{lon}: {fences:?}");
+        }
+    };
+    check(-179.998, 2, -179.997);
+    // It only touches the meridian, whose longitude may be written either way.
+    check(-180.0, 1, -179.999);
+}
+
 #[test]
 fn along_the_date_line_a_line_is_whole() {
     let document = json!({

@@ -19,7 +19,7 @@ mod shifts;
 mod slabs;
 mod way;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::fs::File;
 use std::io::Read;
@@ -31,7 +31,7 @@ pub use error::DemError;
 pub use ground::Dem;
 pub use lattice::{Degrees, Lattice};
 pub use raster::Raster;
-use raster::{Span, Visit};
+use raster::{Span, Visit, Wanted};
 
 use crate::geometry::Rect;
 use crate::geometry::geodesy::{LatLon, TangentPlane};
@@ -287,7 +287,7 @@ impl Dataset {
     pub fn survey(&self) -> Result<Survey, DemError> {
         let lattice = &self.metadata.lattice;
         let (mut min, mut max, mut known) = (f32::INFINITY, f32::NEG_INFINITY, 0_usize);
-        self.read(&lattice.span(), &mut |_, _, samples| {
+        self.read(&lattice.span(), Wanted::All, &mut |_, _, samples| {
             for sample in samples.iter().filter(|sample| !sample.is_nan()) {
                 (min, max) = (min.min(*sample), max.max(*sample));
                 known += 1;
@@ -310,7 +310,7 @@ impl Dataset {
     }
 
     /// The elevations at `places`, metres, bilinear; `None` outside the samples and next to one without data. Reads
-    /// the part of the file that contains them once.
+    /// the file once, and only those of its blocks that are needed.
     ///
     /// # Errors
     /// As [`Dataset::survey`].
@@ -320,7 +320,7 @@ impl Dataset {
             .iter()
             .map(|place| lattice.cells(*place).and_then(|cells| lattice.cell(cells)))
             .collect();
-        let mut nodes = BTreeMap::new();
+        let mut nodes = BTreeSet::new();
         for ([column, row], _) in cells.iter().flatten() {
             for node in [
                 [*row, *column],
@@ -328,20 +328,21 @@ impl Dataset {
                 [row + 1, *column],
                 [row + 1, column + 1],
             ] {
-                nodes.insert(node, f32::NAN);
+                nodes.insert(node);
             }
         }
-        let Some(span) = span(nodes.keys()) else {
+        let Some(span) = span(nodes.iter()) else {
             return Ok(vec![None; places.len()]);
         };
-        self.read(&span, &mut |row, column, samples| {
-            for ([_, at], node) in nodes.range_mut([row, column]..[row, column + samples.len()]) {
-                *node = samples[at - column];
+        let mut known = BTreeMap::new();
+        self.read(&span, Wanted::Some(&nodes), &mut |row, column, samples| {
+            for node in nodes.range([row, column]..[row, column + samples.len()]) {
+                known.insert(*node, samples[node[1] - column]);
             }
             Ok(())
         })?;
         let elevation = |([column, row], [x, y]): ([usize; 2], [f64; 2])| {
-            let at = |row, column| f64::from(nodes[&[row, column]]);
+            let at = |row, column| f64::from(known[&[row, column]]);
             let along = |row| at(row, column) + x * (at(row, column + 1) - at(row, column));
             let (above, below) = (along(row), along(row + 1));
             let elevation = above + y * (below - above);
@@ -387,21 +388,21 @@ impl Dataset {
             });
         }
         let mut raster = Raster::new(lattice, &span);
-        self.read(&span, &mut |row, column, samples| {
+        self.read(&span, Wanted::All, &mut |row, column, samples| {
             raster.keep(row, column, samples);
             Ok(())
         })?;
         Dem::new(raster, plane, area, margin)
     }
 
-    /// Read the samples of `span`, and possibly others.
-    fn read(&self, span: &Span, visit: &mut Visit<'_>) -> Result<(), DemError> {
+    /// Read the `wanted` samples of `span`, and possibly others.
+    fn read(&self, span: &Span, wanted: Wanted<'_>, visit: &mut Visit<'_>) -> Result<(), DemError> {
         let mut checked = |row: usize, column: usize, samples: &[f32]| {
             raster::check_elevations(row, column, samples)?;
             visit(row, column, samples)
         };
         match &self.reader {
-            Reader::GeoTiff(layout) => layout.read(&self.path, span, &mut checked),
+            Reader::GeoTiff(layout) => layout.read(&self.path, span, wanted, &mut checked),
             Reader::AsciiGrid(layout) => layout.read(&self.path, span, &mut checked),
             Reader::Hgt(layout) => layout.read(&self.path, span, &mut checked),
         }

@@ -1,5 +1,6 @@
 //! Samples in memory: a window of a file.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::{DemError, Lattice};
@@ -12,6 +13,44 @@ const BELIEVED: [f64; 2] = [-12_000.0, 12_000.0];
 pub(super) struct Span {
     pub(super) rows: Range<usize>,
     pub(super) columns: Range<usize>,
+}
+
+/// Which samples of a span are wanted: files of blocks leave out those that hold none of them.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Wanted<'a> {
+    All,
+    /// By row and column.
+    Some(&'a BTreeSet<[usize; 2]>),
+}
+
+impl Wanted<'_> {
+    /// The first of `rows` of which anything is wanted.
+    pub(super) fn first_row(self, rows: Range<usize>) -> Option<usize> {
+        match self {
+            Self::All => (!rows.is_empty()).then_some(rows.start),
+            Self::Some(nodes) => nodes
+                .range([rows.start, 0]..[rows.end, 0])
+                .next()
+                .map(|[row, _]| *row),
+        }
+    }
+
+    /// The blocks `width` columns wide that hold anything wanted of `rows` and `columns`, in order.
+    pub(super) fn blocks(
+        self,
+        rows: Range<usize>,
+        columns: &Range<usize>,
+        width: usize,
+    ) -> BTreeSet<usize> {
+        match self {
+            Self::All => (columns.start / width..columns.end.div_ceil(width)).collect(),
+            Self::Some(nodes) => nodes
+                .range([rows.start, 0]..[rows.end, 0])
+                .filter(|[_, column]| columns.contains(column))
+                .map(|[_, column]| column / width)
+                .collect(),
+        }
+    }
 }
 
 /// Receives samples as `(row, column of the first, samples)`; NaN means no data. Samples outside the requested span

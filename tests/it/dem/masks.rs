@@ -6,8 +6,8 @@ use super::tiff::{self, Tiff, Value};
 use super::{deflated, file, open};
 use Value::{Long, Short};
 
-const DEFLATE: u16 = 8;
-const OF_FULL_RESOLUTION: u16 = 4;
+pub(super) const DEFLATE: u16 = 8;
+pub(super) const OF_FULL_RESOLUTION: u16 = 4;
 const OF_AN_OVERVIEW: u16 = 5;
 
 /// Whether the mask of the tests shows a sample.
@@ -17,7 +17,7 @@ fn shows(row: usize, column: usize) -> bool {
 
 /// How an image of the tests is stored.
 #[derive(Debug, Clone, Copy)]
-enum Blocks {
+pub(super) enum Blocks {
     /// Of so many rows.
     Strips(usize),
     /// Squares of so many samples on a side, deflated.
@@ -25,7 +25,7 @@ enum Blocks {
 }
 
 /// An image of `size` columns and rows in blocks; `value` is a sample, `bits` its size.
-fn image(
+pub(super) fn image(
     size: [usize; 2],
     blocks: Blocks,
     bits: u16,
@@ -101,7 +101,7 @@ fn image(
 }
 
 /// The same as a mask.
-fn mask(tiff: Tiff, subfile: u16) -> Tiff {
+pub(super) fn mask(tiff: Tiff, subfile: u16) -> Tiff {
     tiff.with(tiff::SUBFILE, Long(vec![subfile.into()]))
         .with(tiff::PHOTOMETRIC, Short(vec![4]))
         .without(tiff::KEYS)

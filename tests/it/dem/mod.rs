@@ -4,6 +4,7 @@ mod fuzz;
 mod hostile;
 mod masks;
 mod right;
+mod sparse;
 mod tiff;
 
 use std::io::Write;

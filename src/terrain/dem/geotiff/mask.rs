@@ -9,7 +9,7 @@ use tiff_reader::{Ifd, TiffFile};
 use super::samples::{Layout, mask_layout};
 use super::unsupported;
 use crate::terrain::dem::DemError;
-use crate::terrain::dem::raster::Span;
+use crate::terrain::dem::raster::{Span, Wanted};
 
 /// Fewest samples whose mask is read at once, so that the headers are not read for each row.
 const AT_ONCE: usize = 1 << 22;
@@ -58,6 +58,7 @@ pub(super) struct Band<'a> {
     path: &'a Path,
     /// Columns that are looked at; elsewhere nothing has data.
     columns: Range<usize>,
+    wanted: Wanted<'a>,
     /// Rows up to which anything is looked at.
     last: usize,
     /// Rows in memory.
@@ -68,11 +69,18 @@ pub(super) struct Band<'a> {
 
 impl<'a> Band<'a> {
     /// For reading `span`, and the rest of the blocks that it begins, up to the row `last`.
-    pub(super) fn new(mask: &'a Layout, path: &'a Path, span: &Span, last: usize) -> Self {
+    pub(super) fn new(
+        mask: &'a Layout,
+        path: &'a Path,
+        span: &Span,
+        wanted: Wanted<'a>,
+        last: usize,
+    ) -> Self {
         Self {
             mask,
             path,
             columns: span.columns.clone(),
+            wanted,
             last,
             rows: 0..0,
             shown: Vec::new(),
@@ -96,8 +104,11 @@ impl<'a> Band<'a> {
             columns: self.columns.clone(),
         };
         let (columns, shown) = (&self.columns, &mut self.shown);
-        self.mask
-            .read(self.path, &span, &mut |row, column, samples| {
+        self.mask.read(
+            self.path,
+            &span,
+            self.wanted,
+            &mut |row, column, samples| {
                 if !rows.contains(&row) {
                     return Ok(());
                 }
@@ -108,7 +119,8 @@ impl<'a> Band<'a> {
                     }
                 }
                 Ok(())
-            })?;
+            },
+        )?;
         self.rows = rows;
         Ok(())
     }

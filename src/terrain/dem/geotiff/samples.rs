@@ -9,7 +9,7 @@ use tiff_reader::{ByteOrder, RasterLayout, TiffFile};
 
 use super::mask::{Band, mask};
 use super::{LARGEST_BLOCK, malformed, refusal, tiff, unsupported};
-use crate::terrain::dem::raster::{NoData, Span, Visit};
+use crate::terrain::dem::raster::{NoData, Span, Visit, Wanted};
 use crate::terrain::dem::{DemError, SampleType};
 
 /// Approximate size of one read from an uncompressed strip, bytes.
@@ -180,16 +180,17 @@ impl Layout {
         &self,
         path: &Path,
         span: &Span,
+        wanted: Wanted<'_>,
         visit: &mut Visit<'_>,
     ) -> Result<(), DemError> {
         let Some(mask) = &self.mask else {
-            return self.read_samples(path, span, visit);
+            return self.read_samples(path, span, wanted, visit);
         };
         let height = if self.plain { 1 } else { self.block[1] };
         let last = span.rows.end.next_multiple_of(height).min(self.rows);
-        let mut band = Band::new(mask, path, span, last);
+        let mut band = Band::new(mask, path, span, wanted, last);
         let mut shown = Vec::new();
-        self.read_samples(path, span, &mut |row, column, samples| {
+        self.read_samples(path, span, wanted, &mut |row, column, samples| {
             let start = row - row % height;
             band.reach(start..(start + height).min(self.rows))?;
             shown.clear();
@@ -214,19 +215,21 @@ impl Layout {
         &self,
         path: &Path,
         span: &Span,
+        wanted: Wanted<'_>,
         visit: &mut Visit<'_>,
     ) -> Result<(), DemError> {
         if self.plain {
-            return self.read_plain(path, span, visit);
+            return self.read_plain(path, span, wanted, visit);
         }
         let file = tiff(path)?;
         let [width, height] = self.block;
         let across = self.columns.div_ceil(width);
         let mut samples = Vec::with_capacity(width.min(self.columns));
         for block_row in span.rows.start / height..span.rows.end.div_ceil(height) {
-            for block_column in span.columns.start / width..span.columns.end.div_ceil(width) {
-                let [row, column] = [block_row * height, block_column * width];
-                let rows = height.min(self.rows - row);
+            let row = block_row * height;
+            let rows = height.min(self.rows - row);
+            for block_column in wanted.blocks(row..row + rows, &span.columns, width) {
+                let column = block_column * width;
                 let columns = width.min(self.columns - column);
                 if self.is_left_out(block_row * across + block_column) {
                     samples.clear();
@@ -250,14 +253,21 @@ impl Layout {
     }
 
     /// Read the rows of `span` from uncompressed strips.
-    fn read_plain(&self, path: &Path, span: &Span, visit: &mut Visit<'_>) -> Result<(), DemError> {
+    fn read_plain(
+        &self,
+        path: &Path,
+        span: &Span,
+        wanted: Wanted<'_>,
+        visit: &mut Visit<'_>,
+    ) -> Result<(), DemError> {
         let mut file = File::open(path)?;
         let row_bytes = self.columns * self.sample.bytes();
         let at_once = (PLAIN_READ / row_bytes).max(1);
         let mut bytes = Vec::new();
         let mut samples = Vec::with_capacity(self.columns);
         let mut row = span.rows.start;
-        while row < span.rows.end {
+        while let Some(first) = wanted.first_row(row..span.rows.end) {
+            row = first;
             let strip = row / self.block[1];
             let strip_start = strip * self.block[1];
             let end = span.rows.end.min(strip_start + self.block[1]);

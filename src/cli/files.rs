@@ -1,5 +1,6 @@
 //! Files that commands read and write, including the formats of results.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -45,6 +46,17 @@ fn help() -> String {
 }
 
 impl Choice {
+    /// Refuse an option that is given twice, as the service does.
+    fn check_once(&self) -> anyhow::Result<()> {
+        let mut names = BTreeSet::new();
+        for (name, _) in &self.options {
+            if !names.insert(name) {
+                bail!("--set: {name} is given twice");
+            }
+        }
+        Ok(())
+    }
+
     /// The format of each of `outs`, or of standard output when there are none.
     pub(super) fn of(&self, outs: &[&Path]) -> anyhow::Result<Vec<Chosen>> {
         let formats: Vec<&'static Format> = match (&self.format, outs) {
@@ -57,6 +69,7 @@ impl Choice {
             (None, []) => vec![&export::ALL[0]],
             (None, outs) => outs.iter().map(|out| by_extension(out)).collect(),
         };
+        self.check_once()?;
         let known = |format: &Format, name: &str| format.options.contains(&name);
         let mut chosen = Vec::new();
         for &format in &formats {
@@ -65,21 +78,34 @@ impl Choice {
                 known(format, name) || !formats.iter().any(|format| known(format, name))
             });
             let given = given.map(|(name, value)| (name.as_str(), value.as_str()));
-            chosen.push(Chosen {
-                format,
-                options: Options::read(format, given).context("--set")?,
-            });
+            let options = Options::read(format, given).context("--set")?;
+            // Known before the search, so not reported after it.
+            format.fits(&options).context("--set")?;
+            chosen.push(Chosen { format, options });
         }
         Ok(chosen)
     }
 }
 
 fn by_extension(out: &Path) -> &'static Format {
-    let extension = out.extension().and_then(|extension| extension.to_str());
-    let named = |extension: &str| {
-        Format::of_extension(extension).or_else(|| Format::named(&extension.to_ascii_lowercase()))
+    let default = &export::ALL[0];
+    let Some(extension) = out.extension() else {
+        return default;
     };
-    extension.and_then(named).unwrap_or(&export::ALL[0])
+    let extension = extension.to_string_lossy();
+    let named = || Format::named(&extension.to_ascii_lowercase());
+    Format::of_extension(&extension)
+        .or_else(named)
+        .unwrap_or_else(|| {
+            let known = export::ALL.iter().map(|format| format.extension);
+            eprintln!(
+                "{}: no format has the extension {extension}, so it is {}; known are {}, and --format names one",
+                out.display(),
+                default.name,
+                known.collect::<Vec<_>>().join(", ")
+            );
+            default
+        })
 }
 
 /// The bytes of a file; `-` is standard input.

@@ -52,8 +52,11 @@ enum Write {
     Stored,
     /// Any plan.
     Plain(fn(&Delivery, &Options) -> String),
-    /// A plan that can be flown with the given options.
-    Mission(fn(&Delivery, &Options) -> Result<String, ExportError>),
+    /// A plan that can be flown with the given options, if these agree with each other.
+    Mission {
+        fits: fn(&Options) -> Result<(), OptionFault>,
+        write: fn(&Delivery, &Options) -> Result<String, ExportError>,
+    },
 }
 
 /// The input of a format.
@@ -139,7 +142,10 @@ pub const ALL: &[Format] = &[
         geodetic: true,
         flown: true,
         options: mission::OPTIONS,
-        write: Write::Mission(mission::qgc::write),
+        write: Write::Mission {
+            fits: |_| Ok(()),
+            write: mission::qgc::write,
+        },
     },
     Format {
         name: "wpl",
@@ -148,7 +154,10 @@ pub const ALL: &[Format] = &[
         geodetic: true,
         flown: true,
         options: mission::OPTIONS,
-        write: Write::Mission(mission::wpl::write),
+        write: Write::Mission {
+            fits: mission::wpl::fits,
+            write: mission::wpl::write,
+        },
     },
 ];
 
@@ -183,7 +192,22 @@ impl Format {
         match self.write {
             Write::Stored => Ok(input.result.to_owned()),
             Write::Plain(write) => Ok(write(&self.delivery(input, options)?, options)),
-            Write::Mission(write) => write(&self.delivery(input, options)?, options),
+            Write::Mission { fits, write } => {
+                let delivery = self.delivery(input, options)?;
+                fits(options)?;
+                write(&delivery, options)
+            }
+        }
+    }
+
+    /// Whether the options agree with each other, which is known without a plan.
+    ///
+    /// # Errors
+    /// The option that does not fit.
+    pub fn fits(&self, options: &Options) -> Result<(), OptionFault> {
+        match self.write {
+            Write::Stored | Write::Plain(_) => Ok(()),
+            Write::Mission { fits, .. } => fits(options),
         }
     }
 

@@ -48,6 +48,44 @@ fn a_feasible_plan_exits_0_with_its_result() {
     assert_eq!(written["waypoints"], result["waypoints"]);
 }
 
+/// A search would be in vain: the scenario is not even looked for.
+#[test]
+fn options_that_cannot_be_are_refused_before_anything_is_read() {
+    let check = |options: &[&str], said: &str| {
+        let arguments = [&["plan", "nowhere.json"], options].concat();
+        let refused = run(&arguments, "");
+        assert_eq!(refused.status.code(), Some(1), "{options:?}");
+        let told = String::from_utf8(refused.stderr).expect("UTF-8");
+        assert!(told.contains(said), "{told}");
+    };
+    let epochs = ["epoch=2020-01-01T00:00:00Z", "epoch=2021-01-01T00:00:00Z"];
+    check(
+        &["--format", "czml", "--set", epochs[0], "--set", epochs[1]],
+        "epoch is given twice",
+    );
+    check(
+        &["--out", "route.waypoints", "--set", "altitude=terrain"],
+        "must be relative or absolute for px4",
+    );
+}
+
+#[test]
+fn an_extension_that_no_format_has_is_told() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let told = |name: &str| {
+        let out = directory.path().join(name);
+        let out = out.to_str().expect("UTF-8");
+        let planned = run(&["plan", "-", "--out", out], &scenario().to_string());
+        assert_eq!(planned.status.code(), Some(0), "{name}");
+        String::from_utf8(planned.stderr).expect("UTF-8")
+    };
+    let kmz = told("route.kmz");
+    for part in ["the extension kmz", "it is json", "svg, csv"] {
+        assert!(kmz.contains(part), "{kmz}");
+    }
+    assert_eq!(told("route"), "");
+}
+
 #[test]
 fn a_bad_scenario_exits_2_with_every_fault() {
     let mut wrong = scenario();

@@ -5,18 +5,23 @@ use std::fmt::Write as _;
 use super::items::{FRAME_GLOBAL, Item, mission};
 use crate::export::{Altitude, Delivery, ExportError, Firmware, OptionFault, Options};
 
+/// Whether the firmware knows the frame of the altitudes.
+pub(in crate::export) fn fits(options: &Options) -> Result<(), OptionFault> {
+    if options.altitude == Altitude::Terrain && options.firmware == Firmware::Px4 {
+        return Err(OptionFault {
+            name: "altitude".to_owned(),
+            detail: "altitude is \"terrain\", must be relative or absolute for px4, which knows no other frame"
+                .to_owned(),
+        });
+    }
+    Ok(())
+}
+
 /// Write the mission of a plan.
 pub(in crate::export) fn write(
     delivery: &Delivery,
     options: &Options,
 ) -> Result<String, ExportError> {
-    if options.altitude == Altitude::Terrain && options.firmware == Firmware::Px4 {
-        return Err(ExportError::Option(OptionFault {
-            name: "altitude".to_owned(),
-            detail: "altitude is \"terrain\", must be relative or absolute for px4, which knows no other frame"
-                .to_owned(),
-        }));
-    }
     let mission = mission(delivery, options)?;
     let home = Item {
         command: 16,

@@ -191,6 +191,37 @@ fn an_infeasible_route_is_clearly_marked() {
     assert!(drawing.contains(ALARM));
 }
 
+/// As in the GeoJSON of the same plan.
+#[test]
+fn a_broken_leg_marks_the_waypoint_that_it_leads_to() {
+    let marked = |place: &str| -> Vec<String> {
+        let mut result = run::result(Uuid::nil(), "iterations");
+        result.feasible = false;
+        result.checks.violations = vec![Violation {
+            kind: "threat".to_owned(),
+            place: place.to_owned(),
+            amount: 3.0,
+            message: format!("{place} enters radar 1"),
+        }];
+        let drawing = draw(&scenario(), &result);
+        let document = Document::parse(&drawing).expect("XML");
+        let texts = document.descendants().filter(|node| {
+            let numbers = node
+                .text()
+                .is_some_and(|text| text.parse::<usize>().is_ok());
+            node.has_tag_name("text") && numbers && node.attribute("fill") == Some(ALARM)
+        });
+        texts
+            .filter_map(|node| node.text())
+            .map(str::to_owned)
+            .collect()
+    };
+    assert_eq!(marked("leg 0"), ["1"]);
+    assert_eq!(marked("waypoint 1"), ["1"]);
+    // It leads to the target, which has no number.
+    assert!(marked("leg 1").is_empty());
+}
+
 #[test]
 fn every_shipped_scenario_draws() {
     let directory = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios");

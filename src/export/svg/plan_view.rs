@@ -265,11 +265,12 @@ fn end_names(canvas: &mut Canvas, delivery: &Delivery, map: &MapScale, labels: &
 fn waypoint_numbers(canvas: &mut Canvas, delivery: &Delivery, map: &MapScale, labels: &mut Labels) {
     let calm = Font::new(10.0, INK).halo();
     let alarmed = Font::new(11.0, BROKEN).bold().halo();
-    let broken = broken(delivery, "leg");
+    let [legs, places] = ["leg", "waypoint"].map(|place| broken(delivery, place));
     let waypoints = &delivery.waypoints;
     let inner = waypoints.len() - 1;
     for (idx, point) in waypoints.iter().enumerate().take(inner).skip(1) {
-        let font = if broken.contains(&idx) {
+        // A leg's violations are those of the waypoint that it leads to, as in `geojson`.
+        let font = if places.contains(&idx) || legs.contains(&(idx - 1)) {
             &alarmed
         } else {
             &calm

@@ -34,7 +34,7 @@ pub(super) fn draw(canvas: &mut Canvas, delivery: &Delivery, relief: &Relief, ma
         .into_iter()
         .flatten()
     {
-        labels.reserve_line(&spots(line, map));
+        labels.reserve_line(&thinned(&spots(line, map)));
     }
     let [nw, ne, se, sw] = area_corners(delivery, map);
     labels.reserve_line(&[nw, ne, se, sw, nw]);

@@ -33,6 +33,16 @@ impl Declaration {
         }
     }
 
+    /// The same with one of the names that a tile may have. Contents that were kept under another have checksums with
+    /// that, so it is for new uploads only.
+    pub(super) fn canonical(self) -> Self {
+        let canonical = |name: String| dem::canonical_tile(&name).unwrap_or(name);
+        Self {
+            filename: self.filename.map(canonical),
+            ..self
+        }
+    }
+
     /// Open the file at `path` with this declaration, and keep only what the file does not say itself: then equal
     /// ground has equal checksums, however it was uploaded.
     pub(super) fn open(

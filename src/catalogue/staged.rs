@@ -59,7 +59,7 @@ impl Staged {
         self.file
             .sync_all()
             .map_err(|error| CatalogueError::unavailable("written", &self.path, error))?;
-        let (dataset, declaration) = declaration.open(format, &self.path)?;
+        let (dataset, declaration) = declaration.canonical().open(format, &self.path)?;
         let survey = dataset.survey()?;
         Ok(Checked {
             sha256: self.sum(&declaration),

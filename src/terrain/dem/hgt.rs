@@ -80,6 +80,12 @@ fn corner(name: &str) -> Option<[f64; 2]> {
     (lat < 90.0 && lon < 180.0).then_some([lat, lon])
 }
 
+/// The file name that says no more than where a tile belongs: `N36W085.hgt` for `n36w085.SRTMGL1.hgt`.
+pub(super) fn canonical(name: &str) -> Option<String> {
+    corner(name)?;
+    Some(format!("{}.hgt", name.get(..7)?.to_ascii_uppercase()))
+}
+
 impl Layout {
     pub(super) fn read(
         &self,
@@ -124,5 +130,14 @@ mod tests {
         check("W085N36.hgt", None);
         check("N3\u{e9}W085", None);
         check("", None);
+    }
+
+    #[test]
+    fn a_place_has_one_name() {
+        let check = |name, expected: Option<&str>| assert_eq!(canonical(name).as_deref(), expected);
+        check("n36w085", Some("N36W085.hgt"));
+        check("N36W085.hgt", Some("N36W085.hgt"));
+        check("s01e179.SRTMGL1.hgt", Some("S01E179.hgt"));
+        check("tile.hgt", None);
     }
 }

@@ -211,6 +211,12 @@ pub fn open(path: &Path, declared: Declared<'_>) -> Result<Dataset, DemError> {
     })
 }
 
+/// The one name for the SRTM tiles of a place, of all file names that they may have; `None` if `name` is none of them.
+#[must_use]
+pub fn canonical_tile(name: &str) -> Option<String> {
+    hgt::canonical(name)
+}
+
 /// Detect the format of a file from its content.
 fn format(path: &Path, len: u64, said: Option<Format>) -> Result<Format, DemError> {
     let mut beginning = Vec::new();

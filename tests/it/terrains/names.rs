@@ -219,6 +219,16 @@ async fn declared_properties_are_part_of_the_content() {
         serde_json::json!({"lat": 0.0, "lon": 180.0})
     );
     assert_ne!(here["sha256"], there["sha256"]);
+    // However the name of its file is written, a tile in one place is one content.
+    for filename in ["N36W085.hgt", "n36w085.SRTMGL3.hgt"] {
+        let again = put(
+            &api,
+            &format!("/terrains/n36w085?filename={filename}"),
+            vec![0; 2 * 1201 * 1201],
+        )
+        .await;
+        assert_eq!(again.json()["sha256"], here["sha256"], "{filename}");
+    }
 
     let grid = |west, south, cell| {
         crate::support::elevations::ascii_grid([40, 30], [west, south], cell, |_, _| 250.0)

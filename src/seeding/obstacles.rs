@@ -157,6 +157,13 @@ impl Obstacles {
         scene
     }
 
+    /// As it is, with bodies that may be touched `deep` metres deep at least.
+    #[must_use]
+    pub(super) fn forgiving(mut self, deep: f64) -> Self {
+        self.touch = self.touch.max(deep);
+        self
+    }
+
     fn add(&mut self, idx: usize, outline: Outline) {
         let distances = self.ends.map(|end| outline.distance(end));
         let nearest = distances[0].min(distances[1]);

@@ -49,6 +49,10 @@ impl Event {
     }
 }
 
+/// Where edges of two rings cross, each this many times the tolerance beyond the other at both of its ends, nothing
+/// passes between the rings.
+const CROSSED: f64 = 4.0;
+
 /// A convex core: a disc's centre, or an edge of a ring.
 #[derive(Debug, Clone, Copy)]
 struct Core {
@@ -56,6 +60,13 @@ struct Core {
     b: Point2,
     wall: usize,
     edge: usize,
+}
+
+impl Core {
+    /// Whether it is the edge of a ring.
+    fn is_edge(&self) -> bool {
+        self.a != self.b
+    }
 }
 
 /// All events, cheapest first; `None` when there are too many to examine, or once `stop` asks for it.
@@ -163,11 +174,16 @@ fn gap(one: &Core, other: &Core, walls: &[Wall], prices: &Prices) -> Option<Even
     let (wall, next) = (&walls[one.wall], &walls[other.wall]);
     let (p, q) = nearest_points((one.a, one.b), (other.a, other.b));
     let apart = (q - p).norm();
-    if apart >= wall.wide + next.wide || apart <= wall.core + next.core {
+    if apart >= wall.wide + next.wide {
         return None;
     }
     let same = one.wall == other.wall;
-    if same && is_closed(wall, one, other, p, q) {
+    let closed = if same {
+        is_closed(wall, one, other, p, q)
+    } else {
+        is_shut([one, other], [wall, next], apart, prices.tolerance)
+    };
+    if closed {
         return None;
     }
     let ways = prices.ends.map(|end| point_segment(end.xy(), p, q));
@@ -197,6 +213,21 @@ fn gap(one: &Core, other: &Core, walls: &[Wall], prices: &Prices) -> Option<Even
         cost: prices.reaching(length, extra),
         extra,
     })
+}
+
+/// Whether nothing passes between the hard parts of two walls where they are `apart`. To touch is not to enter, and a
+/// ring may be entered by the tolerance, which the core of a disc is smaller by already.
+fn is_shut([one, other]: [&Core; 2], walls: [&Wall; 2], apart: f64, tolerance: f64) -> bool {
+    let hard = walls[0].core + walls[1].core;
+    match (one.is_edge(), other.is_edge()) {
+        (false, false) => apart <= hard,
+        (true, true) => {
+            let beyond = |end, of: &Core| point_segment(end, of.a, of.b) > CROSSED * tolerance;
+            let is_beyond = |edge: &Core, of: &Core| beyond(edge.a, of) && beyond(edge.b, of);
+            apart <= 0.0 && is_beyond(one, other) && is_beyond(other, one)
+        }
+        _ => apart <= hard - tolerance,
+    }
 }
 
 /// Least exposure to two discs on a way that begins between their centres and goes `way` metres or

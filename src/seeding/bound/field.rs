@@ -38,13 +38,14 @@ impl Field<'_> {
     /// A lower bound for routes that use at most the `allowed` events; `enough` or more where that is reached.
     pub(super) fn level(&self, allowed: &[Event], enough: f64) -> f64 {
         let enough_across = self.prices.across(enough);
-        let cost = |radii: &[Option<f64>], spent: &[usize]| {
+        let across = |radii: &[Option<f64>], spent: &[usize]| {
             let limits = (enough_across, self.stop);
             let (cost, ways) = string::cost((self.walls, radii), self.prices, spent, limits);
             self.ways.set(self.ways.get() + ways);
-            self.prices.climbing_at(cost)
+            cost
         };
-        let tame = cost(&self.radii(allowed), &[]);
+        let cost = |radii: &[Option<f64>]| self.prices.climbing_at(across(radii, &[]));
+        let tame = cost(&self.radii(allowed));
         if allowed.is_empty() || tame >= enough {
             return tame;
         }
@@ -58,8 +59,20 @@ impl Field<'_> {
             return tame;
         }
         let touched: Vec<usize> = allowed.iter().flat_map(Event::walls).collect();
-        let with = cost(&self.bare(allowed), &touched) + extra;
-        tame.max(with.min(cost(&self.radii(&[]), &[])))
+        let with = self.with_one(allowed, across(&self.bare(allowed), &touched));
+        tame.max(with.min(cost(&self.radii(&[]))))
+    }
+
+    /// A lower bound for routes that use at least one of the `allowed` events and cost at least `across` seen from above
+    /// beside what these are made of.
+    fn with_one(&self, allowed: &[Event], across: f64) -> f64 {
+        let climbing = self.prices.climbing_at(across);
+        let with = |event: &Event| match event.kind {
+            // Its waypoint is one of those that the climb to the middle of the band counts.
+            Kind::Pass { .. } => climbing.max(self.prices.level_at(across) + event.extra),
+            Kind::Slip { .. } | Kind::Dip { .. } => climbing + event.extra,
+        };
+        allowed.iter().map(with).fold(f64::INFINITY, f64::min)
     }
 
     /// A lower bound for all routes, event by event, and by the legs that begin at the start and end at the target;
@@ -191,8 +204,13 @@ impl Field<'_> {
                 && let [Some(one), Some(other)] = walls.map(|wall| radii[wall])
                 && one + other > apart
             {
+                let [core, next] = self.bare_radii(walls, apart);
+                if self.is_hardly_open(walls, apart) {
+                    radii[walls[0]] = Some(one.min(core));
+                    radii[walls[1]] = Some(other.min(next));
+                    continue;
+                }
                 // Both shrink alike, but not below their cores.
-                let [core, next] = walls.map(|wall| self.walls[wall].core);
                 let shrunk = (one - 0.5 * (one + other - apart))
                     .max(core)
                     .min(apart - next);
@@ -214,13 +232,36 @@ impl Field<'_> {
             match event.kind {
                 Kind::Pass { wall } => radii[wall] = None,
                 Kind::Dip { wall } => radii[wall] = radii[wall].map(|_| self.walls[wall].core),
-                Kind::Slip { walls, .. } => {
-                    for wall in walls {
-                        radii[wall] = radii[wall].map(|_| self.walls[wall].core);
+                Kind::Slip {
+                    walls,
+                    between: [p, q],
+                } => {
+                    for (wall, bare) in walls
+                        .into_iter()
+                        .zip(self.bare_radii(walls, (q - p).norm()))
+                    {
+                        radii[wall] = radii[wall].map(|radius| radius.min(bare));
                     }
                 }
             }
         }
         radii
+    }
+
+    /// Radii of two walls `apart` that leave a string way between them: those of their cores, or a little less where
+    /// the way is no wider than what routes may enter.
+    fn bare_radii(&self, walls: [usize; 2], apart: f64) -> [f64; 2] {
+        let cores = walls.map(|wall| self.walls[wall].core);
+        if self.is_hardly_open(walls, apart) {
+            cores.map(|core| (core - 2.0 * self.prices.tolerance).max(0.0))
+        } else {
+            cores
+        }
+    }
+
+    /// Whether the way between two walls `apart` is no wider than what routes may enter.
+    fn is_hardly_open(&self, walls: [usize; 2], apart: f64) -> bool {
+        let hard: f64 = walls.iter().map(|wall| self.walls[*wall].core).sum();
+        apart <= hard + self.prices.tolerance
     }
 }

@@ -53,10 +53,15 @@ impl Prices {
 
     /// Least cost of a way between the ends that costs at least `cost` seen from above, waypoints included.
     pub(super) fn climbing_at(&self, cost: f64) -> f64 {
-        let rise = self.fuel * self.rise();
-        let level = (cost * cost + rise * rise).sqrt();
+        let level = self.level_at(cost);
         let peak = self.peak.filter(|_| level.is_finite());
         peak.map_or(level, |peak| peak.least(self.fuel, cost).max(level))
+    }
+
+    /// As [`Prices::climbing_at`], without waypoints.
+    pub(super) fn level_at(&self, cost: f64) -> f64 {
+        let rise = self.fuel * self.rise();
+        (cost * cost + rise * rise).sqrt()
     }
 
     /// Least cost of a way between the ends at least `length` long seen from above, with `extra` for soft zones.

@@ -72,11 +72,12 @@ pub(super) struct Gap {
 impl Gap {
     /// Between shapes that are nearest to each other at two points, which are surrounded by their `cores`.
     pub(super) fn new([p, q]: [Point2; 2], cores: [f64; 2]) -> Self {
-        let along = (q - p).normalize();
-        let (p, q) = (p + along * cores[0], q - along * cores[1]);
+        let apart = (q - p).norm();
+        // Shapes that touch have no way of their own between them: the gap is a point.
+        let along = (q - p).try_normalize(0.0).unwrap_or_default();
         Self {
-            middle: nalgebra::center(&p, &q),
-            half: 0.5 * (q - p).norm(),
+            middle: p + along * (0.5 * (apart + cores[0] - cores[1])),
+            half: 0.5 * (apart - cores[0] - cores[1]).max(0.0),
         }
     }
 }
@@ -130,7 +131,8 @@ pub(super) fn departures(
     [[start, target], [target, start]].map(|ends| Departure::of(field, prices, ends, spent))
 }
 
-/// Walls, none of which is wider than it may be at either end.
+/// Walls, none of which is wider than it may be at either end. Strings pass where two of them overlap by what routes
+/// may enter both.
 pub(super) fn scene((walls, radii): (&[Wall], &[Option<f64>]), ends: [Point2; 2]) -> Obstacles {
     let outlines = walls.iter().zip(radii).map(|(wall, radius)| {
         let outline = wall.outline((*radius)?);
@@ -139,7 +141,8 @@ pub(super) fn scene((walls, radii): (&[Wall], &[Option<f64>]), ends: [Point2; 2]
             ..outline
         })
     });
-    Obstacles::new(outlines, ends, None)
+    let tolerance = walls.iter().map(|wall| wall.tolerance).fold(0.0, f64::max);
+    Obstacles::new(outlines, ends, None).forgiving(2.0 * tolerance)
 }
 
 /// Metres by which the string may be shorter because routes may cut corners, or pay to do so.

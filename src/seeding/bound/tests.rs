@@ -3,6 +3,7 @@
 use super::super::tests::{among, read, scenario};
 use super::*;
 use crate::geometry::Point3;
+use crate::scenario::Weights;
 
 /// From ground to ground, with bands above it.
 #[test]
@@ -250,4 +251,73 @@ fn the_bound_is_never_below_the_straight_line() {
     let scenario = scenario(r#""threats": []"#);
     let straight = 0.5 * (scenario.target - scenario.start).norm();
     assert!(lower_bound(&scenario) >= straight * (1.0 - 1e-8));
+}
+
+/// To touch is not to enter: threats that touch leave a way between them, and so do some that overlap by less than
+/// routes may enter them.
+#[test]
+fn routes_may_pass_where_threats_touch() {
+    let block = |y: f64| {
+        format!(
+            r#"{{"x": -1500, "y": {y}}}, {{"x": 2500, "y": {y}}}, {{"x": 2500, "y": 2500}}, {{"x": -1500, "y": 2500}}"#
+        )
+    };
+    let tip = r#"{"x": 500, "y": 600}, {"x": 480, "y": 0}, {"x": 520, "y": 0}"#;
+    let flush =
+        r#"{"x": 495, "y": 600}, {"x": 505, "y": 600}, {"x": 505, "y": 0}, {"x": 495, "y": 0}"#;
+    let ring = |vertices: &str, margin: f64| {
+        format!(r#"{{"kind": "polygon", "margin": {margin}, "vertices": [{vertices}]}}"#)
+    };
+    let bound = |[one, other]: [&str; 2], [x, y]: [f64; 2]| {
+        lower_bound(&read(&format!(
+            r#"{{ "frame": "local",
+                "start": {{ "x": {x}, "y": {y}, "z": 100 }}, "target": {{ "x": {}, "y": {y}, "z": 100 }},
+                "area": {{ "min": {{ "x": -2000, "y": -2000 }}, "max": {{ "x": 3000, "y": 3000 }} }},
+                "altitude": {{ "min": 0, "max": 200 }},
+                "vehicle": {{ "max_turn_deg": 180, "max_climb_deg": 45, "fuel_per_km": 1000 }},
+                "weights": {{ "fuel": 1, "threat": 1, "altitude": 1 }},
+                "planner": {{ "algorithm": "tms-sba" }}, "threats": [{one}, {other}] }}"#,
+            1000.0 - x
+        )))
+    };
+    // Totals of feasible routes through the common point.
+    for (vertices, margin, total) in [
+        (tip, 10.0, 418.526),
+        (tip, 30.0, 880.094),
+        (flush, 10.0, 459.276),
+        (flush, 30.0, 993.104),
+    ] {
+        let threats = [&ring(&block(600.0), margin), &ring(vertices, margin)];
+        let bound = bound(threats.map(String::as_str), [350.0, 500.0]);
+        assert!(bound > 300.0 && bound <= total, "{bound} {total}");
+    }
+    let disc = r#"{"kind": "cylinder", "center": {"x": 500, "y": -699.9999893933983}, "radius": 1200, "influence": 1200}"#;
+    let threats = [&*ring(&block(500.0), 0.0), disc];
+    let bound = bound(threats, [0.0, 440.0]);
+    assert!(bound > 1000.0 && bound <= 1033.239, "{bound}");
+}
+
+/// A waypoint pays for its height once, whether it is beyond a threat or on the way to the middle of the band.
+#[test]
+fn the_height_of_a_waypoint_beyond_a_threat_is_counted_once() {
+    for (width, limit, z, waypoints, weight, total) in [
+        (20.0, r#""base": 50"#, 51.0, 1, 1.0, 850.03),
+        (20.0, r#""top": 150"#, 149.0, 1, 0.1, 805.006),
+        (200.0, r#""base": 50"#, 51.0, 2, 0.1, 809.917),
+    ] {
+        let [west, east] = [500.0 - 0.5 * width, 500.0 + 0.5 * width];
+        let mut scenario = scenario(&format!(
+            r#""threats": [{{"kind": "polygon", {limit}, "vertices": [{{"x": {west}, "y": -3000}}, {{"x": {east}, "y": -3000}}, {{"x": {east}, "y": 4000}}, {{"x": {west}, "y": 4000}}]}}]"#
+        ));
+        scenario.start = Point3::new(100.0, 500.0, z);
+        scenario.target = Point3::new(900.0, 500.0, z);
+        scenario.weights = Weights {
+            fuel: 1.0,
+            threat: 1.0,
+            altitude: weight,
+        };
+        scenario.planner.waypoints = waypoints;
+        let bound = lower_bound(&scenario);
+        assert!(bound > 0.99 * total && bound <= total, "{bound} {total}");
+    }
 }

@@ -113,7 +113,10 @@ impl Heights {
         let lowest = ends.iter().fold(band.min, |low, h| low.min(*h));
         let floor = if within { band.min } else { lowest.min(0.0) };
         let ceiling = ends.iter().fold(band.max, |high, h| high.max(*h));
-        let hair = 1e-3 + 1e-9 * (high.abs() + low.abs() + ceiling.abs());
+        let tolerance = Tolerance::of(scenario);
+        let hair = 1e-3
+            + 2.0 * tolerance.length_m.max(tolerance.height_m)
+            + 1e-9 * (high.abs() + low.abs() + ceiling.abs());
         Self {
             floor: low + floor - hair,
             ceiling: high + ceiling + hair,

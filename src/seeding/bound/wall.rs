@@ -13,6 +13,8 @@ use crate::threat::{Shape, Threat};
 #[derive(Debug, Clone)]
 pub(super) struct Wall {
     pub(super) shape: OutlineShape,
+    /// How deep a feasible route may enter it, metres.
+    pub(super) tolerance: f64,
     /// No route comes nearer than this, metres; 0 for a ring.
     pub(super) core: f64,
     /// End of the soft zone, metres.
@@ -58,6 +60,7 @@ impl Wall {
         };
         let wall = Self {
             shape,
+            tolerance: slack,
             core,
             influence,
             wide: 0.0,

@@ -1,9 +1,8 @@
 //! Scenarios and results: beside the steps, so that a step stays small.
 
-use async_nats::jetstream::object_store::{DeleteErrorKind, GetErrorKind, InfoErrorKind};
+use async_nats::jetstream::object_store::{DeleteErrorKind, InfoErrorKind};
 use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use bytes::Bytes;
-use tokio::io::AsyncReadExt as _;
 
 use super::connect::Servers;
 use super::errors::failed;
@@ -69,7 +68,7 @@ impl Servers {
         Ok(())
     }
 
-    /// `None` when the servers have lost it.
+    /// `None` when the servers have lost it, or a part of it.
     pub(super) async fn read(&self, document: &Document) -> Result<Option<String>, StoreError> {
         self.outlast(|| self.try_to_read(document)).await
     }
@@ -77,17 +76,10 @@ impl Servers {
     async fn try_to_read(&self, document: &Document) -> Result<Option<String>, StoreError> {
         let what = || format!("document {}", document.key);
         let bytes = if document.large {
-            let mut object = match self.objects.get(&document.key).await {
-                Ok(object) => object,
-                Err(error) if error.kind() == GetErrorKind::NotFound => return Ok(None),
-                Err(error) => return Err(failed(&what(), &error)),
-            };
-            let mut bytes = Vec::with_capacity(object.info().size);
-            object
-                .read_to_end(&mut bytes)
-                .await
-                .map_err(|error| failed(&what(), &error))?;
-            bytes
+            match self.get_object(&document.key).await? {
+                Some(bytes) => bytes,
+                None => return Ok(None),
+            }
         } else {
             let got = self.documents.get(&document.key).await;
             let bytes = match got.map_err(|error| failed(&what(), &error))? {

@@ -7,9 +7,10 @@ use async_nats::jetstream::Message;
 use async_nats::jetstream::consumer::{DeliverPolicy, push};
 use futures_util::StreamExt as _;
 use tokio::sync::watch;
+use tokio::time::timeout;
 
 use super::JetStream;
-use super::connect::plan_of;
+use super::connect::{PATIENCE, plan_of};
 use super::errors::{failed, refused};
 use super::history::History;
 use super::record::{Placed, State, Step};
@@ -151,7 +152,14 @@ impl JetStream {
         if is_empty {
             return Ok(history);
         }
-        while let Some(message) = messages.next().await {
+        loop {
+            // Steps that are removed just now never come.
+            let Ok(next) = timeout(PATIENCE, messages.next()).await else {
+                let standing = self.plans().look_up(id).await?;
+                standing.record(id, (self.options.clock)())?;
+                return Err(refused(&what, "none came for a while"));
+            };
+            let Some(message) = next else { break };
             let message = message.map_err(|error| refused(&what, &error))?;
             let pending = message
                 .info()

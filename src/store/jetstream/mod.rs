@@ -19,6 +19,7 @@ mod lane;
 mod leases;
 mod lost_jobs;
 mod nodes;
+mod objects;
 mod orphans;
 mod record;
 mod removal;
@@ -56,6 +57,7 @@ use self::lane::Lane;
 use self::leases::Leases;
 use self::lost_jobs::Round;
 use self::orphans::Orphans;
+use self::record::Document;
 use self::steps::Plans;
 use self::view::{Standing, View};
 use super::{
@@ -118,6 +120,17 @@ impl JetStream {
         let standing = self.plans().standing(id).await?;
         let record = standing.record(id, (self.options.clock)())?;
         Ok(self.view.known().shown(record))
+    }
+
+    /// A document that a plan's record names.
+    async fn read_document(&self, id: PlanId, document: &Document) -> Result<String, StoreError> {
+        if let Some(text) = self.servers.read(document).await? {
+            return Ok(text);
+        }
+        // It goes with its plan, which may have been removed meanwhile.
+        let standing = self.plans().look_up(id).await?;
+        standing.record(id, (self.options.clock)())?;
+        Err(document.missing())
     }
 }
 
@@ -250,18 +263,14 @@ impl Store for JetStreamStore {
         let store = self.open_store()?;
         let standing = store.plans().standing(id).await?;
         let record = standing.record(id, (store.options.clock)())?;
-        let found = store.servers.read(&record.scenario).await?;
-        found.ok_or_else(|| record.scenario.missing())
+        store.read_document(id, &record.scenario).await
     }
 
     async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError> {
         let store = self.open_store()?;
         let standing = store.plans().standing(id).await?;
         match &standing.record(id, (store.options.clock)())?.result {
-            Some(result) => {
-                let found = store.servers.read(result).await?;
-                found.ok_or_else(|| result.missing()).map(Some)
-            }
+            Some(result) => store.read_document(id, result).await.map(Some),
             None => Ok(None),
         }
     }

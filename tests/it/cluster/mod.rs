@@ -2,6 +2,7 @@
 
 mod chaos;
 mod credentials;
+mod large;
 mod nodes;
 mod outages;
 mod partition;

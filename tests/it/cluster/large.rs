@@ -1,0 +1,56 @@
+//! Documents that are too long for a message, and are kept in parts.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
+
+use async_nats::jetstream;
+use noctule::config::Address;
+use noctule::job::{PlanId, Status, Submission};
+use noctule::store::{Store, StoreError, Trouble};
+
+use super::open;
+use crate::support::nats::{self, namespace};
+use crate::support::patience::in_time;
+use crate::support::plans::submission;
+
+/// Longer than a message, in several parts.
+const LARGE: usize = 600_000;
+
+async fn submit_large(store: &dyn Store) -> PlanId {
+    let large = Submission {
+        scenario: " ".repeat(LARGE),
+        ..submission()
+    };
+    store.submit(large).await.unwrap().plan.id
+}
+
+/// The stream that has the parts of all large documents.
+async fn parts(address: &str) -> jetstream::stream::Stream {
+    let servers = Address::read(address).unwrap().servers;
+    let client = jetstream::new(async_nats::connect(servers).await.unwrap());
+    let name = format!("OBJ_{}-objects", namespace(address));
+    client.get_stream(name).await.unwrap()
+}
+
+/// The only large plan fails, and the next is claimed.
+async fn fails_and_the_next_is_run(store: &dyn Store, lost: PlanId) {
+    let sound = store.submit(submission()).await.unwrap().plan.id;
+    assert_eq!(in_time(store.claim()).await.unwrap().plan.id, sound);
+    let plan = store.get(lost).await.unwrap();
+    assert_eq!(plan.status, Status::Failed);
+    assert_eq!(plan.error.unwrap().kind, "scenario-lost");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_document_without_its_parts_is_not_waited_for() {
+    let address = nats::address();
+    let store = open(&address).await;
+    let lost = submit_large(&*store).await;
+    let purged = parts(&address).await.purge().filter("$O.*.C.>").await;
+    assert!(purged.unwrap().purged > 1);
+    let read = in_time(store.scenario(lost)).await;
+    let Err(StoreError::Unavailable { trouble, detail }) = read else {
+        panic!("{read:?}")
+    };
+    assert_eq!(trouble, Trouble::Other, "{detail}");
+    fails_and_the_next_is_run(&*store, lost).await;
+}

@@ -8,6 +8,7 @@ use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE;
 use sha2::{Digest as _, Sha256};
+use std::io;
 use tokio::io::AsyncReadExt as _;
 use tokio::time::timeout;
 
@@ -44,6 +45,7 @@ impl Servers {
             match read {
                 Ok(0) => return Ok(Some(bytes)),
                 Ok(_) => {}
+                Err(error) if error.kind() == io::ErrorKind::InvalidData => return Ok(None),
                 Err(error) => return Err(failed(&document(key), &error)),
             }
         }

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
 use async_nats::jetstream;
+use futures_util::StreamExt as _;
 use noctule::config::Address;
 use noctule::job::{PlanId, Status, Submission};
 use noctule::store::{Store, StoreError, Trouble};
@@ -31,6 +32,12 @@ async fn parts(address: &str) -> jetstream::stream::Stream {
     client.get_stream(name).await.unwrap()
 }
 
+/// The subjects of the parts that are there.
+async fn subjects(parts: &jetstream::stream::Stream) -> Vec<String> {
+    let there = parts.info_with_subjects("$O.*.C.>").await.unwrap();
+    there.map(|subject| subject.unwrap().0).collect().await
+}
+
 /// The only large plan fails, and the next is claimed.
 async fn fails_and_the_next_is_run(store: &dyn Store, lost: PlanId) {
     let sound = store.submit(submission()).await.unwrap().plan.id;
@@ -52,5 +59,19 @@ async fn a_document_without_its_parts_is_not_waited_for() {
         panic!("{read:?}")
     };
     assert_eq!(trouble, Trouble::Other, "{detail}");
+    fails_and_the_next_is_run(&*store, lost).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plan_whose_document_lacks_a_part_fails_and_does_not_block_the_queue() {
+    let address = nats::address();
+    let store = open(&address).await;
+    let lost = submit_large(&*store).await;
+    let parts = parts(&address).await;
+    let [subject] = &subjects(&parts).await[..] else {
+        panic!("one document has been written")
+    };
+    let part = parts.get_first_raw_message_by_subject(subject, 0).await;
+    parts.delete_message(part.unwrap().sequence).await.unwrap();
     fails_and_the_next_is_run(&*store, lost).await;
 }

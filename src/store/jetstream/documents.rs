@@ -1,6 +1,5 @@
 //! Scenarios and results: beside the steps, so that a step stays small.
 
-use async_nats::jetstream::object_store::{DeleteErrorKind, InfoErrorKind};
 use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use bytes::Bytes;
 
@@ -55,11 +54,7 @@ impl Servers {
     async fn try_to_write(&self, document: &Document, text: &str) -> Result<(), StoreError> {
         let what = || format!("document {}", document.key);
         if document.large {
-            let put = self
-                .objects
-                .put(document.key.as_str(), &mut text.as_bytes())
-                .await;
-            put.map_err(|error| failed(&what(), &error))?;
+            self.put_object(&document.key, text.as_bytes()).await?;
         } else {
             let text = Bytes::copy_from_slice(text.as_bytes());
             let put = self.documents.put(&document.key, text).await;
@@ -107,42 +102,15 @@ impl Servers {
         }
     }
 
-    /// Remove all documents of a plan. `objects` are the keys of those that may be in the object store.
+    /// Remove all documents of a plan. `objects` are the keys of those that may be in the object store. Nothing is
+    /// written for it, so that full servers do it too.
     pub(super) async fn remove_documents(
         &self,
         id: PlanId,
         objects: &[String],
     ) -> Result<(), StoreError> {
         self.purge_documents(id).await?;
-        for key in objects {
-            match self.objects.delete(key).await {
-                Err(error) if error.kind() != DeleteErrorKind::NotFound => {
-                    return Err(failed(&documents_of(id), &error));
-                }
-                _ => {}
-            }
-        }
-        Ok(())
-    }
-
-    /// As [`Servers::remove_documents`], without writing anything: the heads of objects stay.
-    pub(super) async fn empty_documents(
-        &self,
-        id: PlanId,
-        objects: &[String],
-    ) -> Result<(), StoreError> {
-        self.purge_documents(id).await?;
-        for key in objects {
-            let object = match self.objects.info(key).await {
-                Ok(object) => object,
-                Err(error) if error.kind() == InfoErrorKind::NotFound => continue,
-                Err(error) => return Err(failed(&documents_of(id), &error)),
-            };
-            let chunks = format!("$O.{}.C.{}", object.bucket, object.nuid);
-            let purged = self.chunks.purge().filter(chunks).await;
-            purged.map_err(|error| failed(&documents_of(id), &error))?;
-        }
-        Ok(())
+        self.remove_objects(id, objects).await
     }
 
     /// Remove those documents of a plan that are no objects.

@@ -2,21 +2,136 @@
 //!
 //! The servers deliver an object by themselves, as fast as they can. Where that yields nothing whole, the leader of the
 //! stream is asked for each part: only it can tell a document that is lost from one that a server has not got yet.
+//!
+//! Objects are not written by the client, whose chunks have random names that only the head tells: those of an object
+//! that was never finished could not be found again. Here they begin with the name of the object, and so with the plan.
 
-use async_nats::jetstream::object_store::{GetErrorKind, ObjectInfo};
+use std::collections::HashMap;
+use std::io;
+
+use async_nats::jetstream::message::PublishMessage;
+use async_nats::jetstream::object_store::{GetErrorKind, InfoErrorKind, ObjectInfo, ObjectOptions};
 use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE;
+use bytes::Bytes;
 use sha2::{Digest as _, Sha256};
-use std::io;
 use tokio::io::AsyncReadExt as _;
 use tokio::time::timeout;
+use uuid::Uuid;
 
 use super::connect::{PATIENCE, Servers};
 use super::errors::failed;
+use crate::job::PlanId;
 use crate::store::StoreError;
 
+/// Bytes in a chunk; servers accept messages of 1 MiB by default.
+const CHUNK: usize = 128 << 10;
+
 impl Servers {
+    /// Store an object in place of the one that had this name; nothing is left of one that is refused.
+    pub(super) async fn put_object(&self, key: &str, bytes: &[u8]) -> Result<(), StoreError> {
+        let before = self.head(key).await.ok().flatten();
+        let nuid = format!("{key}.{}", Uuid::new_v4().simple());
+        let put = self.put_parts(key, &nuid, bytes).await;
+        let useless = match &put {
+            Ok(()) => before.map(|before| before.nuid),
+            Err(_) => Some(nuid),
+        };
+        if let Some(nuid) = useless
+            && let Err(error) = self.purge_from_objects(self.chunks_of(&nuid)).await
+        {
+            tracing::debug!(%error, key, "parts of a document are left until its plan is removed");
+        }
+        put
+    }
+
+    /// The head comes last: without it there is no object.
+    async fn put_parts(&self, key: &str, nuid: &str, bytes: &[u8]) -> Result<(), StoreError> {
+        let chunks = self.chunks_of(nuid);
+        for chunk in bytes.chunks(CHUNK) {
+            let chunk = PublishMessage::build().payload(Bytes::copy_from_slice(chunk));
+            self.publish_part(key, chunks.clone(), chunk).await?;
+        }
+        let head = ObjectInfo {
+            name: key.to_owned(),
+            description: None,
+            metadata: HashMap::new(),
+            headers: None,
+            options: Some(ObjectOptions {
+                link: None,
+                max_chunk_size: Some(CHUNK),
+            }),
+            bucket: self.bucket(),
+            nuid: nuid.to_owned(),
+            size: bytes.len(),
+            chunks: bytes.len().div_ceil(CHUNK),
+            modified: None,
+            digest: Some(digest(bytes)),
+            deleted: false,
+        };
+        let head = serde_json::to_vec(&head).map_err(|error| failed(&document(key), &error))?;
+        let head = PublishMessage::build()
+            .header("Nats-Rollup", "sub")
+            .payload(head.into());
+        self.publish_part(key, self.head_of(key), head).await
+    }
+
+    async fn publish_part(
+        &self,
+        key: &str,
+        subject: String,
+        part: PublishMessage,
+    ) -> Result<(), StoreError> {
+        let sent = self.context.send_publish(subject, part).await;
+        let answered = match sent {
+            Ok(answer) => answer.await,
+            Err(error) => Err(error),
+        };
+        answered
+            .map(drop)
+            .map_err(|error| failed(&document(key), &error))
+    }
+
+    /// Remove objects of a plan, and what there is of unfinished ones. This writes nothing: full servers do it too.
+    pub(super) async fn remove_objects(
+        &self,
+        id: PlanId,
+        keys: &[String],
+    ) -> Result<(), StoreError> {
+        if keys.is_empty() {
+            return Ok(());
+        }
+        self.purge_from_objects(self.chunks_of(&format!("{id}.>")))
+            .await?;
+        for key in keys {
+            let Some(object) = self.head(key).await? else {
+                continue;
+            };
+            // Earlier versions gave them other names.
+            if !object.nuid.starts_with(key.as_str()) {
+                self.purge_from_objects(self.chunks_of(&object.nuid))
+                    .await?;
+            }
+            self.purge_from_objects(self.head_of(key)).await?;
+        }
+        Ok(())
+    }
+
+    async fn head(&self, key: &str) -> Result<Option<ObjectInfo>, StoreError> {
+        match self.objects.info(key).await {
+            Ok(object) => Ok(Some(object)),
+            Err(error) if error.kind() == InfoErrorKind::NotFound => Ok(None),
+            Err(error) => Err(failed(&document(key), &error)),
+        }
+    }
+
+    async fn purge_from_objects(&self, subject: String) -> Result<(), StoreError> {
+        let purged = self.chunks.purge().filter(&subject).await;
+        purged.map_err(|error| failed(&subject, &error))?;
+        Ok(())
+    }
+
     /// `None` when the servers have lost it, or a part of it.
     pub(super) async fn get_object(&self, key: &str) -> Result<Option<Vec<u8>>, StoreError> {
         match self.delivered(key).await? {
@@ -91,12 +206,16 @@ impl Servers {
 
     /// The subject of an object's head.
     fn head_of(&self, key: &str) -> String {
-        format!("$O.{}-objects.M.{}", self.namespace, URL_SAFE.encode(key))
+        format!("$O.{}.M.{}", self.bucket(), URL_SAFE.encode(key))
     }
 
     /// The subject of an object's chunks.
     fn chunks_of(&self, nuid: &str) -> String {
-        format!("$O.{}-objects.C.{nuid}", self.namespace)
+        format!("$O.{}.C.{nuid}", self.bucket())
+    }
+
+    fn bucket(&self) -> String {
+        format!("{}-objects", self.namespace)
     }
 }
 

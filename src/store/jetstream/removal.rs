@@ -29,7 +29,7 @@ impl JetStream {
             buried = self.write_grave(id, now_ms, expired).await;
         }
         if is_refused(&buried) {
-            self.empty_documents(id).await?;
+            self.give_up_documents(id).await?;
             buried = self.write_grave(id, now_ms, expired).await;
         }
         let (standing, Remains { place, objects }) = buried?;
@@ -82,12 +82,12 @@ impl JetStream {
         Ok(())
     }
 
-    async fn empty_documents(&self, id: PlanId) -> Result<(), StoreError> {
+    async fn give_up_documents(&self, id: PlanId) -> Result<(), StoreError> {
         let standing = self.plans().standing(id).await?;
         let State::Kept(record) = &*standing.state else {
             return Ok(());
         };
-        self.servers.empty_documents(id, &record.objects()).await
+        self.servers.remove_documents(id, &record.objects()).await
     }
 
     /// Remove a tombstone, and what an interrupted removal has left.

@@ -154,7 +154,7 @@ impl JetStream {
         let place = match document.and(job) {
             Ok(place) => place,
             Err(error) => {
-                // What remains of it is removed with its job.
+                // If this fails too, what remains of it is removed with its job.
                 let _ = self.servers.remove_documents(id, &[scenario.key]).await;
                 return Err(NotAccepted::certainly(error));
             }

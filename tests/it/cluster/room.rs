@@ -133,3 +133,38 @@ async fn expired_plans_are_swept_from_full_servers() {
     assert_eq!(first + sweep().await, 3);
     submit(&store, 2).await;
 }
+
+/// Number of messages that make up the large documents, and number of those documents that have parts.
+async fn large(address: &str) -> (u64, usize) {
+    let client = client(address).await;
+    let objects = format!("OBJ_{}-objects", namespace(address));
+    let objects = client.get_stream(objects).await.unwrap();
+    let parts = objects.info_with_subjects("$O.*.C.>").await.unwrap();
+    let documents = parts.count().await;
+    (objects.get_info().await.unwrap().state.messages, documents)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plan_refused_for_want_of_room_takes_up_none() {
+    let server = NatsServer::with_room(ROOM);
+    let address = server.address();
+    let options = Options::new(100);
+    let store = JetStreamStore::open(node(&address), options).await.unwrap();
+    let mut accepted = Vec::new();
+    for _ in 0..2 {
+        accepted.push(submit(&store, 3 << 20).await);
+    }
+    let before = large(&address).await;
+    assert_eq!(before.1, 2);
+    // A part of it fits.
+    let third = Submission {
+        scenario: " ".repeat(3 << 20),
+        ..submission()
+    };
+    assert_eq!(trouble(store.submit(third).await), Some(Trouble::Full));
+    assert_eq!(large(&address).await, before);
+    for id in accepted {
+        store.delete(id, 0).await.unwrap();
+    }
+    assert_eq!(large(&address).await, (0, 0));
+}

@@ -69,7 +69,12 @@ impl Plans<'_> {
 
     /// A plan's state on the servers.
     pub(super) async fn look_up(&self, id: PlanId) -> Result<Standing, StoreError> {
-        let newest = self.newest(id).await?.ok_or(StoreError::NotFound(id))?;
+        let known = self.view.standing(id);
+        let Some(newest) = self.newest(id).await? else {
+            let known = known.map_or(0, |known| known.sequence);
+            self.view.forget_since(id, known);
+            return Err(StoreError::NotFound(id));
+        };
         self.learn(id, &newest);
         Ok(Standing {
             sequence: newest.sequence,
@@ -155,8 +160,10 @@ impl Plans<'_> {
                     }
                 }
             };
-            if let Some(newest) = &newest {
-                self.learn(id, newest);
+            match &newest {
+                Some(newest) => self.learn(id, newest),
+                // All its steps have been removed: by an operator, or long ago by nodes that this one could not hear.
+                None => self.view.forget_since(id, expected),
             }
             let own = newest
                 .as_ref()

@@ -74,6 +74,19 @@ impl View {
         self.known().forget(id);
     }
 
+    /// A plan that is no longer on the servers, unless a later step than `sequence` is known by now.
+    pub(super) fn forget_since(&self, id: PlanId, sequence: u64) {
+        {
+            let mut known = self.known();
+            let standing = known.standing(id);
+            if standing.is_none_or(|standing| standing.sequence > sequence) {
+                return;
+            }
+            known.forget(id);
+        }
+        self.changes.tick(id);
+    }
+
     pub(super) fn standing(&self, id: PlanId) -> Option<Standing> {
         self.known().standing(id)
     }

@@ -12,7 +12,7 @@ use futures_util::StreamExt as _;
 use noctule::config::Address;
 use noctule::job::{Event, Idempotency, Plan, PlanId, Status, Submission};
 use noctule::store::jetstream::{JetStreamStore, Settings};
-use noctule::store::{Options, Store, StoreError};
+use noctule::store::{Options, Retention, Store, StoreError};
 
 use crate::support::nats;
 use crate::support::patience::{eventually, in_time};
@@ -211,4 +211,43 @@ async fn a_plan_whose_document_is_lost_fails_and_does_not_block_the_queue() {
     }
     let stats = store.stats().await.unwrap();
     assert_eq!((stats.queued, stats.running), (0, 1));
+}
+
+/// Removes all steps of a plan from the servers, as if they had never been written.
+async fn remove_steps(address: &str, id: PlanId) {
+    let namespace = nats::namespace(address);
+    let plans = client(address)
+        .await
+        .get_stream(format!("{namespace}-plans"))
+        .await;
+    let steps = format!("{namespace}.plans.{id}");
+    let purged = plans.unwrap().purge().filter(steps).await;
+    assert!(purged.unwrap().purged > 0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plan_that_is_gone_from_the_servers_is_forgotten() {
+    let address = nats::address();
+    let options = Options {
+        retention: Retention {
+            age_ms: Some(1),
+            ..Retention::default()
+        },
+        ..Options::new(10)
+    };
+    let store = JetStreamStore::open(node(&address), options).await.unwrap();
+    let [expired, deleted] = [(); 2].map(|()| store.submit(submission()));
+    let [expired, deleted] = [
+        expired.await.unwrap().plan.id,
+        deleted.await.unwrap().plan.id,
+    ];
+    store.request_cancel(expired, 0).await.unwrap();
+    for id in [expired, deleted] {
+        remove_steps(&address, id).await;
+    }
+    assert_eq!(store.sweep(1_000).await.unwrap(), 0);
+    assert_eq!(kind(store.get(expired).await), Err("not found"));
+    assert_eq!(kind(store.delete(deleted, 0).await), Err("not found"));
+    assert_eq!(kind(store.get(deleted).await), Err("not found"));
+    assert_eq!(store.stats().await.unwrap().queued, 0);
 }

@@ -156,8 +156,8 @@ pub trait Store: Send + Sync + 'static {
     fn changes(&self, id: PlanId) -> watch::Receiver<u64>;
 
     /// Remove ended plans that are past their time or beyond the limits of [`Retention`], those that ended longest ago
-    /// first, at most [`SWEEP`] of them; returns how many. Their tombstones mark them as expired for [`TOMBSTONE_MS`].
-    /// Expired tombstones and idempotency keys are removed too.
+    /// first, at most [`SWEEP`] of them; returns how many, which is fewer only when no more can be removed. Their
+    /// tombstones mark them as expired for [`TOMBSTONE_MS`]. Expired tombstones and idempotency keys are removed too.
     async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError>;
 
     /// Webhooks of ended plans that are due, at most `limit`, and of one owner at most half of it, rounded up: first the

@@ -121,39 +121,61 @@ impl JetStream {
     }
 
     pub(super) async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError> {
-        let retention = self.options.retention;
-        let (expired_tombstones, going) = {
-            let known = self.view.known();
-            let plans = retention.plans.unwrap_or(u64::MAX);
-            let bytes = retention.bytes.unwrap_or(u64::MAX);
-            (
-                known.expired_tombstones(now_ms, SWEEP),
-                known.removable(now_ms, plans, bytes, SWEEP),
-            )
-        };
-        for id in expired_tombstones {
+        let expired = self.view.known().expired_tombstones(now_ms, SWEEP);
+        for id in expired {
             self.forget_tombstone(id).await?;
         }
-        let mut removed = 0;
-        let mut refused = None;
-        for id in going {
-            match self.bury(id, now_ms, true).await {
-                Ok(()) => removed += 1,
-                // Another node was faster.
-                Err(StoreError::Gone(_) | StoreError::NotFound(_)) => {}
-                // This one freed too little; with the next one it may be enough.
-                Err(error) if lacks_room(&error) => refused = Some(error),
-                Err(error) => return Err(error),
-            }
-        }
-        if let Some(error) = refused.filter(|_| removed == 0) {
-            return Err(error);
-        }
+        let removed = self.remove_expired(now_ms).await?;
         if let Err(error) = self.restore_jobs(now_ms).await {
             tracing::debug!(%error, "missing jobs were not looked for; trying again");
         }
         Ok(removed)
     }
+
+    /// Remove plans that nobody has removed yet, as many as a sweep may. Other nodes remove the same plans meanwhile;
+    /// those do not count, or a crowd of nodes would remove no more than one.
+    async fn remove_expired(&self, now_ms: i64) -> Result<usize, StoreError> {
+        let mut removed = 0;
+        loop {
+            let round = self.remove_some(now_ms, SWEEP - removed).await?;
+            removed += round.removed;
+            if removed >= SWEEP || round.outrun == 0 {
+                return Ok(removed);
+            }
+        }
+    }
+
+    async fn remove_some(&self, now_ms: i64, at_most: usize) -> Result<Round, StoreError> {
+        let retention = self.options.retention;
+        let plans = retention.plans.unwrap_or(u64::MAX);
+        let bytes = retention.bytes.unwrap_or(u64::MAX);
+        let mut going = self.view.known().removable(now_ms, plans, bytes, at_most);
+        // Each node in an order of its own, so that they seldom meet.
+        going.sort_by_key(|id| id.as_u128() ^ self.node.as_u128());
+        let mut round = Round::default();
+        let mut refused = None;
+        for id in going {
+            match self.bury(id, now_ms, true).await {
+                Ok(()) => round.removed += 1,
+                Err(StoreError::Gone(_) | StoreError::NotFound(_)) => round.outrun += 1,
+                // This one freed too little; with the next one it may be enough.
+                Err(error) if lacks_room(&error) => refused = Some(error),
+                Err(error) => return Err(error),
+            }
+        }
+        match refused {
+            Some(error) if round.removed == 0 => Err(error),
+            _ => Ok(round),
+        }
+    }
+}
+
+/// Plans that a sweep has tried to remove.
+#[derive(Debug, Default)]
+struct Round {
+    removed: usize,
+    /// Other nodes were faster. None of these is tried again.
+    outrun: usize,
 }
 
 /// What is left of a plan that has been marked as removed.

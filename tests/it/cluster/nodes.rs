@@ -9,7 +9,7 @@ use futures_util::future::join_all;
 use noctule::config::Address;
 use noctule::job::{Event, Idempotency, PlanId, Status, Submission};
 use noctule::store::jetstream::{JetStreamStore, Settings};
-use noctule::store::{Options, Store, StoreError};
+use noctule::store::{Options, Retention, SWEEP, Store, StoreError};
 
 use super::{open, open_as};
 use crate::support::nats::{self, NatsServer};
@@ -267,4 +267,32 @@ async fn webhooks_behind_those_that_another_node_sends_are_sent() {
         let due: Vec<_> = due.iter().map(|due| due.plan.id).collect();
         assert_eq!(due, [id]);
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn each_node_that_sweeps_removes_as_many_plans_as_one_alone() {
+    let address = nats::address();
+    let open = async || {
+        let retention = Retention {
+            age_ms: Some(1),
+            ..Retention::default()
+        };
+        let options = Options {
+            retention,
+            ..Options::new(1_000)
+        };
+        JetStreamStore::open(node(&address), options).await.unwrap()
+    };
+    let (one, other) = tokio::join!(open(), open());
+    let n_plans = SWEEP + SWEEP / 2;
+    let ended = join_all((0..n_plans).map(async |_| {
+        let id = one.submit(submission()).await.unwrap().plan.id;
+        one.request_cancel(id, 0).await.unwrap();
+        id
+    }));
+    for id in ended.await {
+        until(&other, id, |plan| plan.status.is_final()).await;
+    }
+    let (by_one, by_other) = tokio::join!(one.sweep(1_000), other.sweep(1_000));
+    assert_eq!(by_one.unwrap() + by_other.unwrap(), n_plans);
 }

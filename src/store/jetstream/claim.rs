@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use async_nats::jetstream::{AckKind, Message};
 use tokio::runtime::Handle;
-use tokio::sync::oneshot;
+use tokio::sync::{oneshot, watch};
 use tokio::time::Instant;
 use tracing::field::display;
 
@@ -219,7 +219,7 @@ impl JetStream {
                 answer(id, &job, AckKind::Ack).await;
             }
             Found::Ours => {}
-            Found::Run(record) => return self.lease(*record, scenario, job).await,
+            Found::Run(record, cancel) => return self.lease(*record, cancel, scenario).await,
         }
         Ok(None)
     }
@@ -243,12 +243,13 @@ impl JetStream {
         }
     }
 
+    /// Start a plan, and hold its job from then on: its document may take long to arrive.
     async fn start(&self, id: PlanId, job: &Job) -> Result<Found, StoreError> {
-        let mut found = Found::Over;
+        let (mut started, mut found) = (None, Found::Over);
         let now_ms = (self.options.clock)();
         self.plans()
             .change(id, |standing| {
-                found = Found::Over;
+                (started, found) = (None, Found::Over);
                 let State::Kept(record) = &*standing.state else {
                     return Ok(None);
                 };
@@ -275,28 +276,32 @@ impl JetStream {
                 record.plan.start(now_ms)?;
                 record.attempt += 1;
                 record.appended = 0;
-                found = Found::Run(record.clone());
+                started = Some(record.clone());
                 Ok(Some(Change {
                     events,
                     ..Change::announced(record)
                 }))
             })
-            .await
-            .map(|_| found)
+            .await?;
+        let Some(record) = started else {
+            return Ok(found);
+        };
+        let lease = self.settings.lease;
+        let cancel = self.leases.hold(id, record.attempt, job.clone(), lease);
+        // Take in requests that came between the step and the hold.
+        if let Some(standing) = self.view.standing(id) {
+            self.leases.heed(id, &standing.state);
+        }
+        Ok(Found::Run(record, cancel))
     }
 
     async fn lease(
         &self,
         record: Record,
+        cancel: watch::Receiver<bool>,
         scenario: Result<Option<String>, StoreError>,
-        job: Job,
     ) -> Result<Option<Lease>, StoreError> {
         let (id, attempt) = (record.id(), record.attempt);
-        let cancel = self.leases.hold(id, attempt, job, self.settings.lease);
-        // Take in requests that came between the step and the hold.
-        if let Some(standing) = self.view.standing(id) {
-            self.leases.heed(id, &standing.state);
-        }
         match scenario {
             Ok(Some(scenario)) => Ok(Some(Lease {
                 plan: record.plan,
@@ -360,8 +365,8 @@ impl Drop for Caller {
 
 /// What a job turned out to be.
 enum Found {
-    /// To be run, as it now stands.
-    Run(Box<Record>),
+    /// To be run, and held, with what tells its run to stop.
+    Run(Box<Record>, watch::Receiver<bool>),
     /// It is already run here, under a lease that was not renewed in time.
     Ours,
     /// Ended, or removed.

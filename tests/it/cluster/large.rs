@@ -2,16 +2,20 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
+use std::time::Duration;
+
 use async_nats::jetstream;
 use futures_util::StreamExt as _;
 use noctule::config::Address;
 use noctule::job::{PlanId, Status, Submission};
+use noctule::store::jetstream::Settings;
 use noctule::store::{Store, StoreError, Trouble};
 
-use super::open;
+use super::{open, open_as};
 use crate::support::nats::{self, namespace};
 use crate::support::patience::in_time;
-use crate::support::plans::submission;
+use crate::support::plans::{history, statuses, submission, until};
+use crate::support::stores::node;
 
 /// Longer than a message, in several parts.
 const LARGE: usize = 600_000;
@@ -74,4 +78,27 @@ async fn a_plan_whose_document_lacks_a_part_fails_and_does_not_block_the_queue()
     let part = parts.get_first_raw_message_by_subject(subject, 0).await;
     parts.delete_message(part.unwrap().sequence).await.unwrap();
     fails_and_the_next_is_run(&*store, lost).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_node_keeps_its_lease_while_it_reads_a_document() {
+    let address = nats::address();
+    // Shorter than the time for which the parts are waited for.
+    let settings = || Settings {
+        lease: Duration::from_secs(3),
+        ..node(&address)
+    };
+    let (one, other) = tokio::join!(open_as(settings()), open_as(settings()));
+    let lost = submit_large(&*one).await;
+    let purged = parts(&address).await.purge().filter("$O.*.C.>").await;
+    assert!(purged.unwrap().purged > 1);
+    let claims = [&one, &other].map(|node| {
+        let node = node.clone();
+        tokio::spawn(async move { node.claim().await })
+    });
+    in_time(until(&*one, lost, |plan| plan.status.is_final())).await;
+    let told = history(&*one, lost).await;
+    let expected = [Status::Queued, Status::Running, Status::Failed];
+    assert_eq!(statuses(&told), expected);
+    claims.iter().for_each(tokio::task::JoinHandle::abort);
 }

@@ -28,6 +28,7 @@ mod runs;
 mod settings;
 mod shelf;
 mod steps;
+mod strays;
 mod streams;
 mod submit;
 mod turns;
@@ -59,6 +60,7 @@ use self::lost_jobs::Round;
 use self::orphans::Orphans;
 use self::record::Document;
 use self::steps::Plans;
+use self::strays::Strays;
 use self::view::{Standing, View};
 use super::{
     DatasetUse, End, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError, Submitted,
@@ -98,6 +100,7 @@ struct JetStream {
     orphans: Orphans,
     /// The search for missing jobs.
     round: Mutex<Round>,
+    strays: Mutex<Strays>,
     all_slots: AtomicUsize,
     /// Plans whose webhooks this node is sending.
     telling: Mutex<BTreeSet<PlanId>>,
@@ -155,6 +158,7 @@ impl JetStreamStore {
             last_patrol: Mutex::default(),
             orphans: Orphans::default(),
             round: Mutex::default(),
+            strays: Mutex::default(),
             telling: Mutex::default(),
             end: watch::Sender::new(false),
             vanished: watch::Sender::new(false),

@@ -129,6 +129,9 @@ impl JetStream {
         if let Err(error) = self.restore_jobs(now_ms).await {
             tracing::debug!(%error, "missing jobs were not looked for; trying again");
         }
+        if let Err(error) = self.discard_strays(now_ms).await {
+            tracing::debug!(%error, "jobs without plans were not looked for; trying again");
+        }
         Ok(removed)
     }
 

@@ -1,7 +1,8 @@
 //! How a plan is accepted.
 //!
 //! Its document and its job are written first, its record last: a submission that was interrupted before that was never
-//! accepted, and its job, which has no record, is discarded by whichever node finds it.
+//! accepted, and its job, which has no record, is discarded by whichever node receives it, or finds it in the
+//! queue once more after some minutes.
 
 use std::error::Error;
 use std::time::Duration;

@@ -226,6 +226,53 @@ async fn remove_steps(address: &str, id: PlanId) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn an_interrupted_submission_is_removed_though_nobody_asks_for_its_lane() {
+    let address = nats::address();
+    let store = super::open(&address).await;
+    let submit = async |owner: &str| {
+        let owned = Submission {
+            owner: Some(owner.to_owned()),
+            scenario: " ".repeat(600_000),
+            ..submission()
+        };
+        store.submit(owned).await.unwrap().plan
+    };
+    let (broken_off, accepted) = (submit("one").await, submit("other").await);
+    store.close().await;
+    // Its record, which is written last.
+    remove_steps(&address, broken_off.id).await;
+
+    let store = super::open(&address).await;
+    let namespace = nats::namespace(&address);
+    let client = client(&address).await;
+    let jobs = client
+        .get_stream(format!("{namespace}-jobs"))
+        .await
+        .unwrap();
+    let objects = client
+        .get_stream(format!("OBJ_{namespace}-objects"))
+        .await
+        .unwrap();
+    let messages = async || {
+        let (jobs, objects) = (
+            jobs.get_info().await.unwrap(),
+            objects.get_info().await.unwrap(),
+        );
+        (jobs.state.messages, objects.state.messages)
+    };
+    let (_, all) = messages().await;
+    let seen_ms = accepted.created_ms;
+    store.sweep(seen_ms).await.unwrap();
+    // It may still be on its way.
+    store.sweep(seen_ms + 59_000).await.unwrap();
+    assert_eq!(messages().await, (2, all));
+    store.sweep(seen_ms + 600_000).await.unwrap();
+    assert_eq!(messages().await, (1, all / 2));
+    let lease = in_time(store.claim()).await.unwrap();
+    assert_eq!(lease.plan.id, accepted.id);
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_plan_that_is_gone_from_the_servers_is_forgotten() {
     let address = nats::address();
     let options = Options {

@@ -67,7 +67,7 @@ pub trait Store: Send + Sync + 'static {
 
     /// As [`Store::claim`], but the lease may come before the claim is durable or visible: a run may begin during the
     /// wait for the disk, since a forgotten run is only repeated. If the claim fails after all, the lease is lost:
-    /// whatever is written under it is refused.
+    /// whatever is written under it is refused, and until a claim succeeds, failed ones return their error.
     ///
     /// # Errors
     /// As [`Store::claim`].

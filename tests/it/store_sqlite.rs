@@ -243,6 +243,48 @@ async fn an_early_lease_whose_claim_fails_is_lost() {
     assert_eq!(ids, [1, 2, 3, 4], "nothing remains of the void run");
 }
 
+/// Whoever claims learns that claims fail, rather than running the same plan over and over.
+#[tokio::test(flavor = "multi_thread")]
+async fn after_a_lost_claim_none_is_early_until_one_succeeds() {
+    const BREAK: &str = "CREATE TRIGGER break AFTER UPDATE OF attempt ON plans \
+                         BEGIN INSERT INTO broken VALUES (-1); END";
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    for _ in 0..2 {
+        store.submit(submission()).await.unwrap();
+    }
+    let database = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
+    database
+        .execute_batch(
+            "CREATE TABLE broken (of INTEGER REFERENCES plans (seq) DEFERRABLE INITIALLY DEFERRED)",
+        )
+        .unwrap();
+    database.execute_batch(BREAK).unwrap();
+    let void = store.claim_early().await.unwrap();
+    for _ in 0..3 {
+        // Neither a write that succeeds nor one that finds nothing to write says anything about claims.
+        store.health().await.unwrap();
+        let lost = store.append(&void, vec![point(1, None)]).await;
+        assert!(matches!(lost, Err(StoreError::LeaseLost(_))), "{lost:?}");
+        let failed = store.claim_early().await.map(|lease| lease.attempt);
+        assert!(
+            matches!(failed, Err(StoreError::Unavailable { .. })),
+            "{failed:?}"
+        );
+    }
+
+    database.execute_batch("DROP TRIGGER break").unwrap();
+    let lease = store.claim_early().await.unwrap();
+    assert_eq!(lease.plan.id, void.plan.id);
+    store
+        .finish(&lease, ending(Status::Succeeded).at(12_000))
+        .await
+        .unwrap();
+    // Claims are early again: this one comes although its commit fails.
+    database.execute_batch(BREAK).unwrap();
+    store.claim_early().await.unwrap();
+}
+
 /// Of writes that share a transaction, one that fails after it has written is refused alone.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_write_that_fails_halfway_leaves_nothing_and_fails_no_other() {

@@ -14,7 +14,8 @@ use crate::store::{Lease, StoreError};
 /// When a claimer is given its lease.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum When {
-    /// As soon as its plan is chosen; the commit may still fail.
+    /// As soon as its plan is chosen; the commit may still fail. After one that did, only after the commit, until a
+    /// claim has been committed.
     Chosen,
     /// After the commit.
     Durable,
@@ -35,15 +36,21 @@ pub(super) struct Claims {
     pub(super) any: bool,
     /// The greatest attempt whose lease was handed out before the commit.
     pub(super) early_attempt: u64,
+    /// Whether a plan was chosen for anybody.
+    pub(super) granted: bool,
+    /// Whether those who want their lease before the commit get it then.
+    early: bool,
 }
 
 impl Claims {
-    pub(super) fn new(messages: Sender<Message>) -> Self {
+    pub(super) fn new(messages: Sender<Message>, early: bool) -> Self {
         Self {
             messages,
             held: Vec::new(),
             any: false,
             early_attempt: 0,
+            granted: false,
+            early,
         }
     }
 
@@ -59,13 +66,19 @@ impl Claims {
                     waiting.push_front(claimer);
                     return;
                 }
-                Ok(Some(lease)) if claimer.when == When::Chosen => {
-                    self.early_attempt = self.early_attempt.max(lease.attempt);
-                    self.send(claimer, Ok(lease));
-                }
-                Ok(Some(lease)) => self.held.push((claimer, Ok(lease))),
+                Ok(Some(lease)) => self.grant(claimer, lease),
                 Err(error) => self.held.push((claimer, Err(error))),
             }
+        }
+    }
+
+    fn grant(&mut self, claimer: Claimer, lease: Lease) {
+        self.granted = true;
+        if self.early && claimer.when == When::Chosen {
+            self.early_attempt = self.early_attempt.max(lease.attempt);
+            self.send(claimer, Ok(lease));
+        } else {
+            self.held.push((claimer, Ok(lease)));
         }
     }
 

@@ -110,6 +110,7 @@ impl Writer {
             leases: HashMap::new(),
             queued: 0,
             void_attempt: 0,
+            claims_fail: false,
             found_full: false,
         };
         desk.recover()?;
@@ -195,6 +196,8 @@ struct Desk {
     queued: u64,
     /// The greatest attempt whose lease was handed out but whose claim was not committed.
     void_attempt: u64,
+    /// A claim whose lease was handed out was not committed, and none has been since.
+    claims_fail: bool,
     /// The disk was found full, and nothing as large as a plan has been written since.
     found_full: bool,
 }
@@ -268,7 +271,7 @@ impl Desk {
 
     /// Do a batch in one transaction, and the waiting claims too if `claiming`.
     fn write(&mut self, mut batch: Vec<Box<dyn Operation>>, claiming: bool) {
-        let mut claims = Claims::new(self.messages.clone());
+        let mut claims = Claims::new(self.messages.clone(), !self.claims_fail);
         let mut spoiled = false;
         let durable = self.commit(|tx, waiting| {
             // A claimer that can be given a plan now need not wait until everything else is written.
@@ -283,9 +286,7 @@ impl Desk {
             }
             spoiled = tx.sound().is_err();
         });
-        if durable.is_err() {
-            self.void_attempt = self.void_attempt.max(claims.early_attempt);
-        }
+        self.learn(&claims, durable.is_ok());
         let any_claimed = claims.any;
         claims.answer(durable.as_ref().copied());
         if durable.is_err() && any_claimed && !batch.is_empty() {
@@ -306,6 +307,17 @@ impl Desk {
             tracing::error!(%error, operations = batch.len(), "a write failed");
         }
         self.answer(batch, durable);
+    }
+
+    /// While claims fail, none is answered early: its plan would be run in vain, over and over, and whoever claims
+    /// would not learn that there is reason to pause. Other commits do not show that claims succeed: some write nothing.
+    fn learn(&mut self, claims: &Claims, committed: bool) {
+        if !committed {
+            self.void_attempt = self.void_attempt.max(claims.early_attempt);
+            self.claims_fail |= claims.early_attempt > 0;
+        } else if claims.granted {
+            self.claims_fail = false;
+        }
     }
 
     /// Waking a task from outside the runtime costs a system call each; one spawned task wakes them all.

@@ -3,7 +3,7 @@
 //! A service whose store cannot be opened does not exit: whatever restarts it would only do so for ever. It answers,
 //! says that it is not ready and why, and accepts plans once the cause is gone.
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use async_trait::async_trait;
@@ -41,7 +41,8 @@ pub struct Reopening {
 /// A store that is of no use until it is opened again.
 #[derive(Clone)]
 struct Lost {
-    store: Arc<dyn Store>,
+    /// Kept alive by nothing but its use: who follows its plans learns that it is gone when it is dropped.
+    store: Weak<dyn Store>,
     trouble: Trouble,
     detail: String,
 }
@@ -97,7 +98,7 @@ impl Reopening {
         }) = &answer
         {
             self.lost.send_replace(Some(Lost {
-                store: Arc::clone(store),
+                store: Arc::downgrade(store),
                 trouble: *trouble,
                 detail: detail.clone(),
             }));
@@ -170,9 +171,10 @@ async fn report_of(
     reports: &mut watch::Receiver<Option<Lost>>,
 ) -> Option<Lost> {
     // A late report about a store that has since been replaced is ignored.
+    let store = Arc::downgrade(store);
     let this = |reported: &Option<Lost>| {
         let reported = reported.as_ref();
-        reported.is_some_and(|lost| Arc::ptr_eq(&lost.store, store))
+        reported.is_some_and(|lost| Weak::ptr_eq(&lost.store, &store))
     };
     reports.wait_for(this).await.ok()?.clone()
 }

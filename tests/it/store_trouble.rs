@@ -190,6 +190,7 @@ async fn damage_found_while_reading_closes_the_store_until_it_is_repaired() {
 
     let store = Reopening::start(open).await;
     store.stats().await.expect("the rest is sound");
+    let followed = store.changes(ids[0]);
     let mut told = None;
     for id in &ids {
         if let Err(StoreError::Unavailable { trouble, .. }) = store.scenario(*id).await {
@@ -203,6 +204,10 @@ async fn damage_found_while_reading_closes_the_store_until_it_is_repaired() {
     file.write_all_at(&sound[part..part + 4], part as u64)
         .unwrap();
     until(&store, true).await;
+    // Whoever followed a plan is woken, to follow it in the store that is open now.
+    followed
+        .has_changed()
+        .expect_err("the closed store is gone");
     for id in &ids {
         assert_eq!(store.scenario(*id).await.unwrap().len(), 50_000);
     }

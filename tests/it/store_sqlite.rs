@@ -6,9 +6,9 @@ use std::ffi::OsStr;
 use std::path::Path;
 use std::sync::Arc;
 
-use noctule::job::{Event, Status};
+use noctule::job::{Event, Status, Submission};
 use noctule::store::sqlite::{SqliteStore, upkeep};
-use noctule::store::{Options, Store, StoreError};
+use noctule::store::{ListQuery, Options, Retention, Store, StoreError};
 use tempfile::TempDir;
 
 use crate::support::plans::{ending, history, point, submission};
@@ -382,6 +382,146 @@ async fn an_unreadable_plan_fails_and_does_not_block_the_queue() {
         })
         .unwrap();
     assert_eq!(status, "failed");
+}
+
+/// Execute each statement on a file that is in use; each changes one row.
+fn damage(data_dir: &Path, statements: &[&str]) {
+    let database = rusqlite::Connection::open(data_dir.join("noctule.db")).unwrap();
+    for damage in statements {
+        assert_eq!(database.execute(damage, []).unwrap(), 1, "{damage}");
+    }
+}
+
+async fn run_next(store: &SqliteStore) {
+    let lease = store.claim().await.unwrap();
+    let end = ending(Status::Succeeded).at(12_000);
+    store.finish(&lease, end).await.unwrap();
+}
+
+/// The others are listed, and fill the pages.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_unreadable_plan_is_left_out_of_lists() {
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let mut ids = Vec::new();
+    for _ in 0..6 {
+        ids.push(store.submit(submission()).await.unwrap().plan.id);
+    }
+    damage(
+        directory.path(),
+        &[
+            "UPDATE plans SET name = CAST(x'ff' AS TEXT) WHERE seq = 3",
+            "UPDATE plans SET algorithm = CAST(x'ff' AS TEXT) WHERE seq = 4",
+            "UPDATE plans SET id = 'x' WHERE seq = 5",
+        ],
+    );
+    let page = async |before| {
+        let query = ListQuery {
+            status: None,
+            owner: None,
+            before,
+            limit: 2,
+        };
+        let plans = store.list(query).await.unwrap();
+        plans.iter().map(|plan| plan.id).collect::<Vec<_>>()
+    };
+    assert_eq!(page(None).await, [ids[5], ids[1]]);
+    assert_eq!(page(Some(ids[1])).await, [ids[0]]);
+    store.get(ids[3]).await.unwrap_err();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_unreadable_running_plan_is_set_aside_at_the_next_start() {
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let mut ids = Vec::new();
+    for _ in 0..3 {
+        ids.push(store.submit(submission()).await.unwrap().plan.id);
+    }
+    for _ in 0..2 {
+        store.claim().await.unwrap();
+    }
+    // As if its process had died: nothing is given back.
+    drop(store);
+    damage(
+        directory.path(),
+        &["UPDATE plans SET id = 'x' WHERE seq = 1"],
+    );
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let stats = store.stats().await.unwrap();
+    assert_eq!((stats.queued, stats.running), (2, 0));
+    for id in &ids[1..] {
+        assert_eq!(store.claim().await.unwrap().plan.id, *id);
+    }
+    // Nor does one keep the others from being given back when the store is closed.
+    damage(
+        directory.path(),
+        &["UPDATE plans SET name = CAST(x'ff' AS TEXT) WHERE seq = 2"],
+    );
+    store.close().await;
+    drop(store);
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let lease = store.claim().await.unwrap();
+    assert_eq!((lease.plan.id, lease.attempt), (ids[2], 2));
+    assert_eq!(store.stats().await.unwrap().queued, 0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_unreadable_ended_plan_is_removed_in_its_turn() {
+    let directory = TempDir::new().unwrap();
+    let retention = Retention {
+        plans: Some(1),
+        ..Retention::default()
+    };
+    let options = Options {
+        retention,
+        ..options()
+    };
+    let store = SqliteStore::open(directory.path(), options).unwrap();
+    let mut ids = Vec::new();
+    for _ in 0..4 {
+        ids.push(store.submit(submission()).await.unwrap().plan.id);
+        run_next(&store).await;
+    }
+    damage(
+        directory.path(),
+        &[
+            "UPDATE plans SET id = 'x' WHERE seq = 1",
+            "UPDATE plans SET owner = CAST(x'ff' AS TEXT) WHERE seq = 2",
+            "UPDATE plans SET name = CAST(x'ff' AS TEXT) WHERE seq = 3",
+        ],
+    );
+    assert_eq!(store.sweep(13_000).await.unwrap(), 3);
+    for id in &ids[..3] {
+        store.get(*id).await.unwrap_err();
+    }
+    store.get(ids[3]).await.unwrap();
+    assert_eq!(store.sweep(13_000).await.unwrap(), 0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_unreadable_ended_plan_does_not_hold_up_the_webhooks_of_others() {
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let mut ids = Vec::new();
+    for _ in 0..3 {
+        let told = Submission {
+            webhook: Some("https://receiver.example".to_owned()),
+            ..submission()
+        };
+        ids.push(store.submit(told).await.unwrap().plan.id);
+        run_next(&store).await;
+    }
+    damage(
+        directory.path(),
+        &[
+            "UPDATE plans SET id = 'x' WHERE seq = 1",
+            "UPDATE plans SET name = CAST(x'ff' AS TEXT) WHERE seq = 2",
+        ],
+    );
+    let due = store.due_webhooks(13_000, 10).await.unwrap();
+    let due: Vec<_> = due.iter().map(|webhook| webhook.plan.id).collect();
+    assert_eq!(due, ids[2..]);
 }
 
 /// However often claims fail after they have written, other writes in their transactions succeed.

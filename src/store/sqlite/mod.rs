@@ -17,6 +17,7 @@ mod schema;
 #[cfg(test)]
 mod tests;
 mod transaction;
+mod unreadable;
 pub mod upkeep;
 mod webhooks;
 mod writer;
@@ -34,6 +35,7 @@ use self::claims::When;
 use self::opening::{create_directory, lock, open_database, sync_directory};
 use self::read::Readers;
 use self::records::Records;
+use self::unreadable::Passed;
 use self::writer::Writer;
 use super::changes::Changes;
 use super::{
@@ -57,6 +59,7 @@ pub struct SqliteStore {
     readers: Arc<Readers>,
     changes: Arc<Changes>,
     records: Arc<Records>,
+    passed: Arc<Passed>,
     clock: Clock,
 }
 
@@ -128,6 +131,7 @@ impl SqliteStore {
             readers: Readers::new(file),
             changes,
             records,
+            passed: Arc::default(),
             clock,
         })
     }
@@ -234,8 +238,9 @@ impl Store for SqliteStore {
     }
 
     async fn list(&self, query: ListQuery) -> Result<Vec<Plan>, StoreError> {
+        let passed = Arc::clone(&self.passed);
         self.readers
-            .read(move |connection| read::list(connection, query))
+            .read(move |connection| read::list(connection, &query, &passed))
             .await
     }
 
@@ -262,8 +267,9 @@ impl Store for SqliteStore {
     }
 
     async fn due_webhooks(&self, now_ms: i64, limit: usize) -> Result<Vec<Webhook>, StoreError> {
+        let passed = Arc::clone(&self.passed);
         self.readers
-            .read(move |connection| webhooks::due(connection, now_ms, limit))
+            .read(move |connection| webhooks::due(connection, now_ms, limit, &passed))
             .await
     }
 

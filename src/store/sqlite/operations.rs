@@ -173,16 +173,23 @@ pub(super) fn recover(tx: &mut Transaction<'_>) -> Result<Vec<Plan>, StoreError>
     Ok(ended)
 }
 
-/// Running plans in order of acceptance.
+/// Running plans in order of acceptance. Those whose record cannot be read are set aside.
 fn running(tx: &Transaction<'_>) -> Result<Vec<PlanRow>, StoreError> {
-    let rows = tx
+    let rows: Vec<_> = tx
         .connection
         .prepare_cached(&format!(
             "SELECT {COLUMNS} FROM plans WHERE status = 'running' ORDER BY seq"
         ))?
-        .query_map([], PlanRow::read)?
+        .query_map([], PlanRow::try_read)?
         .collect::<Result<_, _>>()?;
-    Ok(rows)
+    let mut running = Vec::new();
+    for row in rows {
+        match row {
+            Ok(row) => running.push(row),
+            Err(unreadable) => unreadable.set_aside(tx)?,
+        }
+    }
+    Ok(running)
 }
 
 pub(super) fn request_cancel(

@@ -11,6 +11,7 @@ use tokio::sync::Semaphore;
 
 use super::packed;
 use super::row::{COLUMNS, PlanRow};
+use super::unreadable::{Passed, Unreadable};
 use super::{BUSY_TIMEOUT, closed};
 use crate::export::document::Incumbent;
 use crate::job::{Event, NumberedEvent, Plan, PlanId, Status};
@@ -144,22 +145,45 @@ fn document(
     }
 }
 
-pub(super) fn list(connection: &Connection, query: ListQuery) -> Result<Vec<Plan>, StoreError> {
+/// Plans whose record cannot be read are left out, and others take their place on the page.
+pub(super) fn list(
+    connection: &Connection,
+    query: &ListQuery,
+    passed: &Passed,
+) -> Result<Vec<Plan>, StoreError> {
+    let mut n_left_out = 0;
+    let rows = loop {
+        let (rows, left_out) = page(connection, query, query.limit.saturating_add(n_left_out))?;
+        left_out.iter().for_each(|row| passed.over(row));
+        if left_out.len() == n_left_out {
+            break rows;
+        }
+        n_left_out = left_out.len();
+    };
+    placed(connection, rows)
+}
+
+/// The first rows of a list: those that can be read, and the others.
+fn page(
+    connection: &Connection,
+    query: &ListQuery,
+    limit: usize,
+) -> Result<(Vec<PlanRow>, Vec<Unreadable>), StoreError> {
     let mut conditions = Vec::new();
     let mut values = Vec::new();
     if let Some(status) = query.status {
         conditions.push("status = ?");
         values.push(Value::from(status.name().to_owned()));
     }
-    if let Some(owner) = query.owner {
+    if let Some(owner) = &query.owner {
         conditions.push("owner = ?");
-        values.push(Value::from(owner));
+        values.push(Value::from(owner.clone()));
     }
     if let Some(before) = query.before {
         conditions.push("id < ?");
         values.push(Value::from(before.to_string()));
     }
-    values.push(Value::from(i64::try_from(query.limit).unwrap_or(i64::MAX)));
+    values.push(Value::from(i64::try_from(limit).unwrap_or(i64::MAX)));
     let filter = if conditions.is_empty() {
         String::new()
     } else {
@@ -168,10 +192,18 @@ pub(super) fn list(connection: &Connection, query: ListQuery) -> Result<Vec<Plan
     let mut statement = connection.prepare_cached(&format!(
         "SELECT {COLUMNS} FROM plans {filter} ORDER BY id DESC LIMIT ?"
     ))?;
-    let rows = statement
-        .query_map(params_from_iter(values), PlanRow::read)?
-        .collect::<Result<Vec<_>, _>>()?;
+    let (mut rows, mut left_out) = (Vec::new(), Vec::new());
+    for row in statement.query_map(params_from_iter(values), PlanRow::try_read)? {
+        match row? {
+            Ok(row) => rows.push(row),
+            Err(unreadable) => left_out.push(unreadable),
+        }
+    }
+    Ok((rows, left_out))
+}
 
+/// The records with their places in the queue.
+fn placed(connection: &Connection, rows: Vec<PlanRow>) -> Result<Vec<Plan>, StoreError> {
     let some_queued = rows.iter().any(|row| row.plan.status == Status::Queued);
     let queue = if some_queued {
         queue(connection)?

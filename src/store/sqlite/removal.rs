@@ -1,6 +1,6 @@
 //! Removal of plans that have expired, and what remains of removed ones.
 
-use rusqlite::{Params, params};
+use rusqlite::{Params, Row, params};
 
 use super::idempotency;
 use super::transaction::{Effect, Transaction};
@@ -10,9 +10,28 @@ use crate::store::{SWEEP, StoreError, TOMBSTONE_MS, Tombstone};
 /// An ended plan that may have to be removed.
 struct Ended {
     seq: i64,
-    id: String,
-    owner: Option<String>,
     bytes: u64,
+    /// `None` when its id or owner cannot be read.
+    tombstone: Option<Tombstone>,
+}
+
+impl Ended {
+    /// From `seq, id, owner, bytes`. A text that cannot be read is done without, or the plan would hold up the removal
+    /// of all others for ever.
+    fn read(row: &Row<'_>) -> rusqlite::Result<Self> {
+        let id = row.get::<_, String>(1).ok();
+        let id = id.and_then(|id| PlanId::parse_str(&id).ok());
+        let owner = row.get(2).ok();
+        Ok(Self {
+            seq: row.get(0)?,
+            bytes: row.get::<_, i64>(3)?.cast_unsigned(),
+            tombstone: id.zip(owner).map(|(id, owner)| Tombstone {
+                id,
+                owner,
+                expired: true,
+            }),
+        })
+    }
 }
 
 /// See [`Store::sweep`](crate::store::Store::sweep).
@@ -76,26 +95,20 @@ fn ended(
     parameters: impl Params,
 ) -> Result<Vec<Ended>, StoreError> {
     let mut statement = tx.connection.prepare_cached(sql)?;
-    let rows = statement.query_map(parameters, |row| {
-        Ok(Ended {
-            seq: row.get(0)?,
-            id: row.get(1)?,
-            owner: row.get(2)?,
-            bytes: row.get::<_, i64>(3)?.cast_unsigned(),
-        })
-    })?;
+    let rows = statement.query_map(parameters, Ended::read)?;
     Ok(rows.collect::<Result<_, _>>()?)
 }
 
 fn expire(tx: &mut Transaction<'_>, plan: Ended, now_ms: i64) -> Result<(), StoreError> {
-    let id = PlanId::parse_str(&plan.id)
-        .map_err(|error| StoreError::unavailable(format!("plan id {:?}: {error}", plan.id)))?;
-    let tombstone = Tombstone {
-        id,
-        owner: plan.owner,
-        expired: true,
-    };
-    remove(tx, plan.seq, tombstone, now_ms)
+    if let Some(tombstone) = plan.tombstone {
+        return remove(tx, plan.seq, tombstone, now_ms);
+    }
+    let seq = plan.seq;
+    tracing::error!(
+        seq,
+        "an expired plan whose record cannot be read is removed without a trace"
+    );
+    delete_row(tx, seq)
 }
 
 /// Remove a plan and all that belongs to it; its tombstone remains.
@@ -106,15 +119,20 @@ pub(super) fn remove(
     now_ms: i64,
 ) -> Result<(), StoreError> {
     let Tombstone { id, owner, expired } = tombstone;
-    tx.connection
-        .prepare_cached("DELETE FROM plans WHERE seq = ?1")?
-        .execute([seq])?;
+    delete_row(tx, seq)?;
     tx.connection
         .prepare_cached(
             "INSERT OR REPLACE INTO tombstones (id, deleted_ms, owner, expired) VALUES (?1, ?2, ?3, ?4)",
         )?
         .execute(params![id.to_string(), now_ms, owner, expired])?;
     tx.effects.push(Effect::Changed(id));
+    Ok(())
+}
+
+fn delete_row(tx: &Transaction<'_>, seq: i64) -> Result<(), StoreError> {
+    tx.connection
+        .prepare_cached("DELETE FROM plans WHERE seq = ?1")?
+        .execute([seq])?;
     Ok(())
 }
 

@@ -3,6 +3,7 @@
 use rusqlite::types::{FromSql, Type};
 use rusqlite::{Connection, OptionalExtension, Row, params};
 
+use super::unreadable::{Unreadable, is_the_row_s};
 use crate::job::{Failure, Plan, PlanId, Status};
 
 /// The columns that [`PlanRow::read`] expects, in its order.
@@ -66,6 +67,17 @@ impl PlanRow {
         })
     }
 
+    /// As [`PlanRow::read`], but a row whose content cannot be read does not fail the query.
+    pub(super) fn try_read(row: &Row<'_>) -> rusqlite::Result<Result<Self, Unreadable>> {
+        match Self::read(row) {
+            Err(error) if is_the_row_s(&error) => {
+                let seq = row.get(0)?;
+                Ok(Err(Unreadable { seq, error }))
+            }
+            read => read.map(Ok),
+        }
+    }
+
     /// The row of this plan, including its place in the queue.
     pub(super) fn load(connection: &Connection, id: PlanId) -> rusqlite::Result<Option<Self>> {
         let row = connection
@@ -77,13 +89,15 @@ impl PlanRow {
 
     /// The row at the head of the queue, at position 1. Without the hint, the database would take the index by status
     /// and sort the whole queue.
-    pub(super) fn head(connection: &Connection) -> rusqlite::Result<Option<Self>> {
+    pub(super) fn head(
+        connection: &Connection,
+    ) -> rusqlite::Result<Option<Result<Self, Unreadable>>> {
         connection
             .prepare_cached(&format!(
                 "SELECT {COLUMNS} FROM plans INDEXED BY plans_queue WHERE status = 'queued' \
                  ORDER BY seq LIMIT 1"
             ))?
-            .query_row([], Self::read)
+            .query_row([], Self::try_read)
             .optional()
     }
 

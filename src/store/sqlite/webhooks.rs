@@ -2,8 +2,9 @@
 
 use rusqlite::{Connection, params};
 
-use super::row::PlanRow;
+use super::row::{COLUMNS, PlanRow};
 use super::transaction::Transaction;
+use super::unreadable::Passed;
 use crate::job::{PlanId, Submission};
 use crate::store::{StoreError, Webhook};
 
@@ -34,12 +35,13 @@ pub(super) fn due(
     connection: &Connection,
     now_ms: i64,
     limit: usize,
+    passed: &Passed,
 ) -> Result<Vec<Webhook>, StoreError> {
     let [each, limit] =
         [limit.div_ceil(2), limit].map(|most| i64::try_from(most).unwrap_or(i64::MAX));
     let mut statement = connection.prepare_cached(
-        "SELECT id, url, tries FROM ( \
-           SELECT id, url, tries, due_ms, row_number() OVER (PARTITION BY owner ORDER BY due_ms) AS turn \
+        "SELECT seq, url, tries FROM ( \
+           SELECT seq, url, tries, due_ms, row_number() OVER (PARTITION BY owner ORDER BY due_ms) AS turn \
            FROM webhooks JOIN plans ON seq = plan_seq WHERE due_ms <= ?1 \
          ) WHERE turn <= ?2 ORDER BY turn, due_ms LIMIT ?3",
     )?;
@@ -48,12 +50,13 @@ pub(super) fn due(
     })?;
     let mut due = Vec::new();
     for row in rows {
-        let (id, url, tries): (String, String, u32) = row?;
-        let id = PlanId::parse_str(&id)
-            .map_err(|error| StoreError::unavailable(format!("plan id {id:?}: {error}")))?;
-        if let Some(row) = PlanRow::load(connection, id)? {
-            let plan = row.plan;
-            due.push(Webhook { plan, url, tries });
+        let (seq, url, tries): (i64, String, u32) = row?;
+        let ended = connection
+            .prepare_cached(&format!("SELECT {COLUMNS} FROM plans WHERE seq = ?1"))?
+            .query_row([seq], PlanRow::try_read)?;
+        match ended {
+            Ok(PlanRow { plan, .. }) => due.push(Webhook { plan, url, tries }),
+            Err(unreadable) => passed.over(&unreadable),
         }
     }
     Ok(due)

@@ -97,13 +97,40 @@ fn counted(instruments: &Arc<Instruments>) -> OnLost {
     })
 }
 
-/// In the settings, 0 means no limit.
+/// In the settings, 0 means no limit. A fraction of a millisecond is a limit.
 fn retention(settings: config::Retention) -> Retention {
     let limit = |setting: u64| (setting > 0).then_some(setting);
-    let age_ms = i64::try_from(settings.age.as_millis()).unwrap_or(i64::MAX);
+    let age_ms = settings.age.as_nanos().div_ceil(1_000_000);
+    let age_ms = i64::try_from(age_ms).unwrap_or(i64::MAX);
     Retention {
         age_ms: (age_ms > 0).then_some(age_ms),
         plans: limit(settings.plans),
         bytes: limit(settings.bytes),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn only_an_age_of_zero_means_for_ever() {
+        for (age, expected_ms) in [
+            (Duration::ZERO, None),
+            (Duration::from_nanos(1), Some(1)),
+            (Duration::from_micros(400), Some(1)),
+            (Duration::from_millis(1), Some(1)),
+            (Duration::from_micros(1_400), Some(2)),
+            (Duration::from_secs(604_800), Some(604_800_000)),
+            (Duration::MAX, Some(i64::MAX)),
+        ] {
+            let settings = config::Retention {
+                age,
+                ..config::Retention::default()
+            };
+            assert_eq!(retention(settings).age_ms, expected_ms, "{age:?}");
+        }
     }
 }

@@ -9,7 +9,7 @@ mod polygon;
 
 pub use cylinder::Cylinder;
 pub use polygon::Polygon;
-pub(crate) use polygon::Zone;
+pub(crate) use polygon::{HAIR, Zone};
 
 use crate::geometry::{Point2, Point3, Rect, Segment};
 

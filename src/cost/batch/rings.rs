@@ -11,7 +11,7 @@ use crate::cost::threat::sampled_exposure;
 use crate::geometry::lane::{Lane, Mask};
 use crate::geometry::{LEVEL, Point2, Rect, ring};
 use crate::scenario::Quadrature;
-use crate::threat::{Polygon, Zone};
+use crate::threat::{HAIR, Polygon, Zone};
 
 /// A ring between two heights.
 #[derive(Debug, Clone)]
@@ -153,7 +153,7 @@ impl<S: Simd> View<S> {
         let Linear { at_start, gain } = self.along;
         let (enters, leaves) = (-at_start / gain, (leg.splat(zone.length) - at_start) / gain);
         let level = gain.abs().lt(leg.splat(LEVEL));
-        let beside = zero.le(at_start) & at_start.le(leg.splat(zone.length));
+        let beside = leg.splat(-HAIR).le(at_start) & at_start.le(leg.splat(zone.length + HAIR));
         let from = level.select(beside.select(zero, one), enters.min(leaves));
         let to = level.select(beside.select(one, zero), enters.max(leaves));
         let (from, to) = (window.t0.max(from), window.t1.min(to));
@@ -220,13 +220,15 @@ impl<S: Simd> Linear<S> {
         [self.at_start.min(at_end), self.at_start.max(at_end)]
     }
 
-    /// Between which `t` of the leg it is above 0; none where the first is not the lesser.
+    /// Between which `t` of the leg it is above 0, a hair above where it stays the same; none where the first is not the
+    /// lesser.
     #[inline(always)]
     fn positive(&self) -> [Lane<S>; 2] {
         let (zero, one) = (self.gain.with(0.0), self.gain.with(1.0));
-        let (rises, falls) = (zero.lt(self.gain), self.gain.lt(zero));
+        let level = self.gain.with(LEVEL);
+        let (rises, falls) = (level.le(self.gain), self.gain.le(-level));
         let at = -self.at_start / self.gain;
-        let always = zero.le(self.at_start);
+        let always = self.gain.with(HAIR).lt(self.at_start);
         [
             rises.select(at, falls.select(zero, always.select(zero, one))),
             falls.select(at, rises.select(one, always.select(one, zero))),

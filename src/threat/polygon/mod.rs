@@ -9,7 +9,7 @@ mod zones;
 
 use super::{Cylinder, hover_exposure, intensity};
 use crate::geometry::{LEVEL, Point2, Rect, Segment, ring};
-pub(crate) use zones::Zone;
+pub(crate) use zones::{HAIR, Zone};
 
 use index::Index;
 use nearest::{Edge, Feature, Kind, Piece, cut};

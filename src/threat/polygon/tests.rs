@@ -22,6 +22,23 @@ fn leg(a: [f64; 3], b: [f64; 3]) -> Segment {
     }
 }
 
+/// The zones of a side and of the corner at its end meet on a line at right angles to it: the next side's, where the ring
+/// has a right angle.
+#[test]
+fn a_leg_in_line_with_a_side_is_exposed_once() {
+    for (a, b) in [
+        ([-20.0, 0.0, 0.0], [-5.0, 0.0, 0.0]),
+        ([30.0, 0.0, 0.0], [15.0, 0.0, 0.0]),
+        ([-5.0, 10.0, 0.0], [-20.0, 10.0, 0.0]),
+        ([0.0, 15.0, 0.0], [0.0, 40.0, 0.0]),
+        ([10.0, -5.0, 0.0], [10.0, -50.0, 0.0]),
+    ] {
+        // The depth goes from 5 m to 0 over 5 m.
+        let exposure = square(10.0).exposure(&leg(a, b), (0.0, 1.0));
+        assert!((exposure - 12.5).abs() < 1e-9, "{exposure} from {a:?}");
+    }
+}
+
 #[test]
 fn clearance_is_exact_and_signed() {
     let check = |a, b, expected: f64| {

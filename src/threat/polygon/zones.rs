@@ -12,8 +12,10 @@ use crate::threat::Cylinder;
 /// Non-convex rings with more vertices than this have no zones.
 const MOST_VERTICES: usize = 256;
 
-/// A point this near to an edge's line, metres, counts as on it: beyond the line is the inside of the ring.
-const HAIR: f64 = 1e-6;
+/// A point this near to an edge's line, metres, counts as on it: beyond the line is the inside of the ring. A leg this
+/// near to the line on which the zones of an edge and of a corner meet, and parallel to it, counts as beside the edge,
+/// and for the edge alone.
+pub(crate) const HAIR: f64 = 1e-6;
 
 /// A part of an edge, usually all of it, and the part of the soft zone to which it is nearest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -219,11 +221,15 @@ impl Polygon {
                 return None;
             }
             // Fractions of the part, from 0 to 1.
-            let beside = clip(along, [0.0, zone.length]);
+            let beside = clip(along, [0.0, zone.length], HAIR);
             exposure += self.beside_edge(outward, beside) * (to - from) * leg.length();
             if let Some(before) = zone.before {
-                let past = clip(seen.map(|end| end.dot(&before)), [0.0, f64::INFINITY]);
-                let ahead = clip(along, [f64::NEG_INFINITY, 0.0]);
+                let past = clip(
+                    seen.map(|end| end.dot(&before)),
+                    [0.0, f64::INFINITY],
+                    -HAIR,
+                );
+                let ahead = clip(along, [f64::NEG_INFINITY, 0.0], -HAIR);
                 let (enters, leaves) = (past[0].max(ahead[0]), past[1].min(ahead[1]));
                 if enters < leaves {
                     let corner = Cylinder {
@@ -249,12 +255,12 @@ impl Polygon {
     }
 }
 
-/// The fractions, 0 to 1, between which a value going linearly from `start` to `end` lies within `[low, high]`; an
-/// empty range if the first is not less than the second.
-fn clip([start, end]: [f64; 2], [low, high]: [f64; 2]) -> [f64; 2] {
+/// The fractions, 0 to 1, between which a value going linearly from `start` to `end` lies within `[low, high]`, widened
+/// by `hair` for a value that stays the same; an empty range if the first is not less than the second.
+fn clip([start, end]: [f64; 2], [low, high]: [f64; 2], hair: f64) -> [f64; 2] {
     let gain = end - start;
     if gain.abs() < LEVEL {
-        return if start >= low && start <= high {
+        return if start >= low - hair && start <= high + hair {
             [0.0, 1.0]
         } else {
             [1.0, 0.0]

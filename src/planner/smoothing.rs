@@ -8,8 +8,8 @@
 
 use super::Path;
 use crate::cost::{Breach, Constraint, Model, Tolerance};
-use crate::geometry::Point3;
 use crate::geometry::bspline::BSpline;
+use crate::geometry::{LEVEL, Point3};
 use crate::scenario::Quadrature;
 
 /// How tightly a corner is drawn: 0 is the bare waypoint, [`SHARP`] the repeated one.
@@ -74,8 +74,12 @@ pub(super) fn smooth(model: &Model, route: &[Point3]) -> Option<Path> {
         {
             // Legs shorter than the sample spacing turn too.
             let corners = corners_alone(route, spacing);
-            let points: Vec<Point3> = corners.iter().map(|sample| sample.point).collect();
-            return keeps_limits(model, &points).then(|| deliver(model, spline, &corners));
+            if keeps(model, &corners) {
+                return Some(deliver(model, spline, &corners));
+            }
+            // What rounding makes of samples between must not cost a route its path.
+            let bare = corners_alone(route, f64::INFINITY);
+            return keeps(model, &bare).then(|| deliver(model, spline, &bare));
         }
     }
 }
@@ -176,15 +180,26 @@ fn corners_alone(route: &[Point3], spacing: f64) -> Vec<Sample> {
     let mut samples = vec![at(route[0])];
     for ends in route.windows(2) {
         let way = ends[1] - ends[0];
+        let is_level = way.z.abs() < LEVEL;
         let parts = (way.norm() / spacing).ceil();
         let mut part = 1.0;
         while part < parts {
-            samples.push(at(ends[0] + way * (part / parts)));
+            let mut point = ends[0] + way * (part / parts);
+            if is_level {
+                // A leg just below a threat's base must not be rounded up to it.
+                point.z = ends[0].z.min(ends[1].z);
+            }
+            samples.push(at(point));
             part += 1.0;
         }
         samples.push(at(ends[1]));
     }
     samples
+}
+
+fn keeps(model: &Model, samples: &[Sample]) -> bool {
+    let points: Vec<Point3> = samples.iter().map(|sample| sample.point).collect();
+    keeps_limits(model, &points)
 }
 
 /// Whether `points` break none of the constraints that apply to a path.
@@ -392,6 +407,35 @@ mod tests {
         route.push(scenario.target);
         let path = smooth(&Model::new(&scenario), &route).expect("the polyline is clear");
         assert_eq!(path.points[path.points.len() - 1], scenario.target);
+    }
+
+    /// As near below a threat as numbers allow, from an end at its base: samples between must not be rounded up to it.
+    #[test]
+    fn a_route_just_below_a_threat_has_a_path() {
+        let mut scenario = scenario();
+        scenario.threats.truncate(1);
+        scenario.threats[0].base = Some(100.0);
+        (scenario.start, scenario.target) = (
+            Point3::new(200.0, 250.0, 100.0),
+            Point3::new(500.0, 250.0, 100.0),
+        );
+        let below = 100.0_f64.next_down();
+        let model = Model::new(&scenario);
+        for free in [
+            vec![[250.0, 250.0, below]],
+            vec![[450.0, 250.0, below]],
+            vec![[250.0, 250.0, below], [450.0, 250.0, below]],
+        ] {
+            let route = [&[scenario.start], &points(&free)[..], &[scenario.target]].concat();
+            assert!(keeps_limits(&model, &route));
+            let path = smooth(&model, &route).expect("the route itself can be flown");
+            assert!(keeps_limits(&model, &path.points));
+            let apart = path
+                .points
+                .windows(2)
+                .map(|ends| (ends[1] - ends[0]).norm());
+            assert!(apart.fold(0.0, f64::max) <= scenario.planner.smoothing.spacing + 1e-9);
+        }
     }
 
     #[test]

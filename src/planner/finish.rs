@@ -46,7 +46,7 @@ const FINE_STEPS: Steps = Steps {
     ..LAST_STEPS
 };
 
-/// Polish the best route, as the last point of the curve, unless it is already good enough; the polish may make it so.
+/// Polish the best route, which the last point of the curve shows, unless it is already good enough; the polish may make it so.
 /// One of the `others` that lead elsewhere may become better, and so may one of those `beyond` limits.
 pub(super) fn finish(
     model: &Model,
@@ -70,7 +70,7 @@ pub(super) fn finish(
             bring_home(model, &[], log);
         }
         bring_within(model, beyond, log);
-        log.last_point();
+        log.is_polished = true;
     }
     if reason == StopReason::Iterations && log.has_converged() {
         return StopReason::Converged;

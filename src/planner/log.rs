@@ -19,6 +19,8 @@ pub(super) struct Log<'o> {
     reported: Option<Vec<Point3>>,
     /// Routes priced so far.
     pub(super) evaluations: u64,
+    /// Whether something came after the last iteration, which its last point shows.
+    pub(super) is_polished: bool,
     /// Proven lower bound of a route's cost. Known only where the search makes use of it.
     pub(super) lower: Option<f64>,
 }
@@ -38,6 +40,7 @@ impl<'o> Log<'o> {
             best: Fitness::WORST,
             reported: None,
             evaluations: 0,
+            is_polished: false,
             lower: None,
         }
     }
@@ -83,29 +86,26 @@ impl<'o> Log<'o> {
         self.record(iteration, mean_cost, feasible / count);
     }
 
-    /// One more point for the last iteration: for what came after it.
+    /// One more point for the last iteration, if something came after it: the curve ends with what is delivered.
     pub(super) fn last_point(&mut self) {
-        let Some(&last) = self.convergence.last() else {
-            return;
-        };
-        self.record(last.iteration, last.mean_cost, last.feasible_fraction);
+        if let Some(&last) = self.convergence.last()
+            && self.is_polished
+        {
+            self.record(last.iteration, last.mean_cost, last.feasible_fraction);
+        }
+    }
+
+    /// Tell the observer of a better route between two points of the curve.
+    pub(super) fn tell(&mut self) {
+        let iteration = self.convergence.last().map_or(0, |last| last.iteration);
+        let elapsed_ms = self.stop.elapsed_ms();
+        self.show(iteration, elapsed_ms);
     }
 
     fn record(&mut self, iteration: usize, mean_cost: f64, feasible_fraction: f64) {
         let elapsed_ms = self.stop.elapsed_ms();
         let best = self.best;
-        let last = self.reported.as_ref();
-        if last != Some(&self.route) {
-            self.observer.incumbent(&Incumbent {
-                frame: self.model.scenario.frame.clone(),
-                iteration,
-                elapsed_ms,
-                cost: best.cost,
-                feasible: best.is_feasible(),
-                waypoints: self.route.clone(),
-            });
-            self.reported = Some(self.route.clone());
-        }
+        self.show(iteration, elapsed_ms);
         let point = ConvergencePoint {
             iteration,
             evaluations: self.evaluations,
@@ -117,5 +117,21 @@ impl<'o> Log<'o> {
         };
         self.observer.iteration(&point);
         self.convergence.push(point);
+    }
+
+    /// Pass the best route to the observer, unless it knows it.
+    fn show(&mut self, iteration: usize, elapsed_ms: f64) {
+        if self.reported.as_ref() == Some(&self.route) {
+            return;
+        }
+        self.observer.incumbent(&Incumbent {
+            frame: self.model.scenario.frame.clone(),
+            iteration,
+            elapsed_ms,
+            cost: self.best.cost,
+            feasible: self.best.is_feasible(),
+            waypoints: self.route.clone(),
+        });
+        self.reported = Some(self.route.clone());
     }
 }

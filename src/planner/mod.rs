@@ -106,6 +106,13 @@ pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -
 }
 
 fn search(model: &Model, log: &mut Log) -> StopReason {
+    let reason = search_to_the_end(model, log);
+    // Only now: the searches after the last iteration are one point of the curve together.
+    log.last_point();
+    reason
+}
+
+fn search_to_the_end(model: &Model, log: &mut Log) -> StopReason {
     match starts::routes(model, log.stop) {
         None => search::plain(model, log),
         Some(starts) => {

@@ -42,6 +42,8 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     if model.scenario.planner.waypoints > MOST {
         return StopReason::Iterations;
     }
+    // It takes long, and the best so far may be all there is.
+    log.tell();
     for times in TIMES {
         if let Some(reason) = why_stop(model.scenario, log.stop) {
             return reason;
@@ -49,17 +51,12 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
         if let Some(mut route) = roomy(model, times, log) {
             match leave_out(model, &mut route, log) {
                 Ok(fitness) => log.offer(&route, fitness),
-                Err(reason) => {
-                    // What was priced until then counts.
-                    log.last_point();
-                    return reason;
-                }
+                Err(reason) => return reason,
             };
         }
         if log.best.is_feasible() {
             return finish(model, StopReason::Iterations, &[], &[], log);
         }
-        log.last_point();
     }
     StopReason::Iterations
 }

@@ -73,6 +73,23 @@ pub(super) fn disc([x, y, radius, influence]: [f64; 4]) -> Threat {
     }
 }
 
+/// A wall across the whole area.
+fn wall() -> Threat {
+    let corners = [
+        (-100.0, 400.0),
+        (1100.0, 400.0),
+        (1100.0, 450.0),
+        (-100.0, 450.0),
+    ];
+    let ring = corners.map(|(x, y)| Point2::new(x, y)).to_vec();
+    Threat {
+        name: None,
+        shape: Shape::Polygon(crate::threat::Polygon::new(ring, 0.0)),
+        base: None,
+        top: None,
+    }
+}
+
 /// The start of the scenario with three radars, the given free waypoints, and its target.
 pub(super) fn route(free: &[[f64; 3]]) -> Vec<Point3> {
     let scenario = scenario();
@@ -394,16 +411,7 @@ fn many_waypoints_over_hills_are_moved_together() {
 #[test]
 fn an_impossible_scenario_ends_with_its_violations() {
     let mut scenario = scenario();
-    // A wall across the whole area.
-    scenario.threats[1].shape = Shape::Polygon(crate::threat::Polygon::new(
-        vec![
-            Point2::new(-100.0, 400.0),
-            Point2::new(1100.0, 400.0),
-            Point2::new(1100.0, 450.0),
-            Point2::new(-100.0, 450.0),
-        ],
-        0.0,
-    ));
+    scenario.threats[1] = wall();
     let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(u32::MAX));
     assert!(!outcome.feasible && outcome.path.is_none() && outcome.path_checks.is_none());
     assert!(
@@ -418,6 +426,27 @@ fn an_impossible_scenario_ends_with_its_violations() {
     assert_eq!(last.best_cost, None);
     let sum: f64 = amounts.sum();
     assert_eq!(last.best_violation.to_bits(), sum.to_bits());
+}
+
+/// What is tried after the last iteration, however often, is one more point of the curve.
+#[test]
+fn the_curve_of_an_impossible_scenario_repeats_no_iteration_but_the_last() {
+    let mut scenario = scenario();
+    scenario.threats = vec![wall()];
+    scenario.planner.seeding = Seeding::Tangent;
+    scenario.planner.polish = true;
+    (scenario.planner.waypoints, scenario.planner.iterations) = (4, 8);
+    let mut diary = Diary::default();
+    let outcome = plan(&scenario, &mut diary, &Nobody);
+    assert!(!outcome.feasible);
+    let iterations = |points: &[ConvergencePoint]| -> Vec<usize> {
+        points.iter().map(|point| point.iteration).collect()
+    };
+    let expected: Vec<usize> = (0..=8).chain([8]).collect();
+    assert_eq!(iterations(&outcome.convergence), expected);
+    assert_eq!(iterations(&diary.points), expected);
+    let last = outcome.convergence.last().expect("there is a curve");
+    assert_eq!(last.evaluations, outcome.evaluations);
 }
 
 #[test]

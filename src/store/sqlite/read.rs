@@ -154,7 +154,9 @@ pub(super) fn list(
     let mut n_left_out = 0;
     let rows = loop {
         let (rows, left_out) = page(connection, query, query.limit.saturating_add(n_left_out))?;
-        left_out.iter().for_each(|row| passed.over(row));
+        for row in &left_out {
+            passed.over(row);
+        }
         if left_out.len() == n_left_out {
             break rows;
         }

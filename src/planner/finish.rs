@@ -46,8 +46,8 @@ const FINE_STEPS: Steps = Steps {
     ..LAST_STEPS
 };
 
-/// Polish the best route, which the last point of the curve shows, unless it is already good enough; the polish may make it so.
-/// One of the `others` that lead elsewhere may become better, and so may one of those `beyond` limits.
+/// Polish the best route, which the last point of the curve shows, unless it is already good enough; the polish may make
+/// it so. One of the `others` that lead elsewhere may become better, and so may one of those `beyond` limits.
 pub(super) fn finish(
     model: &Model,
     reason: StopReason,

@@ -113,8 +113,13 @@ def fenced(route):
 
 
 def fence_items(route):
-    """One item per circle, one per corner of a polygon."""
-    return sum(len(threat.get("vertices", [None])) for threat in fenced(route))
+    """One item per circle, one per corner of a polygon; where a side crosses 180 degrees, each part has a corner there."""
+    return sum(1 if threat["kind"] == "cylinder" else corners(threat["vertices"]) for threat in fenced(route))
+
+
+def corners(vertices):
+    sides = zip(vertices, vertices[1:] + vertices[:1])
+    return len(vertices) + 2 * sum(abs(a["lon"] - b["lon"]) > 180 for a, b in sides)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,10 @@ use crate::store::StoreError;
 /// How long the servers keep a consumer that is not used.
 const UNASKED: Duration = Duration::from_secs(24 * 60 * 60);
 
+/// How often a lane is asked again that nobody answers for, and the pause before that.
+const MORE_TRIES: usize = 3;
+const PAUSE: Duration = Duration::from_millis(200);
+
 /// Maximum number of redelivered jobs that are sorted.
 const MOST_SORTED: usize = 64;
 
@@ -56,7 +60,19 @@ impl JetStream {
         Ok(Some(next))
     }
 
+    /// After an outage of its server, a lane's stream may be there before what delivers from it: made sure of, that
+    /// answers.
     async fn fetch_any(&self, lane: &Lane) -> Result<Option<Message>, StoreError> {
+        for _ in 0..MORE_TRIES {
+            match self.try_to_fetch(lane).await {
+                Err(error) if is_unanswered(&error) => tokio::time::sleep(PAUSE).await,
+                fetched => return fetched,
+            }
+        }
+        self.try_to_fetch(lane).await
+    }
+
+    async fn try_to_fetch(&self, lane: &Lane) -> Result<Option<Message>, StoreError> {
         let what = || format!("lane {}", lane.name());
         let consumer = self.consumer(lane).await?;
         let asked = async {
@@ -104,6 +120,11 @@ impl JetStream {
     fn consumers(&self) -> MutexGuard<'_, HashMap<Lane, PullConsumer>> {
         self.consumers.lock()
     }
+}
+
+/// Whether the request had no responders, status 503 of NATS.
+fn is_unanswered(error: &StoreError) -> bool {
+    matches!(error, StoreError::Unavailable { detail, .. } if detail.contains(": 503, "))
 }
 
 fn came_again(job: &Message) -> bool {

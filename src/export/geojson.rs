@@ -1,13 +1,10 @@
 //! RFC 7946: path, waypoints and threats as features; heights above the ellipsoid.
 
-pub(super) mod antimeridian;
-
 use geojson::{Feature, FeatureCollection, GeometryValue, JsonObject};
 use serde_json::{Value, json};
 
 use super::chart::{Chart, rounded};
-use super::outline;
-use super::{Delivery, Options};
+use super::{Delivery, Options, antimeridian, outline};
 use crate::geometry::geodesy::LatLon;
 use crate::geometry::{Point2, Point3};
 use crate::threat::{Shape, Threat};

@@ -3,6 +3,7 @@
 //! docs/FORMATS.md describes what each contains, its datums, and what is lost. Deliberately absent: clocks, and
 //! anything that is not in the two stored documents.
 
+mod antimeridian;
 mod chart;
 mod csv;
 mod czml;

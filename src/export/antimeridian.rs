@@ -93,7 +93,7 @@ pub(super) fn ring(corners: &[Place]) -> GeometryValue {
 }
 
 /// The parts of such a ring, each without repeated first corner.
-pub(in crate::export) fn parts(corners: &[Place]) -> Vec<Vec<Position>> {
+pub(super) fn parts(corners: &[Place]) -> Vec<Vec<Position>> {
     let (mut corners, way) = unrolled(corners);
     if way.abs() > 0.0 {
         corners = over_a_pole(&corners, way);

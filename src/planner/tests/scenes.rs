@@ -1,0 +1,143 @@
+//! Scenarios and routes that the planner's tests start from.
+
+use crate::geometry::{Point2, Point3, Rect};
+use crate::scenario::{AltitudeBand, Frame, PlannerSettings, Scenario, Seeding, Vehicle, Weights};
+use crate::terrain::{Flat, Peak, Peaks, Terrain};
+use crate::threat::{Cylinder, Shape, Threat};
+
+/// Mountains, each given as centre x and y, height, width and depth.
+pub(in crate::planner) fn peaks(base: f64, peaks: &[[f64; 5]]) -> Terrain {
+    let peak = |&[x, y, height, wide, deep]: &[f64; 5]| Peak {
+        center: Point2::new(x, y),
+        height,
+        spread: Point2::new(wide, deep),
+    };
+    let peaks = peaks.iter().map(peak).collect();
+    Terrain::Peaks(Peaks { base, peaks })
+}
+
+/// The same scenario among hills, with a band of 30 to 150 m above ground.
+pub(in crate::planner) fn hilly_scenario() -> Scenario {
+    let mut scenario = scenario();
+    let round = |x, y, height, spread| [x, y, height, spread, 0.8 * spread];
+    let hills = [
+        round(420.0, 360.0, 180.0, 90.0),
+        round(600.0, 500.0, 240.0, 110.0),
+        round(300.0, 600.0, 150.0, 70.0),
+        round(520.0, 690.0, -60.0, 60.0),
+    ];
+    scenario.terrain = peaks(-20.0, &hills);
+    scenario.altitude = AltitudeBand {
+        min: 30.0,
+        max: 150.0,
+    };
+    scenario
+}
+
+/// From the top of a mountain that is too steep to fly straight down to the plain, or up.
+pub(in crate::planner) fn mountain(height: f64, is_down: bool) -> Scenario {
+    let mut scenario = scenario();
+    scenario.threats.clear();
+    scenario.terrain = peaks(0.0, &[[300.0, 500.0, height, 150.0, 150.0]]);
+    scenario.altitude = AltitudeBand {
+        min: 30.0,
+        max: 120.0,
+    };
+    scenario.vehicle.max_climb_deg = 20.0;
+    scenario.planner.waypoints = 16;
+    scenario.planner.seeding = Seeding::Tangent;
+    scenario.planner.polish = true;
+    let on_ground = |x, y| Point3::new(x, y, scenario.terrain.elevation(Point2::new(x, y)));
+    let ends = [on_ground(300.0, 500.0), on_ground(900.0, 600.0)];
+    [scenario.start, scenario.target] = if is_down { ends } else { [ends[1], ends[0]] };
+    scenario
+}
+
+/// A disc with a soft zone of 30 m.
+pub(in crate::planner) fn radar(x: f64, y: f64, radius: f64) -> Threat {
+    disc([x, y, radius, radius + 30.0])
+}
+
+/// A disc given as centre x and y, radius and influence.
+pub(in crate::planner) fn disc([x, y, radius, influence]: [f64; 4]) -> Threat {
+    Threat {
+        name: Some(format!("radar at {x}, {y}")),
+        shape: Shape::Cylinder(Cylinder {
+            center: Point2::new(x, y),
+            radius,
+            influence,
+        }),
+        base: None,
+        top: None,
+    }
+}
+
+/// A wall across the whole area.
+pub(super) fn wall() -> Threat {
+    let corners = [
+        (-100.0, 400.0),
+        (1100.0, 400.0),
+        (1100.0, 450.0),
+        (-100.0, 450.0),
+    ];
+    let ring = corners.map(|(x, y)| Point2::new(x, y)).to_vec();
+    Threat {
+        name: None,
+        shape: Shape::Polygon(crate::threat::Polygon::new(ring, 0.0)),
+        base: None,
+        top: None,
+    }
+}
+
+/// The start of the scenario with three radars, the given free waypoints, and its target.
+pub(in crate::planner) fn route(free: &[[f64; 3]]) -> Vec<Point3> {
+    let scenario = scenario();
+    let free = free.iter().map(|&point| Point3::from(point));
+    std::iter::once(scenario.start)
+        .chain(free)
+        .chain([scenario.target])
+        .collect()
+}
+
+/// Three radars on flat ground, as in the first scenario of the paper.
+pub(in crate::planner) fn scenario() -> Scenario {
+    Scenario {
+        frame: Frame::Local,
+        name: None,
+        start: Point3::new(200.0, 100.0, 0.0),
+        target: Point3::new(800.0, 800.0, 150.0),
+        area: Rect {
+            min: Point2::new(0.0, 0.0),
+            max: Point2::new(1000.0, 1000.0),
+        },
+        threats: vec![
+            radar(350.0, 250.0, 60.0),
+            radar(500.0, 480.0, 70.0),
+            radar(680.0, 620.0, 60.0),
+        ],
+        terrain: Terrain::Flat(Flat { elevation: 0.0 }),
+        altitude: AltitudeBand {
+            min: 0.0,
+            max: 200.0,
+        },
+        vehicle: Vehicle {
+            max_turn_deg: 60.0,
+            max_climb_deg: 45.0,
+            min_leg: 8.4,
+            cruise_speed: 15.0,
+            fuel_per_km: 1000.0,
+        },
+        weights: Weights {
+            fuel: 0.5,
+            threat: 1.0,
+            altitude: 1.0,
+        },
+        planner: PlannerSettings {
+            waypoints: 10,
+            population: 60,
+            iterations: 60,
+            seed: 7,
+            ..PlannerSettings::plain()
+        },
+    }
+}

@@ -6,7 +6,7 @@ use std::ffi::OsStr;
 use std::path::Path;
 use std::sync::Arc;
 
-use noctule::job::{Event, Status, Submission};
+use noctule::job::{Event, PlanId, Status, Submission};
 use noctule::store::sqlite::{SqliteStore, upkeep};
 use noctule::store::{ListQuery, Options, Retention, Store, StoreError};
 use tempfile::TempDir;
@@ -341,6 +341,23 @@ async fn a_backup_may_have_any_file_name() {
     assert_eq!(restored.get(id).await.unwrap().status, Status::Queued);
 }
 
+/// Execute each statement on a file that is in use; each changes one row.
+fn damage(data_dir: &Path, statements: &[&str]) {
+    let database = rusqlite::Connection::open(data_dir.join("noctule.db")).unwrap();
+    for damage in statements {
+        assert_eq!(database.execute(damage, []).unwrap(), 1, "{damage}");
+    }
+}
+
+/// So many plans, in the order in which they were accepted.
+async fn accepted(store: &SqliteStore, count: usize) -> Vec<PlanId> {
+    let mut ids = Vec::new();
+    for _ in 0..count {
+        ids.push(store.submit(submission()).await.unwrap().plan.id);
+    }
+    ids
+}
+
 /// Whatever is wrong with the plan at the head of the queue, those behind it are still claimed.
 #[tokio::test(flavor = "multi_thread")]
 async fn an_unreadable_plan_fails_and_does_not_block_the_queue() {
@@ -351,18 +368,15 @@ async fn an_unreadable_plan_fails_and_does_not_block_the_queue() {
         ..options()
     };
     let store = SqliteStore::open(directory.path(), options).unwrap();
-    let mut ids = Vec::new();
-    for _ in 0..4 {
-        ids.push(store.submit(submission()).await.unwrap().plan.id);
-    }
-    let database = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
-    for damage in [
-        "DELETE FROM scenarios WHERE plan_seq = 1",
-        "UPDATE scenarios SET document = CAST(x'ff' AS TEXT) WHERE plan_seq = 2",
-        "UPDATE plans SET id = 'x' WHERE seq = 3",
-    ] {
-        assert_eq!(database.execute(damage, []).unwrap(), 1, "{damage}");
-    }
+    let ids = accepted(&store, 4).await;
+    damage(
+        directory.path(),
+        &[
+            "DELETE FROM scenarios WHERE plan_seq = 1",
+            "UPDATE scenarios SET document = CAST(x'ff' AS TEXT) WHERE plan_seq = 2",
+            "UPDATE plans SET id = 'x' WHERE seq = 3",
+        ],
+    );
 
     assert_eq!(store.claim().await.unwrap().plan.id, ids[3]);
     for id in &ids[..2] {
@@ -376,20 +390,13 @@ async fn an_unreadable_plan_fails_and_does_not_block_the_queue() {
     assert!(ended.try_recv().is_err());
     let stats = store.stats().await.unwrap();
     assert_eq!((stats.queued, stats.running), (0, 1));
+    let database = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
     let status: String = database
         .query_row("SELECT status FROM plans WHERE seq = 3", [], |row| {
             row.get(0)
         })
         .unwrap();
     assert_eq!(status, "failed");
-}
-
-/// Execute each statement on a file that is in use; each changes one row.
-fn damage(data_dir: &Path, statements: &[&str]) {
-    let database = rusqlite::Connection::open(data_dir.join("noctule.db")).unwrap();
-    for damage in statements {
-        assert_eq!(database.execute(damage, []).unwrap(), 1, "{damage}");
-    }
 }
 
 async fn run_next(store: &SqliteStore) {
@@ -403,10 +410,7 @@ async fn run_next(store: &SqliteStore) {
 async fn an_unreadable_plan_is_left_out_of_lists() {
     let directory = TempDir::new().unwrap();
     let store = SqliteStore::open(directory.path(), options()).unwrap();
-    let mut ids = Vec::new();
-    for _ in 0..6 {
-        ids.push(store.submit(submission()).await.unwrap().plan.id);
-    }
+    let ids = accepted(&store, 6).await;
     damage(
         directory.path(),
         &[
@@ -434,10 +438,7 @@ async fn an_unreadable_plan_is_left_out_of_lists() {
 async fn an_unreadable_running_plan_is_set_aside_at_the_next_start() {
     let directory = TempDir::new().unwrap();
     let store = SqliteStore::open(directory.path(), options()).unwrap();
-    let mut ids = Vec::new();
-    for _ in 0..3 {
-        ids.push(store.submit(submission()).await.unwrap().plan.id);
-    }
+    let ids = accepted(&store, 3).await;
     for _ in 0..2 {
         store.claim().await.unwrap();
     }

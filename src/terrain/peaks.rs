@@ -130,7 +130,13 @@ impl Peaks {
             } else {
                 -(p * u + q * v) / sharpness
             };
-            let offset = p * p + q * q - sharpness * summit * summit;
+            // At the summit, without cancellation.
+            let across = p * v - q * u;
+            let offset = if flat {
+                p * p + q * q
+            } else {
+                across * across / sharpness
+            };
             let off_leg = summit - summit.clamp(0.0, 1.0);
             (offset + sharpness * off_leg * off_leg < NEGLIGIBLE).then(|| Bump {
                 height: peak.height * libm::exp(-offset),
@@ -327,6 +333,28 @@ mod tests {
                 check(spread, height, [5.0, 5.0, 100.0], [5.0, 5.0 + 1e-10, 100.0]);
             }
         }
+    }
+
+    /// The summit is 2 m beside a leg of 1000 km.
+    #[test]
+    fn a_needle_beside_a_long_leg_keeps_its_height() {
+        let needle = Peak {
+            center: Point2::new(0.0, 0.0),
+            height: 2000.0,
+            spread: Point2::new(1.0, 1.0),
+        };
+        let peaks = Peaks {
+            base: 0.0,
+            peaks: vec![needle],
+        };
+        let at = |along: f64| Point3::new(0.6 * along - 1.6, 0.8 * along + 1.2, 100.0);
+        let leg = Segment {
+            a: at(-3e5),
+            b: at(7e5),
+        };
+        let range = peaks.height_range(&leg, (0.0, 1.0));
+        let expected = 100.0 - 2000.0 * libm::exp(-4.0);
+        assert!((range.min - expected).abs() < 1e-7, "{range:?} {expected}");
     }
 
     proptest! {

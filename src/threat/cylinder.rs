@@ -45,14 +45,18 @@ impl Cylinder {
 
     /// Whether any point of `leg`, at any height, lies within the soft zone.
     pub(super) fn may_reach(&self, leg: &Segment) -> bool {
-        let distance = leg.squared_distance_to(self.center);
-        let nearest = (-0.5 * distance.b / distance.a).clamp(0.0, 1.0);
-        let nearest = if nearest.is_nan() { 0.0 } else { nearest };
-        distance.at(nearest) <= self.influence * self.influence
+        let nearest = self.nearest(leg, (0.0, 1.0));
+        (nearest - self.center).norm() <= self.influence
     }
 
     /// Least distance of the part `window` of `leg` from the circle, metres, negative inside.
     pub(super) fn clearance(&self, leg: &Segment, window: (f64, f64)) -> f64 {
+        self.distance(self.nearest(leg, window))
+    }
+
+    /// The point of the part `window` of `leg` that is nearest to the axis. Its distance keeps its digits on legs of
+    /// any length, which the squared distance as a function of `t` does not.
+    fn nearest(&self, leg: &Segment, window: (f64, f64)) -> Point2 {
         let direction = leg.b.xy() - leg.a.xy();
         let squared = direction.norm_squared();
         let t = if squared < LEVEL * LEVEL {
@@ -60,7 +64,7 @@ impl Cylinder {
         } else {
             ((self.center - leg.a.xy()).dot(&direction) / squared).clamp(window.0, window.1)
         };
-        self.distance(leg.at(t).xy())
+        leg.at(t).xy()
     }
 
     /// Integral of `T` over the part `window` of `leg`, Eq. 4-5, in closed form.
@@ -187,6 +191,23 @@ mod tests {
         check([-10.0, 7.0, 0.0], [10.0, 7.0, 0.0], 2.0);
         check([-10.0, 1.0, 0.0], [10.0, 1.0, 0.0], -4.0);
         check([8.0, 6.0, 0.0], [20.0, 6.0, 0.0], 5.0);
+    }
+
+    /// Through a disc of 5 mm in the middle of 1000 km.
+    #[test]
+    fn a_tiny_disc_is_met_on_a_long_leg() {
+        let tiny = disc(123_456.7, 234_567.8, 0.005, 0.005);
+        let half = [400_000.3, -300_000.1];
+        let end = |sign: f64| {
+            [
+                tiny.center.x + sign * half[0],
+                tiny.center.y + sign * half[1],
+                0.0,
+            ]
+        };
+        let leg = leg(end(-1.0), end(1.0));
+        assert!(tiny.may_reach(&leg));
+        assert!(tiny.clearance(&leg, (0.0, 1.0)) < -0.0049);
     }
 
     #[test]

@@ -59,7 +59,7 @@ fn heights() -> impl Strategy<Value = String> {
 }
 
 fn cylinder() -> impl Strategy<Value = String> {
-    (100.0..900.0f64, 100.0..900.0f64, 2.0..130.0f64, prop_oneof![Just(0.0), 0.0..90.0f64], heights()).prop_map(
+    (0.0..1000.0f64, 0.0..1000.0f64, 2.0..130.0f64, prop_oneof![Just(0.0), 0.0..90.0f64], heights()).prop_map(
         |(x, y, radius, margin, heights)| {
             format!(
                 r#"{{"kind": "cylinder", "center": {{"x": {x}, "y": {y}}}, "radius": {radius}, "influence": {}{heights}}}"#,
@@ -73,8 +73,8 @@ fn cylinder() -> impl Strategy<Value = String> {
 fn polygon() -> impl Strategy<Value = String> {
     let corner = (0.1..1.0f64, 15.0..160.0f64);
     (
-        150.0..850.0f64,
-        150.0..850.0f64,
+        0.0..1000.0f64,
+        0.0..1000.0f64,
         prop::collection::vec(corner, 3..9),
         prop_oneof![Just(0.0), 0.0..90.0f64],
         heights(),

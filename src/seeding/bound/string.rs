@@ -151,7 +151,7 @@ pub(super) fn slack(walls: &[Wall], radii: &[Option<f64>], prices: &Prices) -> f
         .iter()
         .zip(radii)
         .filter(|(_, radius)| radius.is_some());
-    let length: f64 = kept.map(|(wall, _)| wall.slack(prices.tolerance)).sum();
+    let length: f64 = kept.map(|(wall, _)| wall.slack()).sum();
     // A way round a corner instead of across it may lie in every soft zone.
     let dearest: f64 = walls.iter().map(|wall| wall.influence).sum();
     length * (1.0 + prices.exposure * dearest / prices.fuel)

@@ -10,6 +10,7 @@ use tokio::time::Instant;
 use tracing::field::display;
 
 use super::connect::plan_of;
+use super::errors::lacks_consumers;
 use super::lane::{Lane, Version};
 use super::leases::Job;
 use super::orphans::Orphan;
@@ -106,6 +107,7 @@ impl JetStream {
     async fn next_job(&self) -> Result<Option<Message>, StoreError> {
         // A lane whose only jobs are held, by a claimer that was lost, must not keep the turn from the others.
         let mut passed = Vec::new();
+        let mut unserved = None;
         let mut tries = 0;
         while tries < LANES {
             let Some(lane) = self.next_lane(&passed) else {
@@ -116,7 +118,7 @@ impl JetStream {
                 continue;
             };
             tries += 1;
-            if let Some(job) = self.fetch(&lane).await? {
+            if let Some(job) = self.fetch_if_served(&lane, &mut unserved).await? {
                 // The next slot need not ask for it again.
                 if let Some(id) = plan_of(&job.subject) {
                     self.view.known().expect_run(id);
@@ -129,12 +131,28 @@ impl JetStream {
         if self.is_patrol_due() {
             let lanes = self.view.known().running_lanes(Version::own());
             for lane in lanes {
-                if let Some(job) = self.fetch(&lane).await? {
+                if let Some(job) = self.fetch_if_served(&lane, &mut unserved).await? {
                     return Ok(Some(job));
                 }
             }
         }
-        Ok(None)
+        unserved.map_or(Ok(None), Err)
+    }
+
+    /// As [`JetStream::fetch`], but where the servers allow the lane no consumer, others may have theirs: the error is
+    /// `unserved`.
+    async fn fetch_if_served(
+        &self,
+        lane: &Lane,
+        unserved: &mut Option<StoreError>,
+    ) -> Result<Option<Message>, StoreError> {
+        match self.fetch(lane).await {
+            Err(error) if lacks_consumers(&error) => {
+                *unserved = Some(error);
+                Ok(None)
+            }
+            fetched => fetched,
+        }
     }
 
     /// The lane whose turn it is, of those that are not `passed` over.

@@ -1,17 +1,17 @@
-//! The connection, and the streams and buckets on the servers, created where missing.
+//! The connection, and what the store keeps on the servers.
 
-use std::collections::HashMap;
 use std::time::Duration;
 
 use async_nats::connection::State as Connection;
 use async_nats::jetstream::object_store::ObjectStore;
-use async_nats::jetstream::stream::{Config, DiscardPolicy, RetentionPolicy, StorageType, Stream};
-use async_nats::jetstream::{self, Context, kv, object_store};
+use async_nats::jetstream::stream::{Config, DiscardPolicy, RetentionPolicy, Stream};
+use async_nats::jetstream::{self, Context, kv};
 use async_nats::{Client, ConnectErrorKind, ConnectOptions, Event};
 
 use super::election::{Election, outlast};
 use super::errors::{failed, failed_by, passes};
 use super::lane::Version;
+use super::maker::{Maker, maker};
 use super::settings::Settings;
 use crate::job::PlanId;
 use crate::store::{IDEMPOTENCY_MS, Options, StoreError, Trouble};
@@ -200,136 +200,6 @@ fn jobs(options: &Options) -> Config {
         discard: DiscardPolicy::New,
         max_messages: limit.saturating_add(RUNNING),
         ..Config::default()
-    }
-}
-
-/// Creates what is missing on the servers.
-pub(super) struct Maker<'a> {
-    context: &'a Context,
-    namespace: &'a str,
-    replicas: usize,
-}
-
-/// For the namespace in the settings.
-pub(super) fn maker<'a>(context: &'a Context, settings: &'a Settings) -> Maker<'a> {
-    Maker {
-        context,
-        namespace: &settings.address.namespace,
-        replicas: settings.replicas,
-    }
-}
-
-impl Maker<'_> {
-    pub(super) fn name(&self, what: &str) -> String {
-        format!("{}-{what}", self.namespace)
-    }
-
-    /// Create a stream, or bring an existing one to the wanted configuration; never to fewer replicas.
-    async fn stream(&self, wanted: Config) -> Result<Stream, StoreError> {
-        let name = self.name(&wanted.name);
-        let what = || format!("stream {name}");
-        let mut config = Config {
-            subjects: vec![format!("{}.{}.>", self.namespace, wanted.name)],
-            name: name.clone(),
-            storage: StorageType::File,
-            num_replicas: self.replicas,
-            metadata: HashMap::new(),
-            ..wanted
-        };
-        let mut stream = self
-            .context
-            .get_or_create_stream(config.clone())
-            .await
-            .map_err(|error| failed(&what(), &error))?;
-        let info = stream
-            .info()
-            .await
-            .map_err(|error| failed(&what(), &error))?;
-        let there = &info.config;
-        if there.num_replicas > self.replicas {
-            tracing::warn!(
-                stream = name,
-                replicas = there.num_replicas,
-                "more replicas than asked for"
-            );
-            config.num_replicas = there.num_replicas;
-        }
-        let differs = there.num_replicas != config.num_replicas
-            || there.max_messages != config.max_messages
-            || there.max_messages_per_subject != config.max_messages_per_subject
-            || there.retention != config.retention
-            || there.discard != config.discard;
-        if differs {
-            self.context
-                .update_stream(config)
-                .await
-                .map_err(|error| failed(&what(), &error))?;
-        }
-        Ok(stream)
-    }
-
-    pub(super) async fn bucket(
-        &self,
-        what: &str,
-        max_age: Duration,
-    ) -> Result<kv::Store, StoreError> {
-        let config = kv::Config {
-            bucket: self.name(what),
-            history: 1,
-            max_age,
-            num_replicas: self.replicas,
-            ..kv::Config::default()
-        };
-        if let Ok(there) = self.context.get_key_value(&config.bucket).await {
-            self.raise(&there.stream.cached_info().config).await?;
-            return Ok(there);
-        }
-        let what = format!("bucket {}", config.bucket);
-        self.context
-            .create_key_value(config)
-            .await
-            .map_err(|error| failed(&what, &error))
-    }
-
-    pub(super) async fn objects(&self, what: &str) -> Result<ObjectStore, StoreError> {
-        let config = object_store::Config {
-            bucket: self.name(what),
-            num_replicas: self.replicas,
-            ..object_store::Config::default()
-        };
-        let what = format!("object store {}", config.bucket);
-        if let Ok(there) = self.context.get_object_store(&config.bucket).await {
-            let beneath = self.beneath(&config.bucket).await?;
-            self.raise(&beneath.cached_info().config).await?;
-            return Ok(there);
-        }
-        self.context
-            .create_object_store(config)
-            .await
-            .map_err(|error| failed(&what, &error))
-    }
-
-    /// The stream underlying an object store.
-    pub(super) async fn beneath(&self, bucket: &str) -> Result<Stream, StoreError> {
-        let stream = format!("OBJ_{bucket}");
-        let found = self.context.get_stream(&stream).await;
-        found.map_err(|error| failed(&format!("stream {stream}"), &error))
-    }
-
-    /// Bring the stream underlying a bucket to the wanted number of replicas; never to fewer.
-    async fn raise(&self, there: &Config) -> Result<(), StoreError> {
-        if there.num_replicas >= self.replicas {
-            return Ok(());
-        }
-        let raised = Config {
-            num_replicas: self.replicas,
-            ..there.clone()
-        };
-        self.context
-            .update_stream(raised)
-            .await
-            .map(drop)
-            .map_err(|error| failed(&format!("stream {}", there.name), &error))
     }
 }
 

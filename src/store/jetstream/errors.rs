@@ -69,6 +69,11 @@ pub(super) fn lacks_room(error: &StoreError) -> bool {
     )
 }
 
+/// Whether the servers allow the stream no further consumer.
+pub(super) fn lacks_consumers(error: &StoreError) -> bool {
+    matches!(error, StoreError::Unavailable { detail, .. } if detail.contains("maximum consumers"))
+}
+
 /// Whether a stream is no longer on the servers.
 pub(super) fn is_vanished(error: &StoreError) -> bool {
     matches!(

@@ -14,8 +14,8 @@ use super::errors::{failed, refused};
 use super::lane::Lane;
 use crate::store::StoreError;
 
-/// How long the servers keep a consumer that is not used.
-const UNASKED: Duration = Duration::from_secs(24 * 60 * 60);
+/// How long the servers keep a consumer that is not used. (That of a lane with running plans is asked every second.)
+const UNASKED: Duration = Duration::from_secs(60 * 60);
 
 /// How often a lane is asked again that nobody answers for, and the pause before that.
 const MORE_TRIES: usize = 3;

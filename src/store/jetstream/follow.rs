@@ -5,7 +5,9 @@ use std::time::Duration;
 
 use async_nats::jetstream::Message;
 use async_nats::jetstream::consumer::{DeliverPolicy, push};
+use async_nats::jetstream::stream::Stream;
 use futures_util::StreamExt as _;
+use tokio::runtime::Handle;
 use tokio::sync::watch;
 use tokio::time::timeout;
 
@@ -17,14 +19,17 @@ use super::record::{Placed, State, Step};
 use crate::job::PlanId;
 use crate::store::StoreError;
 
+/// While what was there at the start is being read, progress is reported once in so many steps.
+const SAID_EVERY: u64 = 1_000;
+
 /// Pause between attempts to resume.
 const PAUSE: Duration = Duration::from_millis(250);
 
 /// How far the reading has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Reading {
-    /// What was there at the start is still being read.
-    Catching,
+    /// What was there at the start is still being read; so far up to this sequence, roughly.
+    Catching { read: u64 },
     /// Every new step is known at once.
     Current,
     /// Reading was interrupted and is being resumed.
@@ -74,11 +79,11 @@ impl JetStream {
             }
         };
         let all = format!("{}.plans.*", self.servers.namespace);
-        let (is_empty, mut messages) = self.read_steps(what, all, begin).await?;
-        if is_empty {
+        let mut steps = self.read_steps(what, all, begin).await?;
+        if steps.are_none {
             reading.send_replace(Reading::Current);
         }
-        while let Some(message) = messages.next().await {
+        while let Some(message) = steps.messages.next().await {
             let message = message.map_err(|error| refused(what, &error))?;
             let (sequence, pending) = {
                 let info = message.info().map_err(|error| refused(what, &*error))?;
@@ -86,6 +91,15 @@ impl JetStream {
             };
             self.take_in(&message, sequence);
             *read = sequence.max(*read);
+            if pending % SAID_EVERY == 0 {
+                reading.send_if_modified(|reading| {
+                    let is_catching = matches!(reading, Reading::Catching { .. });
+                    if is_catching {
+                        *reading = Reading::Catching { read: sequence };
+                    }
+                    is_catching
+                });
+            }
             if pending == 0 {
                 reading.send_if_modified(|reading| {
                     let news = *reading != Reading::Current;
@@ -117,13 +131,13 @@ impl JetStream {
         }
     }
 
-    /// The steps of a subject from a sequence number on, as they come, and whether there are none so far.
+    /// The steps of a subject from a sequence number on, as they come.
     async fn read_steps(
         &self,
         what: &str,
         filter_subject: String,
         deliver_policy: DeliverPolicy,
-    ) -> Result<(bool, push::Ordered), StoreError> {
+    ) -> Result<Steps, StoreError> {
         let config = push::OrderedConfig {
             deliver_subject: self.servers.client.new_inbox(),
             filter_subject,
@@ -138,9 +152,14 @@ impl JetStream {
             .map_err(|error| failed(what, &error))?;
         // Nothing is delivered before somebody listens. (The delivered count does not tell: for a consumer that starts
         // at a sequence number it is the number before.)
-        let is_empty = info.num_pending == 0;
+        let (are_none, name) = (info.num_pending == 0, info.name.clone());
         let messages = consumer.messages().await;
-        Ok((is_empty, messages.map_err(|error| failed(what, &error))?))
+        Ok(Steps {
+            are_none,
+            messages: messages.map_err(|error| failed(what, &error))?,
+            consumer: name,
+            stream: self.servers.plans.clone(),
+        })
     }
 
     /// All events of a plan that the stream still keeps.
@@ -148,13 +167,13 @@ impl JetStream {
         let what = format!("events of plan {id}");
         let subject = self.servers.subject_of(id);
         let mut history = History::whole();
-        let (is_empty, mut messages) = self.read_steps(&what, subject, DeliverPolicy::All).await?;
-        if is_empty {
+        let mut steps = self.read_steps(&what, subject, DeliverPolicy::All).await?;
+        if steps.are_none {
             return Ok(history);
         }
         loop {
             // Steps that are removed just now never come.
-            let Ok(next) = timeout(PATIENCE, messages.next()).await else {
+            let Ok(next) = timeout(PATIENCE, steps.messages.next()).await else {
                 let standing = self.plans().look_up(id).await?;
                 standing.record(id, (self.options.clock)())?;
                 return Err(refused(&what, "none came for a while"));
@@ -174,5 +193,29 @@ impl JetStream {
             }
         }
         Ok(history)
+    }
+}
+
+/// Steps of a subject, as they come.
+struct Steps {
+    /// Whether there were none at the beginning.
+    are_none: bool,
+    messages: push::Ordered,
+    /// What delivers them.
+    consumer: String,
+    stream: Stream,
+}
+
+impl Drop for Steps {
+    /// The servers would keep the consumer for half a minute, and allow only so many.
+    fn drop(&mut self) {
+        let (stream, consumer) = (self.stream.clone(), std::mem::take(&mut self.consumer));
+        if let Ok(runtime) = Handle::try_current() {
+            runtime.spawn(async move {
+                if let Err(error) = stream.delete_consumer(&consumer).await {
+                    tracing::debug!(%error, "a consumer is left to the servers");
+                }
+            });
+        }
     }
 }

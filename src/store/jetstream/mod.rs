@@ -18,9 +18,11 @@ mod known;
 mod lane;
 mod leases;
 mod lost_jobs;
+mod maker;
 mod nodes;
 mod objects;
 mod orphans;
+mod recalling;
 mod record;
 mod removal;
 mod run_steps;
@@ -54,10 +56,12 @@ pub use shelf::JetStreamShelf;
 
 use self::connect::Servers;
 use self::follow::Reading;
+use self::history::History;
 use self::lane::Lane;
 use self::leases::Leases;
 use self::lost_jobs::Round;
 use self::orphans::Orphans;
+use self::recalling::Recalling;
 use self::record::Document;
 use self::steps::Plans;
 use self::strays::Strays;
@@ -69,7 +73,7 @@ use super::{
 use crate::export::document::Incumbent;
 use crate::job::{Event, Idempotency, Owner, Plan, PlanId, Submission};
 
-/// At the start, existing data must be read within this time.
+/// At the start, existing data must go on being read within this time.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// How long a node whose streams have vanished tries to give back what it runs.
@@ -101,6 +105,7 @@ struct JetStream {
     /// The search for missing jobs.
     round: Mutex<Round>,
     strays: Mutex<Strays>,
+    recalling: Recalling,
     all_slots: AtomicUsize,
     /// Plans whose webhooks this node is sending.
     telling: Mutex<BTreeSet<PlanId>>,
@@ -123,6 +128,16 @@ impl JetStream {
         let standing = self.plans().standing(id).await?;
         let record = standing.record(id, (self.options.clock)())?;
         Ok(self.view.known().shown(record))
+    }
+
+    /// A history that is not in memory; it is from now on, as far as there is room.
+    async fn recall(&self, id: PlanId) -> Result<Arc<History>, StoreError> {
+        let read = async {
+            let history = self.read_history(id).await?;
+            self.view.known().keep_history(id, history.clone());
+            Ok(history)
+        };
+        Box::pin(self.recalling.recall(id, read)).await
     }
 
     /// A document that a plan's record names.
@@ -159,12 +174,13 @@ impl JetStreamStore {
             orphans: Orphans::default(),
             round: Mutex::default(),
             strays: Mutex::default(),
+            recalling: Recalling::default(),
             telling: Mutex::default(),
             end: watch::Sender::new(false),
             vanished: watch::Sender::new(false),
         });
         store.servers.outlast(|| store.announce()).await?;
-        let (read, mut reading) = watch::channel(Reading::Catching);
+        let (read, mut reading) = watch::channel(Reading::Catching { read: 0 });
         let opened = Self {
             tasks: vec![
                 tokio::spawn(store.clone().follow(read)),
@@ -173,10 +189,9 @@ impl JetStreamStore {
             store,
             reading: reading.clone(),
         };
-        let current = reading.wait_for(|reading| *reading == Reading::Current);
-        match tokio::time::timeout(PATIENCE, current).await {
-            Ok(Ok(_)) => {}
-            _ => {
+        while *reading.borrow_and_update() != Reading::Current {
+            let moved = tokio::time::timeout(PATIENCE, reading.changed()).await;
+            if !matches!(moved, Ok(Ok(()))) {
                 return Err(StoreError::unavailable(
                     "the plans on the servers cannot be read",
                 ));
@@ -289,10 +304,7 @@ impl Store for JetStreamStore {
         if let Some(history) = store.view.known().histories.whole(id) {
             return Ok(history.incumbent(record.attempt));
         }
-        let history = store.read_history(id).await?;
-        let incumbent = history.incumbent(record.attempt);
-        store.view.known().keep_history(id, history);
-        Ok(incumbent)
+        Ok(store.recall(id).await?.incumbent(record.attempt))
     }
 
     async fn list(&self, query: ListQuery) -> Result<Vec<Plan>, StoreError> {
@@ -306,10 +318,7 @@ impl Store for JetStreamStore {
         if let Some(page) = store.view.known().histories.page(id, after, limit) {
             return Ok(page);
         }
-        let history = store.read_history(id).await?;
-        let page = history.page(after, limit);
-        store.view.known().keep_history(id, history);
-        Ok(page)
+        Ok(store.recall(id).await?.page(after, limit))
     }
 
     async fn has_event(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {

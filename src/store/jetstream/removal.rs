@@ -1,5 +1,7 @@
 //! Plans that are removed, and what remains of them.
 
+use futures_util::{StreamExt as _, stream};
+
 use super::JetStream;
 use super::connect::plan_of;
 use super::errors::{failed, lacks_room};
@@ -8,6 +10,9 @@ use super::steps::Change;
 use super::view::Standing;
 use crate::job::PlanId;
 use crate::store::{SWEEP, StoreError};
+
+/// Number of expired plans that are removed at the same time.
+const AT_ONCE: usize = 16;
 
 impl JetStream {
     pub(super) async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
@@ -157,8 +162,10 @@ impl JetStream {
         going.sort_by_key(|id| id.as_u128() ^ self.node.as_u128());
         let mut round = Round::default();
         let mut refused = None;
-        for id in going {
-            match self.bury(id, now_ms, true).await {
+        let buried = going.into_iter().map(|id| self.bury(id, now_ms, true));
+        let mut buried = stream::iter(buried).buffer_unordered(AT_ONCE);
+        while let Some(buried) = buried.next().await {
+            match buried {
                 Ok(()) => round.removed += 1,
                 Err(StoreError::Gone(_) | StoreError::NotFound(_)) => round.outrun += 1,
                 // This one freed too little; with the next one it may be enough.

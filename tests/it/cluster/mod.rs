@@ -1,6 +1,7 @@
 //! Failures with several servers and several processes.
 
 mod chaos;
+mod consumers;
 mod credentials;
 mod large;
 mod nodes;

@@ -79,6 +79,12 @@ impl NatsServer {
         Self::started("max_file_store: 16GB, sync_interval: always", &users)
     }
 
+    /// A single server with more lines in its configuration: some for `JetStream`, and the `rest`.
+    pub(crate) fn with(jetstream: &str, rest: &str) -> Self {
+        let storage = format!("max_file_store: 16GB, sync_interval: always, {jetstream}");
+        Self::started(&storage, rest)
+    }
+
     fn started(storage: &str, rest: &str) -> Self {
         let mut server = Self::new(rest, storage);
         server.restart();

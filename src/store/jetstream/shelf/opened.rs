@@ -23,9 +23,10 @@ use uuid::Uuid;
 use super::Failure;
 use crate::catalogue::{Change, Changes, Source};
 use crate::store::StoreError;
-use crate::store::jetstream::connect::{Maker, Servers, connect, maker};
+use crate::store::jetstream::connect::{Servers, connect};
 use crate::store::jetstream::election::outlast;
 use crate::store::jetstream::errors::{failed, is_outrun, passes};
+use crate::store::jetstream::maker::{Maker, maker};
 use crate::store::jetstream::settings::Settings;
 
 /// If no part of a file arrives for this long, the servers are considered away.
@@ -54,7 +55,7 @@ impl Opened {
         let client = connect(settings).await?;
         let context = Servers::context(&client);
         let make = maker(&context, settings);
-        outlast(passes, async || Self::made(&client, &make).await).await
+        outlast(passes, async || Box::pin(Self::made(&client, &make)).await).await
     }
 
     async fn made(client: &Client, make: &Maker<'_>) -> Result<Self, StoreError> {

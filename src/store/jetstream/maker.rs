@@ -1,0 +1,174 @@
+//! The streams and buckets on the servers, created where missing and brought to the wanted configuration.
+
+use std::collections::HashMap;
+use std::time::Duration;
+
+use async_nats::jetstream::object_store::ObjectStore;
+use async_nats::jetstream::stream::{Config, StorageType, Stream};
+use async_nats::jetstream::{Context, kv, object_store};
+
+use super::errors::failed;
+use super::lane::Version;
+use super::settings::Settings;
+use crate::store::StoreError;
+
+/// From this version on, servers allow a stream a thousand consumers unless it says how many.
+const LIMITING_SERVER: &str = "2.15.0";
+
+/// How many consumers each stream may have: there is one for every owner and size of plans, and readers that break off
+/// leave theirs behind for a while.
+const MOST_CONSUMERS: i32 = 100_000;
+
+/// Creates what is missing on the servers.
+pub(super) struct Maker<'a> {
+    pub(super) context: &'a Context,
+    pub(super) namespace: &'a str,
+    replicas: usize,
+}
+
+/// For the namespace in the settings.
+pub(super) fn maker<'a>(context: &'a Context, settings: &'a Settings) -> Maker<'a> {
+    Maker {
+        context,
+        namespace: &settings.address.namespace,
+        replicas: settings.replicas,
+    }
+}
+
+impl Maker<'_> {
+    pub(super) fn name(&self, what: &str) -> String {
+        format!("{}-{what}", self.namespace)
+    }
+
+    /// Create a stream, or bring an existing one to the wanted configuration; never to fewer replicas.
+    pub(super) async fn stream(&self, wanted: Config) -> Result<Stream, StoreError> {
+        let name = self.name(&wanted.name);
+        let what = || format!("stream {name}");
+        let mut config = Config {
+            subjects: vec![format!("{}.{}.>", self.namespace, wanted.name)],
+            name: name.clone(),
+            storage: StorageType::File,
+            num_replicas: self.replicas,
+            metadata: HashMap::new(),
+            ..wanted
+        };
+        let mut stream = self
+            .context
+            .get_or_create_stream(config.clone())
+            .await
+            .map_err(|error| failed(&what(), &error))?;
+        let info = stream
+            .info()
+            .await
+            .map_err(|error| failed(&what(), &error))?;
+        let there = &info.config;
+        if there.num_replicas > self.replicas {
+            tracing::warn!(
+                stream = name,
+                replicas = there.num_replicas,
+                "more replicas than asked for"
+            );
+            config.num_replicas = there.num_replicas;
+        }
+        config.max_consumers = there.max_consumers;
+        let differs = there.num_replicas != config.num_replicas
+            || there.max_messages != config.max_messages
+            || there.max_messages_per_subject != config.max_messages_per_subject
+            || there.retention != config.retention
+            || there.discard != config.discard;
+        if differs {
+            self.context
+                .update_stream(config.clone())
+                .await
+                .map_err(|error| failed(&what(), &error))?;
+        }
+        self.admit(&config).await;
+        Ok(stream)
+    }
+
+    pub(super) async fn bucket(
+        &self,
+        what: &str,
+        max_age: Duration,
+    ) -> Result<kv::Store, StoreError> {
+        let config = kv::Config {
+            bucket: self.name(what),
+            history: 1,
+            max_age,
+            num_replicas: self.replicas,
+            ..kv::Config::default()
+        };
+        let what = format!("bucket {}", config.bucket);
+        let there = match self.context.get_key_value(&config.bucket).await {
+            Ok(there) => there,
+            Err(_) => self
+                .context
+                .create_key_value(config)
+                .await
+                .map_err(|error| failed(&what, &error))?,
+        };
+        self.suit(&there.stream).await?;
+        Ok(there)
+    }
+
+    pub(super) async fn objects(&self, what: &str) -> Result<ObjectStore, StoreError> {
+        let config = object_store::Config {
+            bucket: self.name(what),
+            num_replicas: self.replicas,
+            ..object_store::Config::default()
+        };
+        let what = format!("object store {}", config.bucket);
+        let bucket = config.bucket.clone();
+        let there = match self.context.get_object_store(&bucket).await {
+            Ok(there) => there,
+            Err(_) => self
+                .context
+                .create_object_store(config)
+                .await
+                .map_err(|error| failed(&what, &error))?,
+        };
+        self.suit(&self.beneath(&bucket).await?).await?;
+        Ok(there)
+    }
+
+    /// The stream underlying an object store.
+    pub(super) async fn beneath(&self, bucket: &str) -> Result<Stream, StoreError> {
+        let stream = format!("OBJ_{bucket}");
+        let found = self.context.get_stream(&stream).await;
+        found.map_err(|error| failed(&format!("stream {stream}"), &error))
+    }
+
+    /// Bring the stream underlying a bucket to the wanted number of replicas; never to fewer.
+    async fn suit(&self, beneath: &Stream) -> Result<(), StoreError> {
+        let there = &beneath.cached_info().config;
+        let config = Config {
+            num_replicas: there.num_replicas.max(self.replicas),
+            ..there.clone()
+        };
+        if config.num_replicas > there.num_replicas {
+            self.context
+                .update_stream(config.clone())
+                .await
+                .map_err(|error| failed(&format!("stream {}", there.name), &error))?;
+        }
+        self.admit(&config).await;
+        Ok(())
+    }
+
+    /// Let a stream have more consumers than the servers' default. An account may allow fewer; the store does with
+    /// these.
+    async fn admit(&self, there: &Config) {
+        let limiting = Version::read(LIMITING_SERVER).expect("it is one");
+        let version = Version::read(&self.context.client().server_info().version);
+        if there.max_consumers > 0 || version.is_none_or(|version| version < limiting) {
+            return;
+        }
+        let admitting = Config {
+            max_consumers: MOST_CONSUMERS,
+            ..there.clone()
+        };
+        if let Err(error) = self.context.update_stream(admitting).await {
+            tracing::warn!(%error, stream = there.name, "no more consumers than the servers' default");
+        }
+    }
+}

@@ -74,6 +74,8 @@ pub enum Trouble {
     ReadOnly,
     /// The file's content is not what was written.
     Damaged,
+    /// Another file, or none, is where the open one was.
+    Moved,
     /// The file was written by a newer version of the program.
     Newer,
     /// What it keeps on the servers is no longer there.

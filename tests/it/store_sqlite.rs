@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use noctule::job::{Event, PlanId, Status, Submission};
 use noctule::store::sqlite::{SqliteStore, upkeep};
-use noctule::store::{ListQuery, Options, Retention, Store, StoreError};
+use noctule::store::{ListQuery, Options, Retention, Store, StoreError, Trouble};
 use tempfile::TempDir;
 
 use crate::support::plans::{ending, history, point, submission};
@@ -339,6 +339,58 @@ async fn a_backup_may_have_any_file_name() {
     std::fs::rename(copy, copies.path().join("noctule.db")).unwrap();
     let restored = SqliteStore::open(copies.path(), options()).unwrap();
     assert_eq!(restored.get(id).await.unwrap().status, Status::Queued);
+}
+
+/// Nothing is thrown away, and nobody takes the half of another's for a backup.
+#[tokio::test]
+async fn two_backups_to_one_file_do_not_mix() {
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    accepted(&store, 1).await;
+    let copies = TempDir::new().unwrap();
+    let [copy, part] = ["copy", "copy.part"].map(|name| copies.path().join(name));
+    // One that was killed has left something.
+    std::fs::write(&part, "half").unwrap();
+    let other = std::fs::File::open(&part).unwrap();
+    other.lock().unwrap();
+    let refused = upkeep::backup(directory.path(), &copy).unwrap_err();
+    assert!(refused.to_string().contains("another backup"), "{refused}");
+    assert_eq!(std::fs::read(&part).unwrap(), b"half");
+    other.unlock().unwrap();
+    upkeep::backup(directory.path(), &copy).unwrap();
+    assert!(copy.exists() && !part.exists());
+}
+
+#[tokio::test]
+async fn nothing_is_accepted_into_a_file_that_was_moved() {
+    let directory = TempDir::new().unwrap();
+    let [file, elsewhere] = ["noctule.db", "moved.db"].map(|name| directory.path().join(name));
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let first = accepted(&store, 1).await[0];
+    store.get(first).await.unwrap();
+    std::fs::rename(&file, &elsewhere).unwrap();
+    for another in [false, true] {
+        if another {
+            std::fs::write(&file, "").unwrap();
+        }
+        for refused in [
+            store.submit(submission()).await.map(drop),
+            store.health().await,
+        ] {
+            let moved = matches!(
+                refused,
+                Err(StoreError::Unavailable {
+                    trouble: Trouble::Moved,
+                    ..
+                })
+            );
+            assert!(moved, "{refused:?}");
+        }
+        assert_eq!(store.get(first).await.unwrap().status, Status::Queued);
+    }
+    std::fs::rename(&elsewhere, &file).unwrap();
+    store.health().await.unwrap();
+    accepted(&store, 1).await;
 }
 
 /// Execute each statement on a file that is in use; each changes one row.

@@ -67,6 +67,48 @@ async fn a_full_disk_refuses_plans_and_loses_none() {
     all_end(&service, &accepted).await;
 }
 
+/// A plan that was being run cannot be given back before there is room, and nothing waits for that which is only read.
+#[tokio::test]
+async fn results_can_be_read_after_a_restart_on_a_full_disk() {
+    let directory = TempDir::new().unwrap();
+    let data_dir = directory.path().join("restarted");
+    let disk = Service::start_on_a_small_disk(directory.path(), "size=6m");
+    let service = disk.start_beside(&data_dir);
+    let finished = service.submit(&scenario()).await;
+    service.ended(&finished).await;
+    let result = service.bytes(&format!("{finished}/result")).await;
+    let mut long = scenario();
+    long["planner"]["iterations"] = 10_000.into();
+    long["planner"]["population"] = 1_000.into();
+    let long = service.submit(&long).await;
+    let is_running = async |service: &Service| {
+        let status: Value = service
+            .get(&long)
+            .send()
+            .await
+            .unwrap()
+            .json()
+            .await
+            .unwrap();
+        status["status"] == "running"
+    };
+    eventually(async || is_running(&service).await).await;
+    let ballast = disk.seen(&directory.path().join("ballast"));
+    fill(&ballast);
+    service.kill();
+
+    let service = disk.start_beside(&data_dir);
+    let detail = service.until_ready(503).await;
+    assert!(detail.contains("disk of the store is full"), "{detail}");
+    assert_eq!(service.bytes(&format!("{finished}/result")).await, result);
+    service.bytes("/plans").await;
+    assert_eq!(service.post(&scenario()).await.status(), 503);
+
+    std::fs::remove_file(&ballast).unwrap();
+    service.until_ready(200).await;
+    eventually(async || is_running(&service).await).await;
+}
+
 #[tokio::test]
 async fn a_read_only_directory_is_reported_and_retried() {
     let directory = TempDir::new().unwrap();

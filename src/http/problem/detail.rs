@@ -170,6 +170,7 @@ impl Problem {
                     Some(Trouble::Full) => "the disk of the store is full",
                     Some(Trouble::ReadOnly) => "the data directory cannot be written",
                     Some(Trouble::Damaged) => "the store's file is damaged",
+                    Some(Trouble::Moved) => "the store's file was moved or replaced",
                     Some(Trouble::Newer) => "the store was written by a newer version",
                     Some(Trouble::Vanished) => {
                         "what the store keeps on the NATS servers is missing there"

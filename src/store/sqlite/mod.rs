@@ -32,7 +32,7 @@ use rusqlite::{Connection, ErrorCode};
 use tokio::sync::watch;
 
 use self::claims::When;
-use self::opening::{create_directory, lock, open_database, sync_directory};
+use self::opening::{Place, create_directory, lock, open_database, sync_directory};
 use self::read::Readers;
 use self::records::Records;
 use self::unreadable::Passed;
@@ -120,15 +120,16 @@ impl SqliteStore {
         let changes = Arc::new(Changes::default());
         let records = Arc::new(Records::default());
         let clock = Arc::clone(&options.clock);
+        let place = Arc::new(Place::of(file)?);
         Ok(Self {
             writer: Writer::start(
-                connection,
+                (connection, Arc::clone(&place)),
                 lock,
                 options,
                 Arc::clone(&changes),
                 Arc::clone(&records),
             )?,
-            readers: Readers::new(file),
+            readers: Readers::new(place),
             changes,
             records,
             passed: Arc::default(),

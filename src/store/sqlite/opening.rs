@@ -1,7 +1,8 @@
 //! The files in the data directory: created, locked, opened, and made to survive a power failure.
 
 use std::fs::{DirBuilder, File, TryLockError};
-use std::path::Path;
+use std::os::unix::fs::MetadataExt as _;
+use std::path::{Path, PathBuf};
 
 use rusqlite::Connection;
 
@@ -61,6 +62,39 @@ pub(super) fn sync_directory(data_dir: &Path) -> Result<(), StoreError> {
     #[cfg(not(unix))]
     let _ = data_dir;
     Ok(())
+}
+
+/// Where the open file is: what is written to one that was moved or replaced is lost with the process.
+pub(super) struct Place {
+    path: PathBuf,
+    /// Device and number of the file.
+    file: (u64, u64),
+}
+
+impl Place {
+    pub(super) fn of(path: PathBuf) -> Result<Self, StoreError> {
+        let file = identity(&path).map_err(|error| failed(&path.display().to_string(), &error))?;
+        Ok(Self { path, file })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether the file is still there.
+    pub(super) fn check(&self) -> Result<(), StoreError> {
+        if identity(&self.path).is_ok_and(|file| file == self.file) {
+            return Ok(());
+        }
+        Err(StoreError::Unavailable {
+            trouble: Trouble::Moved,
+            detail: format!("{} is another file now, or gone", self.path.display()),
+        })
+    }
+}
+
+fn identity(path: &Path) -> std::io::Result<(u64, u64)> {
+    std::fs::metadata(path).map(|file| (file.dev(), file.ino()))
 }
 
 fn failed(what: &str, error: &std::io::Error) -> StoreError {

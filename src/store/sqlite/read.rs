@@ -1,7 +1,6 @@
 //! Reads from the store, over a few read-only connections beside the writer's.
 
 use std::error::Error;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use parking_lot::Mutex;
@@ -9,6 +8,7 @@ use rusqlite::types::{Value, ValueRef};
 use rusqlite::{Connection, OpenFlags, OptionalExtension, params_from_iter};
 use tokio::sync::Semaphore;
 
+use super::opening::Place;
 use super::packed;
 use super::row::{COLUMNS, PlanRow};
 use super::unreadable::{Passed, Unreadable};
@@ -25,15 +25,15 @@ const RUNS: i64 = 20;
 
 /// The pool of read-only connections.
 pub(super) struct Readers {
-    file: PathBuf,
+    place: Arc<Place>,
     idle: Mutex<Vec<Connection>>,
     permits: Arc<Semaphore>,
 }
 
 impl Readers {
-    pub(super) fn new(file: PathBuf) -> Arc<Self> {
+    pub(super) fn new(place: Arc<Place>) -> Arc<Self> {
         Arc::new(Self {
-            file,
+            place,
             idle: Mutex::default(),
             permits: Arc::new(Semaphore::new(CONNECTIONS as usize)),
         })
@@ -79,7 +79,9 @@ impl Readers {
 
     fn open(&self) -> Result<Connection, StoreError> {
         let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let connection = Connection::open_with_flags(&self.file, flags)?;
+        let connection = Connection::open_with_flags(self.place.path(), flags)?;
+        // What is there may be another file by now.
+        self.place.check()?;
         connection.busy_timeout(BUSY_TIMEOUT)?;
         connection.set_prepared_statement_cache_capacity(32);
         Ok(connection)

@@ -1,6 +1,6 @@
 //! Operator's maintenance of the file: check for damage, and back up.
 
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::path::Path;
 
 use rusqlite::types::{ToSqlOutput, ValueRef};
@@ -126,15 +126,21 @@ fn ends(batch: &str) -> bool {
 pub fn backup(data_dir: &Path, to: &Path) -> Result<(), StoreError> {
     let unusable =
         |error: std::io::Error| StoreError::unavailable(format!("{}: {error}", to.display()));
+    let exists = || StoreError::unavailable(format!("{} exists", to.display()));
     if to.exists() {
-        return Err(StoreError::unavailable(format!("{} exists", to.display())));
+        return Err(exists());
     }
     let connection = open(data_dir)?;
     // Written under another name until complete, so that nobody takes half of it for a backup.
     let mut name = to.file_name().unwrap_or_default().to_owned();
     name.push(".part");
     let part = to.with_file_name(name);
-    let _ = std::fs::remove_file(&part);
+    let _held = hold(&part).map_err(unusable)?;
+    // Another backup may just have been completed.
+    if to.exists() {
+        let _ = std::fs::remove_file(&part);
+        return Err(exists());
+    }
     // SQLite passes the path to the system unchanged, even when it is not valid UTF-8.
     let path = ToSqlOutput::Borrowed(ValueRef::Text(part.as_os_str().as_encoded_bytes()));
     let written = connection
@@ -145,6 +151,21 @@ pub fn backup(data_dir: &Path, to: &Path) -> Result<(), StoreError> {
         let _ = std::fs::remove_file(&part);
     }
     written
+}
+
+/// An empty file that no other backup is writing at the same time, until this one is dropped. What a backup that was
+/// killed has left is thrown away.
+fn hold(part: &Path) -> std::io::Result<File> {
+    let file = File::options()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(part)?;
+    match file.try_lock() {
+        Ok(()) => file.set_len(0).map(|()| file),
+        Err(TryLockError::WouldBlock) => Err(std::io::Error::other("another backup is writing it")),
+        Err(TryLockError::Error(error)) => Err(error),
+    }
 }
 
 /// Rename a complete file to its final name; file and name are on the disk when this returns.

@@ -14,6 +14,7 @@ use tokio::sync::{oneshot, watch};
 
 use super::claims::{Claimer, Claims, When};
 use super::closed;
+use super::opening::Place;
 use super::records::Records;
 use super::transaction::{Effect, Transaction};
 use super::{operations, removal};
@@ -92,7 +93,7 @@ pub(super) struct Writer {
 impl Writer {
     /// Recover what an earlier process left and start the thread, which holds `lock` until it ends.
     pub(super) fn start(
-        connection: Connection,
+        (connection, place): (Connection, Arc<Place>),
         lock: File,
         options: Options,
         changes: Arc<Changes>,
@@ -101,6 +102,7 @@ impl Writer {
         let (messages, inbox) = channel();
         let mut desk = Desk {
             connection,
+            place,
             options,
             changes,
             records,
@@ -112,8 +114,15 @@ impl Writer {
             void_attempt: 0,
             claims_fail: false,
             found_full: false,
+            recovered: false,
         };
-        desk.recover()?;
+        if let Err(error) = desk.recover() {
+            if !is_full(&error) {
+                return Err(error);
+            }
+            // What can be read can be read meanwhile.
+            tracing::warn!(%error, "what was being run is not given back yet");
+        }
         let thread = std::thread::Builder::new()
             .name("store-writer".to_owned())
             .spawn(move || {
@@ -182,6 +191,7 @@ impl Drop for Writer {
 /// The state of the writing thread.
 struct Desk {
     connection: Connection,
+    place: Arc<Place>,
     options: Options,
     changes: Arc<Changes>,
     records: Arc<Records>,
@@ -200,10 +210,25 @@ struct Desk {
     claims_fail: bool,
     /// The disk was found full, and nothing as large as a plan has been written since.
     found_full: bool,
+    /// What an earlier process left has been recovered, without which nothing else is written.
+    recovered: bool,
+}
+
+fn is_full(error: &StoreError) -> bool {
+    matches!(
+        error,
+        StoreError::Unavailable {
+            trouble: Trouble::Full,
+            ..
+        }
+    )
 }
 
 impl Desk {
     fn recover(&mut self) -> Result<(), StoreError> {
+        if self.recovered {
+            return Ok(());
+        }
         self.queued = self
             .connection
             .query_row(
@@ -222,6 +247,7 @@ impl Desk {
         for plan in &ended {
             (self.options.on_lost)(plan);
         }
+        self.recovered = true;
         Ok(())
     }
 
@@ -264,9 +290,20 @@ impl Desk {
 
     fn serve_batch(&mut self, batch: Vec<Box<dyn Operation>>) {
         self.waiting.retain(|claimer| !claimer.reply.is_closed());
-        if !batch.is_empty() || (self.queued > 0 && !self.waiting.is_empty()) {
-            self.write(batch, true);
+        if batch.is_empty() && (self.queued == 0 || self.waiting.is_empty()) {
+            return;
         }
+        match self.recover() {
+            Ok(()) => self.write(batch, true),
+            Err(error) => self.refuse(batch, error),
+        }
+    }
+
+    fn refuse(&mut self, batch: Vec<Box<dyn Operation>>, error: StoreError) {
+        for claimer in self.waiting.drain(..) {
+            claimer.reply.send(Err(error.clone())).ok();
+        }
+        self.answer(batch, Err(error));
     }
 
     /// Do a batch in one transaction, and the waiting claims too if `claiming`.
@@ -340,9 +377,7 @@ impl Desk {
         work: impl FnOnce(&mut Transaction<'_>, &mut VecDeque<Claimer>) -> T,
     ) -> Result<T, StoreError> {
         let committed = self.try_to_commit(work);
-        if let Err(StoreError::Unavailable { trouble, .. }) = &committed {
-            self.found_full |= *trouble == Trouble::Full;
-        }
+        self.found_full |= committed.as_ref().is_err_and(is_full);
         committed
     }
 
@@ -350,6 +385,7 @@ impl Desk {
         &mut self,
         work: impl FnOnce(&mut Transaction<'_>, &mut VecDeque<Claimer>) -> T,
     ) -> Result<T, StoreError> {
+        self.place.check()?;
         self.connection
             .prepare_cached("BEGIN IMMEDIATE")?
             .execute([])?;

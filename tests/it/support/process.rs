@@ -124,6 +124,14 @@ impl Service {
         Self::start_as(command, LOOPBACK, data_dir, &[], Stdio::null())
     }
 
+    /// On the small disk of another one, which may end meanwhile.
+    pub(crate) fn start_beside(&self, data_dir: &Path) -> Self {
+        let mut command = self.within();
+        command.arg(env!("CARGO_BIN_EXE_noctule"));
+        clean(&mut command);
+        Self::start_as(command, LOOPBACK, data_dir, &[], Stdio::null())
+    }
+
     /// Limited in open files, for example by `ulimit -n 256`.
     pub(crate) fn start_with_few_files(
         ulimit: &str,
@@ -271,14 +279,23 @@ impl Service {
 
     /// Remounts the small disk on `data_dir` with these options.
     pub(crate) fn remount(&self, data_dir: &Path, options: &str) {
-        let done = Command::new("nsenter")
-            .args(["--user", "--mount", "--preserve-credentials", "--target"])
-            .args([&self.child.id().to_string(), "mount", "-o"])
+        let done = self
+            .within()
+            .args(["mount", "-o"])
             .arg(format!("remount,{options}"))
             .arg(data_dir)
             .status()
             .expect("nsenter runs");
         assert!(done.success());
+    }
+
+    /// A command that is run where the process is, on its small disk.
+    fn within(&self) -> Command {
+        let mut command = Command::new("nsenter");
+        command
+            .args(["--user", "--mount", "--preserve-credentials", "--target"])
+            .arg(self.child.id().to_string());
+        command
     }
 
     /// Waits until `/readyz` answers with this status; its detail.

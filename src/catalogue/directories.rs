@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use parking_lot::Mutex;
 
+use super::records::Name;
 use super::shared::Shared;
 use super::uploaded::Uploaded;
 use super::{
@@ -24,7 +25,13 @@ pub(super) trait Uploads: Debug + Send + Sync {
     fn entry(&self, name: &str) -> Result<Entry, CatalogueError>;
     fn stage(&self, limit: u64) -> Result<Staged, CatalogueError>;
     fn permit(&self, naming: &Naming) -> Result<(), CatalogueError>;
-    fn keep(&self, file: &Checked, naming: &Naming, room: u64) -> Result<Kept, CatalogueError>;
+    /// With the record that the name has now.
+    fn keep(
+        &self,
+        file: &Checked,
+        naming: &Naming,
+        room: u64,
+    ) -> Result<(Kept, Name), CatalogueError>;
     fn removable(&self, naming: &Naming) -> Result<String, CatalogueError>;
     fn remove(&self, naming: &Naming) -> Result<(), CatalogueError>;
     fn has_unnamed(&self) -> bool;
@@ -179,9 +186,15 @@ impl Catalogue for Directories {
         self.uploaded()?.permit(naming)
     }
 
-    fn keep(&self, file: Checked, naming: &Naming, room: u64) -> Result<Kept, CatalogueError> {
+    fn keep(
+        &self,
+        file: Checked,
+        naming: &Naming,
+        room: u64,
+    ) -> Result<(Kept, Entry), CatalogueError> {
         self.check_not_mounted(&naming.name)?;
-        self.uploaded()?.keep(&file, naming, room)
+        let (kept, record) = self.uploaded()?.keep(&file, naming, room)?;
+        Ok((kept, record.entry(&naming.name, file)))
     }
 
     fn removable(&self, naming: &Naming) -> Result<String, CatalogueError> {

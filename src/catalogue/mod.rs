@@ -68,12 +68,18 @@ pub trait Catalogue: Datasets {
     fn permit(&self, naming: &Naming) -> Result<(), CatalogueError>;
 
     /// Keep a received file under a name, durably and atomically, where all uploads together need no more than `room`
-    /// bytes with it. Uploads that end at the same moment on several nodes may exceed it.
+    /// bytes with it. Uploads that end at the same moment on several nodes may exceed it. Also returns what is known
+    /// about it, whatever is uploaded under the name right after.
     ///
     /// # Errors
     /// [`CatalogueError::Mounted`], [`CatalogueError::Exists`], [`CatalogueError::Changed`],
     /// [`CatalogueError::Owned`], [`CatalogueError::Full`], [`CatalogueError::Unavailable`].
-    fn keep(&self, file: Checked, naming: &Naming, room: u64) -> Result<Kept, CatalogueError>;
+    fn keep(
+        &self,
+        file: Checked,
+        naming: &Naming,
+        room: u64,
+    ) -> Result<(Kept, Entry), CatalogueError>;
 
     /// The checksum of the content to which a removable name refers.
     ///

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::content::{Checked, Declaration};
-use super::{CatalogueError, Expected, Kept, Naming};
+use super::{CatalogueError, Entry, Expected, Kept, Naming};
 use crate::terrain::dem::Survey;
 
 /// The stored record of a name.
@@ -15,14 +15,6 @@ pub(super) struct Name {
 }
 
 impl Name {
-    pub(super) fn new(file: &Checked, naming: &Naming) -> Self {
-        Self {
-            sha256: file.sha256.clone(),
-            uploaded_ms: naming.now_ms,
-            owner: naming.by.owner.clone(),
-        }
-    }
-
     /// Whether a name that refers to `before` may be assigned to other content or removed.
     pub(super) fn permit(before: Option<&Self>, naming: &Naming) -> Result<(), CatalogueError> {
         let name = naming.name.clone();
@@ -45,12 +37,30 @@ impl Name {
         Ok(())
     }
 
-    /// The result of assigning it to `file`.
-    pub(super) fn kept(before: Option<&Self>, file: &Checked) -> Kept {
+    /// The result of assigning a name that refers to `before` to `file`, and its record then.
+    pub(super) fn assigned(before: Option<&Self>, file: &Checked, naming: &Naming) -> (Kept, Self) {
+        let record = Self {
+            sha256: file.sha256.clone(),
+            uploaded_ms: naming.now_ms,
+            owner: naming.by.owner.clone(),
+        };
         match before {
-            None => Kept::Created,
-            Some(before) if before.sha256 == file.sha256 => Kept::Unchanged,
-            Some(_) => Kept::Replaced,
+            None => (Kept::Created, record),
+            Some(before) if before.sha256 == file.sha256 => (Kept::Unchanged, before.clone()),
+            Some(_) => (Kept::Replaced, record),
+        }
+    }
+
+    /// What is known about the dataset that it refers to.
+    pub(super) fn entry(self, name: &str, file: Checked) -> Entry {
+        Entry {
+            name: name.to_owned(),
+            sha256: Some(self.sha256),
+            bytes: file.staged.bytes(),
+            metadata: file.metadata,
+            survey: Some(file.survey),
+            uploaded_ms: Some(self.uploaded_ms),
+            owner: self.owner,
         }
     }
 

@@ -34,7 +34,8 @@ fn lay(catalogue: &dyn Catalogue, naming: &Naming) -> Result<Kept, CatalogueErro
         return Err(failure.expect("a write that fails says why"));
     }
     let checked = staged.check(None, Declaration::default())?;
-    catalogue.keep(checked, naming, u64::MAX)
+    let (kept, _) = catalogue.keep(checked, naming, u64::MAX)?;
+    Ok(kept)
 }
 
 #[cfg(test)]

@@ -221,27 +221,31 @@ impl Uploads for Uploaded {
         Name::permit(self.lock().names.get(&naming.name), naming)
     }
 
-    fn keep(&self, file: &Checked, naming: &Naming, room: u64) -> Result<Kept, CatalogueError> {
+    fn keep(
+        &self,
+        file: &Checked,
+        naming: &Naming,
+        room: u64,
+    ) -> Result<(Kept, Name), CatalogueError> {
         let name = naming.name.clone();
         let mut state = self.lock();
         let before = state.names.get(&name).cloned();
         Name::permit(before.as_ref(), naming)?;
         self.keep_content(&mut state, file, room)?;
-        let kept = Name::kept(before.as_ref(), file);
+        let (kept, record) = Name::assigned(before.as_ref(), file, naming);
         if kept == Kept::Unchanged {
-            return Ok(kept);
+            return Ok((kept, record));
         }
-        let record = Name::new(file, naming);
         let path = self.name(&name);
         self.write(&path, &record)?;
         state.unread.remove(&path);
-        state.names.insert(name, record);
+        state.names.insert(name, record.clone());
         let now = Instant::now();
         state.asked.insert(file.sha256.clone(), now);
         if let Some(before) = before {
             state.asked.insert(before.sha256, now);
         }
-        Ok(kept)
+        Ok((kept, record))
     }
 
     fn removable(&self, naming: &Naming) -> Result<String, CatalogueError> {

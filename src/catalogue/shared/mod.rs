@@ -171,7 +171,12 @@ impl Uploads for Shared {
         Name::permit(self.view()?.names.get(&naming.name), naming)
     }
 
-    fn keep(&self, file: &Checked, naming: &Naming, room: u64) -> Result<Kept, CatalogueError> {
+    fn keep(
+        &self,
+        file: &Checked,
+        naming: &Naming,
+        room: u64,
+    ) -> Result<(Kept, Name), CatalogueError> {
         // Before sending bytes in vain.
         self.permit(naming)?;
         self.shelve(file, room)?;
@@ -180,12 +185,11 @@ impl Uploads for Shared {
             let view = self.view()?;
             let before = view.names.get(&naming.name);
             Name::permit(before, naming)?;
-            let kept = Name::kept(before, file);
-            let record = Name::new(file, naming);
+            let (kept, record) = Name::assigned(before, file, naming);
             let is_so =
                 kept == Kept::Unchanged || self.write(&key, &record, view.written(&key))?.is_some();
             if is_so {
-                break kept;
+                break (kept, record);
             }
         };
         // A removal of the content that began before it had the name is either complete now or will see the name.

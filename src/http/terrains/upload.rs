@@ -94,16 +94,13 @@ async fn keep(
     let room = state.rules.limits.terrains_bytes;
     let (kept, entry) = state
         .terrains
-        .ask(move |catalogue| {
-            let kept = catalogue.keep(checked, &naming, room)?;
-            Ok((kept, catalogue.entry(&naming.name)?))
-        })
+        .ask(move |catalogue| catalogue.keep(checked, &naming, room))
         .await?;
     tracing::info!(name = entry.name, sha256, ?kept, "a dataset was uploaded");
     Ok((kept, entry))
 }
 
-/// Answers with what the name now refers to.
+/// Answers with what was kept.
 async fn answer(state: &AppState, entry: Entry) -> Result<Response, Problem> {
     let content = entry.sha256.as_deref().map(etag);
     let document = document(state, entry).await?;

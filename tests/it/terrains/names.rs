@@ -112,6 +112,32 @@ async fn a_name_can_be_moved_to_other_content_on_conditions() {
 }
 
 /// The document's tag changes with everything in it; in a conditional change it stands for the content.
+/// Each answer describes the file that came with its request, whatever another request has put under the name since.
+#[tokio::test(flavor = "multi_thread")]
+async fn uploads_at_the_same_time_are_each_answered_for_their_own_file() {
+    let api = Api::new();
+    let mut sums = Vec::new();
+    for height in [100.0, 50.0] {
+        let answer = put(&api, "/terrains/hill", hill(height)).await;
+        sums.push(answer.json()["sha256"].as_str().expect("a sum").to_owned());
+    }
+    for _ in 0..30 {
+        let deleted = async {
+            api.send(Method::DELETE, "/terrains/hill", &[], "").await;
+        };
+        let (high, low, ()) = tokio::join!(
+            put(&api, "/terrains/hill", hill(100.0)),
+            put(&api, "/terrains/hill", hill(50.0)),
+            deleted
+        );
+        for (answer, sum) in [high, low].iter().zip(&sums) {
+            assert!(answer.status.is_success(), "{answer:?}");
+            assert_eq!(answer.json()["sha256"], **sum);
+            assert_eq!(answer.header("etag"), format!("\"{sum}\""));
+        }
+    }
+}
+
 #[tokio::test]
 async fn a_known_dataset_document_is_answered_with_304() {
     let api = Api::new();

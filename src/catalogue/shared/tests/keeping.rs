@@ -21,9 +21,9 @@ fn nodes_share_the_room_for_all_files() {
     assert!(matches!(kept, Err(CatalogueError::Full { room: told }) if told == room));
     assert_eq!(a.shared.tally().datasets, 1);
     let kept = b.shared.keep(&b.checked(100), &naming("other"), room);
-    assert_eq!(kept.expect("the content is there"), Kept::Created);
+    assert_eq!(kept.expect("the content is there").0, Kept::Created);
     let kept = b.shared.keep(&second, &naming("other"), room + 1);
-    assert_eq!(kept.expect("room for both"), Kept::Replaced);
+    assert_eq!(kept.expect("room for both").0, Kept::Replaced);
 }
 
 #[test]

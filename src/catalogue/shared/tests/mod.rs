@@ -64,8 +64,10 @@ impl Node {
     }
 
     pub(super) fn keep(&self, name: &str, height: u32) -> Result<Kept, CatalogueError> {
-        self.shared
-            .keep(&self.checked(height), &naming(name), u64::MAX)
+        let kept = self
+            .shared
+            .keep(&self.checked(height), &naming(name), u64::MAX);
+        kept.map(|(kept, _)| kept)
     }
 
     fn find(&self, name: &str) -> Result<Found, DatasetError> {

@@ -11,7 +11,7 @@ use std::convert::Infallible;
 use std::sync::Arc;
 use tracing::{Instrument as _, Span};
 
-use super::auth::{Access, Digest, Permit};
+use super::auth::{Access, Digest, Permit, Scope};
 use super::caller::Caller;
 use super::feed::{Feed, News};
 use super::params::{self, Id, Params};
@@ -158,7 +158,7 @@ impl Stream {
         let news = tokio::select! {
             news = self.feed.next() => news?,
             // Withdrawing a key ends its streams.
-            () = self.access.withdrawn(self.key) => return None,
+            () = self.access.withdrawn(self.key, Scope::Read) => return None,
         };
         Some(match news {
             News::Events(events) => self.written(events, wire).await,

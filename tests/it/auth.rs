@@ -1,5 +1,7 @@
 //! Authorization: keys, scopes, plan ownership, tickets, rate limits, streams.
 
+use std::time::Duration;
+
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode};
 use http_body_util::BodyExt as _;
@@ -12,7 +14,7 @@ use tower::ServiceExt as _;
 use crate::support::api::{Answer, Api};
 use crate::support::description::DESCRIPTION;
 use crate::support::keys::{bearer, entry, post, send};
-use crate::support::patience::in_time;
+use crate::support::patience::{eventually, in_time};
 use crate::support::{run, scenario};
 
 /// Alice and Bob may plan, Rita may read Alice's plans, Max may read the metrics, Ada may do everything.
@@ -336,6 +338,36 @@ async fn a_long_poll_ends_with_its_key() {
     };
     let (polled, ()) = in_time(async { tokio::join!(polled, withdrawn) }).await;
     polled.expect_problem(401, "unauthorized");
+}
+
+#[tokio::test]
+async fn a_submission_stops_waiting_when_its_key_is_withdrawn() {
+    let api = Api::with_keys(&house());
+    let bearer = bearer("of alice");
+    let headers = [
+        ("authorization", &*bearer),
+        ("content-type", "application/json"),
+        ("prefer", "wait=30"),
+    ];
+    let posted = api.send(Method::POST, "/plans", &headers, scenario().to_string());
+    let withdrawn = async {
+        eventually(async || api.store.stats().await.expect("counted").queued == 1).await;
+        let others = entry("bob", "of bob", "plan", "");
+        api.state.access.replace(Keys::read(&others).expect("keys"));
+        // A request that went on waiting would see the end.
+        tokio::time::sleep(Duration::from_secs(10)).await;
+        run::complete(&*api.store, Vec::new()).await;
+        std::future::pending::<()>().await;
+    };
+    let posted = in_time(async {
+        tokio::select! {
+            posted = posted => posted,
+            () = withdrawn => unreachable!("it goes on"),
+        }
+    });
+    let posted = posted.await;
+    assert_eq!(posted.status, 202, "{posted:?}");
+    assert_eq!(posted.json()["status"], "queued");
 }
 
 /// A page may open its stream on any node, and a restarted node counts as another one.

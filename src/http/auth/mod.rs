@@ -150,22 +150,22 @@ impl Access {
         self.0.streams.open(owner.cloned())
     }
 
-    /// Resolves when the key is withdrawn, expires or may no longer read; never for callers without a key.
-    pub(super) async fn withdrawn(&self, key: Option<Digest>) {
+    /// Resolves when the key is withdrawn, expires or no longer has this scope; never for callers without a key.
+    pub(super) async fn withdrawn(&self, key: Option<Digest>, scope: Scope) {
         match key {
             // Boxed so that streams without a key need no room for this.
-            Some(key) => Box::pin(self.withdrawn_from(key)).await,
+            Some(key) => Box::pin(self.withdrawn_from(key, scope)).await,
             None => std::future::pending().await,
         }
     }
 
-    async fn withdrawn_from(&self, key: Digest) {
+    async fn withdrawn_from(&self, key: Digest, scope: Scope) {
         let mut keys = self.0.keys.subscribe();
         loop {
             let now = Timestamp::now();
             let holds = keys.borrow_and_update().as_ref().is_some_and(|keys| {
                 let key = keys.with_digest(&key);
-                key.is_some_and(|key| !key.has_expired(now) && key.may(Scope::Read))
+                key.is_some_and(|key| !key.has_expired(now) && key.may(scope))
             });
             if !holds {
                 return;

@@ -13,7 +13,7 @@ use tokio::time::Instant;
 pub(super) use list::{MAX_PAGE, list};
 pub(super) use submit::submit;
 
-use super::auth::Unauthorized;
+use super::auth::{Scope, Unauthorized};
 use super::caller::Caller;
 use super::entity_tags::EntityTags;
 use super::params::{Id, NoParams};
@@ -47,7 +47,7 @@ pub(super) async fn show(
         let changed = async {
             tokio::select! {
                 changed = changed => changed,
-                () = state.access.withdrawn(caller.key) => Err(Problem::Unauthorized(Unauthorized::NoKey)),
+                () = state.access.withdrawn(caller.key, Scope::Read) => Err(Problem::Unauthorized(Unauthorized::NoKey)),
             }
         };
         // Few requests wait, so the future is boxed to keep the others' small.

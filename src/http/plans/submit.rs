@@ -10,6 +10,7 @@ use bytes::Bytes;
 use futures_util::future::{BoxFuture, Either};
 
 use super::wait_for;
+use crate::http::auth::Scope;
 use crate::http::body::Announced;
 use crate::http::caller::Caller;
 use crate::http::idempotency::{IDEMPOTENCY_REPLAYED, Once};
@@ -71,7 +72,7 @@ pub(in crate::http) fn submit(
 
         let address = HeaderValue::from_str(&location(plan.id)).expect("an id is visible ASCII");
         let mut answer = match asked.wait {
-            Some(wait) => Box::pin(ended(&state, wait, plan, address)).await,
+            Some(wait) => Box::pin(ended(&state, &caller, wait, plan, address)).await,
             None => accepted(plan, address),
         };
         if replayed {
@@ -189,10 +190,20 @@ async fn refusal(state: &AppState, error: StoreError) -> Problem {
     }
 }
 
-/// The plan's final record, or that it was accepted when the end does not come in time or cannot be read.
-async fn ended(state: &AppState, wait: Wait, plan: Plan, address: HeaderValue) -> Response {
+/// The plan's final record, or that it was accepted when the end does not come in time or cannot be read, or the key is
+/// withdrawn.
+async fn ended(
+    state: &AppState,
+    caller: &Caller,
+    wait: Wait,
+    plan: Plan,
+    address: HeaderValue,
+) -> Response {
     let is_over = |plan: &Plan| plan.status.is_final();
-    let waited = wait_for(state, plan.id, wait.duration(), is_over).await;
+    let waited = tokio::select! {
+        waited = wait_for(state, plan.id, wait.duration(), is_over) => waited.ok(),
+        () = state.access.withdrawn(caller.key, Scope::Plan) => None,
+    };
     // A plan on the disk was accepted, whatever the store reports afterwards.
     let plan = waited.unwrap_or(plan);
     if !is_over(&plan) {

@@ -53,16 +53,6 @@ impl Encounter {
 }
 
 impl Threat {
-    /// Whether `point` is strictly inside the boundary, and between base and top.
-    #[must_use]
-    pub fn contains(&self, point: Point3) -> bool {
-        self.reaches(point.z)
-            && match &self.shape {
-                Shape::Cylinder(cylinder) => cylinder.distance(point.xy()) < 0.0,
-                Shape::Polygon(polygon) => polygon.contains(point.xy()),
-            }
-    }
-
     /// Horizontal distance of `point` from the boundary, metres, negative inside, at any height.
     #[must_use]
     pub fn distance(&self, point: Point2) -> f64 {

@@ -17,6 +17,8 @@ const SUNK_M: f64 = 0.1 + 1e-9;
 const SAME_M: f64 = 1e-6;
 /// Start and target horizontally closer than this give the route no direction, metres.
 const ABOVE_M: f64 = 1e-3;
+/// An end no deeper in a threat touches it, metres: 0.3 - 0.1 is less than 0.2 in floating point.
+const HAIR_M: f64 = 1e-9;
 
 /// Start and target must be apart, also horizontally: the route coding is relative to the line between them.
 pub(super) fn check_apart(start: Point3, target: Point3, faults: &mut Faults) {
@@ -96,7 +98,8 @@ pub(super) fn check_threats(
         .enumerate()
         .filter_map(|(threat_idx, threat)| {
             let threat = threat.as_ref()?;
-            threat.contains(end).then_some((threat_idx, threat))
+            let is_inside = threat.reaches(end.z) && threat.distance(end.xy()) < -HAIR_M;
+            is_inside.then_some((threat_idx, threat))
         });
     let Some((threat_idx, threat)) = around.next() else {
         return;

@@ -232,6 +232,11 @@ fn values_at_the_edge_of_a_fault_are_accepted() {
         // Touching a threat is not being inside it; neither is being at its top.
         (r#""x":100,"y":100,"z":0"#, r#""x":290,"y":250,"z":0"#),
         (r#""x":100,"y":100,"z":0"#, r#""x":350,"y":250,"z":500"#),
+        // Nor is what only rounding puts inside.
+        (
+            r#""x":100,"y":100,"z":0"#,
+            r#""x":290.0000000001,"y":250,"z":0"#,
+        ),
         (r#""x":100,"y":100,"z":0"#, r#""x":550,"y":500,"z":0"#),
         (r#""x":100,"y":100,"z":0"#, r#""x":100,"y":100,"z":-0.1"#),
         // The start may be below or above the band.

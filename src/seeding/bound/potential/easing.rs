@@ -1,8 +1,9 @@
 //! Reduces slopes that are too steep: in the few places where the values left by a march are too steep for a quadratic,
 //! the excess is shared with neighbouring places.
 
-use super::mesh::Mesh;
-use super::slopes::{gradients, response};
+use super::mesh::{Mesh, Triangle};
+use super::slopes::{in_corners, response, with_middles};
+use crate::geometry::Vector2;
 
 /// Maximum number of sweeps when checking whether a mesh is fine enough.
 pub(super) const FEW: usize = 20;
@@ -16,8 +17,9 @@ const ENOUGH: f64 = 1.002;
 /// Share of a Newton step that is taken, because the neighbouring nodes move too.
 const TAKEN: f64 = 0.8;
 
-/// How far beyond good enough a place that is too steep is eased, so that it need not be eased again.
-const BEYOND: f64 = 0.999;
+/// Square of the multiple that a place that is too steep is eased to: a little beyond good enough, so that it need not be
+/// eased again.
+const AIMED: f64 = 0.999 * ENOUGH * ENOUGH;
 
 /// Change `values`, except those of the first `fixed` nodes, so that triangles are no steeper than their `limits`, as
 /// far as possible in this many sweeps: by Newton's method for each node alone, on the squares of the excess.
@@ -27,22 +29,15 @@ pub(super) fn ease(
     values: &mut [f64],
     (fixed, sweeps): (usize, usize),
 ) {
-    // Squares of the allowed slopes.
-    let squares: Vec<[f64; 6]> = limits
-        .iter()
-        .map(|limits| limits.map(|limit| limit * limit * (ENOUGH * ENOUGH)))
+    let triangles = mesh.triangles.iter().zip(limits);
+    let mut slopes: Vec<Slope> = triangles
+        .map(|(triangle, limits)| Slope::of(triangle, limits, values))
         .collect();
-    let is_steep = |triangle: usize, values: &[f64]| {
-        let of = &mesh.triangles[triangle];
-        let gradients = gradients(of, &of.of(values));
-        let mut each = gradients.iter().zip(&squares[triangle]);
-        each.any(|(gradient, allowed)| gradient.norm_squared() > *allowed)
-    };
     let mut asked: Vec<usize> = (0..mesh.triangles.len()).collect();
     // The sweep in which each was last visited.
     let mut met = (vec![0; values.len()], vec![0; mesh.triangles.len()]);
     for sweep in 1..=sweeps {
-        asked.retain(|triangle| is_steep(*triangle, values));
+        asked.retain(|triangle| slopes[*triangle].is_steep());
         if asked.is_empty() {
             return;
         }
@@ -54,8 +49,13 @@ pub(super) fn ease(
             if node < fixed || std::mem::replace(&mut met.0[node], sweep) == sweep {
                 continue;
             }
-            values[node] -= TAKEN * excess(mesh, &squares, values, node);
-            for &(triangle, _) in mesh.round(node) {
+            let change = -TAKEN * excess(mesh, &slopes, node);
+            if change == 0.0 {
+                continue;
+            }
+            values[node] += change;
+            for &(triangle, which) in mesh.round(node) {
+                slopes[triangle].follow(which, change);
                 if std::mem::replace(&mut met.1[triangle], sweep) != sweep {
                     next.push(triangle);
                 }
@@ -66,29 +66,68 @@ pub(super) fn ease(
 }
 
 /// How much too high the value of `node` is for the slopes around it, according to one step of Newton's method.
-fn excess(mesh: &Mesh, squares: &[[f64; 6]], values: &[f64], node: usize) -> f64 {
+fn excess(mesh: &Mesh, slopes: &[Slope], node: usize) -> f64 {
     let (mut slope, mut curvature) = (0.0, 0.0);
     for &(triangle, which) in mesh.round(node) {
-        let of = &mesh.triangles[triangle];
-        let gradients = gradients(of, &of.of(values));
-        let allowed = squares[triangle].map(|square| square * BEYOND);
-        let is_too_steep = |at: usize| gradients[at].norm_squared() > allowed[at];
-        if !(0..6).any(is_too_steep) {
+        let of = &slopes[triangle];
+        let gradients = with_middles(of.corners);
+        let shares = of.shares(&gradients);
+        if !shares.iter().any(|share| *share > 1.0) {
             continue;
         }
-        let response = response(of, which);
-        for at in (0..6).filter(|at| is_too_steep(*at)) {
+        let response = with_middles(response(&of.rates, which));
+        for at in (0..6).filter(|at| shares[*at] > 1.0) {
             // Half the square of c, where c is how much the square of a slope exceeds the allowed one.
-            let too_much = gradients[at].norm_squared() / allowed[at] - 1.0;
-            let change = 2.0 * gradients[at].dot(&response[at]) / allowed[at];
+            let too_much = shares[at] - 1.0;
+            let change = 2.0 * gradients[at].dot(&response[at]) * of.inverses[at];
             slope += too_much * change;
             curvature +=
-                change * change + too_much * 2.0 * response[at].norm_squared() / allowed[at];
+                change * change + too_much * 2.0 * response[at].norm_squared() * of.inverses[at];
         }
     }
     // Neither can be determined for triangles that are too slim.
     let excess = slope / curvature;
     if excess.is_finite() { excess } else { 0.0 }
+}
+
+/// The slopes of a triangle. They follow the values of its nodes, which takes less than to compute them anew for each of
+/// the nodes around.
+struct Slope {
+    /// Gradients in the corners.
+    corners: [Vector2; 3],
+    rates: [Vector2; 3],
+    /// For each node, one over the square of the slope that is aimed at.
+    inverses: [f64; 6],
+}
+
+impl Slope {
+    fn of(triangle: &Triangle, limits: &[f64; 6], values: &[f64]) -> Self {
+        Self {
+            corners: in_corners(triangle, &triangle.of(values)),
+            rates: triangle.rates,
+            inverses: limits.map(|limit| 1.0 / (limit * limit * AIMED)),
+        }
+    }
+
+    /// The squares of its slopes, given its `gradients`, as multiples of what is aimed at.
+    #[inline]
+    fn shares(&self, gradients: &[Vector2; 6]) -> [f64; 6] {
+        std::array::from_fn(|at| gradients[at].norm_squared() * self.inverses[at])
+    }
+
+    fn is_steep(&self) -> bool {
+        let shares = self.shares(&with_middles(self.corners));
+        shares.iter().any(|share| *share > ENOUGH * ENOUGH / AIMED)
+    }
+
+    /// The value of a node has changed by so much.
+    #[inline]
+    fn follow(&mut self, which: usize, change: f64) {
+        let response = response(&self.rates, which);
+        for (corner, response) in self.corners.iter_mut().zip(response) {
+            *corner += response * change;
+        }
+    }
 }
 
 #[cfg(test)]

@@ -6,34 +6,41 @@ use crate::geometry::Vector2;
 /// The gradients in the six nodes of the quadratic that takes `values` there. They are linear in between.
 #[inline]
 pub(super) fn gradients(triangle: &Triangle, values: &[f64; 6]) -> [Vector2; 6] {
+    with_middles(in_corners(triangle, values))
+}
+
+/// The first three of the `gradients`.
+#[inline]
+pub(super) fn in_corners(triangle: &Triangle, values: &[f64; 6]) -> [Vector2; 3] {
     let [a, b, c] = triangle.rates;
     let [p, q, r, pq, qr, rp] = *values;
     let (pq, qr, rp) = (4.0 * pq, 4.0 * qr, 4.0 * rp);
-    with_middles([
+    [
         a * (3.0 * p) + b * (pq - q) + c * (rp - r),
         b * (3.0 * q) + c * (qr - r) + a * (pq - p),
         c * (3.0 * r) + a * (rp - p) + b * (qr - q),
-    ])
+    ]
 }
 
-/// How much a value in the node `which` changes the gradients in all nodes, per unit.
+/// How much a value in the node `which` of a triangle with these `rates` changes the gradients in its corners, per unit.
 #[inline]
-pub(super) fn response(triangle: &Triangle, which: usize) -> [Vector2; 6] {
-    let rates = &triangle.rates;
-    let mut corners = [Vector2::zeros(); 3];
+pub(super) fn response(rates: &[Vector2; 3], which: usize) -> [Vector2; 3] {
     if which < 3 {
-        corners = [-rates[which]; 3];
+        let mut corners = [-rates[which]; 3];
         corners[which] = rates[which] * 3.0;
+        corners
     } else {
         let [one, other] = SIDES[which - 3];
+        let mut corners = [Vector2::zeros(); 3];
         corners[one] = rates[other] * 4.0;
         corners[other] = rates[one] * 4.0;
+        corners
     }
-    with_middles(corners)
 }
 
+/// What is linear in a triangle, in all of its nodes, given it in the corners.
 #[inline]
-fn with_middles([a, b, c]: [Vector2; 3]) -> [Vector2; 6] {
+pub(super) fn with_middles([a, b, c]: [Vector2; 3]) -> [Vector2; 6] {
     [a, b, c, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5]
 }
 
@@ -109,7 +116,8 @@ mod tests {
             let mut more = values;
             more[which] += 1.0;
             let after = gradients(triangle, &more);
-            for (node, response) in response(triangle, which).iter().enumerate() {
+            let response = with_middles(response(&triangle.rates, which));
+            for (node, response) in response.iter().enumerate() {
                 assert!((after[node] - before[node] - response).norm() < 1e-12);
             }
         }

@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 
 use super::draft::{Draft, Place};
 use super::facts::Facts;
-use super::{Conversion, ImportError, Most, xml};
+use super::{Conversion, ImportError, Most, antimeridian, xml};
 
 /// Most XML nodes: elements, texts and comments. The limit on the file's size bounds them too.
 const MOST_NODES: u32 = 2_000_000;
@@ -89,9 +89,26 @@ fn placemark(draft: &mut Draft, node: &Node, row: usize) {
     if shapes.peek().is_none() {
         draft.leave(&at, "a placemark without geometry");
     }
+    let mut placemark = Placemark {
+        at,
+        facts,
+        rings: Vec::new(),
+    };
     for shape in shapes {
-        geometry(draft, &at, &facts, &shape, 0);
+        placemark.geometry(draft, &shape, 0);
     }
+    let Placemark { at, facts, rings } = placemark;
+    for (_, ring) in antimeridian::joined(&rings) {
+        draft.polygon(&at, &facts, &ring);
+    }
+}
+
+/// A placemark while its geometries are read.
+struct Placemark {
+    at: String,
+    facts: Facts,
+    /// Outer rings of its polygons: those that were cut at the 180th meridian are joined when all are known.
+    rings: Vec<Vec<[f64; 2]>>,
 }
 
 fn is_shape(node: &Node) -> bool {
@@ -107,26 +124,29 @@ fn is_shape(node: &Node) -> bool {
     SHAPES.iter().any(|name| is(node, name))
 }
 
-fn geometry(draft: &mut Draft, at: &str, facts: &Facts, node: &Node, depth: usize) {
-    if let Some([lon, lat]) = facts.center()
-        && is(node, "Polygon")
-        && let Ok(Some(_)) = facts.number("radius")
-    {
-        return match Place::new(lon, lat) {
-            Ok(center) => draft.circle(at, facts, center),
-            Err(reason) => draft.leave(at, reason),
-        };
-    }
-    match node.tag_name().name() {
-        "Point" => point(draft, at, facts, node),
-        "Polygon" => polygon(draft, at, facts, node),
-        "MultiGeometry" if depth < DEEPEST => {
-            for inner in node.children().filter(is_shape) {
-                geometry(draft, at, facts, &inner, depth + 1);
-            }
+impl Placemark {
+    fn geometry(&mut self, draft: &mut Draft, node: &Node, depth: usize) {
+        let (at, facts) = (&self.at, &self.facts);
+        if let Some([lon, lat]) = facts.center()
+            && is(node, "Polygon")
+            && let Ok(Some(_)) = facts.number("radius")
+        {
+            return match Place::new(lon, lat) {
+                Ok(center) => draft.circle(at, facts, center),
+                Err(reason) => draft.leave(at, reason),
+            };
         }
-        "MultiGeometry" => draft.leave(at, "geometries nested deeper than 16 levels"),
-        _ => draft.leave(at, "a line: points and polygons make a scenario"),
+        match node.tag_name().name() {
+            "Point" => point(draft, at, facts, node),
+            "Polygon" => self.rings.extend(outer(draft, at, node)),
+            "MultiGeometry" if depth < DEEPEST => {
+                for inner in node.children().filter(is_shape) {
+                    self.geometry(draft, &inner, depth + 1);
+                }
+            }
+            "MultiGeometry" => draft.leave(at, "geometries nested deeper than 16 levels"),
+            _ => draft.leave(at, "a line: points and polygons make a scenario"),
+        }
     }
 }
 
@@ -154,7 +174,8 @@ fn point(draft: &mut Draft, at: &str, facts: &Facts, node: &Node) {
     draft.point(at, facts, place, Some(alt));
 }
 
-fn polygon(draft: &mut Draft, at: &str, facts: &Facts, node: &Node) {
+/// The outer ring of a polygon.
+fn outer(draft: &mut Draft, at: &str, node: &Node) -> Option<Vec<[f64; 2]>> {
     let boundary = |name| node.children().find(move |child| is(child, name));
     let holes = node.children().filter(|child| is(child, "innerBoundaryIs"));
     for (index, _) in holes.enumerate() {
@@ -168,11 +189,11 @@ fn polygon(draft: &mut Draft, at: &str, facts: &Facts, node: &Node) {
         |ring| coordinates(&ring),
     );
     match corners {
-        Ok(corners) => {
-            let flat: Vec<[f64; 2]> = corners.iter().map(|[lon, lat, _]| [*lon, *lat]).collect();
-            draft.polygon(at, facts, &flat);
+        Ok(corners) => Some(corners.iter().map(|[lon, lat, _]| [*lon, *lat]).collect()),
+        Err(reason) => {
+            draft.leave(at, reason);
+            None
         }
-        Err(reason) => draft.leave(at, reason),
     }
 }
 

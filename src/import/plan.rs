@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 
 use super::draft::{Draft, Place};
 use super::facts::Facts;
-use super::{Conversion, ImportError, Most};
+use super::{Conversion, ImportError, Most, antimeridian};
 
 /// MAVLink commands (`MAV_CMD`) that have a position: waypoints and similar, then take-offs and landings.
 const WAYPOINTS: [u64; 6] = [16, 17, 18, 19, 31, 82];
@@ -257,17 +257,30 @@ fn fences(draft: &mut Draft, fence: &Value) {
             }
         }
     }
-    for (index, polygon) in list("polygons").iter().enumerate() {
-        let at = format!("/geoFence/polygons/{index}");
-        if excludes(draft, &at, polygon) {
-            let corners = polygon["polygon"].as_array();
+    polygons(draft, list("polygons"));
+}
+
+/// A fence cannot cross the 180th meridian, so one that is cut there is two, which no name ties together.
+fn polygons(draft: &mut Draft, fences: &[Value]) {
+    let place = |index: usize| format!("/geoFence/polygons/{index}");
+    let (mut indices, mut rings) = (Vec::new(), Vec::new());
+    for (index, fence) in fences.iter().enumerate() {
+        let at = place(index);
+        if excludes(draft, &at, fence) {
+            let corners = fence["polygon"].as_array();
             let corner = |corner: &Value| Some([corner[1].as_f64()?, corner[0].as_f64()?]);
             let ring: Option<Vec<[f64; 2]>> = corners.into_iter().flatten().map(corner).collect();
             match ring {
-                Some(ring) => draft.polygon(&at, &Facts::default(), &ring),
+                Some(ring) => {
+                    indices.push(index);
+                    rings.push(ring);
+                }
                 None => draft.leave(&at, "a corner that is not latitude and longitude"),
             }
         }
+    }
+    for (first, ring) in antimeridian::joined(&rings) {
+        draft.polygon(&place(indices[first]), &Facts::default(), &ring);
     }
 }
 

@@ -307,7 +307,7 @@ async fn exports_convert_back_to_scenarios() {
     }
 }
 
-/// GeoJSON requires a cut at the 180th meridian; a route along the cut would pass through.
+/// GeoJSON requires a cut at the 180th meridian, and autopilots need one; a route along the cut would pass through.
 #[tokio::test]
 async fn a_polygon_across_the_antimeridian_converts_back_to_one_threat() {
     let api = Api::new();
@@ -318,21 +318,30 @@ async fn a_polygon_across_the_antimeridian_converts_back_to_one_threat() {
     scenario["threats"] = json!([{"kind": "polygon", "name": "atoll", "margin": 20, "vertices": [
         corner(-17.004, 179.998), corner(-17.004, -179.997), corner(-17.002, -179.997), corner(-17.002, 179.998)]}]);
     let address = ended(&api, &scenario, -17.0, 180.0).await;
-    let exported = api.get(&format!("{address}/result?format=geojson")).await;
-    let headers = [("content-type", "application/geo+json")];
-    let text = String::from_utf8(exported.body.to_vec()).expect("UTF-8");
-    assert!(text.contains("MultiPolygon"), "it is cut");
-    let text = without_path("geojson", &text);
-    let back = api
-        .send(Method::POST, "/scenarios:convert", &headers, text)
-        .await;
-    let threats = &back.json()["scenario"]["threats"];
-    assert_eq!(threats.as_array().map(Vec::len), Some(1), "{threats}");
-    let lons = threats[0]["vertices"].as_array().expect("corners").iter();
-    let mut lons: Vec<f64> = lons.filter_map(|corner| corner["lon"].as_f64()).collect();
-    lons.sort_by(f64::total_cmp);
-    let expected = [-180.0, -179.997, -179.997, 179.998, 179.998, 180.0];
-    assert_eq!(lons, expected);
+    for (format, media_type, halves) in [
+        ("geojson", "application/geo+json", "MultiPolygon"),
+        ("qgc", "application/json", "-180.0"),
+    ] {
+        let exported = api.get(&format!("{address}/result?format={format}")).await;
+        let headers = [("content-type", media_type)];
+        let text = String::from_utf8(exported.body.to_vec()).expect("UTF-8");
+        assert!(text.contains(halves), "{format} is cut: {text}");
+        let text = without_path(format, &text);
+        let back = api
+            .send(Method::POST, "/scenarios:convert", &headers, text)
+            .await;
+        let threats = &back.json()["scenario"]["threats"];
+        assert_eq!(
+            threats.as_array().map(Vec::len),
+            Some(1),
+            "{format}: {threats}"
+        );
+        let lons = threats[0]["vertices"].as_array().expect("corners").iter();
+        let mut lons: Vec<f64> = lons.filter_map(|corner| corner["lon"].as_f64()).collect();
+        lons.sort_by(f64::total_cmp);
+        let expected = [-180.0, -179.997, -179.997, 179.998, 179.998, 180.0];
+        assert_eq!(lons, expected, "{format}");
+    }
 }
 
 /// The file without its path, its rings shortened.

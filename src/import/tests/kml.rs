@@ -55,3 +55,32 @@ fn placemarks_of_kml() {
     );
     assert_eq!(found.assumed[0].pointer, "/target/alt");
 }
+
+/// Both halves have the placemark's name and margin; between two threats a route could pass.
+#[test]
+fn a_polygon_cut_at_180_degrees_is_one_again() {
+    let half = |corners: &str| {
+        format!(
+            "<Polygon><outerBoundaryIs><LinearRing><coordinates>{corners}</coordinates></LinearRing></outerBoundaryIs></Polygon>"
+        )
+    };
+    let ends =
+        "<Placemark><name>start</name><Point><coordinates>179.5,0</coordinates></Point></Placemark>
+<Placemark><name>target</name><Point><coordinates>-179.5,0</coordinates></Point></Placemark>";
+    let (west, east) = (
+        half("179.9,1 180,1 180,2 179.9,2 179.9,1"),
+        half("-180,1 -179.9,1 -179.9,2 -180,2 -180,1"),
+    );
+    let kml = format!(
+        "<kml><Document>{ends}<Placemark><name>atoll</name><ExtendedData><Data name=\"margin\"><value>20</value></Data></ExtendedData>
+<MultiGeometry>{west}<MultiGeometry>{east}</MultiGeometry></MultiGeometry></Placemark></Document></kml>"
+    );
+    let found = convert(kml.as_bytes(), Syntax::of(kml.as_bytes())).expect("a scenario");
+    let corner = |lat: f64, lon: f64| json!({"lat": lat, "lon": lon});
+    assert_eq!(
+        found.scenario["threats"],
+        json!([{"kind": "polygon", "name": "atoll", "vertices": [
+            corner(2.0, 179.9), corner(1.0, 179.9), corner(1.0, 180.0), corner(1.0, -179.9), corner(2.0, -179.9),
+            corner(2.0, -180.0)], "margin": 20.0, "base": null, "top": null}])
+    );
+}

@@ -3,6 +3,7 @@
 use axum::http::{HeaderMap, HeaderName, header};
 
 use super::list;
+use super::shown::Shown;
 
 /// The media type out of `offers` that the caller prefers; `None` when the caller accepts none of them.
 pub(super) fn choose(headers: &HeaderMap, offers: &[&'static str]) -> Option<&'static str> {
@@ -46,12 +47,10 @@ pub(super) fn takes(headers: &HeaderMap, coding: &str) -> bool {
 }
 
 /// What the caller sent, for people.
-pub(super) fn asked(headers: &HeaderMap) -> String {
+pub(super) fn asked(headers: &HeaderMap) -> Shown {
     let values = headers.get_all(header::ACCEPT).iter();
-    values
-        .filter_map(|value| value.to_str().ok())
-        .collect::<Vec<_>>()
-        .join(", ")
+    let values: Vec<_> = values.filter_map(|value| value.to_str().ok()).collect();
+    Shown::of(&values.join(", "))
 }
 
 /// The entries of a header, in lower case, and the weight of each, 0 to 1.

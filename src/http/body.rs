@@ -12,6 +12,7 @@ use flate2::read::MultiGzDecoder;
 use http_body_util::{BodyExt, LengthLimitError, Limited};
 
 use super::problem::Problem;
+use super::shown::Shown;
 use super::{AppState, off_thread};
 use crate::import::Syntax;
 
@@ -47,7 +48,7 @@ pub(super) async fn read_json_or_xml(
 
 fn unsupported(headers: &HeaderMap, allowed: &'static str) -> Problem {
     let found = headers.get(header::CONTENT_TYPE);
-    let found = found.map(|value| String::from_utf8_lossy(value.as_bytes()).into_owned());
+    let found = found.map(|value| Shown::of(&String::from_utf8_lossy(value.as_bytes())));
     Problem::UnsupportedMediaType { found, allowed }
 }
 
@@ -150,7 +151,7 @@ impl Coding {
             [only] if ["gzip", "x-gzip"].contains(&only.to_ascii_lowercase().as_str()) => {
                 Ok(Self::Gzip)
             }
-            _ => Err(Problem::UnsupportedCoding(codings.join(", "))),
+            _ => Err(Problem::UnsupportedCoding(Shown::of(&codings.join(", ")))),
         }
     }
 }
@@ -165,7 +166,7 @@ fn check_transfer(headers: &HeaderMap) -> Result<(), Problem> {
     if codings.is_empty() || codings.trim().eq_ignore_ascii_case("chunked") {
         return Ok(());
     }
-    Err(Problem::UnsupportedTransferCoding(codings))
+    Err(Problem::UnsupportedTransferCoding(Shown::of(&codings)))
 }
 
 pub(super) fn announced_length(headers: &HeaderMap) -> Option<u64> {
@@ -218,7 +219,7 @@ mod tests {
                 headers.append(header::CONTENT_ENCODING, HeaderValue::from_static(value));
             }
             let coding = Coding::of(&headers).map_err(|problem| match problem {
-                Problem::UnsupportedCoding(codings) => codings,
+                Problem::UnsupportedCoding(codings) => codings.to_string(),
                 other => format!("{other:?}"),
             });
             assert_eq!(coding, expected.map_err(ToOwned::to_owned), "{values:?}");

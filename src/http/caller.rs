@@ -48,7 +48,7 @@ impl Caller {
             Err(StoreError::Gone(tombstone)) if self.may_see(tombstone.owner.as_ref()) => {
                 Err(StoreError::Gone(tombstone).into())
             }
-            Ok(_) | Err(StoreError::Gone(_)) => Err(Problem::NoSuchPlan(id.to_string())),
+            Ok(_) | Err(StoreError::Gone(_)) => Err(Problem::no_such_plan(id)),
             Err(error) => Err(error.into()),
         }
     }

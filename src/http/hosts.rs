@@ -11,7 +11,9 @@ use axum::http::uri::Authority;
 use axum::http::{HeaderMap, Uri, Version, header};
 
 use super::browser::Origins;
+use super::params;
 use super::problem::Problem;
+use super::shown::Shown;
 
 /// The hosts that this service answers for.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -44,7 +46,7 @@ impl Hosts {
         }
         match (named(uri, headers)?, &self.0) {
             (Some(host), Some(known)) if !is_of_this_machine(&host, known) => {
-                Err(Problem::Misdirected(host))
+                Err(Problem::Misdirected(Shown::of(&host)))
             }
             _ => Ok(()),
         }
@@ -64,7 +66,10 @@ fn named(uri: &Uri, headers: &HeaderMap) -> Result<Option<String>, Problem> {
             let text = value.to_str().unwrap_or_default();
             let read = text.parse::<Authority>().ok();
             read.filter(|authority| !authority.as_str().contains('@'))
-                .ok_or_else(|| refused(&format!("is {value:?}, must be a host and maybe a port")))
+                .ok_or_else(|| {
+                    let sent = String::from_utf8_lossy(value.as_bytes());
+                    params::refused("host", &sent, "a host and maybe a port")
+                })
         })
         .transpose()?;
     let authority = uri.authority().or(of_header.as_ref());
@@ -159,5 +164,20 @@ mod tests {
         check(v2, "http://localhost:8080/", &[], None);
         check(v2, "http://evil.example/", &[], Some(421));
         check(v2, "/", &[b"evil.example"], Some(421));
+    }
+
+    /// A header may have 64 KiB.
+    #[test]
+    fn a_long_host_is_repeated_in_part() {
+        let long = "x".repeat(10_000);
+        for host in [long.clone(), format!("me@{long}")] {
+            let value = HeaderValue::from_str(&host).expect("a header");
+            let headers = HeaderMap::from_iter([(header::HOST, value)]);
+            let hosts = Hosts::of_this_machine(&Origins::default());
+            let refused = hosts.check(&Uri::from_static("/"), Version::HTTP_11, &headers);
+            let document = refused.expect_err("another host").document("id");
+            assert!(document.contains("xxx..."), "{document:.300}");
+            assert!(document.len() < 1000, "{document:.300}");
+        }
     }
 }

@@ -35,6 +35,7 @@ mod scenarios;
 pub mod server;
 mod service;
 mod shipped;
+mod shown;
 mod sse;
 mod status;
 mod terrains;
@@ -206,7 +207,7 @@ pub fn routes() -> Vec<Route> {
 
 /// The service: all routes, every refusal a problem, every answer with its request's id.
 pub fn router(parts: Parts) -> Router {
-    let nowhere = async |uri: Uri| Problem::NoSuchResource(uri.path().to_owned());
+    let nowhere = async |uri: Uri| Problem::no_such_resource(&uri);
     assemble(parts, routes(), nowhere)
 }
 
@@ -215,7 +216,7 @@ pub fn upkeep_router(parts: Parts) -> Router {
     const UPKEEP: [&str; 4] = ["/livez", "/readyz", "/metrics", "/version"];
     let mut routes = routes();
     routes.retain(|route| UPKEEP.contains(&route.path));
-    let nowhere = async |uri: Uri| Problem::NotServedHere(uri.path().to_owned());
+    let nowhere = async |uri: Uri| Problem::not_served_here(&uri);
     assemble(parts, routes, nowhere)
 }
 

@@ -1,7 +1,6 @@
 //! Query parameters and plan ids, read strictly: an unknown, duplicate or unreadable parameter is refused, because
 //! ignoring it would give another answer than the one asked for.
 
-use std::borrow::Cow;
 use std::str::FromStr;
 
 use axum::extract::rejection::QueryRejection;
@@ -12,11 +11,9 @@ use uuid::Uuid;
 
 use super::auth::holds_a_key;
 use super::problem::Problem;
+use super::shown::Shown;
 use crate::job::PlanId;
 use crate::telemetry::spans;
-
-/// Maximum length of what is repeated of a parameter or a header.
-const SHOWN_CHARS: usize = 100;
 
 /// The parameters of one request.
 pub(super) struct Params(Vec<(String, String)>);
@@ -27,8 +24,8 @@ impl Params {
         let pairs = pairs_of(uri).map_err(|error| invalid("query", &error.to_string()))?;
         for (position, (name, _)) in pairs.iter().enumerate() {
             if !known.contains(&name.as_str()) {
-                let name = &*begin(name);
-                return Err(invalid(name, &unknown(name, known)));
+                let name = Shown::of(name);
+                return Err(invalid(name.as_str(), &unknown(name.as_str(), known)));
             }
             if pairs[..position].iter().any(|(earlier, _)| earlier == name) {
                 return Err(invalid(name, &format!("{name} is given twice")));
@@ -73,21 +70,16 @@ fn pairs_of(uri: &Uri) -> Result<Vec<(String, String)>, QueryRejection> {
 
 /// `value` is not allowed for `name`.
 pub(super) fn refused(name: &str, value: &str, allowed: &str) -> Problem {
-    let value = begin(value);
-    invalid(name, &format!("{name} is {value:?}, must be {allowed}"))
+    let value = Shown::of(value);
+    invalid(
+        name,
+        &format!("{name} is {:?}, must be {allowed}", value.as_str()),
+    )
 }
 
 /// `name` is needed beside the others.
 pub(super) fn missing(name: &str, allowed: &str) -> Problem {
     invalid(name, &format!("{name} is missing, must be {allowed}"))
-}
-
-/// What a caller sent, as far as it is repeated to it: its head may have 64 KiB.
-pub(super) fn begin(sent: &str) -> Cow<'_, str> {
-    match sent.char_indices().nth(SHOWN_CHARS) {
-        Some((end, _)) => format!("{}...", &sent[..end]).into(),
-        None => sent.into(),
-    }
 }
 
 fn invalid(name: &str, detail: &str) -> Problem {
@@ -155,7 +147,7 @@ impl<S: Send + Sync> FromRequestParts<S> for Id {
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
         let Ok(Path(text)) = Path::<String>::from_request_parts(parts, state).await else {
-            return Err(Problem::NoSuchResource(parts.uri.path().to_owned()));
+            return Err(Problem::no_such_resource(&parts.uri));
         };
         match Uuid::try_parse(&text) {
             // Only the canonical spelling is accepted: each plan has one address.
@@ -163,7 +155,7 @@ impl<S: Send + Sync> FromRequestParts<S> for Id {
                 spans::name_plan(id);
                 Ok(Self(id))
             }
-            _ => Err(Problem::NoSuchPlan(text)),
+            _ => Err(Problem::NoSuchPlan(Shown::of(&text))),
         }
     }
 }

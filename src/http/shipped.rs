@@ -77,7 +77,7 @@ pub(super) async fn show(
 ) -> Result<Response, Problem> {
     let wanted = name.map(|Path(name)| name).unwrap_or_default();
     let Some((_, text)) = SHIPPED.iter().find(|(name, _)| *name == wanted) else {
-        return Err(Problem::NoSuchResource(uri.path().to_owned()));
+        return Err(Problem::no_such_resource(&uri));
     };
     Ok(([(header::CONTENT_TYPE, "application/json")], *text).into_response())
 }

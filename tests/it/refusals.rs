@@ -144,3 +144,42 @@ async fn a_body_beyond_the_limit_is_refused_with_and_without_a_length() {
         .await;
     answer.expect_problem(400, "invalid-json");
 }
+
+/// The head of a request may have 64 KiB, of which an answer repeats the beginning.
+#[tokio::test]
+async fn what_a_caller_sent_is_repeated_in_part() {
+    let api = Api::new();
+    let long: &str = "x".repeat(10_000).leak();
+    let media_type: &str = format!("application/x-www-form-urlencoded{long}").leak();
+    let requests: [(&str, String, &[Header]); 12] = [
+        ("GET", format!("/{long}"), &[]),
+        ("GET", format!("/plans/{long}"), &[]),
+        ("GET", format!("/plans/first/{long}"), &[]),
+        ("GET", format!("/problems/{long}"), &[]),
+        ("GET", format!("/terrains/{long}"), &[]),
+        ("GET", format!("/terrains/{long}/elevations"), &[]),
+        ("GET", format!("/plans?{long}=3"), &[]),
+        ("GET", format!("/plans?limit={long}"), &[]),
+        ("POST", "/plans".to_owned(), &[("content-type", long)]),
+        ("POST", "/plans".to_owned(), &[("content-type", media_type)]),
+        (
+            "POST",
+            "/plans".to_owned(),
+            &[JSON, ("content-encoding", long)],
+        ),
+        (
+            "POST",
+            "/plans".to_owned(),
+            &[JSON, ("transfer-encoding", long)],
+        ),
+    ];
+    for (method, uri, headers) in requests {
+        let begin = format!("{method} {uri:.40} {headers:?}");
+        let method: Method = method.parse().expect("a method");
+        let answer = api.send(method, &uri, headers, "{}").await;
+        let problem = answer.json();
+        let detail = problem["detail"].as_str().expect("a problem");
+        assert!(detail.contains("xxx..."), "{begin}: {detail:.200}");
+        assert!(answer.body.len() < 1000, "{begin}");
+    }
+}

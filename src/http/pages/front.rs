@@ -173,7 +173,7 @@ pub(in crate::http) async fn vendored(
 
 fn serve(name: &str, uri: &Uri, headers: &HeaderMap) -> Result<Response, Problem> {
     let Some(file) = FILES.iter().find(|file| file.name == name) else {
-        return Err(Problem::NoSuchResource(uri.path().to_owned()));
+        return Err(Problem::no_such_resource(uri));
     };
     let (coding, bytes) = file.coded(headers);
     let tag = coding.tag(&file.hash);

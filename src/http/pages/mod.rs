@@ -62,7 +62,7 @@ pub(super) async fn problem(
 ) -> Result<Response, Problem> {
     let section = slug.as_ref().and_then(|Path(slug)| section(slug));
     let Some(text) = section else {
-        return Err(Problem::NoSuchResource(uri.path().to_owned()));
+        return Err(Problem::no_such_resource(&uri));
     };
     let body = format!(
         "<p><a href=\"/docs\">Reference</a></p>\n<main>{}</main>",

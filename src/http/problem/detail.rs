@@ -2,7 +2,7 @@
 
 use super::Problem;
 use crate::http::auth::TooMany;
-use crate::http::params::begin;
+use crate::http::shown::Shown;
 use crate::scenario::json::MORE_FAULTS;
 use crate::store::{Tombstone, Trouble};
 
@@ -72,7 +72,7 @@ impl Problem {
             }
             Self::NoSuchPlan(id) => format!("there is no plan {id}"),
             Self::NoSuchTerrain(name) => {
-                format!("there is no dataset {name:?}; GET /terrains lists what there is")
+                format!("there is no dataset {:?}; GET /terrains lists what there is", name.as_str())
             }
             Self::TerrainInUse { name, plans: 1 } => {
                 format!("a plan over {name} is queued or running; it can be deleted when that has ended")
@@ -100,7 +100,6 @@ impl Problem {
                 "the header Allow lists the methods of this resource".to_owned()
             }
             Self::NotAcceptable { asked, available } => {
-                let asked = begin(asked);
                 format!("asked for {asked}; available: {}", available.join(", "))
             }
             Self::BodyTooSlow(limit) => {
@@ -141,7 +140,7 @@ impl Problem {
                 )
             }
             Self::UnsupportedMediaType { found, allowed } => {
-                unsupported_media_type(found.as_deref(), allowed)
+                unsupported_media_type(found.as_ref(), allowed)
             }
             Self::UnsupportedCoding(found) => {
                 format!("content-encoding is {found}; send the body as it is, or as gzip")
@@ -188,12 +187,18 @@ impl Problem {
     }
 }
 
-fn unsupported_media_type(found: Option<&str>, allowed: &str) -> String {
+fn unsupported_media_type(found: Option<&Shown>, allowed: &str) -> String {
     match found {
         None => format!("no content-type was sent; send {allowed}"),
-        Some(found) if found.starts_with("application/x-www-form-urlencoded") => format!(
-            "content-type is {found}, which curl -d sends by itself; add -H 'content-type: application/json'"
-        ),
+        Some(found)
+            if found
+                .as_str()
+                .starts_with("application/x-www-form-urlencoded") =>
+        {
+            format!(
+                "content-type is {found}, which curl -d sends by itself; add -H 'content-type: application/json'"
+            )
+        }
         Some(found) => format!("content-type is {found}; send {allowed} in UTF-8"),
     }
 }

@@ -6,6 +6,7 @@ use super::Problem;
 use crate::catalogue::CatalogueError;
 use crate::export::ExportError;
 use crate::http::auth::Scope;
+use crate::http::shown::Shown;
 use crate::import::ImportError;
 use crate::scenario::json::Refusal;
 use crate::store::{StoreError, Trouble};
@@ -13,7 +14,7 @@ use crate::store::{StoreError, Trouble};
 impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
         match error {
-            StoreError::NotFound(id) => Self::NoSuchPlan(id.to_string()),
+            StoreError::NotFound(id) => Self::no_such_plan(id),
             StoreError::Gone(tombstone) => Self::Gone(tombstone),
             StoreError::KeyReused => Self::IdempotencyKeyReused,
             StoreError::KeyInFlight => Self::IdempotencyInFlight,
@@ -103,7 +104,7 @@ impl From<CatalogueError> for Problem {
     fn from(error: CatalogueError) -> Self {
         let detail = error.to_string();
         match error {
-            CatalogueError::Unknown { name } => Self::NoSuchTerrain(name),
+            CatalogueError::Unknown { name } => Self::NoSuchTerrain(Shown::of(&name)),
             CatalogueError::Mounted { name } => Self::TerrainMounted(name),
             CatalogueError::Exists { .. }
             | CatalogueError::Absent { .. }

@@ -12,12 +12,13 @@ use std::any::Any;
 use std::time::Duration;
 
 use axum::body::Body;
-use axum::http::{HeaderValue, header};
+use axum::http::{HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 
 pub(super) use document::FailureDocument;
 
 use super::auth::{Allowance, Scope, TooMany, Unauthorized};
+use super::shown::Shown;
 use crate::import::Unused;
 use crate::job::{Failure, PlanId, Status};
 use crate::scenario::json::Fault;
@@ -31,13 +32,13 @@ pub(super) enum Problem {
     /// Address and headers are too long, or too many; the limit in bytes.
     HeadTooLarge(usize),
     /// No route has this path.
-    NoSuchResource(String),
+    NoSuchResource(Shown),
     /// This node only runs plans, and has no route for the path.
-    NotServedHere(String),
+    NotServedHere(Shown),
     /// There never was such a plan, or the id is malformed.
-    NoSuchPlan(String),
+    NoSuchPlan(Shown),
     /// No dataset has this name.
-    NoSuchTerrain(String),
+    NoSuchTerrain(Shown),
     /// The file cannot be used as a dataset; why.
     InvalidTerrain(String),
     /// Plans are queued or running over the dataset.
@@ -68,19 +69,19 @@ pub(super) enum Problem {
     /// The caller accepts none of the available formats.
     NotAcceptable {
         /// What the caller accepts.
-        asked: String,
+        asked: Shown,
         /// What is available.
         available: Vec<&'static str>,
     },
     /// The body has a wrong media type, or none.
     UnsupportedMediaType {
         /// The declared media type.
-        found: Option<String>,
+        found: Option<Shown>,
         /// The allowed one.
         allowed: &'static str,
     },
     /// The body is compressed or otherwise coded; how.
-    UnsupportedCoding(String),
+    UnsupportedCoding(Shown),
     /// The body is too long; the limit in bytes.
     BodyTooLarge(usize),
     /// The body came too slowly; the limit.
@@ -90,7 +91,7 @@ pub(super) enum Problem {
     /// The body's chunked coding is malformed.
     BodyUnreadable,
     /// The body has an unsupported transfer coding; which.
-    UnsupportedTransferCoding(String),
+    UnsupportedTransferCoding(Shown),
     /// The body is declared as gzip and is not; the reader's error.
     BodyNotGzip(String),
     /// The body is not JSON.
@@ -114,7 +115,7 @@ pub(super) enum Problem {
     /// The address contains a key.
     KeyInUrl,
     /// The request is for another host; which.
-    Misdirected(String),
+    Misdirected(Shown),
     /// The caller has sent nothing that grants access.
     Unauthorized(Unauthorized),
     /// The caller's key lacks this scope.
@@ -193,6 +194,21 @@ pub(super) enum Problem {
 }
 
 impl Problem {
+    /// Nothing has the path of this address.
+    pub(super) fn no_such_resource(uri: &Uri) -> Self {
+        Self::NoSuchResource(Shown::of(uri.path()))
+    }
+
+    /// This node serves nothing at the path of this address.
+    pub(super) fn not_served_here(uri: &Uri) -> Self {
+        Self::NotServedHere(Shown::of(uri.path()))
+    }
+
+    /// There is no plan of this id.
+    pub(super) fn no_such_plan(id: PlanId) -> Self {
+        Self::NoSuchPlan(Shown::of(&id.to_string()))
+    }
+
     fn retry_after_s(&self) -> Option<u64> {
         match self {
             Self::NotReady { retry_after_s, .. }

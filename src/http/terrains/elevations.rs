@@ -14,6 +14,7 @@ use crate::http::AppState;
 use crate::http::entity_tags::EntityTags;
 use crate::http::params::{self, Params};
 use crate::http::problem::Problem;
+use crate::http::shown::Shown;
 use crate::terrain::dem::Degrees;
 use crate::terrain::{DatasetError, Datasets};
 
@@ -136,7 +137,7 @@ fn weak_etag(sha256: &str) -> HeaderValue {
 
 fn refusal(error: DatasetError, name: &str) -> Problem {
     match error {
-        DatasetError::Unknown { .. } => Problem::NoSuchTerrain(name.to_owned()),
+        DatasetError::Unknown { .. } => Problem::NoSuchTerrain(Shown::of(name)),
         error @ DatasetError::Replaced { .. } => Problem::NoGround(error.to_string()),
         DatasetError::Unreadable(error) => Problem::InvalidTerrain(error.to_string()),
         DatasetError::Unavailable(error) => Problem::unreachable_datasets(&error),

@@ -111,7 +111,7 @@ impl<S: Send + Sync> FromRequestParts<S> for Name {
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
         match Path::<String>::from_request_parts(parts, state).await {
             Ok(Path(name)) => Ok(Self(name)),
-            Err(_) => Err(Problem::NoSuchResource(parts.uri.path().to_owned())),
+            Err(_) => Err(Problem::no_such_resource(&parts.uri)),
         }
     }
 }

@@ -4,10 +4,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::watch;
-use tokio::task::JoinHandle;
+use tokio::task::{JoinError, JoinHandle};
 use tokio::time::{Instant, timeout, timeout_at};
 
 use crate::cli::exit;
@@ -30,36 +30,67 @@ pub(super) struct Running {
     pub(super) store: Arc<dyn Store>,
 }
 
+/// Why the service ends.
+enum Cause {
+    /// A signal of this name.
+    Signal(&'static str),
+    /// The server has ended by itself, so nobody is answered any more.
+    Server(Result<(), JoinError>),
+}
+
 impl Running {
-    /// Stop them in the right order once a signal requests it, within `grace`; the store has a second at least.
-    pub(super) async fn end_on(self, mut signals: Signals, grace: Duration) -> anyhow::Result<()> {
-        let name = signals.next().await;
-        let signalled = Instant::now();
-        tracing::info!(
-            signal = name,
-            grace_s = grace.as_secs_f64(),
-            "shutting down"
-        );
+    /// Stop them in the right order once a signal requests it or the server has ended, within `grace`; the store has a
+    /// second at least.
+    ///
+    /// # Errors
+    /// When the server ended by itself. The store is closed all the same: runs that are not given back count as lost.
+    pub(super) async fn end_on(
+        mut self,
+        mut signals: Signals,
+        grace: Duration,
+    ) -> anyhow::Result<()> {
+        let cause = tokio::select! {
+            name = signals.next() => Cause::Signal(name),
+            ended = &mut self.server => Cause::Server(ended),
+        };
+        let begun = Instant::now();
+        cause.log(grace);
         leave_on_another(signals);
         let times = Times::within(grace);
         self.phase.send_replace(Phase::Draining);
         drain(self.pool, &times).await;
         self.phase.send_replace(Phase::Stopping);
-        if let Ok(ended) = timeout_at(signalled + times.answers, self.server).await {
-            ended.context("the server broke")?;
-        }
+        let served = match cause {
+            Cause::Signal(_) => timeout_at(begun + times.answers, self.server)
+                .await
+                .unwrap_or(Ok(()))
+                .context("the server broke"),
+            Cause::Server(ended) => ended
+                .context("the server broke")
+                .and_then(|()| bail!("the server ended unasked")),
+        };
         drop((self.sweeper, self.sender));
-        let until = (signalled + grace).max(Instant::now() + LEAST_CLOSE);
+        let until = (begun + grace).max(Instant::now() + LEAST_CLOSE);
         if timeout_at(until, self.store.close()).await.is_err() {
             tracing::warn!(
                 "the store did not close in time; what it had yet to give back is found as after a crash"
             );
         }
         tracing::info!(
-            duration_ms = signalled.elapsed().as_secs_f64() * 1e3,
+            duration_ms = begun.elapsed().as_secs_f64() * 1e3,
             "shut down"
         );
-        Ok(())
+        served
+    }
+}
+
+impl Cause {
+    fn log(&self, grace: Duration) {
+        let grace_s = grace.as_secs_f64();
+        match self {
+            Self::Signal(signal) => tracing::info!(signal, grace_s, "shutting down"),
+            Self::Server(_) => tracing::error!(grace_s, "the server has ended, shutting down"),
+        }
     }
 }
 
@@ -124,6 +155,60 @@ impl Signals {
         tokio::select! {
             _ = self.terminate.recv() => "SIGTERM",
             _ = self.interrupt.recv() => "SIGINT",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::catalogue::Directories;
+    use crate::store::sqlite::SqliteStore;
+    use crate::store::{Options, wall_clock};
+    use crate::worker::{self, Unplanned};
+
+    fn running(data_dir: &Path, server: JoinHandle<()>) -> Running {
+        let options = Options::new(1);
+        let store: Arc<dyn Store> =
+            Arc::new(SqliteStore::open(data_dir, options).expect("nobody else has it open"));
+        let settings = worker::Settings {
+            workers: 1,
+            clock: wall_clock(),
+            instruments: Arc::default(),
+        };
+        let engine: worker::Engine =
+            Arc::new(|_, _, _| Err(Unplanned::NotNow("no plan is submitted".to_owned())));
+        let catalogue = Directories::new(data_dir.join("terrains"), None);
+        Running {
+            phase: watch::Sender::new(Phase::Serving),
+            pool: Pool::start(store.clone(), settings, engine),
+            server,
+            sweeper: Sweeper::start(store.clone(), Arc::new(catalogue), wall_clock()),
+            sender: None,
+            store,
+        }
+    }
+
+    /// Whoever starts it again finds the store closed, and the error in the log.
+    #[tokio::test]
+    async fn a_server_that_ends_by_itself_ends_the_service() {
+        let data_dir = tempfile::tempdir().expect("a directory");
+        let panics = || tokio::spawn(async { panic!("as this test wants") });
+        let returns = || tokio::spawn(async {});
+        for (server, expected) in [
+            (panics(), "the server broke"),
+            (returns(), "the server ended unasked"),
+        ] {
+            let running = running(data_dir.path(), server);
+            let phase = running.phase.subscribe();
+            let signals = Signals::new().expect("signals");
+            let ended = running.end_on(signals, Duration::from_secs(5)).await;
+            let error = ended.expect_err("it was not asked to");
+            assert_eq!(error.to_string(), expected);
+            assert_eq!(*phase.borrow(), Phase::Stopping);
+            drop(SqliteStore::open(data_dir.path(), Options::new(1)).expect("it is closed"));
         }
     }
 }

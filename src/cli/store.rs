@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use clap::{Args, Subcommand};
 
 use super::{config, exit, files};
-use crate::config::Flags;
+use crate::config::{Backend, Flags};
 use crate::store::sqlite::upkeep;
 
 /// Keep or look after the plans of this machine.
@@ -49,12 +49,17 @@ impl Location {
     /// The directory of the service with the same flags, variables and file.
     fn data_dir(self, instead: &str) -> anyhow::Result<PathBuf> {
         let config = config::of_environment(&Flags::with_file(self.config))?.config;
-        let is_shared = match &self.store {
-            Some(store) => !["", "sqlite"].contains(&store.as_str()),
-            None => config.store.is_shared(),
+        // An empty variable counts as unset.
+        let given = self.store.filter(|store| !store.is_empty());
+        let store = match given {
+            Some(store) => {
+                let read: Result<Backend, _> = store.parse();
+                read.map_err(|refused| anyhow!("--store {refused}"))?
+            }
+            None => config.store,
         };
         // A store that is not a file has its own tools.
-        if is_shared {
+        if store.is_shared() {
             bail!(
                 "the plans are on NATS servers, and this looks after a file of one machine: {instead}"
             );

@@ -1,7 +1,9 @@
 //! Where plans are kept, and the node's role there.
 
+use std::str::FromStr;
+
 use super::address::{self, Address};
-use super::value::{Given, Value, quoted};
+use super::value::{Given, Value, quoted, refused};
 
 /// The store.
 #[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd)]
@@ -20,6 +22,20 @@ impl Backend {
     #[must_use]
     pub fn is_shared(&self) -> bool {
         matches!(self, Self::Nats(_))
+    }
+}
+
+impl FromStr for Backend {
+    type Err = String;
+
+    /// As a flag or a variable gives it.
+    ///
+    /// # Errors
+    /// What it is, unless that may hold a password, and what it must be.
+    fn from_str(word: &str) -> Result<Self, String> {
+        let given = Given::Word(word.to_owned());
+        let hides = Self::is_secret(&given);
+        Self::read(&given).ok_or_else(|| refused(&given, hides, Self::ALLOWED))
     }
 }
 

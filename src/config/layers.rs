@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use super::setting::Setting;
 use super::settings;
-use super::value::Given;
+use super::value::{Given, refused};
 use super::{Config, Flags, Role, file};
 
 /// The settings in effect.
@@ -150,13 +150,8 @@ impl Layers<'_> {
         match self.settings[index].set(&mut self.config, given) {
             Ok(()) => self.sources[index] = source,
             Err(allowed) => {
-                let found = if self.settings[index].hides(given) {
-                    "wrong".to_owned()
-                } else {
-                    given.shown()
-                };
-                self.faults
-                    .push(format!("{place} is {found}, must be {allowed}"));
+                let refused = refused(given, self.settings[index].hides(given), &allowed);
+                self.faults.push(format!("{place} {refused}"));
             }
         }
     }

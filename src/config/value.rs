@@ -45,6 +45,16 @@ impl Given {
     }
 }
 
+/// What a value is, unless it `hides`, and what it must be: for a refusal, after the place.
+pub(super) fn refused(given: &Given, hides: bool, allowed: &str) -> String {
+    let found = if hides {
+        "wrong".to_owned()
+    } else {
+        given.shown()
+    };
+    format!("is {found}, must be {allowed}")
+}
+
 /// The type of a setting's value.
 pub(super) trait Value: Clone + PartialOrd + 'static {
     /// For a refusal: what follows "must be".

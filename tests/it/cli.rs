@@ -330,6 +330,21 @@ fn the_store_is_looked_for_where_the_service_keeps_it() {
             found(&here),
         ),
         (
+            &[("NOCTULE_CONFIG", &own), ("NOCTULE_STORE", "")],
+            &["--store", ""],
+            found(&here),
+        ),
+        (
+            &[],
+            &["--data-dir", &here, "--store", "sqllite"],
+            Err("--store is \"sqllite\", must be sqlite, or nats://HOST:PORT"),
+        ),
+        (
+            &[],
+            &["--data-dir", &here, "--store", "nats://me:hush@a"],
+            Err("--store is wrong, must be sqlite, or nats://HOST:PORT"),
+        ),
+        (
             &[("NOCTULE_WORKERS", "no")],
             &["--data-dir", &here],
             Err("NOCTULE_WORKERS is \"no\", must be a whole number"),

@@ -127,8 +127,8 @@ pub trait Store: Send + Sync + 'static {
     /// As [`Store::get`].
     async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError>;
 
-    /// The best route so far: the newest [`Event::Incumbent`] of the present run; `None` before the
-    /// first, and after an end without a result.
+    /// The best route so far: the newest [`Event::Incumbent`] of the present run; `None` before the first, and once the
+    /// run has ended.
     ///
     /// # Errors
     /// As [`Store::get`].

@@ -259,6 +259,16 @@ async fn the_best_route_of_the_current_run_is_kept() {
         let given_back = store.release(&lease).await.unwrap();
         assert_eq!(given_back.status, Status::Cancelled);
         assert_eq!(store.incumbent(id).await.unwrap(), None);
+
+        let id = store.submit(submission()).await.unwrap().plan.id;
+        let lease = store.claim().await.unwrap();
+        store.append(&lease, vec![incumbent(1, 0.1)]).await.unwrap();
+        store
+            .finish(&lease, ending(Status::Succeeded).at(0))
+            .await
+            .unwrap();
+        assert!(store.result(id).await.unwrap().is_some());
+        assert_eq!(store.incumbent(id).await.unwrap(), None);
         let unknown = store.incumbent(PlanId::now_v7()).await;
         assert_eq!(kind(unknown), Err("not found"));
     })

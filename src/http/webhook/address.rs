@@ -71,7 +71,8 @@ pub(super) fn is_public(address: IpAddr) -> bool {
     }
 }
 
-/// All but the blocks in IANA's registry of special-purpose addresses.
+/// All but multicast and the blocks that IANA's registry of special-purpose addresses does not call globally
+/// reachable. The two addresses of 192.0.0.0/24 that it does are left out with their block.
 fn is_public_v4(address: Ipv4Addr) -> bool {
     let [a, b, c, _] = address.octets();
     !(a == 0

@@ -2,6 +2,7 @@
 
 use std::fs::{self, DirBuilder, File};
 use std::io::{self, Write as _};
+use std::os::unix::fs::DirBuilderExt as _;
 use std::path::{Path, PathBuf};
 
 use uuid::Uuid;
@@ -10,11 +11,7 @@ use super::CatalogueError;
 
 /// Create a directory and its parents, accessible to the owner only.
 pub(super) fn make_directory(path: &Path) -> io::Result<()> {
-    let mut builder = DirBuilder::new();
-    builder.recursive(true);
-    #[cfg(unix)]
-    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
-    builder.create(path)
+    DirBuilder::new().recursive(true).mode(0o700).create(path)
 }
 
 /// An unused name in `directory`.
@@ -53,12 +50,9 @@ pub(super) fn remove(path: &Path) -> io::Result<()> {
 
 /// A change survives a power failure only if its directory is synced too.
 fn sync_parent(path: &Path) -> io::Result<()> {
-    #[cfg(unix)]
     if let Some(parent) = path.parent() {
         File::open(parent)?.sync_all()?;
     }
-    #[cfg(not(unix))]
-    let _ = path;
     Ok(())
 }
 

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on shall panic")]
 
 use std::ffi::OsStr;
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -31,12 +32,8 @@ async fn a_new_data_directory_is_private_to_its_owner() {
     let data_dir = parent.path().join("a/b");
     let store = SqliteStore::open(&data_dir, options()).unwrap();
     store.health().await.unwrap();
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        let mode = data_dir.metadata().unwrap().permissions().mode();
-        assert_eq!(mode & 0o777, 0o700);
-    }
+    let mode = data_dir.metadata().unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o700);
 }
 
 #[tokio::test]

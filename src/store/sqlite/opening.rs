@@ -1,7 +1,7 @@
 //! The files in the data directory: created, locked, opened, and made to survive a power failure.
 
 use std::fs::{DirBuilder, File, TryLockError};
-use std::os::unix::fs::MetadataExt as _;
+use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _};
 use std::path::{Path, PathBuf};
 
 use rusqlite::Connection;
@@ -13,11 +13,11 @@ use crate::store::{StoreError, Trouble};
 const LOCK: &str = "noctule.lock";
 
 pub(super) fn create_directory(data_dir: &Path) -> Result<(), StoreError> {
-    let mut builder = DirBuilder::new();
-    builder.recursive(true);
-    #[cfg(unix)]
-    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
-    builder.create(data_dir).map_err(|error| {
+    let made = DirBuilder::new()
+        .recursive(true)
+        .mode(0o700)
+        .create(data_dir);
+    made.map_err(|error| {
         let what = format!("data directory {} cannot be made", data_dir.display());
         failed(&what, &error)
     })
@@ -55,13 +55,9 @@ pub(super) fn open_database(file: &Path) -> Result<Connection, StoreError> {
 
 /// A new file survives a power failure only when its directory entry is on the disk too.
 pub(super) fn sync_directory(data_dir: &Path) -> Result<(), StoreError> {
-    #[cfg(unix)]
     File::open(data_dir)
         .and_then(|directory| directory.sync_all())
-        .map_err(|error| failed(&format!("data directory {}", data_dir.display()), &error))?;
-    #[cfg(not(unix))]
-    let _ = data_dir;
-    Ok(())
+        .map_err(|error| failed(&format!("data directory {}", data_dir.display()), &error))
 }
 
 /// Where the open file is: what is written to one that was moved or replaced is lost with the process.

@@ -2,12 +2,15 @@
 
 use thiserror::Error;
 
+use super::ALL;
+
 /// Why a plan is not written in a format.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ExportError {
     /// The format needs degrees, but the plan is in metres.
     #[error(
-        "{format} needs degrees, and the plan is in a local frame: plan in the frame wgs84, or take json, csv or svg"
+        "{format} needs degrees, and the plan is in a local frame: plan in the frame wgs84, or take {}",
+        local_formats()
     )]
     NoGeodeticFrame {
         /// Name of the format.
@@ -36,6 +39,14 @@ pub enum ExportError {
     /// The documents were not written by this program, or do not belong together.
     #[error("{0}")]
     Damaged(String),
+}
+
+/// The formats of a plan without degrees.
+fn local_formats() -> String {
+    let local = ALL.iter().filter(|format| !format.geodetic);
+    let names: Vec<_> = local.map(|format| format.name).collect();
+    let (last, others) = names.split_last().expect("json is one");
+    format!("{} or {last}", others.join(", "))
 }
 
 /// What is wrong with an option.

@@ -38,6 +38,8 @@ pub struct Format {
     pub extension: &'static str,
     /// Positions are in degrees, so a plan in a local frame cannot be written.
     pub geodetic: bool,
+    /// A browser shows it; others are saved.
+    pub shown: bool,
     /// It is flown by a vehicle, or shown on a map as something to fly. An infeasible plan is written only if the
     /// caller insists.
     pub flown: bool,
@@ -78,6 +80,7 @@ pub const ALL: &[Format] = &[
         media_type: "application/json",
         extension: "json",
         geodetic: false,
+        shown: true,
         flown: false,
         options: &[],
         write: Write::Stored,
@@ -87,6 +90,7 @@ pub const ALL: &[Format] = &[
         media_type: "image/svg+xml",
         extension: "svg",
         geodetic: false,
+        shown: true,
         flown: false,
         options: &[],
         write: Write::Plain(svg::write),
@@ -96,6 +100,7 @@ pub const ALL: &[Format] = &[
         media_type: "text/csv",
         extension: "csv",
         geodetic: false,
+        shown: false,
         flown: false,
         options: &[],
         write: Write::Plain(csv::write),
@@ -105,6 +110,7 @@ pub const ALL: &[Format] = &[
         media_type: "application/geo+json",
         extension: "geojson",
         geodetic: true,
+        shown: false,
         flown: false,
         options: &[],
         write: Write::Plain(geojson::write),
@@ -114,6 +120,7 @@ pub const ALL: &[Format] = &[
         media_type: "application/vnd.google-earth.kml+xml",
         extension: "kml",
         geodetic: true,
+        shown: false,
         flown: true,
         options: &[],
         write: Write::Plain(kml::write),
@@ -123,6 +130,7 @@ pub const ALL: &[Format] = &[
         media_type: "application/vnd.cesium.czml+json",
         extension: "czml",
         geodetic: true,
+        shown: false,
         flown: true,
         options: &["epoch"],
         write: Write::Plain(czml::write),
@@ -132,6 +140,7 @@ pub const ALL: &[Format] = &[
         media_type: "application/gpx+xml",
         extension: "gpx",
         geodetic: true,
+        shown: false,
         flown: true,
         options: &["epoch"],
         write: Write::Plain(gpx::write),
@@ -141,6 +150,7 @@ pub const ALL: &[Format] = &[
         media_type: "application/vnd.qgroundcontrol.plan+json",
         extension: "plan",
         geodetic: true,
+        shown: false,
         flown: true,
         options: mission::OPTIONS,
         write: Write::Mission {
@@ -153,6 +163,7 @@ pub const ALL: &[Format] = &[
         media_type: "text/plain",
         extension: "waypoints",
         geodetic: true,
+        shown: false,
         flown: true,
         options: mission::OPTIONS,
         write: Write::Mission {

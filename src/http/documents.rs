@@ -123,14 +123,10 @@ fn write_first(
     Err(refusal.expect("there is at least one choice"))
 }
 
-/// How a browser should handle it: displayable formats are shown, others saved under a name.
+/// How a browser should handle it.
 fn disposition(plan: &Plan, format: &Format) -> HeaderValue {
     let name = file_name(plan.name.as_deref(), Some(&plan.id.to_string()), format);
-    let kind = if ["json", "svg"].contains(&format.name) {
-        "inline"
-    } else {
-        "attachment"
-    };
+    let kind = if format.shown { "inline" } else { "attachment" };
     HeaderValue::from_str(&format!("{kind}; filename=\"{name}\""))
         .expect("a file's name is ASCII letters, digits and hyphens")
 }

@@ -123,6 +123,15 @@ impl Terrain {
         ((floor - range.min).max(0.0), (range.max - ceiling).max(0.0))
     }
 
+    /// The dataset that it comes from, if any.
+    #[must_use]
+    pub fn dataset(&self) -> Option<&Dem> {
+        match self {
+            Self::Flat(_) | Self::Peaks(_) | Self::Grid(_) => None,
+            Self::Dem(dem) => Some(dem),
+        }
+    }
+
     /// Where the ground is known; `None` means everywhere.
     #[must_use]
     pub fn extent(&self) -> Option<Rect> {

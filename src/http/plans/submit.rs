@@ -23,7 +23,6 @@ use crate::job::{self, Idempotency, Plan, Submission};
 use crate::scenario::{Scenario, json};
 use crate::store::{StoreError, Submitted};
 use crate::telemetry::{Origin, spans};
-use crate::terrain::Terrain;
 
 /// `POST /plans`. The head is read before the future begins, which then holds only what is left of the request.
 pub(in crate::http) fn submit(
@@ -238,14 +237,6 @@ async fn refusal_when_draining(state: &AppState) -> Result<Option<Problem>, Prob
 /// A document of this length, bytes, is read in less time than it takes to hand it to another thread.
 const SHORT: usize = 4_096;
 
-/// Identifies the dataset of a scenario.
-fn dataset(terrain: &Terrain) -> Option<String> {
-    match terrain {
-        Terrain::Dem(dem) => Some(dem.sha256().to_owned()),
-        _ => None,
-    }
-}
-
 /// Whether reading a document may require files: escapes can hide a name. Invalid text is refused before that.
 fn may_name_a_dataset(document: &[u8]) -> bool {
     str::from_utf8(document).is_ok_and(|text| text.contains('\\') || text.contains("dataset"))
@@ -282,6 +273,8 @@ async fn accept_slowly(
 }
 
 fn submission(scenario: Scenario, caller: Caller, now_ms: i64) -> Submission {
+    let dataset = scenario.terrain.dataset();
+    let dataset = dataset.map(|dem| dem.sha256().to_owned());
     Submission {
         id: job::new_id(now_ms),
         scenario: json::write(&scenario),
@@ -295,7 +288,7 @@ fn submission(scenario: Scenario, caller: Caller, now_ms: i64) -> Submission {
         quota: caller.quota,
         webhook: None,
         idempotency: None,
-        dataset: dataset(&scenario.terrain),
+        dataset,
     }
 }
 

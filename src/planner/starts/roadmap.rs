@@ -113,7 +113,7 @@ fn legs_unwatched(scenario: &Scenario) -> usize {
     };
     let peaks = match &scenario.terrain {
         Terrain::Peaks(peaks) => peaks.peaks.len(),
-        _ => 0,
+        Terrain::Flat(_) | Terrain::Grid(_) | Terrain::Dem(_) => 0,
     };
     let met = peaks + scenario.threats.iter().map(met).sum::<usize>();
     (MET_UNWATCHED / met.max(1)).next_multiple_of(LANES)

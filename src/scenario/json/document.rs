@@ -191,10 +191,11 @@ fn layout(
 
 /// The given area, which a terrain grid must cover.
 fn covered(area: Rect, terrain: &Terrain, chart: &Chart, faults: &mut Faults) -> Option<Rect> {
-    let Terrain::Grid(grid) = terrain else {
-        return Some(area);
+    let ground = match terrain {
+        Terrain::Grid(grid) => grid.extent(),
+        // The area was trimmed to a dataset when that was found.
+        Terrain::Flat(_) | Terrain::Peaks(_) | Terrain::Dem(_) => return Some(area),
     };
-    let ground = grid.extent();
     if ground.excess(area.min).max(ground.excess(area.max)) > OVERHANG_M {
         faults.add(
             &Path::Key(&Path::Root, "area"),

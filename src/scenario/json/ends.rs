@@ -50,11 +50,12 @@ pub(super) fn check_ground(
     faults: &mut Faults,
 ) {
     let path = Path::Key(&Path::Root, name);
-    let what = match terrain {
-        Terrain::Dem(_) => "the dataset",
-        _ => "the terrain grid",
+    let known = match terrain {
+        Terrain::Flat(_) | Terrain::Peaks(_) => None,
+        Terrain::Grid(grid) => Some(("the terrain grid", grid.extent())),
+        Terrain::Dem(dem) => Some(("the dataset", dem.extent())),
     };
-    if let Some(extent) = terrain.extent().filter(|extent| !extent.contains(end.xy())) {
+    if let Some((what, extent)) = known.filter(|(_, extent)| !extent.contains(end.xy())) {
         return outside(&path, "outside-terrain", what, end, extent, chart, faults);
     }
     let ground = terrain.elevation(end.xy());

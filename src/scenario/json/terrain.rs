@@ -40,10 +40,11 @@ pub(super) fn terrain(
         }
         ("peaks", fields) => Terrain::Peaks(peaks(&fields, chart, limits, faults)?),
         ("grid", fields) => Terrain::Grid(grid(&fields, chart, limits, faults)?),
-        (_, fields) => {
+        ("dataset", fields) => {
             let (terrain, area) = dataset::ground(&fields, site, faults)?;
             return Some((terrain, Some(area)));
         }
+        _ => unreachable!("a kind that the table above lacks"),
     };
     Some((terrain, None))
 }

@@ -69,7 +69,8 @@ impl Said {
 fn read_format(name: &str) -> Result<Format, Problem> {
     let found = document::FORMATS.iter().find(|(known, _)| *known == name);
     let format = found.map(|(_, format)| *format);
-    format.ok_or_else(|| params::refused("format", name, "geotiff, asc or hgt"))
+    let names = || document::FORMATS.map(|(known, _)| known).join(", ");
+    format.ok_or_else(|| params::refused("format", name, &format!("one of {}", names())))
 }
 
 async fn permit(terrains: &Terrains, naming: Naming) -> Result<(), Problem> {

@@ -18,6 +18,15 @@ pub enum Backend {
 impl Backend {
     const SQLITE: &'static str = "sqlite";
 
+    /// What kind it is, without its address.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Sqlite => Self::SQLITE,
+            Self::Nats(_) => "nats",
+        }
+    }
+
     /// Whether several nodes can share it.
     #[must_use]
     pub fn is_shared(&self) -> bool {
@@ -51,7 +60,7 @@ impl Value for Backend {
 
     fn to_toml(&self) -> Option<String> {
         Some(match self {
-            Self::Sqlite => quoted(Self::SQLITE),
+            Self::Sqlite => quoted(self.name()),
             Self::Nats(address) => quoted(&address.to_string()),
         })
     }

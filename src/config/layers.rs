@@ -139,8 +139,9 @@ impl Layers<'_> {
                 _ => "no other process could run its plans",
             };
             self.faults.push(format!(
-                "{place} is {:?}, must be all while store is sqlite: {reason}; nodes share a store nats://...",
-                role.name()
+                "{place} is {:?}, must be all while store is {}: {reason}; nodes share a store nats://...",
+                role.name(),
+                store.name()
             ));
         }
     }

@@ -1,4 +1,4 @@
-//! Opens the store that the configuration names: one row each.
+//! Opens the store that the configuration names, and where its nodes share datasets: one arm each.
 
 use std::path::PathBuf;
 use std::sync::Arc;

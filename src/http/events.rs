@@ -82,12 +82,13 @@ pub(super) async fn follow(
 }
 
 fn read_rate(params: &Params) -> Result<f64, Problem> {
-    const ALLOWED: &str = "0 (every iteration) or from 0.01 to 1000 a second";
-    let rate_hz = params.parse("rate", ALLOWED)?.unwrap_or(DEFAULT_RATE_HZ);
+    let (least, most) = RATES_HZ.into_inner();
+    let allowed = format!("0 (every iteration) or from {least} to {most} a second");
+    let rate_hz = params.parse("rate", &allowed)?.unwrap_or(DEFAULT_RATE_HZ);
     if rate_hz == 0.0 || RATES_HZ.contains(&rate_hz) {
         Ok(rate_hz)
     } else {
-        Err(params::refused("rate", &rate_hz.to_string(), ALLOWED))
+        Err(params::refused("rate", &rate_hz.to_string(), &allowed))
     }
 }
 

@@ -8,7 +8,7 @@ use axum::extract::State;
 use axum::http::{HeaderMap, Uri};
 use serde::Serialize;
 
-use super::params::{self, Params};
+use super::params::Params;
 use super::problem::Problem;
 use super::{AppState, body};
 use crate::geometry::geodesy::{LatLon, wrapped};
@@ -54,20 +54,13 @@ pub(super) async fn sample(
     body: Body,
 ) -> Result<Json<GroundDocument>, Problem> {
     let params = Params::read(&uri, &["columns", "rows"])?;
-    let (columns, rows) = (nodes(&params, "columns")?, nodes(&params, "rows")?);
+    let nodes = |name| params.within(name, &NODES, "a whole number");
+    let columns = nodes("columns")?.unwrap_or(SOME_NODES);
+    let rows = nodes("rows")?.unwrap_or(SOME_NODES);
     let text = body::read_json(&state, &headers, body).await?;
     let rules = state.rules.clone();
     let read = move || json::read(&text, &rules, 0).map(|read| sampled(&read, columns, rows));
     Ok(Json(state.terrains.read(read).await??))
-}
-
-fn nodes(params: &Params, name: &str) -> Result<usize, Problem> {
-    let allowed = format!("a whole number from {} to {}", NODES.start(), NODES.end());
-    let count = params.parse(name, &allowed)?.unwrap_or(SOME_NODES);
-    if NODES.contains(&count) {
-        return Ok(count);
-    }
-    Err(params::refused(name, &count.to_string(), &allowed))
 }
 
 fn sampled(scenario: &Scenario, columns: usize, rows: usize) -> GroundDocument {

@@ -1,6 +1,8 @@
 //! Query parameters and plan ids, read strictly: an unknown, duplicate or unreadable parameter is refused, because
 //! ignoring it would give another answer than the one asked for.
 
+use std::fmt::Display;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use axum::extract::rejection::QueryRejection;
@@ -56,6 +58,21 @@ impl Params {
         self.text(name)
             .map(|value| value.parse().map_err(|_| refused(name, value, allowed)))
             .transpose()
+    }
+
+    /// The parsed value, which must lie in `range`; `unit` is what it is a number of, for a refusal.
+    pub(super) fn within<T: FromStr + PartialOrd + Display>(
+        &self,
+        name: &str,
+        range: &RangeInclusive<T>,
+        unit: &str,
+    ) -> Result<Option<T>, Problem> {
+        let allowed = || format!("{unit} from {} to {}", range.start(), range.end());
+        let read = |text: &str| {
+            let value = text.parse().ok().filter(|value| range.contains(value));
+            value.ok_or_else(|| refused(name, text, &allowed()))
+        };
+        self.text(name).map(read).transpose()
     }
 }
 
@@ -189,6 +206,32 @@ mod tests {
             ("/?limit=3&limit=4", Some("limit is given twice")),
         ] {
             assert_eq!(fault(query).as_deref(), expected, "{query}");
+        }
+    }
+
+    #[test]
+    fn a_number_is_within_its_range() {
+        #[track_caller]
+        fn check(query: &'static str, expected: Result<Option<f64>, &str>) {
+            let params = Params::read(&Uri::from_static(query), &["north"]).expect("known");
+            let read = params.within("north", &(-90.0..=90.0), "degrees");
+            let read = read.map_err(|problem| match problem {
+                Problem::InvalidParameter { detail, .. } => detail,
+                other => format!("{other:?}"),
+            });
+            assert_eq!(read, expected.map_err(ToOwned::to_owned), "{query}");
+        }
+        check("/", Ok(None));
+        check("/?north=-90", Ok(Some(-90.0)));
+        check("/?north=90", Ok(Some(90.0)));
+        for (query, shown) in [
+            ("/?north=90.5", "90.5"),
+            ("/?north=NaN", "NaN"),
+            ("/?north=up", "up"),
+            ("/?north=", ""),
+        ] {
+            let refused = format!("north is {shown:?}, must be degrees from -90 to 90");
+            check(query, Err(&refused));
         }
     }
 }

@@ -42,16 +42,8 @@ pub(in crate::http) async fn list(
 ) -> Result<Response, Problem> {
     let params = Params::read(&uri, &["status", "limit", "cursor"])?;
     let status = params.text("status").map(read_status).transpose()?;
-    let limit = params
-        .parse("limit", "a number from 1 to 1000")?
-        .unwrap_or(DEFAULT_PAGE);
-    if !(1..=MAX_PAGE).contains(&limit) {
-        return Err(params::refused(
-            "limit",
-            &limit.to_string(),
-            "from 1 to 1000",
-        ));
-    }
+    let limit = params.within("limit", &(1..=MAX_PAGE), "a number")?;
+    let limit = limit.unwrap_or(DEFAULT_PAGE);
     let before = params.text("cursor").map(read_cursor).transpose()?;
 
     // One more than asked for tells whether there is a next page.

@@ -1,5 +1,7 @@
 //! `GET /terrains/{name}/elevations`: a dataset sampled on a grid of degrees, for drawing.
 
+use std::ops::RangeInclusive;
+
 use axum::Json;
 use axum::extract::State;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
@@ -18,12 +20,12 @@ use crate::http::shown::Shown;
 use crate::terrain::dem::Degrees;
 use crate::terrain::{DatasetError, Datasets};
 
-/// Maximum number of samples along one side.
-const MOST_LOOKS_ALONG: usize = 512;
+/// Allowed number of samples along one side.
+const LOOKS_ALONG: RangeInclusive<usize> = 2..=512;
 /// Maximum number of samples.
 const MOST_LOOKS: usize = 131_072;
 /// Samples along one side by default.
-const LOOKS_ALONG: usize = 64;
+const SOME_LOOKS: usize = 64;
 
 const PARAMETERS: [&str; 7] = [
     "south", "west", "north", "east", "columns", "rows", "sha256",
@@ -88,7 +90,9 @@ struct Asked {
 impl Asked {
     fn read(name: String, uri: &Uri) -> Result<Self, Problem> {
         let params = Params::read(uri, &PARAMETERS)?;
-        let (columns, rows) = (looks(&params, "columns")?, looks(&params, "rows")?);
+        let looks = |name| params.within(name, &LOOKS_ALONG, "a whole number");
+        let columns = looks("columns")?.unwrap_or(SOME_LOOKS);
+        let rows = looks("rows")?.unwrap_or(SOME_LOOKS);
         if columns * rows > MOST_LOOKS {
             let allowed = format!("at most {MOST_LOOKS} divided by columns");
             return Err(params::refused("rows", &rows.to_string(), &allowed));
@@ -144,27 +148,9 @@ fn refusal(error: DatasetError, name: &str) -> Problem {
     }
 }
 
-fn looks(params: &Params, name: &str) -> Result<usize, Problem> {
-    let allowed = format!("a whole number from 2 to {MOST_LOOKS_ALONG}");
-    let looks = params.parse(name, &allowed)?.unwrap_or(LOOKS_ALONG);
-    if (2..=MOST_LOOKS_ALONG).contains(&looks) {
-        return Ok(looks);
-    }
-    Err(params::refused(name, &looks.to_string(), &allowed))
-}
-
 /// The requested area; `None` for all of it.
 fn area(params: &Params) -> Result<Option<Degrees>, Problem> {
-    let degrees = |name: &str, most: f64| -> Result<Option<f64>, Problem> {
-        let allowed = format!("degrees from {} to {most}", -most);
-        let value: Option<f64> = params.parse(name, &allowed)?;
-        match value {
-            Some(value) if !(-most..=most).contains(&value) => {
-                Err(params::refused(name, &value.to_string(), &allowed))
-            }
-            value => Ok(value),
-        }
-    };
+    let degrees = |name: &str, most: f64| params.within(name, &(-most..=most), "degrees");
     let sides = [
         degrees("south", 90.0)?,
         degrees("west", 180.0)?,

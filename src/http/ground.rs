@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use super::params::Params;
 use super::problem::Problem;
+use super::sampled::{between, to_the_centimetre};
 use super::{AppState, body};
 use crate::geometry::geodesy::{LatLon, wrapped};
 use crate::geometry::{Point2, Rect};
@@ -75,10 +76,6 @@ fn sampled(scenario: &Scenario, columns: usize, rows: usize) -> GroundDocument {
         ),
     };
     let area = Rect { min, max };
-    let between = |from: f64, to: f64, at: usize, count: usize| {
-        let share = at as f64 / (count - 1) as f64;
-        from * (1.0 - share) + to * share
-    };
     let elevation = |node: usize| {
         let x = between(area.min.x, area.max.x, node % columns, columns);
         let y = between(area.min.y, area.max.y, node / columns, rows);
@@ -89,7 +86,7 @@ fn sampled(scenario: &Scenario, columns: usize, rows: usize) -> GroundDocument {
                 lon: wrapped(x),
             }),
         };
-        (scenario.terrain.elevation(point) * 100.0).round() / 100.0
+        to_the_centimetre(scenario.terrain.elevation(point))
     };
     let place = |point: Point2| match wgs84 {
         None => Place::Local {

@@ -31,6 +31,7 @@ mod problem;
 mod readiness;
 mod request_id;
 mod retry;
+mod sampled;
 mod scenarios;
 pub mod server;
 mod service;

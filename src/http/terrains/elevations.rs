@@ -16,6 +16,7 @@ use crate::http::AppState;
 use crate::http::entity_tags::EntityTags;
 use crate::http::params::{self, Params};
 use crate::http::problem::Problem;
+use crate::http::sampled::{between, to_the_centimetre};
 use crate::http::shown::Shown;
 use crate::terrain::dem::Degrees;
 use crate::terrain::{DatasetError, Datasets};
@@ -186,20 +187,8 @@ fn area(params: &Params) -> Result<Option<Degrees>, Problem> {
 
 /// From the south-west along the parallels, in the order of a scenario's grid.
 fn places(area: Degrees, columns: usize, rows: usize) -> impl Iterator<Item = LatLon> {
-    let at = |from: f64, to: f64, i: usize, n: usize| {
-        let last = n - 1;
-        if i == last {
-            to
-        } else {
-            from + (to - from) * i as f64 / last as f64
-        }
-    };
     (0..columns * rows).map(move |look| LatLon {
-        lat: at(area.south, area.north, look / columns, rows),
-        lon: wrapped(at(area.west, area.east, look % columns, columns)),
+        lat: between(area.south, area.north, look / columns, rows),
+        lon: wrapped(between(area.west, area.east, look % columns, columns)),
     })
-}
-
-fn to_the_centimetre(metres: f64) -> f64 {
-    (metres * 100.0).round() / 100.0
 }

@@ -4,7 +4,7 @@
 //! quadratic, so the least and greatest heights above it are exact.
 
 use super::HeightRange;
-use crate::geometry::Quadratic;
+use crate::geometry::{Point2, Quadratic, Rect};
 
 /// Elevations at the nodes of a lattice, row by row.
 #[derive(Debug, Clone, Copy)]
@@ -107,8 +107,36 @@ impl<Z: Copy + Into<f64>> Cells<'_, Z> {
     }
 }
 
+/// The parts of `window` on a leg's ground track `a` .. `b` between the lines through the `sides` of a lattice. Beyond an
+/// edge the elevation at the edge applies, so the track over the ground bends where it crosses one. At least one part,
+/// in order; empty parts are left out unless the window is.
+pub(super) fn straight_parts(
+    [a, b]: [Point2; 2],
+    sides: Rect,
+    (t0, t1): (f64, f64),
+) -> impl Iterator<Item = (f64, f64)> {
+    let mut bends = [
+        share_of_way(a.x, b.x, sides.min.x),
+        share_of_way(a.x, b.x, sides.max.x),
+        share_of_way(a.y, b.y, sides.min.y),
+        share_of_way(a.y, b.y, sides.max.y),
+        t1,
+    ];
+    bends.sort_by(f64::total_cmp);
+    let (mut from, mut any) = (t0, false);
+    bends.into_iter().filter_map(move |bend| {
+        let to = bend.clamp(t0, t1);
+        let part = (from, to);
+        let counts = to > from || (to >= t1 && !any);
+        if counts {
+            (from, any) = (to, true);
+        }
+        counts.then_some(part)
+    })
+}
+
 /// The `t` at which `a + (b - a) t` equals `value`; infinite if there is none.
-pub(super) fn share_of_way(a: f64, b: f64, value: f64) -> f64 {
+fn share_of_way(a: f64, b: f64, value: f64) -> f64 {
     let t = (value - a) / (b - a);
     if t.is_nan() { f64::INFINITY } else { t }
 }

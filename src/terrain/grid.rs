@@ -3,7 +3,7 @@
 //! The least and greatest heights of a leg above it are exact.
 
 use super::HeightRange;
-use super::cells::{Cells, share_of_way};
+use super::cells::{Cells, straight_parts};
 use crate::geometry::{Point2, Rect, Segment};
 
 /// Elevations at nodes, row-major from south to north; the ground between them is bilinear.
@@ -34,44 +34,30 @@ impl Grid {
     }
 
     pub(super) fn elevation(&self, point: Point2) -> f64 {
-        let (x, y) = self.in_cells(point);
-        self.cells().elevation([x, y])
+        let place = self.in_cells(point);
+        self.cells().elevation([place.x, place.y])
     }
 
-    pub(super) fn height_range(&self, leg: &Segment, (t0, t1): (f64, f64)) -> HeightRange {
-        let (x0, y0) = self.in_cells(leg.a.xy());
-        let (x1, y1) = self.in_cells(leg.b.xy());
-        let (columns, rows) = ((self.columns - 1) as f64, (self.rows - 1) as f64);
-        let inside = |x: f64, y: f64| 0.0 <= x && x <= columns && 0.0 <= y && y <= rows;
-        if inside(x0, y0) && inside(x1, y1) {
-            return self.height_range_straight(leg, (t0, t1));
+    pub(super) fn height_range(&self, leg: &Segment, window: (f64, f64)) -> HeightRange {
+        let track = [leg.a, leg.b].map(|end| self.in_cells(end.xy()));
+        let lattice = Rect {
+            min: Point2::origin(),
+            max: Point2::new((self.columns - 1) as f64, (self.rows - 1) as f64),
+        };
+        if track.iter().all(|end| lattice.contains(*end)) {
+            return self.height_range_straight(leg, window);
         }
-        // Beyond an edge the elevation at the edge applies, so the ground track bends there.
-        let mut bends = [
-            share_of_way(x0, x1, 0.0),
-            share_of_way(x0, x1, columns),
-            share_of_way(y0, y1, 0.0),
-            share_of_way(y0, y1, rows),
-            t1,
-        ];
-        bends.sort_by(f64::total_cmp);
-        let mut range = HeightRange::EMPTY;
-        let mut from = t0;
-        for to in bends.map(|bend| bend.clamp(t0, t1)) {
-            if to > from || (to >= t1 && range == HeightRange::EMPTY) {
-                range = range.join(self.height_range_straight(leg, (from, to)));
-                from = to;
-            }
-        }
-        range
+        straight_parts(track, lattice, window)
+            .map(|part| self.height_range_straight(leg, part))
+            .fold(HeightRange::EMPTY, HeightRange::join)
     }
 
     /// As [`Grid::height_range`], for a part that crosses no edge of the grid.
     fn height_range_straight(&self, leg: &Segment, (t0, t1): (f64, f64)) -> HeightRange {
         let place = |t: f64| {
             let point = leg.at(t);
-            let (x, y) = self.in_cells(point.xy());
-            [x, y, point.z]
+            let place = self.in_cells(point.xy());
+            [place.x, place.y, point.z]
         };
         self.cells().height_range(place(t0), place(t1))
     }
@@ -85,9 +71,8 @@ impl Grid {
     }
 
     /// `point` in cells from the first node.
-    fn in_cells(&self, point: Point2) -> (f64, f64) {
-        let offset = (point - self.origin) / self.cell;
-        (offset.x, offset.y)
+    fn in_cells(&self, point: Point2) -> Point2 {
+        Point2::from((point - self.origin) / self.cell)
     }
 }
 

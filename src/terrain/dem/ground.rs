@@ -14,7 +14,7 @@ use crate::geometry::geodesy::{LatLon, TangentPlane};
 use crate::geometry::geoid::Geoid;
 use crate::geometry::{Point2, Point3, Rect, Segment};
 use crate::terrain::HeightRange;
-use crate::terrain::cells::{Cells, Place, share_of_way};
+use crate::terrain::cells::{Cells, Place, straight_parts};
 
 /// Largest height error of a chord, metres.
 const CHORD_M: f64 = 2.5e-4;
@@ -187,30 +187,17 @@ impl Dem {
     pub(in crate::terrain) fn height_range_beyond(
         &self,
         leg: &Segment,
-        (t0, t1): (f64, f64),
+        window: (f64, f64),
         band: HeightRange,
     ) -> HeightRange {
         let mut range = HeightRange::EMPTY;
-        let Rect { min, max } = self.extent;
-        if self.extent.contains(leg.a.xy()) && self.extent.contains(leg.b.xy()) {
-            self.widen(leg.at(t0), leg.at(t1), band, &mut range);
-            return range;
-        }
-        // Beyond the extent the elevation at the edge applies, so the ground track bends there.
-        let (a, b) = (leg.a, leg.b);
-        let mut bends = [
-            share_of_way(a.x, b.x, min.x),
-            share_of_way(a.x, b.x, max.x),
-            share_of_way(a.y, b.y, min.y),
-            share_of_way(a.y, b.y, max.y),
-            t1,
-        ];
-        bends.sort_by(f64::total_cmp);
-        let mut from = t0;
-        for to in bends.map(|bend| bend.clamp(t0, t1)) {
-            if to > from || (to >= t1 && range == HeightRange::EMPTY) {
-                self.widen(leg.at(from), leg.at(to), band, &mut range);
-                from = to;
+        let mut widen = |(from, to)| self.widen(leg.at(from), leg.at(to), band, &mut range);
+        let track = [leg.a.xy(), leg.b.xy()];
+        if track.iter().all(|end| self.extent.contains(*end)) {
+            widen(window);
+        } else {
+            for part in straight_parts(track, self.extent, window) {
+                widen(part);
             }
         }
         range

@@ -10,7 +10,7 @@ use crate::terrain::{DatasetError, Datasets, Found, Terrain};
 
 use super::chart::{Chart, Earth};
 use super::fault::Faults;
-use super::fields::{Fields, nearest};
+use super::fields::{Fields, hint};
 use super::path::Path;
 use super::tree::Node;
 use super::value::{At, quote};
@@ -178,9 +178,7 @@ fn known(name: &str, names: &[String]) -> String {
             .to_owned();
     }
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let hint = nearest(name, &names)
-        .map(|name| format!(", did you mean {name}?"))
-        .unwrap_or_default();
+    let hint = hint(name, &names);
     let more = match names.len().saturating_sub(LISTED) {
         0 => String::new(),
         more => format!(" or {more} more"),

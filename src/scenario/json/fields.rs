@@ -28,11 +28,7 @@ impl<'a> At<'a> {
                     allowed,
                     faults,
                 ),
-                Some(slot) if found[slot].is_some() => {
-                    faults.add(&path, "duplicate-key", || {
-                        format!("{key} is given twice, must be given once")
-                    });
-                }
+                Some(slot) if found[slot].is_some() => given_twice(&path, key, faults),
                 Some(slot) => found[slot] = Some(node),
             }
         }
@@ -169,9 +165,7 @@ pub(super) fn unknown_key(
         parent
     };
     faults.add(path, code, || {
-        let hint = nearest(key, allowed)
-            .map(|name| format!(", did you mean {name}?"))
-            .unwrap_or_default();
+        let hint = hint(key, allowed);
         let allowed = if allowed.is_empty() {
             "nothing".to_owned()
         } else {
@@ -181,8 +175,22 @@ pub(super) fn unknown_key(
     });
 }
 
+/// Report a key that an object has more than once.
+pub(super) fn given_twice(path: &Path<'_>, key: &str, faults: &mut Faults) {
+    faults.add(path, "duplicate-key", || {
+        format!("{key} is given twice, must be given once")
+    });
+}
+
+/// The end of a message about a name that is not allowed: the one that it probably stands for.
+pub(super) fn hint(key: &str, allowed: &[&str]) -> String {
+    nearest(key, allowed)
+        .map(|name| format!(", did you mean {name}?"))
+        .unwrap_or_default()
+}
+
 /// The allowed name that `key` probably stands for: ignoring case and separators, at most two edits away.
-pub(super) fn nearest<'n>(key: &str, allowed: &[&'n str]) -> Option<&'n str> {
+fn nearest<'n>(key: &str, allowed: &[&'n str]) -> Option<&'n str> {
     const MAX_CHARS: usize = 40;
     if key.len() > MAX_CHARS {
         return None;

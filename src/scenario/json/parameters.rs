@@ -6,7 +6,7 @@ use crate::scenario::Quadrature;
 
 use super::AlgorithmRule;
 use super::fault::Faults;
-use super::fields::unknown_key;
+use super::fields::{given_twice, unknown_key};
 use super::path::Path;
 use super::ranges::{GAP, Range, THREADS};
 use super::tree::Node;
@@ -125,9 +125,7 @@ pub(super) fn parameters(
         };
         let path = Path::Key(at.path, key);
         if std::mem::replace(&mut seen[slot], true) {
-            faults.add(&path, "duplicate-key", || {
-                format!("{key} is given twice, must be given once")
-            });
+            given_twice(&path, key, faults);
             continue;
         }
         let at = At { node, path: &path };

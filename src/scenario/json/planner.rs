@@ -6,7 +6,7 @@ use crate::scenario::{PlannerSettings, Seeding, Smoothing, WarmStart, work};
 
 use super::chart::Chart;
 use super::fault::Faults;
-use super::fields::{Fields, nearest};
+use super::fields::{Fields, hint};
 use super::parameters::{Parameters, parameters};
 use super::path::Path;
 use super::ranges::{DEGREE, MIN_POPULATION, SEED, SPACING, TIME_LIMIT_MS};
@@ -128,13 +128,11 @@ fn algorithm<'r>(at: At<'_>, rules: &'r Rules, faults: &mut Faults) -> Option<&'
     if found.is_none() {
         faults.add(at.path, "unknown-algorithm", || {
             let known: Vec<&str> = rules.algorithms.iter().map(|rule| rule.name).collect();
-            let hint = nearest(name, &known)
-                .map(|name| format!(", did you mean {name}?"))
-                .unwrap_or_default();
             format!(
-                "algorithm is {}, must be one of {}{hint}",
+                "algorithm is {}, must be one of {}{}",
                 quote(name),
-                known.join(", ")
+                known.join(", "),
+                hint(name, &known)
             )
         });
     }

@@ -45,6 +45,9 @@ pub enum Datum {
 }
 
 impl Datum {
+    /// Every one.
+    pub const ALL: [Self; 2] = [Self::Msl, Self::Ellipsoid];
+
     /// The name used in `altitude_datum`.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -163,6 +163,20 @@ pub enum Seeding {
     Random,
 }
 
+impl Seeding {
+    /// Every one.
+    pub const ALL: [Self; 2] = [Self::Tangent, Self::Random];
+
+    /// The name used in `seeding`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tangent => "tangent",
+            Self::Random => "random",
+        }
+    }
+}
+
 /// A known route to start from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum WarmStart {
@@ -188,4 +202,18 @@ pub enum Quadrature {
     Integral,
     /// By five samples per leg, as printed; kept to reproduce the paper's tables.
     Paper,
+}
+
+impl Quadrature {
+    /// Every one; the first is the default.
+    pub const ALL: [Self; 2] = [Self::Integral, Self::Paper];
+
+    /// The name used in `quadrature`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Integral => "integral",
+            Self::Paper => "paper",
+        }
+    }
 }

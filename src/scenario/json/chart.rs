@@ -345,12 +345,7 @@ fn blame(
 /// The datum of altitudes.
 fn datum(fields: &Fields<'_>, faults: &mut Faults) -> Option<Datum> {
     fields.or("altitude_datum", Datum::Msl, faults, |at, faults| {
-        let choice = at.choice(&["msl", "ellipsoid"], faults)?;
-        Some(if choice == "msl" {
-            Datum::Msl
-        } else {
-            Datum::Ellipsoid
-        })
+        at.named(Datum::ALL, Datum::name, faults)
     })
 }
 

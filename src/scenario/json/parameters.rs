@@ -44,7 +44,10 @@ pub enum Takes {
     },
 }
 
-const QUADRATURES: &[&str] = &["integral", "paper"];
+const QUADRATURES: [&str; Quadrature::ALL.len()] = {
+    let [integral, paper] = Quadrature::ALL;
+    [integral.name(), paper.name()]
+};
 const NO_GAP: f64 = 0.0;
 const ONE_THREAD: usize = 1;
 
@@ -54,7 +57,7 @@ pub const COMMON: [CommonParameter; 3] = [
         name: "quadrature",
         takes: Takes::Choice {
             default: QUADRATURES[0],
-            choices: QUADRATURES,
+            choices: &QUADRATURES,
         },
         meaning: "how a leg is priced: integral exactly, paper by the published five samples",
     },
@@ -131,12 +134,8 @@ pub(super) fn parameters(
         let at = At { node, path: &path };
         sound &= match allowed[slot] {
             "quadrature" => at
-                .choice(QUADRATURES, faults)
-                .map(|choice| {
-                    if choice == "paper" {
-                        parameters.quadrature = Quadrature::Paper;
-                    }
-                })
+                .named(Quadrature::ALL, Quadrature::name, faults)
+                .map(|quadrature| parameters.quadrature = quadrature)
                 .is_some(),
             "gap" => at
                 .number(GAP, faults)

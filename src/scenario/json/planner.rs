@@ -65,11 +65,7 @@ pub(super) fn planner(
         _ => at.whole(TIME_LIMIT_MS, faults).map(Some),
     });
     let seeding = fields.or("seeding", Seeding::Tangent, faults, |at, faults| {
-        at.choice(&["tangent", "random"], faults)
-            .map(|choice| match choice {
-                "random" => Seeding::Random,
-                _ => Seeding::Tangent,
-            })
+        at.named(Seeding::ALL, Seeding::name, faults)
     });
     #[expect(
         clippy::redundant_closure_for_method_calls,

@@ -139,6 +139,17 @@ impl<'a> At<'a> {
         None
     }
 
+    /// The one of `all` that has this name.
+    pub(super) fn named<T: Copy, const N: usize>(
+        self,
+        all: [T; N],
+        name: impl Fn(T) -> &'static str,
+        faults: &mut Faults,
+    ) -> Option<T> {
+        let choice = self.choice(&all.map(&name), faults)?;
+        all.into_iter().find(|one| name(*one) == choice)
+    }
+
     /// How many items the array has.
     pub(super) fn len(self, faults: &mut Faults) -> Option<usize> {
         match self.node {

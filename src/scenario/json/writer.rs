@@ -6,7 +6,7 @@ use serde::{Serialize, Serializer};
 
 use crate::geometry::geodesy::LatLon;
 use crate::geometry::{Point2, Point3};
-use crate::scenario::{Frame, PlannerSettings, Quadrature, Scenario, Seeding, WarmStart};
+use crate::scenario::{Frame, PlannerSettings, Scenario, WarmStart};
 use crate::terrain::{Peak, Terrain};
 use crate::threat::{Shape, Threat};
 
@@ -386,10 +386,7 @@ impl<'a> WirePlanner<'a> {
             iterations: planner.iterations,
             seed: planner.seed,
             time_limit_ms: planner.time_limit_ms,
-            seeding: match planner.seeding {
-                Seeding::Tangent => "tangent",
-                Seeding::Random => "random",
-            },
+            seeding: planner.seeding.name(),
             polish: planner.polish,
             warm_start: planner
                 .warm_start
@@ -400,10 +397,7 @@ impl<'a> WirePlanner<'a> {
                 spacing: Figure(planner.smoothing.spacing),
             },
             parameters: WireParameters {
-                quadrature: match planner.quadrature {
-                    Quadrature::Integral => "integral",
-                    Quadrature::Paper => "paper",
-                },
+                quadrature: planner.quadrature.name(),
                 gap: Figure(planner.gap),
                 threads: planner.threads,
                 constants: constants.collect(),

@@ -42,6 +42,7 @@ mod status;
 mod terrains;
 mod throttle;
 mod tickets;
+mod time;
 mod warm_start;
 pub mod webhook;
 

@@ -3,10 +3,10 @@
 use axum::body::Body;
 use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse, Response};
-use jiff::Timestamp;
 use serde::{Serialize, Serializer};
 
 use super::problem::FailureDocument;
+use super::time::Time;
 use crate::job::{Plan, PlanId};
 
 /// The body of `GET /plans/{id}` and the data of `status` events.
@@ -131,31 +131,4 @@ pub(super) fn etag(plan: &Plan) -> HeaderValue {
     let position = plan.queue_position.unwrap_or(0);
     HeaderValue::from_str(&format!("W/\"{}-{position}\"", plan.revision))
         .expect("digits are visible ASCII")
-}
-
-/// Milliseconds since 1970, written as UTC.
-#[derive(Debug)]
-struct Time(i64);
-
-impl Serialize for Time {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let time = Timestamp::from_millisecond(self.0).unwrap_or(Timestamp::UNIX_EPOCH);
-        serializer.collect_str(&format_args!("{time:.3}"))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn times_are_utc_with_milliseconds() {
-        for (ms, expected) in [
-            (1_700_000_000_123, "2023-11-14T22:13:20.123Z"),
-            (0, "1970-01-01T00:00:00.000Z"),
-        ] {
-            let written = serde_json::to_value(Time(ms)).expect("a text");
-            assert_eq!(written, expected);
-        }
-    }
 }

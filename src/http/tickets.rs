@@ -10,12 +10,13 @@ use super::caller::Caller;
 use super::params::{Id, NoParams};
 use super::problem::Problem;
 use super::status::location;
+use super::time::Time;
 
 /// The ticket, when it expires, and the streams it opens.
 #[derive(Serialize)]
 pub(super) struct TicketDocument {
     ticket: String,
-    expires_at: String,
+    expires_at: Time,
     events: String,
 }
 
@@ -31,7 +32,7 @@ pub(super) async fn issue(
     let (ticket, until) = ticket.map_err(Problem::Unauthorized)?;
     let document = TicketDocument {
         events: format!("{}/events?ticket={ticket}", location(id)),
-        expires_at: format!("{until:.3}"),
+        expires_at: until.into(),
         ticket,
     };
     Ok((StatusCode::CREATED, Json(document)))

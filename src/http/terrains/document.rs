@@ -1,10 +1,10 @@
 //! A dataset as clients see it.
 
-use jiff::Timestamp;
 use serde::Serialize;
 
 use crate::catalogue::Entry;
 use crate::geometry::geodesy::wrapped;
+use crate::http::time::Time;
 use crate::terrain::dem::{Degrees, Format};
 
 /// Names of the formats.
@@ -30,7 +30,7 @@ pub(super) struct TerrainDocument {
     min: Option<f64>,
     max: Option<f64>,
     no_data_share: Option<f64>,
-    uploaded_at: Option<String>,
+    uploaded_at: Option<Time>,
     mounted: bool,
     in_use: u64,
 }
@@ -64,7 +64,6 @@ impl TerrainDocument {
         let mut found = found.filter(|(_, format)| *format == entry.metadata.format);
         let (format, _) = found.next().expect("every format has a name");
         let finite = |value: f64| value.is_finite().then_some(value);
-        let uploaded = entry.uploaded_ms.map(Timestamp::from_millisecond);
         Self {
             name: entry.name,
             sha256: entry.sha256,
@@ -85,7 +84,7 @@ impl TerrainDocument {
             min: entry.survey.and_then(|survey| finite(survey.min)),
             max: entry.survey.and_then(|survey| finite(survey.max)),
             no_data_share: entry.survey.map(|survey| survey.no_data_share),
-            uploaded_at: uploaded.and_then(Result::ok).map(|at| at.to_string()),
+            uploaded_at: entry.uploaded_ms.map(Time),
             mounted,
             in_use,
         }

@@ -25,6 +25,7 @@ pub use secret::Secrets;
 use super::params;
 use super::problem::Problem;
 use super::status::StatusDocument;
+use super::time::Time;
 use crate::job::{Owner, PlanId};
 use crate::store::{Clock, Store, StoreError, Webhook};
 use address::Target;
@@ -225,17 +226,15 @@ fn again(id: PlanId, tries: u32, why: &str) -> Option<i64> {
 struct Message {
     r#type: &'static str,
     /// Time of the end.
-    timestamp: String,
+    timestamp: Time,
     data: StatusDocument,
 }
 
 impl Message {
     fn of(webhook: Webhook) -> Self {
-        let ended_ms = webhook.plan.finished_ms.unwrap_or_default();
-        let ended = Timestamp::from_millisecond(ended_ms).unwrap_or(Timestamp::UNIX_EPOCH);
         Self {
             r#type: "plan.ended",
-            timestamp: format!("{ended:.3}"),
+            timestamp: Time(webhook.plan.finished_ms.unwrap_or_default()),
             data: webhook.plan.into(),
         }
     }

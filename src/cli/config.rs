@@ -1,11 +1,19 @@
 //! The settings in effect, for every command that heeds them.
 
-use anyhow::anyhow;
+use std::path::PathBuf;
 
-use crate::config::{self, Flags, Loaded};
+use anyhow::{Context as _, anyhow};
+
+use crate::config::{self, Config, Flags, Loaded};
 
 /// The settings of these flags, of the environment, and of the file that the flags name.
 pub(super) fn of_environment(flags: &Flags) -> anyhow::Result<Loaded> {
     config::load(flags, |name| std::env::var_os(name))
         .map_err(|faults| anyhow!("wrong configuration\n  {}", faults.join("\n  ")))
+}
+
+/// The directory of the plans.
+pub(super) fn data_dir(config: &Config) -> anyhow::Result<PathBuf> {
+    let data_dir = config.data_dir.clone();
+    data_dir.context("the user has no home; name a directory with --data-dir")
 }

@@ -8,11 +8,10 @@ mod parts;
 
 use std::io::Write as _;
 use std::net::SocketAddr;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use anyhow::Context;
+use anyhow::Context as _;
 use axum::Router;
 use tokio::net::{TcpListener, TcpSocket};
 use tokio::sync::watch;
@@ -166,11 +165,6 @@ fn slots(config: &Config) -> usize {
     } else {
         0
     }
-}
-
-fn data_dir(config: &Config) -> anyhow::Result<PathBuf> {
-    let data_dir = config.data_dir.clone();
-    data_dir.context("the user has no home; name a directory with --data-dir")
 }
 
 /// Bind the address, with the largest backlog that the system allows.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{anyhow, bail};
 use clap::{Args, Subcommand};
 
 use super::{config, exit, files};
@@ -51,12 +51,11 @@ impl Location {
         let config = config::of_environment(&Flags::with_file(self.config))?.config;
         // An empty variable counts as unset.
         let given = self.store.filter(|store| !store.is_empty());
-        let store = match given {
-            Some(store) => {
-                let read: Result<Backend, _> = store.parse();
-                read.map_err(|refused| anyhow!("--store {refused}"))?
-            }
-            None => config.store,
+        let store: Backend = match given {
+            Some(store) => store
+                .parse()
+                .map_err(|refused| anyhow!("--store {refused}"))?,
+            None => config.store.clone(),
         };
         // A store that is not a file has its own tools.
         if store.is_shared() {
@@ -64,9 +63,7 @@ impl Location {
                 "the plans are on NATS servers, and this looks after a file of one machine: {instead}"
             );
         }
-        self.data_dir
-            .or(config.data_dir)
-            .context("the user has no home; name a directory with --data-dir")
+        self.data_dir.map_or_else(|| config::data_dir(&config), Ok)
     }
 }
 

@@ -1,7 +1,6 @@
 //! `noctule terrain`: the content of an elevation file, and its elevations at points.
 
 use std::fmt::Write as _;
-use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -108,13 +107,8 @@ fn name(sample_type: SampleType) -> &'static str {
 }
 
 fn sample(dataset: &Dataset, points: &Path) -> anyhow::Result<String> {
-    let text = if points == Path::new("-") {
-        let mut text = String::new();
-        io::stdin().read_to_string(&mut text).map(|_| text)
-    } else {
-        std::fs::read_to_string(points)
-    };
-    let text = text.with_context(|| format!("cannot read {}", points.display()))?;
+    let text = String::from_utf8(files::read(points)?)
+        .with_context(|| format!("cannot read {}", points.display()))?;
     let places = text
         .lines()
         .enumerate()

@@ -224,5 +224,15 @@ pub fn by_name(name: &str) -> Option<&'static Algorithm> {
     ALL.iter().find(|algorithm| algorithm.name == name)
 }
 
+/// As many of `count` as make up `share`, 0 to 1, rounded down.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a share below 1 of a count"
+)]
+pub(crate) fn share_of(count: usize, share: f64) -> usize {
+    (count as f64 * share) as usize
+}
+
 #[cfg(test)]
 mod tests;

@@ -6,6 +6,7 @@
 use super::ranking::Ranking;
 use super::{
     Algorithm, Fitness, Objective, Optimizer, Parameter, Random, Settings, Swarm, parameter,
+    share_of,
 };
 
 /// The entry in the table of algorithms.
@@ -85,15 +86,6 @@ const STAGNATION: f64 = 1e-3;
 
 /// Initial fraction of the swarm from which a walk may start.
 const ELITE: f64 = 0.2;
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a share below 1 of a count"
-)]
-fn share_of(count: usize, share: f64) -> usize {
-    (count as f64 * share) as usize
-}
 
 /// A running search.
 pub(super) struct TmsSba {

@@ -8,7 +8,7 @@ use super::starts::Starts;
 use super::{StopReason, same, starts, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
-use crate::optimizer::{self, Algorithm, Fitness, Optimizer, Settings};
+use crate::optimizer::{self, Algorithm, Fitness, Optimizer, Settings, share_of};
 
 /// Share of the iterations that a guided search spends on coarse routes.
 const COARSE_SHARE: f64 = 0.4;
@@ -90,15 +90,6 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
     }
     elites.extend(best_starts);
     finish(model, reason, &elites, &starts.beyond, log)
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a share below 1 of a count"
-)]
-fn share_of(count: usize, share: f64) -> usize {
-    (count as f64 * share) as usize
 }
 
 /// Start the algorithm and do `iterations`; where the range begins with 0, the first evaluation is

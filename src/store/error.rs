@@ -57,6 +57,11 @@ impl StoreError {
             detail: detail.into(),
         }
     }
+
+    /// Asked after [`Store::close`](super::Store::close).
+    pub(crate) fn closed() -> Self {
+        Self::unavailable("the store is closed")
+    }
 }
 
 impl From<Refused> for StoreError {

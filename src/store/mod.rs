@@ -270,6 +270,9 @@ pub struct ListQuery {
     pub limit: usize,
 }
 
+/// Number of runs in [`Stats::mean_run_ms`].
+const RUNS_IN_MEAN: u32 = 20;
+
 /// Counts of a store.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stats {
@@ -279,7 +282,7 @@ pub struct Stats {
     pub oldest_queued_ms: Option<i64>,
     /// Plans being run.
     pub running: u64,
-    /// Mean run time of the last few plans that ended with a result, milliseconds; `None` before the first.
+    /// Mean run time of the last 20 plans that ended with a result, milliseconds; `None` before the first.
     pub mean_run_ms: Option<f64>,
     /// Plans that all nodes of the store together run at the same time; `None` when one process alone uses it.
     pub slots: Option<usize>,

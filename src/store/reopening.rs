@@ -81,9 +81,7 @@ impl Reopening {
     async fn opened(&self) -> State {
         let mut state = self.state.clone();
         let opened = state.wait_for(Result::is_ok).await;
-        opened
-            .map_err(|_| StoreError::unavailable("the store is closed"))?
-            .clone()
+        opened.map_err(|_| StoreError::closed())?.clone()
     }
 
     /// Pass an answer on, and have the store reopened when the answer says that it is damaged or missing.

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use tokio::runtime::Handle;
 
-use super::{data_dir, slots};
+use super::slots;
 use crate::catalogue::Shelf;
+use crate::cli::config::data_dir;
 use crate::config::{self, Address, Backend, Config};
 use crate::store::jetstream::{JetStreamShelf, JetStreamStore, Settings};
 use crate::store::reopening::{Open, Reopening};

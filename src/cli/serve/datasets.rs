@@ -6,8 +6,9 @@ use std::time::Duration;
 use anyhow::Context as _;
 use tokio::time::timeout;
 
-use super::{backend, data_dir};
+use super::backend;
 use crate::catalogue::{Catalogue, CatalogueError, Directories, Mounted, Sharing, lay_down};
+use crate::cli::config::data_dir;
 use crate::config::Config;
 use crate::store;
 use crate::telemetry::Instruments;

@@ -13,6 +13,7 @@ use super::fault::Faults;
 use super::fields::Fields;
 use super::path::Path;
 use super::planner::planner;
+use super::sketch::MIN_PADDING_M;
 use super::terrain;
 use super::threats::threats;
 use super::tree::Node;
@@ -36,8 +37,6 @@ const FIELDS: &[&str] = &[
 
 /// An area may extend beyond the terrain grid by this much, for rounding, metres; it is then trimmed.
 const OVERHANG_M: f64 = 1e-6;
-/// Least padding of the default area on each side, metres.
-const MIN_PADDING_M: f64 = 10.0;
 
 /// Read the document; `None` has added at least one fault.
 pub(super) fn document(

@@ -7,15 +7,13 @@ use crate::terrain::dem::Degrees;
 use super::chart::Earth;
 use super::dataset::Named;
 use super::fields::Fields;
-use super::sketch;
+use super::sketch::{self, GRAIN, down, up};
 use super::tree::Node;
 
 /// Points along each side of a rectangle at which its place on the earth is looked up.
 const LOOKS: usize = 24;
 /// Most rounds of fitting a box of degrees into the data.
 const ROUNDS: usize = 8;
-/// Corners of a fitted area are rounded inwards to 1 / this degrees.
-const GRAIN: f64 = 1e6;
 
 /// The part of `wanted` that has data, as the default area; all of it where that would cut off one of `ends`.
 pub(super) fn over_dataset(
@@ -130,14 +128,6 @@ fn inside(rect: Rect, plane: &TangentPlane) -> Option<LatLonBox> {
         [up(min[0]), up(middle + min[1])],
         [down(max[0]), down(middle + max[1])],
     )
-}
-
-fn up(degrees: f64) -> f64 {
-    (degrees * GRAIN).ceil() / GRAIN
-}
-
-fn down(degrees: f64) -> f64 {
-    (degrees * GRAIN).floor() / GRAIN
 }
 
 /// The box from the south-west to the north-east corner, `[lat, lon]`; `None` if it is empty.

@@ -18,11 +18,11 @@ pub(super) const MAX_WIDTH_M: f64 = 200e3;
 /// A default area takes at most this fraction of [`MAX_WIDTH_M`].
 const FITTING: f64 = 0.99;
 /// Least padding of the default area on each side, metres.
-const MIN_PADDING_M: f64 = 10.0;
+pub(super) const MIN_PADDING_M: f64 = 10.0;
 /// Metres per degree of latitude, approximately.
 const DEGREE_M: f64 = 111_320.0;
-/// The default area is rounded outwards to 1 / this degrees, for readability.
-const GRAIN: f64 = 1e6;
+/// Corners of a default area are rounded to 1 / this degrees, for readability.
+pub(super) const GRAIN: f64 = 1e6;
 
 /// Approximate location of everything in a document.
 #[derive(Debug, Clone)]
@@ -92,8 +92,6 @@ impl Sketch {
         let diagonal = (width * width + height * height).sqrt();
         let padding = (diagonal / 4.0).max(self.climb_m).min(room);
         let padding = padding.max(MIN_PADDING_M) / DEGREE_M;
-        let down = |degrees: f64| (degrees * GRAIN).floor() / GRAIN;
-        let up = |degrees: f64| (degrees * GRAIN).ceil() / GRAIN;
         LatLonBox {
             min: LatLon {
                 lat: down(self.south - padding).max(-90.0),
@@ -105,6 +103,16 @@ impl Sketch {
             },
         }
     }
+}
+
+/// The next multiple of the grain, from `degrees` upwards.
+pub(super) fn up(degrees: f64) -> f64 {
+    (degrees * GRAIN).ceil() / GRAIN
+}
+
+/// The next multiple of the grain, from `degrees` downwards.
+pub(super) fn down(degrees: f64) -> f64 {
+    (degrees * GRAIN).floor() / GRAIN
 }
 
 /// A place that a default area must contain, with its reach around it.

@@ -9,6 +9,7 @@ use tokio::sync::{oneshot, watch};
 use tokio::time::Instant;
 use tracing::field::display;
 
+use super::JetStream;
 use super::connect::plan_of;
 use super::errors::lacks_consumers;
 use super::lane::{Lane, Version};
@@ -17,7 +18,6 @@ use super::orphans::Orphan;
 use super::record::{Document, Record, State};
 use super::steps::Change;
 use super::view::Standing;
-use super::{JetStream, closed};
 use crate::job::{Plan, PlanId, Status};
 use crate::store::{Ending, Lease, StoreError, lost};
 
@@ -44,7 +44,9 @@ impl JetStream {
             store: Arc::clone(self),
             take,
         };
-        (&mut caller.take).await.unwrap_or_else(|_| Err(closed()))
+        (&mut caller.take)
+            .await
+            .unwrap_or_else(|_| Err(StoreError::closed()))
     }
 
     async fn take_for(&self, mut give: oneshot::Sender<Result<Lease, StoreError>>) {
@@ -58,7 +60,7 @@ impl JetStream {
                 return;
             }
             let job = if *end.borrow() {
-                Err(closed())
+                Err(StoreError::closed())
             } else {
                 self.next_job().await
             };

@@ -9,10 +9,7 @@ use super::record::{Placed, Record, State};
 use super::turns::{self, Lanes};
 use super::view::Standing;
 use crate::job::{Owner, Plan, PlanId, Status};
-use crate::store::{DatasetUse, ListQuery, Stats, StoreError, TOMBSTONE_MS};
-
-/// Number of runs in the mean time.
-const RUNS: usize = 20;
+use crate::store::{DatasetUse, ListQuery, RUNS_IN_MEAN, Stats, StoreError, TOMBSTONE_MS};
 
 /// The plans, and their counts.
 #[derive(Debug)]
@@ -136,7 +133,7 @@ impl Known {
             && let Some((end_ms, began_ms)) = plan.finished_ms.zip(plan.started_ms)
         {
             self.run_times.push_back(end_ms - began_ms);
-            if self.run_times.len() > RUNS {
+            if self.run_times.len() > RUNS_IN_MEAN as usize {
                 self.run_times.pop_front();
             }
         }

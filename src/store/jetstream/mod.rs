@@ -202,7 +202,7 @@ impl JetStreamStore {
 
     fn open_store(&self) -> Result<&Arc<JetStream>, StoreError> {
         if *self.store.end.borrow() {
-            return Err(closed());
+            return Err(StoreError::closed());
         }
         if *self.store.vanished.borrow() {
             return Err(streams::vanished());
@@ -429,8 +429,4 @@ async fn detached<T: Send + 'static>(
                 "a task of the store broke: {broken}"
             )))
         })
-}
-
-fn closed() -> StoreError {
-    StoreError::unavailable("the store is closed")
 }

@@ -326,7 +326,3 @@ impl From<rusqlite::Error> for StoreError {
         }
     }
 }
-
-fn closed() -> StoreError {
-    StoreError::unavailable("the store is closed".to_owned())
-}

@@ -8,20 +8,19 @@ use rusqlite::types::{Value, ValueRef};
 use rusqlite::{Connection, OpenFlags, OptionalExtension, params_from_iter};
 use tokio::sync::Semaphore;
 
+use super::BUSY_TIMEOUT;
 use super::opening::Place;
 use super::packed;
 use super::row::{COLUMNS, PlanRow};
 use super::unreadable::{Passed, Unreadable};
-use super::{BUSY_TIMEOUT, closed};
 use crate::export::document::Incumbent;
 use crate::job::{Event, NumberedEvent, Plan, PlanId, Status};
-use crate::store::{DatasetUse, EventPage, ListQuery, Stats, StoreError, TOMBSTONE_MS, Tombstone};
+use crate::store::{
+    DatasetUse, EventPage, ListQuery, RUNS_IN_MEAN, Stats, StoreError, TOMBSTONE_MS, Tombstone,
+};
 
 /// Concurrent reads; further ones wait.
 const CONNECTIONS: u32 = 8;
-
-/// Number of recent runs that [`Stats::mean_run_ms`] averages.
-const RUNS: i64 = 20;
 
 /// The pool of read-only connections.
 pub(super) struct Readers {
@@ -50,7 +49,7 @@ impl Readers {
             .clone()
             .acquire_owned()
             .await
-            .map_err(|_| closed())?;
+            .map_err(|_| StoreError::closed())?;
         let readers = Arc::clone(self);
         let task = tokio::task::spawn_blocking(move || {
             let mut connection = readers.take()?;
@@ -319,7 +318,7 @@ pub(super) fn stats(connection: &Connection) -> Result<Stats, StoreError> {
             "SELECT avg(finished_ms - started_ms) FROM (SELECT started_ms, finished_ms FROM plans \
              WHERE stop_reason IS NOT NULL ORDER BY finished_ms DESC LIMIT ?1)",
         )?
-        .query_row([RUNS], |row| row.get(0))?;
+        .query_row([RUNS_IN_MEAN], |row| row.get(0))?;
     let oldest_queued_ms = connection
         .prepare_cached(
             "SELECT created_ms FROM plans INDEXED BY plans_queue WHERE status = 'queued' \

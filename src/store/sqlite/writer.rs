@@ -13,7 +13,6 @@ use tokio::runtime::Handle;
 use tokio::sync::{oneshot, watch};
 
 use super::claims::{Claimer, Claims, When};
-use super::closed;
 use super::opening::Place;
 use super::records::Records;
 use super::transaction::{Effect, Transaction};
@@ -50,7 +49,7 @@ where
 {
     Box::new(Change {
         work,
-        done: Err(closed()),
+        done: Err(StoreError::closed()),
         answer,
     })
 }
@@ -153,14 +152,14 @@ impl Writer {
             // If the caller was dropped, nobody waits; the change stands all the same.
             reply.send(outcome).ok();
         })))?;
-        answer.await.map_err(|_| closed())?
+        answer.await.map_err(|_| StoreError::closed())?
     }
 
     /// Wait for a plan to run.
     pub(super) async fn claim(&self, when: When) -> Result<Lease, StoreError> {
         let (reply, answer) = oneshot::channel();
         self.send(Message::Claim(Claimer { when, reply }))?;
-        let delivery = answer.await.map_err(|_| closed())??;
+        let delivery = answer.await.map_err(|_| StoreError::closed())??;
         Ok(delivery.accept())
     }
 
@@ -173,7 +172,9 @@ impl Writer {
     }
 
     fn send(&self, message: Message) -> Result<(), StoreError> {
-        self.messages.send(message).map_err(|_| closed())
+        self.messages
+            .send(message)
+            .map_err(|_| StoreError::closed())
     }
 }
 

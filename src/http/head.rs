@@ -17,7 +17,7 @@ use super::problem::Problem;
 pub(super) const MOST_BYTES: usize = 64 * 1024;
 
 /// Maximum number of headers; hyper's own in HTTP/1.
-const MOST_HEADERS: usize = 100;
+pub(super) const MOST_HEADERS: usize = 100;
 
 /// The layer before all routes; a single one, because each layer costs every request.
 #[derive(Clone)]

@@ -1,8 +1,11 @@
 //! A problem's explanation for people.
 
-use super::Problem;
+use super::{A_PLACE_S, Problem};
 use crate::http::auth::TooMany;
+use crate::http::head::MOST_HEADERS;
+use crate::http::prefer::MAX_WAIT_S;
 use crate::http::shown::Shown;
+use crate::http::terrains::SLOWEST;
 use crate::scenario::json::MORE_FAULTS;
 use crate::store::{Tombstone, Trouble};
 
@@ -29,7 +32,7 @@ impl Problem {
             }
             Self::Malformed => "its first line, a header or the length of its body cannot be read, see RFC 9112".to_owned(),
             Self::HeadTooLarge(limit) => {
-                format!("request line and headers together may have {limit} bytes, and there may be 100 headers")
+                format!("request line and headers together may have {limit} bytes, and there may be {MOST_HEADERS} headers")
             }
             Self::BodyIncomplete => "the connection ended before the body did".to_owned(),
             Self::BodyUnreadable => "the chunks that the body comes in cannot be read, see RFC 9112 section 7.1".to_owned(),
@@ -91,10 +94,11 @@ impl Problem {
             }
             Self::UploadStalled(limit) => {
                 let limit = limit.as_secs_f64();
-                format!("nothing came for {limit} s, or less than 8 KiB a second on the whole")
+                let slowest = SLOWEST / 1024.0;
+                format!("nothing came for {limit} s, or less than {slowest} KiB a second on the whole")
             }
             Self::TooManyUploads(most) => {
-                format!("{most} datasets are being uploaded, as many as may be; try again in 5 s")
+                format!("{most} datasets are being uploaded, as many as may be; try again in {A_PLACE_S} s")
             }
             Self::MethodNotAllowed => {
                 "the header Allow lists the methods of this resource".to_owned()
@@ -106,7 +110,7 @@ impl Problem {
                 format!("the body was not complete after {} s", limit.as_secs_f64())
             }
             Self::NotReady { id, status, .. } => format!(
-                "plan {id} is {}; GET /plans/{id} with Prefer: wait=30 waits for it",
+                "plan {id} is {}; GET /plans/{id} with Prefer: wait={MAX_WAIT_S} waits for it",
                 status.name()
             ),
             Self::NoResult {

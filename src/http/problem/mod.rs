@@ -24,6 +24,9 @@ use crate::job::{Failure, PlanId, Status};
 use crate::scenario::json::Fault;
 use crate::store::{Tombstone, Trouble};
 
+/// When to ask again for a place among streams or uploads, seconds: how long others take is not known.
+const A_PLACE_S: u64 = 5;
+
 /// Everything for which a request can be refused.
 #[derive(Debug, Clone)]
 pub(super) enum Problem {
@@ -217,7 +220,7 @@ impl Problem {
             | Self::RateLimited { retry_after_s }
             | Self::Draining { retry_after_s } => Some(*retry_after_s),
             Self::StoreUnavailable(_) | Self::IdempotencyInFlight => Some(1),
-            Self::TooManyStreams(_) | Self::TooManyUploads(_) => Some(5),
+            Self::TooManyStreams(_) | Self::TooManyUploads(_) => Some(A_PLACE_S),
             _ => None,
         }
     }

@@ -19,6 +19,7 @@ use serde::Serialize;
 use tokio::sync::Semaphore;
 
 pub(super) use elevations::elevations;
+pub(super) use receive::SLOWEST;
 pub(super) use upload::put;
 
 use document::TerrainDocument;

@@ -18,7 +18,7 @@ use crate::http::body::{Coding, announced_length, broken_off};
 use crate::http::problem::Problem;
 
 /// Minimum average bytes a second: a slower sender would hold a place for nothing.
-const SLOWEST: f64 = 8.0 * 1024.0;
+pub(in crate::http) const SLOWEST: f64 = 8.0 * 1024.0;
 
 /// Capacity of the channel from the connection to the disk.
 const PIECES: usize = 4;

@@ -5,7 +5,7 @@ use uuid::Uuid;
 
 use crate::geometry::Point3;
 use crate::geometry::geodesy::LatLon;
-use crate::planner::{self, ConvergencePoint, CostFigures, Measures, Outcome};
+use crate::planner::{self, ConvergencePoint, CostFigures, Measures, Outcome, Place};
 use crate::scenario::frame::{Datum, Frame, Geodetic, Wgs84};
 
 /// The document of `GET /plans/{id}/result` and of `noctule plan`.
@@ -168,8 +168,8 @@ pub struct Violation {
     /// `threat`, `altitude`, `terrain`, `turn`, `climb`, `leg` or `area`.
     pub kind: String,
     /// Place of the violation, such as `leg 3`.
-    #[serde(rename = "where")]
-    pub place: String,
+    #[serde(rename = "where", with = "place")]
+    pub place: Place,
     /// Metres or degrees beyond the limit.
     pub amount: f64,
     /// Message for the user.
@@ -397,7 +397,7 @@ impl From<&planner::Violation> for Violation {
     fn from(violation: &planner::Violation) -> Self {
         Self {
             kind: violation.kind.to_owned(),
-            place: violation.place.clone(),
+            place: violation.place,
             amount: violation.amount,
             message: violation.message.clone(),
         }
@@ -427,5 +427,27 @@ impl From<&planner::Incumbent> for Incumbent {
             feasible: incumbent.feasible,
             waypoints: positions(&incumbent.waypoints, &incumbent.frame),
         }
+    }
+}
+
+/// A place as a text.
+mod place {
+    use serde::de::Error as _;
+    use serde::{Deserialize as _, Deserializer, Serializer};
+
+    use super::Place;
+
+    pub(super) fn serialize<S: Serializer>(
+        place: &Place,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(place)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Place, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        text.parse().map_err(D::Error::custom)
     }
 }

@@ -7,6 +7,7 @@ use super::chart::{Chart, rounded};
 use super::{Delivery, Options, antimeridian, outline};
 use crate::geometry::geodesy::LatLon;
 use crate::geometry::{Point2, Point3};
+use crate::planner::Place;
 use crate::threat::{Shape, Threat};
 
 /// Write a plan. An infeasible one is also written, because its violations are best seen on a map.
@@ -66,14 +67,12 @@ fn waypoint(delivery: &Delivery, index: usize) -> Feature {
 /// Violations at a waypoint or on the leg that leads to it.
 fn violations(delivery: &Delivery, index: usize) -> impl Iterator<Item = &str> {
     let places = [
-        format!("waypoint {index}"),
-        index
-            .checked_sub(1)
-            .map_or_else(String::new, |leg| format!("leg {leg}")),
+        Some(Place::Waypoint(index)),
+        index.checked_sub(1).map(Place::Leg),
     ];
     let violations = delivery.result.checks.violations.iter();
     violations
-        .filter(move |violation| places.contains(&violation.place))
+        .filter(move |violation| places.contains(&Some(violation.place)))
         .map(|violation| violation.message.as_str())
 }
 

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{Clearance, Leg, Measures, Violation};
+use super::{Clearance, Leg, Measures, Place, Violation};
 use crate::cost::{Breach, Constraint, Model, turns};
 use crate::geometry::{Point3, Segment};
 use crate::scenario::Quadrature;
@@ -60,8 +60,13 @@ pub(super) fn violations(model: &Model, route: &[Point3]) -> Vec<Violation> {
 fn describe(model: &Model, breach: &Breach) -> Violation {
     let vehicle = &model.scenario.vehicle;
     let place = match breach.constraint {
-        Constraint::Area => format!("waypoint {}", breach.index),
-        _ => format!("leg {}", breach.index),
+        Constraint::Area => Place::Waypoint(breach.index),
+        Constraint::Threat
+        | Constraint::Altitude
+        | Constraint::Terrain
+        | Constraint::Turn
+        | Constraint::Climb
+        | Constraint::Leg => Place::Leg(breach.index),
     };
     let amount = format!("{:.3} {}", breach.amount, breach.constraint.unit());
     let message = match breach.constraint {

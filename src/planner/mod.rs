@@ -15,6 +15,7 @@ mod moves;
 mod newton;
 mod objective;
 mod outcome;
+mod place;
 mod polish;
 mod price;
 mod roomier;
@@ -30,6 +31,7 @@ pub use outcome::{
     Bound, Clearance, ConvergencePoint, Incumbent, Leg, Measures, Outcome, Path, StopReason,
     Violation,
 };
+pub use place::Place;
 pub use rules::rules;
 
 pub(crate) use smoothing::keeps_limits;

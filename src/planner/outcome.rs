@@ -1,5 +1,6 @@
 //! What a run delivers. Lengths are in metres, angles in degrees.
 
+use super::Place;
 use crate::cost::CostFigures;
 use crate::geometry::Point3;
 use crate::scenario::Frame;
@@ -135,8 +136,8 @@ pub struct Clearance {
 pub struct Violation {
     /// One of `threat`, `altitude`, `terrain`, `turn`, `climb`, `leg` and `area`.
     pub kind: &'static str,
-    /// Such as `leg 3` or `waypoint 2`.
-    pub place: String,
+    /// Where.
+    pub place: Place,
     /// Metres or degrees beyond the limit.
     pub amount: f64,
     /// For people.

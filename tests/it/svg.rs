@@ -155,7 +155,7 @@ fn hostile_names_are_escaped() {
         result.path = None;
         result.checks.violations.push(Violation {
             kind: "threat".to_owned(),
-            place: "leg 0".to_owned(),
+            place: planner::Place::Leg(0),
             amount: 3.0,
             message: format!("leg 0 enters threat 0 ({name}) by 3.000 m"),
         });
@@ -199,7 +199,7 @@ fn a_broken_leg_marks_the_waypoint_that_it_leads_to() {
         result.feasible = false;
         result.checks.violations = vec![Violation {
             kind: "threat".to_owned(),
-            place: place.to_owned(),
+            place: place.parse().expect("a place"),
             amount: 3.0,
             message: format!("{place} enters radar 1"),
         }];

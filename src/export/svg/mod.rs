@@ -21,6 +21,7 @@ use scale::MapScale;
 
 use super::{Delivery, Options};
 use crate::geometry::{Point3, Rect};
+use crate::planner::Place;
 
 /// Width of the sheet, pixels.
 const WIDTH: f64 = 900.0;
@@ -81,11 +82,11 @@ fn route_color(delivery: &Delivery) -> &'static str {
     }
 }
 
-/// Indices of each `leg` or each `waypoint` that violates a constraint.
-fn broken(delivery: &Delivery, place: &str) -> Vec<usize> {
-    let places = delivery.result.checks.violations.iter();
-    let mut indices: Vec<usize> = places
-        .filter_map(|violation| violation.place.strip_prefix(place)?.trim().parse().ok())
+/// Indices of each leg or each waypoint that violates a constraint.
+fn broken(delivery: &Delivery, index: fn(Place) -> Option<usize>) -> Vec<usize> {
+    let violations = delivery.result.checks.violations.iter();
+    let mut indices: Vec<usize> = violations
+        .filter_map(|violation| index(violation.place))
         .collect();
     indices.dedup();
     indices

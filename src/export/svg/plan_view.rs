@@ -9,6 +9,7 @@ use super::scale::MapScale;
 use super::{broken, route_color};
 use crate::export::Delivery;
 use crate::geometry::{Point2, Point3};
+use crate::planner::Place;
 use crate::threat::{Shape, Threat};
 
 /// Style of a line drawn below another one for contrast.
@@ -176,13 +177,13 @@ fn route(canvas: &mut Canvas, delivery: &Delivery, map: &MapScale) {
             &straight,
             &format!("{LINE} stroke=\"{color}\" stroke-width=\"2\""),
         );
-        for leg in broken(delivery, "leg") {
+        for leg in broken(delivery, Place::leg) {
             if let Some(ends) = waypoints.get(leg..leg + 2) {
                 canvas.path(&polyline(ends), BROKEN_LEG);
             }
         }
     }
-    let broken = broken(delivery, "waypoint");
+    let broken = broken(delivery, Place::waypoint);
     for (idx, spot) in waypoints.iter().enumerate() {
         if broken.contains(&idx) {
             canvas.circle(
@@ -265,7 +266,7 @@ fn end_names(canvas: &mut Canvas, delivery: &Delivery, map: &MapScale, labels: &
 fn waypoint_numbers(canvas: &mut Canvas, delivery: &Delivery, map: &MapScale, labels: &mut Labels) {
     let calm = Font::new(10.0, INK).halo();
     let alarmed = Font::new(11.0, BROKEN).bold().halo();
-    let [legs, places] = ["leg", "waypoint"].map(|place| broken(delivery, place));
+    let [legs, places] = [Place::leg, Place::waypoint].map(|index| broken(delivery, index));
     let waypoints = &delivery.waypoints;
     let inner = waypoints.len() - 1;
     for (idx, point) in waypoints.iter().enumerate().take(inner).skip(1) {

@@ -7,6 +7,7 @@ use super::scale::Steps;
 use super::{broken, route_color};
 use crate::export::Delivery;
 use crate::geometry::{Point2, Point3};
+use crate::planner::Place;
 use crate::threat::Threat;
 
 /// Number of places along the route at which ground and threats are sampled.
@@ -259,7 +260,7 @@ fn flown(
             .map(|(point, way)| scale.spot(way, point.z))
             .collect()
     } else {
-        for leg in broken(delivery, "leg") {
+        for leg in broken(delivery, Place::leg) {
             if let Some(ends) = course.get(leg..leg + 2) {
                 canvas.path(&polyline(ends), BROKEN_LEG);
             }

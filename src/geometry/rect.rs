@@ -39,7 +39,8 @@ impl Rect {
     /// Whether `point` lies inside or on the edge.
     #[must_use]
     pub fn contains(&self, point: Point2) -> bool {
-        self.excess(point) <= 0.0
+        (self.min.x <= point.x && point.x <= self.max.x)
+            && (self.min.y <= point.y && point.y <= self.max.y)
     }
 
     /// Whether the two rectangles have a point in common.
@@ -84,5 +85,29 @@ impl Rect {
     #[must_use]
     pub fn diagonal(&self) -> f64 {
         (self.max - self.min).norm()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_edge_belongs_to_it_and_nowhere_does_not() {
+        let rect = Rect {
+            min: Point2::new(-1.0, 0.0),
+            max: Point2::new(1.0, 2.0),
+        };
+        for (x, y, expected) in [
+            (0.0, 1.0, true),
+            (-1.0, 0.0, true),
+            (1.0, 2.0, true),
+            (1.0 + 1e-15, 2.0, false),
+            (0.0, -5e-324, false),
+            (f64::NAN, 1.0, false),
+            (0.0, f64::INFINITY, false),
+        ] {
+            assert_eq!(rect.contains(Point2::new(x, y)), expected, "{x} {y}");
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! A straight leg, and its distance from points of the plane.
 
-use super::{Point2, Point3, Quadratic};
+use super::{Point2, Point3, Quadratic, Rect};
 
 /// Legs horizontally shorter than this have no heading, metres.
 pub const LEVEL: f64 = 1e-9;
@@ -19,6 +19,15 @@ impl Segment {
     #[must_use]
     pub fn at(&self, t: f64) -> Point3 {
         self.a + (self.b - self.a) * t
+    }
+
+    /// The rectangle around it, seen from above.
+    #[must_use]
+    pub fn bounds(&self) -> Rect {
+        Rect {
+            min: Point2::new(self.a.x.min(self.b.x), self.a.y.min(self.b.y)),
+            max: Point2::new(self.a.x.max(self.b.x), self.a.y.max(self.b.y)),
+        }
     }
 
     /// 3-D length, metres.

@@ -82,9 +82,7 @@ impl Polygon {
 
     /// Whether `point` is strictly inside, by the even-odd rule.
     pub(super) fn contains(&self, point: Point2) -> bool {
-        let bounds = &self.bounds;
-        (bounds.min.x <= point.x && point.x <= bounds.max.x)
-            && (bounds.min.y <= point.y && point.y <= bounds.max.y)
+        self.bounds.contains(point)
             && match &self.index {
                 Some(index) => index.contains(&self.vertices, point),
                 None => ring::contains(&self.vertices, point),
@@ -103,18 +101,7 @@ impl Polygon {
 
     /// Whether the box around `leg` intersects the box around the soft zone.
     pub(super) fn may_reach(&self, leg: &Segment) -> bool {
-        let box_of = |low: f64, high: f64, min: f64, max: f64| low <= max && high >= min;
-        box_of(
-            leg.a.x.min(leg.b.x),
-            leg.a.x.max(leg.b.x),
-            self.extent.min.x,
-            self.extent.max.x,
-        ) && box_of(
-            leg.a.y.min(leg.b.y),
-            leg.a.y.max(leg.b.y),
-            self.extent.min.y,
-            self.extent.max.y,
-        )
+        leg.bounds().meets(&self.extent)
     }
 
     /// Distance from the ring, metres, negative inside.

@@ -163,6 +163,24 @@ fn other_routes_never_worsen_the_result() {
     }
 }
 
+/// A route on the long way round a threat gains by one on the short way.
+#[test]
+fn another_route_is_taken_if_it_leads_to_a_better_result() {
+    let mut scenario = stiff();
+    // To the left of the straight line.
+    scenario.threats = vec![radar(454.0, 489.0, 110.0)];
+    let model = Model::new(&scenario);
+    let mut random = Random::new(9);
+    let (left, right) = (
+        arc(&scenario, 8, 240.0, 0.0, &mut random),
+        arc(&scenario, 8, -120.0, 0.0, &mut random),
+    );
+    let improved =
+        |others: &[Vec<Point3>]| Newton::new(&model, &Nobody).improve(&mut left.clone(), others);
+    let (alone, both) = (improved(&[]), improved(&[right]));
+    assert!(both.beats(&alone), "{alone:?} {both:?}");
+}
+
 #[test]
 fn distant_limits_are_inactive() {
     let mut scenario = scenario();

@@ -38,6 +38,12 @@ impl Known {
     /// Submits plans until there are `enough`, then looks for results.
     async fn grow(&mut self, service: &Service, enough: usize) {
         self.post(service, enough).await;
+        self.collect(service).await;
+        std::future::pending::<()>().await;
+    }
+
+    /// Keeps the results that there are.
+    async fn collect(&mut self, service: &Service) {
         for address in &self.accepted {
             if self.finished.contains_key(address) {
                 continue;
@@ -49,7 +55,6 @@ impl Known {
                 self.finished.insert(address.clone(), result);
             }
         }
-        std::future::pending::<()>().await;
     }
 }
 
@@ -66,6 +71,7 @@ async fn kills_at_random_points_lose_nothing_and_repeat_nothing() {
                 for address in &known.accepted {
                     service.ended(address).await;
                 }
+                known.collect(&service).await;
             }
             // The kill comes at a random time and may cut any request.
             let point = Instant::now() + Duration::from_millis(dice.below(LIFE_MS) as u64);
@@ -89,6 +95,7 @@ async fn kills_at_random_points_lose_nothing_and_repeat_nothing() {
             let ids: Vec<u64> = told.iter().map(|(id, _)| *id).collect();
             assert_eq!(ids, (1..=ids.len() as u64).collect::<Vec<_>>(), "{address}");
         }
+        assert!(!finished.is_empty(), "no kill followed a result");
         for (address, before) in finished {
             let after = service.bytes(&format!("{address}/result")).await;
             assert_eq!(after, before, "{address}");

@@ -42,6 +42,12 @@ fn described() -> BTreeSet<String> {
 #[tokio::test]
 async fn every_described_route_reaches_a_handler() {
     let api = Api::new();
+    let nowhere = api.get("/nowhere").await.json();
+    let nothing_at = |uri: &str| {
+        let detail = nowhere["detail"].as_str().expect("a problem");
+        detail.replace("/nowhere", uri)
+    };
+    assert_ne!(nothing_at("/"), nothing_at("/nowhere"), "the path is told");
     for operation in described() {
         let (method, path) = operation.split_once(' ').expect("a method and a path");
         let method: Method = method.parse().expect("a method");
@@ -58,7 +64,7 @@ async fn every_described_route_reaches_a_handler() {
         let answer = api.send(method, &uri, &[], "").await;
         assert_ne!(answer.status, 405, "{operation}");
         let text = String::from_utf8_lossy(&answer.body);
-        assert!(!text.contains("nothing is at "), "{operation}: {text}");
+        assert!(!text.contains(&nothing_at(&uri)), "{operation}: {text}");
         if path.contains("{id}") {
             assert_eq!(
                 answer.json()["detail"],

@@ -8,6 +8,7 @@ use async_nats::jetstream::stream::{Config, DiscardPolicy, RetentionPolicy, Stre
 use async_nats::jetstream::{self, Context, kv};
 use async_nats::{Client, ConnectErrorKind, ConnectOptions, Event};
 
+use super::bucket::Bucket;
 use super::election::{Election, outlast};
 use super::errors::{failed, failed_by, passes};
 use super::lane::Version;
@@ -44,8 +45,8 @@ pub(super) struct Servers {
     pub(super) documents: kv::Store,
     /// Documents that are too long for a message.
     pub(super) objects: ObjectStore,
-    /// The underlying stream of `objects`.
-    pub(super) chunks: Stream,
+    /// What underlies `objects`.
+    pub(super) bucket: Bucket,
     /// Idempotency keys.
     pub(super) keys: kv::Store,
     /// Which nodes there are.
@@ -136,7 +137,7 @@ impl Servers {
             jobs: make.stream(jobs(options)).await?,
             documents: make.bucket("documents", Duration::ZERO).await?,
             objects: make.objects("objects").await?,
-            chunks: make.beneath(&make.name("objects")).await?,
+            bucket: make.beneath(make.name("objects")).await?,
             keys: make.bucket("keys", kept).await?,
             nodes: make.bucket("nodes", ALIVE).await?,
             tellers: make.bucket("tellers", TELLING).await?,

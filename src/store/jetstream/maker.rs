@@ -7,6 +7,7 @@ use async_nats::jetstream::object_store::ObjectStore;
 use async_nats::jetstream::stream::{Config, StorageType, Stream};
 use async_nats::jetstream::{Context, kv, object_store};
 
+use super::bucket::Bucket;
 use super::errors::failed;
 use super::lane::Version;
 use super::settings::Settings;
@@ -127,15 +128,16 @@ impl Maker<'_> {
                 .await
                 .map_err(|error| failed(&what, &error))?,
         };
-        self.suit(&self.beneath(&bucket).await?).await?;
+        self.suit(&self.beneath(bucket).await?.stream).await?;
         Ok(there)
     }
 
-    /// The stream underlying an object store.
-    pub(super) async fn beneath(&self, bucket: &str) -> Result<Stream, StoreError> {
-        let stream = format!("OBJ_{bucket}");
+    /// What underlies the object store of this name.
+    pub(super) async fn beneath(&self, name: String) -> Result<Bucket, StoreError> {
+        let stream = format!("OBJ_{name}");
         let found = self.context.get_stream(&stream).await;
-        found.map_err(|error| failed(&format!("stream {stream}"), &error))
+        let stream = found.map_err(|error| failed(&format!("stream {stream}"), &error))?;
+        Ok(Bucket { name, stream })
     }
 
     /// Bring the stream underlying a bucket to the wanted number of replicas; never to fewer.

@@ -5,6 +5,7 @@
 //! written only if nobody was faster; a run belongs to this node for as long as the node renews its lease in time.
 //! Deliberately absent: any queue, election or replication of our own.
 
+mod bucket;
 mod claim;
 mod connect;
 mod documents;

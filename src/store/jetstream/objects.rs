@@ -39,7 +39,7 @@ impl Servers {
             Err(_) => Some(nuid),
         };
         if let Some(nuid) = useless
-            && let Err(error) = self.purge_from_objects(self.chunks_of(&nuid)).await
+            && let Err(error) = self.bucket.purge(self.bucket.chunks_of(&nuid)).await
         {
             tracing::debug!(%error, key, "parts of a document are left until its plan is removed");
         }
@@ -48,7 +48,7 @@ impl Servers {
 
     /// The head comes last: without it there is no object.
     async fn put_parts(&self, key: &str, nuid: &str, bytes: &[u8]) -> Result<(), StoreError> {
-        let chunks = self.chunks_of(nuid);
+        let chunks = self.bucket.chunks_of(nuid);
         for chunk in bytes.chunks(CHUNK) {
             let chunk = PublishMessage::build().payload(Bytes::copy_from_slice(chunk));
             self.publish_part(key, chunks.clone(), chunk).await?;
@@ -62,7 +62,7 @@ impl Servers {
                 link: None,
                 max_chunk_size: Some(CHUNK),
             }),
-            bucket: self.bucket(),
+            bucket: self.bucket.name.clone(),
             nuid: nuid.to_owned(),
             size: bytes.len(),
             chunks: bytes.len().div_ceil(CHUNK),
@@ -74,7 +74,7 @@ impl Servers {
         let head = PublishMessage::build()
             .header("Nats-Rollup", "sub")
             .payload(head.into());
-        self.publish_part(key, self.head_of(key), head).await
+        self.publish_part(key, self.bucket.head_of(key), head).await
     }
 
     async fn publish_part(
@@ -102,18 +102,17 @@ impl Servers {
         if keys.is_empty() {
             return Ok(());
         }
-        self.purge_from_objects(self.chunks_of(&format!("{id}.>")))
-            .await?;
+        let bucket = &self.bucket;
+        bucket.purge(bucket.chunks_of(&format!("{id}.>"))).await?;
         for key in keys {
             let Some(object) = self.head(key).await? else {
                 continue;
             };
             // Earlier versions gave them other names.
             if !object.nuid.starts_with(key.as_str()) {
-                self.purge_from_objects(self.chunks_of(&object.nuid))
-                    .await?;
+                bucket.purge(bucket.chunks_of(&object.nuid)).await?;
             }
-            self.purge_from_objects(self.head_of(key)).await?;
+            bucket.purge(bucket.head_of(key)).await?;
         }
         Ok(())
     }
@@ -124,12 +123,6 @@ impl Servers {
             Err(error) if error.kind() == InfoErrorKind::NotFound => Ok(None),
             Err(error) => Err(failed(&document(key), &error)),
         }
-    }
-
-    async fn purge_from_objects(&self, subject: String) -> Result<(), StoreError> {
-        let purged = self.chunks.purge().filter(&subject).await;
-        purged.map_err(|error| failed(&subject, &error))?;
-        Ok(())
     }
 
     /// `None` when the servers have lost it, or a part of it.
@@ -168,9 +161,9 @@ impl Servers {
 
     /// The object as the leader of its stream has it; `None` when it is not whole there.
     async fn object_of_the_leader(&self, key: &str) -> Result<Option<Vec<u8>>, StoreError> {
-        let head = match self
-            .chunks
-            .get_last_raw_message_by_subject(&self.head_of(key))
+        let stream = &self.bucket.stream;
+        let head = match stream
+            .get_last_raw_message_by_subject(&self.bucket.head_of(key))
             .await
         {
             Ok(head) => head,
@@ -182,12 +175,11 @@ impl Servers {
         let Ok(object) = serde_json::from_slice::<ObjectInfo>(&head.payload) else {
             return Ok(None);
         };
-        let subject = self.chunks_of(&object.nuid);
+        let subject = self.bucket.chunks_of(&object.nuid);
         let mut bytes = Vec::with_capacity(object.size);
         let mut next = 0;
         for _ in 0..object.chunks {
-            let chunk = match self
-                .chunks
+            let chunk = match stream
                 .get_first_raw_message_by_subject(&subject, next)
                 .await
             {
@@ -202,20 +194,6 @@ impl Servers {
         }
         let is_whole = !object.deleted && object.digest == Some(digest(&bytes));
         Ok(is_whole.then_some(bytes))
-    }
-
-    /// The subject of an object's head.
-    fn head_of(&self, key: &str) -> String {
-        format!("$O.{}.M.{}", self.bucket(), URL_SAFE.encode(key))
-    }
-
-    /// The subject of an object's chunks.
-    fn chunks_of(&self, nuid: &str) -> String {
-        format!("$O.{}.C.{nuid}", self.bucket())
-    }
-
-    fn bucket(&self) -> String {
-        format!("{}-objects", self.namespace)
     }
 }
 

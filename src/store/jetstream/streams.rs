@@ -34,7 +34,7 @@ impl Servers {
             &self.plans,
             &self.jobs,
             &self.documents.stream,
-            &self.chunks,
+            &self.bucket.stream,
             &self.keys.stream,
             &self.nodes.stream,
             &self.tellers.stream,

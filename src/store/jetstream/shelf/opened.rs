@@ -12,7 +12,6 @@ use async_nats::jetstream::kv::{self, Operation};
 use async_nats::jetstream::object_store::{
     GetErrorKind, InfoErrorKind, ObjectMetadata, ObjectStore,
 };
-use async_nats::jetstream::stream::Stream;
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE;
 use futures_util::{StreamExt as _, TryStreamExt as _};
@@ -23,6 +22,7 @@ use uuid::Uuid;
 use super::Failure;
 use crate::catalogue::{Change, Changes, Source};
 use crate::store::StoreError;
+use crate::store::jetstream::bucket::Bucket;
 use crate::store::jetstream::connect::{Servers, connect};
 use crate::store::jetstream::election::outlast;
 use crate::store::jetstream::errors::{failed, is_outrun, passes};
@@ -43,10 +43,8 @@ pub(super) struct Opened {
     client: Client,
     records: kv::Store,
     files: ObjectStore,
-    /// The underlying stream of `files`.
-    chunks: Stream,
-    /// Its bucket.
-    bucket: String,
+    /// What underlies `files`.
+    bucket: Bucket,
 }
 
 impl Opened {
@@ -59,13 +57,11 @@ impl Opened {
     }
 
     async fn made(client: &Client, make: &Maker<'_>) -> Result<Self, StoreError> {
-        let bucket = make.name("terrains");
         Ok(Self {
             client: client.clone(),
             records: make.bucket("terrains", Duration::ZERO).await?,
             files: make.objects("terrains").await?,
-            chunks: make.beneath(&bucket).await?,
-            bucket,
+            bucket: make.beneath(make.name("terrains")).await?,
         })
     }
 
@@ -74,7 +70,7 @@ impl Opened {
     }
 
     pub(super) async fn changes(&self, after: u64) -> Result<Changes, StoreError> {
-        let what = || format!("records of {}", self.bucket);
+        let what = || format!("records of {}", self.bucket.name);
         let info = self.records.stream.get_info().await;
         let state = info.map_err(|error| failed(&what(), &error))?.state;
         let mut read = Changes {
@@ -184,10 +180,10 @@ impl Opened {
 
     pub(super) async fn files(&self) -> Result<BTreeSet<String>, StoreError> {
         // Chunks first: those of a file that is finished meanwhile then belong to it.
-        let mut unfinished = self.under(&self.chunks_of("")).await?;
+        let mut unfinished = self.under(&self.bucket.chunks_of("")).await?;
         let mut files = BTreeSet::new();
         // One by one: the client's own listing waits for ever for entries that another node removes meanwhile.
-        for head in self.under(&self.head_of("")).await? {
+        for head in self.under(&self.bucket.head_of("")).await? {
             let name = URL_SAFE.decode(&head).ok();
             let Some(name) = name.and_then(|name| String::from_utf8(name).ok()) else {
                 continue;
@@ -208,8 +204,12 @@ impl Opened {
 
     /// The rest of each of the stream's subjects with this prefix.
     async fn under(&self, prefix: &str) -> Result<BTreeSet<String>, StoreError> {
-        let what = || format!("files of {}", self.bucket);
-        let subjects = self.chunks.info_with_subjects(format!("{prefix}>")).await;
+        let what = || format!("files of {}", self.bucket.name);
+        let subjects = self
+            .bucket
+            .stream
+            .info_with_subjects(format!("{prefix}>"))
+            .await;
         let subjects = subjects.map_err(|error| failed(&what(), &error))?;
         let ends = subjects.try_filter_map(async |(subject, _)| {
             Ok(subject.strip_prefix(prefix).map(str::to_owned))
@@ -220,7 +220,7 @@ impl Opened {
 
     pub(super) async fn discard(&self, name: &str) -> Result<(), StoreError> {
         if let Some(chunks) = name.strip_prefix(UNFINISHED) {
-            return self.purge(self.chunks_of(chunks)).await;
+            return self.bucket.purge(self.bucket.chunks_of(chunks)).await;
         }
         let object = match self.files.info(name).await {
             Ok(object) => object,
@@ -228,23 +228,9 @@ impl Opened {
             Err(error) => return Err(failed(&format!("file {name}"), &error)),
         };
         // Without its head the file is no longer found; remaining chunks are found as unfinished.
-        let head = self.head_of(&URL_SAFE.encode(name));
-        self.purge(head).await?;
-        self.purge(self.chunks_of(&object.nuid)).await
-    }
-
-    async fn purge(&self, subject: String) -> Result<(), StoreError> {
-        let purged = self.chunks.purge().filter(&subject).await;
-        purged.map_err(|error| failed(&subject, &error))?;
-        Ok(())
-    }
-
-    fn head_of(&self, file: &str) -> String {
-        format!("$O.{}.M.{file}", self.bucket)
-    }
-
-    fn chunks_of(&self, file: &str) -> String {
-        format!("$O.{}.C.{file}", self.bucket)
+        self.bucket.purge(self.bucket.head_of(name)).await?;
+        let chunks = self.bucket.chunks_of(&object.nuid);
+        self.bucket.purge(chunks).await
     }
 }
 

@@ -50,8 +50,8 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         0
     };
     let whole = |routes: Vec<Vec<Point3>>, log: &mut Log| -> Vec<Vec<Point3>> {
-        let whole = |route| starts::with_waypoints(model, route, settings.waypoints);
-        let routes: Vec<_> = routes.into_iter().map(whole).collect();
+        let with_all = |route| starts::with_waypoints(model, route, settings.waypoints);
+        let routes: Vec<_> = routes.into_iter().map(with_all).collect();
         for route in &routes {
             log.offer_unpriced(route);
         }

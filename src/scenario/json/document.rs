@@ -57,7 +57,7 @@ pub(super) fn document(
     let draft = fields.or("vehicle", vehicle::DEFAULT, faults, vehicle::vehicle);
     let weights = fields.or(
         "weights",
-        vehicle::default_weights(),
+        vehicle::DEFAULT_WEIGHTS,
         faults,
         vehicle::weights,
     );

@@ -11,7 +11,8 @@ const DEFAULT_MAX_CLIMB_DEG: f64 = 45.0;
 const DEFAULT_CRUISE_SPEED: f64 = 15.0;
 /// With this a metre costs 1.
 const DEFAULT_FUEL_PER_KM: f64 = 1000.0;
-const DEFAULT_WEIGHTS: Weights = Weights {
+/// The weights of a document that gives none.
+pub(super) const DEFAULT_WEIGHTS: Weights = Weights {
     fuel: 1.0,
     threat: 1.0,
     altitude: 1.0,
@@ -133,9 +134,4 @@ pub(super) fn weights(at: At<'_>, faults: &mut Faults) -> Option<Weights> {
         threat: threat?,
         altitude: altitude?,
     })
-}
-
-/// The weights of a document that gives none.
-pub(super) fn default_weights() -> Weights {
-    DEFAULT_WEIGHTS
 }

@@ -1,7 +1,7 @@
 //! Population-based searches over a box of real numbers. They use an [`Objective`] and know nothing of aircraft.
 //!
 //! A new algorithm needs one file beside `tms_sba.rs` and one row in [`ALL`]; the planner chooses the meaning of its
-//! positions by its name.
+//! positions by its name, in a table that a test holds complete.
 
 mod abc;
 mod ba;

@@ -129,7 +129,7 @@ const FUNCTIONS: [(Function, f64); 4] = [
 /// two to ten times the actual result. The best of as many random draws is about 26, 15 000, 90 and 14. A swarm that
 /// drops its velocities ends at 3, 400, 24 and 7; a colony that accepts everything it finds is no better than random
 /// draws.
-const REACHED: [(&str, [f64; 4]); 6] = [
+const REACHED: &[(&str, [f64; 4])] = &[
     ("tms-sba", [1e-5, 10.0, 6.0, 0.02]),
     ("sba", [5e-5, 10.0, 8.0, 0.04]),
     ("spso", [1e-4, 30.0, 16.0, 0.1]),

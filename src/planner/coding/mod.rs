@@ -38,7 +38,7 @@ const CARTESIAN: Make =
 const COURSE: Make = |scenario, waypoints| Coding::Course(Course::new(scenario, waypoints));
 
 /// The coding that each algorithm searches in, by the algorithm's name.
-const CODINGS: [(&str, Make); 6] = [
+const CODINGS: &[(&str, Make)] = &[
     ("tms-sba", SPHERICAL),
     ("sba", SPHERICAL),
     ("spso", COURSE),

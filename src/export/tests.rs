@@ -298,9 +298,24 @@ fn words_of_callers_stay_words() {
                 .is_some_and(|text| text.contains("</name><Document>&amp;"))
         }));
     }
-    for format in ["geojson", "czml", "qgc"] {
+    for format in ["geojson", "czml"] {
         let text = write(&plan, format, &[]).expect("a plan");
-        serde_json::from_str::<Value>(&text).expect("JSON");
+        let document: Value = serde_json::from_str(&text).expect("JSON");
+        assert!(says(&document, "</name><Document>&amp;"), "{text}");
+        assert!(says(&document, "<!-- x"), "{text}");
+    }
+    // It names neither the plan nor what is fenced.
+    let text = write(&plan, "qgc", &[]).expect("a plan");
+    serde_json::from_str::<Value>(&text).expect("JSON");
+}
+
+/// Whether a text of the document contains `words`.
+fn says(document: &Value, words: &str) -> bool {
+    match document {
+        Value::String(text) => text.contains(words),
+        Value::Array(items) => items.iter().any(|item| says(item, words)),
+        Value::Object(members) => members.values().any(|member| says(member, words)),
+        Value::Null | Value::Bool(_) | Value::Number(_) => false,
     }
 }
 

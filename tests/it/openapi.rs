@@ -285,20 +285,6 @@ async fn every_problem_type_leads_to_its_page() {
     unknown.expect_problem(404, "not-found");
 }
 
-#[test]
-fn every_problem_type_is_documented() {
-    let page = include_str!("../../docs/PROBLEMS.md");
-    let types =
-        DESCRIPTION["components"]["schemas"]["Problem"]["properties"]["type"]["enum"].as_array();
-    for slug in types.expect("a list").iter().filter_map(Value::as_str) {
-        let heading = format!("## {}\n", slug.trim_start_matches("/problems/"));
-        assert!(
-            page.contains(&heading),
-            "docs/PROBLEMS.md has no section {heading}"
-        );
-    }
-}
-
 /// Generated clients take a constant without a type for anything, and integers for 32 bits.
 #[test]
 fn constants_and_great_integers_say_their_type() {

@@ -4,7 +4,7 @@ use super::{Stop, why_stop};
 use crate::cost::batch::LANES;
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;
-use crate::threat::Shape;
+use crate::threat::Threat;
 
 /// Number of steps, each of some nanoseconds, between two checks of the clock.
 const STEPS_UNWATCHED: usize = 1_000_000;
@@ -51,15 +51,7 @@ impl<'s> Watch<'s> {
 
 /// The approximate number of steps for pricing one route, if no threat is too far away to matter.
 fn steps(scenario: &Scenario) -> usize {
-    let vertices = |shape: &Shape| match shape {
-        Shape::Cylinder(_) => 1,
-        Shape::Polygon(polygon) => 10 * polygon.vertices().len(),
-    };
-    let threats: usize = scenario
-        .threats
-        .iter()
-        .map(|threat| vertices(&threat.shape))
-        .sum();
+    let threats: usize = scenario.threats.iter().map(Threat::effort).sum();
     let ground = match &scenario.terrain {
         Terrain::Flat(_) => 1,
         Terrain::Peaks(peaks) => 10 * (1 + peaks.peaks.len()),

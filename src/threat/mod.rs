@@ -52,7 +52,18 @@ impl Encounter {
     };
 }
 
+/// A leg past the corners of a jagged ring takes so many times as long to price as one past as many discs.
+const A_CORNER: usize = 10;
+
 impl Threat {
+    /// About how long a leg past it takes to price, in discs.
+    pub(crate) fn effort(&self) -> usize {
+        match &self.shape {
+            Shape::Cylinder(_) => 1,
+            Shape::Polygon(polygon) => A_CORNER * polygon.vertices().len(),
+        }
+    }
+
     /// Horizontal distance of `point` from the boundary, metres, negative inside, at any height.
     #[must_use]
     pub fn distance(&self, point: Point2) -> f64 {

@@ -14,7 +14,7 @@ use crate::geometry::Point3;
 use crate::planner::price::PRICED_FROM;
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;
-use crate::threat::{Shape, Threat};
+use crate::threat::Threat;
 
 /// Places of the net, apart from both ends, on level ground.
 const PLACES: usize = 160;
@@ -43,9 +43,6 @@ const EFFORT: usize = 4_000;
 
 /// With fewer legs than this between two checks, a scene is vast: that of 400 ring corners is, or of 4,000 peaks.
 const VAST: usize = 1_000;
-
-/// A leg past the corners of a jagged ring takes so many times as long as one past as many discs.
-const A_CORNER: usize = 10;
 
 /// Number of threats, ring corners and peaks, counted for each leg priced, between two checks whether to stop: the net
 /// of an ordinary scene takes so little time that it pays even where time is over.
@@ -107,15 +104,11 @@ fn places(model: &Model) -> Vec<Point3> {
 
 /// Legs between two checks whether to stop.
 fn legs_unwatched(scenario: &Scenario) -> usize {
-    let met = |threat: &Threat| match &threat.shape {
-        Shape::Cylinder(_) => 1,
-        Shape::Polygon(polygon) => A_CORNER * polygon.vertices().len(),
-    };
     let peaks = match &scenario.terrain {
         Terrain::Peaks(peaks) => peaks.peaks.len(),
         Terrain::Flat(_) | Terrain::Grid(_) | Terrain::Dem(_) => 0,
     };
-    let met = peaks + scenario.threats.iter().map(met).sum::<usize>();
+    let met = peaks + scenario.threats.iter().map(Threat::effort).sum::<usize>();
     (MET_UNWATCHED / met.max(1)).next_multiple_of(LANES)
 }
 
@@ -367,7 +360,7 @@ mod tests {
     use super::*;
     use crate::geometry::Point2;
     use crate::planner::tests::{hilly_scenario, scenario};
-    use crate::threat::Polygon;
+    use crate::threat::{Polygon, Shape};
 
     /// Around a coast of thousands of corners legs take long to price, so a stop is checked after few of them.
     #[test]

@@ -3,6 +3,7 @@
 //!
 //! Plain functions: no async, no store, no clock of their own.
 
+mod backwards;
 mod beside;
 mod blocks;
 mod certificate;
@@ -118,7 +119,10 @@ fn search_to_the_end(model: &Model, log: &mut Log) -> StopReason {
     match starts::routes(model, log.stop) {
         None => search::plain(model, log),
         Some(starts) => {
-            let reason = search::guided(model, starts, log);
+            let mut reason = search::guided(model, starts, log);
+            if reason == StopReason::Iterations && backwards::is_worthwhile(model, log) {
+                reason = backwards::search(model, log);
+            }
             let is_lost = reason == StopReason::Iterations && !log.best.is_feasible();
             if is_lost && model.scenario.planner.polish {
                 return roomier::search(model, log);

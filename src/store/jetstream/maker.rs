@@ -1,6 +1,7 @@
 //! The streams and buckets on the servers, created where missing and brought to the wanted configuration.
 
 use std::collections::HashMap;
+use std::error::Error;
 use std::time::Duration;
 
 use async_nats::jetstream::object_store::ObjectStore;
@@ -53,11 +54,9 @@ impl Maker<'_> {
             metadata: HashMap::new(),
             ..wanted
         };
-        let mut stream = self
-            .context
-            .get_or_create_stream(config.clone())
-            .await
-            .map_err(|error| failed(&what(), &error))?;
+        let find = || self.context.get_stream(&name);
+        let make = self.context.create_stream(config.clone());
+        let mut stream = found_or_made(&what(), find, make).await?;
         let info = stream
             .info()
             .await
@@ -100,14 +99,10 @@ impl Maker<'_> {
             ..kv::Config::default()
         };
         let what = format!("bucket {}", config.bucket);
-        let there = match self.context.get_key_value(&config.bucket).await {
-            Ok(there) => there,
-            Err(_) => self
-                .context
-                .create_key_value(config)
-                .await
-                .map_err(|error| failed(&what, &error))?,
-        };
+        let name = config.bucket.clone();
+        let find = || self.context.get_key_value(&name);
+        let make = self.context.create_key_value(config);
+        let there = found_or_made(&what, find, make).await?;
         self.suit(&there.stream).await?;
         Ok(there)
     }
@@ -120,14 +115,9 @@ impl Maker<'_> {
         };
         let what = format!("object store {}", config.bucket);
         let bucket = config.bucket.clone();
-        let there = match self.context.get_object_store(&bucket).await {
-            Ok(there) => there,
-            Err(_) => self
-                .context
-                .create_object_store(config)
-                .await
-                .map_err(|error| failed(&what, &error))?,
-        };
+        let find = || self.context.get_object_store(&bucket);
+        let make = self.context.create_object_store(config);
+        let there = found_or_made(&what, find, make).await?;
         self.suit(&self.beneath(bucket).await?.stream).await?;
         Ok(there)
     }
@@ -172,5 +162,25 @@ impl Maker<'_> {
         if let Err(error) = self.context.update_stream(admitting).await {
             tracing::warn!(%error, stream = there.name, "no more consumers than the servers' default");
         }
+    }
+}
+
+/// What is there, or else what is made. Another node may make it at the same moment, and change at once what this one
+/// would not.
+async fn found_or_made<T, Found, NotFound, NotMade>(
+    what: &str,
+    find: impl Fn() -> Found,
+    make: impl Future<Output = Result<T, NotMade>>,
+) -> Result<T, StoreError>
+where
+    Found: Future<Output = Result<T, NotFound>>,
+    NotMade: Error + 'static,
+{
+    if let Ok(there) = find().await {
+        return Ok(there);
+    }
+    match make.await {
+        Ok(made) => Ok(made),
+        Err(error) => find().await.map_err(|_| failed(what, &error)),
     }
 }

@@ -12,7 +12,7 @@ use crate::support::plans::{ending, submission};
 
 async fn submit(store: &dyn Store, owner: usize) -> PlanId {
     let theirs = Submission {
-        owner: Some(format!("owner {owner}").into()),
+        owner: Some(format!("owner {owner}")),
         ..submission()
     };
     store.submit(theirs).await.unwrap().plan.id

@@ -1,0 +1,111 @@
+//! The same search from the target to the start. Costs and limits do not depend on the direction, but starts, codings and
+//! bats do: over hills where the vehicle's limits are felt, either direction finds ways that the other misses.
+
+use super::log::Log;
+use super::search::{self};
+use super::{Nobody, StopReason, newton, starts};
+use crate::cost::Model;
+use crate::scenario::Seeding;
+
+/// Whether a search that ended with the best route of `log` is worth another in the other direction.
+pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {
+    let settings = &model.scenario.planner;
+    let is_guided = settings.polish && settings.seeding == Seeding::Tangent;
+    is_guided
+        && settings.warm_start.is_none()
+        && !model.scenario.terrain.is_flat()
+        && (!log.best.is_feasible() || newton::is_felt(model, &log.route))
+}
+
+/// Search in the other direction, and keep what is found if it is better.
+pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
+    // It takes as long again, and the best so far may be all there is.
+    log.tell();
+    let mut scenario = model.scenario.clone();
+    std::mem::swap(&mut scenario.start, &mut scenario.target);
+    let model = Model::new(&scenario);
+    let mut nobody = Nobody;
+    let mut own = Log::new(&model, &mut nobody, log.stop);
+    own.lower = log.lower;
+    let Some(starts) = starts::routes(&model, log.stop) else {
+        return StopReason::Iterations;
+    };
+    let reason = search::guided(&model, starts, &mut own);
+    log.evaluations += own.evaluations;
+    own.route.reverse();
+    log.offer_unpriced(&own.route);
+    reason
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point3;
+    use crate::planner::plan;
+    use crate::planner::tests::{hilly_scenario, mountain};
+    use crate::scenario::{Scenario, WarmStart};
+
+    /// Evenly spaced, at the heights between start and target.
+    fn straight(scenario: &Scenario) -> Vec<Point3> {
+        let legs = scenario.planner.waypoints + 1;
+        let way = scenario.target - scenario.start;
+        (0..=legs)
+            .map(|idx| scenario.start + way * (idx as f64 / legs as f64))
+            .collect()
+    }
+
+    #[test]
+    fn what_is_found_in_the_other_direction_leads_from_start_to_target() {
+        let scenario = mountain(200.0, true);
+        let model = Model::new(&scenario);
+        let mut nobody = Nobody;
+        let mut log = Log::new(&model, &mut nobody, &Nobody);
+        log.offer_unpriced(&straight(&scenario));
+        assert!(!log.best.is_feasible() && is_worthwhile(&model, &log));
+        assert_eq!(search(&model, &mut log), StopReason::Iterations);
+        assert!(log.best.is_feasible() && log.evaluations > 1_000);
+        let ends = [log.route.first(), log.route.last()];
+        assert_eq!(ends, [Some(&scenario.start), Some(&scenario.target)]);
+    }
+
+    /// Each of them is found by searching in either direction.
+    #[test]
+    fn a_steep_mountain_costs_the_same_either_way() {
+        let [down, up] = [true, false].map(|is_down| {
+            let outcome = plan(&mountain(200.0, is_down), &mut Nobody, &Nobody);
+            assert!(outcome.feasible);
+            outcome.cost.total
+        });
+        assert!((down / up - 1.0).abs() < 2e-3, "{down} {up}");
+    }
+
+    #[test]
+    fn level_ground_gentle_hills_and_known_routes_are_searched_once() {
+        let mut scenario = mountain(200.0, true);
+        let worthwhile = |scenario: &Scenario| {
+            let model = Model::new(scenario);
+            let mut nobody = Nobody;
+            let mut log = Log::new(&model, &mut nobody, &Nobody);
+            log.offer_unpriced(&straight(scenario));
+            is_worthwhile(&model, &log)
+        };
+        assert!(worthwhile(&scenario));
+        scenario.planner.warm_start = Some(WarmStart::Waypoints(Vec::new()));
+        assert!(!worthwhile(&scenario));
+        scenario.planner.warm_start = None;
+        scenario.planner.seeding = Seeding::Random;
+        assert!(!worthwhile(&scenario));
+
+        let mut gentle = hilly_scenario();
+        gentle.planner.seeding = Seeding::Tangent;
+        gentle.planner.polish = true;
+        gentle.vehicle.max_turn_deg = 180.0;
+        gentle.vehicle.max_climb_deg = 80.0;
+        let outcome = plan(&gentle, &mut Nobody, &Nobody);
+        let model = Model::new(&gentle);
+        let mut nobody = Nobody;
+        let mut log = Log::new(&model, &mut nobody, &Nobody);
+        log.offer_unpriced(&outcome.waypoints);
+        assert!(outcome.feasible && !is_worthwhile(&model, &log));
+    }
+}

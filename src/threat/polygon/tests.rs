@@ -39,6 +39,28 @@ fn a_leg_in_line_with_a_side_is_exposed_once() {
     }
 }
 
+/// Beyond a corner and on along the side, exactly in line or a rounding error off.
+#[test]
+fn a_leg_along_a_side_pays_before_its_corners_too() {
+    for (a, b, expected) in [
+        ([-20.0, 10.0], [30.0, 10.0], 200.0),
+        ([30.0, 0.0], [-20.0, 0.0], 200.0),
+        ([5.0, 10.0], [30.0, 10.0], 100.0),
+        ([10.0, 30.0], [10.0, 5.0], 100.0),
+        ([10.0, 30.0], [10.0, -5.0], 187.5),
+        ([0.0, -30.0], [0.0, 2.0], 70.0),
+    ] {
+        for off in [0.0, 1e-13, -1e-13] {
+            let leg = leg([a[0] + off, a[1] + off, 0.0], [b[0], b[1], 0.0]);
+            let exposure = square(10.0).exposure(&leg, (0.0, 1.0));
+            assert!(
+                (exposure - expected).abs() < 1e-9,
+                "{exposure} from {a:?} to {b:?}, {off} off"
+            );
+        }
+    }
+}
+
 #[test]
 fn clearance_is_exact_and_signed() {
     let check = |a, b, expected: f64| {

@@ -245,12 +245,24 @@ impl Polygon {
         Some(exposure)
     }
 
-    /// Integral of `T` between two fractions of a line along which the distance from an edge changes linearly.
-    fn beside_edge(&self, [start, end]: [f64; 2], [enters, leaves]: [f64; 2]) -> f64 {
-        let [d0, d1] = [enters, leaves].map(|share| start + (end - start) * share);
-        if enters >= leaves || d0.min(d1) < -HAIR {
+    /// Integral of `T` between two fractions of a line along which the distance from an edge changes linearly. A leg in
+    /// line with the next side goes on behind the edge's line, along that side, which pays for it there.
+    fn beside_edge(&self, outward: [f64; 2], beside: [f64; 2]) -> f64 {
+        let [start, end] = outward;
+        let away = |[enters, leaves]: [f64; 2]| {
+            [enters, leaves].map(|share| start + (end - start) * share)
+        };
+        let [d0, d1] = away(beside);
+        let [enters, leaves] = if d0.min(d1) < -HAIR {
+            let before = clip(outward, [0.0, f64::INFINITY], 0.0);
+            [beside[0].max(before[0]), beside[1].min(before[1])]
+        } else {
+            beside
+        };
+        if enters >= leaves {
             return 0.0;
         }
+        let [d0, d1] = away([enters, leaves]);
         self.mean_intensity(d0, d1) * (leaves - enters)
     }
 }

@@ -153,7 +153,8 @@ impl<S: Simd> View<S> {
         let Linear { at_start, gain } = self.along;
         let (enters, leaves) = (-at_start / gain, (leg.splat(zone.length) - at_start) / gain);
         let level = gain.abs().lt(leg.splat(LEVEL));
-        let beside = leg.splat(-HAIR).le(at_start) & at_start.le(leg.splat(zone.length + HAIR));
+        let beside =
+            leg.splat(-HAIR).le(at_start) & at_start.le(leg.splat(zone.length + zone.overhang));
         let from = level.select(beside.select(zero, one), enters.min(leaves));
         let to = level.select(beside.select(one, zero), enters.max(leaves));
         let (from, to) = (window.t0.max(from), window.t1.min(to));

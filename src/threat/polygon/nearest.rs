@@ -329,9 +329,16 @@ fn reign(features: &[Feature], nearest: &Feature, middle: f64, window: (f64, f64
             begins_here |= slope > 0.0 || (slope == 0.0 && ahead.a < 0.0);
         }
         // An edge takes over from its own end exactly where it becomes valid: a double root, which rounding may hide.
-        for t in [rival.valid.0, rival.valid.1] {
-            if t.is_finite() && ahead.at(t) <= 1e-9 * (1.0 + nearest.squared.at(t)) {
+        for (t, takes_over) in [(rival.valid.0, true), (rival.valid.1, false)] {
+            if !t.is_finite() || ahead.at(t) > 1e-9 * (1.0 + nearest.squared.at(t)) {
+                continue;
+            }
+            if (t - middle).abs() > NO_TIME {
                 shrink_to(t);
+            } else {
+                // The slope of a double root is rounding.
+                ends_here |= takes_over;
+                begins_here |= !takes_over;
             }
         }
     }

@@ -61,6 +61,52 @@ fn a_leg_along_a_side_pays_before_its_corners_too() {
     }
 }
 
+/// At a vertex where two sides are in line, only one of them is beside the leg.
+#[test]
+fn a_leg_at_right_angles_to_a_straight_vertex_is_exposed_once() {
+    let ring = ring(
+        &[
+            [0.0, 0.0],
+            [10.0, 0.0],
+            [10.0, 5.0],
+            [10.0, 10.0],
+            [0.0, 10.0],
+        ],
+        10.0,
+    );
+    for off in [0.0, 1e-10, -1e-10] {
+        let leg = leg([30.0, 5.0 + off, 0.0], [12.0, 5.0 + off, 0.0]);
+        let exposure = ring.exposure(&leg, (0.0, 1.0));
+        assert!((exposure - 32.0).abs() < 1e-9, "{exposure} {off}");
+    }
+}
+
+/// The leg is halved where the nearest feature changes, and each half of the first half again.
+#[test]
+fn features_may_change_exactly_in_the_middle() {
+    let ring = ring(
+        &[
+            [250.0, 250.0],
+            [400.0, 250.0],
+            [400.0, 325.0],
+            [325.0, 325.0],
+            [325.0, 400.0],
+            [250.0, 400.0],
+        ],
+        100.0,
+    );
+    for end in [[99.7, 399.933], [99.7, 399.933_000_000_1]] {
+        let leg = leg([400.0, 467.0, 0.0], [end[0], end[1], 0.0]);
+        let exposure = ring.exposure(&leg, (0.0, 1.0));
+        let n = 200_000;
+        let sum: f64 = (0..n)
+            .map(|idx| ring.intensity(leg.at((f64::from(idx) + 0.5) / f64::from(n)).xy()))
+            .sum();
+        let expected = sum * leg.length() / f64::from(n);
+        assert!((exposure - expected).abs() < 1e-3, "{exposure} {expected}");
+    }
+}
+
 #[test]
 fn clearance_is_exact_and_signed() {
     let check = |a, b, expected: f64| {

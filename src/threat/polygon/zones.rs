@@ -17,6 +17,9 @@ const MOST_VERTICES: usize = 256;
 /// and for the edge alone.
 pub(crate) const HAIR: f64 = 1e-6;
 
+/// Sine of the angle between edges that are in line.
+const IN_LINE: f64 = 1e-13;
+
 /// A part of an edge, usually all of it, and the part of the soft zone to which it is nearest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Zone {
@@ -27,6 +30,9 @@ pub(crate) struct Zone {
     pub(crate) length: f64,
     /// Unit vector out of the ring.
     pub(crate) outward: Vector2<f64>,
+    /// How far beyond its end a leg parallel to `outward` may be, metres, to count as beside it; below 0 where the next
+    /// edge goes on in line, which has that leg for its own.
+    pub(crate) overhang: f64,
     /// Direction of the previous edge, if the corner at `a` is nearest to a part of its own.
     pub(crate) before: Option<Vector2<f64>>,
     /// Whether something else may be as near as this part or its corner.
@@ -123,6 +129,7 @@ impl<'r> Sides<'r> {
             along: edge.along,
             length: to - from,
             outward: edge.outward,
+            overhang: HAIR,
             before: None,
             is_shared,
             center: edge.a + edge.along * (0.5 * (from + to)),
@@ -139,6 +146,11 @@ impl<'r> Sides<'r> {
             if to < edge.length {
                 zones.push(part(to, edge.length, true));
             }
+        }
+        if edge.along.perp(&self.after(idx).along).abs() < IN_LINE
+            && let Some(last) = zones.last_mut()
+        {
+            last.overhang = -HAIR;
         }
         if self.points_outwards(idx) {
             if self.is_corner_alone(idx) {
@@ -221,15 +233,15 @@ impl Polygon {
                 return None;
             }
             // Fractions of the part, from 0 to 1.
-            let beside = clip(along, [0.0, zone.length], HAIR);
+            let beside = clip(along, [0.0, zone.length], [HAIR, zone.overhang]);
             exposure += self.beside_edge(outward, beside) * (to - from) * leg.length();
             if let Some(before) = zone.before {
                 let past = clip(
                     seen.map(|end| end.dot(&before)),
                     [0.0, f64::INFINITY],
-                    -HAIR,
+                    [-HAIR; 2],
                 );
-                let ahead = clip(along, [f64::NEG_INFINITY, 0.0], -HAIR);
+                let ahead = clip(along, [f64::NEG_INFINITY, 0.0], [-HAIR; 2]);
                 let (enters, leaves) = (past[0].max(ahead[0]), past[1].min(ahead[1]));
                 if enters < leaves {
                     let corner = Cylinder {
@@ -254,7 +266,7 @@ impl Polygon {
         };
         let [d0, d1] = away(beside);
         let [enters, leaves] = if d0.min(d1) < -HAIR {
-            let before = clip(outward, [0.0, f64::INFINITY], 0.0);
+            let before = clip(outward, [0.0, f64::INFINITY], [0.0; 2]);
             [beside[0].max(before[0]), beside[1].min(before[1])]
         } else {
             beside
@@ -268,11 +280,11 @@ impl Polygon {
 }
 
 /// The fractions, 0 to 1, between which a value going linearly from `start` to `end` lies within `[low, high]`, widened
-/// by `hair` for a value that stays the same; an empty range if the first is not less than the second.
-fn clip([start, end]: [f64; 2], [low, high]: [f64; 2], hair: f64) -> [f64; 2] {
+/// by `hairs` for a value that stays the same; an empty range if the first is not less than the second.
+fn clip([start, end]: [f64; 2], [low, high]: [f64; 2], hairs: [f64; 2]) -> [f64; 2] {
     let gain = end - start;
     if gain.abs() < LEVEL {
-        return if start >= low - hair && start <= high + hair {
+        return if start >= low - hairs[0] && start <= high + hairs[1] {
             [0.0, 1.0]
         } else {
             [1.0, 0.0]

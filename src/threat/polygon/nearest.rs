@@ -143,7 +143,9 @@ fn edge_feature(leg: &Segment, edge: &Edge) -> Option<Feature> {
     let (across0, across1) = (origin.perp(&along), way.perp(&along));
     let (along0, along1) = (origin.dot(&along), way.dot(&along));
     let valid = if along1.abs() < LEVEL {
-        (along0 >= 0.0 && along0 <= length).then_some((f64::NEG_INFINITY, f64::INFINITY))?
+        // As a crossing, the edge counts as slightly longer.
+        let is_beside = along0 >= -LEVEL && along0 <= length + LEVEL;
+        is_beside.then_some((f64::NEG_INFINITY, f64::INFINITY))?
     } else {
         let (u, v) = (-along0 / along1, (length - along0) / along1);
         (u.min(v), u.max(v))

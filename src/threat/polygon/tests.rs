@@ -50,8 +50,9 @@ fn a_leg_along_a_side_pays_before_its_corners_too() {
         ([10.0, 30.0], [10.0, -5.0], 187.5),
         ([0.0, -30.0], [0.0, 2.0], 70.0),
     ] {
-        for off in [0.0, 1e-13, -1e-13] {
-            let leg = leg([a[0] + off, a[1] + off, 0.0], [b[0], b[1], 0.0]);
+        for (off, on) in [(0.0, 0.0), (1e-13, 0.0), (-1e-13, 0.0), (1e-13, -1e-13)] {
+            let (a, b) = (a.map(|at| at + off), b.map(|at| at + on));
+            let leg = leg([a[0], a[1], 0.0], [b[0], b[1], 0.0]);
             let exposure = square(10.0).exposure(&leg, (0.0, 1.0));
             assert!(
                 (exposure - expected).abs() < 1e-9,

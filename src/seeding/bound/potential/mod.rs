@@ -66,8 +66,7 @@ pub(super) fn applies(walls: &[Wall], prices: &Prices) -> bool {
 
 /// The threats that cover all heights.
 pub(super) fn whole(walls: &[Wall]) -> impl Iterator<Item = &Wall> {
-    let is_whole = |wall: &&Wall| wall.toll.is_none() && !wall.is_border;
-    walls.iter().filter(is_whole)
+    walls.iter().filter(|wall| wall.toll.is_none())
 }
 
 /// A proof of a lower bound at the prices of fuel and soft zones, seen from above, where it `applies`; `None` where

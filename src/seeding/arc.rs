@@ -94,6 +94,13 @@ impl Arc {
         }
     }
 
+    /// The same part of a circle whose radius is less by this much.
+    pub(super) fn narrowed(&self, by: f64) -> Self {
+        let mut narrowed = *self;
+        narrowed.on.radius = (self.on.radius - by).max(0.0);
+        narrowed
+    }
+
     pub(super) fn length(&self) -> f64 {
         self.on.radius * self.turn
     }

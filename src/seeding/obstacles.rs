@@ -283,15 +283,18 @@ impl Obstacles {
         let low = [center.x - radius, center.y - radius];
         let high = [center.x + radius, center.y + radius];
         self.first_of(low, high, own, |body| {
-            let distance = if body.a == body.b {
-                arc.distance_to(body.a)
-            } else {
-                arc.distance_to_segment(body.a, body.b)
-            };
+            let distance = distance(arc, body);
             // An edge without width is not crossed either: the ring's inside is beyond it.
             distance < body.radius - self.touch
-                || (body.radius <= self.touch && distance <= 0.0 && !touches(arc, body, self.touch))
+                || (body.radius <= self.touch && distance <= 0.0 && self.crosses_edge(arc, body))
         })
+    }
+
+    /// Whether `arc`, which meets the edge `body`, crosses it by more than a touch: not only with an end, and not only
+    /// as far as it bulges.
+    fn crosses_edge(&self, arc: &Arc, body: &Body) -> bool {
+        let flatter = arc.narrowed(self.touch);
+        distance(&flatter, body) <= 0.0 && !touches(arc, body, self.touch)
     }
 
     /// Whether `arc` leaves the area.
@@ -391,6 +394,15 @@ impl Body {
                 self.a.y.max(self.b.y) + radius,
             ],
         )
+    }
+}
+
+/// Distance of `arc` from the middle of `body`.
+fn distance(arc: &Arc, body: &Body) -> f64 {
+    if body.a == body.b {
+        arc.distance_to(body.a)
+    } else {
+        arc.distance_to_segment(body.a, body.b)
     }
 }
 

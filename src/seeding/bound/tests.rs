@@ -321,3 +321,24 @@ fn the_height_of_a_waypoint_beyond_a_threat_is_counted_once() {
         assert!(bound > 0.99 * total && bound <= total, "{bound} {total}");
     }
 }
+
+/// A zone without room for its widened wall beside a polygon without margin: narrowed to touch the polygon, the wall
+/// leaves a way there. A feasible route through the gap, with the start in the zone, costs 187.935.
+#[test]
+fn a_wall_that_just_touches_a_polygon_leaves_a_way() {
+    let scenario = read(
+        r#"{ "frame": "local", "start": { "x": 0.7, "y": 108.8, "z": 32 }, "target": { "x": 142.3, "y": 59.5, "z": 32.4 },
+            "area": { "min": { "x": -100, "y": -100 }, "max": { "x": 304, "y": 304 } },
+            "altitude": { "min": 12.2, "max": 61 },
+            "vehicle": { "max_turn_deg": 180, "max_climb_deg": 89, "fuel_per_km": 1000 },
+            "weights": { "fuel": 1, "threat": 100, "altitude": 0 },
+            "threats": [
+                { "kind": "cylinder", "center": { "x": 1, "y": 119.8 }, "radius": 6.8, "influence": 11 },
+                { "kind": "cylinder", "center": { "x": 7.6, "y": 106.5 }, "radius": 7.2, "influence": 8 },
+                { "kind": "polygon", "margin": 0, "vertices": [{ "x": -99, "y": -99 }, { "x": 0, "y": -99 },
+                    { "x": 0, "y": 300 }, { "x": -99, "y": 300 }] }
+            ] }"#,
+    );
+    let bound = lower_bound(&scenario);
+    assert!(bound > 149.0 && bound <= 187.935, "{bound}");
+}

@@ -154,16 +154,8 @@ impl Wall {
     /// Number of corners of a ring.
     pub(super) fn corners(&self) -> usize {
         match &self.shape {
-            OutlineShape::Ring(ring) => ring.len(),
             OutlineShape::Disc(_) => 0,
-        }
-    }
-
-    /// Number of circles that a string may bend round.
-    pub(super) fn bends(&self) -> usize {
-        match &self.shape {
-            OutlineShape::Disc(_) => 1,
-            OutlineShape::Ring(_) => self.corners(),
+            OutlineShape::Ring(ring) => ring.len(),
         }
     }
 

@@ -64,7 +64,7 @@ pub(super) fn applies(walls: &[Wall], prices: &Prices) -> bool {
         && whole(walls).any(|wall| wall.influence > wall.core)
 }
 
-/// The threats that cover all heights.
+/// The walls that cover all heights.
 pub(super) fn whole(walls: &[Wall]) -> impl Iterator<Item = &Wall> {
     walls.iter().filter(|wall| wall.toll.is_none())
 }

@@ -3,7 +3,7 @@
 
 use super::log::Log;
 use super::search::{self};
-use super::{Nobody, StopReason, newton, starts};
+use super::{StopReason, newton};
 use crate::cost::Model;
 use crate::scenario::Seeding;
 
@@ -23,26 +23,20 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     log.tell();
     let mut scenario = model.scenario.clone();
     std::mem::swap(&mut scenario.start, &mut scenario.target);
-    let model = Model::new(&scenario);
-    let mut nobody = Nobody;
-    let mut own = Log::new(&model, &mut nobody, log.stop);
-    own.lower = log.lower;
-    let Some(starts) = starts::routes(&model, log.stop) else {
-        return StopReason::Iterations;
-    };
-    let reason = search::guided(&model, starts, &mut own);
-    log.evaluations += own.evaluations;
-    own.route.reverse();
-    log.offer_unpriced(&own.route);
-    reason
+    let found = search::aside(&Model::new(&scenario), log.lower, log);
+    found.map_or(StopReason::Iterations, |(reason, _, mut route)| {
+        route.reverse();
+        log.offer_unpriced(&route);
+        reason
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::Point3;
-    use crate::planner::plan;
     use crate::planner::tests::{hilly_scenario, mountain};
+    use crate::planner::{Nobody, plan};
     use crate::scenario::{Scenario, WarmStart};
 
     /// Evenly spaced, at the heights between start and target.

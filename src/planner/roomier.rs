@@ -7,7 +7,7 @@ use super::newton::Newton;
 use super::polish::Steps;
 use super::price::price;
 use super::search::{self, COARSE_STEPS};
-use super::{Nobody, StopReason, starts, why_stop};
+use super::{StopReason, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
@@ -68,14 +68,8 @@ fn roomy(model: &Model, times: f64, log: &mut Log) -> Option<Vec<Point3>> {
     settings.waypoints = more(settings.waypoints, times);
     settings.population = settings.population.min(POPULATION);
     settings.iterations = settings.iterations.min(ITERATIONS);
-    let model = Model::new(&scenario);
-    let mut nobody = Nobody;
-    let mut own = Log::new(&model, &mut nobody, log.stop);
-    if let Some(starts) = starts::routes(&model, log.stop) {
-        search::guided(&model, starts, &mut own);
-    }
-    log.evaluations += own.evaluations;
-    own.best.is_feasible().then_some(own.route)
+    let (_, best, route) = search::aside(&Model::new(&scenario), None, log)?;
+    best.is_feasible().then_some(route)
 }
 
 #[expect(
@@ -134,6 +128,7 @@ fn into_place(model: &Model, route: &mut Vec<Point3>, log: &mut Log) -> Fitness 
 mod tests {
     use super::*;
     use crate::geometry::Point2;
+    use crate::planner::Nobody;
     use crate::planner::tests::{Looks, scenario};
     use crate::scenario::{Scenario, Seeding};
     use crate::threat::{Polygon, Shape, Threat};

@@ -5,7 +5,7 @@ use super::log::Log;
 use super::objective::Routes;
 use super::polish::Steps;
 use super::starts::Starts;
-use super::{StopReason, same, starts, why_stop};
+use super::{Nobody, StopReason, same, starts, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::{self, Algorithm, Fitness, Optimizer, Settings, share_of};
@@ -90,6 +90,22 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
     }
     elites.extend(best_starts);
     finish(model, reason, &elites, &starts.beyond, log)
+}
+
+/// The guided search of another `model` on behalf of the run of `log`, which counts what it prices: why it ended, and its
+/// best route. `None` where there is nothing to start from.
+pub(super) fn aside(
+    model: &Model,
+    lower: Option<f64>,
+    log: &mut Log,
+) -> Option<(StopReason, Fitness, Vec<Point3>)> {
+    let mut nobody = Nobody;
+    let mut own = Log::new(model, &mut nobody, log.stop);
+    own.lower = lower;
+    let starts = starts::routes(model, log.stop)?;
+    let reason = guided(model, starts, &mut own);
+    log.evaluations += own.evaluations;
+    Some((reason, own.best, own.route))
 }
 
 /// Start the algorithm and do `iterations`; where the range begins with 0, the first evaluation is

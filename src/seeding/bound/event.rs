@@ -198,7 +198,13 @@ fn gap(one: &Core, other: &Core, walls: &[Wall], prices: &Prices) -> Option<Even
                 if discs {
                     between_discs(wall, next, apart, *way)
                 } else {
-                    ramp(depth, 2.0, *way)
+                    // The border has no zone that could be left.
+                    let zones = if wall.is_border || next.is_border {
+                        1.0
+                    } else {
+                        2.0
+                    };
+                    ramp(depth, zones, *way)
                 }
             }
         })

@@ -7,6 +7,7 @@
 //! field of all prices proves more; the better of both counts. Finally, a start or target at another height than the
 //! middle of the band costs what its straight legs do.
 
+mod border;
 mod departure;
 mod ends;
 mod event;

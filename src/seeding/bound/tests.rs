@@ -1,6 +1,6 @@
 //! The bound of whole scenarios, compared with the best known routes.
 
-use super::super::tests::{among, read, scenario};
+use super::super::tests::{among, disc, read, scenario};
 use super::*;
 use crate::geometry::Point3;
 use crate::scenario::Weights;
@@ -322,23 +322,62 @@ fn the_height_of_a_waypoint_beyond_a_threat_is_counted_once() {
     }
 }
 
-/// A zone without room for its widened wall beside a polygon without margin: narrowed to touch the polygon, the wall
-/// leaves a way there. A feasible route through the gap, with the start in the zone, costs 187.935.
+/// A zone without room for its widened wall beside a polygon without margin, or beside the border: narrowed to touch it,
+/// the wall leaves a way there. A feasible route through the gap, with the start in the zone, costs 187.935.
 #[test]
-fn a_wall_that_just_touches_a_polygon_leaves_a_way() {
-    let scenario = read(
-        r#"{ "frame": "local", "start": { "x": 0.7, "y": 108.8, "z": 32 }, "target": { "x": 142.3, "y": 59.5, "z": 32.4 },
-            "area": { "min": { "x": -100, "y": -100 }, "max": { "x": 304, "y": 304 } },
-            "altitude": { "min": 12.2, "max": 61 },
-            "vehicle": { "max_turn_deg": 180, "max_climb_deg": 89, "fuel_per_km": 1000 },
-            "weights": { "fuel": 1, "threat": 100, "altitude": 0 },
-            "threats": [
-                { "kind": "cylinder", "center": { "x": 1, "y": 119.8 }, "radius": 6.8, "influence": 11 },
-                { "kind": "cylinder", "center": { "x": 7.6, "y": 106.5 }, "radius": 7.2, "influence": 8 },
-                { "kind": "polygon", "margin": 0, "vertices": [{ "x": -99, "y": -99 }, { "x": 0, "y": -99 },
-                    { "x": 0, "y": 300 }, { "x": -99, "y": 300 }] }
-            ] }"#,
-    );
-    let bound = lower_bound(&scenario);
-    assert!(bound > 149.0 && bound <= 187.935, "{bound}");
+fn a_wall_that_just_touches_a_polygon_or_the_border_leaves_a_way() {
+    let polygon = r#", { "kind": "polygon", "margin": 0, "vertices": [{ "x": -99, "y": -99 }, { "x": 0, "y": -99 },
+        { "x": 0, "y": 300 }, { "x": -99, "y": 300 }] }"#;
+    for (west, polygon) in [(-100, polygon), (0, "")] {
+        let scenario = read(&format!(
+            r#"{{ "frame": "local", "start": {{ "x": 0.7, "y": 108.8, "z": 32 }}, "target": {{ "x": 142.3, "y": 59.5, "z": 32.4 }},
+                "area": {{ "min": {{ "x": {west}, "y": -100 }}, "max": {{ "x": 304, "y": 304 }} }},
+                "altitude": {{ "min": 12.2, "max": 61 }},
+                "vehicle": {{ "max_turn_deg": 180, "max_climb_deg": 89, "fuel_per_km": 1000 }},
+                "weights": {{ "fuel": 1, "threat": 100, "altitude": 0 }},
+                "threats": [
+                    {{ "kind": "cylinder", "center": {{ "x": 1, "y": 119.8 }}, "radius": 6.8, "influence": 11 }},
+                    {{ "kind": "cylinder", "center": {{ "x": 7.6, "y": 106.5 }}, "radius": 7.2, "influence": 8 }}{polygon}
+                ] }}"#
+        ));
+        let bound = lower_bound(&scenario);
+        assert!(bound > 149.0 && bound <= 187.935, "{bound}");
+    }
+}
+
+/// A wall that reaches over the border is gone round inside the area; a disc near the border may be passed beside it.
+#[test]
+fn strings_stay_inside_the_area() {
+    let bound = |threats: &str, y: f64| {
+        let mut scenario = scenario(&format!(r#""threats": [{threats}]"#));
+        scenario.start = Point3::new(100.0, y, 100.0);
+        scenario.target = Point3::new(900.0, y, 100.0);
+        scenario.weights.fuel = 1.0;
+        lower_bound(&scenario)
+    };
+    let slab = |west: u32, [south, north]: [i32; 2]| {
+        let east = west + 20;
+        format!(
+            r#"{{"kind": "polygon", "margin": 20, "vertices": [{{"x": {west}, "y": {south}}}, {{"x": {east}, "y": {south}}},
+                {{"x": {east}, "y": {north}}}, {{"x": {west}, "y": {north}}}]}}"#
+        )
+    };
+    let round = |north: f64| 2.0 * libm::hypot(390.0, north - 100.0) + 20.0;
+    for south in [-50, -1] {
+        let bound = bound(&slab(490, [south, 900]), 100.0);
+        assert!(bound > round(900.0) && bound < round(930.0), "{bound}");
+    }
+    let slalom = [
+        slab(300, [-10, 900]),
+        slab(490, [100, 1010]),
+        slab(680, [-10, 900]),
+    ];
+    let length = 2.0 * libm::hypot(200.0, 800.0) + 2.0 * libm::hypot(170.0, 800.0) + 60.0;
+    let slaloms = bound(&slalom.join(", "), 100.0);
+    assert!(slaloms > length && slaloms < 1.05 * length, "{slaloms}");
+
+    // Ten metres are left beside the disc, with a soft zone that costs more than the way round the other side; or none.
+    let beside = |influence: f64| bound(&disc(500.0, 200.0, 190.0, influence), 20.0);
+    let (free, dear) = (beside(190.0), beside(230.0));
+    assert!(free < 850.0 && dear > free + 50.0, "{free} {dear}");
 }

@@ -3,7 +3,7 @@
 
 use super::prices::Prices;
 use super::toll::{Heights, Toll, climbs, stays};
-use crate::geometry::{Point2, Vector2, ring};
+use crate::geometry::{Point2, Rect, Vector2, ring};
 use crate::scenario::Scenario;
 use crate::seeding::arc::{nearest_points, point_segment, segment_segment};
 use crate::seeding::outline::{Outline, OutlineShape};
@@ -35,6 +35,8 @@ pub(super) struct Wall {
     /// From the start and from the target, metres up to its top and down to its base; negative where these have been
     /// passed, infinite where there is none.
     pub(super) climbs: [[f64; 2]; 2],
+    /// Whether it is a side of the area's border and no threat.
+    pub(super) is_border: bool,
 }
 
 impl Wall {
@@ -69,6 +71,7 @@ impl Wall {
             toll,
             stays: stays(threat, scenario),
             climbs: climbs(threat, prices),
+            is_border: false,
         };
         if let OutlineShape::Ring(ring) = &wall.shape
             && (wall.slack() >= perimeter(ring) || is_thin(ring, 2.0 * slack))
@@ -77,6 +80,23 @@ impl Wall {
             return None;
         }
         Some(wall)
+    }
+
+    /// A side of the area's border, all of which lies beyond every feasible route.
+    pub(super) fn side(of: &Rect) -> Self {
+        Self {
+            shape: OutlineShape::Ring(of.corners().into()),
+            tolerance: 0.0,
+            core: 0.0,
+            influence: 0.0,
+            wide: 0.0,
+            dip: 0.0,
+            safe: 0.0,
+            toll: None,
+            stays: [0.0; 2],
+            climbs: [[f64::INFINITY; 2]; 2],
+            is_border: true,
+        }
     }
 
     /// Widen it by `most` at most.
@@ -151,11 +171,19 @@ impl Wall {
         nearest + (point - nearest).normalize() * radius
     }
 
-    /// Number of corners of a ring.
+    /// Number of corners of a ring; of the border, none can be reached.
     pub(super) fn corners(&self) -> usize {
         match &self.shape {
-            OutlineShape::Disc(_) => 0,
-            OutlineShape::Ring(ring) => ring.len(),
+            OutlineShape::Ring(ring) if !self.is_border => ring.len(),
+            _ => 0,
+        }
+    }
+
+    /// Number of circles that a string may bend round.
+    pub(super) fn bends(&self) -> usize {
+        match &self.shape {
+            OutlineShape::Disc(_) => 1,
+            OutlineShape::Ring(_) => self.corners(),
         }
     }
 

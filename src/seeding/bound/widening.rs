@@ -1,5 +1,6 @@
 //! How far each wall may be widened: not over the ends, except for one wall around each.
 
+use super::border::border;
 use super::prices::Prices;
 use super::toll::Heights;
 use super::wall::Wall;
@@ -7,11 +8,12 @@ use crate::geometry::Point2;
 use crate::scenario::Scenario;
 use crate::threat::Threat;
 
-/// All walls of `scenario`.
+/// All walls of `scenario`: its threats, and the border where it matters.
 pub(super) fn walls(scenario: &Scenario, prices: &Prices) -> Vec<Wall> {
     let heights = Heights::of(scenario);
     let wall = |threat: &Threat| Wall::new(threat, scenario, prices, &heights);
     let mut walls: Vec<Wall> = scenario.threats.iter().filter_map(wall).collect();
+    walls.extend(border(&walls, &scenario.area, prices));
     let ends = prices.ends.map(|end| end.xy());
     let first = Around::of(&walls, ends, None, prices);
     let taken = first.map(|first| first.wall);

@@ -38,7 +38,7 @@ pub(in super::super) fn over(
     };
     proof.look_up();
     let fine = LEAST * proof.total();
-    let corners: usize = walls.iter().map(|wall| wall.centers().len()).sum();
+    let corners: usize = walls.iter().map(Wall::bends).sum();
     let effort = EFFORT * MOST_CORNERS / corners.max(MOST_CORNERS);
     let excess = |end: usize| {
         let rise = |at, spread| proof.rise(end, at, spread);

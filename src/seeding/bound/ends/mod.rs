@@ -44,7 +44,7 @@ const CORNERS: usize = 3;
 
 /// Whether there are too many corners to examine legs.
 pub(super) fn are_too_many(walls: &[Wall]) -> bool {
-    walls.iter().map(|wall| wall.centers().len()).sum::<usize>() > MOST_CORNERS
+    walls.iter().map(Wall::bends).sum::<usize>() > MOST_CORNERS
 }
 
 /// The first and the last legs of routes round widened walls.

@@ -66,7 +66,8 @@ pub(super) fn applies(walls: &[Wall], prices: &Prices) -> bool {
 
 /// The walls that cover all heights.
 pub(super) fn whole(walls: &[Wall]) -> impl Iterator<Item = &Wall> {
-    walls.iter().filter(|wall| wall.toll.is_none())
+    let is_whole = |wall: &&Wall| wall.toll.is_none() && !wall.is_border;
+    walls.iter().filter(is_whole)
 }
 
 /// A proof of a lower bound at the prices of fuel and soft zones, seen from above, where it `applies`; `None` where

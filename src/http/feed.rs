@@ -13,7 +13,7 @@ use super::Phase;
 use super::phase::stopping;
 use super::throttle::Throttle;
 use crate::job::{Event, NumberedEvent, PlanId, Status};
-use crate::store::{Store, StoreError};
+use crate::store::{LastEvent, Store, StoreError};
 
 /// Events read at once.
 const PAGE: usize = 128;
@@ -110,7 +110,8 @@ impl Feed {
             self.changes.mark_unchanged();
             let page = match self.store.events(self.id, self.after, PAGE).await {
                 Ok(page) => page,
-                Err(StoreError::Gone(_) | StoreError::NotFound(_)) => return self.removed(),
+                Err(StoreError::Gone(tombstone)) => return self.removed(tombstone.end),
+                Err(StoreError::NotFound(_)) => return self.removed(None),
                 Err(error) => {
                     tracing::warn!(%error, "a stream of events broke off");
                     break;
@@ -175,19 +176,36 @@ impl Feed {
         }]))
     }
 
-    /// The plan has been deleted, which cancels it if it had not ended. A reader who is behind cannot be told how it
-    /// ended.
-    fn removed(&mut self) -> Option<News> {
-        self.over = true;
-        let mut out = Vec::new();
-        self.throttle.flush(&mut out);
-        if self.caught_up {
-            out.push(NumberedEvent {
-                id: self.after + 1,
-                event: Event::End(Status::Cancelled),
+    /// The plan has been removed, and its events with it: what was not read is missing. Where nothing says how the plan
+    /// ended, a reader who is behind cannot be told.
+    fn removed(&mut self, end: Option<LastEvent>) -> Option<News> {
+        if self.throttle.holds() {
+            let mut out = Vec::new();
+            self.throttle.flush(&mut out);
+            return Some(News::Events(out));
+        }
+        let next = self.after + 1;
+        let here = self.caught_up.then_some(LastEvent {
+            id: next,
+            status: Status::Cancelled,
+        });
+        let Some(end) = end.or(here) else {
+            self.over = true;
+            return None;
+        };
+        // A new reader asked for none of what is missing.
+        if next > 1 && next < end.id {
+            self.after = end.id - 1;
+            return Some(News::Gap {
+                from: next,
+                to: self.after,
             });
         }
-        (!out.is_empty()).then_some(News::Events(out))
+        self.over = true;
+        Some(News::Events(vec![NumberedEvent {
+            id: end.id.max(next),
+            event: Event::End(end.status),
+        }]))
     }
 
     fn take(&mut self, page: Vec<NumberedEvent>, out: &mut Vec<NumberedEvent>) {

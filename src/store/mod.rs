@@ -22,6 +22,7 @@ pub use options::{OnLost, Options, Retention};
 use std::sync::Arc;
 
 use async_trait::async_trait;
+use serde::{Deserialize, Serialize};
 use tokio::sync::watch;
 
 use crate::export::document::Incumbent;
@@ -242,6 +243,32 @@ pub struct Tombstone {
     pub owner: Option<Owner>,
     /// Whether it had expired; otherwise somebody deleted it.
     pub expired: bool,
+    /// The last of its events; `None` of one that an earlier version of this program removed.
+    pub end: Option<LastEvent>,
+}
+
+/// The `end` of a removed plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LastEvent {
+    /// Its number.
+    pub id: u64,
+    /// How the plan ended.
+    pub status: Status,
+}
+
+impl LastEvent {
+    /// Of a plan that is removed in this state, with `newest` the number of its newest event: its end, or else the removal
+    /// cancels it.
+    pub(crate) fn of(status: Status, newest: u64) -> Self {
+        if status.is_final() {
+            Self { id: newest, status }
+        } else {
+            Self {
+                id: newest + 1,
+                status: Status::Cancelled,
+            }
+        }
+    }
 }
 
 /// The right to run one plan, from [`Store::claim`] or [`Store::claim_early`] to [`Store::finish`] or [`Store::release`].

@@ -380,6 +380,53 @@ async fn the_end_of_a_deleted_plan_has_the_next_id_for_every_reader() {
     .await;
 }
 
+/// The ids of all events, in order; those that a gap names count as read.
+fn accounted(blocks: &[Block]) -> Vec<u64> {
+    let mut ids = Vec::new();
+    for block in blocks {
+        match block {
+            Block::Event { name, data, .. } if name == "gap" => {
+                let id = |name| data[name].as_u64().expect("an id");
+                ids.extend(id("from")..=id("to"));
+            }
+            Block::Event { id, .. } => ids.push(*id),
+            _ => {}
+        }
+    }
+    ids
+}
+
+#[tokio::test]
+async fn a_reader_who_is_behind_when_the_plan_is_deleted_is_told_what_it_missed_and_the_end() {
+    for_every_backend(async |backend| {
+        for ended in [false, true] {
+            let plan = Followed::on(backend).await;
+            let store = &*plan.api.store;
+            let mut stream = Stream::open(plan.events("?rate=0")).await;
+            let mut blocks = vec![stream.next().await.expect("the first status")];
+            let lease = store.claim().await.expect("a queued plan");
+            let many = (0..50).flat_map(|_| a_run()).collect();
+            store.append(&lease, many).await.expect("held");
+            if ended {
+                run::finish(store, &lease, Status::Succeeded).await;
+            }
+            plan.api.delete(&plan.address).await;
+            blocks.extend(in_time(stream.rest()).await);
+
+            let ids = accounted(&blocks);
+            let last = *ids.last().expect("an end");
+            assert_eq!(ids, (1..=last).collect::<Vec<_>>(), "{blocks:?}");
+            let Some(Block::Event { name, data, .. }) = blocks.last() else {
+                panic!("{blocks:?}")
+            };
+            let status = if ended { "succeeded" } else { "cancelled" };
+            assert_eq!((name.as_str(), &data["status"]), ("end", &status.into()));
+            assert!(last > 50, "{last} events");
+        }
+    })
+    .await;
+}
+
 #[tokio::test]
 async fn streams_end_when_the_service_stops() {
     let plan = Followed::new().await;

@@ -59,7 +59,7 @@ async fn a_newer_schema_is_refused_and_left_unchanged() {
     drop(database);
     let message = refusal(directory.path());
     assert!(
-        message.contains("schema version 99") && message.contains("up to 8"),
+        message.contains("schema version 99") && message.contains("up to 9"),
         "{message}"
     );
     let database = rusqlite::Connection::open(&file).unwrap();

@@ -157,8 +157,8 @@ async fn a_file_of_version_4_is_migrated_with_all_its_contents() {
         panic!("it was deleted");
     };
     assert_eq!(
-        (tombstone.owner.as_deref(), tombstone.expired),
-        (Some("bob"), false)
+        (tombstone.owner.as_deref(), tombstone.expired, tombstone.end),
+        (Some("bob"), false, None)
     );
     let used = DatasetUse {
         sha256: "85e41b0da922754e1be762d1b21ae5ac213333287d8fad6f571dc3319eef2f47".to_owned(),

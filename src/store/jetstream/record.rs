@@ -12,7 +12,7 @@ use uuid::Uuid;
 use super::lane::Lane;
 use super::steps::Change;
 use crate::job::{Event, NumberedEvent, Owner, Plan, PlanId, Status, Submission};
-use crate::store::{Retention, StoreError, Tombstone};
+use crate::store::{LastEvent, Retention, StoreError, Tombstone};
 
 /// A step, as it is written.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -101,6 +101,9 @@ pub(super) struct Grave {
     /// See [`Record::objects`].
     #[serde(default)]
     pub(super) objects: Vec<String>,
+    /// See [`Tombstone::end`].
+    #[serde(default)]
+    pub(super) end: Option<LastEvent>,
 }
 
 impl Record {
@@ -171,6 +174,7 @@ impl Grave {
             id,
             owner: self.owner.clone(),
             expired: self.expired,
+            end: self.end,
         }
     }
 }

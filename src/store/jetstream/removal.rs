@@ -9,7 +9,7 @@ use super::record::{Grave, State};
 use super::steps::Change;
 use super::view::Standing;
 use crate::job::PlanId;
-use crate::store::{SWEEP, StoreError};
+use crate::store::{LastEvent, SWEEP, StoreError};
 
 /// Number of expired plans that are removed at the same time.
 const AT_ONCE: usize = 16;
@@ -72,6 +72,7 @@ impl JetStream {
                     expired,
                     deleted_ms: now_ms,
                     objects,
+                    end: Some(LastEvent::of(record.plan.status, record.last_event)),
                 };
                 Ok(Some(Change::silent(State::Buried(grave))))
             })

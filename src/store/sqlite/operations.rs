@@ -11,7 +11,7 @@ use super::transaction::{Effect, Transaction};
 use super::{head, idempotency, removal, webhooks};
 use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Status, Submission};
-use crate::store::{End, Ending, Lease, StoreError, Submitted, Tombstone, lost};
+use crate::store::{End, Ending, LastEvent, Lease, StoreError, Submitted, Tombstone, lost};
 
 /// More than the documents of nearly all plans.
 const BALLAST_BYTES: i64 = 512 << 10;
@@ -229,6 +229,7 @@ pub(super) fn delete(tx: &mut Transaction<'_>, id: PlanId, now_ms: i64) -> Resul
         id,
         owner: row.plan.owner,
         expired: false,
+        end: Some(LastEvent::of(row.plan.status, row.last_event)),
     };
     removal::remove(tx, row.seq, tombstone, now_ms)?;
     if row.plan.status == Status::Queued {

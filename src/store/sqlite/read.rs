@@ -16,7 +16,8 @@ use super::unreadable::{Passed, Unreadable};
 use crate::export::document::Incumbent;
 use crate::job::{Event, NumberedEvent, Plan, PlanId, Status};
 use crate::store::{
-    DatasetUse, EventPage, ListQuery, RUNS_IN_MEAN, Stats, StoreError, TOMBSTONE_MS, Tombstone,
+    DatasetUse, EventPage, LastEvent, ListQuery, RUNS_IN_MEAN, Stats, StoreError, TOMBSTONE_MS,
+    Tombstone,
 };
 
 /// Concurrent reads; further ones wait.
@@ -342,10 +343,23 @@ pub(super) fn missing(
     now_ms: i64,
 ) -> Result<StoreError, StoreError> {
     let tombstone: Option<(i64, Tombstone)> = connection
-        .prepare_cached("SELECT deleted_ms, owner, expired FROM tombstones WHERE id = ?1")?
+        .prepare_cached(
+            "SELECT deleted_ms, owner, expired, status, last_event FROM tombstones WHERE id = ?1",
+        )?
         .query_row([id.to_string()], |row| {
-            let (owner, expired) = (row.get(1)?, row.get(2)?);
-            Ok((row.get(0)?, Tombstone { id, owner, expired }))
+            let status: Option<String> = row.get(3)?;
+            let status = status.as_deref().and_then(Status::from_name);
+            let last: Option<i64> = row.get(4)?;
+            let tombstone = Tombstone {
+                id,
+                owner: row.get(1)?,
+                expired: row.get(2)?,
+                end: status.zip(last).map(|(status, last)| LastEvent {
+                    id: last.cast_unsigned(),
+                    status,
+                }),
+            };
+            Ok((row.get(0)?, tombstone))
         })
         .optional()?;
     Ok(match tombstone {

@@ -4,8 +4,8 @@ use rusqlite::{Params, Row, params};
 
 use super::idempotency;
 use super::transaction::{Effect, Transaction};
-use crate::job::PlanId;
-use crate::store::{SWEEP, StoreError, TOMBSTONE_MS, Tombstone};
+use crate::job::{PlanId, Status};
+use crate::store::{LastEvent, SWEEP, StoreError, TOMBSTONE_MS, Tombstone};
 
 /// An ended plan that may have to be removed.
 struct Ended {
@@ -16,12 +16,15 @@ struct Ended {
 }
 
 impl Ended {
-    /// From `seq, id, owner, bytes`. A text that cannot be read is done without, or the plan would hold up the removal
+    /// From `seq, id, owner, bytes, status, last_event`. A text that cannot be read is done without, or the plan would hold up the removal
     /// of all others for ever.
     fn read(row: &Row<'_>) -> rusqlite::Result<Self> {
         let id = row.get::<_, String>(1).ok();
         let id = id.and_then(|id| PlanId::parse_str(&id).ok());
         let owner = row.get(2).ok();
+        let status = row.get::<_, String>(4).ok();
+        let status = status.as_deref().and_then(Status::from_name);
+        let last: Option<i64> = row.get(5).ok();
         Ok(Self {
             seq: row.get(0)?,
             bytes: row.get::<_, i64>(3)?.cast_unsigned(),
@@ -29,6 +32,9 @@ impl Ended {
                 id,
                 owner,
                 expired: true,
+                end: status
+                    .zip(last)
+                    .map(|(status, last)| LastEvent::of(status, last.cast_unsigned())),
             }),
         })
     }
@@ -53,7 +59,7 @@ pub(super) fn sweep(tx: &mut Transaction<'_>, now_ms: i64) -> Result<usize, Stor
 fn expired(tx: &Transaction<'_>, now_ms: i64) -> Result<Vec<Ended>, StoreError> {
     ended(
         tx,
-        "SELECT seq, id, owner, bytes FROM plans WHERE expires_ms <= ?1 ORDER BY expires_ms LIMIT ?2",
+        "SELECT seq, id, owner, bytes, status, last_event FROM plans WHERE expires_ms <= ?1 ORDER BY expires_ms LIMIT ?2",
         [now_ms, SWEEP.cast_signed() as i64],
     )
 }
@@ -76,7 +82,7 @@ fn beyond_limits(tx: &Transaction<'_>, at_most: usize) -> Result<Vec<Ended>, Sto
     }
     let oldest = ended(
         tx,
-        "SELECT seq, id, owner, bytes FROM plans INDEXED BY plans_ended \
+        "SELECT seq, id, owner, bytes, status, last_event FROM plans INDEXED BY plans_ended \
          WHERE finished_ms IS NOT NULL ORDER BY finished_ms LIMIT ?1",
         [at_most.cast_signed() as i64],
     )?;
@@ -118,13 +124,26 @@ pub(super) fn remove(
     tombstone: Tombstone,
     now_ms: i64,
 ) -> Result<(), StoreError> {
-    let Tombstone { id, owner, expired } = tombstone;
+    let Tombstone {
+        id,
+        owner,
+        expired,
+        end,
+    } = tombstone;
     delete_row(tx, seq)?;
     tx.connection
         .prepare_cached(
-            "INSERT OR REPLACE INTO tombstones (id, deleted_ms, owner, expired) VALUES (?1, ?2, ?3, ?4)",
+            "INSERT OR REPLACE INTO tombstones (id, deleted_ms, owner, expired, status, last_event) \
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
         )?
-        .execute(params![id.to_string(), now_ms, owner, expired])?;
+        .execute(params![
+            id.to_string(),
+            now_ms,
+            owner,
+            expired,
+            end.map(|end| end.status.name()),
+            end.map(|end| end.id.cast_signed()),
+        ])?;
     tx.effects.push(Effect::Changed(id));
     Ok(())
 }

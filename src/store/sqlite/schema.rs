@@ -124,6 +124,10 @@ ALTER TABLE plans ADD COLUMN place INTEGER; -- in the queue as it was accepted; 
     "
 ALTER TABLE health ADD COLUMN ballast BLOB; -- as large as a plan once the disk was found full, to see whether one fits
 ",
+    "
+ALTER TABLE tombstones ADD COLUMN status TEXT;        -- how the plan ended; NULL where an earlier version removed it
+ALTER TABLE tombstones ADD COLUMN last_event INTEGER; -- id of its end
+",
 ];
 
 /// Bring the file up to this version; refuse files of a newer one.

@@ -54,12 +54,9 @@ pub(super) async fn follow(
         // Read again, since that query may have brought news of the plan.
         plan = state.store.get(id).await?;
     }
-    if plan.status.is_final() {
-        let rest = state.store.events(id, after, 1).await?;
-        if rest.events.is_empty() {
-            // The reader has had everything; EventSource stops asking at a 204.
-            return Ok(StatusCode::NO_CONTENT.into_response());
-        }
+    if plan.status.is_final() && !state.store.has_event(id, after + 1).await? {
+        // The reader has had everything; EventSource stops asking at a 204.
+        return Ok(StatusCode::NO_CONTENT.into_response());
     }
     // An event that the plan does not have yet belongs to another history, as after a restore from an older copy: a reader
     // who names one starts from the beginning.

@@ -193,8 +193,7 @@ impl Feed {
             self.over = true;
             return None;
         };
-        // A new reader asked for none of what is missing.
-        if next > 1 && next < end.id {
+        if next < end.id {
             self.after = end.id - 1;
             return Some(News::Gap {
                 from: next,

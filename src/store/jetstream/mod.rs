@@ -126,7 +126,7 @@ impl JetStream {
     }
 
     async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {
-        let standing = self.plans().standing(id).await?;
+        let standing = self.plans().present(id).await?;
         let record = standing.record(id, (self.options.clock)())?;
         Ok(self.view.known().shown(record))
     }
@@ -288,7 +288,7 @@ impl Store for JetStreamStore {
 
     async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError> {
         let store = self.open_store()?;
-        let standing = store.plans().standing(id).await?;
+        let standing = store.plans().present(id).await?;
         match &standing.record(id, (store.options.clock)())?.result {
             Some(result) => store.read_document(id, result).await.map(Some),
             None => Ok(None),

@@ -1,9 +1,12 @@
 //! The only way to change a plan: a step that is written if nobody was faster.
 
+use std::time::Duration;
+
 use async_nats::jetstream::context::{self, PublishErrorKind};
 use async_nats::jetstream::message::PublishMessage;
 use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use bytes::Bytes;
+use tokio::time::timeout;
 
 use super::connect::Servers;
 use super::election::Election;
@@ -13,6 +16,9 @@ use super::record::{Placed, Record, State, Step};
 use super::view::{Standing, View};
 use crate::job::{Event, PlanId};
 use crate::store::StoreError;
+
+/// How long servers may take to answer a reader who can do without them.
+const AN_ANSWER: Duration = Duration::from_secs(1);
 
 /// The effect of a step on a plan.
 pub(super) struct Change {
@@ -65,6 +71,28 @@ impl Plans<'_> {
             return Ok(standing);
         }
         self.look_up(id).await
+    }
+
+    /// A plan's state, no older than what any node has told of it: of a plan that has not ended, another may know more for
+    /// some milliseconds, so the servers are asked. Where they do not answer, what is known here has to do.
+    ///
+    /// (Not taken in: the steps between come in their order, or the plan's history would have a hole.)
+    pub(super) async fn present(&self, id: PlanId) -> Result<Standing, StoreError> {
+        let known = self.standing(id).await?;
+        let has_ended = match &*known.state {
+            State::Kept(record) => record.plan.status.is_final(),
+            State::Buried(_) => true,
+        };
+        if has_ended || !self.servers.is_connected() {
+            return Ok(known);
+        }
+        Ok(match timeout(AN_ANSWER, self.ask_for_newest(id)).await {
+            Ok(Ok(Some(newest))) if newest.sequence > known.sequence => Standing {
+                sequence: newest.sequence,
+                state: newest.step.state,
+            },
+            _ => known,
+        })
     }
 
     /// A plan's state on the servers.

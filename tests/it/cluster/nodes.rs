@@ -9,7 +9,7 @@ use futures_util::future::join_all;
 use noctule::config::Address;
 use noctule::job::{Event, Idempotency, PlanId, Status, Submission};
 use noctule::store::jetstream::{JetStreamStore, Settings};
-use noctule::store::{Options, Retention, SWEEP, Store, StoreError};
+use noctule::store::{Options, Retention, SWEEP, Store, StoreError, wall_clock};
 
 use super::{open, open_as};
 use crate::support::nats::{self, NatsServer};
@@ -67,6 +67,31 @@ async fn a_plan_accepted_by_one_node_and_run_by_another_is_readable_on_a_third()
     assert_eq!(read, history(&*running, id).await);
     assert!(result.is_some());
     until(&*accepting, id, |plan| plan.status == Status::Succeeded).await;
+}
+
+/// Whoever was told by one node may ask another next, behind a load balancer.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_one_node_has_told_no_other_node_denies() {
+    let address = nats::address();
+    let (one, other) = tokio::join!(open(&address), open(&address));
+    let present = async |id| other.get(id).await.unwrap().status;
+    for _ in 0..20 {
+        let id = one.submit(submission()).await.unwrap().plan.id;
+        assert_eq!(present(id).await, Status::Queued);
+        let lease = one.claim().await.unwrap();
+        assert_eq!(present(id).await, Status::Running);
+        one.request_cancel(id, 0).await.unwrap();
+        assert!(other.get(id).await.unwrap().cancel_requested);
+        let end = ending(Status::Cancelled).at(0);
+        one.finish(&lease, end).await.unwrap();
+        assert!(other.result(id).await.unwrap().is_some());
+        assert!(other.has_event(id, 5).await.unwrap(), "with the end");
+        assert_eq!(present(id).await, Status::Cancelled);
+
+        let id = one.submit(submission()).await.unwrap().plan.id;
+        one.delete(id, wall_clock()()).await.unwrap();
+        assert!(matches!(other.get(id).await, Err(StoreError::Gone(_))));
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -16,8 +16,8 @@ struct Ended {
 }
 
 impl Ended {
-    /// From `seq, id, owner, bytes, status, last_event`. A text that cannot be read is done without, or the plan would hold up the removal
-    /// of all others for ever.
+    /// From `seq, id, owner, bytes, status, last_event`. A text that cannot be read is done without, or the plan would
+    /// hold up the removal of all others for ever.
     fn read(row: &Row<'_>) -> rusqlite::Result<Self> {
         let id = row.get::<_, String>(1).ok();
         let id = id.and_then(|id| PlanId::parse_str(&id).ok());

@@ -23,7 +23,6 @@ mod maker;
 mod nodes;
 mod objects;
 mod orphans;
-mod recalling;
 mod record;
 mod removal;
 mod run_steps;
@@ -34,6 +33,7 @@ mod steps;
 mod strays;
 mod streams;
 mod submit;
+mod together;
 mod turns;
 mod view;
 
@@ -62,10 +62,10 @@ use self::lane::Lane;
 use self::leases::Leases;
 use self::lost_jobs::Round;
 use self::orphans::Orphans;
-use self::recalling::Recalling;
 use self::record::Document;
 use self::steps::Plans;
 use self::strays::Strays;
+use self::together::Together;
 use self::view::{Standing, View};
 use super::{
     DatasetUse, End, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError, Submitted,
@@ -79,6 +79,12 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 /// How long a node whose streams have vanished tries to give back what it runs.
 const GIVING_BACK: Duration = Duration::from_secs(3);
+
+/// Plans whose histories are read from the servers at the same time: each may be megabytes.
+const HISTORIES: usize = 4;
+
+/// Plans whose states are asked for at the same time.
+const STATES: usize = 1024;
 
 /// The store for several machines.
 ///
@@ -106,7 +112,10 @@ struct JetStream {
     /// The search for missing jobs.
     round: Mutex<Round>,
     strays: Mutex<Strays>,
-    recalling: Recalling,
+    /// Histories that are not in memory.
+    recalled: Together<Arc<History>>,
+    /// States that another node may have changed.
+    present: Together<Standing>,
     all_slots: AtomicUsize,
     /// Plans whose webhooks this node is sending.
     telling: Mutex<BTreeSet<PlanId>>,
@@ -126,7 +135,7 @@ impl JetStream {
     }
 
     async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {
-        let standing = self.plans().present(id).await?;
+        let standing = self.present(id).await?;
         let record = standing.record(id, (self.options.clock)())?;
         Ok(self.view.known().shown(record))
     }
@@ -136,9 +145,21 @@ impl JetStream {
         let read = async {
             let history = self.read_history(id).await?;
             self.view.known().keep_history(id, history.clone());
-            Ok(history)
+            Ok(Arc::new(history))
         };
-        Box::pin(self.recalling.recall(id, read)).await
+        Box::pin(self.recalled.ask(id, read)).await
+    }
+
+    /// A plan's state, no older than what any node has told of it: of a plan that has not ended, another may know more
+    /// for some milliseconds, so the servers are asked.
+    async fn present(&self, id: PlanId) -> Result<Standing, StoreError> {
+        let known = self.plans().standing(id).await?;
+        if known.has_ended() || !self.servers.is_connected() {
+            return Ok(known);
+        }
+        let plans = self.plans();
+        let renewed = async { Ok(plans.renewed(id, known).await) };
+        self.present.ask(id, renewed).await
     }
 
     /// A document that a plan's record names.
@@ -175,7 +196,8 @@ impl JetStreamStore {
             orphans: Orphans::default(),
             round: Mutex::default(),
             strays: Mutex::default(),
-            recalling: Recalling::default(),
+            recalled: Together::new(HISTORIES),
+            present: Together::new(STATES),
             telling: Mutex::default(),
             end: watch::Sender::new(false),
             vanished: watch::Sender::new(false),
@@ -288,7 +310,7 @@ impl Store for JetStreamStore {
 
     async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError> {
         let store = self.open_store()?;
-        let standing = store.plans().present(id).await?;
+        let standing = store.present(id).await?;
         match &standing.record(id, (store.options.clock)())?.result {
             Some(result) => store.read_document(id, result).await.map(Some),
             None => Ok(None),

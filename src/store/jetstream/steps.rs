@@ -73,26 +73,25 @@ impl Plans<'_> {
         self.look_up(id).await
     }
 
-    /// A plan's state, no older than what any node has told of it: of a plan that has not ended, another may know more for
-    /// some milliseconds, so the servers are asked. Where they do not answer, what is known here has to do.
-    ///
-    /// (Not taken in: the steps between come in their order, or the plan's history would have a hole.)
-    pub(super) async fn present(&self, id: PlanId) -> Result<Standing, StoreError> {
-        let known = self.standing(id).await?;
-        let has_ended = match &*known.state {
-            State::Kept(record) => record.plan.status.is_final(),
-            State::Buried(_) => true,
+    /// A plan's state on the servers, if it is newer than the `known` one, as soon as it has come here too with all steps
+    /// before it: whoever is told of an end shall find all events. Where the servers do not answer in time, what is known
+    /// has to do.
+    pub(super) async fn renewed(&self, id: PlanId, known: Standing) -> Standing {
+        let mut newest = known;
+        let renewing = async {
+            if let Ok(Some(placed)) = self.ask_for_newest(id).await
+                && placed.sequence > newest.sequence
+            {
+                newest = Standing {
+                    sequence: placed.sequence,
+                    state: placed.step.state,
+                };
+                self.view.caught_up(id, placed.sequence).await;
+            }
         };
-        if has_ended || !self.servers.is_connected() {
-            return Ok(known);
-        }
-        Ok(match timeout(AN_ANSWER, self.ask_for_newest(id)).await {
-            Ok(Ok(Some(newest))) if newest.sequence > known.sequence => Standing {
-                sequence: newest.sequence,
-                state: newest.step.state,
-            },
-            _ => known,
-        })
+        // Too late is as good as never.
+        let _ = timeout(AN_ANSWER, renewing).await;
+        newest
     }
 
     /// A plan's state on the servers.

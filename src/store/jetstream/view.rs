@@ -87,12 +87,30 @@ impl View {
         self.changes.tick(id);
     }
 
+    /// Wait until the steps of a plan up to this one have come, or the plan is forgotten.
+    pub(super) async fn caught_up(&self, id: PlanId, sequence: u64) {
+        let mut changes = self.changes.subscribe(id);
+        let is_behind = || {
+            let standing = self.standing(id);
+            standing.is_some_and(|standing| standing.sequence < sequence)
+        };
+        while is_behind() && changes.changed().await.is_ok() {}
+    }
+
     pub(super) fn standing(&self, id: PlanId) -> Option<Standing> {
         self.known().standing(id)
     }
 }
 
 impl Standing {
+    /// Whether nothing more happens to the plan, but that it may be removed.
+    pub(super) fn has_ended(&self) -> bool {
+        match &*self.state {
+            State::Kept(record) => record.plan.status.is_final(),
+            State::Buried(_) => true,
+        }
+    }
+
     /// The record of a plan that has not been removed.
     ///
     /// # Errors

@@ -23,6 +23,7 @@ mod maker;
 mod nodes;
 mod objects;
 mod orphans;
+mod reading;
 mod record;
 mod removal;
 mod run_steps;
@@ -57,16 +58,14 @@ pub use shelf::JetStreamShelf;
 
 use self::connect::Servers;
 use self::follow::Reading;
-use self::history::History;
 use self::lane::Lane;
 use self::leases::Leases;
 use self::lost_jobs::Round;
 use self::orphans::Orphans;
-use self::record::Document;
+use self::reading::Asking;
 use self::steps::Plans;
 use self::strays::Strays;
-use self::together::Together;
-use self::view::{Standing, View};
+use self::view::View;
 use super::{
     DatasetUse, End, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError, Submitted,
     Webhook,
@@ -79,12 +78,6 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 /// How long a node whose streams have vanished tries to give back what it runs.
 const GIVING_BACK: Duration = Duration::from_secs(3);
-
-/// Plans whose histories are read from the servers at the same time: each may be megabytes.
-const HISTORIES: usize = 4;
-
-/// Plans whose states are asked for at the same time.
-const STATES: usize = 1024;
 
 /// The store for several machines.
 ///
@@ -112,10 +105,7 @@ struct JetStream {
     /// The search for missing jobs.
     round: Mutex<Round>,
     strays: Mutex<Strays>,
-    /// Histories that are not in memory.
-    recalled: Together<Arc<History>>,
-    /// States that another node may have changed.
-    present: Together<Standing>,
+    asking: Asking,
     all_slots: AtomicUsize,
     /// Plans whose webhooks this node is sending.
     telling: Mutex<BTreeSet<PlanId>>,
@@ -132,45 +122,6 @@ impl JetStream {
             view: &self.view,
             leases: &self.leases,
         }
-    }
-
-    async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {
-        let standing = self.present(id).await?;
-        let record = standing.record(id, (self.options.clock)())?;
-        Ok(self.view.known().shown(record))
-    }
-
-    /// A history that is not in memory; it is from now on, as far as there is room.
-    async fn recall(&self, id: PlanId) -> Result<Arc<History>, StoreError> {
-        let read = async {
-            let history = self.read_history(id).await?;
-            self.view.known().keep_history(id, history.clone());
-            Ok(Arc::new(history))
-        };
-        Box::pin(self.recalled.ask(id, read)).await
-    }
-
-    /// A plan's state, no older than what any node has told of it: of a plan that has not ended, another may know more
-    /// for some milliseconds, so the servers are asked.
-    async fn present(&self, id: PlanId) -> Result<Standing, StoreError> {
-        let known = self.plans().standing(id).await?;
-        if known.has_ended() || !self.servers.is_connected() {
-            return Ok(known);
-        }
-        let plans = self.plans();
-        let renewed = async { Ok(plans.renewed(id, known).await) };
-        self.present.ask(id, renewed).await
-    }
-
-    /// A document that a plan's record names.
-    async fn read_document(&self, id: PlanId, document: &Document) -> Result<String, StoreError> {
-        if let Some(text) = self.servers.read(document).await? {
-            return Ok(text);
-        }
-        // It goes with its plan, which may have been removed meanwhile.
-        let standing = self.plans().look_up(id).await?;
-        standing.record(id, (self.options.clock)())?;
-        Err(document.missing())
     }
 }
 
@@ -196,8 +147,7 @@ impl JetStreamStore {
             orphans: Orphans::default(),
             round: Mutex::default(),
             strays: Mutex::default(),
-            recalled: Together::new(HISTORIES),
-            present: Together::new(STATES),
+            asking: Asking::default(),
             telling: Mutex::default(),
             end: watch::Sender::new(false),
             vanished: watch::Sender::new(false),
@@ -302,32 +252,15 @@ impl Store for JetStreamStore {
     }
 
     async fn scenario(&self, id: PlanId) -> Result<String, StoreError> {
-        let store = self.open_store()?;
-        let standing = store.plans().standing(id).await?;
-        let record = standing.record(id, (store.options.clock)())?;
-        store.read_document(id, &record.scenario).await
+        self.open_store()?.scenario(id).await
     }
 
     async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError> {
-        let store = self.open_store()?;
-        let standing = store.present(id).await?;
-        match &standing.record(id, (store.options.clock)())?.result {
-            Some(result) => store.read_document(id, result).await.map(Some),
-            None => Ok(None),
-        }
+        self.open_store()?.result(id).await
     }
 
     async fn incumbent(&self, id: PlanId) -> Result<Option<Incumbent>, StoreError> {
-        let store = self.open_store()?;
-        let standing = store.plans().standing(id).await?;
-        let record = standing.record(id, (store.options.clock)())?;
-        if !record.is_run_under(record.attempt) {
-            return Ok(None);
-        }
-        if let Some(history) = store.view.known().histories.whole(id) {
-            return Ok(history.incumbent(record.attempt));
-        }
-        Ok(store.recall(id).await?.incumbent(record.attempt))
+        self.open_store()?.incumbent(id).await
     }
 
     async fn list(&self, query: ListQuery) -> Result<Vec<Plan>, StoreError> {
@@ -335,26 +268,11 @@ impl Store for JetStreamStore {
     }
 
     async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<EventPage, StoreError> {
-        let store = self.open_store()?;
-        let standing = store.plans().standing(id).await?;
-        standing.record(id, (store.options.clock)())?;
-        if let Some(page) = store.view.known().histories.page(id, after, limit) {
-            return Ok(page);
-        }
-        Ok(store.recall(id).await?.page(after, limit))
+        self.open_store()?.events(id, after, limit).await
     }
 
     async fn has_event(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
-        let store = self.open_store()?;
-        let has_come_so_far = |standing: &Standing| -> Result<bool, StoreError> {
-            let record = standing.record(id, (store.options.clock)())?;
-            Ok(event <= record.last_event)
-        };
-        let plans = store.plans();
-        if has_come_so_far(&plans.standing(id).await?)? {
-            return Ok(true);
-        }
-        has_come_so_far(&plans.look_up(id).await?)
+        self.open_store()?.has_event(id, event).await
     }
 
     fn changes(&self, id: PlanId) -> watch::Receiver<u64> {

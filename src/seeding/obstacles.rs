@@ -113,6 +113,7 @@ impl Obstacles {
         area: Option<Rect>,
     ) -> Self {
         let outlines: Vec<Option<Outline>> = outlines.into_iter().collect();
+        let count = outlines.len();
         let extent = outlines.iter().flatten().flat_map(|outline| {
             let points: &[Point2] = match &outline.shape {
                 OutlineShape::Disc(center) => std::slice::from_ref(center),
@@ -126,9 +127,9 @@ impl Obstacles {
         });
         let mut scene = Self {
             ends,
-            bodies: Vec::new(),
-            corners: Vec::new(),
-            corners_of: Vec::new(),
+            bodies: Vec::with_capacity(count),
+            corners: Vec::with_capacity(count),
+            corners_of: Vec::with_capacity(count),
             rings: Vec::new(),
             tree: None,
             stride: f64::INFINITY,

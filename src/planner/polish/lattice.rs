@@ -226,11 +226,11 @@ impl<'m, 's> Lattice<'m, 's> {
         } else {
             self.pricer.legs(&self.from, &self.to, &mut self.prices);
         }
-        self.legs.clear();
+        // Those of the sweep before are written over: nobody reads what they keep of it.
+        self.legs.resize_with(last, || Leg::EMPTY);
         let mut rows = self.prices.iter();
         let mut next = || rows.next().expect("as many rows as were priced");
-        for leg_idx in 0..last {
-            let mut leg = Leg::EMPTY;
+        for (leg_idx, leg) in self.legs.iter_mut().enumerate() {
             if leg_idx + 1 < last {
                 for place in 0..count(leg_idx, last) {
                     let price = next();
@@ -250,7 +250,6 @@ impl<'m, 's> Lattice<'m, 's> {
             leg.cost[0][0] = self.prices[row].cost[lane];
             let (a, b) = (&self.waypoints[leg_idx], &self.waypoints[leg_idx + 1]);
             leg.finish(a, b, count(leg_idx, last));
-            self.legs.push(leg);
         }
     }
 

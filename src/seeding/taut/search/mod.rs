@@ -31,6 +31,9 @@ const FIRST_REACH: f64 = 0.002;
 /// The same with few corners, when each pass costs little.
 const FIRST_REACH_OF_FEW: f64 = 0.02;
 
+/// Room for the steps and the open ways of a short search: many strings are pulled, most of them short.
+const ROOM: usize = 32;
+
 /// Number of ways examined between two checks whether to stop.
 const WAYS_UNWATCHED: usize = 1_000;
 
@@ -59,12 +62,12 @@ impl<'o> Search<'o> {
         let mut search = Self {
             obstacles,
             k,
-            steps: Vec::new(),
-            open: BinaryHeap::new(),
+            steps: Vec::with_capacity(ROOM),
+            open: BinaryHeap::with_capacity(ROOM),
             ways: 0,
             limits,
             next_look: WAYS_UNWATCHED,
-            active: Vec::new(),
+            active: Vec::with_capacity(obstacles.corners_of.len()),
             is_active: vec![false; obstacles.corners_of.len()],
             blocked: HashMap::default(),
             arrivals: HashMap::default(),

@@ -2,7 +2,8 @@
 
 use std::cell::LazyCell;
 
-use super::{MOST_COARSE, few, may_turn, may_turn_along, net};
+use super::shapes::MOST_COARSE;
+use super::{few, may_turn, may_turn_along, net};
 use crate::cost::Model;
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::geometry::Point3;

@@ -81,7 +81,8 @@ mod tests {
     use super::*;
     use crate::optimizer::{Fitness, Random};
     use crate::planner::price::price;
-    use crate::planner::starts::{along_strings, roadmap};
+    use crate::planner::starts::roadmap;
+    use crate::planner::starts::shapes::along_strings;
     use crate::planner::tests::{disc, peaks, radar, scenario};
     use crate::planner::{Nobody, plan};
     use crate::scenario::{Scenario, Seeding};

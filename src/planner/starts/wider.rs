@@ -4,7 +4,8 @@
 //! legs touches the top of the band over a valley, or its floor over a ridge. In a wider band a net meets such ways, and
 //! most of the routes along them can be brought into the band.
 
-use super::{HOPELESS_OVER_HILLS, OVERLAND, bends, known, priced, refine, roadmap, with_waypoints};
+use super::shapes::{HOPELESS_OVER_HILLS, OVERLAND, bends, priced};
+use super::{known, refine, roadmap, with_waypoints};
 use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;

@@ -10,7 +10,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
-use super::is_steep;
+use super::height::is_steep;
 use super::net::{self, Found};
 use super::thin::thin;
 use crate::cost::{Model, metre};

@@ -41,7 +41,7 @@ pub struct Section {
 impl TerminalZones {
     pub(super) fn of(scenario: &Scenario) -> Self {
         let band = scenario.altitude;
-        let steepest = libm::tan(scenario.vehicle.max_climb_deg.to_radians());
+        let steepest = scenario.vehicle.steepest();
         let zone = |point: Point3| {
             let height = point.z - scenario.terrain.elevation(point.xy());
             TerminalZone {

@@ -70,6 +70,32 @@ pub struct Vehicle {
     pub fuel_per_km: f64,
 }
 
+impl Vehicle {
+    /// Largest heading change between legs, radians.
+    #[must_use]
+    pub fn max_turn(&self) -> f64 {
+        self.max_turn_deg.to_radians()
+    }
+
+    /// Largest climb or descent angle of a leg, radians.
+    #[must_use]
+    pub fn max_climb(&self) -> f64 {
+        self.max_climb_deg.to_radians()
+    }
+
+    /// Metres that a leg may climb or descend per metre seen from above.
+    #[must_use]
+    pub fn steepest(&self) -> f64 {
+        libm::tan(self.max_climb())
+    }
+
+    /// Cosine of the largest heading change: legs with a smaller one turn too sharply.
+    #[must_use]
+    pub fn sharpest(&self) -> f64 {
+        libm::cos(self.max_turn())
+    }
+}
+
 /// Weights of the three cost terms, Eq. 1; each >= 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weights {

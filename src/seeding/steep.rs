@@ -96,7 +96,7 @@ impl<'s> Ground<'s> {
 
     /// Whether a cell lies on ground that rises faster than can be climbed.
     fn is_steep(&self, column: usize, row: usize) -> bool {
-        let climb = libm::tan(self.scenario.vehicle.max_climb_deg.to_radians());
+        let climb = self.scenario.vehicle.steepest();
         let band = self.scenario.altitude;
         let center = self.center(column, row);
         let (column, row) = (MARGIN + 2 * column + 1, MARGIN + 2 * row + 1);

@@ -45,8 +45,8 @@ impl<'s> Spherical<'s> {
         let distance = (way.x * way.x + way.y * way.y).sqrt();
         // Twice the length of a leg of the straight route.
         let amplitude = 2.0 * way.norm() / legs as f64;
-        let max_turn = scenario.vehicle.max_turn_deg.to_radians();
-        let max_climb = scenario.vehicle.max_climb_deg.to_radians();
+        let max_turn = scenario.vehicle.max_turn();
+        let max_climb = scenario.vehicle.max_climb();
         let level = std::f64::consts::FRAC_PI_2;
         let lower = [0.0, -max_turn, level - max_climb];
         let upper = [amplitude, max_turn, level + max_climb];

@@ -78,7 +78,7 @@ impl<'m, 's> Limits<'m, 's> {
         Self {
             model,
             steepest: steepest(scenario),
-            max_turn: vehicle.max_turn_deg.to_radians() * (1.0 - HAIR),
+            max_turn: vehicle.max_turn() * (1.0 - HAIR),
             min_leg: vehicle.min_leg * (1.0 + HAIR),
             arm: way / (waypoints + 1) as f64,
             way,

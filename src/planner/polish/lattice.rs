@@ -71,7 +71,7 @@ impl<'m, 's> Lattice<'m, 's> {
             hilly: pricer.is_hilly(),
             pricer,
             tolerance,
-            steepest: libm::tan(model.scenario.vehicle.max_climb_deg.to_radians()),
+            steepest: model.scenario.vehicle.steepest(),
             legs_priced: 0,
             waypoints: Vec::new(),
             around: Vec::new(),

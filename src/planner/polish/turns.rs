@@ -24,7 +24,7 @@ impl Turns {
         let max_turn_deg = model.scenario.vehicle.max_turn_deg;
         Self {
             tolerance,
-            cos_turn: libm::cos(max_turn_deg.to_radians()),
+            cos_turn: model.scenario.vehicle.sharpest(),
             max_turn_deg,
         }
     }

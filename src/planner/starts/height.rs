@@ -53,5 +53,5 @@ pub(super) fn is_steep(scenario: &Scenario) -> bool {
 
 /// Metres that the vehicle may climb per metre seen from above, less a hair.
 pub(in crate::planner) fn steepest(scenario: &Scenario) -> f64 {
-    libm::tan(scenario.vehicle.max_climb_deg.to_radians()) * (1.0 - 1e-9)
+    scenario.vehicle.steepest() * (1.0 - 1e-9)
 }

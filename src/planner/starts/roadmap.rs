@@ -224,7 +224,7 @@ impl<'p, 's> Legs<'p, 's> {
             measured: vec![vec![!hilly; count]; count],
             priced,
             watch,
-            sharpest: libm::cos(scenario.vehicle.max_turn_deg.to_radians()),
+            sharpest: scenario.vehicle.sharpest(),
         }
     }
 

@@ -10,7 +10,7 @@ const SHORT: f64 = 0.004;
 /// `chain` with waypoints added after those where it turns more than the vehicle can, if it then has no more than
 /// allowed.
 pub(super) fn rounded(scenario: &Scenario, chain: &[Point3]) -> Option<Vec<Point3>> {
-    let most = scenario.vehicle.max_turn_deg.to_radians() * (1.0 - 1e-6);
+    let most = scenario.vehicle.max_turn() * (1.0 - 1e-6);
     let short = (SHORT * (scenario.target - scenario.start).norm())
         .max(scenario.vehicle.min_leg * (1.0 + 1e-6));
     let mut route = vec![chain[0]];

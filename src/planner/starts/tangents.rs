@@ -27,7 +27,7 @@ const STRAIGHT: f64 = 1e-9;
 /// gain of one corner more falls with each: taking the greatest gain first is optimal.
 pub(super) fn corners(scenario: &Scenario, string: &TautString, waypoints: usize) -> Vec<Point2> {
     let arcs = arcs(string);
-    let max_turn = scenario.vehicle.max_turn_deg.to_radians() * (1.0 - 1e-6);
+    let max_turn = scenario.vehicle.max_turn() * (1.0 - 1e-6);
     let mut counts: Vec<usize> = arcs
         .iter()
         .map(|arc| least_corners(arc, max_turn))

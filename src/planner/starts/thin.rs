@@ -106,7 +106,7 @@ impl<'c> Legs<'c> {
             chain,
             worth,
             most: most.min(last),
-            sharpest: libm::cos(scenario.vehicle.max_turn_deg.to_radians()),
+            sharpest: scenario.vehicle.sharpest(),
         }
     }
 

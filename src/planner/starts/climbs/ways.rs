@@ -63,7 +63,7 @@ impl<'m, 's> Ways<'m, 's> {
     /// With bends at least `room` times their radius away from the edge of the area.
     pub(super) fn new(model: &'m Model<'s>, climb: Climb, room: f64) -> Self {
         let scenario = model.scenario;
-        let max_turn = scenario.vehicle.max_turn_deg.to_radians() * (1.0 - SLACK);
+        let max_turn = scenario.vehicle.max_turn() * (1.0 - SLACK);
         let side = scenario.vehicle.min_leg * (1.0 + SLACK);
         let places = places(scenario, climb, room * side / max_turn);
         let level = |&at: &Point2| scenario.terrain.elevation(at) + climb.height;

@@ -62,7 +62,7 @@ impl<'s> Net<'s> {
         Self {
             legs: Legs::new(model, spots),
             metre: metre(scenario),
-            sharpest: libm::cos(scenario.vehicle.max_turn_deg.to_radians()) - 1e-9,
+            sharpest: scenario.vehicle.sharpest() - 1e-9,
         }
     }
 
@@ -223,7 +223,7 @@ mod tests {
         for is_down in [true, false] {
             let scenario = mountain(250.0, is_down);
             let model = Model::new(&scenario);
-            let sharpest = libm::cos(scenario.vehicle.max_turn_deg.to_radians()) - 1e-6;
+            let sharpest = scenario.vehicle.sharpest() - 1e-6;
             let mut net = Net::new(&model, SPOTS);
             let trees = net.trees(&|| false).expect("a way is found");
             let chains = net.chains(&model, &trees, 8);

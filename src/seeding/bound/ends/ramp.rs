@@ -29,7 +29,7 @@ impl Ramp {
     pub(super) fn round(heights: [f64; 2], scenario: &Scenario) -> [Option<Self>; 2] {
         let outside = heights.map(|height| beyond(scenario.altitude, height));
         // A hair wider than the real zones.
-        let allowed = libm::tan(scenario.vehicle.max_climb_deg.to_radians());
+        let allowed = scenario.vehicle.steepest();
         let reaches = outside.map(|outside| 2.0 * outside / allowed * (1.0 + 1e-9));
         let apart = (scenario.target.xy() - scenario.start.xy()).norm();
         if reaches[0] + reaches[1] >= apart {

@@ -38,13 +38,14 @@ pub(super) async fn result(
     let known: Vec<_> = PARAMETERS.into_iter().chain(options).collect();
     let params = Params::read(&uri, &known)?;
     let partial = params.parse("partial", "true or false")?.unwrap_or(false);
-    let plan = caller.plan(&*state.store, id).await?;
+    let mut plan = caller.plan(&*state.store, id).await?;
     let choices = choices(&params, &headers)?;
-    if partial
-        && !plan.status.is_final()
-        && let Some(so_far) = partial::result(&state, &plan).await?
-    {
-        return written(&state, &plan, choices, so_far).await;
+    if partial && !plan.status.is_final() {
+        if let Some(so_far) = partial::result(&state, &plan).await? {
+            return written(&state, &plan, choices, so_far).await;
+        }
+        // A run that has ended meanwhile has a result instead of a route so far.
+        plan = caller.plan(&*state.store, id).await?;
     }
     if !plan.status.is_final() {
         let retry_after_s = retry::for_end(&plan, &state.store.stats().await?, state.capacity);

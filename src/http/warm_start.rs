@@ -59,6 +59,16 @@ pub(super) fn names_a_plan(scenario: &Scenario) -> bool {
     matches!(scenario.planner.warm_start, Some(WarmStart::Plan(_)))
 }
 
+/// The result of another plan of the caller, if it has one. The plan may be deleted at any moment.
+async fn result_of(
+    state: &AppState,
+    caller: &Caller,
+    plan: PlanId,
+) -> Result<Option<String>, Problem> {
+    caller.plan(&*state.store, plan).await?;
+    Ok(state.store.result(plan).await?)
+}
+
 /// Insert the waypoints of the plan that `scenario` starts from.
 ///
 /// # Errors
@@ -75,15 +85,13 @@ pub(super) async fn resolve(
     let plan: PlanId = id
         .parse()
         .map_err(|_| unknown("must be the id of a plan, a UUID"))?;
-    match caller.plan(&*state.store, plan).await {
-        Ok(_) => {}
+    let result = match result_of(state, caller, plan).await {
+        Ok(result) => result.ok_or_else(|| unknown("that plan has no route yet"))?,
         Err(Problem::NoSuchPlan(_) | Problem::Gone(_)) => {
             return Err(unknown("no plan has this id"));
         }
         Err(problem) => return Err(problem),
-    }
-    let result = state.store.result(plan).await?;
-    let result = result.ok_or_else(|| unknown("that plan has no route yet"))?;
+    };
     let route: Route = serde_json::from_str(&result).map_err(|error| {
         tracing::error!(warm_start_plan_id = %plan, %error, "a stored result cannot be read");
         Problem::Internal

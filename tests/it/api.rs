@@ -1,6 +1,7 @@
 //! The service's responses, one by one; `support::api` checks each of them against `openapi.yaml`.
 
 use std::io::Read as _;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use axum::body::Body;
@@ -11,6 +12,7 @@ use noctule::store::{Options, Retention};
 use serde_json::{Value, json};
 
 use crate::support::api::Api;
+use crate::support::faulty_store::FaultyStore;
 use crate::support::patience::eventually;
 use crate::support::stores::for_every_backend;
 use crate::support::{run, scenario};
@@ -643,6 +645,22 @@ async fn a_partial_result_is_measured_like_a_final_one() {
     let ended = api.get(&partial).await;
     let stored = api.get(&format!("{address}/result")).await;
     assert_eq!(ended.body, stored.body);
+}
+
+#[tokio::test]
+async fn a_run_that_ends_while_its_route_so_far_is_read_gives_its_result() {
+    let mut api = Api::new();
+    let address = api.submit().await;
+    let lease = api.store.claim().await.expect("a queued plan");
+    let told = vec![run::convergence(0, 0.1), run::incumbent(0, 0.1)];
+    api.store.append(&lease, told).await.expect("held");
+    api.state.store = Arc::new(FaultyStore::that_ends(api.store.clone(), lease));
+    api.router = noctule::http::router(api.state.clone());
+    let result = api
+        .get(&format!("{address}/result?partial=true"))
+        .await
+        .json();
+    assert_eq!(result["stop_reason"], "iterations");
 }
 
 #[tokio::test]

@@ -404,6 +404,19 @@ async fn a_ticket_expires() {
 }
 
 #[tokio::test]
+async fn a_ticket_expires_no_later_than_its_key() {
+    let expires = jiff::Timestamp::now() + std::time::Duration::from_secs(60);
+    let expires = expires.round(jiff::Unit::Second).expect("a time");
+    let key = entry("amy", "of amy", "plan", &format!("expires = {expires}"));
+    let api = Api::with_keys(&key);
+    let plan = submit(&api, "of amy").await;
+    let ticket = send(&api, "of amy", &format!("POST {plan}/tickets")).await;
+    let until = ticket.json()["expires_at"].as_str().map(str::to_owned);
+    let until: jiff::Timestamp = until.expect("text").parse().expect("a time");
+    assert_eq!(until, expires);
+}
+
+#[tokio::test]
 async fn tickets_also_work_without_keys() {
     let api = Api::new();
     let plan = api.submit().await;

@@ -1,9 +1,12 @@
 //! Starting from a known route: a stored plan's, or one given in the document.
 
+use std::sync::Arc;
+
 use noctule::job::Status;
 use serde_json::{Value, json};
 
 use crate::support::api::Api;
+use crate::support::faulty_store::FaultyStore;
 use crate::support::process::{Service, run};
 use crate::support::{run as worker, scenario};
 
@@ -116,6 +119,18 @@ async fn an_unavailable_store_is_not_reported_as_a_fault_of_the_document() {
     api.post("/plans?validate_only=true", &from_plan(&id_of(&first)))
         .await
         .expect_problem(503, "store-unavailable");
+}
+
+#[tokio::test]
+async fn a_plan_that_is_deleted_while_its_route_is_read_is_unknown() {
+    let mut api = Api::new();
+    let first = api.submit().await;
+    worker::complete(&*api.store, vec![worker::convergence(0, 0.1)]).await;
+    api.state.store = Arc::new(FaultyStore::that_deletes(api.store.clone()));
+    api.router = noctule::http::router(api.state.clone());
+    let refused = api.post("/plans", &from_plan(&id_of(&first))).await;
+    let refused = refused.expect_problem(422, "invalid-scenario");
+    assert_eq!(refused["errors"][0]["code"], "unknown-plan");
 }
 
 #[test]

@@ -142,6 +142,9 @@ impl Access {
         };
         let life = self.0.settings.ticket_life;
         let until = Timestamp::now().checked_add(life).unwrap_or(Timestamp::MAX);
+        let until = key
+            .and_then(|key| key.expires)
+            .map_or(until, |end| end.min(until));
         Ok((ticket::issue(plan, key, until.as_millisecond()), until))
     }
 

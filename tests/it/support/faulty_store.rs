@@ -1,43 +1,67 @@
-//! A store that fails at every other step of a run or a webhook, and works otherwise.
+//! A store that fails at every other step of a run or a webhook, or in which something happens while a plan is read,
+//! and that works otherwise.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use async_trait::async_trait;
 use noctule::export::document::Incumbent;
-use noctule::job::{Event, Idempotency, Owner, Plan, PlanId, Submission};
+use noctule::job::{Event, Idempotency, Owner, Plan, PlanId, Status, Submission};
 use noctule::store::{
     DatasetUse, End, EventPage, Lease, ListQuery, Stats, Store, StoreError, Submitted, Webhook,
+    wall_clock,
 };
 use tokio::sync::watch;
+
+use super::run;
 
 pub(crate) struct FaultyStore {
     sound: Arc<dyn Store>,
     steps: AtomicU64,
-    panics: bool,
+    trouble: Trouble,
+}
+
+enum Trouble {
+    Fails,
+    Panics,
+    /// A plan is deleted before its result is read.
+    Deleted,
+    /// The run ends before its route so far is read.
+    Ended(Box<Lease>),
 }
 
 impl FaultyStore {
     pub(crate) fn new(sound: Arc<dyn Store>) -> Self {
+        Self::with(sound, Trouble::Fails)
+    }
+
+    fn with(sound: Arc<dyn Store>, trouble: Trouble) -> Self {
         Self {
             sound,
             steps: AtomicU64::new(0),
-            panics: false,
+            trouble,
         }
     }
 
     /// Panics where the other one fails.
     pub(crate) fn that_panics(sound: Arc<dyn Store>) -> Self {
-        Self {
-            panics: true,
-            ..Self::new(sound)
-        }
+        Self::with(sound, Trouble::Panics)
+    }
+
+    /// Plans are deleted before their results are read.
+    pub(crate) fn that_deletes(sound: Arc<dyn Store>) -> Self {
+        Self::with(sound, Trouble::Deleted)
+    }
+
+    /// The run of `lease` succeeds before its route so far is read.
+    pub(crate) fn that_ends(sound: Arc<dyn Store>, lease: Lease) -> Self {
+        Self::with(sound, Trouble::Ended(Box::new(lease)))
     }
 
     /// Fails for the first, third, fifth, ... caller.
     fn stumble(&self) -> Result<(), StoreError> {
         match self.steps.fetch_add(1, Ordering::SeqCst) % 2 {
-            0 if self.panics => panic!("as it shall"),
+            0 if matches!(self.trouble, Trouble::Panics) => panic!("as it shall"),
             0 => Err(StoreError::unavailable("disk full")),
             _ => Ok(()),
         }
@@ -100,10 +124,16 @@ impl Store for FaultyStore {
     }
 
     async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError> {
+        if matches!(self.trouble, Trouble::Deleted) {
+            self.sound.delete(id, wall_clock()()).await?;
+        }
         self.sound.result(id).await
     }
 
     async fn incumbent(&self, id: PlanId) -> Result<Option<Incumbent>, StoreError> {
+        if let Trouble::Ended(lease) = &self.trouble {
+            run::finish(&*self.sound, lease, Status::Succeeded).await;
+        }
         self.sound.incumbent(id).await
     }
 

@@ -10,6 +10,7 @@ use super::entity_tags::EntityTags;
 use super::problem::Problem;
 use super::status::etag;
 use crate::job::{Plan, PlanId};
+use crate::store::StoreError;
 
 /// The conditions in the two headers.
 pub(super) struct Precondition {
@@ -32,6 +33,26 @@ impl Precondition {
             "plan {} has the entity tag {tag}, which If-Match or If-None-Match rules out",
             plan.id
         )))
+    }
+
+    /// What `change` does to `plan`, or to what that has become meanwhile, if it is as the caller expects. Only a plan of
+    /// the revision that was looked at is changed, if the caller expects anything.
+    pub(super) async fn heeded<T, F>(
+        &self,
+        mut plan: Plan,
+        change: impl Fn(Option<u64>) -> F,
+    ) -> Result<T, Problem>
+    where
+        F: Future<Output = Result<T, StoreError>>,
+    {
+        loop {
+            self.check(&plan)?;
+            let expects = self.one_of.is_some() || self.none_of.is_some();
+            match change(expects.then_some(plan.revision)).await {
+                Err(StoreError::Changed(now)) => plan = *now,
+                done => return Ok(done?),
+            }
+        }
     }
 
     /// Refuses if the caller expects anything of a plan that was removed.

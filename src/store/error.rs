@@ -1,8 +1,18 @@
 //! Errors of a store.
 
 use super::Tombstone;
-use crate::job::PlanId;
 use crate::job::state::Refused;
+use crate::job::{Plan, PlanId};
+
+/// Refuses unless `plan` has this `revision`, if one is given.
+pub(super) fn expected(plan: &Plan, revision: Option<u64>) -> Result<(), StoreError> {
+    match revision {
+        Some(revision) if revision != plan.revision => {
+            Err(StoreError::Changed(Box::new(plan.clone())))
+        }
+        Some(_) | None => Ok(()),
+    }
+}
 
 /// Why a store did not do what was asked.
 #[derive(Debug, Clone, thiserror::Error)]
@@ -13,6 +23,9 @@ pub enum StoreError {
     /// It was removed, less than a day ago.
     #[error("plan {} is gone", .0.id)]
     Gone(Tombstone),
+    /// Its record is not the expected one: this is the record now.
+    #[error("plan {} has changed", .0.id)]
+    Changed(Box<Plan>),
     /// The queue holds as many plans as the store was opened for.
     #[error("the queue holds {queued} plans, its limit")]
     QueueFull {

@@ -88,13 +88,27 @@ impl Store for MeasuredStore {
         self.measured("release", self.store.release(lease)).await
     }
 
-    async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
-        self.measured("request_cancel", self.store.request_cancel(id, now_ms))
-            .await
+    async fn request_cancel_if(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+    ) -> Result<Plan, StoreError> {
+        self.measured(
+            "request_cancel",
+            self.store.request_cancel_if(id, revision, now_ms),
+        )
+        .await
     }
 
-    async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
-        self.measured("delete", self.store.delete(id, now_ms)).await
+    async fn delete_if(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+    ) -> Result<(), StoreError> {
+        self.measured("delete", self.store.delete_if(id, revision, now_ms))
+            .await
     }
 
     async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {

@@ -16,6 +16,7 @@ pub mod sqlite;
 
 pub use clock::{Clock, SteadyClock, wall_clock};
 pub use end::{End, Ending};
+use error::expected;
 pub use error::{StoreError, Trouble};
 pub use options::{OnLost, Options, Retention};
 
@@ -101,14 +102,41 @@ pub trait Store: Send + Sync + 'static {
     ///
     /// # Errors
     /// [`StoreError::NotFound`], [`StoreError::Gone`].
-    async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError>;
+    async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
+        self.request_cancel_if(id, None, now_ms).await
+    }
+
+    /// As [`Store::request_cancel`], but nothing is done unless the record has this `revision`, if one is given.
+    ///
+    /// # Errors
+    /// As [`Store::request_cancel`], and [`StoreError::Changed`].
+    async fn request_cancel_if(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+    ) -> Result<Plan, StoreError>;
 
     /// Remove a plan and all that belongs to it; a running one's lease is notified, and lost. A tombstone remains for
     /// [`TOMBSTONE_MS`]; until it expires, removing the plan again is no error.
     ///
     /// # Errors
     /// [`StoreError::NotFound`] when there is neither such a plan nor its tombstone.
-    async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError>;
+    async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
+        self.delete_if(id, None, now_ms).await
+    }
+
+    /// As [`Store::delete`], but nothing is done unless the record has this `revision`, if one is given; then removing
+    /// the plan again is an error.
+    ///
+    /// # Errors
+    /// As [`Store::delete`], and [`StoreError::Changed`], [`StoreError::Gone`].
+    async fn delete_if(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+    ) -> Result<(), StoreError>;
 
     /// The record.
     ///

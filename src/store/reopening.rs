@@ -219,14 +219,24 @@ impl Store for Reopening {
         self.heed(&store, store.release(lease).await)
     }
 
-    async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
+    async fn request_cancel_if(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+    ) -> Result<Plan, StoreError> {
         let store = self.store()?;
-        self.heed(&store, store.request_cancel(id, now_ms).await)
+        self.heed(&store, store.request_cancel_if(id, revision, now_ms).await)
     }
 
-    async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
+    async fn delete_if(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+    ) -> Result<(), StoreError> {
         let store = self.store()?;
-        self.heed(&store, store.delete(id, now_ms).await)
+        self.heed(&store, store.delete_if(id, revision, now_ms).await)
     }
 
     async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {

@@ -316,6 +316,40 @@ async fn cancel_and_delete_honour_if_match_and_if_none_match() {
     }
 }
 
+/// Several callers have seen the same version of a plan, and each would change that one.
+#[tokio::test(flavor = "multi_thread")]
+async fn of_many_who_would_change_one_version_of_a_plan_one_does() {
+    for_every_backend(async |backend| {
+        let api = Api::on(backend, Options::new(100)).await;
+        for round in 0..20 {
+            let address = api.submit().await;
+            let cancel = format!("{address}/cancel");
+            let seen = api.get(&address).await.header("etag").to_owned();
+            let seen = [("if-match", &*seen)];
+            let change = |nth: usize| {
+                if nth.is_multiple_of(2) {
+                    api.send(Method::DELETE, &address, &seen, "")
+                } else {
+                    api.send(Method::POST, &cancel, &seen, "")
+                }
+            };
+            let answers = futures_util::future::join_all((round..round + 8).map(change)).await;
+            let (done, refused): (Vec<_>, Vec<_>) = answers
+                .iter()
+                .partition(|answer| answer.status.is_success());
+            assert_eq!(done.len(), 1, "{answers:?}");
+            // Whoever would cancel a plan that is gone is told that it is.
+            assert!(
+                refused
+                    .iter()
+                    .all(|answer| [410, 412].contains(&answer.status.as_u16())),
+                "{answers:?}"
+            );
+        }
+    })
+    .await;
+}
+
 #[tokio::test]
 async fn a_deleted_plan_is_gone() {
     let api = Api::new();

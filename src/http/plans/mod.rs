@@ -91,8 +91,9 @@ pub(super) async fn cancel(
     precondition: Precondition,
 ) -> Result<Response, Problem> {
     let plan = caller.plan(&*state.store, id).await?;
-    precondition.check(&plan)?;
-    let plan = state.store.request_cancel(id, state.clock.now_ms()).await?;
+    let now_ms = state.clock.now_ms();
+    let cancel = |revision| state.store.request_cancel_if(id, revision, now_ms);
+    let plan = precondition.heeded(plan, cancel).await?;
     let status = if plan.status.is_final() {
         state.instruments.origins.forget(id);
         StatusCode::OK
@@ -110,12 +111,14 @@ pub(super) async fn delete(
     _: NoParams,
     precondition: Precondition,
 ) -> Result<StatusCode, Problem> {
-    match caller.plan(&*state.store, id).await {
-        Ok(plan) => {
-            precondition.check(&plan)?;
-            state.store.delete(id, state.clock.now_ms()).await?;
-            state.instruments.origins.forget(id);
-        }
+    let now_ms = state.clock.now_ms();
+    let delete = |revision| state.store.delete_if(id, revision, now_ms);
+    let deleted = match caller.plan(&*state.store, id).await {
+        Ok(plan) => precondition.heeded(plan, delete).await,
+        Err(problem) => Err(problem),
+    };
+    match deleted {
+        Ok(()) => state.instruments.origins.forget(id),
         // Whoever repeats the request got no answer the first time.
         Err(Problem::Gone(_)) => precondition.check_removed(id)?,
         Err(problem) => return Err(problem),

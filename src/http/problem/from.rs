@@ -16,6 +16,10 @@ impl From<StoreError> for Problem {
         match error {
             StoreError::NotFound(id) => Self::no_such_plan(id),
             StoreError::Gone(tombstone) => Self::Gone(tombstone),
+            StoreError::Changed(plan) => Self::PreconditionFailed(format!(
+                "plan {} has changed since its entity tag was compared",
+                plan.id
+            )),
             StoreError::KeyReused => Self::IdempotencyKeyReused,
             StoreError::KeyInFlight => Self::IdempotencyInFlight,
             StoreError::QuotaReached { active, quota } => Self::QuotaReached {

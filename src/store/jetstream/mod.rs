@@ -238,13 +238,25 @@ impl Store for JetStreamStore {
             .await
     }
 
-    async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
-        self.open_store()?.request_cancel(id, now_ms).await
+    async fn request_cancel_if(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+    ) -> Result<Plan, StoreError> {
+        self.open_store()?
+            .request_cancel(id, revision, now_ms)
+            .await
     }
 
-    async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
+    async fn delete_if(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+    ) -> Result<(), StoreError> {
         let store = Arc::clone(self.open_store()?);
-        detached(async move { store.delete(id, now_ms).await }).await
+        detached(async move { store.delete(id, revision, now_ms).await }).await
     }
 
     async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {

@@ -9,33 +9,44 @@ use super::record::{Grave, State};
 use super::steps::Change;
 use super::view::Standing;
 use crate::job::PlanId;
-use crate::store::{LastEvent, SWEEP, StoreError};
+use crate::store::{LastEvent, SWEEP, StoreError, expected};
 
 /// Number of expired plans that are removed at the same time.
 const AT_ONCE: usize = 16;
 
 impl JetStream {
-    pub(super) async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
-        match self.bury(id, now_ms, false).await {
-            Ok(()) | Err(StoreError::Gone(_)) => Ok(()),
-            Err(error) => Err(error),
+    pub(super) async fn delete(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+    ) -> Result<(), StoreError> {
+        match self.bury(id, revision, now_ms, false).await {
+            Err(StoreError::Gone(_)) if revision.is_none() => Ok(()),
+            buried => buried,
         }
     }
 
     /// Remove a plan and all that belongs to it, except its tombstone.
-    async fn bury(&self, id: PlanId, now_ms: i64, expired: bool) -> Result<(), StoreError> {
+    async fn bury(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+        expired: bool,
+    ) -> Result<(), StoreError> {
         let is_refused =
             |buried: &Result<_, StoreError>| matches!(buried, Err(error) if lacks_room(error));
-        let mut buried = self.write_grave(id, now_ms, expired).await;
+        let mut buried = self.write_grave(id, revision, now_ms, expired).await;
         // Full servers take nothing, not even a plan's removal, but they do remove. Old events go first: they may be
         // enough, and a plan that stays after all can do without them.
         if is_refused(&buried) {
             self.remove_old_steps(id).await?;
-            buried = self.write_grave(id, now_ms, expired).await;
+            buried = self.write_grave(id, revision, now_ms, expired).await;
         }
         if is_refused(&buried) {
             self.give_up_documents(id).await?;
-            buried = self.write_grave(id, now_ms, expired).await;
+            buried = self.write_grave(id, revision, now_ms, expired).await;
         }
         let (standing, Remains { place, objects }) = buried?;
         if let Some(place) = place {
@@ -54,6 +65,7 @@ impl JetStream {
     async fn write_grave(
         &self,
         id: PlanId,
+        revision: Option<u64>,
         now_ms: i64,
         expired: bool,
     ) -> Result<(Standing, Remains), StoreError> {
@@ -62,6 +74,7 @@ impl JetStream {
             .plans()
             .change(id, |standing| {
                 let record = standing.record(id, now_ms)?;
+                expected(&record.plan, revision)?;
                 let objects = record.objects();
                 remains = Remains {
                     place: (!record.plan.status.is_final()).then_some(record.place),
@@ -163,7 +176,9 @@ impl JetStream {
         going.sort_by_key(|id| id.as_u128() ^ self.node.as_u128());
         let mut round = Round::default();
         let mut refused = None;
-        let buried = going.into_iter().map(|id| self.bury(id, now_ms, true));
+        let buried = going
+            .into_iter()
+            .map(|id| self.bury(id, None, now_ms, true));
         let mut buried = stream::iter(buried).buffer_unordered(AT_ONCE);
         while let Some(buried) = buried.next().await {
             match buried {

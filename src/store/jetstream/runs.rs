@@ -10,7 +10,7 @@ use super::run_steps::{Appended, RunSteps};
 use super::steps::Change;
 use super::view::Standing;
 use crate::job::{Event, Plan, PlanId, Status};
-use crate::store::{End, Ending, StoreError};
+use crate::store::{End, Ending, StoreError, expected};
 
 /// Maximum number of events in one step.
 const EVENTS: usize = 256;
@@ -219,7 +219,12 @@ impl JetStream {
         Ok(record.plan.clone())
     }
 
-    pub(super) async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
+    pub(super) async fn request_cancel(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+    ) -> Result<Plan, StoreError> {
         let clock_ms = (self.options.clock)();
         let mut waited = None;
         let standing = self
@@ -227,6 +232,7 @@ impl JetStream {
             .change(id, |standing| {
                 waited = None;
                 let mut record = Box::new(standing.record(id, clock_ms)?.clone());
+                expected(&record.plan, revision)?;
                 match record.plan.status {
                     Status::Queued => {
                         record.plan.cancel(now_ms)?;

@@ -189,15 +189,25 @@ impl Store for SqliteStore {
             .await
     }
 
-    async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
+    async fn request_cancel_if(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+    ) -> Result<Plan, StoreError> {
         self.writer
-            .change(move |tx| operations::request_cancel(tx, id, now_ms))
+            .change(move |tx| operations::request_cancel(tx, id, revision, now_ms))
             .await
     }
 
-    async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
+    async fn delete_if(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+    ) -> Result<(), StoreError> {
         self.writer
-            .change(move |tx| operations::delete(tx, id, now_ms))
+            .change(move |tx| operations::delete(tx, id, revision, now_ms))
             .await
     }
 

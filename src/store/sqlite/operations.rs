@@ -11,7 +11,9 @@ use super::transaction::{Effect, Transaction};
 use super::{head, idempotency, removal, webhooks};
 use crate::export::document::Incumbent;
 use crate::job::{Event, Plan, PlanId, Status, Submission};
-use crate::store::{End, Ending, LastEvent, Lease, StoreError, Submitted, Tombstone, lost};
+use crate::store::{
+    End, Ending, LastEvent, Lease, StoreError, Submitted, Tombstone, expected, lost,
+};
 
 /// More than the documents of nearly all plans.
 const BALLAST_BYTES: i64 = 512 << 10;
@@ -195,11 +197,13 @@ fn running(tx: &Transaction<'_>) -> Result<Vec<PlanRow>, StoreError> {
 pub(super) fn request_cancel(
     tx: &mut Transaction<'_>,
     id: PlanId,
+    revision: Option<u64>,
     now_ms: i64,
 ) -> Result<Plan, StoreError> {
     let Some(mut row) = PlanRow::load(tx.connection, id)? else {
         return Err(missing(tx.connection, id, tx.now_ms())?);
     };
+    expected(&row.plan, revision)?;
     match row.plan.status {
         Status::Queued => {
             row.plan.cancel(now_ms)?;
@@ -218,13 +222,19 @@ pub(super) fn request_cancel(
     Ok(row.plan)
 }
 
-pub(super) fn delete(tx: &mut Transaction<'_>, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
+pub(super) fn delete(
+    tx: &mut Transaction<'_>,
+    id: PlanId,
+    revision: Option<u64>,
+    now_ms: i64,
+) -> Result<(), StoreError> {
     let Some(row) = PlanRow::load(tx.connection, id)? else {
         return match missing(tx.connection, id, now_ms)? {
-            StoreError::Gone(_) => Ok(()),
+            StoreError::Gone(_) if revision.is_none() => Ok(()),
             other => Err(other),
         };
     };
+    expected(&row.plan, revision)?;
     let tombstone = Tombstone {
         id,
         owner: row.plan.owner,

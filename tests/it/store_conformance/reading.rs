@@ -1,7 +1,7 @@
 //! What can be read, and for how long.
 
 use noctule::job::{Event, NumberedEvent, PlanId, Status, Submission};
-use noctule::store::{ListQuery, Store, TOMBSTONE_MS};
+use noctule::store::{ListQuery, Store, StoreError, TOMBSTONE_MS};
 
 use crate::support::plans::{ending, failure, history, kind, point, statuses, submission, until};
 use crate::support::stores::on_every_backend;
@@ -23,6 +23,47 @@ async fn an_unknown_plan_is_not_found() {
         assert_eq!(kind(store.events(id, 0, 10).await), Err("not found"));
         assert_eq!(kind(store.request_cancel(id, 0).await), Err("not found"));
         assert_eq!(kind(store.delete(id, 0).await), Err("not found"));
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_change_that_expects_a_revision_is_made_to_that_revision_alone() {
+    on_every_backend(10, async |store| {
+        let queued = store.submit(submission()).await.unwrap().plan;
+        let (id, seen) = (queued.id, Some(queued.revision));
+        let lease = store.claim().await.unwrap();
+        let running = store.get(id).await.unwrap();
+        let cancelled = store.request_cancel_if(id, seen, 0).await;
+        let Err(StoreError::Changed(now)) = &cancelled else {
+            panic!("{cancelled:?}");
+        };
+        assert_eq!(
+            (now.status, now.revision),
+            (Status::Running, running.revision)
+        );
+        let now_ms = store.now_ms();
+        assert_eq!(
+            kind(store.delete_if(id, seen, now_ms).await),
+            Err("changed")
+        );
+        assert!(!*lease.cancel.borrow());
+        assert_eq!(store.get(id).await.unwrap(), running);
+
+        let seen = Some(running.revision);
+        let cancelled = store.request_cancel_if(id, seen, 0).await.unwrap();
+        assert!(cancelled.cancel_requested);
+        assert_eq!(
+            kind(store.request_cancel_if(id, seen, 0).await),
+            Err("changed")
+        );
+        let seen = Some(cancelled.revision);
+        store.delete_if(id, seen, now_ms).await.unwrap();
+        assert_eq!(kind(store.delete_if(id, seen, now_ms).await), Err("gone"));
+        assert_eq!(
+            kind(store.request_cancel_if(id, seen, 0).await),
+            Err("gone")
+        );
     })
     .await;
 }

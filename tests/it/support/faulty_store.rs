@@ -107,12 +107,22 @@ impl Store for FaultyStore {
         self.sound.release(lease).await
     }
 
-    async fn request_cancel(&self, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
-        self.sound.request_cancel(id, now_ms).await
+    async fn request_cancel_if(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+    ) -> Result<Plan, StoreError> {
+        self.sound.request_cancel_if(id, revision, now_ms).await
     }
 
-    async fn delete(&self, id: PlanId, now_ms: i64) -> Result<(), StoreError> {
-        self.sound.delete(id, now_ms).await
+    async fn delete_if(
+        &self,
+        id: PlanId,
+        revision: Option<u64>,
+        now_ms: i64,
+    ) -> Result<(), StoreError> {
+        self.sound.delete_if(id, revision, now_ms).await
     }
 
     async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {

@@ -99,6 +99,7 @@ pub(crate) fn kind<T>(result: Result<T, StoreError>) -> Result<(), &'static str>
     result.map(drop).map_err(|error| match error {
         StoreError::NotFound(_) => "not found",
         StoreError::Gone(_) => "gone",
+        StoreError::Changed(_) => "changed",
         StoreError::QueueFull { .. } => "queue full",
         StoreError::QuotaReached { .. } => "quota reached",
         StoreError::KeyReused => "key reused",

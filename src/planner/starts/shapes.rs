@@ -46,6 +46,7 @@ const COARSE_OVER_HILLS: usize = 7;
 pub(super) const MOST_COARSE: usize = 20;
 
 /// Shapes of routes, and what finding them has told about the ground.
+#[derive(Default)]
 pub(super) struct Shapes {
     /// A known route first.
     pub(super) routes: Vec<Vec<Point3>>,
@@ -70,10 +71,7 @@ impl Shapes {
         let mut shapes = Self {
             is_known: known.is_some(),
             routes: known.into_iter().collect(),
-            is_rough: false,
-            is_low: false,
-            legs_priced: 0,
-            routes_priced: 0,
+            ..Self::default()
         };
         if settings.seeding == Seeding::Tangent {
             shapes.routes.extend(along_strings(model, is_over));

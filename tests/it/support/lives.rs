@@ -28,12 +28,16 @@ pub(crate) async fn waiting(service: &Service) -> String {
     service.submit(&scenario()).await
 }
 
-/// Reads until the plan is running.
+/// Reads until the plan's run has reported something. Its status tells of the run a moment before the worker has it: a
+/// service that ends in that moment puts the plan back into the queue.
 pub(crate) async fn running(service: &Service, address: &str) -> Stream {
-    running_at(service, address, 10.0).await
+    let mut stream = running_at(service, address, 10.0).await;
+    let is_report = |block: &Block| matches!(block, Block::Event { name, .. } if name != "status");
+    while !is_report(&stream.next().await.expect("it has not ended")) {}
+    stream
 }
 
-/// The same, with at most `rate_hz` points a second.
+/// Reads until the plan is running, with at most `rate_hz` points a second.
 pub(crate) async fn running_at(service: &Service, address: &str, rate_hz: f64) -> Stream {
     let mut stream = Stream::open(service.get(&format!("{address}/events?rate={rate_hz}"))).await;
     await_run(&mut stream).await;

@@ -54,6 +54,10 @@ pub struct Settings {
     pub instruments: Arc<Instruments>,
 }
 
+/// How long a caller that has connected may take to send the first bytes of a request once the service stops. Bytes that
+/// are there already may take a moment to be noticed.
+const LAST_REQUESTS: Duration = Duration::from_millis(100);
+
 /// Pause after a failed accept, such as when file descriptors run out.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
@@ -83,21 +87,22 @@ pub async fn serve(
         unread: settings.body_timeout,
     };
     let mut failures_to_accept = RepeatedFailures::default();
+    let begin = |(stream, place): (TcpStream, OwnedSemaphorePermit), phase| {
+        let socket = Socket::new(stream, settings.instruments.clone());
+        let answer = answer(socket, router.clone(), phase, times);
+        let counted = settings.instruments.metrics.connection();
+        tokio::spawn(async move {
+            answer.await;
+            drop((place, counted));
+        });
+    };
     loop {
         let arrival = tokio::select! {
             arrival = accept(&listener, &places) => arrival,
             () = stopping(&mut phase) => break,
         };
         match arrival {
-            Ok((stream, place)) => {
-                let socket = Socket::new(stream, settings.instruments.clone());
-                let answer = answer(socket, router.clone(), phase.clone(), times);
-                let counted = settings.instruments.metrics.connection();
-                tokio::spawn(async move {
-                    answer.await;
-                    drop((place, counted));
-                });
-            }
+            Ok(arrived) => begin(arrived, phase.clone()),
             Err(error) => {
                 if let Some(failures) = failures_to_accept.count(Instant::now()) {
                     tracing::warn!(%error, failures, "a connection could not be accepted");
@@ -106,7 +111,9 @@ pub async fn serve(
             }
         }
     }
-    drop(listener);
+    for arrived in last_arrivals(listener, &places) {
+        begin(arrived, phase.clone());
+    }
     // Each connection returns its place when it ends.
     let all_ended = places.acquire_many(n_places);
     if tokio::time::timeout(settings.patience, all_ended)
@@ -136,13 +143,30 @@ async fn accept(
     Ok((stream, place.expect("the semaphore is never closed")))
 }
 
+/// The connections in the backlog of a listener that is given up, which would be reset with it. An error ends them like
+/// an empty backlog.
+fn last_arrivals(
+    listener: TcpListener,
+    places: &Arc<Semaphore>,
+) -> impl Iterator<Item = (TcpStream, OwnedSemaphorePermit)> {
+    // Asked without tokio, which knows of an arrival only after its next look at all sockets.
+    let listener = listener.into_std();
+    std::iter::from_fn(move || {
+        let place = places.clone().try_acquire_owned().ok()?;
+        let (stream, _) = listener.as_ref().ok()?.accept().ok()?;
+        stream.set_nonblocking(true).ok()?;
+        stream.set_nodelay(true).ok()?;
+        Some((TcpStream::from_std(stream).ok()?, place))
+    })
+}
+
 /// Answer the requests of one connection.
 async fn answer(socket: Socket, router: Router, mut phase: watch::Receiver<Phase>, times: Times) {
     let http1 = tokio::select! {
         // Callers that have already sent a request get an answer.
         biased;
         http1 = speaks_http1(&socket.stream) => http1,
-        () = stopping(&mut phase) => return,
+        () = sent_nothing_at_the_end(&mut phase) => return,
         () = tokio::time::sleep(times.idle) => {
             tracing::debug!("a connection sent nothing");
             return;
@@ -191,6 +215,11 @@ async fn answer(socket: Socket, router: Router, mut phase: watch::Receiver<Phase
         let connection = builder.serve_connection(socket, service);
         Box::pin(keep(connection, phase, &traffic, times, false)).await;
     }
+}
+
+async fn sent_nothing_at_the_end(phase: &mut watch::Receiver<Phase>) {
+    stopping(phase).await;
+    tokio::time::sleep(LAST_REQUESTS).await;
 }
 
 /// Run a connection until it ends, the service stops, or there is no more traffic on it.

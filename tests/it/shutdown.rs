@@ -2,14 +2,20 @@
 
 use std::fs::{self, File};
 use std::net::TcpListener;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use axum::Router;
 use futures_util::future::join_all;
+use noctule::http::{Phase, server};
 use reqwest::Method;
 use serde_json::Value;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::TcpStream;
+use tokio::sync::watch;
 
 use crate::support::lives::{a_run_of, await_run, life, running, running_at};
-use crate::support::patience::in_time;
+use crate::support::patience::{PATIENCE, in_time};
 use crate::support::process::Service;
 use crate::support::sse::{Block, events};
 use crate::support::stores::{Place, for_every_backend};
@@ -174,4 +180,34 @@ async fn a_service_that_is_starting_ends_at_the_first_signal_and_outlives_a_hang
     );
     assert!(!log.contains("panicked"), "{log}");
     drop(connected);
+}
+
+/// They wait in the listener's backlog, and nothing tells them from those who came a moment earlier.
+#[tokio::test]
+async fn callers_whom_nobody_has_taken_yet_are_answered_at_the_end() {
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await;
+    let listener = listener.expect("a free port");
+    let address = listener.local_addr().expect("bound");
+    let (_phase, watched) = watch::channel(Phase::Stopping);
+    let mut callers = Vec::new();
+    for _ in 0..20 {
+        let mut caller = TcpStream::connect(address).await.expect("a connection");
+        let request = b"GET / HTTP/1.1\r\nhost: here\r\n\r\n";
+        caller.write_all(request).await.expect("sent");
+        callers.push(caller);
+    }
+    let settings = server::Settings {
+        head_timeout: Duration::from_secs(30),
+        body_timeout: Duration::from_secs(30),
+        max_connections: 30,
+        patience: PATIENCE,
+        instruments: Arc::default(),
+    };
+    let router = Router::new().fallback(async || "here");
+    server::serve(listener, router, watched, settings).await;
+    for mut caller in callers {
+        let mut answer = String::new();
+        caller.read_to_string(&mut answer).await.expect("an answer");
+        assert!(answer.starts_with("HTTP/1.1 200 "), "{answer}");
+    }
 }

@@ -14,7 +14,8 @@ use noctule::http::webhook::{Secrets, Sender, Settings};
 use noctule::job::Submission;
 use noctule::store::wall_clock;
 use serde_json::{Value, json};
-use tokio::net::TcpListener;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::mpsc;
 
 use crate::support::api::{Answer, Api};
@@ -385,6 +386,41 @@ async fn a_pending_webhook_survives_a_restart() {
     let told = check(&receiver.next().await, &plan);
     assert_eq!(told["status"], "succeeded");
     drop(service);
+}
+
+#[tokio::test]
+async fn a_webhook_on_its_way_arrives_before_the_service_ends() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
+    let url = format!("http://{}/", listener.local_addr().expect("bound"));
+    let service = start(directory.path(), &[]);
+    submit_to(&service, &url).await;
+    let (mut connection, _) = in_time(listener.accept()).await.expect("a connection");
+    service.signal("TERM");
+    // Nobody else is to be answered any more.
+    let refuses = async || TcpStream::connect(service.address()).await.is_err();
+    eventually(refuses).await;
+    let answer = b"HTTP/1.1 204 No Content\r\nconnection: close\r\n\r\n";
+    connection
+        .write_all(answer)
+        .await
+        .expect("it still listens");
+    assert!(service.exit().await.success());
+
+    let service = start(directory.path(), &[]);
+    let plan = submit_to(&service, &url).await;
+    let (mut connection, _) = in_time(listener.accept()).await.expect("a connection");
+    let (_, id) = plan.rsplit_once('/').expect("a path");
+    let mut message = String::new();
+    let whole = async {
+        while !message.contains(id) {
+            let mut part = [0; 4096];
+            let length = connection.read(&mut part).await.expect("readable");
+            assert!(length > 0, "the first plan's end is told again: {message}");
+            message.push_str(std::str::from_utf8(&part[..length]).expect("UTF-8"));
+        }
+    };
+    in_time(whole).await;
 }
 
 #[tokio::test]

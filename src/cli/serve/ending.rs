@@ -69,7 +69,16 @@ impl Running {
                 .context("the server broke")
                 .and_then(|()| bail!("the server ended unasked")),
         };
-        drop((self.sweeper, self.sender));
+        if let Some(sender) = self.sender
+            && timeout_at(begun + times.answers, sender.finish())
+                .await
+                .is_err()
+        {
+            tracing::warn!(
+                "some webhooks did not arrive in time; the next process sends them again"
+            );
+        }
+        drop(self.sweeper);
         let until = (begun + grace).max(Instant::now() + LEAST_CLOSE);
         if timeout_at(until, self.store.close()).await.is_err() {
             tracing::warn!(
@@ -121,12 +130,13 @@ struct Times {
     runs: Duration,
     /// How long stopping them and giving them back may take after that.
     giving_back: Duration,
-    /// Until when, counted from the signal, connections may finish their answers; the rest is for the store.
+    /// Until when, counted from the signal, connections may finish their answers and webhooks may arrive; the rest is for
+    /// the store.
     answers: Duration,
 }
 
 impl Times {
-    /// The last quarter, at most two seconds, is for giving back, for connections, and for the store.
+    /// The last quarter, at most two seconds, is for giving back, for connections and webhooks, and for the store.
     fn within(grace: Duration) -> Self {
         let reserve = (grace / 4).min(Duration::from_secs(2));
         Self {

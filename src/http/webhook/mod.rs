@@ -17,6 +17,7 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use futures_util::FutureExt as _;
 use jiff::Timestamp;
 use serde::Serialize;
+use tokio::sync::watch;
 use tokio::task::{self, JoinHandle, JoinSet};
 use tokio::time::MissedTickBehavior;
 
@@ -79,7 +80,11 @@ pub(super) fn asked(
 }
 
 /// Sends due webhooks, until dropped.
-pub struct Sender(JoinHandle<()>);
+pub struct Sender {
+    sending: JoinHandle<()>,
+    /// Becomes true when no more are to be sent.
+    end: watch::Sender<bool>,
+}
 
 impl Sender {
     /// Send the webhooks in `store`.
@@ -92,13 +97,22 @@ impl Sender {
             client,
             clock,
         });
-        Self(tokio::spawn(deliver_all(delivery)))
+        let end = watch::Sender::new(false);
+        let sending = tokio::spawn(deliver_all(delivery, end.subscribe()));
+        Self { sending, end }
+    }
+
+    /// Send no more; returns when those on their way have arrived, or failed to.
+    pub async fn finish(mut self) {
+        self.end.send_replace(true);
+        // If it panicked, none is on its way.
+        let _ = (&mut self.sending).await;
     }
 }
 
 impl Drop for Sender {
     fn drop(&mut self) {
-        self.0.abort();
+        self.sending.abort();
     }
 }
 
@@ -110,7 +124,7 @@ struct Delivery {
     clock: Clock,
 }
 
-async fn deliver_all(delivery: Arc<Delivery>) {
+async fn deliver_all(delivery: Arc<Delivery>, mut end: watch::Receiver<bool>) {
     let mut looks = tokio::time::interval(LOOK);
     looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut on_their_way: HashMap<task::Id, (PlanId, Option<Owner>)> = HashMap::new();
@@ -118,6 +132,7 @@ async fn deliver_all(delivery: Arc<Delivery>) {
     loop {
         tokio::select! {
             _ = looks.tick() => {}
+            _ = end.wait_for(|end| *end) => break,
             Some(ended) = tasks.join_next_with_id() => {
                 // A webhook whose task panicked is no longer in flight either.
                 let task = ended.map_or_else(|broken| broken.id(), |(task, ())| task);
@@ -144,6 +159,7 @@ async fn deliver_all(delivery: Arc<Delivery>) {
             }
         }
     }
+    while tasks.join_next().await.is_some() {}
 }
 
 impl Delivery {

@@ -1,6 +1,7 @@
 //! Keeps the view current: reads the plans' stream as it grows, and resumes after an interruption.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use async_nats::jetstream::Message;
@@ -9,7 +10,7 @@ use async_nats::jetstream::stream::Stream;
 use futures_util::StreamExt as _;
 use tokio::runtime::Handle;
 use tokio::sync::watch;
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 
 use super::JetStream;
 use super::connect::{PATIENCE, plan_of};
@@ -24,6 +25,9 @@ const SAID_EVERY: u64 = 1_000;
 
 /// Pause between attempts to resume.
 const PAUSE: Duration = Duration::from_millis(250);
+
+/// While no step comes, it is looked in these intervals whether the servers have one.
+const LOOK: Duration = Duration::from_millis(500);
 
 /// How far the reading has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,7 +64,7 @@ impl JetStream {
                     tracing::debug!(%error, "plans are not followed yet; trying again");
                 }
             }
-            tokio::time::sleep(PAUSE).await;
+            sleep(PAUSE).await;
         }
     }
 
@@ -79,11 +83,21 @@ impl JetStream {
             }
         };
         let all = format!("{}.plans.*", self.servers.namespace);
+        let connects = self.connects();
+        // It may have been removed since, and never come.
+        let newest = self.newest_sequence().await?;
         let mut steps = self.read_steps(what, all, begin).await?;
         if steps.are_none {
+            *read = newest.max(*read);
             reading.send_replace(Reading::Current);
         }
-        while let Some(message) = steps.messages.next().await {
+        loop {
+            let message = tokio::select! {
+                biased;
+                message = steps.messages.next() => message,
+                why = self.left_behind(*read, connects) => return Err(refused(what, why)),
+            };
+            let Some(message) = message else { break };
             let message = message.map_err(|error| refused(what, &error))?;
             let (sequence, pending) = {
                 let info = message.info().map_err(|error| refused(what, &*error))?;
@@ -101,6 +115,7 @@ impl JetStream {
                 });
             }
             if pending == 0 {
+                *read = newest.max(*read);
                 reading.send_if_modified(|reading| {
                     let news = *reading != Reading::Current;
                     *reading = Reading::Current;
@@ -109,6 +124,40 @@ impl JetStream {
             }
         }
         Ok(())
+    }
+
+    /// Returns when steps may have been missed: the connection was cut, or the servers have had one after `read` for a
+    /// while. What delivers them may be gone with its server, which the client notices only after ten seconds.
+    async fn left_behind(&self, read: u64, connects: u64) -> &'static str {
+        let mut is_late = false;
+        loop {
+            sleep(LOOK).await;
+            if self.connects() != connects || !self.servers.is_connected() {
+                return "the connection was cut";
+            }
+            // Who does not answer may not have anything to deliver either.
+            let has_more = matches!(self.newest_sequence().await, Ok(newest) if newest > read);
+            if has_more && is_late {
+                return "steps do not come";
+            }
+            is_late = has_more;
+        }
+    }
+
+    /// How often the client has connected.
+    fn connects(&self) -> u64 {
+        self.servers
+            .client
+            .statistics()
+            .connects
+            .load(Ordering::Relaxed)
+    }
+
+    /// The sequence of the newest step on the servers.
+    async fn newest_sequence(&self) -> Result<u64, StoreError> {
+        let info = self.servers.plans.get_info().await;
+        let info = info.map_err(|error| failed("the plans' stream", &error))?;
+        Ok(info.state.last_sequence)
     }
 
     fn take_in(&self, message: &Message, sequence: u64) {

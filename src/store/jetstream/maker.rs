@@ -21,6 +21,9 @@ const LIMITING_SERVER: &str = "2.15.0";
 /// leave theirs behind for a while.
 const MOST_CONSUMERS: i32 = 100_000;
 
+/// How often it is looked whether a change that is not answered yet has been made all the same.
+const LOOK: Duration = Duration::from_millis(100);
+
 /// Creates what is missing on the servers.
 pub(super) struct Maker<'a> {
     pub(super) context: &'a Context,
@@ -71,17 +74,16 @@ impl Maker<'_> {
             config.num_replicas = there.num_replicas;
         }
         config.max_consumers = there.max_consumers;
-        let differs = there.num_replicas != config.num_replicas
-            || there.max_messages != config.max_messages
-            || there.max_messages_per_subject != config.max_messages_per_subject
-            || there.retention != config.retention
-            || there.discard != config.discard;
-        if differs {
-            self.context
-                .update_stream(config.clone())
-                .await
-                .map_err(|error| failed(&what(), &error))?;
-        }
+        self.adjust(there, &config, |one| {
+            (
+                one.num_replicas,
+                one.max_messages,
+                one.max_messages_per_subject,
+                one.retention,
+                one.discard,
+            )
+        })
+        .await?;
         self.admit(&config).await;
         Ok(stream)
     }
@@ -137,12 +139,7 @@ impl Maker<'_> {
             num_replicas: there.num_replicas.max(self.replicas),
             ..there.clone()
         };
-        if config.num_replicas > there.num_replicas {
-            self.context
-                .update_stream(config.clone())
-                .await
-                .map_err(|error| failed(&format!("stream {}", there.name), &error))?;
-        }
+        self.adjust(there, &config, |one| one.num_replicas).await?;
         self.admit(&config).await;
         Ok(())
     }
@@ -159,8 +156,41 @@ impl Maker<'_> {
             max_consumers: MOST_CONSUMERS,
             ..there.clone()
         };
-        if let Err(error) = self.context.update_stream(admitting).await {
+        let adjusted = self
+            .adjust(there, &admitting, |one| one.max_consumers)
+            .await;
+        if let Err(error) = adjusted {
             tracing::warn!(%error, stream = there.name, "no more consumers than the servers' default");
+        }
+    }
+
+    /// Bring a stream from one configuration to the wanted one, if they differ in the `part` that matters. When two nodes
+    /// do so at once, the servers may answer only one of them: the other sees that it is done.
+    async fn adjust<T: PartialEq>(
+        &self,
+        there: &Config,
+        wanted: &Config,
+        part: impl Fn(&Config) -> T,
+    ) -> Result<(), StoreError> {
+        if part(there) == part(wanted) {
+            return Ok(());
+        }
+        let what = || format!("stream {}", wanted.name);
+        let is_done = async {
+            loop {
+                tokio::time::sleep(LOOK).await;
+                if let Ok(stream) = self.context.get_stream(&wanted.name).await
+                    && part(&stream.cached_info().config) == part(wanted)
+                {
+                    return;
+                }
+            }
+        };
+        tokio::select! {
+            updated = self.context.update_stream(wanted) => {
+                updated.map_err(|error| failed(&what(), &error)).map(drop)
+            }
+            () = is_done => Ok(()),
         }
     }
 }

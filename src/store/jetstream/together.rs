@@ -2,6 +2,7 @@
 //! All answers come over the node's one connection, which the servers cut when too much waits on it.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,8 +14,14 @@ use crate::store::StoreError;
 
 /// One kind of question, with answers `T`.
 pub(super) struct Together<T> {
-    desks: Mutex<HashMap<PlanId, Arc<Desk<T>>>>,
+    desks: Mutex<HashMap<PlanId, Visited<T>>>,
     permits: Semaphore,
+}
+
+/// A desk, and how many are at it.
+struct Visited<T> {
+    visitors: usize,
+    desk: Arc<Desk<T>>,
 }
 
 /// Where those who ask about the same plan meet.
@@ -66,12 +73,19 @@ struct Visit<'a, T> {
 impl<'a, T> Visit<'a, T> {
     fn to(together: &'a Together<T>, id: PlanId) -> Self {
         let fresh = || {
-            Arc::new(Desk {
+            let desk = Desk {
                 asked: AtomicU64::default(),
                 answered: tokio::sync::Mutex::default(),
-            })
+            };
+            Visited {
+                visitors: 0,
+                desk: Arc::new(desk),
+            }
         };
-        let desk = Arc::clone(together.desks.lock().entry(id).or_insert_with(fresh));
+        let mut desks = together.desks.lock();
+        let visited = desks.entry(id).or_insert_with(fresh);
+        visited.visitors += 1;
+        let desk = Arc::clone(&visited.desk);
         Self { together, id, desk }
     }
 }
@@ -79,9 +93,11 @@ impl<'a, T> Visit<'a, T> {
 impl<T> Drop for Visit<'_, T> {
     fn drop(&mut self) {
         let mut desks = self.together.desks.lock();
-        // One is the map's, one is this.
-        if Arc::strong_count(&self.desk) == 2 {
-            desks.remove(&self.id);
+        if let Entry::Occupied(mut visited) = desks.entry(self.id) {
+            visited.get_mut().visitors -= 1;
+            if visited.get().visitors == 0 {
+                visited.remove();
+            }
         }
     }
 }

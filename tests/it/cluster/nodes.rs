@@ -10,9 +10,11 @@ use noctule::config::Address;
 use noctule::job::{Event, Idempotency, PlanId, Status, Submission};
 use noctule::store::jetstream::{JetStreamStore, Settings};
 use noctule::store::{Options, Retention, SWEEP, Store, StoreError, wall_clock};
+use parking_lot::Mutex;
 
 use super::{open, open_as};
 use crate::support::nats::{self, NatsServer};
+use crate::support::patience::in_time;
 use crate::support::plans::{ending, history, kind, point, statuses, submission, until};
 use crate::support::stores::node;
 
@@ -320,4 +322,34 @@ async fn each_node_that_sweeps_removes_as_many_plans_as_one_alone() {
     }
     let (by_one, by_other) = tokio::join!(one.sweep(1_000), other.sweep(1_000));
     assert_eq!(by_one.unwrap() + by_other.unwrap(), n_plans);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn of_two_nodes_that_look_for_webhooks_one_sends_each() {
+    const PLANS: usize = 200;
+    let address = nats::address();
+    let (one, other) = tokio::join!(open(&address), open(&address));
+    for _ in 0..PLANS {
+        let submission = Submission {
+            webhook: Some("https://hooks.example/".to_owned()),
+            ..submission()
+        };
+        let id = one.submit(submission).await.unwrap().plan.id;
+        one.request_cancel(id, 0).await.unwrap();
+    }
+    let sent = Mutex::new(Vec::new());
+    let send = async |store: &dyn Store| {
+        while sent.lock().len() < PLANS {
+            for webhook in store.due_webhooks(i64::MAX, 8).await.unwrap() {
+                sent.lock().push(webhook.plan.id);
+                store.webhook_tried(webhook.plan.id, None).await.unwrap();
+            }
+        }
+    };
+    in_time(async { tokio::join!(send(&*one), send(&*other)) }).await;
+    let mut sent = sent.into_inner();
+    sent.sort();
+    let count = sent.len();
+    sent.dedup();
+    assert_eq!((sent.len(), count), (PLANS, PLANS));
 }

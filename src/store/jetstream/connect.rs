@@ -26,6 +26,9 @@ pub(super) const PATIENCE: Duration = Duration::from_secs(5);
 /// Room in the stream for jobs beyond the queue's limit: those being run.
 const RUNNING: i64 = 4_096;
 
+/// What the servers write for a limit that is not set.
+const UNLIMITED: i64 = -1;
+
 /// How long a node counts as alive after its last announcement.
 pub(super) const ALIVE: Duration = Duration::from_secs(30);
 
@@ -186,7 +189,8 @@ impl Servers {
 fn plans(options: &Options) -> Config {
     Config {
         name: "plans".to_owned(),
-        max_messages_per_subject: i64::try_from(options.events_kept).unwrap_or(-1),
+        max_messages: UNLIMITED,
+        max_messages_per_subject: i64::try_from(options.events_kept).unwrap_or(UNLIMITED),
         allow_direct: true,
         ..Config::default()
     }
@@ -200,6 +204,7 @@ fn jobs(options: &Options) -> Config {
         retention: RetentionPolicy::WorkQueue,
         discard: DiscardPolicy::New,
         max_messages: limit.saturating_add(RUNNING),
+        max_messages_per_subject: UNLIMITED,
         ..Config::default()
     }
 }

@@ -7,6 +7,7 @@ use std::time::Duration;
 use async_nats::jetstream::object_store::ObjectStore;
 use async_nats::jetstream::stream::{Config, StorageType, Stream};
 use async_nats::jetstream::{Context, kv, object_store};
+use tokio::time::{sleep, timeout};
 
 use super::bucket::Bucket;
 use super::errors::failed;
@@ -23,6 +24,9 @@ const MOST_CONSUMERS: i32 = 100_000;
 
 /// How often it is looked whether a change that is not answered yet has been made all the same.
 const LOOK: Duration = Duration::from_millis(100);
+
+/// How long it is waited for the answer whether something is there, when asking again costs nothing.
+const SOON: Duration = Duration::from_secs(1);
 
 /// Creates what is missing on the servers.
 pub(super) struct Maker<'a> {
@@ -178,8 +182,9 @@ impl Maker<'_> {
         let what = || format!("stream {}", wanted.name);
         let is_done = async {
             loop {
-                tokio::time::sleep(LOOK).await;
-                if let Ok(stream) = self.context.get_stream(&wanted.name).await
+                sleep(LOOK).await;
+                let found = timeout(SOON, self.context.get_stream(&wanted.name)).await;
+                if let Ok(Ok(stream)) = found
                     && part(&stream.cached_info().config) == part(wanted)
                 {
                     return;
@@ -196,7 +201,7 @@ impl Maker<'_> {
 }
 
 /// What is there, or else what is made. Another node may make it at the same moment, and change at once what this one
-/// would not.
+/// would not; the servers may leave this one without an answer then.
 async fn found_or_made<T, Found, NotFound, NotMade>(
     what: &str,
     find: impl Fn() -> Found,
@@ -206,10 +211,24 @@ where
     Found: Future<Output = Result<T, NotFound>>,
     NotMade: Error + 'static,
 {
-    if let Ok(there) = find().await {
+    // Of what is just being made the servers may say nothing at all.
+    let find_soon = || timeout(SOON, find());
+    if let Ok(Ok(there)) = find_soon().await {
         return Ok(there);
     }
-    match make.await {
+    let found_meanwhile = async {
+        loop {
+            sleep(LOOK).await;
+            if let Ok(Ok(there)) = find_soon().await {
+                return there;
+            }
+        }
+    };
+    let made = tokio::select! {
+        made = make => made,
+        there = found_meanwhile => return Ok(there),
+    };
+    match made {
         Ok(made) => Ok(made),
         Err(error) => find().await.map_err(|_| failed(what, &error)),
     }

@@ -3,7 +3,7 @@
 
 use super::log::Log;
 use super::search::{self};
-use super::{StopReason, newton};
+use super::{StopReason, newton, starts};
 use crate::cost::Model;
 use crate::scenario::Seeding;
 
@@ -23,7 +23,9 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     log.tell();
     let mut scenario = model.scenario.clone();
     std::mem::swap(&mut scenario.start, &mut scenario.target);
-    let found = search::aside(&Model::new(&scenario), log.lower, log);
+    let back = Model::new(&scenario);
+    let starts = starts::routes(&back, log.stop);
+    let found = search::aside(&back, starts, log.lower, log);
     found.map_or(StopReason::Iterations, |(reason, _, mut route)| {
         route.reverse();
         log.offer_unpriced(&route);

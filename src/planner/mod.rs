@@ -8,6 +8,7 @@ mod beside;
 mod blocks;
 mod certificate;
 mod coding;
+mod fewer;
 mod finish;
 mod guide;
 mod kept;

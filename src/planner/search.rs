@@ -92,18 +92,18 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
     finish(model, reason, &elites, &starts.beyond, log)
 }
 
-/// The guided search of another `model` on behalf of the run of `log`, which counts what it prices: why it ended, and its
-/// best route. `None` where there is nothing to start from.
+/// The guided search of another `model` from `starts`, on behalf of the run of `log`, which counts what it prices: why it
+/// ended, and its best route. `None` where there is nothing to start from.
 pub(super) fn aside(
     model: &Model,
+    starts: Option<Starts>,
     lower: Option<f64>,
     log: &mut Log,
 ) -> Option<(StopReason, Fitness, Vec<Point3>)> {
     let mut nobody = Nobody;
     let mut own = Log::new(model, &mut nobody, log.stop);
     own.lower = lower;
-    let starts = starts::routes(model, log.stop)?;
-    let reason = guided(model, starts, &mut own);
+    let reason = guided(model, starts?, &mut own);
     log.evaluations += own.evaluations;
     Some((reason, own.best, own.route))
 }

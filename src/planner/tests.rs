@@ -1,13 +1,14 @@
 mod scenes;
 
-use self::scenes::wall;
-pub(super) use self::scenes::{disc, hilly_scenario, mountain, peaks, radar, route, scenario};
+pub(super) use self::scenes::{
+    disc, hilly_scenario, mountain, peaks, radar, route, scenario, slalom, wall,
+};
 use super::newton::Newton;
 use super::*;
 use crate::cost::Model;
 use crate::geometry::Point2;
 use crate::scenario::{AltitudeBand, Seeding, WarmStart};
-use crate::threat::{Cylinder, Shape};
+use crate::threat::{Cylinder, Shape, Threat};
 
 #[derive(Default)]
 struct Diary {
@@ -274,10 +275,15 @@ fn many_waypoints_over_hills_are_moved_together() {
     assert!(outcome.feasible && gain < 1e-4, "{gain}");
 }
 
+/// From one side of the area to the other.
+fn wall_across() -> Threat {
+    wall([-100.0, 1100.0], [400.0, 450.0])
+}
+
 #[test]
 fn an_impossible_scenario_ends_with_its_violations() {
     let mut scenario = scenario();
-    scenario.threats[1] = wall();
+    scenario.threats[1] = wall_across();
     let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(u32::MAX));
     assert!(!outcome.feasible && outcome.path.is_none() && outcome.path_checks.is_none());
     assert!(
@@ -298,7 +304,7 @@ fn an_impossible_scenario_ends_with_its_violations() {
 #[test]
 fn the_curve_of_an_impossible_scenario_repeats_no_iteration_but_the_last() {
     let mut scenario = scenario();
-    scenario.threats = vec![wall()];
+    scenario.threats = vec![wall_across()];
     scenario.planner.seeding = Seeding::Tangent;
     scenario.planner.polish = true;
     (scenario.planner.waypoints, scenario.planner.iterations) = (4, 8);

@@ -63,6 +63,15 @@ impl Outline {
 }
 
 impl OutlineShape {
+    /// Number of points that it is given by.
+    #[must_use]
+    pub fn corners(&self) -> usize {
+        match self {
+            Self::Disc(_) => 1,
+            Self::Ring(ring) => ring.len(),
+        }
+    }
+
     /// Distance of `point`, metres; 0 within a ring.
     #[must_use]
     pub fn distance(&self, point: Point2) -> f64 {

@@ -135,6 +135,20 @@ impl<'m, 's> Newton<'m, 's> {
         best
     }
 
+    /// Bring `route` within the limits; it stays as it is where that does not come nearer to them.
+    pub(super) fn reach(&mut self, route: &mut Vec<Point3>) -> Fitness {
+        let mut best = price(self.model, route);
+        let original = route.clone();
+        for rate in [USUAL, HIGH] {
+            let found = self.search(&original, rate, f64::INFINITY);
+            self.take(found, route, &mut best, &mut Vec::new());
+            if best.is_feasible() {
+                break;
+            }
+        }
+        best
+    }
+
     /// Put waypoints of `route` where limits are felt, for as long as that makes it better.
     fn deal(
         &mut self,

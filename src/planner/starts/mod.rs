@@ -10,6 +10,7 @@ mod flanks;
 mod heap;
 mod height;
 mod known;
+mod ledges;
 mod levels;
 mod net;
 mod over;
@@ -65,9 +66,24 @@ pub(super) struct Starts {
 
 /// Where the search of `model` starts; `None` for the algorithm alone.
 pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
+    from(model, |is_over| Shapes::find(model, is_over), stop)
+}
+
+/// As [`routes`], where a search from those has found no route that keeps every limit: along ledges too; `None` where
+/// there are none.
+pub(super) fn along_ledges(model: &Model, stop: &dyn Stop) -> Option<Starts> {
+    let shapes = |is_over: &dyn Fn() -> bool| Shapes::find_with_ledges(model, is_over);
+    from(model, |is_over| shapes(is_over).unwrap_or_default(), stop)
+}
+
+fn from(
+    model: &Model,
+    shapes: impl Fn(&dyn Fn() -> bool) -> Shapes,
+    stop: &dyn Stop,
+) -> Option<Starts> {
     let settings = &model.scenario.planner;
     let is_over = || why_stop(model.scenario, stop).is_some();
-    let shapes = Shapes::find(model, &is_over);
+    let shapes = shapes(&is_over);
     if shapes.routes.is_empty() {
         return None;
     }

@@ -4,7 +4,8 @@
 use super::height::{is_steep, lifted};
 use super::net::Found;
 use super::{
-    climbs, contours, exposed, flanks, known, over, roadmap, rounded, tangents, trails, ways, worth,
+    climbs, contours, exposed, flanks, known, ledges, over, roadmap, rounded, tangents, trails,
+    ways, worth,
 };
 use crate::cost::Model;
 use crate::geometry::Point3;
@@ -81,6 +82,17 @@ impl Shapes {
             }
         }
         shapes
+    }
+
+    /// As [`Shapes::find`], with those along ledges; `None` where there are none.
+    pub(super) fn find_with_ledges(model: &Model, is_over: &dyn Fn() -> bool) -> Option<Self> {
+        let ledges = ledges::routes(model, is_over);
+        if ledges.routes.is_empty() {
+            return None;
+        }
+        let mut shapes = Self::find(model, is_over);
+        shapes.add(ledges);
+        Some(shapes)
     }
 
     fn look_over_ground(&mut self, model: &Model, is_over: &dyn Fn() -> bool) {

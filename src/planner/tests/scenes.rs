@@ -3,7 +3,7 @@
 use crate::geometry::{Point2, Point3, Rect};
 use crate::scenario::{AltitudeBand, Frame, PlannerSettings, Scenario, Seeding, Vehicle, Weights};
 use crate::terrain::{Flat, Peak, Peaks, Terrain};
-use crate::threat::{Cylinder, Shape, Threat};
+use crate::threat::{Cylinder, Polygon, Shape, Threat};
 
 /// Mountains, each given as centre x and y, height, width and depth.
 pub(in crate::planner) fn peaks(base: f64, peaks: &[[f64; 5]]) -> Terrain {
@@ -72,18 +72,13 @@ pub(in crate::planner) fn disc([x, y, radius, influence]: [f64; 4]) -> Threat {
     }
 }
 
-/// A wall across the whole area.
-pub(super) fn wall() -> Threat {
-    let corners = [
-        (-100.0, 400.0),
-        (1100.0, 400.0),
-        (1100.0, 450.0),
-        (-100.0, 450.0),
-    ];
+/// A wall that reaches from one x to another, and from one y to another, at all heights.
+pub(in crate::planner) fn wall([west, east]: [f64; 2], [south, north]: [f64; 2]) -> Threat {
+    let corners = [(west, south), (east, south), (east, north), (west, north)];
     let ring = corners.map(|(x, y)| Point2::new(x, y)).to_vec();
     Threat {
         name: None,
-        shape: Shape::Polygon(crate::threat::Polygon::new(ring, 0.0)),
+        shape: Shape::Polygon(Polygon::new(ring, 0.0)),
         base: None,
         top: None,
     }
@@ -140,4 +135,21 @@ pub(in crate::planner) fn scenario() -> Scenario {
             ..PlannerSettings::plain()
         },
     }
+}
+
+/// Walls across the area with gates at alternating ends, and few waypoints to get through them.
+pub(in crate::planner) fn slalom() -> Scenario {
+    let mut scenario = scenario();
+    let at = |x| Point3::new(x, 500.0, 100.0);
+    (scenario.start, scenario.target) = (at(50.0), at(950.0));
+    scenario.threats = vec![
+        wall([300.0, 310.0], [-100.0, 850.0]),
+        wall([500.0, 510.0], [150.0, 1100.0]),
+        wall([700.0, 710.0], [-100.0, 850.0]),
+    ];
+    scenario.vehicle.max_turn_deg = 70.0;
+    scenario.planner.waypoints = 9;
+    scenario.planner.seeding = Seeding::Tangent;
+    scenario.planner.polish = true;
+    scenario
 }

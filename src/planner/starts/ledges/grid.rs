@@ -1,0 +1,242 @@
+//! The shortest way over the grid: by A*, over the ranges of heights at which its cells can be reached.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::ground::{Ground, Range, cells, common, is_empty, wider};
+use crate::geometry::{Point2, Point3};
+
+/// Ranges of heights kept for one cell.
+const RANGES: usize = 4;
+
+/// The ends are joined to the cells within this many steps of the grid.
+const REACH: f64 = 3.0;
+
+/// Cells looked at between two checks whether to stop.
+const UNWATCHED: usize = 1_000;
+
+/// Steps to the cells around: to neighbours, and a knight's move away.
+const STEPS: [[isize; 2]; 16] = [
+    [1, 0],
+    [0, 1],
+    [-1, 0],
+    [0, -1],
+    [1, 1],
+    [-1, 1],
+    [-1, -1],
+    [1, -1],
+    [2, 1],
+    [1, 2],
+    [-1, 2],
+    [-2, 1],
+    [-2, -1],
+    [-1, -2],
+    [1, -2],
+    [2, -1],
+];
+
+/// The heights at which a way from the start can be over a cell.
+struct Reached {
+    cell: [usize; 2],
+    heights: Range,
+    length: f64,
+    before: Option<usize>,
+}
+
+/// A step that is still to be looked at.
+struct Open {
+    least: f64,
+    reached: Reached,
+}
+
+impl PartialEq for Open {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Open {}
+
+impl PartialOrd for Open {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Open {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        let least = self.least.total_cmp(&other.least);
+        least
+            .then(self.reached.cell.cmp(&other.reached.cell))
+            .then(self.reached.before.cmp(&other.reached.before))
+    }
+}
+
+/// A grid between two ends.
+pub(super) struct Grid<'g> {
+    pub(super) ground: &'g Ground,
+    pub(super) ends: [Point3; 2],
+    /// Metres climbed per metre at most.
+    pub(super) climb: f64,
+    /// Metres of the band kept free below and above.
+    pub(super) margin: f64,
+}
+
+impl Grid<'_> {
+    /// The shortest way, if there is one.
+    pub(super) fn shortest(&self, is_over: &dyn Fn() -> bool) -> Option<Vec<Point3>> {
+        let [columns, rows] = self.ground.size;
+        let [start, target] = self.ends;
+        let mut known: Vec<Vec<usize>> = vec![Vec::new(); columns * rows];
+        let mut all: Vec<Reached> = Vec::new();
+        let mut open = BinaryHeap::new();
+        let push = |open: &mut BinaryHeap<_>, reached: Reached| {
+            let least = reached.length + (target.xy() - self.place(reached.cell)).norm();
+            open.push(Reverse(Open { least, reached }));
+        };
+        for cell in self.around(start.xy()) {
+            let length = (self.place(cell) - start.xy()).norm();
+            let heights = common(wider([start.z; 2], length * self.climb), self.allowed(cell));
+            if !is_empty(heights) {
+                push(
+                    &mut open,
+                    Reached {
+                        cell,
+                        heights,
+                        length,
+                        before: None,
+                    },
+                );
+            }
+        }
+        let near_target = self.around(target.xy());
+        while let Some(Reverse(Open { reached, .. })) = open.pop() {
+            let cell = reached.cell;
+            let here = &mut known[cell[1] * columns + cell[0]];
+            let holds = |&other: &usize| {
+                let other = all[other].heights;
+                other[0] <= reached.heights[0] && reached.heights[1] <= other[1]
+            };
+            if here.len() == RANGES || here.iter().any(holds) {
+                continue;
+            }
+            if all.len().is_multiple_of(UNWATCHED) && is_over() {
+                return None;
+            }
+            here.push(all.len());
+            let (heights, length, own) = (reached.heights, reached.length, all.len());
+            all.push(reached);
+            if near_target.contains(&cell) {
+                let away = (target.xy() - self.place(cell)).norm();
+                if !is_empty(common(heights, wider([target.z; 2], away * self.climb))) {
+                    return Some(self.way(&all, own));
+                }
+            }
+            for step in STEPS {
+                let Some((next, halfway, away)) = self.next(cell, step) else {
+                    continue;
+                };
+                let climb = 0.5 * away * self.climb;
+                let middle = common(wider(heights, climb), self.within(halfway));
+                let heights = common(wider(middle, climb), self.allowed(next));
+                if is_empty(middle) || is_empty(heights) {
+                    continue;
+                }
+                let holds = |&other: &usize| {
+                    let other = all[other].heights;
+                    other[0] <= heights[0] && heights[1] <= other[1]
+                };
+                if !known[next[1] * columns + next[0]].iter().any(holds) {
+                    push(
+                        &mut open,
+                        Reached {
+                            cell: next,
+                            heights,
+                            length: length + away,
+                            before: Some(own),
+                        },
+                    );
+                }
+            }
+        }
+        None
+    }
+
+    /// The way that ends with number `last` of `all`: at each place as near to the middle of the band as may be.
+    fn way(&self, all: &[Reached], last: usize) -> Vec<Point3> {
+        let [start, target] = self.ends;
+        let mut way = vec![target];
+        let (mut from, mut halfway) = (last, None);
+        loop {
+            let reached = &all[from];
+            let at = self.place(reached.cell);
+            let after = way[way.len() - 1];
+            let climb = (after.xy() - at).norm() * self.climb;
+            let onward = match halfway {
+                None => wider([after.z; 2], climb),
+                Some(halfway) => {
+                    let middle = common(wider([after.z; 2], 0.5 * climb), self.within(halfway));
+                    wider(middle, 0.5 * climb)
+                }
+            };
+            let [low, high] = common(reached.heights, onward);
+            let [floor, ceiling] = self.allowed(reached.cell);
+            let z = (0.5 * (floor + ceiling)).max(low).min(high);
+            way.push(Point3::new(at.x, at.y, z));
+            let Some(before) = reached.before else {
+                break;
+            };
+            let [one, other] = [all[before].cell, reached.cell];
+            halfway = Some([one[0] + other[0], one[1] + other[1]]);
+            from = before;
+        }
+        way.push(start);
+        way.reverse();
+        way
+    }
+
+    fn place(&self, cell: [usize; 2]) -> Point2 {
+        self.ground.at(2 * cell[0], 2 * cell[1])
+    }
+
+    fn allowed(&self, cell: [usize; 2]) -> Range {
+        self.within([2 * cell[0], 2 * cell[1]])
+    }
+
+    fn within(&self, [column, row]: [usize; 2]) -> Range {
+        wider(self.ground.allowed(column, row), -self.margin)
+    }
+
+    /// The cells near to an end.
+    fn around(&self, at: Point2) -> Vec<[usize; 2]> {
+        let reach = REACH * self.ground.step;
+        let offset = at - self.ground.corner;
+        let about = |metres: f64, count: usize| {
+            let from = cells((metres - reach) / self.ground.step);
+            from..(cells((metres + reach) / self.ground.step) + 1).min(count)
+        };
+        let [columns, rows] = self.ground.size;
+        let mut near = Vec::new();
+        for row in about(offset.y, rows) {
+            for column in about(offset.x, columns) {
+                if (self.place([column, row]) - at).norm() <= reach {
+                    near.push([column, row]);
+                }
+            }
+        }
+        near
+    }
+
+    /// The cell one `step` from `cell`, where halfway to it is, and how far away it is.
+    fn next(&self, cell: [usize; 2], step: [isize; 2]) -> Option<([usize; 2], [usize; 2], f64)> {
+        let [columns, rows] = self.ground.size;
+        let column = cell[0]
+            .checked_add_signed(step[0])
+            .filter(|&column| column < columns)?;
+        let row = cell[1]
+            .checked_add_signed(step[1])
+            .filter(|&row| row < rows)?;
+        let away = self.ground.step * ((step[0] * step[0] + step[1] * step[1]) as f64).sqrt();
+        Some(([column, row], [cell[0] + column, cell[1] + row], away))
+    }
+}

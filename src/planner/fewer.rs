@@ -63,7 +63,7 @@ struct Choice {
     /// How many routes are kept.
     kept: usize,
     /// Whether Newton's method makes each of those tried as good as it gets; otherwise it only brings as many within the
-    /// limits as are kept, which takes a tenth of the time.
+    /// limits as are kept, which takes less time.
     is_thorough: bool,
 }
 

@@ -9,6 +9,7 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use crate::config::Config;
 use crate::http::auth::{Access, Keys, Settings};
 use crate::http::{Hosts, Origins};
+use crate::store::Clock;
 
 /// The keys themselves, in the form of the file.
 const VARIABLE: &str = "NOCTULE_KEYS";
@@ -17,7 +18,7 @@ const VARIABLE: &str = "NOCTULE_KEYS";
 ///
 /// # Errors
 /// When the keys cannot be read, and when there are none although other machines can reach the service.
-pub(super) fn open(config: &Config) -> anyhow::Result<Access> {
+pub(super) fn open(config: &Config, clock: Clock) -> anyhow::Result<Access> {
     let of_environment = match std::env::var(VARIABLE) {
         Ok(text) => Some(text).filter(|text| !text.trim().is_empty()),
         Err(std::env::VarError::NotPresent) => None,
@@ -46,7 +47,7 @@ pub(super) fn open(config: &Config) -> anyhow::Result<Access> {
         streams_per_key: config.http.streams_per_key,
         ..Settings::default()
     };
-    Ok(Access::new(keys, settings))
+    Ok(Access::new(keys, settings, clock))
 }
 
 /// The names that the service answers to. Without keys it is for this machine alone, which excludes pages with other

@@ -28,10 +28,13 @@ pub(super) async fn readyz(
     }
     let health = state.readiness.shared(state.store.health()).await;
     health.map_err(|error| Problem::store_unavailable(&error))?;
-    Ok(state.clock.jump_ms().map_or_else(ok, |jump_ms| {
-        let warning = format!("the clock jumped by {jump_ms} ms and is not believed for now");
-        Json(json!({"status": "ok", "warnings": [warning]})).into_response()
-    }))
+    let jump = |jump_ms| format!("the clock jumped by {jump_ms} ms and is not believed for now");
+    let jumped = state.clock.jump_ms().map(jump);
+    let warnings: Vec<_> = jumped.into_iter().chain(state.store.warning()).collect();
+    if warnings.is_empty() {
+        return Ok(ok());
+    }
+    Ok(Json(json!({"status": "ok", "warnings": warnings})).into_response())
 }
 
 fn ok() -> Response {

@@ -19,7 +19,7 @@ pub fn wall_clock() -> Clock {
 }
 
 /// A clock that is ahead of or behind the elapsed time by more than this has jumped.
-const TOLERANCE_MS: i64 = 60_000;
+pub const TOLERANCE_MS: i64 = 60_000;
 
 /// A clock that has jumped is trusted again once it has run steadily for this long.
 const PROBATION: Duration = Duration::from_secs(60 * 60);

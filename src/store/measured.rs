@@ -172,6 +172,10 @@ impl Store for MeasuredStore {
         self.measured("health", self.store.health()).await
     }
 
+    fn warning(&self) -> Option<String> {
+        self.store.warning()
+    }
+
     async fn close(&self) {
         self.store.close().await;
     }

@@ -14,7 +14,7 @@ mod options;
 pub mod reopening;
 pub mod sqlite;
 
-pub use clock::{Clock, SteadyClock, wall_clock};
+pub use clock::{Clock, SteadyClock, TOLERANCE_MS, wall_clock};
 pub use end::{End, Ending};
 use error::expected;
 pub use error::{StoreError, Trouble};
@@ -207,6 +207,11 @@ pub trait Store: Send + Sync + 'static {
 
     /// Whether the store can take a write now: it makes a small one durable.
     async fn health(&self) -> Result<(), StoreError>;
+
+    /// What an operator should see to, although the store works.
+    fn warning(&self) -> Option<String> {
+        None
+    }
 
     /// Finish pending writes, give back what is still being run here, and release files. Waiting claims and later calls
     /// fail.

@@ -15,6 +15,9 @@ pub struct Options {
     pub queue_limit: u64,
     /// The clock for claims, tombstones and recovery.
     pub clock: Clock,
+    /// Where the store's servers have a clock of their own: how far it may be from this one, milliseconds, before nothing is
+    /// removed for its age any more, since one of them is wrong; `None` for any distance.
+    pub most_apart_ms: Option<i64>,
     /// How long plans are kept.
     pub retention: Retention,
     /// Events kept of each plan; of a longer history the oldest are deleted.
@@ -31,6 +34,7 @@ impl Options {
         Self {
             queue_limit,
             clock: wall_clock(),
+            most_apart_ms: None,
             retention: Retention::default(),
             events_kept: u64::MAX,
             on_lost: Arc::new(|_| {}),

@@ -310,6 +310,10 @@ impl Store for Reopening {
         self.heed(&store, store.health().await)
     }
 
+    fn warning(&self) -> Option<String> {
+        self.store().ok()?.warning()
+    }
+
     async fn close(&self) {
         self.opener.abort();
         if let Ok(store) = self.store() {

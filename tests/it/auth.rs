@@ -1,5 +1,6 @@
 //! Authorization: keys, scopes, plan ownership, tickets, rate limits, streams.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Body;
@@ -8,6 +9,7 @@ use http_body_util::BodyExt as _;
 use noctule::digest::sha256_hex;
 use noctule::http;
 use noctule::http::auth::{Access, Keys, Needs, Scope, Settings};
+use noctule::store::wall_clock;
 use serde_json::Value;
 use tower::ServiceExt as _;
 
@@ -381,7 +383,7 @@ async fn a_ticket_is_valid_on_every_node_with_the_same_keys() {
     let other_key = house().replace(&sha256_hex(b"of rita"), &sha256_hex(b"of rita too"));
     for (keys, status) in [(house(), 200), (other_key, 401)] {
         let keys = Keys::read(&keys).expect("keys");
-        api.state.access = Access::new(Some(keys), Settings::default());
+        api.state.access = Access::new(Some(keys), Settings::default(), wall_clock());
         api.router = http::router(api.state.clone());
         assert_eq!(api.get(&events).await.status, status);
     }
@@ -414,6 +416,29 @@ async fn a_ticket_expires_no_later_than_its_key() {
     let until = ticket.json()["expires_at"].as_str().map(str::to_owned);
     let until: jiff::Timestamp = until.expect("text").parse().expect("a time");
     assert_eq!(until, expires);
+}
+
+/// Not by the machine's clock, which may have jumped.
+#[tokio::test]
+async fn keys_and_tickets_expire_by_the_clock_of_the_service() {
+    let expires = jiff::Timestamp::now() + Duration::from_secs(3_600);
+    let key = entry("amy", "of amy", "plan", &format!("expires = {expires}"));
+    let mut api = Api::with_keys(&key);
+    let plan = submit(&api, "of amy").await;
+    let ticket = send(&api, "of amy", &format!("POST {plan}/tickets")).await;
+    let events = ticket.json()["events"].as_str().expect("text").to_owned();
+    run::complete(&*api.store, Vec::new()).await;
+    for (ahead_ms, status) in [(0, 200), (7_200_000, 401)] {
+        let keys = Keys::read(&key).expect("keys");
+        let clock = Arc::new(move || wall_clock()() + ahead_ms);
+        api.state.access = Access::new(Some(keys), Settings::default(), clock);
+        api.router = http::router(api.state.clone());
+        assert_eq!(
+            send(&api, "of amy", &format!("GET {plan}")).await.status,
+            status
+        );
+        assert_eq!(api.get(&events).await.status, status);
+    }
 }
 
 #[tokio::test]

@@ -12,7 +12,7 @@ use crate::config::{self, Address, Backend, Config};
 use crate::store::jetstream::{JetStreamShelf, JetStreamStore, Settings};
 use crate::store::reopening::{Open, Reopening};
 use crate::store::sqlite::SqliteStore;
-use crate::store::{Clock, OnLost, Options, Retention, Store};
+use crate::store::{Clock, OnLost, Options, Retention, Store, TOLERANCE_MS};
 use crate::telemetry::Instruments;
 use crate::telemetry::metrics::Ended;
 
@@ -79,6 +79,7 @@ fn settings(config: &Config, address: &Address) -> Settings {
 fn options(config: &Config, clock: Clock, instruments: &Arc<Instruments>) -> Options {
     Options {
         clock,
+        most_apart_ms: Some(TOLERANCE_MS),
         on_lost: counted(instruments),
         retention: retention(config.retention),
         events_kept: config.retention.events,

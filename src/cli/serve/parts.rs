@@ -16,9 +16,10 @@ use crate::store::measured::MeasuredStore;
 use crate::store::{self, SteadyClock};
 use crate::telemetry::Instruments;
 
-/// Who may call, and who is notified: the fallible parts of the configuration, read before anything is locked or
+/// Who may call, by which clock, and who is notified: the fallible parts of the configuration, read before anything is locked or
 /// opened.
 pub(super) struct Callers {
+    clock: Arc<SteadyClock>,
     access: Access,
     cors: Origins,
     hosts: Hosts,
@@ -27,10 +28,12 @@ pub(super) struct Callers {
 
 impl Callers {
     pub(super) fn read(config: &Config) -> anyhow::Result<Self> {
-        let access = access::open(config)?;
+        let clock = SteadyClock::following(store::wall_clock());
+        let access = access::open(config, clock.clock())?;
         let cors = Origins::new(&config.cors_origins);
         Ok(Self {
             hosts: access::hosts(config, &access, &cors),
+            clock,
             access,
             cors,
             webhooks: webhooks(&config.webhook)?,
@@ -45,7 +48,13 @@ pub(super) async fn open(
     instruments: Arc<Instruments>,
     phase: watch::Receiver<Phase>,
 ) -> anyhow::Result<Parts> {
-    let clock = SteadyClock::following(store::wall_clock());
+    let Callers {
+        clock,
+        access,
+        cors,
+        hosts,
+        webhooks,
+    } = callers;
     instruments.metrics.began(clock.now_ms());
     // Side by side, for servers that do not answer are waited for twice otherwise.
     let (store, catalogue) = tokio::try_join!(
@@ -53,12 +62,6 @@ pub(super) async fn open(
         datasets::open(config, &instruments),
     )?;
     let rules = planner::rules(config.limits).with_datasets(catalogue.clone());
-    let Callers {
-        access,
-        cors,
-        hosts,
-        webhooks,
-    } = callers;
     Ok(Parts {
         store: Arc::new(MeasuredStore::new(store, instruments.clone())),
         rules: Arc::new(rules),

@@ -41,6 +41,7 @@ use super::params::ticket_of;
 use super::problem::Problem;
 use crate::config;
 use crate::job::{Owner, PlanId};
+use crate::store::Clock;
 use crate::telemetry::spans;
 use rate::{Buckets, Taken};
 use streams::Streams;
@@ -49,15 +50,16 @@ use streams::Streams;
 const EXPIRY_LOOK: Duration = Duration::from_secs(60);
 
 /// The keys in force, and what their holders are using.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Access(Arc<Inner>);
 
-#[derive(Debug)]
 struct Inner {
     keys: watch::Sender<Option<Arc<Keys>>>,
     buckets: Buckets,
     streams: Arc<Streams>,
     settings: Settings,
+    /// Decides whether keys and tickets have expired.
+    clock: Clock,
 }
 
 /// Limits on callers apart from those in their keys.
@@ -99,15 +101,20 @@ impl Unauthorized {
 }
 
 impl Access {
-    /// With these keys; without any, everybody may do everything.
+    /// With these keys, which expire by this clock; without any, everybody may do everything.
     #[must_use]
-    pub fn new(keys: Option<Keys>, settings: Settings) -> Self {
+    pub fn new(keys: Option<Keys>, settings: Settings, clock: Clock) -> Self {
         Self(Arc::new(Inner {
             keys: watch::Sender::new(keys.map(Arc::new)),
             buckets: Buckets::default(),
             streams: Streams::new(settings.streams, settings.streams_per_key),
             settings,
+            clock,
         }))
+    }
+
+    fn now(&self) -> Timestamp {
+        Timestamp::from_millisecond((self.0.clock)()).unwrap_or(Timestamp::MAX)
     }
 
     /// Put these keys in force. Whatever was opened with other keys ends.
@@ -141,7 +148,7 @@ impl Access {
             _ => None,
         };
         let life = self.0.settings.ticket_life;
-        let until = Timestamp::now().checked_add(life).unwrap_or(Timestamp::MAX);
+        let until = self.now().checked_add(life).unwrap_or(Timestamp::MAX);
         let until = key
             .and_then(|key| key.expires)
             .map_or(until, |end| end.min(until));
@@ -165,7 +172,7 @@ impl Access {
     async fn withdrawn_from(&self, key: Digest, scope: Scope) {
         let mut keys = self.0.keys.subscribe();
         loop {
-            let now = Timestamp::now();
+            let now = self.now();
             let holds = keys.borrow_and_update().as_ref().is_some_and(|keys| {
                 let key = keys.with_digest(&key);
                 key.is_some_and(|key| !key.has_expired(now) && key.may(scope))
@@ -192,7 +199,7 @@ impl Access {
             Needs::Ticket if !headers.contains_key(header::AUTHORIZATION) => ticket_of(uri),
             _ => None,
         };
-        let now = Timestamp::now();
+        let now = self.now();
         let key = match (ticket, keys.as_deref()) {
             (Some((ticket, plan)), keys) => {
                 let plan = plan.ok_or(Unauthorized::NoTicket)?;

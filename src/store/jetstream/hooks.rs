@@ -70,9 +70,23 @@ impl JetStream {
                 self.telling().insert(id);
                 Ok(true)
             }
-            Err(error) if error.kind() == CreateErrorKind::AlreadyExists => Ok(false),
+            Err(error) if error.kind() == CreateErrorKind::AlreadyExists => {
+                self.has_right_to_tell(id).await
+            }
             Err(error) => Err(failed(&format!("webhook of plan {id}"), &error)),
         }
+    }
+
+    /// Whether the right to send this webhook that somebody has is this node's: its taking may not have been acknowledged.
+    async fn has_right_to_tell(&self, id: PlanId) -> Result<bool, StoreError> {
+        let entry = self.servers.tellers.get(id.to_string()).await;
+        let entry = entry.map_err(|error| failed(&format!("webhook of plan {id}"), &error))?;
+        let own = self.node.to_string();
+        let is_own = entry.is_some_and(|teller| teller == own.as_bytes());
+        if is_own {
+            self.telling().insert(id);
+        }
+        Ok(is_own)
     }
 
     pub(super) async fn webhook_tried(

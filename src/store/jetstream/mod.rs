@@ -40,7 +40,7 @@ mod view;
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
-use std::sync::atomic::AtomicUsize;
+use std::sync::atomic::{AtomicI64, AtomicUsize};
 use std::time::Duration;
 
 use async_nats::jetstream::consumer::PullConsumer;
@@ -107,6 +107,8 @@ struct JetStream {
     strays: Mutex<Strays>,
     asking: Asking,
     all_slots: AtomicUsize,
+    /// How far this node's clock is ahead of the servers', milliseconds.
+    ahead_ms: AtomicI64,
     /// Plans whose webhooks this node is sending.
     telling: Mutex<BTreeSet<PlanId>>,
     /// Becomes true when the store is closed.
@@ -148,11 +150,13 @@ impl JetStreamStore {
             round: Mutex::default(),
             strays: Mutex::default(),
             asking: Asking::default(),
+            ahead_ms: AtomicI64::default(),
             telling: Mutex::default(),
             end: watch::Sender::new(false),
             vanished: watch::Sender::new(false),
         });
         store.servers.outlast(|| store.announce()).await?;
+        store.servers.outlast(|| store.compare_clocks()).await?;
         let (read, mut reading) = watch::channel(Reading::Catching { read: 0 });
         let opened = Self {
             tasks: vec![
@@ -328,6 +332,13 @@ impl Store for JetStreamStore {
             ));
         }
         Ok(())
+    }
+
+    fn warning(&self) -> Option<String> {
+        let ahead_ms = self.store.apart_ms()?;
+        Some(format!(
+            "the clock is {ahead_ms} ms ahead of the NATS servers', and nothing is removed for its age"
+        ))
     }
 
     async fn close(&self) {

@@ -51,8 +51,40 @@ impl JetStream {
             }
             if let Err(error) = self.announce().await {
                 tracing::debug!(%error, "this node was not announced");
+            } else if let Err(error) = self.compare_clocks().await {
+                tracing::debug!(%error, "the clock was not compared with the servers'");
             }
         }
+    }
+
+    /// Compare this node's clock with the time at which the servers wrote its announcement, just now.
+    pub(super) async fn compare_clocks(&self) -> Result<(), StoreError> {
+        let now_ms = (self.options.clock)();
+        let entry = self.servers.nodes.entry(self.node.to_string()).await;
+        let Some(entry) = entry.map_err(|error| failed("this node", &error))? else {
+            return Ok(());
+        };
+        let written_ms = entry.created.unix_timestamp_nanos() / 1_000_000;
+        let written_ms = i64::try_from(written_ms).unwrap_or(i64::MAX);
+        let was_apart = self.apart_ms().is_some();
+        let ahead_ms = now_ms.saturating_sub(written_ms);
+        self.ahead_ms.store(ahead_ms, Ordering::Relaxed);
+        match (was_apart, self.apart_ms().is_some()) {
+            (false, true) => tracing::warn!(
+                ahead_ms,
+                "the clock is not that of the servers; nothing is removed for its age"
+            ),
+            (true, false) => tracing::info!(ahead_ms, "the clock is that of the servers again"),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// How far this node's clock is ahead of the servers', while that is further than allowed.
+    pub(super) fn apart_ms(&self) -> Option<i64> {
+        let ahead_ms = self.ahead_ms.load(Ordering::Relaxed);
+        let most = self.options.most_apart_ms?;
+        (ahead_ms.saturating_abs() > most).then_some(ahead_ms)
     }
 
     fn next_announcement(&self) -> Duration {

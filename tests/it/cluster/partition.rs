@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use noctule::job::{Event, Status};
 use noctule::store::jetstream::JetStreamStore;
-use noctule::store::{Options, Store, wall_clock};
+use noctule::store::{Options, Retention, Store, wall_clock};
 
 use super::open;
 use crate::support::nats::{self, NatsServer, namespace};
@@ -91,4 +91,48 @@ async fn a_wrong_clock_never_takes_over_a_run() {
         until(&**accepting, id, |plan| plan.status == Status::Succeeded).await;
         assert_eq!(history(&**accepting, id).await.len(), 4);
     }
+}
+
+/// A clock that is a day fast would expire the plans of all nodes, and forget what was deleted.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_wrong_clock_removes_nothing_for_its_age() {
+    const DAY_MS: i64 = 24 * 60 * 60 * 1_000;
+    let address = nats::address();
+    let options = |ahead_ms: i64, plans| Options {
+        clock: Arc::new(move || wall_clock()() + ahead_ms),
+        most_apart_ms: Some(60_000),
+        retention: Retention {
+            age_ms: Some(DAY_MS),
+            plans: Some(plans),
+            bytes: None,
+        },
+        ..Options::new(1_000)
+    };
+    let right = JetStreamStore::open(node(&address), options(0, 100)).await;
+    let right = right.unwrap();
+    assert_eq!(right.warning(), None);
+    let now_ms = wall_clock()();
+    let mut ended = Vec::new();
+    for _ in 0..3 {
+        let id = right.submit(submission()).await.unwrap().plan.id;
+        right.request_cancel(id, now_ms).await.unwrap();
+        ended.push(id);
+    }
+    let deleted = ended.pop().unwrap();
+    right.delete(deleted, now_ms).await.unwrap();
+
+    for ahead_ms in [2 * DAY_MS, -2 * DAY_MS] {
+        let wrong = JetStreamStore::open(node(&address), options(ahead_ms, 100)).await;
+        let wrong = wrong.unwrap();
+        let warning = wrong.warning().unwrap();
+        assert!(warning.contains("ahead of the NATS servers'"), "{warning}");
+        assert_eq!(wrong.sweep(now_ms + ahead_ms).await.unwrap(), 0);
+        for id in &ended {
+            assert!(right.get(*id).await.is_ok());
+        }
+        assert_eq!(kind(right.get(deleted).await), Err("gone"));
+    }
+    // What is too many goes whatever the time.
+    let wrong = JetStreamStore::open(node(&address), options(2 * DAY_MS, 1)).await;
+    assert_eq!(wrong.unwrap().sweep(now_ms + 2 * DAY_MS).await.unwrap(), 1);
 }

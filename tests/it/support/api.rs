@@ -58,7 +58,11 @@ impl Api {
 
     /// Over a store with these options.
     pub(crate) fn with_store(options: Options) -> Self {
-        Self::made(options, Access::new(None, Settings::default()), &[])
+        Self::made(
+            options,
+            Access::new(None, Settings::default(), wall_clock()),
+            &[],
+        )
     }
 
     /// Over a store of the given kind.
@@ -66,7 +70,7 @@ impl Api {
         let place = Place::new(backend);
         let queue = options.queue_limit;
         let store = place.open(options).await.expect("a fresh store");
-        let access = Access::new(None, Settings::default());
+        let access = Access::new(None, Settings::default(), wall_clock());
         Self::over(store, place, queue, access, &[])
     }
 
@@ -94,12 +98,16 @@ impl Api {
     /// The same with other access settings.
     pub(crate) fn with_access(keys: &str, settings: Settings) -> Self {
         let keys = Keys::read(keys).expect("keys");
-        Self::made(Options::new(1000), Access::new(Some(keys), settings), &[])
+        Self::made(
+            Options::new(1000),
+            Access::new(Some(keys), settings, wall_clock()),
+            &[],
+        )
     }
 
     /// Open to pages of these origins.
     pub(crate) fn with_origins(origins: &[&str]) -> Self {
-        let access = Access::new(None, Settings::default());
+        let access = Access::new(None, Settings::default(), wall_clock());
         Self::made(Options::new(1000), access, origins)
     }
 

@@ -188,6 +188,10 @@ impl Store for FaultyStore {
         self.sound.health().await
     }
 
+    fn warning(&self) -> Option<String> {
+        self.sound.warning()
+    }
+
     async fn close(&self) {
         self.sound.close().await;
     }

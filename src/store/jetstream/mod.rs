@@ -337,7 +337,7 @@ impl Store for JetStreamStore {
     fn warning(&self) -> Option<String> {
         let ahead_ms = self.store.apart_ms()?;
         Some(format!(
-            "the clock is {ahead_ms} ms ahead of the NATS servers', and nothing is removed for its age"
+            "the clock is {ahead_ms} ms from that of the NATS servers, and nothing is removed for its age"
         ))
     }
 

@@ -16,8 +16,8 @@ use crate::store::measured::MeasuredStore;
 use crate::store::{self, SteadyClock};
 use crate::telemetry::Instruments;
 
-/// Who may call, by which clock, and who is notified: the fallible parts of the configuration, read before anything is locked or
-/// opened.
+/// Who may call, by which clock, and who is notified: the fallible parts of the configuration, read before anything is
+/// locked or opened.
 pub(super) struct Callers {
     clock: Arc<SteadyClock>,
     access: Access,

@@ -66,24 +66,23 @@ pub(super) struct Starts {
 
 /// Where the search of `model` starts; `None` for the algorithm alone.
 pub(super) fn routes(model: &Model, stop: &dyn Stop) -> Option<Starts> {
-    from(model, |is_over| Shapes::find(model, is_over), stop)
+    from(Shapes::find, model, stop)
 }
 
 /// As [`routes`], where a search from those has found no route that keeps every limit: along ledges too; `None` where
 /// there are none.
 pub(super) fn along_ledges(model: &Model, stop: &dyn Stop) -> Option<Starts> {
-    let shapes = |is_over: &dyn Fn() -> bool| Shapes::find_with_ledges(model, is_over);
-    from(model, |is_over| shapes(is_over).unwrap_or_default(), stop)
+    from(Shapes::find_with_ledges, model, stop)
 }
 
 fn from(
+    find: impl Fn(&Model, &dyn Fn() -> bool) -> Shapes,
     model: &Model,
-    shapes: impl Fn(&dyn Fn() -> bool) -> Shapes,
     stop: &dyn Stop,
 ) -> Option<Starts> {
     let settings = &model.scenario.planner;
     let is_over = || why_stop(model.scenario, stop).is_some();
-    let shapes = shapes(&is_over);
+    let shapes = find(model, &is_over);
     if shapes.routes.is_empty() {
         return None;
     }

@@ -84,15 +84,15 @@ impl Shapes {
         shapes
     }
 
-    /// As [`Shapes::find`], with those along ledges; `None` where there are none.
-    pub(super) fn find_with_ledges(model: &Model, is_over: &dyn Fn() -> bool) -> Option<Self> {
+    /// As [`Shapes::find`], with those along ledges; nothing where there are none.
+    pub(super) fn find_with_ledges(model: &Model, is_over: &dyn Fn() -> bool) -> Self {
         let ledges = ledges::routes(model, is_over);
         if ledges.routes.is_empty() {
-            return None;
+            return Self::default();
         }
         let mut shapes = Self::find(model, is_over);
         shapes.add(ledges);
-        Some(shapes)
+        shapes
     }
 
     fn look_over_ground(&mut self, model: &Model, is_over: &dyn Fn() -> bool) {

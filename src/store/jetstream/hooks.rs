@@ -39,22 +39,26 @@ impl JetStream {
             }
             if self.telling().contains(&id) {
                 taken.push(webhook);
-            } else if self.may_tell(id).await? {
-                // What is taken here is sent by no other node, but one may have sent it just before.
-                let newest = match self.plans().look_up(id).await {
-                    Err(StoreError::NotFound(_)) => Ok(None),
-                    newest => newest.map(|newest| due_of(&newest, now_ms)),
-                };
-                match newest {
-                    Ok(Some(webhook)) => taken.push(webhook),
-                    nothing => {
-                        self.let_tell(id).await;
-                        nothing?;
-                    }
-                }
+            } else {
+                taken.extend(self.take(id, now_ms).await?);
             }
         }
         Ok(taken)
+    }
+
+    /// A webhook that from now on no other node sends; `None` where one has the right to, or has sent it just before.
+    async fn take(&self, id: PlanId, now_ms: i64) -> Result<Option<Webhook>, StoreError> {
+        if !self.may_tell(id).await? {
+            return Ok(None);
+        }
+        let due = match self.plans().look_up(id).await {
+            Err(StoreError::NotFound(_)) => Ok(None),
+            newest => newest.map(|newest| due_of(&newest, now_ms)),
+        };
+        if !matches!(due, Ok(Some(_))) {
+            self.let_tell(id).await;
+        }
+        due
     }
 
     /// Take the right to send this webhook, unless another node has it; for two minutes no other gets it.

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::ground::{Ground, Range, cells, common, is_empty, wider};
+use super::ground::{Ground, Range, cells, common, holds, is_empty, wider};
 use crate::geometry::{Point2, Point3};
 
 /// Ranges of heights kept for one cell.
@@ -36,6 +36,7 @@ const STEPS: [[isize; 2]; 16] = [
 ];
 
 /// The heights at which a way from the start can be over a cell.
+#[derive(Clone, Copy)]
 struct Reached {
     cell: [usize; 2],
     heights: Range,
@@ -43,34 +44,9 @@ struct Reached {
     before: Option<usize>,
 }
 
-/// A step that is still to be looked at.
-struct Open {
-    least: f64,
-    reached: Reached,
-}
-
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Open {}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        let least = self.least.total_cmp(&other.least);
-        least
-            .then(self.reached.cell.cmp(&other.reached.cell))
-            .then(self.reached.before.cmp(&other.reached.before))
-    }
-}
+/// What is still to be looked at, by the least length of a way over it and its number among all that was reached.
+/// Lengths are never negative, so their bits sort like them.
+type Open = BinaryHeap<Reverse<(u64, usize)>>;
 
 /// A grid between two ends.
 pub(super) struct Grid<'g> {
@@ -87,45 +63,46 @@ impl Grid<'_> {
     pub(super) fn shortest(&self, is_over: &dyn Fn() -> bool) -> Option<Vec<Point3>> {
         let [columns, rows] = self.ground.size;
         let [start, target] = self.ends;
-        let mut known: Vec<Vec<usize>> = vec![Vec::new(); columns * rows];
         let mut all: Vec<Reached> = Vec::new();
-        let mut open = BinaryHeap::new();
-        let push = |open: &mut BinaryHeap<_>, reached: Reached| {
+        let mut open = Open::new();
+        let push = |all: &mut Vec<Reached>, open: &mut Open, reached: Reached| {
             let least = reached.length + (target.xy() - self.place(reached.cell)).norm();
-            open.push(Reverse(Open { least, reached }));
+            open.push(Reverse((least.to_bits(), all.len())));
+            all.push(reached);
         };
         for cell in self.around(start.xy()) {
             let length = (self.place(cell) - start.xy()).norm();
             let heights = common(wider([start.z; 2], length * self.climb), self.allowed(cell));
             if !is_empty(heights) {
-                push(
-                    &mut open,
-                    Reached {
-                        cell,
-                        heights,
-                        length,
-                        before: None,
-                    },
-                );
+                let reached = Reached {
+                    cell,
+                    heights,
+                    length,
+                    before: None,
+                };
+                push(&mut all, &mut open, reached);
             }
         }
         let near_target = self.around(target.xy());
-        while let Some(Reverse(Open { reached, .. })) = open.pop() {
-            let cell = reached.cell;
+        let mut known: Vec<Vec<Range>> = vec![Vec::new(); columns * rows];
+        let is_known = |known: &[Range], heights| known.iter().any(|&other| holds(other, heights));
+        let mut looked_at = 0;
+        while let Some(Reverse((_, own))) = open.pop() {
+            let Reached {
+                cell,
+                heights,
+                length,
+                ..
+            } = all[own];
             let here = &mut known[cell[1] * columns + cell[0]];
-            let holds = |&other: &usize| {
-                let other = all[other].heights;
-                other[0] <= reached.heights[0] && reached.heights[1] <= other[1]
-            };
-            if here.len() == RANGES || here.iter().any(holds) {
+            if here.len() == RANGES || is_known(here, heights) {
                 continue;
             }
-            if all.len().is_multiple_of(UNWATCHED) && is_over() {
+            here.push(heights);
+            looked_at += 1;
+            if looked_at % UNWATCHED == 0 && is_over() {
                 return None;
             }
-            here.push(all.len());
-            let (heights, length, own) = (reached.heights, reached.length, all.len());
-            all.push(reached);
             if near_target.contains(&cell) {
                 let away = (target.xy() - self.place(cell)).norm();
                 if !is_empty(common(heights, wider([target.z; 2], away * self.climb))) {
@@ -139,24 +116,19 @@ impl Grid<'_> {
                 let climb = 0.5 * away * self.climb;
                 let middle = common(wider(heights, climb), self.within(halfway));
                 let heights = common(wider(middle, climb), self.allowed(next));
-                if is_empty(middle) || is_empty(heights) {
+                if is_empty(middle)
+                    || is_empty(heights)
+                    || is_known(&known[next[1] * columns + next[0]], heights)
+                {
                     continue;
                 }
-                let holds = |&other: &usize| {
-                    let other = all[other].heights;
-                    other[0] <= heights[0] && heights[1] <= other[1]
+                let reached = Reached {
+                    cell: next,
+                    heights,
+                    length: length + away,
+                    before: Some(own),
                 };
-                if !known[next[1] * columns + next[0]].iter().any(holds) {
-                    push(
-                        &mut open,
-                        Reached {
-                            cell: next,
-                            heights,
-                            length: length + away,
-                            before: Some(own),
-                        },
-                    );
-                }
+                push(&mut all, &mut open, reached);
             }
         }
         None

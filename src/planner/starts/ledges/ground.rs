@@ -27,6 +27,11 @@ pub(super) fn is_empty(range: Range) -> bool {
     range[0] > range[1]
 }
 
+/// Whether all of `inner` is within `outer`.
+pub(super) fn holds(outer: Range, inner: Range) -> bool {
+    outer[0] <= inner[0] && inner[1] <= outer[1]
+}
+
 pub(super) fn wider(range: Range, by: f64) -> Range {
     [range[0] - by, range[1] + by]
 }

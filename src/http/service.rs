@@ -28,9 +28,8 @@ pub(super) async fn readyz(
     }
     let health = state.readiness.shared(state.store.health()).await;
     health.map_err(|error| Problem::store_unavailable(&error))?;
-    let jump = |jump_ms| format!("the clock jumped by {jump_ms} ms and is not believed for now");
-    let jumped = state.clock.jump_ms().map(jump);
-    let warnings: Vec<_> = jumped.into_iter().chain(state.store.warning()).collect();
+    let warnings = [state.clock.warning(), state.store.warning()];
+    let warnings: Vec<_> = warnings.into_iter().flatten().collect();
     if warnings.is_empty() {
         return Ok(ok());
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::clock::{Clock, wall_clock};
+use super::clock::{Clock, SteadyClock, wall_clock};
 use crate::job::Plan;
 
 /// Called with a plan in its present state.
@@ -15,6 +15,9 @@ pub struct Options {
     pub queue_limit: u64,
     /// The clock for claims, tombstones and recovery.
     pub clock: Clock,
+    /// What `clock` is, if it is in doubt at times: an opened store tells it how far its records reach, and keeps what it
+    /// would expire meanwhile.
+    pub steady: Option<Arc<SteadyClock>>,
     /// Where the store's servers have a clock of their own: how far it may be from this one, milliseconds, before nothing is
     /// removed for its age any more, since one of them is wrong; `None` for any distance.
     pub most_apart_ms: Option<i64>,
@@ -34,11 +37,28 @@ impl Options {
         Self {
             queue_limit,
             clock: wall_clock(),
+            steady: None,
             most_apart_ms: None,
             retention: Retention::default(),
             events_kept: u64::MAX,
             on_lost: Arc::new(|_| {}),
         }
+    }
+
+    /// On a clock that is not believed whatever it shows.
+    #[must_use]
+    pub fn by(self, clock: &Arc<SteadyClock>) -> Self {
+        Self {
+            clock: clock.clock(),
+            steady: Some(Arc::clone(clock)),
+            ..self
+        }
+    }
+
+    /// By what time things expire when it is `now_ms`.
+    pub(super) fn expiry_ms(&self, now_ms: i64) -> i64 {
+        let reached_ms = self.steady.as_ref().and_then(|clock| clock.reached_ms());
+        reached_ms.map_or(now_ms, |reached_ms| reached_ms.min(now_ms))
     }
 }
 

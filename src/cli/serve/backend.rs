@@ -12,7 +12,7 @@ use crate::config::{self, Address, Backend, Config};
 use crate::store::jetstream::{JetStreamShelf, JetStreamStore, Settings};
 use crate::store::reopening::{Open, Reopening};
 use crate::store::sqlite::SqliteStore;
-use crate::store::{Clock, OnLost, Options, Retention, Store, TOLERANCE_MS};
+use crate::store::{OnLost, Options, Retention, SteadyClock, Store, TOLERANCE_MS};
 use crate::telemetry::Instruments;
 use crate::telemetry::metrics::Ended;
 
@@ -22,7 +22,7 @@ use crate::telemetry::metrics::Ended;
 /// When the configuration names none.
 pub(super) async fn open(
     config: &Config,
-    clock: Clock,
+    clock: &Arc<SteadyClock>,
     instruments: &Arc<Instruments>,
 ) -> anyhow::Result<Arc<dyn Store>> {
     let options = options(config, clock, instruments);
@@ -76,14 +76,13 @@ fn settings(config: &Config, address: &Address) -> Settings {
     }
 }
 
-fn options(config: &Config, clock: Clock, instruments: &Arc<Instruments>) -> Options {
+fn options(config: &Config, clock: &Arc<SteadyClock>, instruments: &Arc<Instruments>) -> Options {
     Options {
-        clock,
         most_apart_ms: Some(TOLERANCE_MS),
         on_lost: counted(instruments),
         retention: retention(config.retention),
         events_kept: config.retention.events,
-        ..Options::new(config.queue as u64)
+        ..Options::new(config.queue as u64).by(clock)
     }
 }
 

@@ -58,7 +58,7 @@ pub(super) async fn open(
     instruments.metrics.began(clock.now_ms());
     // Side by side, for servers that do not answer are waited for twice otherwise.
     let (store, catalogue) = tokio::try_join!(
-        backend::open(config, clock.clock(), &instruments),
+        backend::open(config, &clock, &instruments),
         datasets::open(config, &instruments),
     )?;
     let rules = planner::rules(config.limits).with_datasets(catalogue.clone());

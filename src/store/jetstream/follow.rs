@@ -224,7 +224,7 @@ impl JetStream {
             // Steps that are removed just now never come.
             let Ok(next) = timeout(PATIENCE, steps.messages.next()).await else {
                 let standing = self.plans().look_up(id).await?;
-                standing.record(id, (self.options.clock)())?;
+                standing.record(id, self.expiry_ms())?;
                 return Err(refused(&what, "none came for a while"));
             };
             let Some(message) = next else { break };

@@ -386,6 +386,16 @@ impl Known {
         going
     }
 
+    /// The newest time that anything bears, milliseconds since 1970; `None` when there is nothing.
+    pub(super) fn newest_ms(&self) -> Option<i64> {
+        let accepted_last = self.plans.keys().next_back().and_then(|&id| self.kept(id));
+        let of = |times: &BTreeSet<(i64, PlanId)>| times.last().map(|&(ms, _)| ms);
+        accepted_last
+            .map(|record| record.plan.created_ms)
+            .max(of(&self.ended))
+            .max(of(&self.graves))
+    }
+
     /// Tombstones that have expired.
     pub(super) fn expired_tombstones(&self, now_ms: i64, at_most: usize) -> Vec<PlanId> {
         let until = (now_ms.saturating_sub(TOMBSTONE_MS), PlanId::max());

@@ -156,7 +156,6 @@ impl JetStreamStore {
             vanished: watch::Sender::new(false),
         });
         store.servers.outlast(|| store.announce()).await?;
-        store.servers.outlast(|| store.compare_clocks()).await?;
         let (read, mut reading) = watch::channel(Reading::Catching { read: 0 });
         let opened = Self {
             tasks: vec![
@@ -174,6 +173,7 @@ impl JetStreamStore {
                 ));
             }
         }
+        opened.store.judge_clock().await?;
         Ok(opened)
     }
 

@@ -57,6 +57,16 @@ impl JetStream {
         }
     }
 
+    /// See how far this node's clock is to be relied on, once the plans are known.
+    pub(super) async fn judge_clock(&self) -> Result<(), StoreError> {
+        if let Some(clock) = &self.options.steady
+            && let Some(newest_ms) = self.view.known().newest_ms()
+        {
+            clock.has_seen(newest_ms);
+        }
+        self.servers.outlast(|| self.compare_clocks()).await
+    }
+
     /// Compare this node's clock with the time at which the servers wrote its announcement, just now.
     pub(super) async fn compare_clocks(&self) -> Result<(), StoreError> {
         let now_ms = (self.options.clock)();
@@ -85,6 +95,20 @@ impl JetStream {
         let ahead_ms = self.ahead_ms.load(Ordering::Relaxed);
         let most = self.options.most_apart_ms?;
         (ahead_ms.saturating_abs() > most).then_some(ahead_ms)
+    }
+
+    /// The time by which things expire when it is `now_ms` here: none does by a clock that may be wrong.
+    pub(super) fn expiry_ms_at(&self, now_ms: i64) -> i64 {
+        if self.apart_ms().is_some() {
+            i64::MIN
+        } else {
+            now_ms
+        }
+    }
+
+    /// The time by which things expire now.
+    pub(super) fn expiry_ms(&self) -> i64 {
+        self.expiry_ms_at((self.options.clock)())
     }
 
     fn next_announcement(&self) -> Duration {

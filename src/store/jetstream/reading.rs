@@ -37,19 +37,19 @@ impl Default for Asking {
 impl JetStream {
     pub(super) async fn get(&self, id: PlanId) -> Result<Plan, StoreError> {
         let standing = self.present(id).await?;
-        let record = standing.record(id, (self.options.clock)())?;
+        let record = standing.record(id, self.expiry_ms())?;
         Ok(self.view.known().shown(record))
     }
 
     pub(super) async fn scenario(&self, id: PlanId) -> Result<String, StoreError> {
         let standing = self.plans().standing(id).await?;
-        let record = standing.record(id, (self.options.clock)())?;
+        let record = standing.record(id, self.expiry_ms())?;
         self.read_document(id, &record.scenario).await
     }
 
     pub(super) async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError> {
         let standing = self.present(id).await?;
-        match &standing.record(id, (self.options.clock)())?.result {
+        match &standing.record(id, self.expiry_ms())?.result {
             Some(result) => self.read_document(id, result).await.map(Some),
             None => Ok(None),
         }
@@ -57,7 +57,7 @@ impl JetStream {
 
     pub(super) async fn incumbent(&self, id: PlanId) -> Result<Option<Incumbent>, StoreError> {
         let standing = self.plans().standing(id).await?;
-        let record = standing.record(id, (self.options.clock)())?;
+        let record = standing.record(id, self.expiry_ms())?;
         if !record.is_run_under(record.attempt) {
             return Ok(None);
         }
@@ -74,7 +74,7 @@ impl JetStream {
         limit: usize,
     ) -> Result<EventPage, StoreError> {
         let standing = self.plans().standing(id).await?;
-        standing.record(id, (self.options.clock)())?;
+        standing.record(id, self.expiry_ms())?;
         if let Some(page) = self.view.known().histories.page(id, after, limit) {
             return Ok(page);
         }
@@ -84,7 +84,7 @@ impl JetStream {
     /// Where it is not known here, the servers decide: who is told wrongly that there is no such event reads all again.
     pub(super) async fn has_event(&self, id: PlanId, event: u64) -> Result<bool, StoreError> {
         let has_come_so_far = |standing: &Standing| -> Result<bool, StoreError> {
-            let record = standing.record(id, (self.options.clock)())?;
+            let record = standing.record(id, self.expiry_ms())?;
             Ok(event <= record.last_event)
         };
         let plans = self.plans();
@@ -123,7 +123,7 @@ impl JetStream {
         }
         // It goes with its plan, which may have been removed meanwhile.
         let standing = self.plans().look_up(id).await?;
-        standing.record(id, (self.options.clock)())?;
+        standing.record(id, self.expiry_ms())?;
         Err(document.missing())
     }
 }

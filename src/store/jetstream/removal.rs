@@ -73,7 +73,7 @@ impl JetStream {
         let standing = self
             .plans()
             .change(id, |standing| {
-                let record = standing.record(id, now_ms)?;
+                let record = standing.record(id, self.expiry_ms_at(now_ms))?;
                 expected(&record.plan, revision)?;
                 let objects = record.objects();
                 remains = Remains {
@@ -141,13 +141,12 @@ impl JetStream {
 
     pub(super) async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError> {
         // A wrong clock would remove what all nodes have; what is beyond the limits may go whatever the time.
-        let is_doubtful = self.apart_ms().is_some();
-        let expire_ms = if is_doubtful { i64::MIN } else { now_ms };
-        let expired = self.view.known().expired_tombstones(expire_ms, SWEEP);
+        let expiry_ms = self.expiry_ms_at(now_ms);
+        let expired = self.view.known().expired_tombstones(expiry_ms, SWEEP);
         for id in expired {
             self.forget_tombstone(id).await?;
         }
-        let removed = self.remove_expired(expire_ms, now_ms).await?;
+        let removed = self.remove_expired(expiry_ms, now_ms).await?;
         if let Err(error) = self.restore_jobs(now_ms).await {
             tracing::debug!(%error, "missing jobs were not looked for; trying again");
         }
@@ -159,10 +158,10 @@ impl JetStream {
 
     /// Remove plans that nobody has removed yet, as many as a sweep may. Other nodes remove the same plans meanwhile;
     /// those do not count, or a crowd of nodes would remove no more than one.
-    async fn remove_expired(&self, expire_ms: i64, now_ms: i64) -> Result<usize, StoreError> {
+    async fn remove_expired(&self, expiry_ms: i64, now_ms: i64) -> Result<usize, StoreError> {
         let mut removed = 0;
         loop {
-            let round = self.remove_some(expire_ms, now_ms, SWEEP - removed).await?;
+            let round = self.remove_some(expiry_ms, now_ms, SWEEP - removed).await?;
             removed += round.removed;
             if removed >= SWEEP || round.outrun == 0 {
                 return Ok(removed);
@@ -170,10 +169,10 @@ impl JetStream {
         }
     }
 
-    /// Those that have expired at `expire_ms` and those beyond the limits, removed at `now_ms`.
+    /// Those that have expired at `expiry_ms` and those beyond the limits, removed at `now_ms`.
     async fn remove_some(
         &self,
-        expire_ms: i64,
+        expiry_ms: i64,
         now_ms: i64,
         at_most: usize,
     ) -> Result<Round, StoreError> {
@@ -183,7 +182,7 @@ impl JetStream {
         let mut going = self
             .view
             .known()
-            .removable(expire_ms, plans, bytes, at_most);
+            .removable(expiry_ms, plans, bytes, at_most);
         // Each node in an order of its own, so that they seldom meet.
         going.sort_by_key(|id| id.as_u128() ^ self.node.as_u128());
         let mut round = Round::default();

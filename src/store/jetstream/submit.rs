@@ -46,10 +46,10 @@ impl First {
     fn read(
         entry: &Entry,
         idempotency: &Idempotency,
-        now_ms: i64,
+        expiry_ms: i64,
     ) -> Result<Option<Self>, StoreError> {
         let first: Self = serde_json::from_slice(&entry.value).map_err(|error| unread(&error))?;
-        if first.seen_ms <= now_ms.saturating_sub(IDEMPOTENCY_MS) {
+        if first.seen_ms <= expiry_ms.saturating_sub(IDEMPOTENCY_MS) {
             return Ok(None);
         }
         if first.body_sha256 != idempotency.body_sha256 {
@@ -79,8 +79,7 @@ impl JetStream {
         let Some(entry) = entry.filter(|entry| entry.operation == Operation::Put) else {
             return Ok(None);
         };
-        let now_ms = (self.options.clock)();
-        let Some(first) = First::read(&entry, idempotency, now_ms)? else {
+        let Some(first) = First::read(&entry, idempotency, self.expiry_ms())? else {
             return Ok(None);
         };
         match self.get(first.plan).await {
@@ -262,7 +261,7 @@ impl JetStream {
             let Some(entry) = entry.filter(|entry| entry.operation == Operation::Put) else {
                 continue;
             };
-            if let Some(first) = First::read(&entry, idempotency, now_ms)? {
+            if let Some(first) = First::read(&entry, idempotency, self.expiry_ms())? {
                 if first.plan == submission.id {
                     // It was claimed earlier, but the answer was lost.
                     let revision = entry.revision;

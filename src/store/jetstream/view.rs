@@ -115,10 +115,10 @@ impl Standing {
     ///
     /// # Errors
     /// [`StoreError::Gone`], [`StoreError::NotFound`].
-    pub(super) fn record(&self, id: PlanId, now_ms: i64) -> Result<&Record, StoreError> {
+    pub(super) fn record(&self, id: PlanId, expiry_ms: i64) -> Result<&Record, StoreError> {
         match &*self.state {
             State::Kept(record) => Ok(record),
-            State::Buried(grave) if now_ms.saturating_sub(grave.deleted_ms) < TOMBSTONE_MS => {
+            State::Buried(grave) if expiry_ms.saturating_sub(grave.deleted_ms) < TOMBSTONE_MS => {
                 Err(StoreError::Gone(grave.tombstone(id)))
             }
             State::Buried(_) => Err(StoreError::NotFound(id)),

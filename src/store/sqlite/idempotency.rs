@@ -12,7 +12,7 @@ pub(super) fn earlier(
     connection: &Connection,
     owner: Option<&Owner>,
     idempotency: &Idempotency,
-    now_ms: i64,
+    expiry_ms: i64,
 ) -> Result<Option<Plan>, StoreError> {
     let seen: Option<(String, String)> = connection
         .prepare_cached(
@@ -20,7 +20,7 @@ pub(super) fn earlier(
              WHERE owner = ?1 AND key = ?2 AND seen_ms > ?3",
         )?
         .query_row(
-            params![named(owner), idempotency.key, oldest(now_ms)],
+            params![named(owner), idempotency.key, oldest(expiry_ms)],
             |row| Ok((row.get(0)?, row.get(1)?)),
         )
         .optional()?;
@@ -32,7 +32,7 @@ pub(super) fn earlier(
     }
     let plan = PlanId::parse_str(&plan)
         .map_err(|error| StoreError::unavailable(format!("plan id {plan:?}: {error}")))?;
-    read::get(connection, plan, now_ms).map(Some)
+    read::get(connection, plan, expiry_ms).map(Some)
 }
 
 /// Store the key of a submission that made a plan.
@@ -56,15 +56,15 @@ pub(super) fn remember(tx: &Transaction<'_>, submission: &Submission) -> Result<
 }
 
 /// Forget the keys that have expired.
-pub(super) fn forget(tx: &Transaction<'_>, now_ms: i64) -> Result<(), StoreError> {
+pub(super) fn forget(tx: &Transaction<'_>, expiry_ms: i64) -> Result<(), StoreError> {
     tx.connection
         .prepare_cached("DELETE FROM idempotency_keys WHERE seen_ms <= ?1")?
-        .execute([oldest(now_ms)])?;
+        .execute([oldest(expiry_ms)])?;
     Ok(())
 }
 
-fn oldest(now_ms: i64) -> i64 {
-    now_ms.saturating_sub(IDEMPOTENCY_MS)
+fn oldest(expiry_ms: i64) -> i64 {
+    expiry_ms.saturating_sub(IDEMPOTENCY_MS)
 }
 
 /// No part of the key may be null.

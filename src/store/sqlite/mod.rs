@@ -39,8 +39,8 @@ use self::unreadable::Passed;
 use self::writer::Writer;
 use super::changes::Changes;
 use super::{
-    Clock, DatasetUse, End, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError,
-    Submitted, Trouble, Webhook,
+    DatasetUse, End, EventPage, Lease, ListQuery, Options, Stats, Store, StoreError, Submitted,
+    Trouble, Webhook,
 };
 use crate::export::document::Incumbent;
 use crate::job::{Event, Idempotency, Owner, Plan, PlanId, Submission};
@@ -60,7 +60,7 @@ pub struct SqliteStore {
     changes: Arc<Changes>,
     records: Arc<Records>,
     passed: Arc<Passed>,
-    clock: Clock,
+    options: Options,
 }
 
 impl SqliteStore {
@@ -108,6 +108,11 @@ impl SqliteStore {
         // `IN (...)` check SQLite builds a temporary table, a quarter of the cost of inserting a plan.
         connection.pragma_update(None, "ignore_check_constraints", true)?;
         sync_directory(data_dir)?;
+        if let Some(clock) = &options.steady
+            && let Some(newest_ms) = read::newest_ms(&connection)?
+        {
+            clock.has_seen(newest_ms);
+        }
         Self::assemble(connection, lock, file, options)
     }
 
@@ -119,13 +124,12 @@ impl SqliteStore {
     ) -> Result<Self, StoreError> {
         let changes = Arc::new(Changes::default());
         let records = Arc::new(Records::default());
-        let clock = Arc::clone(&options.clock);
         let place = Arc::new(Place::of(file)?);
         Ok(Self {
             writer: Writer::start(
                 (connection, Arc::clone(&place)),
                 lock,
-                options,
+                options.clone(),
                 Arc::clone(&changes),
                 Arc::clone(&records),
             )?,
@@ -133,8 +137,13 @@ impl SqliteStore {
             changes,
             records,
             passed: Arc::default(),
-            clock,
+            options,
         })
+    }
+
+    /// The time by which things expire now.
+    fn expiry_ms(&self) -> i64 {
+        self.options.expiry_ms((self.options.clock)())
     }
 }
 
@@ -152,10 +161,10 @@ impl Store for SqliteStore {
         idempotency: &Idempotency,
     ) -> Result<Option<Plan>, StoreError> {
         let (owner, idempotency) = (owner.cloned(), idempotency.clone());
-        let now_ms = (self.clock)();
+        let expiry_ms = self.expiry_ms();
         self.readers
             .read(move |connection| {
-                idempotency::earlier(connection, owner.as_ref(), &idempotency, now_ms)
+                idempotency::earlier(connection, owner.as_ref(), &idempotency, expiry_ms)
             })
             .await
     }
@@ -215,12 +224,12 @@ impl Store for SqliteStore {
         if let Some(plan) = self.records.plan(id) {
             return Ok(plan);
         }
-        let now_ms = (self.clock)();
+        let expiry_ms = self.expiry_ms();
         let records = Arc::clone(&self.records);
         self.readers
             .read(move |connection| {
                 let version = records.version();
-                let plan = read::get(connection, id, now_ms)?;
+                let plan = read::get(connection, id, expiry_ms)?;
                 records.keep_plan(version, &plan);
                 Ok(plan)
             })
@@ -228,23 +237,23 @@ impl Store for SqliteStore {
     }
 
     async fn scenario(&self, id: PlanId) -> Result<String, StoreError> {
-        let now_ms = (self.clock)();
+        let expiry_ms = self.expiry_ms();
         self.readers
-            .read(move |connection| read::scenario(connection, id, now_ms))
+            .read(move |connection| read::scenario(connection, id, expiry_ms))
             .await
     }
 
     async fn result(&self, id: PlanId) -> Result<Option<String>, StoreError> {
-        let now_ms = (self.clock)();
+        let expiry_ms = self.expiry_ms();
         self.readers
-            .read(move |connection| read::result(connection, id, now_ms))
+            .read(move |connection| read::result(connection, id, expiry_ms))
             .await
     }
 
     async fn incumbent(&self, id: PlanId) -> Result<Option<Incumbent>, StoreError> {
-        let now_ms = (self.clock)();
+        let expiry_ms = self.expiry_ms();
         self.readers
-            .read(move |connection| read::incumbent(connection, id, now_ms))
+            .read(move |connection| read::incumbent(connection, id, expiry_ms))
             .await
     }
 
@@ -256,9 +265,9 @@ impl Store for SqliteStore {
     }
 
     async fn events(&self, id: PlanId, after: u64, limit: usize) -> Result<EventPage, StoreError> {
-        let now_ms = (self.clock)();
+        let expiry_ms = self.expiry_ms();
         self.readers
-            .read(move |connection| read::events(connection, id, after, limit, now_ms))
+            .read(move |connection| read::events(connection, id, after, limit, expiry_ms))
             .await
     }
 

@@ -24,7 +24,7 @@ pub(super) fn submit(
 ) -> Result<Submitted, StoreError> {
     let owner = submission.owner.as_ref();
     if let Some(idempotency) = &submission.idempotency
-        && let Some(plan) = idempotency::earlier(tx.connection, owner, idempotency, tx.now_ms())?
+        && let Some(plan) = idempotency::earlier(tx.connection, owner, idempotency, tx.expiry_ms())?
     {
         return Ok(Submitted {
             plan,
@@ -201,7 +201,7 @@ pub(super) fn request_cancel(
     now_ms: i64,
 ) -> Result<Plan, StoreError> {
     let Some(mut row) = PlanRow::load(tx.connection, id)? else {
-        return Err(missing(tx.connection, id, tx.now_ms())?);
+        return Err(missing(tx.connection, id, tx.expiry_ms())?);
     };
     expected(&row.plan, revision)?;
     match row.plan.status {
@@ -229,7 +229,7 @@ pub(super) fn delete(
     now_ms: i64,
 ) -> Result<(), StoreError> {
     let Some(row) = PlanRow::load(tx.connection, id)? else {
-        return match missing(tx.connection, id, now_ms)? {
+        return match missing(tx.connection, id, tx.options.expiry_ms(now_ms))? {
             StoreError::Gone(_) if revision.is_none() => Ok(()),
             other => Err(other),
         };

@@ -92,40 +92,40 @@ impl Readers {
     }
 }
 
-pub(super) fn get(connection: &Connection, id: PlanId, now_ms: i64) -> Result<Plan, StoreError> {
+pub(super) fn get(connection: &Connection, id: PlanId, expiry_ms: i64) -> Result<Plan, StoreError> {
     match PlanRow::load(connection, id)? {
         Some(row) => Ok(row.plan),
-        None => Err(missing(connection, id, now_ms)?),
+        None => Err(missing(connection, id, expiry_ms)?),
     }
 }
 
 pub(super) fn scenario(
     connection: &Connection,
     id: PlanId,
-    now_ms: i64,
+    expiry_ms: i64,
 ) -> Result<String, StoreError> {
     let sql = "SELECT document FROM plans LEFT JOIN scenarios ON plan_seq = seq WHERE id = ?1";
-    let document = document(connection, sql, id, now_ms)?;
+    let document = document(connection, sql, id, expiry_ms)?;
     document.ok_or_else(|| StoreError::unavailable(format!("plan {id} has lost its scenario")))
 }
 
 pub(super) fn result(
     connection: &Connection,
     id: PlanId,
-    now_ms: i64,
+    expiry_ms: i64,
 ) -> Result<Option<String>, StoreError> {
     let sql = "SELECT document FROM plans LEFT JOIN results ON plan_seq = seq WHERE id = ?1";
-    document(connection, sql, id, now_ms)
+    document(connection, sql, id, expiry_ms)
 }
 
 /// See [`Store::incumbent`](crate::store::Store::incumbent).
 pub(super) fn incumbent(
     connection: &Connection,
     id: PlanId,
-    now_ms: i64,
+    expiry_ms: i64,
 ) -> Result<Option<Incumbent>, StoreError> {
     let sql = "SELECT document FROM plans LEFT JOIN incumbents ON plan_seq = seq WHERE id = ?1";
-    let document = document(connection, sql, id, now_ms)?;
+    let document = document(connection, sql, id, expiry_ms)?;
     let read = document.map(|document| serde_json::from_str(&document));
     read.transpose()
         .map_err(|error| StoreError::unavailable(format!("best route of plan {id}: {error}")))
@@ -135,7 +135,7 @@ fn document(
     connection: &Connection,
     sql: &str,
     id: PlanId,
-    now_ms: i64,
+    expiry_ms: i64,
 ) -> Result<Option<String>, StoreError> {
     let document: Option<Option<String>> = connection
         .prepare_cached(sql)?
@@ -143,7 +143,7 @@ fn document(
         .optional()?;
     match document {
         Some(document) => Ok(document),
-        None => Err(missing(connection, id, now_ms)?),
+        None => Err(missing(connection, id, expiry_ms)?),
     }
 }
 
@@ -245,7 +245,7 @@ pub(super) fn events(
     id: PlanId,
     after: u64,
     limit: usize,
-    now_ms: i64,
+    expiry_ms: i64,
 ) -> Result<EventPage, StoreError> {
     let plan: Option<(i64, i64, Option<i64>)> = connection
         .prepare_cached("SELECT seq, forgotten, place FROM plans WHERE id = ?1")?
@@ -254,7 +254,7 @@ pub(super) fn events(
         })
         .optional()?;
     let Some((seq, forgotten, place)) = plan else {
-        return Err(missing(connection, id, now_ms)?);
+        return Err(missing(connection, id, expiry_ms)?);
     };
     let after = i64::try_from(after).unwrap_or(i64::MAX);
     let mut statement = connection.prepare_cached(
@@ -263,7 +263,7 @@ pub(super) fn events(
     let mut rows = statement.query([seq, after])?;
     let mut events = Vec::new();
     if let (0, 0, Some(place)) = (after, forgotten, place) {
-        let accepted = get(connection, id, now_ms)?.as_accepted(place.cast_unsigned());
+        let accepted = get(connection, id, expiry_ms)?.as_accepted(place.cast_unsigned());
         events.push(NumberedEvent {
             id: 1,
             event: Event::Status(Box::new(accepted)),
@@ -336,11 +336,25 @@ pub(super) fn stats(connection: &Connection) -> Result<Stats, StoreError> {
     })
 }
 
+/// The newest time that anything bears, milliseconds since 1970; `None` in a new file.
+pub(super) fn newest_ms(connection: &Connection) -> Result<Option<i64>, StoreError> {
+    let newest_ms: i64 = connection.query_row(
+        "SELECT max( \
+            (SELECT max(checked_ms) FROM health), \
+            coalesce((SELECT created_ms FROM plans ORDER BY seq DESC LIMIT 1), 0), \
+            coalesce((SELECT max(finished_ms) FROM plans WHERE finished_ms IS NOT NULL), 0), \
+            coalesce((SELECT max(deleted_ms) FROM tombstones), 0))",
+        [],
+        |row| row.get(0),
+    )?;
+    Ok((newest_ms > 0).then_some(newest_ms))
+}
+
 /// Why there is no such plan.
 pub(super) fn missing(
     connection: &Connection,
     id: PlanId,
-    now_ms: i64,
+    expiry_ms: i64,
 ) -> Result<StoreError, StoreError> {
     let tombstone: Option<(i64, Tombstone)> = connection
         .prepare_cached(
@@ -363,7 +377,7 @@ pub(super) fn missing(
         })
         .optional()?;
     Ok(match tombstone {
-        Some((deleted_ms, tombstone)) if now_ms.saturating_sub(deleted_ms) < TOMBSTONE_MS => {
+        Some((deleted_ms, tombstone)) if expiry_ms.saturating_sub(deleted_ms) < TOMBSTONE_MS => {
             StoreError::Gone(tombstone)
         }
         _ => StoreError::NotFound(id),

@@ -42,10 +42,11 @@ impl Ended {
 
 /// See [`Store::sweep`](crate::store::Store::sweep).
 pub(super) fn sweep(tx: &mut Transaction<'_>, now_ms: i64) -> Result<usize, StoreError> {
-    bury_for_good(tx, now_ms)?;
-    idempotency::forget(tx, now_ms)?;
+    let expiry_ms = tx.options.expiry_ms(now_ms);
+    bury_for_good(tx, expiry_ms)?;
+    idempotency::forget(tx, expiry_ms)?;
     let mut removed = 0;
-    for plan in expired(tx, now_ms)? {
+    for plan in expired(tx, expiry_ms)? {
         expire(tx, plan, now_ms)?;
         removed += 1;
     }
@@ -56,11 +57,11 @@ pub(super) fn sweep(tx: &mut Transaction<'_>, now_ms: i64) -> Result<usize, Stor
     Ok(removed)
 }
 
-fn expired(tx: &Transaction<'_>, now_ms: i64) -> Result<Vec<Ended>, StoreError> {
+fn expired(tx: &Transaction<'_>, expiry_ms: i64) -> Result<Vec<Ended>, StoreError> {
     ended(
         tx,
         "SELECT seq, id, owner, bytes, status, last_event FROM plans WHERE expires_ms <= ?1 ORDER BY expires_ms LIMIT ?2",
-        [now_ms, SWEEP.cast_signed() as i64],
+        [expiry_ms, SWEEP.cast_signed() as i64],
     )
 }
 
@@ -156,9 +157,9 @@ fn delete_row(tx: &Transaction<'_>, seq: i64) -> Result<(), StoreError> {
 }
 
 /// Delete the tombstones that have expired.
-pub(super) fn bury_for_good(tx: &Transaction<'_>, now_ms: i64) -> Result<(), StoreError> {
+pub(super) fn bury_for_good(tx: &Transaction<'_>, expiry_ms: i64) -> Result<(), StoreError> {
     tx.connection
         .prepare_cached("DELETE FROM tombstones WHERE deleted_ms <= ?1")?
-        .execute([now_ms.saturating_sub(TOMBSTONE_MS)])?;
+        .execute([expiry_ms.saturating_sub(TOMBSTONE_MS)])?;
     Ok(())
 }

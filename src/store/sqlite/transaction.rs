@@ -73,6 +73,11 @@ impl Transaction<'_> {
         (self.options.clock)()
     }
 
+    /// The time by which things expire now.
+    pub(super) fn expiry_ms(&self) -> i64 {
+        self.options.expiry_ms(self.now_ms())
+    }
+
     /// Add to the events of a plan, and delete its oldest when there are too many; the caller writes the row.
     pub(super) fn add_events(
         &mut self,

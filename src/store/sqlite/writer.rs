@@ -238,10 +238,9 @@ impl Desk {
                 |row| row.get::<_, i64>(0),
             )?
             .cast_unsigned();
-        let now_ms = (self.options.clock)();
         let ended = self.commit(|tx, _| {
             tx.step(|tx| {
-                removal::bury_for_good(tx, now_ms)?;
+                removal::bury_for_good(tx, tx.expiry_ms())?;
                 operations::recover(tx)
             })
         })??;

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use noctule::job::{Event, Status};
+use noctule::job::{Event, Idempotency, Status, Submission};
 use noctule::store::jetstream::JetStreamStore;
 use noctule::store::{Options, Retention, Store, wall_clock};
 
@@ -112,11 +112,19 @@ async fn a_wrong_clock_removes_nothing_for_its_age() {
     let right = right.unwrap();
     assert_eq!(right.warning(), None);
     let now_ms = wall_clock()();
-    let mut ended = Vec::new();
-    for _ in 0..3 {
-        let id = right.submit(submission()).await.unwrap().plan.id;
+    let keyed = || Submission {
+        idempotency: Some(Idempotency {
+            key: "once".to_owned(),
+            body_sha256: "0".repeat(64),
+        }),
+        ..submission()
+    };
+    let mut ended = vec![right.submit(keyed()).await.unwrap().plan.id];
+    for _ in 0..2 {
+        ended.push(right.submit(submission()).await.unwrap().plan.id);
+    }
+    for &id in &ended {
         right.request_cancel(id, now_ms).await.unwrap();
-        ended.push(id);
     }
     let deleted = ended.pop().unwrap();
     right.delete(deleted, now_ms).await.unwrap();
@@ -130,7 +138,10 @@ async fn a_wrong_clock_removes_nothing_for_its_age() {
         for id in &ended {
             assert!(right.get(*id).await.is_ok());
         }
-        assert_eq!(kind(right.get(deleted).await), Err("gone"));
+        for node in [&right, &wrong] {
+            assert_eq!(kind(node.get(deleted).await), Err("gone"));
+            assert_eq!(node.submit(keyed()).await.unwrap().plan.id, ended[0]);
+        }
     }
     // What is too many goes whatever the time.
     let wrong = JetStreamStore::open(node(&address), options(2 * DAY_MS, 1)).await;

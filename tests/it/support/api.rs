@@ -67,9 +67,12 @@ impl Api {
 
     /// Over a store of the given kind.
     pub(crate) async fn on(backend: Backend, options: Options) -> Self {
-        let place = Place::new(backend);
+        Self::at(Place::new(backend), options).await
+    }
+
+    async fn at(place: Place, options: Options) -> Self {
         let queue = options.queue_limit;
-        let store = place.open(options).await.expect("a fresh store");
+        let store = place.open(options).await.expect("nobody else uses it");
         let access = Access::new(None, Settings::default(), wall_clock());
         Self::over(store, place, queue, access, &[])
     }
@@ -80,14 +83,21 @@ impl Api {
         clock: Arc<SteadyClock>,
         options: Options,
     ) -> Self {
-        let options = Options {
-            clock: clock.clock(),
-            ..options
-        };
-        let mut api = Self::on(backend, options).await;
-        api.state.clock = clock;
-        api.router = http::router(api.state.clone());
-        api
+        Self::on(backend, options.by(&clock)).await.told_by(clock)
+    }
+
+    /// Another process over the same store, on the given clock.
+    pub(crate) async fn reopened_by(self, clock: Arc<SteadyClock>, options: Options) -> Self {
+        self.store.close().await;
+        let place = self.place;
+        drop((self.store, self.state, self.router));
+        Self::at(place, options.by(&clock)).await.told_by(clock)
+    }
+
+    fn told_by(mut self, clock: Arc<SteadyClock>) -> Self {
+        self.state.clock = clock;
+        self.router = http::router(self.state.clone());
+        self
     }
 
     /// For callers with keys only.

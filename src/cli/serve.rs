@@ -86,6 +86,7 @@ async fn serve(config: &Config, instruments: Arc<Instruments>) -> anyhow::Result
     let settings = http::server::Settings {
         head_timeout: config.http.head_timeout,
         body_timeout: config.http.body_timeout,
+        reader_patience: http::server::READER_PATIENCE,
         max_connections,
         patience: LAST_ANSWERS,
         instruments: parts.instruments.clone(),

@@ -146,7 +146,7 @@ fn streamed(stream: Stream, wire: Wire) -> Response {
         (header::VARY, HeaderValue::from_static("accept")),
     ];
     let body = Body::from_stream(futures_util::StreamExt::chain(prologue, events));
-    // A slow reader costs a position in a plan's events and no memory, so it may be as slow as it likes.
+    // A slow reader costs a position in a plan's events and no memory, so it may be slow.
     (Extension(MayStandStill), headers, body).into_response()
 }
 

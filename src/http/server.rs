@@ -46,6 +46,8 @@ pub struct Settings {
     pub head_timeout: Duration,
     /// After that, a caller that still does not take an answer is cut off after this time too.
     pub body_timeout: Duration,
+    /// For so long the readers of a connection's event streams may take nothing; see [`READER_PATIENCE`].
+    pub reader_patience: Duration,
     /// Connections open at once; more wait in the listener's backlog.
     pub max_connections: usize,
     /// At shutdown, how long open connections may take to finish their answers.
@@ -53,6 +55,10 @@ pub struct Settings {
     /// Where connections are counted.
     pub instruments: Arc<Instruments>,
 }
+
+/// For so long a service lets readers of event streams take nothing: much longer than the pauses of a slow one, who is
+/// sent something every 15 seconds.
+pub const READER_PATIENCE: Duration = Duration::from_secs(5 * 60);
 
 /// How long a caller that has connected may take to send the first bytes of a request once the service stops. Bytes that
 /// are there already may take a moment to be noticed.
@@ -88,7 +94,8 @@ pub async fn serve(
     };
     let mut failures_to_accept = RepeatedFailures::default();
     let begin = |(stream, place): (TcpStream, OwnedSemaphorePermit), phase| {
-        let socket = Socket::new(stream, settings.instruments.clone());
+        let instruments = settings.instruments.clone();
+        let socket = Socket::new(stream, settings.reader_patience, instruments);
         let answer = answer(socket, router.clone(), phase, times);
         let counted = settings.instruments.metrics.connection();
         tokio::spawn(async move {

@@ -199,6 +199,7 @@ async fn callers_whom_nobody_has_taken_yet_are_answered_at_the_end() {
     let settings = server::Settings {
         head_timeout: Duration::from_secs(30),
         body_timeout: Duration::from_secs(30),
+        reader_patience: Duration::from_secs(30),
         max_connections: 30,
         patience: PATIENCE,
         instruments: Arc::default(),

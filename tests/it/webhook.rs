@@ -105,6 +105,7 @@ async fn axum_serve(listener: TcpListener, router: Router) {
     let settings = noctule::http::server::Settings {
         head_timeout: Duration::from_secs(30),
         body_timeout: Duration::from_secs(30),
+        reader_patience: Duration::from_secs(30),
         max_connections: 10,
         patience: Duration::ZERO,
         instruments: Arc::default(),

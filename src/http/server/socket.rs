@@ -29,10 +29,14 @@ pub(super) struct Socket {
 }
 
 impl Socket {
-    pub(super) fn new(stream: TcpStream, instruments: Arc<Instruments>) -> Self {
+    pub(super) fn new(
+        stream: TcpStream,
+        reader_patience: Duration,
+        instruments: Arc<Instruments>,
+    ) -> Self {
         Self {
             stream,
-            traffic: Arc::new(Traffic::new()),
+            traffic: Arc::new(Traffic::new(reader_patience)),
             instruments,
             instead: Vec::new(),
             lingering: None,

@@ -15,7 +15,8 @@ use hyper::body::{Frame, SizeHint};
 use parking_lot::{Mutex, MutexGuard};
 use tokio::time::Instant;
 
-/// Among an answer's extensions, marks one that may stand still for as long as it likes.
+/// Among an answer's extensions, marks one that may have nothing to say for as long as it likes: it keeps its connection
+/// while the caller takes what is said now and then.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::http) struct MayStandStill;
 
@@ -25,12 +26,22 @@ const WORTH_NOTING: usize = 1024;
 
 /// The traffic on one connection.
 #[derive(Debug)]
-pub(super) struct Traffic(Mutex<State>);
+pub(super) struct Traffic {
+    /// How long the readers of answers that may stand still may take nothing.
+    reader_patience: Duration,
+    state: Mutex<State>,
+}
 
 #[derive(Debug)]
 struct State {
-    /// Requests being worked on, and answers that may stand still.
+    /// Requests being worked on.
     busy: usize,
+    /// Answers that may stand still.
+    readers: usize,
+    /// When one of these was last asked for more.
+    asked: Instant,
+    /// When the caller last took anything.
+    taken: Instant,
     /// Time of the last traffic.
     moved: Instant,
     /// Bytes sent since then.
@@ -42,14 +53,21 @@ struct State {
 }
 
 impl Traffic {
-    pub(super) fn new() -> Self {
-        Self(Mutex::new(State {
-            busy: 0,
-            moved: Instant::now(),
-            unnoted: 0,
-            held_up: false,
-            unread: false,
-        }))
+    pub(super) fn new(reader_patience: Duration) -> Self {
+        let now = Instant::now();
+        Self {
+            reader_patience,
+            state: Mutex::new(State {
+                busy: 0,
+                readers: 0,
+                asked: now,
+                taken: now,
+                moved: now,
+                unnoted: 0,
+                held_up: false,
+                unread: false,
+            }),
+        }
     }
 
     /// A request has come. The connection counts as active until it is answered.
@@ -62,6 +80,7 @@ impl Traffic {
     pub(super) fn sent(&self, bytes: usize) {
         let mut state = self.state();
         state.held_up = false;
+        state.taken = Instant::now();
         state.unnoted += bytes;
         if state.unnoted >= WORTH_NOTING {
             state.note();
@@ -94,7 +113,7 @@ impl Traffic {
         loop {
             tokio::time::sleep_until(due).await;
             let now = Instant::now();
-            due = self.state().moved(now) + time;
+            due = self.state().moved(now, self.reader_patience) + time;
             if due <= now {
                 return;
             }
@@ -102,7 +121,7 @@ impl Traffic {
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        self.0.lock()
+        self.state.lock()
     }
 }
 
@@ -112,8 +131,20 @@ impl State {
         self.unnoted = 0;
     }
 
-    fn moved(&self, now: Instant) -> Instant {
-        if self.busy > 0 { now } else { self.moved }
+    /// When there was last any traffic, at `now`.
+    fn moved(&self, now: Instant, reader_patience: Duration) -> Instant {
+        if self.busy > 0 || self.is_read(now, reader_patience) {
+            now
+        } else {
+            self.moved
+        }
+    }
+
+    /// Whether somebody takes what the answers say that may stand still. The system still accepts some data when nobody
+    /// reads it, and HTTP/1 asks for more even when it does not; HTTP/2 asks only when the caller has room.
+    fn is_read(&self, now: Instant, reader_patience: Duration) -> bool {
+        let sign = if self.held_up { self.taken } else { self.asked };
+        self.readers > 0 && now.duration_since(sign) < reader_patience
     }
 }
 
@@ -125,8 +156,8 @@ impl Busy {
     /// The request is answered with this.
     pub(super) fn answered(self, answer: Response) -> Response<Answer> {
         let may_stand_still = answer.extensions().get::<MayStandStill>().is_some();
-        let busy = may_stand_still.then_some(self);
-        answer.map(|body| Answer { body, _busy: busy })
+        let reader = may_stand_still.then(|| Reader::new(self.0.clone()));
+        answer.map(|body| Answer { body, reader })
     }
 }
 
@@ -138,11 +169,34 @@ impl Drop for Busy {
     }
 }
 
+/// Who reads an answer that may stand still.
+struct Reader(Arc<Traffic>);
+
+impl Reader {
+    fn new(traffic: Arc<Traffic>) -> Self {
+        traffic.state().readers += 1;
+        let reader = Self(traffic);
+        reader.asks();
+        reader
+    }
+
+    fn asks(&self) {
+        self.0.state().asked = Instant::now();
+    }
+}
+
+impl Drop for Reader {
+    fn drop(&mut self) {
+        let mut state = self.0.state();
+        state.readers -= 1;
+        state.note();
+    }
+}
+
 /// The body of an answer.
 pub(super) struct Answer {
     body: Body,
-    /// Held by an answer that may stand still.
-    _busy: Option<Busy>,
+    reader: Option<Reader>,
 }
 
 impl hyper::body::Body for Answer {
@@ -153,6 +207,9 @@ impl hyper::body::Body for Answer {
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        if let Some(reader) = &self.reader {
+            reader.asks();
+        }
         Pin::new(&mut self.body).poll_frame(context)
     }
 
@@ -170,6 +227,7 @@ mod tests {
     use super::*;
 
     const TIME: Duration = Duration::from_secs(30);
+    const PATIENCE: Duration = Duration::from_secs(300);
 
     /// Seconds until `traffic` has been idle for [`TIME`].
     async fn still_after_s(traffic: &Traffic) -> u64 {
@@ -180,7 +238,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn only_data_worth_noting_resets_the_idle_time() {
-        let traffic = Arc::new(Traffic::new());
+        let traffic = Arc::new(Traffic::new(PATIENCE));
         assert_eq!(still_after_s(&traffic).await, 30, "nobody asks");
         assert_eq!(still_after_s(&traffic).await, 30, "from now on");
 
@@ -196,7 +254,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_request_is_active_until_answered_and_a_stream_until_it_ends() {
-        let traffic = Arc::new(Traffic::new());
+        let traffic = Arc::new(Traffic::new(PATIENCE));
         let after = async |held: Box<dyn Send>| {
             tokio::time::sleep(Duration::from_secs(100)).await;
             drop(held);
@@ -209,10 +267,50 @@ mod tests {
         let (still, ()) = tokio::join!(still_after_s(&traffic), after(Box::new(answer)));
         assert_eq!(still, 30, "nobody reads it");
 
-        let mut stream = Response::default();
-        stream.extensions_mut().insert(MayStandStill);
-        let stream = traffic.clone().begin().answered(stream);
+        let stream = traffic.clone().begin().answered(stream());
         let (still, ()) = tokio::join!(still_after_s(&traffic), after(Box::new(stream)));
         assert_eq!(still, 130);
+    }
+
+    /// An answer that may stand still.
+    fn stream() -> Response {
+        let mut stream = Response::default();
+        stream.extensions_mut().insert(MayStandStill);
+        stream
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_stream_that_nobody_reads_is_active_for_as_long_as_readers_may_pause() {
+        let traffic = Arc::new(Traffic::new(PATIENCE));
+        let mut stream = traffic.clone().begin().answered(stream()).into_body();
+        assert_eq!(still_after_s(&traffic).await, 300);
+
+        let mut asks = || {
+            let context = &mut Context::from_waker(std::task::Waker::noop());
+            let _ = hyper::body::Body::poll_frame(Pin::new(&mut stream), context);
+        };
+        let reads = async {
+            for _ in 0..100 {
+                tokio::time::sleep(Duration::from_secs(15)).await;
+                asks();
+            }
+        };
+        let (still, ()) = tokio::join!(still_after_s(&traffic), reads);
+        assert_eq!(still, 1_800);
+
+        // What is said is not taken, though HTTP/1 goes on asking.
+        traffic.sent(WORTH_NOTING);
+        traffic.hold_up();
+        let asked = async {
+            for _ in 0..100 {
+                tokio::time::sleep(Duration::from_secs(15)).await;
+                asks();
+            }
+        };
+        let still = tokio::select! {
+            still = still_after_s(&traffic) => still,
+            () = asked => 0,
+        };
+        assert_eq!(still, 300);
     }
 }

@@ -1,5 +1,6 @@
 //! Idle connections, over either version of HTTP: closed, unless they carry an event stream.
 
+use std::net::SocketAddr;
 use std::path::Path;
 use std::time::Duration;
 
@@ -34,17 +35,15 @@ async fn impatient(data_dir: &Path) -> (Service, String) {
 }
 
 /// An HTTP/2 connection that answers pings and sends nothing else by itself.
-struct Http2 {
+pub(super) struct Http2 {
     sender: SendRequest<Empty<Bytes>>,
     until_closed: JoinHandle<hyper::Result<()>>,
 }
 
 impl Http2 {
     /// Accepts at most `window` bytes of a response until they are read.
-    async fn new(service: &Service, window: u32) -> Self {
-        let stream = TcpStream::connect(service.address())
-            .await
-            .expect("connected");
+    pub(super) async fn new(service: SocketAddr, window: u32) -> Self {
+        let stream = TcpStream::connect(service).await.expect("connected");
         let (sender, connection) = http2::Builder::new(TokioExecutor::new())
             .initial_stream_window_size(window)
             .handshake(TokioIo::new(stream))
@@ -56,7 +55,7 @@ impl Http2 {
         }
     }
 
-    async fn get(&mut self, url: String) -> Response<Incoming> {
+    pub(super) async fn get(&mut self, url: String) -> Response<Incoming> {
         let request = Request::get(url).body(Empty::<Bytes>::new());
         let answer = self.sender.send_request(request.expect("a request"));
         in_time(answer).await.expect("an answer")
@@ -77,14 +76,14 @@ async fn idle_connections_are_closed_and_event_streams_stay_open() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let (service, waiting) = impatient(directory.path()).await;
     let events = format!("{waiting}/events");
-    let mut following = Http2::new(&service, WINDOW).await;
+    let mut following = Http2::new(service.address(), WINDOW).await;
     let second = following.get(service.url(&events)).await.into_body();
     let mut first = service.get(&events).send().await.expect("an answer");
 
     // One after the other, so that the streams stay idle for much longer than the timeout.
     for _ in 0..3 {
-        Http2::new(&service, WINDOW).await.closed().await;
-        let mut asked = Http2::new(&service, WINDOW).await;
+        Http2::new(service.address(), WINDOW).await.closed().await;
+        let mut asked = Http2::new(service.address(), WINDOW).await;
         let answer = asked.get(service.url("/livez")).await;
         assert_eq!(answer.status(), 200);
         answer.collect().await.expect("a whole body");
@@ -130,7 +129,7 @@ async fn a_caller_who_does_not_read_the_response_is_disconnected() {
     let said = tokio::sync::Mutex::new(unread);
     eventually(async || said.lock().await.write_all(b"\r\n").await.is_err()).await;
 
-    let mut unread = Http2::new(&service, 1).await;
+    let mut unread = Http2::new(service.address(), 1).await;
     let answer = unread.get(service.url(LARGE)).await;
     assert_eq!(answer.status(), 200);
     unread.closed().await;

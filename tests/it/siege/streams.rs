@@ -1,6 +1,7 @@
 //! Event readers: cut anywhere, many at once, and one that never reads.
 
 use std::net::SocketAddr;
+use std::time::Duration;
 
 use futures_util::future::join_all;
 use noctule::job::{Event, Status};
@@ -10,9 +11,10 @@ use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
 use super::Dice;
+use super::still::Http2;
 use crate::support::api::Api;
 use crate::support::lives::a_run_of;
-use crate::support::patience::in_time;
+use crate::support::patience::{eventually, in_time};
 use crate::support::process::Service;
 use crate::support::run;
 use crate::support::server::Server;
@@ -38,8 +40,13 @@ impl Plan {
     }
 
     async fn over(api: Api) -> Self {
+        let server = Server::start(&api).await;
+        Self::at(server, api).await
+    }
+
+    async fn at(server: Server, api: Api) -> Self {
         Self {
-            server: Server::start(&api).await,
+            server,
             address: api.submit().await,
             client: Client::builder().no_proxy().build().expect("a client"),
             api,
@@ -217,6 +224,38 @@ async fn a_stalled_reader_delays_no_other_and_loses_nothing() {
     assert_eq!(
         text.matches("\nevent: incumbent\n").count(),
         20_000_usize.div_ceil(3)
+    );
+}
+
+/// Its place is another's then, and it can go on where it was.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stream_of_which_nothing_is_taken_is_ended() {
+    let api = Api::new();
+    let server = Server::with_patience(&api, Duration::from_secs(1)).await;
+    let plan = Plan::at(server, api).await;
+    let stalled = stall(plan.server.address, &plan.address).await;
+    plan.run(20_000).await;
+    let mut unread = Http2::new(plan.server.address, 1).await;
+    let events = plan.server.url(&format!("{}/events", plan.address));
+    assert_eq!(unread.get(events).await.status(), 200);
+
+    let open = async || {
+        let metrics = plan.api.get("/metrics").await.body;
+        let metrics = String::from_utf8_lossy(&metrics).into_owned();
+        let mut lines = metrics.lines();
+        let line = lines.find(|line| line.starts_with("noctule_http_event_streams "));
+        line.expect("it is counted").to_owned()
+    };
+    assert_eq!(open().await, "noctule_http_event_streams 2");
+    eventually(async || open().await == "noctule_http_event_streams 0").await;
+    drop((stalled, unread));
+    assert_eq!(
+        plan.read("?rate=0", 26_000, usize::MAX)
+            .await
+            .last()
+            .expect("events")
+            .1,
+        "end"
     );
 }
 

@@ -18,11 +18,17 @@ pub(crate) struct Server {
 impl Server {
     /// On a free port.
     pub(crate) async fn start(api: &Api) -> Self {
+        Self::with_patience(api, Duration::from_secs(30)).await
+    }
+
+    /// With this time for a head, a body, and a reader who takes nothing.
+    pub(crate) async fn with_patience(api: &Api, time: Duration) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
         let address = listener.local_addr().expect("bound");
         let settings = Settings {
-            head_timeout: Duration::from_secs(30),
-            body_timeout: Duration::from_secs(30),
+            head_timeout: time,
+            body_timeout: time,
+            reader_patience: time,
             max_connections: 20_000,
             patience: Duration::from_secs(5),
             instruments: api.state.instruments.clone(),

@@ -171,7 +171,13 @@ async fn a_start_with_a_fast_clock_neither_forgets_nor_expires_anything() {
         assert_eq!(api.get(&first).await.status, 200);
         assert_eq!(service.post("first").await.header("location"), first);
         api.get(&deleted).await.expect_problem(410, "gone");
+        assert_eq!(api.get("/readyz").await.status, 200);
     }
+    // Another start by the same clock is no surer of it.
+    let service = service.started_again(0, 8 * DAY_MS).await;
+    let api = &service.api;
+    service.sweep().await;
+    assert_eq!(api.get(&first).await.status, 200);
     // It is set, and nothing is in doubt any more.
     service.set_by(0);
     service.sweep().await;
@@ -229,4 +235,19 @@ async fn a_start_before_the_clock_is_set_goes_on_from_the_newest_record() {
         assert_eq!(api.get(&second).await.status, 200);
     })
     .await;
+}
+
+/// What was checked by a fast clock, but bears no time of it, says nothing.
+#[tokio::test]
+async fn a_clock_that_was_fast_for_a_while_is_believed_once_it_is_set() {
+    let (service, first, _) = with_plans(Backend::Sqlite).await;
+    let service = service.started_again(60_000, 3_650 * DAY_MS).await;
+    assert_eq!(service.api.get("/readyz").await.status, 200);
+    let service = service.started_again(60_000, 0).await;
+    assert_eq!(
+        service.api.get("/readyz").await.json(),
+        json!({"status": "ok"})
+    );
+    service.sweep().await;
+    assert_eq!(service.api.get(&first).await.status, 200);
 }

@@ -109,7 +109,7 @@ impl SqliteStore {
         connection.pragma_update(None, "ignore_check_constraints", true)?;
         sync_directory(data_dir)?;
         if let Some(clock) = &options.steady
-            && let Some(newest_ms) = read::newest_ms(&connection)?
+            && let Some(newest_ms) = read::newest_ms(&connection, (options.clock)())?
         {
             clock.has_seen(newest_ms);
         }

@@ -336,15 +336,16 @@ pub(super) fn stats(connection: &Connection) -> Result<Stats, StoreError> {
     })
 }
 
-/// The newest time that anything bears, milliseconds since 1970; `None` in a new file.
-pub(super) fn newest_ms(connection: &Connection) -> Result<Option<i64>, StoreError> {
+/// The newest time that any record bears, milliseconds since 1970, or at which the store was last checked, unless that
+/// is after `now_ms`; `None` in a new file.
+pub(super) fn newest_ms(connection: &Connection, now_ms: i64) -> Result<Option<i64>, StoreError> {
     let newest_ms: i64 = connection.query_row(
         "SELECT max( \
-            (SELECT max(checked_ms) FROM health), \
+            coalesce((SELECT max(checked_ms) FROM health WHERE checked_ms <= ?1), 0), \
             coalesce((SELECT created_ms FROM plans ORDER BY seq DESC LIMIT 1), 0), \
             coalesce((SELECT max(finished_ms) FROM plans WHERE finished_ms IS NOT NULL), 0), \
             coalesce((SELECT max(deleted_ms) FROM tombstones), 0))",
-        [],
+        [now_ms],
         |row| row.get(0),
     )?;
     Ok((newest_ms > 0).then_some(newest_ms))

@@ -320,6 +320,7 @@ mod tests {
     use crate::optimizer::Random;
     use crate::planner::coding::Cartesian;
     use crate::planner::moves::Moves;
+    use crate::planner::price::pricer;
     use crate::planner::tests::{hilly_scenario, scenario};
     use crate::planner::{Nobody, plan};
     use crate::scenario::Scenario;
@@ -335,11 +336,7 @@ mod tests {
 
     fn hold_to_prices_alone(scenario: &Scenario) {
         let model = Model::new(scenario);
-        let pricer = Pricer::new(
-            &model,
-            scenario.planner.quadrature,
-            model.tolerance.scaled(0.5),
-        );
+        let pricer = pricer(&model);
         let pricers = Pricers::new(pricer.clone());
         let space = Cartesian::new(scenario, 6);
         let coding = Coding::Cartesian(space.clone());

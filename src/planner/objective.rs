@@ -9,10 +9,10 @@ use super::blocks::{Blocks, Pricers};
 use super::coding::{Cartesian, Coding};
 use super::guide::Guide;
 use super::kept::Kept;
-use super::price::PRICED_FROM;
+use super::price::pricer;
 use super::watch::Watch;
 use crate::cost::Model;
-use crate::cost::batch::{LANES, Pricer};
+use crate::cost::batch::LANES;
 use crate::geometry::Point3;
 use crate::optimizer::{Bounds, Fitness, Objective, Random};
 
@@ -53,10 +53,8 @@ impl<'s> Routes<'s> {
         model: &Model<'s>,
         stop: &'s dyn Stop,
     ) -> Self {
-        let tolerance = model.tolerance.scaled(PRICED_FROM);
         let settings = &model.scenario.planner;
-        let quadrature = settings.quadrature;
-        let pricers = Pricers::new(Pricer::new(model, quadrature, tolerance));
+        let pricers = Pricers::new(pricer(model));
         let legs = if pricers.is_hilly() {
             settings.population * (settings.waypoints + 1)
         } else {

@@ -21,7 +21,7 @@ mod merit;
 #[cfg(test)]
 mod tests;
 
-use super::price::{PRICED_FROM, price};
+use super::price::{price, search_tolerance};
 use super::{Stop, why_stop};
 use crate::cost::batch::Pricer;
 use crate::cost::{Model, metre};
@@ -95,9 +95,8 @@ pub(super) struct Newton<'m, 's> {
 
 impl<'m, 's> Newton<'m, 's> {
     pub(super) fn new(model: &'m Model<'s>, stop: &'m dyn Stop) -> Self {
-        let tolerance = model.tolerance.scaled(PRICED_FROM);
         // Climbs are limits of the vehicle, handled separately.
-        let mut blind = tolerance;
+        let mut blind = search_tolerance(model);
         blind.angle_deg = 360.0;
         Self {
             pricer: Pricer::new(model, model.scenario.planner.quadrature, blind),
@@ -250,7 +249,7 @@ impl<'m, 's> Newton<'m, 's> {
             pricer: &self.pricer,
             step: STEP * self.way(),
             min_leg: self.model.scenario.vehicle.min_leg,
-            tolerance: self.model.tolerance.scaled(PRICED_FROM).length_m,
+            tolerance: search_tolerance(self.model).length_m,
         }
     }
 

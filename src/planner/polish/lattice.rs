@@ -4,7 +4,7 @@
 //! priced alone; turns join two legs. The best combination of all places is found exactly, so that
 //! waypoints that only gain together, such as those of one bend, move together.
 
-use super::super::price::PRICED_FROM;
+use super::super::price::{pricer, search_tolerance};
 use super::clear::ClearWays;
 use super::turns::Turns;
 use super::ways::{CHOICES, Leg, Waypoint, Ways, count};
@@ -63,8 +63,8 @@ pub(super) struct Lattice<'m, 's> {
 
 impl<'m, 's> Lattice<'m, 's> {
     pub(super) fn new(model: &'m Model<'s>) -> Self {
-        let tolerance = model.tolerance.scaled(PRICED_FROM);
-        let pricer = Pricer::new(model, model.scenario.planner.quadrature, tolerance);
+        let tolerance = search_tolerance(model);
+        let pricer = pricer(model);
         Self {
             model,
             verdicts: pricer.clone().verdicts(),

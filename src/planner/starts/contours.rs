@@ -9,9 +9,8 @@ use super::net::Found;
 use super::thin::thin;
 use super::{direction, lifted, steepest};
 use crate::cost::Model;
-use crate::cost::batch::Pricer;
 use crate::geometry::{Point2, Point3, Vector2, wrap_angle};
-use crate::planner::price::PRICED_FROM;
+use crate::planner::price::pricer;
 use crate::scenario::Scenario;
 
 /// How steep the ground under the walker may be, as shares of what the vehicle can climb. The route lies inside its
@@ -47,8 +46,7 @@ const PLACES: usize = 120;
 /// too steep. Once `is_over`, those found so far.
 pub(super) fn routes(model: &Model, is_over: &dyn Fn() -> bool) -> Found {
     let scenario = model.scenario;
-    let tolerance = model.tolerance.scaled(PRICED_FROM);
-    let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).verdicts();
+    let pricer = pricer(model).verdicts();
     let mut found = Found::default();
     for (side, share) in SIDES
         .iter()

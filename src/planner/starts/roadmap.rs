@@ -11,7 +11,7 @@ use super::{few, levels, may_turn, may_turn_along};
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::cost::{Model, metre};
 use crate::geometry::Point3;
-use crate::planner::price::PRICED_FROM;
+use crate::planner::price::{pricer, search_tolerance};
 use crate::scenario::Scenario;
 use crate::terrain::Terrain;
 use crate::threat::Threat;
@@ -162,8 +162,8 @@ impl<'p, 's> Legs<'p, 's> {
         is_over: &'p dyn Fn() -> bool,
     ) -> Self {
         let scenario = model.scenario;
-        let tolerance = model.tolerance.scaled(PRICED_FROM);
-        let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).verdicts();
+        let tolerance = search_tolerance(model);
+        let pricer = pricer(model).verdicts();
         let hilly = pricer.is_hilly();
         let count = places.len();
         let direct = (scenario.target - scenario.start).norm();

@@ -5,7 +5,7 @@ use super::{lifted, steepest};
 use crate::cost::{Model, metre};
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
-use crate::planner::price::price;
+use crate::planner::price::{price, search_tolerance};
 
 /// Waypoints are placed no nearer to each other than this share of the way, if the legs allow it.
 const APART: f64 = 1e-4;
@@ -122,7 +122,7 @@ struct Split {
 
 impl Split {
     fn of(model: &Model, a: Point3, b: Point3) -> Self {
-        let tolerance = model.tolerance.scaled(0.5);
+        let tolerance = search_tolerance(model);
         let length = (b - a).norm();
         let way = (model.scenario.target - model.scenario.start).norm();
         let apart = model.scenario.vehicle.min_leg.max(APART * way);
@@ -158,7 +158,7 @@ impl Split {
     /// to end, as between one threat that is flown over and the next.
     fn off_leg(model: &Model, a: Point3, b: Point3) -> Self {
         let scenario = model.scenario;
-        let tolerance = model.tolerance.scaled(0.5);
+        let tolerance = search_tolerance(model);
         let middle = lifted(scenario, nalgebra::center(&a, &b).xy(), 0.5);
         let climb = 0.5 * (b.xy() - a.xy()).norm() * steepest(scenario);
         let (lowest, highest) = (a.z.max(b.z) - climb, a.z.min(b.z) + climb);

@@ -8,7 +8,7 @@ use crate::cost::Model;
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::geometry::Point3;
 use crate::optimizer::Fitness;
-use crate::planner::price::PRICED_FROM;
+use crate::planner::price::search_tolerance;
 
 /// Maximum number of routes along a chain examined for one that can be flown with the allowed turns.
 const EFFORT: usize = 40_000;
@@ -68,7 +68,7 @@ impl<'c> Legs<'c> {
     /// From each place `at_once` legs, and as many more while any of these breaks no limit.
     fn new(model: &Model, pricer: &Pricer, chain: &'c [Point3], at_once: usize) -> Self {
         let last = chain.len() - 1;
-        let tolerance = model.tolerance.scaled(PRICED_FROM);
+        let tolerance = search_tolerance(model);
         let mut own: Vec<(f64, f64)> = chain
             .iter()
             .map(|&place| model.waypoint(place, tolerance))
@@ -243,6 +243,7 @@ impl few::Legs for Feasible<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::planner::price::pricer;
     use crate::planner::tests::{radar, scenario};
     use crate::scenario::Scenario;
 
@@ -267,7 +268,7 @@ mod tests {
 
     fn sum_of_legs(model: &Model, route: &[Point3]) -> Fitness {
         let scenario = model.scenario;
-        let tolerance = model.tolerance.scaled(PRICED_FROM);
+        let tolerance = search_tolerance(model);
         let mut sum = Fitness {
             violation: 0.0,
             cost: 0.0,
@@ -288,8 +289,7 @@ mod tests {
 
     fn thinned(scenario: &Scenario) -> (Fitness, Vec<Point3>) {
         let model = Model::new(scenario);
-        let tolerance = model.tolerance.scaled(PRICED_FROM);
-        let pricer = Pricer::new(&model, scenario.planner.quadrature, tolerance).verdicts();
+        let pricer = pricer(&model).verdicts();
         let (thin, priced) = thin(&model, &pricer, &astray(scenario));
         assert_eq!(priced, 6 * 7 / 2);
         assert!((3..=4).contains(&thin.len()));
@@ -348,8 +348,7 @@ mod tests {
         for (waypoints, most) in [(20, 2 * all / 3), (1, 2 * all)] {
             scenario.planner.waypoints = waypoints;
             let model = Model::new(&scenario);
-            let tolerance = model.tolerance.scaled(PRICED_FROM);
-            let pricer = Pricer::new(&model, scenario.planner.quadrature, tolerance).verdicts();
+            let pricer = pricer(&model).verdicts();
             let (route, priced) = thin(&model, &pricer, &chain);
             let best = Legs::new(&model, &pricer, &chain, chain.len()).best();
             let best: Vec<Point3> = best

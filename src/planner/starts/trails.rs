@@ -14,7 +14,7 @@ use super::thin::thin;
 use crate::cost::Model;
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::geometry::Point3;
-use crate::planner::price::PRICED_FROM;
+use crate::planner::price::{pricer, search_tolerance};
 use crate::scenario::Scenario;
 
 /// Spots of the net, apart from both ends.
@@ -105,8 +105,8 @@ struct Arrival {
 impl<'s> Net<'s> {
     fn new(model: &Model<'s>, spots: &Spots) -> Self {
         let scenario = model.scenario;
-        let tolerance = model.tolerance.scaled(PRICED_FROM);
-        let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).verdicts();
+        let tolerance = search_tolerance(model);
+        let pricer = pricer(model).verdicts();
         let places = places(model, spots);
         let mut ends = Vec::new();
         let reach = REACH * spots.step;

@@ -8,9 +8,8 @@ use super::lifted;
 use super::net::Found;
 use super::thin::thin;
 use crate::cost::Model;
-use crate::cost::batch::Pricer;
 use crate::geometry::Point3;
-use crate::planner::price::PRICED_FROM;
+use crate::planner::price::pricer;
 use crate::seeding::{WaysSought, cheap_ways, cheapest_slip};
 
 /// From this many threats on they are a crowd, in which one gap follows another.
@@ -55,8 +54,7 @@ pub(super) fn sought(
 /// Routes of at most as many free waypoints as `model` asks for, each along a different way; fewer once `is_over`.
 pub(super) fn routes(model: &Model, sought: WaysSought, is_over: &dyn Fn() -> bool) -> Found {
     let scenario = model.scenario;
-    let tolerance = model.tolerance.scaled(PRICED_FROM);
-    let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).verdicts();
+    let pricer = pricer(model).verdicts();
     let band = scenario.altitude;
     let ground = scenario.terrain.elevation(scenario.start.xy());
     let height = ground + 0.5 * (band.min + band.max);

@@ -3,9 +3,9 @@
 use super::super::{direction, net};
 use super::Climb;
 use crate::cost::Model;
-use crate::cost::batch::{LANES, Price, Pricer};
+use crate::cost::batch::{LANES, Price};
 use crate::geometry::{Point2, Point3, Rect, Vector2};
-use crate::planner::price::PRICED_FROM;
+use crate::planner::price::pricer;
 use crate::scenario::Scenario;
 
 /// Start and target come first among the places.
@@ -71,8 +71,7 @@ fn round(count: usize) -> impl Iterator<Item = Vector2> {
 
 /// Every leg between `places`, at `levels` in the frame, row by row; none from a place to itself.
 pub(super) fn legs(model: &Model, places: &[Point2], levels: &[f64]) -> Vec<Leg> {
-    let tolerance = model.tolerance.scaled(PRICED_FROM);
-    let pricer = Pricer::new(model, model.scenario.planner.quadrature, tolerance).verdicts();
+    let pricer = pricer(model).verdicts();
     let count = places.len();
     let points: Vec<Point3> = places
         .iter()

@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::cost::Model;
 use crate::cost::batch::{LANES, Price, Pricer};
 use crate::geometry::{LEVEL, Point2, Point3, Vector2};
-use crate::planner::price::PRICED_FROM;
+use crate::planner::price::{pricer, search_tolerance};
 use crate::planner::starts::net::{self, Spots};
 use crate::planner::starts::{steepest, winding};
 use crate::scenario::Scenario;
@@ -54,7 +54,7 @@ impl<'s> Legs<'s> {
     /// None priced yet, between the places of a net of about so many `spots`.
     pub(super) fn new(model: &Model<'s>, spots: usize) -> Self {
         let scenario = model.scenario;
-        let tolerance = model.tolerance.scaled(PRICED_FROM);
+        let tolerance = search_tolerance(model);
         let steepest = steepest(scenario);
         let way = scenario.target - scenario.start;
         let direct = way.xy().norm().max(LEVEL);
@@ -72,7 +72,7 @@ impl<'s> Legs<'s> {
             near: near(scenario, &points, REACH * step),
             known: vec![None; places.len()],
             count: 0,
-            pricer: Pricer::new(model, scenario.planner.quadrature, tolerance).verdicts(),
+            pricer: pricer(model).verdicts(),
             own: places.iter().map(own).collect(),
             steepest: steepest * (1.0 + 1e-9),
             places,

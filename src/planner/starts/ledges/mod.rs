@@ -12,9 +12,9 @@ use super::net::Found;
 use super::steepest;
 use super::thin::thin;
 use crate::cost::Model;
-use crate::cost::batch::Pricer;
 use crate::geometry::Point3;
-use crate::planner::price::PRICED_FROM;
+use crate::planner::price::pricer;
+use crate::scenario::Scenario;
 use grid::Grid;
 use ground::Ground;
 
@@ -28,8 +28,6 @@ const PLACES: usize = 120;
 /// Routes along the shortest ways over the grid. Once `is_over`, those found so far.
 pub(super) fn routes(model: &Model, is_over: &dyn Fn() -> bool) -> Found {
     let scenario = model.scenario;
-    let tolerance = model.tolerance.scaled(PRICED_FROM);
-    let pricer = Pricer::new(model, scenario.planner.quadrature, tolerance).verdicts();
     let mut found = Found::default();
     if scenario.terrain.is_flat() {
         return found;
@@ -37,16 +35,11 @@ pub(super) fn routes(model: &Model, is_over: &dyn Fn() -> bool) -> Found {
     let Some(ground) = Ground::new(model, is_over) else {
         return found;
     };
-    for [steep, margin] in ROOM {
+    let pricer = pricer(model).verdicts();
+    for grid in grids(scenario, &ground) {
         if is_over() {
             break;
         }
-        let grid = Grid {
-            ground: &ground,
-            ends: [scenario.start, scenario.target],
-            climb: steep * steepest(scenario),
-            margin: margin * (scenario.altitude.max - scenario.altitude.min),
-        };
         if let Some(way) = grid.shortest(is_over) {
             let places = thinned_out(&way, PLACES);
             let (route, legs_priced) = thin(model, &pricer, &places);
@@ -56,6 +49,17 @@ pub(super) fn routes(model: &Model, is_over: &dyn Fn() -> bool) -> Found {
         }
     }
     found
+}
+
+/// The same grid with ever more room.
+fn grids<'g>(scenario: &Scenario, ground: &'g Ground) -> [Grid<'g>; 3] {
+    let band = scenario.altitude.max - scenario.altitude.min;
+    ROOM.map(|[steep, margin]| Grid {
+        ground,
+        ends: [scenario.start, scenario.target],
+        climb: steep * steepest(scenario),
+        margin: margin * band,
+    })
 }
 
 /// About `most` places of a way, evenly.
@@ -71,18 +75,11 @@ mod tests {
 
     use super::*;
     use crate::planner::tests::{mountain, scenario, wall};
-    use crate::scenario::Scenario;
 
     fn ways(scenario: &Scenario, examine: impl Fn(&Model, f64, Option<Vec<Point3>>)) {
         let model = Model::new(scenario);
         let ground = Ground::new(&model, &|| false).expect("few corners");
-        for [steep, margin] in ROOM {
-            let grid = Grid {
-                ground: &ground,
-                ends: [scenario.start, scenario.target],
-                climb: steep * steepest(scenario),
-                margin: margin * (scenario.altitude.max - scenario.altitude.min),
-            };
+        for grid in grids(scenario, &ground) {
             examine(&model, grid.climb, grid.shortest(&|| false));
         }
     }

@@ -61,75 +61,17 @@ pub(super) struct Grid<'g> {
 impl Grid<'_> {
     /// The shortest way, if there is one.
     pub(super) fn shortest(&self, is_over: &dyn Fn() -> bool) -> Option<Vec<Point3>> {
-        let [columns, rows] = self.ground.size;
-        let [start, target] = self.ends;
-        let mut all: Vec<Reached> = Vec::new();
-        let mut open = Open::new();
-        let push = |all: &mut Vec<Reached>, open: &mut Open, reached: Reached| {
-            let least = reached.length + (target.xy() - self.place(reached.cell)).norm();
-            open.push(Reverse((least.to_bits(), all.len())));
-            all.push(reached);
-        };
-        for cell in self.around(start.xy()) {
-            let length = (self.place(cell) - start.xy()).norm();
-            let heights = common(wider([start.z; 2], length * self.climb), self.allowed(cell));
-            if !is_empty(heights) {
-                let reached = Reached {
-                    cell,
-                    heights,
-                    length,
-                    before: None,
-                };
-                push(&mut all, &mut open, reached);
-            }
-        }
-        let near_target = self.around(target.xy());
-        let mut known: Vec<Vec<Range>> = vec![Vec::new(); columns * rows];
-        let is_known = |known: &[Range], heights| known.iter().any(|&other| holds(other, heights));
+        let mut search = Search::from_start(self);
         let mut looked_at = 0;
-        while let Some(Reverse((_, own))) = open.pop() {
-            let Reached {
-                cell,
-                heights,
-                length,
-                ..
-            } = all[own];
-            let here = &mut known[cell[1] * columns + cell[0]];
-            if here.len() == RANGES || is_known(here, heights) {
-                continue;
-            }
-            here.push(heights);
+        while let Some(own) = search.next() {
             looked_at += 1;
             if looked_at % UNWATCHED == 0 && is_over() {
                 return None;
             }
-            if near_target.contains(&cell) {
-                let away = (target.xy() - self.place(cell)).norm();
-                if !is_empty(common(heights, wider([target.z; 2], away * self.climb))) {
-                    return Some(self.way(&all, own));
-                }
+            if search.arrives(own) {
+                return Some(self.way(&search.all, own));
             }
-            for step in STEPS {
-                let Some((next, halfway, away)) = self.next(cell, step) else {
-                    continue;
-                };
-                let climb = 0.5 * away * self.climb;
-                let middle = common(wider(heights, climb), self.within(halfway));
-                let heights = common(wider(middle, climb), self.allowed(next));
-                if is_empty(middle)
-                    || is_empty(heights)
-                    || is_known(&known[next[1] * columns + next[0]], heights)
-                {
-                    continue;
-                }
-                let reached = Reached {
-                    cell: next,
-                    heights,
-                    length: length + away,
-                    before: Some(own),
-                };
-                push(&mut all, &mut open, reached);
-            }
+            search.go_on(own);
         }
         None
     }
@@ -211,4 +153,107 @@ impl Grid<'_> {
         let away = self.ground.step * ((step[0] * step[0] + step[1] * step[1]) as f64).sqrt();
         Some(([column, row], [cell[0] + column, cell[1] + row], away))
     }
+}
+
+/// What has been reached so far.
+struct Search<'g> {
+    grid: &'g Grid<'g>,
+    /// The cells from which the target may be reached.
+    near_target: Vec<[usize; 2]>,
+    all: Vec<Reached>,
+    open: Open,
+    /// For each cell, the ranges that were looked at.
+    known: Vec<Vec<Range>>,
+}
+
+impl<'g> Search<'g> {
+    fn from_start(grid: &'g Grid) -> Self {
+        let [start, target] = grid.ends;
+        let [columns, rows] = grid.ground.size;
+        let mut search = Self {
+            grid,
+            near_target: grid.around(target.xy()),
+            all: Vec::new(),
+            open: Open::new(),
+            known: vec![Vec::new(); columns * rows],
+        };
+        for cell in grid.around(start.xy()) {
+            let length = (grid.place(cell) - start.xy()).norm();
+            let from_start = wider([start.z; 2], length * grid.climb);
+            search.reach(Reached {
+                cell,
+                heights: common(from_start, grid.allowed(cell)),
+                length,
+                before: None,
+            });
+        }
+        search
+    }
+
+    /// To be looked at in its turn, if it is news.
+    fn reach(&mut self, reached: Reached) {
+        let Reached { cell, heights, .. } = reached;
+        if is_empty(heights) || is_known(&self.known[self.number(cell)], heights) {
+            return;
+        }
+        let away = (self.grid.ends[1].xy() - self.grid.place(cell)).norm();
+        let least = reached.length + away;
+        self.open.push(Reverse((least.to_bits(), self.all.len())));
+        self.all.push(reached);
+    }
+
+    /// The number of what is to be looked at now, which is known from then on.
+    fn next(&mut self) -> Option<usize> {
+        while let Some(Reverse((_, own))) = self.open.pop() {
+            let Reached { cell, heights, .. } = self.all[own];
+            let number = self.number(cell);
+            let known = &mut self.known[number];
+            if known.len() < RANGES && !is_known(known, heights) {
+                known.push(heights);
+                return Some(own);
+            }
+        }
+        None
+    }
+
+    /// Whether a way to number `own` can go straight on to the target.
+    fn arrives(&self, own: usize) -> bool {
+        let Reached { cell, heights, .. } = self.all[own];
+        let target = self.grid.ends[1];
+        if !self.near_target.contains(&cell) {
+            return false;
+        }
+        let away = (target.xy() - self.grid.place(cell)).norm();
+        let to_target = wider([target.z; 2], away * self.grid.climb);
+        !is_empty(common(heights, to_target))
+    }
+
+    /// Reach the cells around that of number `own`.
+    fn go_on(&mut self, own: usize) {
+        let grid = self.grid;
+        let from = self.all[own];
+        for step in STEPS {
+            let Some((next, halfway, away)) = grid.next(from.cell, step) else {
+                continue;
+            };
+            let climb = 0.5 * away * grid.climb;
+            let middle = common(wider(from.heights, climb), grid.within(halfway));
+            if !is_empty(middle) {
+                self.reach(Reached {
+                    cell: next,
+                    heights: common(wider(middle, climb), grid.allowed(next)),
+                    length: from.length + away,
+                    before: Some(own),
+                });
+            }
+        }
+    }
+
+    fn number(&self, cell: [usize; 2]) -> usize {
+        cell[1] * self.grid.ground.size[0] + cell[0]
+    }
+}
+
+fn is_known(known: &[Range], heights: Range) -> bool {
+    known.iter().any(|&other| holds(other, heights))
 }

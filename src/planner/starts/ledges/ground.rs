@@ -3,6 +3,7 @@
 use crate::cost::Model;
 use crate::geometry::{Point2, Rect};
 use crate::planner::starts::over;
+use crate::scenario::Scenario;
 use crate::seeding::Outline;
 
 /// Cells along the longer side of the grid.
@@ -50,7 +51,14 @@ pub(super) struct Ground {
 impl Ground {
     /// `None` where threats have too many corners to look at, or once `is_over`.
     pub(super) fn new(model: &Model, is_over: &dyn Fn() -> bool) -> Option<Self> {
-        let scenario = model.scenario;
+        let mut ground = Self::about(model.scenario);
+        ground.measure(model, is_over)?;
+        ground.close_threats(model.scenario, is_over)?;
+        Some(ground)
+    }
+
+    /// Where the grid lies; no height is known yet.
+    fn about(scenario: &Scenario) -> Self {
         let ends = [scenario.start.xy(), scenario.target.xy()];
         let direct = (ends[1] - ends[0]).norm();
         let near = Rect::around(ends)
@@ -59,40 +67,45 @@ impl Ground {
         let corner = scenario.area.nearest(near.min);
         let across = scenario.area.nearest(near.max) - corner;
         let step = across.x.max(across.y) / CELLS;
-        let size = [across.x, across.y].map(|side| cells(side / step) + 1);
-        let mut ground = Self {
+        Self {
             corner,
             step,
-            size,
+            size: [across.x, across.y].map(|side| cells(side / step) + 1),
             allowed: Vec::new(),
-        };
-        let [columns, rows] = ground.halves();
+        }
+    }
+
+    /// The band over each half step.
+    fn measure(&mut self, model: &Model, is_over: &dyn Fn() -> bool) -> Option<()> {
+        let [columns, rows] = self.halves();
         for row in 0..rows {
             if is_over() {
                 return None;
             }
             for column in 0..columns {
-                let at = ground.at(column, row);
-                let below = scenario.terrain.elevation(at);
+                let at = self.at(column, row);
+                let below = model.scenario.terrain.elevation(at);
                 let (floor, ceiling) = model.heights_over(at);
-                ground.allowed.push([below + floor, below + ceiling]);
+                self.allowed.push([below + floor, below + ceiling]);
             }
         }
-        let closed = scenario
-            .threats
-            .iter()
-            .filter(|threat| !over::passable(scenario, threat));
+        Some(())
+    }
+
+    /// Nothing passes the threats that reach across the band.
+    fn close_threats(&mut self, scenario: &Scenario, is_over: &dyn Fn() -> bool) -> Option<()> {
+        let threats = scenario.threats.iter();
         let mut corners = 0;
-        for threat in closed {
+        for threat in threats.filter(|threat| !over::passable(scenario, threat)) {
             let outline = Outline::hard(threat);
-            let near = ground.within(threat.extent());
+            let near = self.within(threat.extent());
             corners += near[0].len() * near[1].len() * outline.shape.corners();
             if corners > MOST_CORNERS || is_over() {
                 return None;
             }
-            ground.close(&outline, near);
+            self.close(&outline, near);
         }
-        Some(ground)
+        Some(())
     }
 
     /// Half steps along x and y.

@@ -5,19 +5,16 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use async_nats::jetstream::Message;
-use async_nats::jetstream::consumer::{DeliverPolicy, push};
-use async_nats::jetstream::stream::Stream;
+use async_nats::jetstream::consumer::DeliverPolicy;
 use futures_util::StreamExt as _;
-use tokio::runtime::Handle;
 use tokio::sync::watch;
-use tokio::time::{sleep, timeout};
+use tokio::time::sleep;
 
 use super::JetStream;
-use super::connect::{PATIENCE, plan_of};
+use super::connect::plan_of;
+use super::delivery::Delivery;
 use super::errors::{failed, refused};
-use super::history::History;
-use super::record::{Placed, State, Step};
-use crate::job::PlanId;
+use super::record::{Placed, Step};
 use crate::store::StoreError;
 
 /// While what was there at the start is being read, progress is reported once in so many steps.
@@ -46,12 +43,8 @@ impl JetStream {
         let mut read = 0;
         loop {
             let ended = self.read_on(&mut read, &reading).await;
-            let broken = reading.send_if_modified(|reading| {
-                let was_current = *reading == Reading::Current;
-                if was_current {
-                    *reading = Reading::Broken;
-                }
-                was_current
+            let broken = report(&reading, Reading::Broken, |before| {
+                before == Reading::Current
             });
             if let Err(error) = ended {
                 if self.heed_vanished(&error) {
@@ -86,15 +79,15 @@ impl JetStream {
         let connects = self.connects();
         // It may have been removed since, and never come.
         let newest = self.newest_sequence().await?;
-        let mut steps = self.read_steps(what, all, begin).await?;
-        if steps.are_none {
+        let mut delivery = Delivery::of(&self.servers, what, all, begin).await?;
+        if delivery.is_empty {
             *read = newest.max(*read);
-            reading.send_replace(Reading::Current);
+            report(reading, Reading::Current, |_| true);
         }
         loop {
             let message = tokio::select! {
                 biased;
-                message = steps.messages.next() => message,
+                message = delivery.steps.next() => message,
                 why = self.left_behind(*read, connects) => return Err(refused(what, why)),
             };
             let Some(message) = message else { break };
@@ -106,21 +99,14 @@ impl JetStream {
             self.take_in(&message, sequence);
             *read = sequence.max(*read);
             if pending % SAID_EVERY == 0 {
-                reading.send_if_modified(|reading| {
-                    let is_catching = matches!(reading, Reading::Catching { .. });
-                    if is_catching {
-                        *reading = Reading::Catching { read: sequence };
-                    }
-                    is_catching
+                let progress = Reading::Catching { read: sequence };
+                report(reading, progress, |before| {
+                    matches!(before, Reading::Catching { .. })
                 });
             }
             if pending == 0 {
                 *read = newest.max(*read);
-                reading.send_if_modified(|reading| {
-                    let news = *reading != Reading::Current;
-                    *reading = Reading::Current;
-                    news
-                });
+                report(reading, Reading::Current, |_| true);
             }
         }
         Ok(())
@@ -179,92 +165,19 @@ impl JetStream {
             }
         }
     }
-
-    /// The steps of a subject from a sequence number on, as they come.
-    async fn read_steps(
-        &self,
-        what: &str,
-        filter_subject: String,
-        deliver_policy: DeliverPolicy,
-    ) -> Result<Steps, StoreError> {
-        let config = push::OrderedConfig {
-            deliver_subject: self.servers.client.new_inbox(),
-            filter_subject,
-            deliver_policy,
-            ..push::OrderedConfig::default()
-        };
-        let made = self.servers.plans.create_consumer(config).await;
-        let mut consumer = made.map_err(|error| failed(what, &error))?;
-        let info = consumer
-            .info()
-            .await
-            .map_err(|error| failed(what, &error))?;
-        // Nothing is delivered before somebody listens. (The delivered count does not tell: for a consumer that starts
-        // at a sequence number it is the number before.)
-        let (are_none, name) = (info.num_pending == 0, info.name.clone());
-        let messages = consumer.messages().await;
-        Ok(Steps {
-            are_none,
-            messages: messages.map_err(|error| failed(what, &error))?,
-            consumer: name,
-            stream: self.servers.plans.clone(),
-        })
-    }
-
-    /// All events of a plan that the stream still keeps.
-    pub(super) async fn read_history(&self, id: PlanId) -> Result<History, StoreError> {
-        let what = format!("events of plan {id}");
-        let subject = self.servers.subject_of(id);
-        let mut history = History::whole();
-        let mut steps = self.read_steps(&what, subject, DeliverPolicy::All).await?;
-        if steps.are_none {
-            return Ok(history);
-        }
-        loop {
-            // Steps that are removed just now never come.
-            let Ok(next) = timeout(PATIENCE, steps.messages.next()).await else {
-                let standing = self.plans().look_up(id).await?;
-                standing.record(id, self.expiry_ms())?;
-                return Err(refused(&what, "none came for a while"));
-            };
-            let Some(message) = next else { break };
-            let message = message.map_err(|error| refused(&what, &error))?;
-            let pending = message
-                .info()
-                .map_err(|error| refused(&what, &*error))?
-                .pending;
-            let step = Step::read(&message.payload)?;
-            if matches!(*step.state, State::Kept(_)) {
-                history.push(&step, self.options.events_kept);
-            }
-            if pending == 0 {
-                break;
-            }
-        }
-        Ok(history)
-    }
 }
 
-/// Steps of a subject, as they come.
-struct Steps {
-    /// Whether there were none at the beginning.
-    are_none: bool,
-    messages: push::Ordered,
-    /// What delivers them.
-    consumer: String,
-    stream: Stream,
-}
-
-impl Drop for Steps {
-    /// The servers would keep the consumer for half a minute, and allow only so many.
-    fn drop(&mut self) {
-        let (stream, consumer) = (self.stream.clone(), std::mem::take(&mut self.consumer));
-        if let Ok(runtime) = Handle::try_current() {
-            runtime.spawn(async move {
-                if let Err(error) = stream.delete_consumer(&consumer).await {
-                    tracing::debug!(%error, "a consumer is left to the servers");
-                }
-            });
+/// Say so if it is news after what was said `before`; true when it is.
+fn report(
+    reading: &watch::Sender<Reading>,
+    now: Reading,
+    follows: impl Fn(Reading) -> bool,
+) -> bool {
+    reading.send_if_modified(|before| {
+        let is_news = *before != now && follows(*before);
+        if is_news {
+            *before = now;
         }
-    }
+        is_news
+    })
 }

@@ -8,11 +8,13 @@
 mod bucket;
 mod claim;
 mod connect;
+mod delivery;
 mod documents;
 mod election;
 mod errors;
 mod fetch;
 mod follow;
+mod giving_back;
 mod history;
 mod hooks;
 mod known;
@@ -45,7 +47,6 @@ use std::time::Duration;
 
 use async_nats::jetstream::consumer::PullConsumer;
 use async_trait::async_trait;
-use futures_util::future::join_all;
 use parking_lot::Mutex;
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
@@ -75,9 +76,6 @@ use crate::job::{Event, Idempotency, Owner, Plan, PlanId, Submission};
 
 /// At the start, existing data must go on being read within this time.
 const PATIENCE: Duration = Duration::from_secs(60);
-
-/// How long a node whose streams have vanished tries to give back what it runs.
-const GIVING_BACK: Duration = Duration::from_secs(3);
 
 /// The store for several machines.
 ///
@@ -346,37 +344,16 @@ impl Store for JetStreamStore {
         if !was_open {
             return;
         }
-        if *self.store.vanished.borrow() {
-            // A plan whose record is still there is queued again. Its job may be gone: all at once, for servers that
-            // have lost it do not answer.
-            let runs = self.store.leases.all().into_iter();
-            let releases = runs.map(|(id, attempt)| self.store.release(id, attempt));
-            let released = tokio::time::timeout(GIVING_BACK, join_all(releases));
-            if released.await.is_err() {
-                tracing::debug!(
-                    "not all runs were given back; they are left to the end of their leases"
-                );
-            }
-            for (id, attempt) in self.store.leases.all() {
-                self.store.leases.let_go(id, attempt);
-            }
-            self.tasks.iter().for_each(JoinHandle::abort);
-            return;
+        let has_vanished = *self.store.vanished.borrow();
+        if has_vanished {
+            self.store.give_back_at_once().await;
+        } else {
+            self.store.give_back_in_order().await;
+            self.store.let_tell_all().await;
+            self.store.take_leave().await;
         }
-        let mut runs = self.store.leases.all();
-        // In the order in which they are to run again.
-        runs.sort_by_key(|(id, _)| self.store.view.known().place(*id));
-        for (id, attempt) in runs {
-            if let Err(error) = self.store.release(id, attempt).await {
-                tracing::debug!(plan_id = %id, %error, "a run is left to the end of its lease");
-            }
-        }
-        self.store.let_tell_all().await;
-        self.store.take_leave().await;
-        for task in &self.tasks {
-            task.abort();
-        }
-        if let Err(error) = self.store.servers.client.flush().await {
+        self.tasks.iter().for_each(JoinHandle::abort);
+        if !has_vanished && let Err(error) = self.store.servers.client.flush().await {
             tracing::debug!(%error, "the last words may not have been heard");
         }
     }

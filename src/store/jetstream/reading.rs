@@ -2,9 +2,16 @@
 
 use std::sync::Arc;
 
+use async_nats::jetstream::consumer::DeliverPolicy;
+use futures_util::StreamExt as _;
+use tokio::time::timeout;
+
 use super::JetStream;
+use super::connect::PATIENCE;
+use super::delivery::Delivery;
+use super::errors::refused;
 use super::history::History;
-use super::record::Document;
+use super::record::{Document, Step};
 use super::together::Together;
 use super::view::Standing;
 use crate::export::document::Incumbent;
@@ -102,6 +109,36 @@ impl JetStream {
             Ok(Arc::new(history))
         };
         Box::pin(self.asking.histories.ask(id, read)).await
+    }
+
+    /// All events of a plan that the stream still keeps.
+    async fn read_history(&self, id: PlanId) -> Result<History, StoreError> {
+        let what = format!("events of plan {id}");
+        let subject = self.servers.subject_of(id);
+        let mut history = History::whole();
+        let mut delivery = Delivery::of(&self.servers, &what, subject, DeliverPolicy::All).await?;
+        if delivery.is_empty {
+            return Ok(history);
+        }
+        loop {
+            // Steps that are removed just now never come.
+            let Ok(next) = timeout(PATIENCE, delivery.steps.next()).await else {
+                let standing = self.plans().look_up(id).await?;
+                standing.record(id, self.expiry_ms())?;
+                return Err(refused(&what, "none came for a while"));
+            };
+            let Some(message) = next else { break };
+            let message = message.map_err(|error| refused(&what, &error))?;
+            let pending = message
+                .info()
+                .map_err(|error| refused(&what, &*error))?
+                .pending;
+            history.push(&Step::read(&message.payload)?, self.options.events_kept);
+            if pending == 0 {
+                break;
+            }
+        }
+        Ok(history)
     }
 
     /// A plan's state, no older than what any node has told of it: of a plan that has not ended, another may know more

@@ -3,8 +3,11 @@
 use std::time::Duration;
 
 use async_nats::connection::State as Connection;
+use async_nats::jetstream::context::PublishError;
+use async_nats::jetstream::message::PublishMessage;
 use async_nats::jetstream::object_store::ObjectStore;
-use async_nats::jetstream::stream::{Config, DiscardPolicy, RetentionPolicy, Stream};
+use async_nats::jetstream::publish::PublishAck;
+use async_nats::jetstream::stream::{Config, DiscardPolicy, No, Purge, RetentionPolicy, Stream};
 use async_nats::jetstream::{self, Context, kv};
 use async_nats::{Client, ConnectErrorKind, ConnectOptions, Event};
 
@@ -12,7 +15,7 @@ use super::bucket::Bucket;
 use super::election::{Election, outlast};
 use super::errors::{failed, failed_by, passes};
 use super::lane::Version;
-use super::maker::{Maker, maker};
+use super::maker::Maker;
 use super::settings::Settings;
 use crate::job::PlanId;
 use crate::store::{IDEMPOTENCY_MS, Options, StoreError, Trouble};
@@ -122,7 +125,7 @@ impl Servers {
             .query_account()
             .await
             .map_err(|error| failed("JetStream of the NATS server", &error))?;
-        let make = maker(&context, settings);
+        let make = Maker::new(&context, settings);
         let made = outlast(passes, async || {
             Box::pin(Self::made(&client, &make, options)).await
         });
@@ -155,6 +158,20 @@ impl Servers {
         let mut context = jetstream::new(client.clone());
         context.set_timeout(PATIENCE);
         context
+    }
+
+    /// Write a message; returns what the servers acknowledge.
+    pub(super) async fn publish(
+        &self,
+        subject: String,
+        message: PublishMessage,
+    ) -> Result<PublishAck, PublishError> {
+        self.context.send_publish(subject, message).await?.await
+    }
+
+    /// A removal of a plan's steps: of all, unless it is narrowed.
+    pub(super) fn purge_steps(&self, id: PlanId) -> Purge<No, No> {
+        self.plans.purge().filter(self.subject_of(id))
     }
 
     pub(super) fn subject_of(&self, id: PlanId) -> String {

@@ -1,10 +1,9 @@
 //! Scenarios and results: beside the steps, so that a step stays small.
 
-use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use bytes::Bytes;
 
 use super::connect::Servers;
-use super::errors::failed;
+use super::errors::{failed, found};
 use super::record::Document;
 use crate::job::PlanId;
 use crate::store::StoreError;
@@ -94,12 +93,10 @@ impl Servers {
     async fn of_the_leader(&self, document: &Document) -> Result<Option<Bytes>, StoreError> {
         let subject = format!("{}{}", self.documents.prefix, document.key);
         let stream = &self.documents.stream;
-        match stream.get_last_raw_message_by_subject(&subject).await {
-            Ok(message) if message.headers.get(DELETION).is_some() => Ok(None),
-            Ok(message) => Ok(Some(message.payload)),
-            Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => Ok(None),
-            Err(error) => Err(failed(&format!("document {}", document.key), &error)),
-        }
+        let newest = stream.get_last_raw_message_by_subject(&subject).await;
+        let newest = found(newest, || format!("document {}", document.key))?;
+        let there = newest.filter(|message| message.headers.get(DELETION).is_none());
+        Ok(there.map(|message| message.payload))
     }
 
     /// Remove all documents of a plan. `objects` are the keys of those that may be in the object store. Nothing is

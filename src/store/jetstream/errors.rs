@@ -3,6 +3,9 @@
 use std::error::Error;
 use std::fmt::Display;
 
+use async_nats::jetstream::message::StreamMessage;
+use async_nats::jetstream::stream::{LastRawMessageError, LastRawMessageErrorKind};
+
 use crate::store::{StoreError, Trouble};
 
 /// An error for a step that failed, with the message of the server or client.
@@ -38,6 +41,18 @@ fn said(what: &str, error: &(impl Error + 'static)) -> String {
 /// As [`failed`], for an error that has no source.
 pub(super) fn refused(what: &str, error: &(impl Display + ?Sized)) -> StoreError {
     described(format!("{what}: {error}"))
+}
+
+/// The message that was asked for, if there is one; `what` it belongs to, for an error.
+pub(super) fn found(
+    answer: Result<StreamMessage, LastRawMessageError>,
+    what: impl FnOnce() -> String,
+) -> Result<Option<StreamMessage>, StoreError> {
+    match answer {
+        Ok(message) => Ok(Some(message)),
+        Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => Ok(None),
+        Err(error) => Err(failed(&what(), &error)),
+    }
 }
 
 /// Whether it results from an election among the servers, or another short outage: a retry will succeed.

@@ -6,11 +6,10 @@
 
 use std::time::Duration;
 
-use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use tokio::time::Instant;
 
 use super::JetStream;
-use super::errors::failed;
+use super::errors::found;
 use super::lane::Lane;
 use super::record::{Record, State};
 use super::steps::Change;
@@ -112,11 +111,8 @@ impl JetStream {
     async fn has_job(&self, id: PlanId, lane: &Lane) -> Result<bool, StoreError> {
         let subject = self.job_subject(id, lane);
         let jobs = &self.servers.jobs;
-        match jobs.get_last_raw_message_by_subject(&subject).await {
-            Ok(_) => Ok(true),
-            Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => Ok(false),
-            Err(error) => Err(failed(&format!("job of plan {id}"), &error)),
-        }
+        let job = jobs.get_last_raw_message_by_subject(&subject).await;
+        Ok(found(job, || format!("job of plan {id}"))?.is_some())
     }
 }
 

@@ -35,16 +35,16 @@ pub(super) struct Maker<'a> {
     replicas: usize,
 }
 
-/// For the namespace in the settings.
-pub(super) fn maker<'a>(context: &'a Context, settings: &'a Settings) -> Maker<'a> {
-    Maker {
-        context,
-        namespace: &settings.address.namespace,
-        replicas: settings.replicas,
+impl<'a> Maker<'a> {
+    /// For the namespace in the settings.
+    pub(super) fn new(context: &'a Context, settings: &'a Settings) -> Self {
+        Self {
+            context,
+            namespace: &settings.address.namespace,
+            replicas: settings.replicas,
+        }
     }
-}
 
-impl Maker<'_> {
     pub(super) fn name(&self, what: &str) -> String {
         format!("{}-{what}", self.namespace)
     }

@@ -11,7 +11,6 @@ use std::io;
 
 use async_nats::jetstream::message::PublishMessage;
 use async_nats::jetstream::object_store::{GetErrorKind, InfoErrorKind, ObjectInfo, ObjectOptions};
-use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE;
 use bytes::Bytes;
@@ -21,7 +20,7 @@ use tokio::time::timeout;
 use uuid::Uuid;
 
 use super::connect::{PATIENCE, Servers};
-use super::errors::failed;
+use super::errors::{failed, found};
 use crate::job::PlanId;
 use crate::store::StoreError;
 
@@ -83,12 +82,8 @@ impl Servers {
         subject: String,
         part: PublishMessage,
     ) -> Result<(), StoreError> {
-        let sent = self.context.send_publish(subject, part).await;
-        let answered = match sent {
-            Ok(answer) => answer.await,
-            Err(error) => Err(error),
-        };
-        answered
+        let written = self.publish(subject, part).await;
+        written
             .map(drop)
             .map_err(|error| failed(&document(key), &error))
     }
@@ -162,15 +157,10 @@ impl Servers {
     /// The object as the leader of its stream has it; `None` when it is not whole there.
     async fn object_of_the_leader(&self, key: &str) -> Result<Option<Vec<u8>>, StoreError> {
         let stream = &self.bucket.stream;
-        let head = match stream
-            .get_last_raw_message_by_subject(&self.bucket.head_of(key))
-            .await
-        {
-            Ok(head) => head,
-            Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => {
-                return Ok(None);
-            }
-            Err(error) => return Err(failed(&document(key), &error)),
+        let head = self.bucket.head_of(key);
+        let head = stream.get_last_raw_message_by_subject(&head).await;
+        let Some(head) = found(head, || document(key))? else {
+            return Ok(None);
         };
         let Ok(object) = serde_json::from_slice::<ObjectInfo>(&head.payload) else {
             return Ok(None);
@@ -179,15 +169,11 @@ impl Servers {
         let mut bytes = Vec::with_capacity(object.size);
         let mut next = 0;
         for _ in 0..object.chunks {
-            let chunk = match stream
+            let chunk = stream
                 .get_first_raw_message_by_subject(&subject, next)
-                .await
-            {
-                Ok(chunk) => chunk,
-                Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => {
-                    return Ok(None);
-                }
-                Err(error) => return Err(failed(&document(key), &error)),
+                .await;
+            let Some(chunk) = found(chunk, || document(key))? else {
+                return Ok(None);
             };
             next = chunk.sequence + 1;
             bytes.extend_from_slice(&chunk.payload);

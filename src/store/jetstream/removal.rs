@@ -21,32 +21,31 @@ impl JetStream {
         revision: Option<u64>,
         now_ms: i64,
     ) -> Result<(), StoreError> {
-        match self.bury(id, revision, now_ms, false).await {
+        let burial = Burial {
+            revision,
+            expired: false,
+            now_ms,
+        };
+        match self.bury(id, burial).await {
             Err(StoreError::Gone(_)) if revision.is_none() => Ok(()),
             buried => buried,
         }
     }
 
     /// Remove a plan and all that belongs to it, except its tombstone.
-    async fn bury(
-        &self,
-        id: PlanId,
-        revision: Option<u64>,
-        now_ms: i64,
-        expired: bool,
-    ) -> Result<(), StoreError> {
+    async fn bury(&self, id: PlanId, burial: Burial) -> Result<(), StoreError> {
         let is_refused =
             |buried: &Result<_, StoreError>| matches!(buried, Err(error) if lacks_room(error));
-        let mut buried = self.write_grave(id, revision, now_ms, expired).await;
+        let mut buried = self.write_grave(id, burial).await;
         // Full servers take nothing, not even a plan's removal, but they do remove. Old events go first: they may be
         // enough, and a plan that stays after all can do without them.
         if is_refused(&buried) {
             self.remove_old_steps(id).await?;
-            buried = self.write_grave(id, revision, now_ms, expired).await;
+            buried = self.write_grave(id, burial).await;
         }
         if is_refused(&buried) {
             self.give_up_documents(id).await?;
-            buried = self.write_grave(id, revision, now_ms, expired).await;
+            buried = self.write_grave(id, burial).await;
         }
         let (standing, Remains { place, objects }) = buried?;
         if let Some(place) = place {
@@ -54,8 +53,7 @@ impl JetStream {
         }
         self.servers.remove_documents(id, &objects).await?;
         // Last: while steps remain, documents may remain too.
-        let steps = self.servers.plans.purge();
-        let steps = steps.filter(self.servers.subject_of(id));
+        let steps = self.servers.purge_steps(id);
         let purged = steps.sequence(standing.sequence).await;
         purged.map_err(|error| failed(&format!("steps of plan {id}"), &error))?;
         Ok(())
@@ -65,10 +63,13 @@ impl JetStream {
     async fn write_grave(
         &self,
         id: PlanId,
-        revision: Option<u64>,
-        now_ms: i64,
-        expired: bool,
+        burial: Burial,
     ) -> Result<(Standing, Remains), StoreError> {
+        let Burial {
+            revision,
+            expired,
+            now_ms,
+        } = burial;
         let mut remains = Remains::default();
         let standing = self
             .plans()
@@ -95,8 +96,7 @@ impl JetStream {
 
     /// Remove all steps of a plan but the newest, by which other writers and nodes know it.
     async fn remove_old_steps(&self, id: PlanId) -> Result<(), StoreError> {
-        let steps = self.servers.plans.purge().keep(1);
-        let purged = steps.filter(self.servers.subject_of(id)).await;
+        let purged = self.servers.purge_steps(id).keep(1).await;
         purged.map_err(|error| failed(&format!("steps of plan {id}"), &error))?;
         Ok(())
     }
@@ -111,8 +111,7 @@ impl JetStream {
 
     /// Remove a tombstone, and what an interrupted removal has left.
     async fn forget_tombstone(&self, id: PlanId) -> Result<(), StoreError> {
-        let steps = self.servers.plans.purge();
-        let purged = steps.filter(self.servers.subject_of(id)).await;
+        let purged = self.servers.purge_steps(id).await;
         let purged = purged.map_err(|error| failed(&format!("tombstone of plan {id}"), &error))?;
         if let Some(standing) = self.view.standing(id)
             && let State::Buried(grave) = &*standing.state
@@ -187,9 +186,12 @@ impl JetStream {
         going.sort_by_key(|id| id.as_u128() ^ self.node.as_u128());
         let mut round = Round::default();
         let mut refused = None;
-        let buried = going
-            .into_iter()
-            .map(|id| self.bury(id, None, now_ms, true));
+        let burial = Burial {
+            revision: None,
+            expired: true,
+            now_ms,
+        };
+        let buried = going.into_iter().map(|id| self.bury(id, burial));
         let mut buried = stream::iter(buried).buffer_unordered(AT_ONCE);
         while let Some(buried) = buried.next().await {
             match buried {
@@ -205,6 +207,16 @@ impl JetStream {
             _ => Ok(round),
         }
     }
+}
+
+/// How a plan is removed.
+#[derive(Debug, Clone, Copy)]
+struct Burial {
+    /// Only at this revision, if at one.
+    revision: Option<u64>,
+    /// Whether nobody has asked for it.
+    expired: bool,
+    now_ms: i64,
 }
 
 /// Plans that a sweep has tried to remove.

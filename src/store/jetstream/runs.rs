@@ -105,9 +105,7 @@ impl JetStream {
         let Some(Some(first)) = self.leases.steps(id, attempt, excess) else {
             return;
         };
-        let purge = self.servers.plans.purge();
-        let older = purge.filter(self.servers.subject_of(id)).sequence(first);
-        match older.await {
+        match self.servers.purge_steps(id).sequence(first).await {
             Ok(_) => {
                 let forget = |steps: &mut RunSteps| steps.forget_before(first);
                 self.leases.steps(id, attempt, forget);

@@ -4,13 +4,12 @@ use std::time::Duration;
 
 use async_nats::jetstream::context::{self, PublishErrorKind};
 use async_nats::jetstream::message::PublishMessage;
-use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use bytes::Bytes;
 use tokio::time::timeout;
 
 use super::connect::Servers;
 use super::election::Election;
-use super::errors::{failed, is_outrun, lacks_room};
+use super::errors::{failed, found, is_outrun, lacks_room};
 use super::leases::Leases;
 use super::record::{Placed, Record, State, Step};
 use super::view::{Standing, View};
@@ -115,16 +114,10 @@ impl Plans<'_> {
 
     async fn ask_for_newest(&self, id: PlanId) -> Result<Option<Placed>, StoreError> {
         let subject = self.servers.subject_of(id);
-        match self
-            .servers
-            .plans
-            .get_last_raw_message_by_subject(&subject)
-            .await
-        {
-            Ok(message) => Ok(Some(message.try_into()?)),
-            Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => Ok(None),
-            Err(error) => Err(failed(&format!("plan {id}"), &error)),
-        }
+        let plans = &self.servers.plans;
+        let newest = plans.get_last_raw_message_by_subject(&subject).await;
+        let newest = found(newest, || format!("plan {id}"))?;
+        newest.map(Placed::try_from).transpose()
     }
 
     /// Write the first step of a plan's life.
@@ -206,22 +199,14 @@ impl Plans<'_> {
     }
 
     async fn publish(&self, id: PlanId, expected: u64, step: Bytes) -> Result<u64, PublishError> {
-        let what = || format!("a step of plan {id}");
         let message = PublishMessage::build()
             .payload(step)
             .expected_last_subject_sequence(expected);
-        let sent = self
-            .servers
-            .context
-            .send_publish(self.servers.subject_of(id), message)
-            .await;
-        let answered = match sent {
-            Ok(answer) => answer.await,
-            Err(error) => Err(error),
-        };
-        answered
+        let subject = self.servers.subject_of(id);
+        let written = self.servers.publish(subject, message).await;
+        written
             .map(|ack| ack.sequence)
-            .map_err(|error| PublishError::of(&what(), &error))
+            .map_err(|error| PublishError::of(&format!("a step of plan {id}"), &error))
     }
 }
 

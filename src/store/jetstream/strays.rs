@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use futures_util::TryStreamExt as _;
 
 use super::JetStream;
 use super::connect::plan_of;
-use super::errors::failed;
+use super::errors::{failed, found};
 use super::record::Document;
 use crate::job::PlanId;
 use crate::store::StoreError;
@@ -81,13 +80,10 @@ impl JetStream {
         let scenario = Document::scenario_key(id);
         self.servers.remove_documents(id, &[scenario]).await?;
         let jobs = &self.servers.jobs;
-        match jobs.get_last_raw_message_by_subject(subject).await {
-            Ok(job) => {
-                self.withdraw(id, job.sequence).await;
-                Ok(())
-            }
-            Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => Ok(()),
-            Err(error) => Err(failed(&format!("job of plan {id}"), &error)),
+        let job = jobs.get_last_raw_message_by_subject(subject).await;
+        if let Some(job) = found(job, || format!("job of plan {id}"))? {
+            self.withdraw(id, job.sequence).await;
         }
+        Ok(())
     }
 }

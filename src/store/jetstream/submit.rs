@@ -192,29 +192,22 @@ impl JetStream {
     }
 
     async fn try_to_enqueue(&self, id: PlanId, lane: &Lane, mark: &str) -> Result<u64, StoreError> {
-        let what = || format!("job of plan {id}");
         let job = PublishMessage::build().message_id(mark);
         let subject = self.job_subject(id, lane);
-        let sent = self.servers.context.send_publish(subject, job).await;
-        let answered = match sent {
-            Ok(answer) => answer.await,
-            Err(error) => Err(error),
+        let error = match self.servers.publish(subject, job).await {
+            Ok(ack) => return Ok(ack.sequence),
+            Err(error) => error,
         };
-        match answered {
-            Ok(ack) => Ok(ack.sequence),
-            Err(error) => {
-                let refusal = failed(&what(), &error);
-                let is_full = error.kind() == PublishErrorKind::Other
-                    && refusal.to_string().contains("maximum messages exceeded");
-                Err(if is_full {
-                    StoreError::QueueFull {
-                        queued: self.view.known().stats().queued,
-                    }
-                } else {
-                    refusal
-                })
+        let refusal = failed(&format!("job of plan {id}"), &error);
+        let is_full = error.kind() == PublishErrorKind::Other
+            && refusal.to_string().contains("maximum messages exceeded");
+        Err(if is_full {
+            StoreError::QueueFull {
+                queued: self.view.known().stats().queued,
             }
-        }
+        } else {
+            refusal
+        })
     }
 
     pub(super) fn job_subject(&self, id: PlanId, lane: &Lane) -> String {

@@ -26,7 +26,7 @@ use crate::store::jetstream::bucket::Bucket;
 use crate::store::jetstream::connect::{Servers, connect};
 use crate::store::jetstream::election::outlast;
 use crate::store::jetstream::errors::{failed, is_outrun, passes};
-use crate::store::jetstream::maker::{Maker, maker};
+use crate::store::jetstream::maker::Maker;
 use crate::store::jetstream::settings::Settings;
 
 /// If no part of a file arrives for this long, the servers are considered away.
@@ -52,7 +52,7 @@ impl Opened {
     pub(super) async fn new(settings: &Settings) -> Result<Self, StoreError> {
         let client = connect(settings).await?;
         let context = Servers::context(&client);
-        let make = maker(&context, settings);
+        let make = Maker::new(&context, settings);
         outlast(passes, async || Box::pin(Self::made(&client, &make)).await).await
     }
 

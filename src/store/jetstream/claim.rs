@@ -199,30 +199,8 @@ impl JetStream {
             answer(None, &job, AckKind::Ack).await;
             return Ok(None);
         };
-        let document = match self.record_of_job(id).await {
-            Ok(standing) => match &*standing.state {
-                State::Kept(record) => record.scenario.clone(),
-                State::Buried(_) => {
-                    answer(id, &job, AckKind::Ack).await;
-                    return Ok(None);
-                }
-            },
-            Err(StoreError::NotFound(_)) => {
-                match self.orphans.miss(id) {
-                    Orphan::Waits(pause) => answer(id, &job, AckKind::Nak(Some(pause))).await,
-                    Orphan::Nobodys => {
-                        tracing::info!(plan_id = %id, "a job that was never accepted is thrown away");
-                        let scenario = Document::scenario_key(id);
-                        self.servers.remove_documents(id, &[scenario]).await?;
-                        answer(id, &job, AckKind::Ack).await;
-                    }
-                }
-                return Ok(None);
-            }
-            Err(error) => {
-                answer(id, &job, AckKind::Nak(None)).await;
-                return Err(error);
-            }
+        let Some(document) = self.document_of_job(id, &job).await? else {
+            return Ok(None);
         };
         let (found, scenario) = tokio::join!(self.start(id, &job), self.servers.read(&document));
         let found = match found {
@@ -240,6 +218,31 @@ impl JetStream {
             }
             Found::Ours => {}
             Found::Run(record, cancel) => return self.lease(*record, cancel, scenario).await,
+        }
+        Ok(None)
+    }
+
+    /// The document to plan from; `None` when nobody wants it any more, or when the job comes again
+    /// later.
+    async fn document_of_job(&self, id: PlanId, job: &Job) -> Result<Option<Document>, StoreError> {
+        match self.record_of_job(id).await {
+            Ok(standing) => match &*standing.state {
+                State::Kept(record) => return Ok(Some(record.scenario.clone())),
+                State::Buried(_) => answer(id, job, AckKind::Ack).await,
+            },
+            Err(StoreError::NotFound(_)) => match self.orphans.miss(id) {
+                Orphan::Waits(pause) => answer(id, job, AckKind::Nak(Some(pause))).await,
+                Orphan::Nobodys => {
+                    tracing::info!(plan_id = %id, "a job that was never accepted is thrown away");
+                    let scenario = Document::scenario_key(id);
+                    self.servers.remove_documents(id, &[scenario]).await?;
+                    answer(id, job, AckKind::Ack).await;
+                }
+            },
+            Err(error) => {
+                answer(id, job, AckKind::Nak(None)).await;
+                return Err(error);
+            }
         }
         Ok(None)
     }

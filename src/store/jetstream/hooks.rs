@@ -1,12 +1,10 @@
 //! Webhooks for ends of plans: each sent by one node at a time.
 
-use std::collections::BTreeSet;
-
 use async_nats::jetstream::kv::CreateErrorKind;
 
 use super::JetStream;
 use super::errors::failed;
-use super::record::State;
+use super::record::{Hook, State};
 use super::steps::Change;
 use super::view::Standing;
 use crate::job::PlanId;
@@ -37,7 +35,7 @@ impl JetStream {
             if of_owner.count() == limit.div_ceil(2) {
                 continue;
             }
-            if self.telling().contains(&id) {
+            if self.telling.lock().contains(&id) {
                 taken.push(webhook);
             } else {
                 taken.extend(self.take(id, now_ms).await?);
@@ -71,7 +69,7 @@ impl JetStream {
             .await
         {
             Ok(_) => {
-                self.telling().insert(id);
+                self.telling.lock().insert(id);
                 Ok(true)
             }
             Err(error) if error.kind() == CreateErrorKind::AlreadyExists => {
@@ -88,7 +86,7 @@ impl JetStream {
         let own = self.node.to_string();
         let is_own = entry.is_some_and(|teller| teller == own.as_bytes());
         if is_own {
-            self.telling().insert(id);
+            self.telling.lock().insert(id);
         }
         Ok(is_own)
     }
@@ -105,14 +103,14 @@ impl JetStream {
                     return Ok(None);
                 };
                 let mut record = record.clone();
-                let Some(hook) = record.webhook.as_mut() else {
+                let Some(hook) = record.webhook.take() else {
                     return Ok(None);
                 };
-                hook.tries += 1;
-                hook.due_ms = next_ms;
-                if next_ms.is_none() {
-                    record.webhook = None;
-                }
+                record.webhook = next_ms.map(|due_ms| Hook {
+                    tries: hook.tries + 1,
+                    due_ms: Some(due_ms),
+                    ..hook
+                });
                 Ok(Some(Change::silent(State::Kept(record))))
             })
             .await;
@@ -128,7 +126,7 @@ impl JetStream {
 
     /// Leave this webhook to whichever node is first.
     async fn let_tell(&self, id: PlanId) {
-        if self.telling().remove(&id)
+        if self.telling.lock().remove(&id)
             && let Err(error) = self.servers.tellers.purge(id.to_string()).await
         {
             tracing::debug!(%error, plan_id = %id, "a webhook is left to others two minutes later");
@@ -137,14 +135,10 @@ impl JetStream {
 
     /// Leave all of them to other nodes.
     pub(super) async fn let_tell_all(&self) {
-        let all = self.telling().clone();
+        let all = self.telling.lock().clone();
         for id in all {
             self.let_tell(id).await;
         }
-    }
-
-    fn telling(&self) -> parking_lot::MutexGuard<'_, BTreeSet<PlanId>> {
-        self.telling.lock()
     }
 }
 

@@ -111,30 +111,22 @@ impl JetStream {
         self.expiry_ms_at((self.options.clock)())
     }
 
+    /// Nodes that were started together do not all announce themselves at once.
     fn next_announcement(&self) -> Duration {
         let spread = Duration::from_millis(u64::from(self.node.as_bytes()[15]) * 4);
         ALIVE / 4 + spread
     }
 
     pub(super) async fn count_nodes(&self) -> Result<(), StoreError> {
-        let what = |error: &(dyn std::error::Error + 'static)| {
-            StoreError::unavailable(format!("nodes: {error}"))
-        };
-        let mut names = self
-            .servers
-            .nodes
-            .keys()
-            .await
-            .map_err(|error| what(&error))?;
+        let what = "the other nodes";
+        let announced = &self.servers.nodes;
+        let names = announced.keys().await;
+        let mut names = names.map_err(|error| failed(what, &error))?;
         let (mut slots, mut nodes) = (0, 0);
         while let Some(name) = names.next().await {
-            let name = name.map_err(|error| what(&error))?;
-            let entry = self
-                .servers
-                .nodes
-                .entry(name)
-                .await
-                .map_err(|error| what(&error))?;
+            let name = name.map_err(|error| failed(what, &error))?;
+            let entry = announced.entry(name).await;
+            let entry = entry.map_err(|error| failed(what, &error))?;
             let Some(entry) = entry.filter(|entry| entry.operation == Operation::Put) else {
                 continue;
             };

@@ -3,7 +3,7 @@
 
 use std::str;
 
-use super::HEAD_BYTES;
+use super::connection::HEAD_BYTES;
 use crate::http::problem::Problem;
 use crate::http::request_id;
 use crate::telemetry::Instruments;

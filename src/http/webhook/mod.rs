@@ -5,17 +5,15 @@
 
 mod address;
 mod client;
+mod delivery;
 mod retry;
 mod secret;
 
 use std::collections::HashMap;
-use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::time::Duration;
 
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
-use futures_util::FutureExt as _;
-use serde::Serialize;
+use axum::http::{HeaderMap, HeaderName};
 use tokio::sync::watch;
 use tokio::task::{self, JoinHandle, JoinSet};
 use tokio::time::MissedTickBehavior;
@@ -24,17 +22,13 @@ pub use secret::Secrets;
 
 use super::params;
 use super::problem::Problem;
-use super::status::StatusDocument;
-use super::time::Time;
 use crate::job::{Owner, PlanId};
-use crate::store::{Clock, Store, StoreError, Webhook};
+use crate::store::{Clock, Store};
 use address::Target;
 use client::Client;
+use delivery::Delivery;
 
 const NOCTULE_WEBHOOK: HeaderName = HeaderName::from_static("noctule-webhook");
-const WEBHOOK_ID: HeaderName = HeaderName::from_static("webhook-id");
-const WEBHOOK_TIMESTAMP: HeaderName = HeaderName::from_static("webhook-timestamp");
-const WEBHOOK_SIGNATURE: HeaderName = HeaderName::from_static("webhook-signature");
 
 /// How often the store is asked for due webhooks.
 const LOOK: Duration = Duration::from_millis(500);
@@ -42,9 +36,6 @@ const LOOK: Duration = Duration::from_millis(500);
 /// Webhooks in flight at once. An owner has at most as many as there are places left, 64 if nobody else has any, so
 /// that receivers who do not answer hold up their owner and not the others.
 const AT_ONCE: usize = 128;
-
-/// Pauses between attempts to record the outcome: the first, and the longest.
-const WRITING_PAUSES: [Duration; 2] = [Duration::from_millis(250), Duration::from_secs(60)];
 
 /// How webhooks are sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -115,14 +106,6 @@ impl Drop for Sender {
     }
 }
 
-struct Delivery {
-    store: Arc<dyn Store>,
-    settings: Settings,
-    client: Client,
-    /// Decides when to try, and dates what is sent.
-    clock: Clock,
-}
-
 async fn deliver_all(delivery: Arc<Delivery>, mut end: watch::Receiver<bool>) {
     let mut looks = tokio::time::interval(LOOK);
     looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -159,102 +142,4 @@ async fn deliver_all(delivery: Arc<Delivery>, mut end: watch::Receiver<bool>) {
         }
     }
     while tasks.join_next().await.is_some() {}
-}
-
-impl Delivery {
-    /// Try once, and record the outcome.
-    async fn deliver(&self, webhook: Webhook) {
-        let (id, tries) = (webhook.plan.id, webhook.tries + 1);
-        // A panic counts as a try, or it would happen again at the next look.
-        let trying = AssertUnwindSafe(self.try_once(webhook)).catch_unwind();
-        let broke = |_| Err(std::io::Error::other("sending it broke"));
-        let pause_ms = match trying.await.unwrap_or_else(broke) {
-            Ok(status) if status.is_success() => {
-                tracing::info!(plan_id = %id, tries, "the webhook got through");
-                None
-            }
-            Ok(StatusCode::GONE) => {
-                tracing::info!(plan_id = %id, tries, "the webhook's receiver is gone");
-                None
-            }
-            Ok(status) => again(id, tries, &format!("the answer is {status}")),
-            Err(error) => again(id, tries, &error.to_string()),
-        };
-        let next_ms = pause_ms.map(|pause_ms| (self.clock)() + pause_ms);
-        self.write_down(id, next_ms).await;
-    }
-
-    /// Retries while the store fails: a webhook whose outcome is not recorded is still due, and the next look would
-    /// send it once more.
-    async fn write_down(&self, id: PlanId, next_ms: Option<i64>) {
-        let [mut pause, longest] = WRITING_PAUSES;
-        while let Err(error) = self.store.webhook_tried(id, next_ms).await {
-            // The plan has been deleted meanwhile, so there is nothing to record.
-            if matches!(error, StoreError::NotFound(_) | StoreError::Gone(_)) {
-                return;
-            }
-            tracing::warn!(plan_id = %id, %error, "a webhook's try is not written down yet; trying again");
-            tokio::time::sleep(pause).await;
-            pause = longest.min(2 * pause);
-        }
-    }
-
-    async fn try_once(&self, webhook: Webhook) -> std::io::Result<StatusCode> {
-        let target = Target::read(&webhook.url, self.settings.allow_private)
-            .ok_or_else(|| std::io::Error::other("the address is no longer allowed"))?;
-        let id = webhook.plan.id.to_string();
-        let body = Message::of(webhook).to_json();
-        let timestamp_s = (self.clock)() / 1_000;
-        let signature = self.settings.secrets.sign(&id, timestamp_s, &body);
-        let mut headers = HeaderMap::new();
-        headers.insert(
-            header::CONTENT_TYPE,
-            HeaderValue::from_static("application/json"),
-        );
-        for (name, value) in [
-            (WEBHOOK_ID, id),
-            (WEBHOOK_TIMESTAMP, timestamp_s.to_string()),
-            (WEBHOOK_SIGNATURE, signature),
-        ] {
-            let value = HeaderValue::from_str(&value).expect("visible ASCII");
-            headers.insert(name, value);
-        }
-        self.client.post(&target, headers, body).await
-    }
-}
-
-/// Milliseconds until the next try. The address stays out of the log: it may contain the receiver's own secret.
-fn again(id: PlanId, tries: u32, why: &str) -> Option<i64> {
-    let jitter = f64::from(getrandom::u32().unwrap_or(u32::MAX / 2)) / f64::from(u32::MAX);
-    if let Some(pause_ms) = retry::pause_ms(tries, jitter) {
-        let pause_s = pause_ms / 1000;
-        tracing::warn!(plan_id = %id, tries, pause_s, why, "a webhook did not get through");
-        Some(pause_ms)
-    } else {
-        tracing::error!(plan_id = %id, tries, why, "a webhook did not get through and is given up");
-        None
-    }
-}
-
-/// The body of a webhook.
-#[derive(Serialize)]
-struct Message {
-    r#type: &'static str,
-    /// Time of the end.
-    timestamp: Time,
-    data: StatusDocument,
-}
-
-impl Message {
-    fn of(webhook: Webhook) -> Self {
-        Self {
-            r#type: "plan.ended",
-            timestamp: Time(webhook.plan.finished_ms.unwrap_or_default()),
-            data: webhook.plan.into(),
-        }
-    }
-
-    fn to_json(&self) -> String {
-        serde_json::to_string(self).expect("every map key is a string")
-    }
 }

@@ -39,19 +39,8 @@ pub(super) async fn show(
 ) -> Result<Response, Problem> {
     let mut plan = caller.plan(&*state.store, id).await?;
     if let Some(wait) = wait {
-        // With a known version, wait for a different one; without, and where none can come, wait for the end.
-        let changed = wait_for(&state, id, wait.duration(), |plan| {
-            let is_news = |known: &EntityTags| !known.contain(&etag(plan));
-            plan.status.is_final() || known.as_ref().is_some_and(is_news)
-        });
-        let changed = async {
-            tokio::select! {
-                changed = changed => changed,
-                () = state.access.withdrawn(caller.key, Scope::Read) => Err(Problem::Unauthorized(Unauthorized::NoKey)),
-            }
-        };
         // Few requests wait, so the future is boxed to keep the others' small.
-        plan = Box::pin(changed).await?;
+        plan = Box::pin(changed(&state, &caller, id, wait, known.as_ref())).await?;
     }
 
     let tag = etag(&plan);
@@ -72,6 +61,25 @@ pub(super) async fn show(
         headers.insert(PREFERENCE_APPLIED, wait.applied());
     }
     Ok(response)
+}
+
+/// The plan once it differs from the version that is `known`; where none is, or none can come, once it has ended.
+async fn changed(
+    state: &AppState,
+    caller: &Caller,
+    id: PlanId,
+    wait: Wait,
+    known: Option<&EntityTags>,
+) -> Result<Plan, Problem> {
+    let is_news = |plan: &Plan| {
+        plan.status.is_final() || known.is_some_and(|known| !known.contain(&etag(plan)))
+    };
+    tokio::select! {
+        changed = wait_for(state, id, wait.duration(), is_news) => changed,
+        () = state.access.withdrawn(caller.key, Scope::Read) => {
+            Err(Problem::Unauthorized(Unauthorized::NoKey))
+        }
+    }
 }
 
 async fn retry_after(state: &AppState, plan: &Plan) -> Result<Option<HeaderValue>, Problem> {

@@ -53,6 +53,16 @@ const SLICES: u32 = 5;
 /// Plans of each scenario; the median counts.
 const PLANS: u64 = 5;
 
+/// What one table measures.
+struct Measured {
+    name: &'static str,
+    title: &'static str,
+    note: &'static str,
+    /// The heading of the labels.
+    column: &'static str,
+    rows: Vec<Row>,
+}
+
 /// One row of what is priced.
 struct Row {
     label: Cell,
@@ -64,84 +74,21 @@ struct Row {
 /// Measure all tables.
 pub(super) fn measure(arguments: &Arguments, cases: &[Case]) -> anyhow::Result<Report> {
     let ground = case::cases(&[GROUND.into()])?;
-    let ground = &ground[0];
-    let planner =
-        |waypoints: usize| json!({"waypoints": waypoints, "population": POPULATION, "seed": 1});
-    let row = |label: Cell, scenario: anyhow::Result<Scenario>, batch: usize| {
-        scenario.map(|scenario| Row {
-            label,
-            scenario,
-            batch,
-        })
-    };
-    let mut by_scenario: Vec<Row> = Vec::new();
-    for case in cases {
-        let whole = row(Cell::text(&case.name), case.with(&planner(10)), POPULATION)?;
-        let level = levelled(&case.name, &whole);
-        by_scenario.extend(std::iter::once(whole).chain(level));
-    }
-    let by_waypoints: Vec<Row> = WAYPOINTS
-        .iter()
-        .map(|&size| row(Cell::count(size), ground.with(&planner(size)), POPULATION))
-        .collect::<Result<_, _>>()?;
-    let by_threats: Vec<Row> = FAR_THREATS
-        .iter()
-        .map(|&count| {
-            let threats = (0..count).map(|idx| far_threat(idx, count)).collect();
-            let scenario = ground.with_threats(&planner(10), threats);
-            row(Cell::Number(f64::from(count), 0), scenario, POPULATION)
-        })
-        .collect::<Result<_, _>>()?;
-    let by_population: Vec<Row> = POPULATIONS
-        .iter()
-        .map(|&size| row(Cell::count(size), ground.with(&planner(10)), size))
-        .collect::<Result<_, _>>()?;
-
-    let tables: [(&'static str, &str, &str, &'static str, Vec<Row>); 4] = [
-        (
-            "scenarios",
-            "Scenarios",
-            "N = 10, population 200. Where there are hills, once more as if the ground were level.",
-            "scenario",
-            by_scenario,
-        ),
-        (
-            "waypoints",
-            "Growth with waypoints",
-            "paper-2, population 200.",
-            "N",
-            by_waypoints,
-        ),
-        (
-            "threats",
-            "Growth with far threats",
-            "paper-2, N = 10, population 200, and so many threats more whose soft zones no sensible route comes near.",
-            "far threats",
-            by_threats,
-        ),
-        (
-            "population",
-            "Growth with the population",
-            "paper-2, N = 10; a population is priced in one batch.",
-            "population",
-            by_population,
-        ),
+    let all = [
+        by_scenario(cases)?,
+        by_waypoints(&ground[0])?,
+        by_threats(&ground[0])?,
+        by_population(&ground[0])?,
     ];
-    let steps = tables.iter().map(|(.., rows)| rows.len()).sum::<usize>() + cases.len();
+    let steps = all.iter().map(|table| table.rows.len()).sum::<usize>() + cases.len();
     let bar = progress::bar(steps);
-    let mut done = Vec::new();
-    for (name, title, note, column, rows) in tables {
-        let mut measured = Vec::new();
-        for row in rows {
-            bar.set_message(title.to_owned());
-            let rates = rates(&row.scenario, row.batch, arguments.time_ms);
-            measured.push((row.label, rates));
-            bar.inc(1);
-        }
-        done.push(rate_table(name, title, note, column, measured));
+    let mut tables = Vec::new();
+    for table in all {
+        bar.set_message(table.title);
+        tables.push(rate_table(table, arguments.time_ms, || bar.inc(1)));
     }
     bar.set_message("Plans");
-    done.push(plan_table(cases, || bar.inc(1))?);
+    tables.push(plan_table(cases, || bar.inc(1))?);
     bar.finish_and_clear();
     Ok(Report {
         title: "Speed".to_owned(),
@@ -152,10 +99,86 @@ pub(super) fn measure(arguments: &Arguments, cases: &[Case]) -> anyhow::Result<R
              {LANES} neighbouring routes side by side, without decoding; the last two columns are of that.",
             arguments.time_ms / SLICES
         ),
-        tables: done,
+        tables,
         raw: Vec::new(),
         drawings: Vec::new(),
     })
+}
+
+fn by_scenario(cases: &[Case]) -> anyhow::Result<Measured> {
+    let mut rows = Vec::new();
+    for case in cases {
+        let whole = Row {
+            label: Cell::text(&case.name),
+            scenario: case.with(&planner_with(10))?,
+            batch: POPULATION,
+        };
+        let level = levelled(&case.name, &whole);
+        rows.extend(std::iter::once(whole).chain(level));
+    }
+    Ok(Measured {
+        name: "scenarios",
+        title: "Scenarios",
+        note: "N = 10, population 200. Where there are hills, once more as if the ground were level.",
+        column: "scenario",
+        rows,
+    })
+}
+
+fn by_waypoints(ground: &Case) -> anyhow::Result<Measured> {
+    let row = |&waypoints: &usize| {
+        Ok(Row {
+            label: Cell::count(waypoints),
+            scenario: ground.with(&planner_with(waypoints))?,
+            batch: POPULATION,
+        })
+    };
+    Ok(Measured {
+        name: "waypoints",
+        title: "Growth with waypoints",
+        note: "paper-2, population 200.",
+        column: "N",
+        rows: WAYPOINTS.iter().map(row).collect::<anyhow::Result<_>>()?,
+    })
+}
+
+fn by_threats(ground: &Case) -> anyhow::Result<Measured> {
+    let row = |&count: &u32| {
+        let threats = (0..count).map(|idx| far_threat(idx, count)).collect();
+        Ok(Row {
+            label: Cell::Number(f64::from(count), 0),
+            scenario: ground.with_threats(&planner_with(10), threats)?,
+            batch: POPULATION,
+        })
+    };
+    Ok(Measured {
+        name: "threats",
+        title: "Growth with far threats",
+        note: "paper-2, N = 10, population 200, and so many threats more whose soft zones no sensible route comes near.",
+        column: "far threats",
+        rows: FAR_THREATS.iter().map(row).collect::<anyhow::Result<_>>()?,
+    })
+}
+
+fn by_population(ground: &Case) -> anyhow::Result<Measured> {
+    let row = |&population: &usize| {
+        Ok(Row {
+            label: Cell::count(population),
+            scenario: ground.with(&planner_with(10))?,
+            batch: population,
+        })
+    };
+    Ok(Measured {
+        name: "population",
+        title: "Growth with the population",
+        note: "paper-2, N = 10; a population is priced in one batch.",
+        column: "population",
+        rows: POPULATIONS.iter().map(row).collect::<anyhow::Result<_>>()?,
+    })
+}
+
+fn planner_with(waypoints: usize) -> Value {
+    json!({"waypoints": waypoints, "population": POPULATION, "seed": 1})
 }
 
 /// The same without its hills, if it has any.
@@ -296,37 +319,38 @@ fn far_threat(idx: u32, count: u32) -> Value {
     })
 }
 
-fn rate_table(
-    name: &'static str,
-    title: &str,
-    note: &str,
-    column: &'static str,
-    measured: Vec<(Cell, Rates)>,
-) -> Table {
-    let first = measured.first().map_or(1.0, |(_, rates)| rates.priced);
-    let row = |(label, rates): (Cell, Rates)| {
+/// Measure the rows of a table; `step` follows each.
+fn rate_table(table: Measured, time_ms: u32, step: impl Fn()) -> Table {
+    let mut first = None;
+    let row = |Row {
+                   label,
+                   scenario,
+                   batch,
+               }: Row| {
+        let rates = rates(&scenario, batch, time_ms);
+        step();
         vec![
             label,
             Cell::Number(rates.scattered, 0),
             Cell::Number(rates.gathered, 0),
             Cell::Number(rates.priced, 0),
             Cell::Number(1e6 / rates.priced, 3),
-            Cell::Number(first / rates.priced, 2),
+            Cell::Number(*first.get_or_insert(rates.priced) / rates.priced, 2),
         ]
     };
     Table {
-        name,
-        title: title.to_owned(),
-        note: note.to_owned(),
+        name: table.name,
+        title: table.title.to_owned(),
+        note: table.note.to_owned(),
         columns: vec![
-            column,
+            table.column,
             "evaluations/s, scattered",
             "evaluations/s, gathered",
             "priced/s",
             "us each",
             "times the first row",
         ],
-        rows: measured.into_iter().map(row).collect(),
+        rows: table.rows.into_iter().map(row).collect(),
     }
 }
 

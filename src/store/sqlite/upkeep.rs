@@ -8,7 +8,6 @@ use rusqlite::{Connection, OpenFlags};
 
 use super::{BUSY_TIMEOUT, DATABASE, StoreError};
 use crate::job::{PlanId, Status};
-use crate::store::Trouble;
 
 /// What [`check`] looked at, and what it found wrong.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -21,8 +20,12 @@ pub struct Findings {
 
 /// Damage that the database itself finds in its file: pages, indexes, rows with dangling references.
 pub(super) fn damage(connection: &Connection) -> rusqlite::Result<Vec<String>> {
+    found_by(connection, "PRAGMA quick_check(20)")
+}
+
+fn found_by(connection: &Connection, check: &str) -> rusqlite::Result<Vec<String>> {
     let mut faults: Vec<String> = connection
-        .prepare("PRAGMA quick_check(20)")?
+        .prepare(check)?
         .query_map([], |row| row.get(0))?
         .collect::<Result<_, _>>()?;
     faults.retain(|fault| fault != "ok");
@@ -38,11 +41,7 @@ pub fn check(data_dir: &Path) -> Result<Findings, StoreError> {
     let mut connection = open(data_dir)?;
     // All in one transaction, or a busy service would seem to contradict itself.
     let connection = connection.transaction()?;
-    let mut faults: Vec<String> = connection
-        .prepare("PRAGMA integrity_check(100)")?
-        .query_map([], |row| row.get(0))?
-        .collect::<Result<_, _>>()?;
-    faults.retain(|fault| fault != "ok");
+    let mut faults = found_by(&connection, "PRAGMA integrity_check(100)")?;
     let plans = if faults.is_empty() {
         records(&connection, &mut faults)?
     } else {
@@ -179,10 +178,8 @@ fn put_in_place(part: &Path, to: &Path) -> std::io::Result<()> {
 fn open(data_dir: &Path) -> Result<Connection, StoreError> {
     let file = data_dir.join(DATABASE);
     if !file.is_file() {
-        return Err(StoreError::Unavailable {
-            trouble: Trouble::Other,
-            detail: format!("there is no store at {}", file.display()),
-        });
+        let nowhere = format!("there is no store at {}", file.display());
+        return Err(StoreError::unavailable(nowhere));
     }
     let connection = Connection::open_with_flags(&file, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
     connection.busy_timeout(BUSY_TIMEOUT)?;

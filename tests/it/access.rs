@@ -8,7 +8,7 @@ use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
 use crate::support::patience::{eventually, in_time};
-use crate::support::process::{Service, run, run_with};
+use crate::support::process::{Service, address_of, run, run_with};
 use crate::support::scenario;
 
 /// A new key and its key file entry.
@@ -59,12 +59,7 @@ impl Guarded {
     async fn submit(&self, key: &str) -> String {
         let request = self.service.client().post(self.service.url("/plans"));
         let request = request.json(&scenario()).bearer_auth(key);
-        let accepted = request.send().await.expect("an answer");
-        assert_eq!(accepted.status(), 202);
-        accepted.headers()["location"]
-            .to_str()
-            .expect("text")
-            .to_owned()
+        address_of(&request.send().await.expect("an answer"))
     }
 
     /// Waits until the log contains `part`; the log.

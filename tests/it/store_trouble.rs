@@ -18,7 +18,7 @@ use tempfile::TempDir;
 
 use crate::support::patience::eventually;
 use crate::support::plans::submission;
-use crate::support::process::{Service, run};
+use crate::support::process::{Service, address_of, run};
 use crate::support::scenario;
 
 /// Fills the disk with a file at `path`.
@@ -51,8 +51,7 @@ async fn a_full_disk_refuses_plans_and_loses_none() {
             assert_eq!(answer.status(), 503);
             break answer.json::<Value>().await.unwrap();
         }
-        let address = answer.headers()["location"].to_str().unwrap();
-        accepted.push(address.to_owned());
+        accepted.push(address_of(&answer));
     };
     assert_eq!(refused["type"], "/problems/store-unavailable");
     let detail = service.until_ready(503).await;

@@ -23,7 +23,7 @@ use crate::support::description::check_schema;
 use crate::support::faulty_store::FaultyStore;
 use crate::support::patience::{eventually, in_time};
 use crate::support::plans::submission;
-use crate::support::process::Service;
+use crate::support::process::{Service, address_of};
 use crate::support::run;
 use crate::support::scenario;
 
@@ -367,12 +367,7 @@ fn start(directory: &Path, variables: &[(&str, &str)]) -> Service {
 async fn submit_to(service: &Service, url: &str) -> String {
     let request = service.client().post(service.url("/plans"));
     let request = request.json(&scenario()).header("noctule-webhook", url);
-    let accepted = request.send().await.expect("an answer");
-    assert_eq!(accepted.status(), 202);
-    accepted.headers()["location"]
-        .to_str()
-        .expect("text")
-        .to_owned()
+    address_of(&request.send().await.expect("an answer"))
 }
 
 #[tokio::test]

@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::{Node, is_whole};
 use crate::support::lives::a_plan;
 use crate::support::nats::Cluster;
-use crate::support::process::Service;
+use crate::support::process::{Service, address_of};
 use crate::support::size::size;
 use crate::support::sse::{Stream, events};
 
@@ -30,7 +30,7 @@ async fn submit(api: &Service, nth: usize) -> String {
         let answer = request.send().await.unwrap();
         let status = answer.status().as_u16();
         if status == 202 {
-            return answer.headers()["location"].to_str().unwrap().to_owned();
+            return address_of(&answer);
         }
         assert!(status == 503 || status == 409, "{status}");
         tokio::time::sleep(Duration::from_millis(200)).await;

@@ -14,7 +14,7 @@ use super::{Node, ends_once};
 use crate::support::lives::{self, a_run_of, await_run, life, running};
 use crate::support::nats;
 use crate::support::patience::in_time;
-use crate::support::process::Service;
+use crate::support::process::{Service, address_of};
 use crate::support::scenario;
 use crate::support::sse::events;
 
@@ -88,7 +88,7 @@ async fn persist(client: &Client, urls: &Mutex<[Option<String>; 2]>, nth: usize)
         };
         let status = answer.status().as_u16();
         if status == 202 {
-            return answer.headers()["location"].to_str().unwrap().to_owned();
+            return address_of(&answer);
         }
         let problem: Value = answer.json().await.unwrap();
         let leaving = status == 503 && problem["type"] == "/problems/draining";

@@ -5,15 +5,8 @@ use futures_util::future::join_all;
 use noctule::job::{Event, Status};
 use noctule::store::ListQuery;
 
-use crate::support::plans::{ending, history, kind, point, statuses, submission, until};
+use crate::support::plans::{ALL, ending, history, kind, point, statuses, submission, until};
 use crate::support::stores::on_every_backend;
-
-const ALL: ListQuery = ListQuery {
-    status: None,
-    owner: None,
-    before: None,
-    limit: 1_000,
-};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn an_accepted_plan_reads_back_as_submitted() {

@@ -3,15 +3,10 @@
 use noctule::job::{Event, NumberedEvent, PlanId, Status, Submission};
 use noctule::store::{ListQuery, Store, StoreError, TOMBSTONE_MS};
 
-use crate::support::plans::{ending, failure, history, kind, point, statuses, submission, until};
-use crate::support::stores::on_every_backend;
-
-const ALL: ListQuery = ListQuery {
-    status: None,
-    owner: None,
-    before: None,
-    limit: 1_000,
+use crate::support::plans::{
+    ALL, ending, failure, history, kind, point, statuses, submission, until,
 };
+use crate::support::stores::on_every_backend;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn an_unknown_plan_is_not_found() {

@@ -2,9 +2,17 @@
 
 use noctule::export::document::Convergence;
 use noctule::job::{Event, Failure, Plan, PlanId, Status, Submission};
-use noctule::store::{Ending, Store, StoreError};
+use noctule::store::{Ending, ListQuery, Store, StoreError};
 
 use super::patience::in_time;
+
+/// Lists all plans of a test.
+pub(crate) const ALL: ListQuery = ListQuery {
+    status: None,
+    owner: None,
+    before: None,
+    limit: 1_000,
+};
 
 /// A submission of ten iterations.
 pub(crate) fn submission() -> Submission {

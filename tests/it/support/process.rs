@@ -240,12 +240,7 @@ impl Service {
 
     /// Submits a scenario; the plan's address.
     pub(crate) async fn submit(&self, document: &Value) -> String {
-        let answer = self.post(document).await;
-        assert_eq!(answer.status(), 202);
-        answer.headers()["location"]
-            .to_str()
-            .expect("visible ASCII")
-            .to_owned()
+        address_of(&self.post(document).await)
     }
 
     /// Waits for the plan's end; its status document.
@@ -342,6 +337,13 @@ impl Drop for Service {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// The address of the plan that was accepted with this answer.
+pub(crate) fn address_of(accepted: &Response) -> String {
+    assert_eq!(accepted.status(), 202);
+    let address = accepted.headers()["location"].to_str();
+    address.expect("visible ASCII").to_owned()
 }
 
 /// The document that a request is answered with.

@@ -1,7 +1,7 @@
 //! Threats that can be passed above or below.
 
 use crate::cost::Model;
-use crate::geometry::{Point3, Segment};
+use crate::geometry::{Point2, Point3, Segment};
 use crate::scenario::Scenario;
 use crate::threat::Threat;
 
@@ -20,8 +20,8 @@ fn heights(scenario: &Scenario, threat: &Threat) -> (f64, f64) {
         middle,
         extent.min,
         extent.max,
-        crate::geometry::Point2::new(extent.min.x, extent.max.y),
-        crate::geometry::Point2::new(extent.max.x, extent.min.y),
+        Point2::new(extent.min.x, extent.max.y),
+        Point2::new(extent.max.x, extent.min.y),
     ];
     let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
     for at in corners {

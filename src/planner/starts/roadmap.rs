@@ -164,68 +164,60 @@ impl<'p, 's> Legs<'p, 's> {
         let scenario = model.scenario;
         let tolerance = search_tolerance(model);
         let pricer = pricer(model).verdicts();
-        let hilly = pricer.is_hilly();
         let count = places.len();
-        let direct = (scenario.target - scenario.start).norm();
-        let worth = WORTH * direct * metre(scenario);
+        let worth = WORTH * (scenario.target - scenario.start).norm() * metre(scenario);
         // Half the cost of either end as a waypoint; the ends of the route cost nothing.
         let mut own: Vec<f64> = places
             .iter()
             .map(|&place| 0.5 * (model.waypoint(place, tolerance).1 + worth))
             .collect();
         (own[0], own[count - 1]) = (0.0, 0.0);
-        let away = [scenario.start, scenario.target]
-            .map(|end| -> Vec<f64> { places.iter().map(|place| (place - end).norm()).collect() });
-        let ways = away[0].iter().zip(&away[1]).map(|(one, other)| one + other);
-        // A longer leg is part of no route that is worth its fuel, and need not be priced.
-        let worthwhile = known / metre(scenario);
-        let farthest = ways.fold(worthwhile.max(DETOUR * direct), f64::max);
-        // Priced in portions, as all at once would fill megabytes.
-        let mut costs = vec![vec![f64::INFINITY; count]; count];
-        let mut priced = 0;
-        let mut watch = Watch {
-            is_over,
-            most_unwatched: legs_unwatched(scenario),
-            unwatched: 0,
-            is_broken_off: false,
+        let mut legs = Self {
+            places,
+            costs: vec![vec![f64::INFINITY; count]; count],
+            measured: vec![vec![!pricer.is_hilly(); count]; count],
+            pricer,
+            priced: 0,
+            watch: Watch {
+                is_over,
+                most_unwatched: legs_unwatched(scenario),
+                unwatched: 0,
+                is_broken_off: false,
+            },
+            sharpest: scenario.vehicle.sharpest(),
         };
-        'rows: for a in 0..count {
-            let is_near = |b: &usize| {
-                let about = (away[0][a] + away[1][*b]).min(away[0][*b] + away[1][a]);
-                about + (places[*b] - places[a]).norm() <= farthest
-            };
-            let ends: Vec<(usize, usize)> =
-                (a + 1..count).filter(is_near).map(|b| (a, b)).collect();
-            for ends in ends.chunks(watch.most_unwatched) {
-                if !watch.may_go_on(ends.len()) {
-                    break 'rows;
-                }
-                let [from, to] = net::rows(places, ends);
-                let mut prices = vec![Price::ZERO; from.len()];
-                if hilly {
-                    pricer.legs_at_best(&from, &to, &mut prices);
-                } else {
-                    pricer.legs(&from, &to, &mut prices);
-                }
-                for (idx, &(_, b)) in ends.iter().enumerate() {
-                    let (price, lane) = (&prices[idx / LANES], idx % LANES);
-                    if price.violation[lane] <= 0.0 {
-                        let cost = price.cost[lane] + own[a] + own[b];
-                        (costs[a][b], costs[b][a]) = (cost, cost);
-                    }
-                }
-                priced += ends.len() as u64;
+        for ends in worthwhile(scenario, places, known) {
+            if !legs.price(&ends, &own) {
+                break;
             }
         }
-        Self {
-            places,
-            pricer,
-            costs,
-            measured: vec![vec![!hilly; count]; count],
-            priced,
-            watch,
-            sharpest: scenario.vehicle.sharpest(),
+        legs
+    }
+
+    /// Price these legs, given half of each place's `own` cost; false where there is no time for all of them.
+    fn price(&mut self, ends: &[(usize, usize)], own: &[f64]) -> bool {
+        let hilly = self.pricer.is_hilly();
+        for ends in ends.chunks(self.watch.most_unwatched) {
+            if !self.watch.may_go_on(ends.len()) {
+                return false;
+            }
+            let [from, to] = net::rows(self.places, ends);
+            let mut prices = vec![Price::ZERO; from.len()];
+            if hilly {
+                self.pricer.legs_at_best(&from, &to, &mut prices);
+            } else {
+                self.pricer.legs(&from, &to, &mut prices);
+            }
+            for (idx, &(a, b)) in ends.iter().enumerate() {
+                let (price, lane) = (&prices[idx / LANES], idx % LANES);
+                if price.violation[lane] <= 0.0 {
+                    let cost = price.cost[lane] + own[a] + own[b];
+                    (self.costs[a][b], self.costs[b][a]) = (cost, cost);
+                }
+            }
+            self.priced += ends.len() as u64;
         }
+        true
     }
 
     /// The cheapest chains of at most `most` legs with turns that the vehicle can fly, no two alike.
@@ -332,6 +324,29 @@ impl<'p, 's> Legs<'p, 's> {
         }
         few.into_iter().map(|(_, other)| other).collect()
     }
+}
+
+/// From each place the legs to later ones that need be priced: a longer one is part of no route that is worth its fuel.
+/// Place by place, as the prices of all at once would fill megabytes.
+fn worthwhile(
+    scenario: &Scenario,
+    places: &[Point3],
+    known: f64,
+) -> impl Iterator<Item = Vec<(usize, usize)>> {
+    let direct = (scenario.target - scenario.start).norm();
+    let away = [scenario.start, scenario.target]
+        .map(|end| -> Vec<f64> { places.iter().map(|place| (place - end).norm()).collect() });
+    let ways = away[0].iter().zip(&away[1]).map(|(one, other)| one + other);
+    let worthwhile = known / metre(scenario);
+    let farthest = ways.fold(worthwhile.max(DETOUR * direct), f64::max);
+    (0..places.len()).map(move |a| {
+        let is_near = |b: &usize| {
+            let about = (away[0][a] + away[1][*b]).min(away[0][*b] + away[1][a]);
+            about + (places[*b] - places[a]).norm() <= farthest
+        };
+        let near = (a + 1..places.len()).filter(is_near);
+        near.map(|b| (a, b)).collect()
+    })
 }
 
 impl few::Legs for Legs<'_, '_> {

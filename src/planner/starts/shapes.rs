@@ -185,14 +185,12 @@ pub(super) fn along_strings(model: &Model, is_over: &dyn Fn() -> bool) -> Vec<Ve
         follow(&Obstacles::soft(scenario, in_the_way), STRINGS);
         follow(&Obstacles::hard(scenario, in_the_way), STRINGS);
     }
-    if !scenario.terrain.is_flat() {
-        let steep = steep_ground(scenario);
-        if !steep.is_empty() {
-            let outlines = scenario.threats.iter().map(Outline::soft).chain(steep);
-            let ends = [scenario.start.xy(), scenario.target.xy()];
-            let obstacles = Obstacles::new(outlines.map(Some), ends, Some(scenario.area));
-            follow(&obstacles, STRINGS_ROUND_MOUNTAINS);
-        }
+    let steep = steep_ground(scenario);
+    if !steep.is_empty() {
+        let outlines = scenario.threats.iter().map(Outline::soft).chain(steep);
+        let ends = [scenario.start.xy(), scenario.target.xy()];
+        let obstacles = Obstacles::new(outlines.map(Some), ends, Some(scenario.area));
+        follow(&obstacles, STRINGS_ROUND_MOUNTAINS);
     }
     // Straight ahead, for when crossing soft zones is worth it.
     shapes.push(vec![scenario.start, scenario.target]);

@@ -60,24 +60,12 @@ impl Running {
         self.phase.send_replace(Phase::Draining);
         drain(self.pool, &times).await;
         self.phase.send_replace(Phase::Stopping);
-        let served = match cause {
-            Cause::Signal(_) => timeout_at(begun + times.answers, self.server)
-                .await
-                .unwrap_or(Ok(()))
-                .context("the server broke"),
-            Cause::Server(ended) => ended
-                .context("the server broke")
-                .and_then(|()| bail!("the server ended unasked")),
-        };
-        if let Some(sender) = self.sender
-            && timeout_at(begun + times.answers, sender.finish())
-                .await
-                .is_err()
-        {
-            tracing::warn!(
-                "some webhooks did not arrive in time; the next process sends them again"
-            );
-        }
+        // Side by side: neither takes the other's time.
+        let last = begun + times.answers;
+        let (served, ()) = tokio::join!(
+            last_answers(cause, self.server, last),
+            last_webhooks(self.sender, last),
+        );
         drop(self.sweeper);
         let until = (begun + grace).max(Instant::now() + LEAST_CLOSE);
         if timeout_at(until, self.store.close()).await.is_err() {
@@ -121,6 +109,31 @@ async fn drain(pool: Pool, times: &Times) {
         .is_err()
     {
         tracing::warn!("some runs did not stop in time; the next process runs them again");
+    }
+}
+
+/// Let connections finish their answers.
+///
+/// # Errors
+/// When the server broke, or had ended by itself.
+async fn last_answers(cause: Cause, server: JoinHandle<()>, until: Instant) -> anyhow::Result<()> {
+    match cause {
+        Cause::Signal(_) => timeout_at(until, server)
+            .await
+            .unwrap_or(Ok(()))
+            .context("the server broke"),
+        Cause::Server(ended) => ended
+            .context("the server broke")
+            .and_then(|()| bail!("the server ended unasked")),
+    }
+}
+
+/// Let webhooks on their way arrive.
+async fn last_webhooks(sender: Option<Sender>, until: Instant) {
+    if let Some(sender) = sender
+        && timeout_at(until, sender.finish()).await.is_err()
+    {
+        tracing::warn!("some webhooks did not arrive in time; the next process sends them again");
     }
 }
 

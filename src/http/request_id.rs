@@ -74,8 +74,9 @@ fn printable(path: &str) -> &str {
 fn of_caller(headers: &HeaderMap) -> Option<String> {
     let id = headers.get(X_REQUEST_ID)?.to_str().ok()?;
     let sane = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~=;+/@,".contains(&byte);
-    let sane_length = (1..=MAX_LENGTH).contains(&id.len()) && !auth::holds_a_key(id);
-    sane_length.then(|| id.bytes().all(sane).then(|| id.to_owned()))?
+    let is_safe =
+        (1..=MAX_LENGTH).contains(&id.len()) && id.bytes().all(sane) && !auth::holds_a_key(id);
+    is_safe.then(|| id.to_owned())
 }
 
 /// A header that cannot be read counts as absent.

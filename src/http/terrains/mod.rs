@@ -31,6 +31,7 @@ use super::problem::Problem;
 use super::{AppState, off_thread};
 use crate::catalogue::{Catalogue, CatalogueError, Claim, Entry, Expected, Naming, Tally};
 use crate::digest::sha256_hex;
+use crate::store::DatasetUse;
 use crate::terrain::is_dataset_name;
 
 /// Uploads at the same time; further ones wait, as long as a body may pause.
@@ -178,7 +179,7 @@ pub(super) async fn list(State(state): State<AppState>, _: NoParams) -> Result<R
     Ok(Json(TerrainsDocument { terrains }).into_response())
 }
 
-fn active(uses: &[crate::store::DatasetUse], sha256: Option<&str>) -> u64 {
+fn active(uses: &[DatasetUse], sha256: Option<&str>) -> u64 {
     let used = uses.iter().find(|used| Some(&*used.sha256) == sha256);
     used.map_or(0, |used| used.active)
 }

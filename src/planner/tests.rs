@@ -166,7 +166,8 @@ fn a_time_limit_stops_the_run() {
 fn a_stop_within_an_iteration_is_noticed() {
     let mut scenario = scenario();
     let far = scenario.threats[0].clone();
-    scenario.threats.extend((0..20_000).map(|_| far.clone()));
+    // So many that no more than a block of routes may pass between two checks.
+    scenario.threats.extend((0..12_000).map(|_| far.clone()));
     // The stop is checked once per block of routes: a population has eight, and an iteration one more check.
     let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(5));
     assert_eq!(outcome.stop_reason, StopReason::Cancelled);

@@ -347,9 +347,10 @@ proptest! {
         let points = (0..steps).map(|i| leg.at(t0 + (t1 - t0) * (f64::from(i) + 0.5) / f64::from(steps)).xy());
         let (mut sum, mut signed) = (0.0, f64::INFINITY);
         for point in points {
-            sum += star.intensity(point);
-            let distance = star.ring_distance(point);
-            signed = signed.min(if star.contains(point) { -distance } else { distance });
+            // What `intensity` is made of, with the distance asked for once.
+            let distance = star.distance(point);
+            sum += intensity(star.margin, distance.max(0.0));
+            signed = signed.min(distance);
         }
         sum *= leg.length() * (t1 - t0) / f64::from(steps);
         let exposure = star.exposure(&leg, (t0, t1));

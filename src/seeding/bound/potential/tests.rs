@@ -303,17 +303,23 @@ fn no_leg_costs_less_than_the_rise_of_the_potential() {
             let (sin, cos) = libm::sincos(share * std::f64::consts::TAU);
             let to = from + Vector2::new(cos, sin) * (400.0 * (share * 37.0).fract());
             let place = |part: i32| from + (to - from) * ((f64::from(part) + 0.5) / 1000.0);
-            let is_free = |at: Point2| walls.iter().all(|wall| wall.distance(at) > wall.core);
-            if !(0..1000).all(|part| is_free(place(part)) && scenario.area.contains(place(part))) {
-                continue;
-            }
-            let depth = |at: Point2| -> f64 {
-                let depths = walls
-                    .iter()
-                    .map(|wall| (wall.influence - wall.distance(at)).max(0.0));
-                depths.sum()
+            // Nothing where a wall or the border is in the way.
+            let depth = |at: Point2| -> Option<f64> {
+                let mut depths = 0.0;
+                for wall in &walls {
+                    let distance = wall.distance(at);
+                    if distance <= wall.core {
+                        return None;
+                    }
+                    depths += (wall.influence - distance).max(0.0);
+                }
+                scenario.area.contains(at).then_some(depths)
             };
-            let depths = (0..1000).map(|part| depth(place(part))).sum::<f64>() / 1000.0;
+            let depths = (0..1000).map(|part| depth(place(part)));
+            let Some(depths) = depths.sum::<Option<f64>>() else {
+                continue;
+            };
+            let depths = depths / 1000.0;
             let cost = (to - from).norm() * (prices.fuel + prices.exposure * depths);
             let to_there = rise(to, 0.0);
             assert!(

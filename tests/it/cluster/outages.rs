@@ -15,7 +15,7 @@ use super::{open, open_as};
 use crate::support::lives::{a_run_of, running};
 use crate::support::nats::{Cluster, NatsServer};
 use crate::support::patience::{eventually, in_time};
-use crate::support::plans::{ending, history, kind, point, submission, until};
+use crate::support::plans::{ending, history, history_to_its_end, kind, point, submission, until};
 use crate::support::process::Service;
 use crate::support::stores::node;
 
@@ -70,7 +70,7 @@ async fn after_a_server_restart_nothing_is_lost_and_work_goes_on() {
         .await
         .unwrap();
     until(&*follower, running, |plan| plan.status == Status::Succeeded).await;
-    let told = history(&*follower, running).await;
+    let told = history_to_its_end(&*follower, running).await;
     assert_eq!(told.last(), Some(&Event::End(Status::Succeeded)));
     assert_eq!(told, history(&*store, running).await);
     assert_eq!(store.claim().await.unwrap().plan.id, waiting);
@@ -174,7 +174,7 @@ async fn a_run_survives_the_loss_of_the_leader() {
     let end = ending(Status::Succeeded).after(vec![point(4, None)], 0);
     persist(|| store.finish(&lease, end.clone())).await;
     until(&*follower, id, |plan| plan.status == Status::Succeeded).await;
-    let told = history(&*follower, id).await;
+    let told = history_to_its_end(&*follower, id).await;
     assert_eq!(told.len(), 2 + 5 + 2);
     assert_eq!(told, history(&*store, id).await);
 }

@@ -11,7 +11,7 @@ use noctule::store::{Options, Retention, Store, wall_clock};
 use super::open;
 use crate::support::nats::{self, NatsServer, namespace};
 use crate::support::patience::eventually;
-use crate::support::plans::{ending, history, kind, point, submission, until};
+use crate::support::plans::{ending, history, history_to_its_end, kind, point, submission, until};
 use crate::support::stores::{LEASE, node};
 use crate::support::wire::Wire;
 
@@ -52,7 +52,7 @@ async fn a_node_that_is_cut_off_loses_its_run_and_catches_up_later() {
     let end = ending(Status::Succeeded).after(vec![point(3, None)], 0);
     near.finish(&taken, end).await.unwrap();
     until(&*far, id, |plan| plan.status == Status::Succeeded).await;
-    let told = history(&*far, id).await;
+    let told = history_to_its_end(&*far, id).await;
     // Queued, running, a point; queued and running again; the points; succeeded, the end.
     assert_eq!(told.len(), 3 + 2 + STEPS * EVENTS + 1 + 2);
     assert_eq!(told.last(), Some(&Event::End(Status::Succeeded)));
@@ -89,7 +89,7 @@ async fn a_wrong_clock_never_takes_over_a_run() {
             .await
             .unwrap();
         until(&**accepting, id, |plan| plan.status == Status::Succeeded).await;
-        assert_eq!(history(&**accepting, id).await.len(), 4);
+        assert_eq!(history_to_its_end(&**accepting, id).await.len(), 4);
     }
 }
 

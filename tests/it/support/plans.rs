@@ -78,6 +78,21 @@ pub(crate) async fn history(store: &dyn Store, id: PlanId) -> Vec<Event> {
         .collect()
 }
 
+/// The same, as soon as the last of them has come: a node that is behind may know sooner that a plan has ended.
+pub(crate) async fn history_to_its_end(store: &dyn Store, id: PlanId) -> Vec<Event> {
+    let mut changes = store.changes(id);
+    let whole = async {
+        loop {
+            let told = history(store, id).await;
+            if matches!(told.last(), Some(Event::End(_))) {
+                return told;
+            }
+            changes.changed().await.expect("the store is open");
+        }
+    };
+    in_time(whole).await
+}
+
 /// The statuses that a plan has gone through, according to its events.
 pub(crate) fn statuses(events: &[Event]) -> Vec<Status> {
     let statuses = events.iter().filter_map(|event| match event {

@@ -235,8 +235,12 @@ impl JetStream {
                 Orphan::Nobodys => {
                     tracing::info!(plan_id = %id, "a job that was never accepted is thrown away");
                     let scenario = Document::scenario_key(id);
-                    self.servers.remove_documents(id, &[scenario]).await?;
-                    answer(id, job, AckKind::Ack).await;
+                    let removed = self.servers.remove_documents(id, &[scenario]).await;
+                    let kind = removed
+                        .as_ref()
+                        .map_or(AckKind::Nak(None), |()| AckKind::Ack);
+                    answer(id, job, kind).await;
+                    removed?;
                 }
             },
             Err(error) => {

@@ -36,7 +36,7 @@ const UNLIMITED: i64 = -1;
 pub(super) const ALIVE: Duration = Duration::from_secs(30);
 
 /// How long a node has to deliver one webhook.
-const TELLING: Duration = Duration::from_secs(120);
+pub(super) const TELLING: Duration = Duration::from_secs(120);
 
 /// All that the store keeps on the servers.
 pub(super) struct Servers {

@@ -1,9 +1,11 @@
 //! Webhooks for ends of plans: each sent by one node at a time.
 
 use async_nats::jetstream::kv::CreateErrorKind;
+use tokio::time::Instant;
 
 use super::JetStream;
-use super::errors::failed;
+use super::connect::TELLING;
+use super::errors::{failed, is_outrun};
 use super::record::{Hook, State};
 use super::steps::Change;
 use super::view::Standing;
@@ -19,6 +21,9 @@ impl JetStream {
         now_ms: i64,
         limit: usize,
     ) -> Result<Vec<Webhook>, StoreError> {
+        self.telling
+            .lock()
+            .retain(|_, taken| taken.elapsed() < TELLING);
         // Other nodes may be sending those that have been due longest.
         let due = self.view.known().due(now_ms, LOOKED_AT * limit);
         let mut taken: Vec<Webhook> = Vec::new();
@@ -35,7 +40,7 @@ impl JetStream {
             if of_owner.count() == limit.div_ceil(2) {
                 continue;
             }
-            if self.telling.lock().contains(&id) {
+            if self.is_telling(id) {
                 taken.push(webhook);
             } else {
                 taken.extend(self.take(id, now_ms).await?);
@@ -69,26 +74,43 @@ impl JetStream {
             .await
         {
             Ok(_) => {
-                self.telling.lock().insert(id);
+                self.telling.lock().insert(id, Instant::now());
                 Ok(true)
             }
             Err(error) if error.kind() == CreateErrorKind::AlreadyExists => {
-                self.has_right_to_tell(id).await
+                self.may_go_on_telling(id).await
             }
             Err(error) => Err(failed(&format!("webhook of plan {id}"), &error)),
         }
     }
 
-    /// Whether the right to send this webhook that somebody has is this node's: its taking may not have been acknowledged.
-    async fn has_right_to_tell(&self, id: PlanId) -> Result<bool, StoreError> {
-        let entry = self.servers.tellers.get(id.to_string()).await;
-        let entry = entry.map_err(|error| failed(&format!("webhook of plan {id}"), &error))?;
-        let own = self.node.to_string();
-        let is_own = entry.is_some_and(|teller| teller == own.as_bytes());
-        if is_own {
-            self.telling.lock().insert(id);
+    /// Take the right to send this webhook anew if it is this node's: that it was taken may not have been acknowledged, or
+    /// may be long ago.
+    async fn may_go_on_telling(&self, id: PlanId) -> Result<bool, StoreError> {
+        let what = || format!("webhook of plan {id}");
+        let (tellers, own) = (&self.servers.tellers, self.node.to_string());
+        let entry = tellers.entry(id.to_string()).await;
+        let entry = entry.map_err(|error| failed(&what(), &error))?;
+        let Some(entry) = entry.filter(|entry| entry.value == own.as_bytes()) else {
+            return Ok(false);
+        };
+        let renewed = tellers.update(id.to_string(), own.into(), entry.revision);
+        match renewed.await {
+            Ok(_) => {
+                self.telling.lock().insert(id, Instant::now());
+                Ok(true)
+            }
+            Err(error) if is_outrun(&error) => Ok(false),
+            Err(error) => Err(failed(&what(), &error)),
         }
-        Ok(is_own)
+    }
+
+    /// Whether this node has the right to send this webhook for some time yet.
+    fn is_telling(&self, id: PlanId) -> bool {
+        let telling = self.telling.lock();
+        telling
+            .get(&id)
+            .is_some_and(|taken| taken.elapsed() < TELLING / 2)
     }
 
     pub(super) async fn webhook_tried(
@@ -126,7 +148,7 @@ impl JetStream {
 
     /// Leave this webhook to whichever node is first.
     async fn let_tell(&self, id: PlanId) {
-        if self.telling.lock().remove(&id)
+        if self.telling.lock().remove(&id).is_some()
             && let Err(error) = self.servers.tellers.purge(id.to_string()).await
         {
             tracing::debug!(%error, plan_id = %id, "a webhook is left to others two minutes later");
@@ -135,7 +157,7 @@ impl JetStream {
 
     /// Leave all of them to other nodes.
     pub(super) async fn let_tell_all(&self) {
-        let all = self.telling.lock().clone();
+        let all: Vec<_> = self.telling.lock().keys().copied().collect();
         for id in all {
             self.let_tell(id).await;
         }

@@ -40,7 +40,7 @@ mod together;
 mod turns;
 mod view;
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicUsize};
 use std::time::Duration;
@@ -107,8 +107,8 @@ struct JetStream {
     all_slots: AtomicUsize,
     /// How far this node's clock is ahead of the servers', milliseconds.
     ahead_ms: AtomicI64,
-    /// Plans whose webhooks this node is sending.
-    telling: Mutex<BTreeSet<PlanId>>,
+    /// Plans whose webhooks this node is sending, and when it took the right to.
+    telling: Mutex<BTreeMap<PlanId, Instant>>,
     /// Becomes true when the store is closed.
     end: watch::Sender<bool>,
     /// Becomes true when a stream has vanished from the servers.

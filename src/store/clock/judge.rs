@@ -10,8 +10,8 @@ const PROBATION_MS: i64 = 60 * 60 * 1_000;
 pub(super) struct Verdict {
     /// The time to go by.
     pub(super) now_ms: i64,
-    /// How far the clock is from that, while it is not trusted.
-    pub(super) off_ms: Option<i64>,
+    /// Whether that is what the clock shows.
+    pub(super) is_trusted: bool,
     /// See [`super::SteadyClock::reached_ms`].
     pub(super) reached_ms: Option<i64>,
 }
@@ -55,7 +55,7 @@ impl Judge {
         let start = self.start.as_ref();
         Verdict {
             now_ms: self.origin_ms.saturating_add(passed_ms),
-            off_ms: (!is_trusted).then(|| origin_ms.saturating_sub(self.origin_ms)),
+            is_trusted,
             reached_ms: start.map(|start| start.earliest_ms.saturating_add(passed_ms)),
         }
     }
@@ -160,11 +160,13 @@ mod tests {
     fn judged(judge: &mut Judge, minutes: i64, ahead_ms: i64) -> (i64, Option<i64>, Option<i64>) {
         let passed_ms = 60_000 * minutes;
         let right_ms = BEGIN_MS + passed_ms;
-        let verdict = judge.look(right_ms + ahead_ms, passed_ms);
+        let shown_ms = right_ms + ahead_ms;
+        let verdict = judge.look(shown_ms, passed_ms);
+        let off_ms = shown_ms - verdict.now_ms;
         let ahead = |ms: i64| ms - right_ms;
         (
             ahead(verdict.now_ms),
-            verdict.off_ms,
+            (!verdict.is_trusted).then_some(off_ms),
             verdict.reached_ms.map(ahead),
         )
     }

@@ -8,8 +8,8 @@ use std::time::Duration;
 use parking_lot::Mutex;
 use rustix::time::{ClockId, clock_gettime};
 
+use judge::Judge;
 pub use judge::TOLERANCE_MS;
-use judge::{Judge, Verdict};
 
 /// Tells the time: milliseconds since 1970.
 pub type Clock = Arc<dyn Fn() -> i64 + Send + Sync>;
@@ -80,11 +80,13 @@ impl SteadyClock {
     /// What an operator should know of the followed clock while it is not believed.
     #[must_use]
     pub fn warning(&self) -> Option<String> {
-        let Verdict {
-            off_ms, reached_ms, ..
-        } = self.ask(Judge::look);
-        let off_ms = off_ms?;
-        let what = if reached_ms.is_some() {
+        let (shown_ms, verdict) =
+            self.ask(|judge, shown_ms, passed_ms| (shown_ms, judge.look(shown_ms, passed_ms)));
+        if verdict.is_trusted {
+            return None;
+        }
+        let off_ms = shown_ms.saturating_sub(verdict.now_ms);
+        let what = if verdict.reached_ms.is_some() {
             format!("is {} ms behind the newest record", off_ms.saturating_abs())
         } else {
             format!("jumped by {off_ms} ms")

@@ -53,7 +53,7 @@ impl Place {
     /// Opens the store.
     pub(crate) async fn open(&self, options: Options) -> Result<Arc<dyn Store>, StoreError> {
         if let Some(address) = &self.address {
-            let store = JetStreamStore::open(node(address), options).await?;
+            let store = Box::pin(JetStreamStore::open(node(address), options)).await?;
             return Ok(Arc::new(store));
         }
         let path = self.path().to_owned();

@@ -55,6 +55,13 @@ impl Options {
         }
     }
 
+    /// The newest time among what an opened store has; `None` when it is empty.
+    pub(super) fn has_seen(&self, newest_ms: Option<i64>) {
+        if let Some((clock, newest_ms)) = self.steady.as_ref().zip(newest_ms) {
+            clock.has_seen(newest_ms);
+        }
+    }
+
     /// By what time things expire when it is `now_ms`.
     pub(super) fn expiry_ms(&self, now_ms: i64) -> i64 {
         let reached_ms = self.steady.as_ref().and_then(|clock| clock.reached_ms());

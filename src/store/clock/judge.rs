@@ -6,6 +6,9 @@ pub const TOLERANCE_MS: i64 = 60_000;
 /// A clock that is in doubt is trusted again once it has run steadily for this long.
 const PROBATION_MS: i64 = 60 * 60 * 1_000;
 
+/// The end of the year 9999: a record of a later time is damaged.
+const LATEST_MS: i64 = 253_402_300_799_999;
+
 /// What to make of a look at the wall clock.
 pub(super) struct Verdict {
     /// The time to go by.
@@ -112,7 +115,7 @@ impl Judge {
 
     /// See [`super::SteadyClock::has_seen`].
     pub(super) fn has_seen(&mut self, newest_ms: i64, shown_ms: i64, passed_ms: i64) {
-        if passed_ms >= PROBATION_MS {
+        if passed_ms >= PROBATION_MS || newest_ms > LATEST_MS {
             return;
         }
         self.look(shown_ms, passed_ms);
@@ -267,11 +270,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_seen_later_or_is_older_changes_nothing() {
+    fn what_is_seen_later_is_older_or_damaged_changes_nothing() {
         let mut judge = begun(0, 8 * DAY_MS);
         judge.has_seen(BEGIN_MS - YEAR_MS, BEGIN_MS, 0);
         assert_eq!(judged(&mut judge, 0, 0), (0, None, Some(-8 * DAY_MS)));
         let mut judge = Judge::new(BEGIN_MS);
+        judge.has_seen(i64::MAX, BEGIN_MS, 0);
         judge.has_seen(BEGIN_MS + YEAR_MS, BEGIN_MS + PROBATION_MS, PROBATION_MS);
         assert_eq!(judged(&mut judge, 61, 0), (0, None, None));
     }

@@ -59,11 +59,7 @@ impl JetStream {
 
     /// See how far this node's clock is to be relied on, once the plans are known.
     pub(super) async fn judge_clock(&self) -> Result<(), StoreError> {
-        if let Some(clock) = &self.options.steady
-            && let Some(newest_ms) = self.view.known().newest_ms()
-        {
-            clock.has_seen(newest_ms);
-        }
+        self.options.has_seen(self.view.known().newest_ms());
         self.servers.outlast(|| self.compare_clocks()).await
     }
 

@@ -108,11 +108,7 @@ impl SqliteStore {
         // `IN (...)` check SQLite builds a temporary table, a quarter of the cost of inserting a plan.
         connection.pragma_update(None, "ignore_check_constraints", true)?;
         sync_directory(data_dir)?;
-        if let Some(clock) = &options.steady
-            && let Some(newest_ms) = read::newest_ms(&connection, (options.clock)())?
-        {
-            clock.has_seen(newest_ms);
-        }
+        options.has_seen(read::newest_ms(&connection, (options.clock)())?);
         Self::assemble(connection, lock, file, options)
     }
 

@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use futures_util::future::join_all;
+use http_body_util::BodyExt as _;
 use noctule::job::{Event, Status};
 use noctule::store::Options;
 use reqwest::Client;
@@ -233,22 +234,24 @@ async fn a_stream_of_which_nothing_is_taken_is_ended() {
     let api = Api::new();
     let server = Server::with_patience(&api, Duration::from_secs(1)).await;
     let plan = Plan::at(server, api).await;
-    let stalled = stall(plan.server.address, &plan.address).await;
     plan.run(20_000).await;
-    let mut unread = Http2::new(plan.server.address, 1).await;
+    let mut stalled = stall(plan.server.address, &plan.address).await;
+    let mut connection = Http2::new(plan.server.address, 1).await;
     let events = plan.server.url(&format!("{}/events", plan.address));
-    assert_eq!(unread.get(events).await.status(), 200);
+    let unread = connection.get(events).await;
+    assert_eq!(unread.status(), 200);
 
-    let open = async || {
+    eventually(async || {
         let metrics = plan.api.get("/metrics").await.body;
         let metrics = String::from_utf8_lossy(&metrics).into_owned();
-        let mut lines = metrics.lines();
-        let line = lines.find(|line| line.starts_with("noctule_http_event_streams "));
-        line.expect("it is counted").to_owned()
-    };
-    assert_eq!(open().await, "noctule_http_event_streams 2");
-    eventually(async || open().await == "noctule_http_event_streams 0").await;
-    drop((stalled, unread));
+        metrics.contains("\nnoctule_http_event_streams 0\n")
+    })
+    .await;
+    let arrived = rest(&mut stalled).await;
+    assert!(arrived.contains("\nevent: convergence\n"));
+    assert!(!arrived.contains("\nevent: end\n"));
+    unread.collect().await.expect_err("it was cut off");
+    drop(connection);
     assert_eq!(
         plan.read("?rate=0", 26_000, usize::MAX)
             .await

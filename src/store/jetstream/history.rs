@@ -213,22 +213,13 @@ mod tests {
     use uuid::Uuid;
 
     use super::*;
-    use crate::job::{Status, Submission};
+    use crate::job::Status;
     use crate::store::jetstream::known::Known;
-    use crate::store::jetstream::record::{Document, Placed, Queued, Record};
-
-    fn record() -> Record {
-        let submission = Submission::example();
-        let queued = Queued {
-            place: 1,
-            position: 1,
-        };
-        Record::accepted(&submission, queued, Document::scenario(Uuid::nil(), "{}"))
-    }
+    use crate::store::jetstream::record::{Placed, Record};
 
     /// Steps of one, two, one, two, ... events.
     fn steps(count: u64) -> Vec<Step> {
-        let mut record = record();
+        let mut record = Record::example();
         (0..count)
             .map(|nth| {
                 let events = vec![Event::End(Status::Failed); 1 + (nth % 2) as usize];

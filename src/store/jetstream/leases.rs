@@ -72,16 +72,16 @@ impl Leases {
             .is_some()
     }
 
-    /// A plan has changed; its run here is stopped when that was requested, or when it is no longer ours.
+    /// A plan has changed; its run here is stopped when that was requested, or when it is no longer ours. States may
+    /// come late, when newer ones have been heeded already.
     pub(super) fn heed(&self, id: PlanId, state: &State) {
         let all = self.held();
         let Some(held) = all.get(&id) else { return };
-        let own = matches!(state, State::Kept(record) if record.is_run_under(held.attempt));
-        let asked = matches!(state, State::Kept(record) if record.plan.cancel_requested);
-        if asked || !own {
+        let order = Order::to_run(held.attempt, state);
+        if order != Order::GoOn {
             held.cancel.send_replace(true);
         }
-        if !own {
+        if order == Order::LetGo {
             // Its worker is told so at its next step, which lets go.
             held.renewing.abort();
         }
@@ -136,6 +136,29 @@ impl Leases {
     }
 }
 
+/// What the state of a plan means to its run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Order {
+    GoOn,
+    /// Somebody requested the end of the plan.
+    Stop,
+    /// The plan is another run's, or nobody's.
+    LetGo,
+}
+
+impl Order {
+    fn to_run(attempt: u64, state: &State) -> Self {
+        match state {
+            // From before this run.
+            State::Kept(record) if record.attempt < attempt => Self::GoOn,
+            State::Kept(record) if !record.is_run_under(attempt) => Self::LetGo,
+            State::Kept(record) if record.plan.cancel_requested => Self::Stop,
+            State::Kept(_) => Self::GoOn,
+            State::Buried(_) => Self::LetGo,
+        }
+    }
+}
+
 impl Drop for Leases {
     fn drop(&mut self) {
         for held in self.held().values() {
@@ -151,5 +174,35 @@ async fn renew(id: PlanId, jobs: watch::Receiver<Job>, period: Duration) {
         if let Err(error) = job.ack_with(AckKind::Progress).await {
             tracing::warn!(plan_id = %id, error = %error, "a lease was not renewed; trying again");
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::record::Record;
+    use super::*;
+
+    /// A thread that takes in a step may be held up until the run that follows it is held here.
+    #[test]
+    fn only_a_request_or_a_later_state_ends_a_run() {
+        let order = |change: &dyn Fn(&mut Record)| {
+            let mut record = Record::example();
+            record.plan.start(1_000).expect("it is queued");
+            record.attempt = 2;
+            change(&mut record);
+            Order::to_run(2, &State::Kept(Box::new(record)))
+        };
+        let requeue = |record: &mut Record| record.plan.requeue().expect("it is running");
+        assert_eq!(order(&|_| {}), Order::GoOn);
+        assert_eq!(order(&|record| record.plan.request_cancel()), Order::Stop);
+        assert_eq!(order(&requeue), Order::LetGo);
+        assert_eq!(order(&|record| record.attempt = 3), Order::LetGo);
+        let earlier = |record: &mut Record| record.attempt = 1;
+        assert_eq!(order(&earlier), Order::GoOn);
+        let waited = |record: &mut Record| {
+            requeue(record);
+            earlier(record);
+        };
+        assert_eq!(order(&waited), Order::GoOn);
     }
 }

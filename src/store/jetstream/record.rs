@@ -130,6 +130,17 @@ impl Record {
         }
     }
 
+    /// A record for tests, of a plan that waits.
+    #[cfg(test)]
+    pub(super) fn example() -> Self {
+        let queued = Queued {
+            place: 1,
+            position: 1,
+        };
+        let scenario = Document::scenario(uuid::Uuid::nil(), "{}");
+        Self::accepted(&Submission::example(), queued, scenario)
+    }
+
     pub(super) fn id(&self) -> PlanId {
         self.plan.id
     }

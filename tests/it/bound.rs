@@ -27,11 +27,13 @@ struct Drawn {
     /// Start and target.
     ends: [[f64; 2]; 2],
     threats: Vec<String>,
+    hills: Vec<Hill>,
     /// Factor for all lengths.
     scale: f64,
     fuel: f64,
     threat: f64,
     altitude: f64,
+    /// Of start and target above the ground.
     heights: [f64; 2],
     /// The lower limit of the band, metres; the upper one is 200.
     lowest: f64,
@@ -39,6 +41,29 @@ struct Drawn {
     waypoints: usize,
     is_sampled: bool,
     seed: u64,
+}
+
+/// A hill, or a hollow.
+#[derive(Debug, Clone, Copy)]
+struct Hill {
+    center: [f64; 2],
+    height: f64,
+    spread: [f64; 2],
+}
+
+impl Hill {
+    fn at(&self, place: [f64; 2]) -> f64 {
+        let off = |axis: usize| (place[axis] - self.center[axis]) / self.spread[axis];
+        self.height * libm::exp(-off(0) * off(0) - off(1) * off(1))
+    }
+
+    fn document(&self) -> String {
+        let ([x, y], [wide, long]) = (self.center, self.spread);
+        format!(
+            r#"{{"center": {{"x": {x}, "y": {y}}}, "height": {}, "spread": {{"x": {wide}, "y": {long}}}}}"#,
+            self.height
+        )
+    }
 }
 
 fn heights() -> impl Strategy<Value = String> {
@@ -128,6 +153,7 @@ fn drawn() -> impl Strategy<Value = Drawn> {
                 Drawn {
                     ends: [[80.0, 120.0], [920.0, 840.0]],
                     threats,
+                    hills: Vec::new(),
                     scale: 1.0,
                     fuel,
                     threat,
@@ -258,6 +284,26 @@ fn soft() -> impl Strategy<Value = Drawn> {
     )
 }
 
+/// Scenarios over hills and hollows; ends stand on them, above them and in between.
+fn hilly() -> impl Strategy<Value = Drawn> {
+    let height = prop_oneof![3 => 10.0..300.0f64, 1 => -200.0..-10.0f64];
+    let place = || 0.0..1000.0f64;
+    let hill = ([place(), place()], height, [40.0..300.0f64, 40.0..300.0f64]);
+    let hill = hill.prop_map(|(center, height, spread)| Hill {
+        center,
+        height,
+        spread,
+    });
+    let end = || prop_oneof![1 => Just(0.0), 2 => 0.0..200.0f64];
+    let hills = prop::collection::vec(hill, 1..7);
+    (drawn(), hills, [end(), end()]).prop_map(|(drawn, hills, heights)| Drawn {
+        threats: drawn.threats.into_iter().take(4).collect(),
+        hills,
+        heights,
+        ..drawn
+    })
+}
+
 /// Multiplies all lengths of a document by `scale`.
 fn scaled(value: &mut Value, scale: f64) {
     const LENGTHS: [&str; 10] = [
@@ -294,21 +340,29 @@ fn rules() -> Rules {
 
 /// `None` when no route can exist or a ring is invalid.
 fn scenario(drawn: &Drawn) -> Option<Scenario> {
+    let ground = |end: [f64; 2]| drawn.hills.iter().map(|hill| hill.at(end)).sum::<f64>();
+    let terrain = if drawn.hills.is_empty() {
+        r#"{"kind": "flat"}"#.to_owned()
+    } else {
+        let hills: Vec<String> = drawn.hills.iter().map(Hill::document).collect();
+        format!(r#"{{"kind": "peaks", "peaks": [{}]}}"#, hills.join(", "))
+    };
     let document = format!(
         r#"{{ "frame": "local",
             "start": {{ "x": {}, "y": {}, "z": {} }}, "target": {{ "x": {}, "y": {}, "z": {} }},
             "area": {{ "min": {{ "x": 0, "y": 0 }}, "max": {{ "x": 1000, "y": 1000 }} }},
             "altitude": {{ "min": {}, "max": 200 }},
+            "terrain": {terrain},
             "vehicle": {{ "max_turn_deg": 180, "max_climb_deg": {}, "fuel_per_km": 1000, "min_leg": 0.001 }},
             "weights": {{ "fuel": {}, "threat": {}, "altitude": {} }},
             "planner": {{ "algorithm": "tms-sba", "waypoints": {}, "population": 40, "iterations": 40, "parameters": {{ "quadrature": "{}" }} }},
             "threats": [{}] }}"#,
         drawn.ends[0][0],
         drawn.ends[0][1],
-        drawn.heights[0],
+        ground(drawn.ends[0]) + drawn.heights[0],
         drawn.ends[1][0],
         drawn.ends[1][1],
-        drawn.heights[1],
+        ground(drawn.ends[1]) + drawn.heights[1],
         drawn.lowest,
         drawn.climb,
         drawn.fuel,
@@ -345,13 +399,15 @@ fn price(model: &Model<'_>, route: &[Point3]) -> (f64, f64) {
     (violation, figures.total)
 }
 
-/// The cheapest way over a lattice at one height.
+/// The cheapest way over a lattice at one height above the ground.
 fn over_lattice(model: &Model<'_>, height: f64) -> Option<Vec<Point3>> {
     let [start, target] = [model.scenario.start, model.scenario.target];
     let spacing = SPACING * scale(model.scenario);
     let node = |idx: usize| {
         let (column, row) = (idx % NODES, idx / NODES);
-        Point3::new(column as f64 * spacing, row as f64 * spacing, height)
+        let at = Point2::new(column as f64 * spacing, row as f64 * spacing);
+        let ground = model.scenario.terrain.elevation(at);
+        Point3::new(at.x, at.y, ground + height)
     };
     let at = |point: Point3| {
         (0..NODES * NODES)
@@ -483,7 +539,10 @@ fn ways(model: &Model<'_>) -> Vec<Vec<Point3>> {
     });
     for string in taut_strings(&hard, 3).strings {
         let along = (0..=60).map(|i| string.at(f64::from(i) / 60.0));
-        let mut way: Vec<Point3> = along.map(|at| Point3::new(at.x, at.y, middle)).collect();
+        let ground = |at: Point2| scenario.terrain.elevation(at);
+        let mut way: Vec<Point3> = along
+            .map(|at| Point3::new(at.x, at.y, ground(at) + middle))
+            .collect();
         way[0] = scenario.start;
         way[60] = scenario.target;
         ways.push(way);
@@ -496,6 +555,11 @@ proptest! {
 
     #[test]
     fn no_route_is_cheaper_than_the_bound(drawn in drawn()) {
+        check(&drawn)?;
+    }
+
+    #[test]
+    fn no_route_over_random_hills_is_cheaper_than_the_bound(drawn in hilly()) {
         check(&drawn)?;
     }
 

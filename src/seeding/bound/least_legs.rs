@@ -1,7 +1,8 @@
 //! The least cost of legs that have a minimum length, wherever they lead. The argument is section 7 of docs/BOUND.md.
 
+use super::middle::Middle;
 use super::prices::Prices;
-use super::toll::{below_middle, steepest};
+use super::toll::steepest;
 use crate::scenario::Scenario;
 
 /// A lower bound for all routes because each leg has a minimum length, and waypoints before the middle of the band cost
@@ -14,7 +15,7 @@ pub(super) fn least_legs(scenario: &Scenario, prices: &Prices) -> f64 {
         weight: scenario.weights.altitude,
     };
     let waypoints = scenario.planner.waypoints;
-    let [start, target] = below_middle(scenario).map_or([0.0; 2], |below| below.map(f64::abs));
+    let [start, target] = Middle::of(scenario).off();
     let between = prices.fuel * legs.shortest * waypoints.saturating_sub(1) as f64;
     legs.from(start, waypoints.div_ceil(2)) + between + legs.from(target, waypoints / 2)
 }

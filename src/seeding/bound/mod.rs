@@ -13,6 +13,7 @@ mod ends;
 mod event;
 mod field;
 mod least_legs;
+mod middle;
 mod peak;
 mod potential;
 mod prices;

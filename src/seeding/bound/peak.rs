@@ -1,10 +1,11 @@
 //! The cost of waypoints having to be at the middle of the band, where both ends are below it or above it: the route
 //! climbs towards it, or all waypoints stay off it. The argument is section 7 of docs/BOUND.md.
 
-use super::toll::{below_middle, climb_worth, steepest};
+use super::middle::Middle;
+use super::toll::{climb_worth, steepest};
 use crate::scenario::Scenario;
 
-/// Both ends on one side of the middle of a band above level ground.
+/// Both ends on one side of the middle of the band.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Peak {
     /// Metres between each end and the middle.
@@ -16,12 +17,14 @@ pub(super) struct Peak {
 }
 
 impl Peak {
-    /// `None` where nothing can be proven: over hills, with ends on different sides of the middle, or where heights
-    /// cost nothing.
+    /// `None` where nothing can be proven: with ends on different sides of the middle, over hills with one above it, or
+    /// where heights cost nothing.
     pub(super) fn of(scenario: &Scenario) -> Option<Self> {
-        let below = below_middle(scenario)?;
+        let Middle {
+            below, is_level, ..
+        } = Middle::of(scenario);
         let weight = scenario.weights.altitude * scenario.planner.waypoints as f64;
-        let is_known = below[0] * below[1] > 0.0 && weight > 0.0;
+        let is_known = below[0] * below[1] > 0.0 && (is_level || below[0] > 0.0) && weight > 0.0;
         is_known.then(|| Self {
             off_middle: below.map(f64::abs),
             weight,

@@ -1,5 +1,6 @@
 //! The cost of passing a threat above or below, and how soon that is possible.
 
+use super::middle::elevations;
 use super::prices::Prices;
 use crate::cost::Tolerance;
 use crate::scenario::Scenario;
@@ -19,15 +20,6 @@ pub(super) struct Toll {
 pub(super) fn steepest(scenario: &Scenario) -> f64 {
     let angle = scenario.vehicle.max_climb_deg + Tolerance::of(scenario).angle_deg;
     libm::tan(angle.min(90.0).to_radians()) * (1.0 + 1e-12)
-}
-
-/// Metres from start and target up to the middle of the band, negative from above it; `None` over hills.
-pub(super) fn below_middle(scenario: &Scenario) -> Option<[f64; 2]> {
-    let Terrain::Flat(ground) = &scenario.terrain else {
-        return None;
-    };
-    let middle = ground.elevation + 0.5 * (scenario.altitude.min + scenario.altitude.max);
-    Some([scenario.start, scenario.target].map(|end| middle - end.z))
 }
 
 /// The climb per metre seen from above, metres, from which on one more metre of climb costs this `share` of a metre
@@ -80,30 +72,10 @@ pub(super) struct Heights {
 
 impl Heights {
     pub(super) fn of(scenario: &Scenario) -> Self {
-        let (low, high, level) = match &scenario.terrain {
-            Terrain::Flat(flat) => (flat.elevation, flat.elevation, Some(flat.elevation)),
-            Terrain::Peaks(peaks) => {
-                let sum = |part: fn(f64) -> f64| -> f64 {
-                    peaks.peaks.iter().map(|peak| part(peak.height)).sum()
-                };
-                (
-                    peaks.base + sum(|height| height.min(0.0)),
-                    peaks.base + sum(|height| height.max(0.0)),
-                    None,
-                )
-            }
-            Terrain::Grid(grid) => {
-                let nodes = grid.elevations.iter().copied();
-                (
-                    nodes.clone().fold(f64::INFINITY, f64::min),
-                    nodes.fold(f64::NEG_INFINITY, f64::max),
-                    None,
-                )
-            }
-            Terrain::Dem(dem) => {
-                let [low, high] = dem.elevations();
-                (low, high, None)
-            }
+        let [low, high] = elevations(&scenario.terrain);
+        let level = match &scenario.terrain {
+            Terrain::Flat(flat) => Some(flat.elevation),
+            Terrain::Peaks(_) | Terrain::Grid(_) | Terrain::Dem(_) => None,
         };
         let band = scenario.altitude;
         let ends = [scenario.start, scenario.target]

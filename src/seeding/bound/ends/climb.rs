@@ -48,6 +48,7 @@ impl End<'_> {
             fuel: self.prices.fuel,
             exposed,
             weight: self.weight,
+            beyond: self.beyond,
         }
     }
 
@@ -90,6 +91,7 @@ impl End<'_> {
             fuel: self.prices.fuel,
             exposed: 0.0,
             weight: if is_within { self.weight } else { 0.0 },
+            beyond: 0.0,
         };
         ramp.leaving(rise, rates, self.height, longest * self.steepest)
     }

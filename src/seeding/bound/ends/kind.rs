@@ -79,8 +79,10 @@ pub(super) struct End<'a> {
     pub(super) height: f64,
     /// Whether it lies below that.
     pub(super) is_below: bool,
-    /// Cost of a metre between the waypoint and the middle of the band.
+    /// Cost of a metre between the waypoint and the middle of the band, on this side of it and beyond it; 0 where
+    /// nothing is known of that.
     pub(super) weight: f64,
+    pub(super) beyond: f64,
     /// Greatest climb per metre seen from above, metres.
     pub(super) steepest: f64,
     /// Set where it lies outside the band.
@@ -243,6 +245,7 @@ pub(super) mod tests {
             height: 100.0,
             is_below: true,
             weight: 1.0,
+            beyond: 1.0,
             steepest: 1.0,
             ramp: None,
             apart: f64::INFINITY,

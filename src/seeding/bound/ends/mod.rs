@@ -17,13 +17,13 @@ pub(super) use excess::over;
 pub(super) use lead::leads;
 pub(super) use rising::rising;
 
+use super::middle::Middle;
 use super::prices::Prices;
 use super::string::{cores, slack};
-use super::toll::{below_middle, steepest};
+use super::toll::steepest;
 use super::wall::Wall;
 use crate::geometry::Point2;
 use crate::scenario::Scenario;
-use crate::terrain::Terrain;
 use kind::{End, Kind};
 use ramp::Ramp;
 
@@ -121,17 +121,14 @@ impl<'a> Legs<'a> {
     }
 }
 
-/// Both ends on level ground, where waypoints off the middle of the band cost something or ends lie outside it; `None`
-/// elsewhere.
+/// Both ends, where waypoints off the middle of the band cost something or ends lie outside it; `None` elsewhere.
 fn ends<'a>(
     scenario: &Scenario,
     prices: &'a Prices,
     (walls, radii): (&'a [Wall], &'a [Option<f64>]),
     stop: &'a dyn Fn() -> bool,
 ) -> Option<[End<'a>; 2]> {
-    let (Terrain::Flat(ground), Some(below)) = (&scenario.terrain, below_middle(scenario)) else {
-        return None;
-    };
+    let middle = Middle::of(scenario);
     // A single waypoint ends both legs.
     let share = if scenario.planner.waypoints > 1 {
         1.0
@@ -139,18 +136,27 @@ fn ends<'a>(
         0.5
     };
     let steepest = steepest(scenario);
-    let heights = prices.ends.map(|end| end.z - ground.elevation);
-    let ramps = Ramp::round(heights, scenario);
+    let ramps = Ramp::round(scenario, &middle);
     let between = prices.direct();
-    let matter = scenario.weights.altitude > 0.0 || ramps.iter().any(Option::is_some);
+    let weights = middle.below.map(|below| {
+        let is_known = middle.is_level || below > 0.0;
+        if is_known {
+            share * scenario.weights.altitude
+        } else {
+            0.0
+        }
+    });
+    let off_middle = middle.off();
+    let matter = weights.iter().any(|weight| *weight > 0.0) || ramps.iter().any(Option::is_some);
     matter.then(|| {
         [0, 1].map(|end| End {
             which: end,
             from: prices.ends[end].xy(),
             to: prices.ends[1 - end].xy(),
-            height: below[end].abs(),
-            is_below: below[end] > 0.0,
-            weight: share * scenario.weights.altitude,
+            height: off_middle[end],
+            is_below: middle.below[end] > 0.0 || !middle.is_level,
+            weight: weights[end],
+            beyond: if middle.is_level { weights[end] } else { 0.0 },
             steepest,
             ramp: ramps[end],
             apart: ramps[1 - end].map_or(f64::INFINITY, |other| between - other.reach),

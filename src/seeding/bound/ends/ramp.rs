@@ -1,6 +1,7 @@
 //! A leg that leaves the zone round an end outside the band is in the band from there on: it is as steep as that
 //! requires, however long it is. The argument is section 7 of docs/BOUND.md.
 
+use super::super::middle::Middle;
 use super::super::toll::climb_worth;
 use crate::cost::Tolerance;
 use crate::scenario::{AltitudeBand, Scenario};
@@ -20,13 +21,17 @@ pub(super) struct Rates {
     pub(super) fuel: f64,
     /// Cost of the soft zones along the shortest leg.
     pub(super) exposed: f64,
+    /// On this side of it, and beyond it.
     pub(super) weight: f64,
+    pub(super) beyond: f64,
 }
 
 impl Ramp {
-    /// For both ends at these heights above level ground; none where they are within the band, or where leaving one
-    /// zone may be entering the other.
-    pub(super) fn round(heights: [f64; 2], scenario: &Scenario) -> [Option<Self>; 2] {
+    /// For both ends; none where they are within the band, where leaving one zone may be entering the other, or where
+    /// the ground may fall away by as much as the band is high.
+    pub(super) fn round(scenario: &Scenario, middle: &Middle) -> [Option<Self>; 2] {
+        let ends = [scenario.start, scenario.target];
+        let heights = ends.map(|end| end.z - scenario.terrain.elevation(end.xy()));
         let outside = heights.map(|height| beyond(scenario.altitude, height));
         // A hair wider than the real zones.
         let allowed = scenario.vehicle.steepest();
@@ -38,7 +43,12 @@ impl Ramp {
         // What is within tolerance counts as within the band.
         let overlooked = 2.0 * Tolerance::of(scenario).height_m;
         [0, 1].map(|end| {
-            let climbed = outside[end] - overlooked;
+            let out = if middle.is_level {
+                outside[end]
+            } else {
+                outside[end].min(middle.lowest + scenario.altitude.min - ends[end].z)
+            };
+            let climbed = out - overlooked;
             (climbed > 0.0).then(|| Self {
                 reach: reaches[end],
                 slope: climbed / reaches[end],
@@ -97,8 +107,8 @@ pub(super) fn climbing(
     } else {
         0.0
     };
-    let off_middle = below.max(climb * shortest - height);
-    whole * ((1.0 + climb * climb).sqrt() - 1.0) + rates.weight * off_middle.max(0.0)
+    let off_middle = (rates.weight * below).max(rates.beyond * (climb * shortest - height));
+    whole * ((1.0 + climb * climb).sqrt() - 1.0) + off_middle.max(0.0)
 }
 
 /// Metres outside the band.
@@ -123,7 +133,7 @@ mod tests {
         ) {
             let longest = shortest + more;
             let ramp = Ramp { reach: 1.0, slope };
-            let rates = Rates { fuel, exposed, weight };
+            let rates = Rates { fuel, exposed, weight, beyond: weight };
             let steepest = 2.0 * slope;
             let least = ramp.steepness([shortest, longest], rates, height, steepest);
             let length = shortest + length * more.min(2000.0);
@@ -143,7 +153,7 @@ mod tests {
             (fuel, weight) in (0.01..2.0f64, prop_oneof![Just(0.0), 0.01..3.0f64]),
             (most, share) in (0.0..3.0f64, 0.0..1.0f64),
         ) {
-            let (ramp, rates) = (Ramp { reach, slope }, Rates { fuel, exposed: 0.0, weight });
+            let (ramp, rates) = (Ramp { reach, slope }, Rates { fuel, exposed: 0.0, weight, beyond: weight });
             let (out, across) = (reach * slope, reach + detour);
             let (height, rise) = (out + off, most * fuel * reach);
             let (before, highest) = (at * across, at * across * 2.0 * slope);
@@ -168,6 +178,7 @@ mod tests {
             fuel: 0.5,
             exposed: 0.0,
             weight: 1.0,
+            beyond: 1.0,
         };
         let cost = |length: f64| ramp.steepness([length, length], rates, 160.0, 1.0);
         let slant = 1.25_f64.sqrt() - 1.0;

@@ -339,7 +339,7 @@ fn limits() -> Vec<Setting> {
         row(
             "limits.path_samples",
             "N",
-            "Samples of the delivered path",
+            "Samples of a straight path from start to target; a detour takes more",
             2..,
             |c| &mut c.limits.path_samples,
         ),

@@ -166,15 +166,18 @@ impl<S: Send + Sync> FromRequestParts<S> for Id {
         let Ok(Path(text)) = Path::<String>::from_request_parts(parts, state).await else {
             return Err(Problem::no_such_resource(&parts.uri));
         };
-        match Uuid::try_parse(&text) {
-            // Only the canonical spelling is accepted: each plan has one address.
-            Ok(id) if id.to_string() == text => {
-                spans::name_plan(id);
-                Ok(Self(id))
-            }
-            _ => Err(Problem::NoSuchPlan(Shown::of(&text))),
-        }
+        let Some(id) = plan_id(&text) else {
+            return Err(Problem::NoSuchPlan(Shown::of(&text)));
+        };
+        spans::name_plan(id);
+        Ok(Self(id))
     }
+}
+
+/// The id of a plan. Only the canonical spelling is accepted: each plan has one address.
+pub(super) fn plan_id(text: &str) -> Option<PlanId> {
+    let id = Uuid::try_parse(text).ok();
+    id.filter(|id| id.to_string() == text)
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use super::AppState;
 use super::caller::Caller;
 use super::off_thread;
+use super::params::plan_id;
 use super::problem::Problem;
 use crate::export::document::{FrameDocument, Position};
 use crate::geometry::Point3;
@@ -82,9 +83,8 @@ pub(super) async fn resolve(
         return Ok(());
     };
     let unknown = |why| Problem::InvalidScenario(vec![Fault::unknown_plan(id, why)]);
-    let plan: PlanId = id
-        .parse()
-        .map_err(|_| unknown("must be the id of a plan, a UUID"))?;
+    let plan = plan_id(id)
+        .ok_or_else(|| unknown("must be the id of a plan, a UUID in lower case with hyphens"))?;
     let result = match result_of(state, caller, plan).await {
         Ok(result) => result.ok_or_else(|| unknown("that plan has no route yet"))?,
         Err(Problem::NoSuchPlan(_) | Problem::Gone(_)) => {

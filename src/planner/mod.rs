@@ -97,15 +97,18 @@ impl Stop for Nobody {
 pub fn plan(scenario: &Scenario, observer: &mut dyn Observer, stop: &dyn Stop) -> Outcome {
     let model = Model::new(scenario);
     let mut log = Log::new(&model, observer, stop);
-    if scenario.planner.gap > 0.0 {
+    let (reason, lower) = if scenario.planner.gap > 0.0 {
         // At each step the search checks whether it is near enough to the bound.
         let is_over = || why_stop(scenario, stop).is_some();
         let lower = seeding::lower_bound_until(scenario, &is_over);
         log.lower = Some(lower);
-        let stop_reason = search(&model, &mut log);
-        return measured(&model, log.route, log.convergence, lower, stop_reason);
-    }
-    let (stop_reason, lower) = beside::bounded(scenario, stop, || search(&model, &mut log));
+        (search(&model, &mut log), lower)
+    } else {
+        beside::bounded(scenario, stop, || search(&model, &mut log))
+    };
+    // What follows the last iteration is cut short by a stop as well, and the outcome is another then.
+    let cut_short = why_stop(scenario, stop).filter(|_| reason == StopReason::Iterations);
+    let stop_reason = cut_short.unwrap_or(reason);
     measured(&model, log.route, log.convergence, lower, stop_reason)
 }
 

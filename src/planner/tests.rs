@@ -139,6 +139,34 @@ fn a_stop_keeps_the_best_so_far() {
     assert_eq!(outcome.convergence[..], longer.convergence[..6]);
 }
 
+/// A run that was cut short in what follows its last iteration, the polish and the bound, says so.
+#[test]
+fn a_stop_after_the_last_iteration_is_told() {
+    let mut scenario = scenario();
+    (scenario.planner.population, scenario.planner.iterations) = (10, 3);
+    (scenario.planner.seeding, scenario.planner.polish) = (Seeding::Tangent, true);
+    scenario.planner.gap = 1e-9;
+    let all = Looks::until(u32::MAX);
+    let whole = plan(&scenario, &mut Diary::default(), &all);
+    assert_eq!(whole.stop_reason, StopReason::Iterations);
+    let mut cut_short = 0;
+    // Nearly all checks are the bound's, which comes first here.
+    for stop_after in (all.count.get() - 120..all.count.get()).step_by(2) {
+        let outcome = plan(&scenario, &mut Diary::default(), &Looks::until(stop_after));
+        assert_eq!(outcome.stop_reason, StopReason::Cancelled, "{stop_after}");
+        let has_iterated = outcome.convergence.len() == whole.convergence.len();
+        cut_short += u32::from(has_iterated && outcome.evaluations < whole.evaluations);
+    }
+    assert!(cut_short > 0, "no stop came during the polish");
+    let whole_again = plan(
+        &scenario,
+        &mut Diary::default(),
+        &Looks::until(all.count.get()),
+    );
+    assert_eq!(whole_again.stop_reason, StopReason::Iterations);
+    assert_eq!(whole_again.waypoints, whole.waypoints);
+}
+
 /// A route of one's own: two waypoints have a straight path, and what is no number is not feasible.
 #[test]
 fn routes_from_elsewhere_are_certified() {

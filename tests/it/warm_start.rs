@@ -82,10 +82,12 @@ async fn a_warm_start_from_a_plan_without_a_route_is_refused() {
 
     let no_such = "no plan has this id";
     let no_route = "that plan has no route yet";
+    let no_id = "must be the id of a plan, a UUID in lower case with hyphens";
     let cases = [
         ("01936f2c-7d1a-7c55-9a53-27b1b44c1a10".to_owned(), no_such),
-        ("first".to_owned(), "must be the id of a plan, a UUID"),
-        (String::new(), "must be the id of a plan, a UUID"),
+        ("first".to_owned(), no_id),
+        (String::new(), no_id),
+        (id_of(&queued).to_uppercase(), no_id),
         (id_of(&deleted), no_such),
         (id_of(&failed), no_route),
         (id_of(&running), no_route),

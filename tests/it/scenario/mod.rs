@@ -147,6 +147,20 @@ fn a_default_spacing_is_never_refused() {
     }
 }
 
+/// Where an operator allows less than the defaults, what is left out is what is allowed.
+#[test]
+fn a_default_is_never_beyond_a_limit() {
+    let mut rules = rules();
+    let limits = &mut rules.limits;
+    (limits.waypoints, limits.population, limits.iterations) = (5, 50, 30);
+    let scenario = json::read(LEAST.as_bytes(), &rules, 11).expect("no fault");
+    let sizes = &scenario.planner;
+    assert_eq!(
+        (sizes.waypoints, sizes.population, sizes.iterations),
+        (5, 50, 30)
+    );
+}
+
 /// A target that is steeper above the start than the vehicle climbs needs room for a detour, and so does the
 /// middle of the band over ends that are close together.
 #[test]

@@ -1,6 +1,5 @@
 //! The least cost of legs that have a minimum length, wherever they lead. The argument is section 7 of docs/BOUND.md.
 
-use super::middle::Middle;
 use super::prices::Prices;
 use super::toll::steepest;
 use crate::scenario::Scenario;
@@ -15,7 +14,7 @@ pub(super) fn least_legs(scenario: &Scenario, prices: &Prices) -> f64 {
         weight: scenario.weights.altitude,
     };
     let waypoints = scenario.planner.waypoints;
-    let [start, target] = Middle::of(scenario).off();
+    let [start, target] = prices.middle.off();
     let between = prices.fuel * legs.shortest * waypoints.saturating_sub(1) as f64;
     legs.from(start, waypoints.div_ceil(2)) + between + legs.from(target, waypoints / 2)
 }

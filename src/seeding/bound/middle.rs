@@ -36,6 +36,11 @@ impl Middle {
         }
     }
 
+    /// Whether the waypoint next to this end is known to pay for being off the middle.
+    pub(super) fn is_known(&self, end: usize) -> bool {
+        self.is_level || self.below[end] > 0.0
+    }
+
     /// Metres by which a route must at least climb or descend from either end to come to the middle.
     pub(super) fn off(&self) -> [f64; 2] {
         self.below.map(|below| {

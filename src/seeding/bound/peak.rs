@@ -19,14 +19,12 @@ pub(super) struct Peak {
 impl Peak {
     /// `None` where nothing can be proven: with ends on different sides of the middle, over hills with one above it, or
     /// where heights cost nothing.
-    pub(super) fn of(scenario: &Scenario) -> Option<Self> {
-        let Middle {
-            below, is_level, ..
-        } = Middle::of(scenario);
+    pub(super) fn of(scenario: &Scenario, middle: &Middle) -> Option<Self> {
         let weight = scenario.weights.altitude * scenario.planner.waypoints as f64;
-        let is_known = below[0] * below[1] > 0.0 && (is_level || below[0] > 0.0) && weight > 0.0;
+        let is_known =
+            middle.below[0] * middle.below[1] > 0.0 && middle.is_known(0) && weight > 0.0;
         is_known.then(|| Self {
-            off_middle: below.map(f64::abs),
+            off_middle: middle.off(),
             weight,
             steepest: steepest(scenario),
         })
@@ -94,7 +92,7 @@ mod tests {
             (scenario.altitude.min, scenario.altitude.max) = (0.0, 200.0);
             (scenario.weights.altitude, scenario.planner.waypoints) = (weight, heights.len());
             scenario.vehicle.max_climb_deg = climb;
-            let peak = Peak::of(&scenario).expect("both are below the middle");
+            let peak = Peak::of(&scenario, &Middle::of(&scenario)).expect("both are below the middle");
             let all: Vec<f64> = [ends[0]].iter().chain(&heights).chain(&ends[1..]).copied().collect();
             let tangent = libm::tan(climb.to_radians());
             let (mut across, mut flown) = (0.0, 0.0);

@@ -1,5 +1,6 @@
 //! The prices of a metre used by a bound.
 
+use super::middle::Middle;
 use super::peak::Peak;
 use crate::cost::{THREAT_SHARE, Tolerance, metre};
 use crate::geometry::Point3;
@@ -15,6 +16,7 @@ pub(super) struct Prices {
     /// Metres by which a feasible route may miss a limit.
     pub(super) tolerance: f64,
     pub(super) ends: [Point3; 2],
+    pub(super) middle: Middle,
     /// The climb towards the middle of the band.
     peak: Option<Peak>,
 }
@@ -26,12 +28,15 @@ impl Prices {
             // With sampling, a soft zone can be crossed for nothing.
             Quadrature::Paper => 0.0,
         };
+        // Finding the lowest ground may take all nodes of a grid.
+        let middle = Middle::of(scenario);
         Self {
             fuel: metre(scenario),
             exposure,
             tolerance: Tolerance::of(scenario).length_m,
             ends: [scenario.start, scenario.target],
-            peak: Peak::of(scenario),
+            middle,
+            peak: Peak::of(scenario, &middle),
         }
     }
 

@@ -17,7 +17,6 @@ pub(super) use excess::over;
 pub(super) use lead::leads;
 pub(super) use rising::rising;
 
-use super::middle::Middle;
 use super::prices::Prices;
 use super::string::{cores, slack};
 use super::toll::steepest;
@@ -128,7 +127,7 @@ fn ends<'a>(
     (walls, radii): (&'a [Wall], &'a [Option<f64>]),
     stop: &'a dyn Fn() -> bool,
 ) -> Option<[End<'a>; 2]> {
-    let middle = Middle::of(scenario);
+    let middle = &prices.middle;
     // A single waypoint ends both legs.
     let share = if scenario.planner.waypoints > 1 {
         1.0
@@ -136,11 +135,10 @@ fn ends<'a>(
         0.5
     };
     let steepest = steepest(scenario);
-    let ramps = Ramp::round(scenario, &middle);
+    let ramps = Ramp::round(scenario, middle);
     let between = prices.direct();
-    let weights = middle.below.map(|below| {
-        let is_known = middle.is_level || below > 0.0;
-        if is_known {
+    let weights = [0, 1].map(|end| {
+        if middle.is_known(end) {
             share * scenario.weights.altitude
         } else {
             0.0

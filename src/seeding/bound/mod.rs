@@ -199,6 +199,10 @@ fn crossing(field: &Field, events: &[Event], used: &[Event], known: f64) -> f64 
         return level.max(legs(field, events, dense));
     }
     let known = known.max(legs(field, events, 0.0));
+    // Over hills it has proven nothing more, and takes longer than the search.
+    if !prices.middle.is_level {
+        return known;
+    }
     // Not for its own sake, but for the cost of the legs at the ends beyond it.
     let climbing = ends::climbing(scenario, prices, walls, &promise.places, stop);
     if climbing <= 0.0 || promise.cost + climbing <= WORTHWHILE_CLIMBING * known {

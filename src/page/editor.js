@@ -1,6 +1,7 @@
 // The scenario as a form: everything that the scene shows, and what it cannot show, as fields and buttons.
 
 import { by, el } from './dom.js';
+import { withValue } from './draft.js';
 import { Form } from './form.js';
 import { axes, isGeodetic } from './frame.js';
 import { say } from './notice.js';
@@ -245,7 +246,8 @@ export class Editor {
   #planner() {
     const algorithms = this.#menu.algorithms.map(({ name, title }) => [name, `${name}: ${title}`]);
     return [
-      this.form.choice('/planner/algorithm', 'Algorithm', algorithms.length ? algorithms : [['tms-sba', 'tms-sba']], { fallback: 'tms-sba' }),
+      this.form.choice('/planner/algorithm', 'Algorithm', algorithms.length ? algorithms : [['tms-sba', 'tms-sba']],
+        { fallback: 'tms-sba', set: (name) => this.draft.edit((document) => this.#searchedBy(document, name)) }),
       el('div', { class: 'grid three' },
         this.form.number('/planner/waypoints', 'Waypoints'), this.form.number('/planner/population', 'Population'), this.form.number('/planner/iterations', 'Iterations'),
         this.form.number('/planner/seed', 'Seed', '', {}), this.form.number('/planner/time_limit_ms', 'Time limit', 'ms', { empty: null }),
@@ -253,6 +255,14 @@ export class Editor {
       this.form.choice('/planner/seeding', 'First population', [['tangent', 'Along tangents of the threats'], ['random', 'Random, as published']], { fallback: 'tangent' }),
       this.form.tick('/planner/polish', 'Polish the best route', true),
     ];
+  }
+
+  /** The document with another algorithm: an accepted one lists the constants of its own, which others refuse. */
+  #searchedBy(document, algorithm) {
+    const constants = new Set(this.#menu.algorithms.flatMap(({ parameters }) => parameters.map(({ name }) => name)));
+    const { parameters } = document.planner ?? {};
+    const common = parameters && Object.fromEntries(Object.entries(parameters).filter(([name]) => !constants.has(name)));
+    return withValue(withValue(document, '/planner/algorithm', algorithm), '/planner/parameters', common);
   }
 
   #area(document) {

@@ -48,10 +48,10 @@ export class Form {
     return this.#field(pointer, label, '', input, (value) => value ?? '', (text) => (text === '' ? empty : text), { empty });
   }
 
-  /** One of `options`: `[value, text]`; `chosen` may make a value of the choice. */
-  choice(pointer, label, options, { fallback, chosen = (value) => value, shown = (value) => value } = {}) {
+  /** One of `options`: `[value, text]`; `chosen` may make a value of the choice, `set` change more than that value. */
+  choice(pointer, label, options, { fallback, chosen = (value) => value, shown = (value) => value, set } = {}) {
     const input = el('select', {}, options.map(([value, text]) => el('option', { value }, text)));
-    return this.#field(pointer, label, '', input, (value) => shown(value) ?? fallback, chosen);
+    return this.#field(pointer, label, '', input, (value) => shown(value) ?? fallback, chosen, { set });
   }
 
   tick(pointer, label, fallback) {
@@ -62,12 +62,12 @@ export class Form {
     return el('label', { class: 'tick' }, input, label);
   }
 
-  #field(pointer, label, unit, input, write, read, { empty } = {}) {
+  #field(pointer, label, unit, input, write, read, { empty, set = (value, gesture) => this.draft.set(pointer, value, gesture) } = {}) {
     const fault = el('span', { class: 'fault', id: `fault${pointer.replaceAll('/', '-')}`, hidden: true });
     let gesture = null;
     input.dataset.pointer = pointer;
     input.addEventListener('focus', () => { gesture = `typing ${gestures += 1}`; });
-    input.addEventListener(input.tagName === 'SELECT' ? 'change' : 'input', () => this.draft.set(pointer, read(input.value), gesture));
+    input.addEventListener(input.tagName === 'SELECT' ? 'change' : 'input', () => set(read(input.value), gesture));
     input.addEventListener('blur', () => {
       this.draft.rest();
       this.sync();

@@ -9,6 +9,7 @@ use crate::scenario::limits::Limits;
 pub fn rules(limits: Limits) -> Rules {
     let rule = |parameter: &optimizer::Parameter| ParameterRule {
         name: parameter.name,
+        default: parameter.default,
         min: parameter.min,
         max: parameter.max,
     };

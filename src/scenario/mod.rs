@@ -136,7 +136,7 @@ pub struct PlannerSettings {
     pub gap: f64,
     /// Threads that may evaluate routes; the result does not depend on it.
     pub threads: usize,
-    /// Constants of the algorithm set by the caller, by name.
+    /// Constants of the algorithm by name; one that is left out has its default, which [`json::read`] fills in.
     pub parameters: BTreeMap<String, f64>,
 }
 

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use noctule::optimizer;
 use noctule::planner::{self, Nobody, Outcome};
+use noctule::scenario::Scenario;
 use noctule::scenario::json::{self, COMMON, CommonParameter, Takes};
 use noctule::scenario::limits::Limits;
 use serde_json::Value;
@@ -17,7 +18,11 @@ fn names() -> Vec<&'static str> {
 }
 
 /// Plans the shipped `paper-1` without seeding or polishing: from a random start.
-fn plan(algorithm: &str, seed: u64, [waypoints, population, iterations]: [u64; 3]) -> Outcome {
+fn plan(algorithm: &str, seed: u64, size: [u64; 3]) -> Outcome {
+    planner::plan(&scenario(algorithm, seed, size), &mut Nobody, &Nobody)
+}
+
+fn scenario(algorithm: &str, seed: u64, [waypoints, population, iterations]: [u64; 3]) -> Scenario {
     let text = include_str!("../../scenarios/paper-1.json");
     let mut document: Value = serde_json::from_str(text).expect("JSON");
     let planner = &mut document["planner"];
@@ -29,8 +34,7 @@ fn plan(algorithm: &str, seed: u64, [waypoints, population, iterations]: [u64; 3
     planner["seeding"] = "random".into();
     planner["polish"] = false.into();
     let rules = planner::rules(Limits::default());
-    let scenario = json::read(document.to_string().as_bytes(), &rules, 1).expect("no fault");
-    planner::plan(&scenario, &mut Nobody, &Nobody)
+    json::read(document.to_string().as_bytes(), &rules, 1).expect("no fault")
 }
 
 #[test]
@@ -121,6 +125,77 @@ async fn every_algorithm_is_listed_with_its_source() {
             page.contains(&heading),
             "docs/EQUATIONS.md has no {heading}"
         );
+    }
+}
+
+/// What is accepted says how it is planned: with the listed default of each parameter that was not given.
+#[tokio::test]
+async fn an_accepted_document_lists_every_parameter_with_its_value() {
+    let api = Api::new();
+    let listed = api.get("/algorithms").await.json();
+    let parameters = |of: &Value| {
+        let parameters = of["parameters"].as_array().expect("a list").clone();
+        let parameters = parameters.into_iter();
+        parameters.map(|parameter| {
+            let name = parameter["name"].as_str().expect("a name").to_owned();
+            (name, parameter["default"].clone())
+        })
+    };
+    for algorithm in listed["algorithms"].as_array().expect("a list") {
+        let mut document = crate::support::scenario();
+        document["planner"]["algorithm"] = algorithm["name"].clone();
+        let mut expected: BTreeMap<String, Value> =
+            parameters(&listed).chain(parameters(algorithm)).collect();
+        let given = parameters(algorithm).next().expect("it has constants").0;
+        for chosen in [None, Some(0.5)] {
+            if let Some(chosen) = chosen {
+                document["planner"]["parameters"] = serde_json::json!({ &given: chosen });
+                expected.insert(given.clone(), chosen.into());
+            }
+            let valid = api.post("/plans?validate_only=true", &document).await;
+            let validated = &valid.json()["scenario"];
+            let submitted = api.post("/plans", &document).await;
+            let plan = submitted.header("location");
+            let accepted = api.get(&format!("{plan}/scenario")).await.json();
+            for filled in [validated, &accepted] {
+                let filled = filled["planner"]["parameters"].as_object();
+                let filled = filled.expect("an object").clone();
+                let filled = filled.into_iter().map(in_floating_point);
+                let expected = expected.clone().into_iter().map(in_floating_point);
+                assert_eq!(
+                    filled.collect::<BTreeMap<_, _>>(),
+                    expected.collect(),
+                    "{algorithm}"
+                );
+            }
+        }
+    }
+}
+
+/// Whole numbers are written without a fraction in one place and with one in the other.
+fn in_floating_point((name, value): (String, Value)) -> (String, Value) {
+    let value = value.as_f64().map_or(value, Into::into);
+    (name, value)
+}
+
+/// Earlier versions kept only the constants that were given. Such a document is still read, and what is filled in
+/// changes no bit of its plan.
+#[test]
+fn defaults_that_are_filled_in_change_no_plan() {
+    let rules = planner::rules(Limits::NONE);
+    for name in names() {
+        let scenario = scenario(name, 5, [5, 20, 20]);
+        let mut sparse = scenario.clone();
+        sparse.planner.parameters.clear();
+        let stored = json::write(&sparse);
+        let read = json::read_accepted(&stored, &rules).expect("no fault");
+        assert_eq!(read, scenario, "{name}");
+        let filled = json::write(&read);
+        assert_ne!(filled, stored, "{name}");
+        let again = json::read_accepted(&filled, &rules).expect("no fault");
+        assert_eq!(again, scenario, "{name}");
+        let plan = |scenario| planner::plan(scenario, &mut Nobody, &Nobody);
+        assert_eq!(plan(&again), plan(&sparse), "{name}");
     }
 }
 

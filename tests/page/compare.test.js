@@ -61,6 +61,22 @@ test('what is taken away before it has opened stays away, and what is laid over 
   await page.done();
 });
 
+test('a plan is planned again by another algorithm, which has other constants', async () => {
+  const page = await open(chrome, `${site.url}#plan=${await made(site.url, { ...SMALL, name: 'bats' })}`);
+  await page.waitForSelector('.verdict');
+  const constants = async () => Object.keys((await document_(page)).planner.parameters).sort();
+  const ofBats = await constants();
+  assert.ok(ofBats.includes('pulse_rate'), 'the accepted document has them all');
+  await page.click('[data-part="planner"] > summary');
+  await page.selectOption('[data-pointer="/planner/algorithm"]', 'pso');
+  assert.deepEqual(await constants(), ['gap', 'quadrature', 'threads']);
+  const id = await plan(page);
+  assert.equal((await ask(site.url, `/plans/${id}`)).algorithm, 'pso');
+  await page.click('#undo');
+  assert.deepEqual(await constants(), ofBats, 'it is one step');
+  await page.done();
+});
+
 test('a plan that is left before it has opened is not followed', async () => {
   const page = await open(chrome, site.url);
   await drawn(page, FIRST);

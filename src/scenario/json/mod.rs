@@ -50,6 +50,8 @@ pub struct AlgorithmRule {
 pub struct ParameterRule {
     /// As used in `planner.parameters`.
     pub name: &'static str,
+    /// Used when absent; within the range.
+    pub default: f64,
     /// Smallest value allowed.
     pub min: f64,
     /// Largest value allowed.

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use crate::scenario::Quadrature;
 
-use super::AlgorithmRule;
 use super::fault::Faults;
 use super::fields::{given_twice, unknown_key};
 use super::path::Path;
 use super::ranges::{GAP, Range, THREADS};
 use super::tree::Node;
 use super::value::At;
+use super::{AlgorithmRule, ParameterRule};
 
 /// A parameter listed among the algorithm's constants that every algorithm has.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,19 +89,28 @@ pub(super) struct Parameters {
     pub(super) constants: BTreeMap<String, f64>,
 }
 
-impl Default for Parameters {
-    fn default() -> Self {
+impl Parameters {
+    /// Those of a document that gives none.
+    pub(super) fn default(rule: Option<&AlgorithmRule>) -> Self {
+        let constants = constants(rule).iter();
         Self {
             quadrature: Quadrature::Integral,
             gap: NO_GAP,
             threads: ONE_THREAD,
-            constants: BTreeMap::new(),
+            constants: constants
+                .map(|constant| (constant.name.to_owned(), constant.default))
+                .collect(),
         }
     }
 }
 
-/// Reads the common parameters and the constants that `rule` allows. Without a rule the other keys cannot be checked,
-/// so they are skipped.
+fn constants(rule: Option<&AlgorithmRule>) -> &[ParameterRule] {
+    rule.map_or(&[], |rule| &rule.parameters)
+}
+
+/// Reads the common parameters and the constants that `rule` allows; those not given get their defaults, so that an
+/// accepted document says what its plan was made with. Without a rule the other keys cannot be checked, so they are
+/// skipped.
 pub(super) fn parameters(
     at: At<'_>,
     rule: Option<&AlgorithmRule>,
@@ -111,12 +120,12 @@ pub(super) fn parameters(
         at.fields(&[], faults);
         return None;
     };
-    let constants = rule.map_or(&[][..], |rule| &rule.parameters);
+    let constants = constants(rule);
     let mut allowed: Vec<&str> = COMMON.iter().map(|parameter| parameter.name).collect();
     allowed.extend(constants.iter().map(|parameter| parameter.name));
     let mut seen = vec![false; allowed.len()];
     let mut sound = true;
-    let mut parameters = Parameters::default();
+    let mut parameters = Parameters::default(rule);
     for (key, node) in entries {
         let Some(slot) = allowed.iter().position(|name| *name == &**key) else {
             if let Some(rule) = rule {

@@ -76,7 +76,8 @@ pub(super) fn planner(
         warm_start(at, chart, limits.waypoints, faults)
     });
     let smoothing = fields.or("smoothing", DEFAULT_SMOOTHING, faults, smoothing);
-    let parameters = fields.or("parameters", Parameters::default(), faults, |at, faults| {
+    let unset = Parameters::default(algorithm);
+    let parameters = fields.or("parameters", unset, faults, |at, faults| {
         parameters(at, algorithm, faults)
     });
     check_work(at.path, sizes, limits.work, faults);

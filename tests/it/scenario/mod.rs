@@ -24,11 +24,13 @@ fn rules() -> Rules {
     let parameters = vec![
         ParameterRule {
             name: "f_min",
+            default: -1.0,
             min: -10.0,
             max: 10.0,
         },
         ParameterRule {
             name: "loudness",
+            default: 0.25,
             min: 0.0,
             max: 1.0,
         },
@@ -236,7 +238,7 @@ fn every_part_of_a_full_document_is_read() {
     assert_eq!(scenario.planner.quadrature, Quadrature::Paper);
     assert_eq!(
         scenario.planner.parameters,
-        BTreeMap::from([("loudness".to_owned(), 0.5)])
+        BTreeMap::from([("f_min".to_owned(), -1.0), ("loudness".to_owned(), 0.5)])
     );
 }
 

@@ -64,12 +64,15 @@ impl LatLonBox {
         }
     }
 
-    /// Whether `place` lies inside or on the edge.
+    /// Whether `place` lies inside or on the edge, whichever way its longitude is written: 180 and -180 degrees are the
+    /// same meridian. Longitudes are compared, not their differences, so that nothing is rounded on the edge.
     #[must_use]
     pub fn contains(&self, place: LatLon) -> bool {
-        let east = place.lon - self.min.lon;
-        let east = if east < 0.0 { east + 360.0 } else { east };
-        (self.min.lat..=self.max.lat).contains(&place.lat) && east <= self.width()
+        let (west, east) = (self.min.lon, self.max.lon);
+        let east = if east > west { east } else { east + 360.0 };
+        let is_between = |lon: f64| (west..=east).contains(&lon);
+        let turned = [place.lon - 360.0, place.lon, place.lon + 360.0];
+        (self.min.lat..=self.max.lat).contains(&place.lat) && turned.into_iter().any(is_between)
     }
 }
 
@@ -234,6 +237,39 @@ mod tests {
             let back = plane.local(plane.geodetic(point));
             prop_assert!((back - point).norm() < 1e-6, "{back} {point}");
         }
+    }
+
+    #[test]
+    fn a_box_contains_its_edge_however_that_is_written() {
+        let check = |[west, east]: [f64; 2], within: &[f64], beyond: &[f64]| {
+            let corner = |lat, lon| LatLon { lat, lon };
+            let area = LatLonBox {
+                min: corner(10.0, west),
+                max: corner(11.0, east),
+            };
+            for (lons, expected) in [(within, true), (beyond, false)] {
+                for lon in lons {
+                    let contained = area.contains(corner(10.5, *lon));
+                    assert_eq!(contained, expected, "{lon} in {west} to {east}");
+                }
+            }
+            assert!(!area.contains(corner(9.9, within[0])));
+        };
+        check([-180.0, -179.9], &[180.0, -180.0, -179.9], &[179.9, -179.8]);
+        check([179.9, 180.0], &[179.9, 180.0, -180.0], &[-179.9, 179.8]);
+        check(
+            [179.9, -179.9],
+            &[179.9, 180.0, -180.0, -179.9],
+            &[179.8, -179.8, 0.0],
+        );
+        check([180.0, -179.9], &[180.0, -180.0, -179.9], &[179.9, -179.8]);
+        check([179.9, -180.0], &[179.9, 180.0, -180.0], &[-179.9, 179.8]);
+        check(
+            [-84.1, -84.0],
+            &[-84.1, -84.0],
+            &[-84.11, -83.99, 180.0, -180.0],
+        );
+        check([-180.0, 180.0], &[-180.0, 0.0, 180.0], &[]);
     }
 
     #[test]

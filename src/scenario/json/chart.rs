@@ -154,14 +154,24 @@ impl Chart {
         }
     }
 
-    /// `point` in messages, in the coordinates of the document.
+    /// `point` in messages, in the coordinates of the document; as it was written there, if it was.
     pub(super) fn say(&self, point: Point2) -> String {
+        let Self::Wgs84(earth) = self else {
+            return format!("({}, {})", figure(point.x), figure(point.y));
+        };
+        if let Some(place) = earth.written(point) {
+            return exactly(place);
+        }
+        let LatLon { lat, lon } = earth.plane.geodetic(point);
+        format!("lat {lat:.6}, lon {lon:.6}")
+    }
+
+    /// The corners of the area in messages. In degrees they are those of the document, of which `area` covers only the
+    /// largest part.
+    pub(super) fn say_area(&self, area: Rect) -> [String; 2] {
         match self {
-            Self::Wgs84(earth) => {
-                let place = earth.plane.geodetic(point);
-                format!("lat {:.6}, lon {:.6}", place.lat, place.lon)
-            }
-            _ => format!("({}, {})", figure(point.x), figure(point.y)),
+            Self::Wgs84(earth) => [earth.area.min, earth.area.max].map(exactly),
+            _ => [area.min, area.max].map(|corner| self.say(corner)),
         }
     }
 
@@ -297,8 +307,12 @@ impl Earth {
 
     /// The place as written for `point`.
     pub(super) fn place(&self, point: Point2) -> LatLon {
-        let written = self.written.borrow().get(&frame::key(point)).copied();
+        let written = self.written(point);
         written.unwrap_or_else(|| self.plane.geodetic(point))
+    }
+
+    fn written(&self, point: Point2) -> Option<LatLon> {
+        self.written.borrow().get(&frame::key(point)).copied()
     }
 
     /// `place` on the plane; a fault if it is too far away for the plane to fit.
@@ -375,13 +389,13 @@ fn area(at: At<'_>, faults: &mut Faults) -> Option<LatLonBox> {
         return Some(area);
     }
     faults.add(at.path, "empty-area", || {
-        format!(
-            "area runs from lat {}, lon {} to lat {}, lon {}, must have min < max in lat, and min west of max",
-            figure(area.min.lat),
-            figure(area.min.lon),
-            figure(area.max.lat),
-            figure(area.max.lon)
-        )
+        let [min, max] = [area.min, area.max].map(exactly);
+        format!("area runs from {min} to {max}, must have min < max in lat, and min west of max")
     });
     None
+}
+
+/// A place in messages, with all the digits that it was given with.
+fn exactly(place: LatLon) -> String {
+    format!("lat {}, lon {}", figure(place.lat), figure(place.lon))
 }

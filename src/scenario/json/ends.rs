@@ -56,7 +56,8 @@ pub(super) fn check_ground(
         Terrain::Dem(dem) => Some(("the dataset", dem.extent())),
     };
     if let Some((what, extent)) = known.filter(|(_, extent)| !extent.contains(end.xy())) {
-        return outside(&path, "outside-terrain", what, end, extent, chart, faults);
+        let corners = [extent.min, extent.max].map(|corner| chart.say(corner));
+        return outside(&path, "outside-terrain", what, end, &corners, chart, faults);
     }
     let ground = terrain.elevation(end.xy());
     if ground - end.z > SUNK_M {
@@ -82,7 +83,16 @@ pub(super) fn check_area(
     let contained = chart.is_in_area(end.xy(), area);
     if !contained {
         let path = Path::Key(&Path::Root, name);
-        outside(&path, "outside-area", "the area", end, area, chart, faults);
+        let corners = chart.say_area(area);
+        outside(
+            &path,
+            "outside-area",
+            "the area",
+            end,
+            &corners,
+            chart,
+            faults,
+        );
     }
     contained
 }
@@ -141,17 +151,15 @@ fn outside(
     code: &'static str,
     what: &str,
     end: Point3,
-    rect: Rect,
+    [from, to]: &[String; 2],
     chart: &Chart,
     faults: &mut Faults,
 ) {
     faults.add(path, code, || {
         format!(
-            "{} is at {}, must lie in {what}, from {} to {}",
+            "{} is at {}, must lie in {what}, from {from} to {to}",
             path.label(),
-            chart.say(end.xy()),
-            chart.say(rect.min),
-            chart.say(rect.max)
+            chart.say(end.xy())
         )
     });
 }

@@ -8,6 +8,7 @@ use proptest::prelude::*;
 use serde_json::{Value, json};
 
 use super::{faults, read};
+use crate::support::process::run;
 
 /// Refusals specific to degrees: the document, the pointer, the code and the detail.
 pub(super) fn cases() -> Vec<(String, &'static str, &'static str, &'static str)> {
@@ -20,7 +21,17 @@ pub(super) fn cases() -> Vec<(String, &'static str, &'static str, &'static str)>
     let mut far = document();
     far["area"] = json!({"min": {"lat": 36.4, "lon": -84.5}, "max": {"lat": 36.8, "lon": -84.0}});
     far["threats"][0]["center"]["lon"] = (-20).into();
+    let mut outside = document();
+    outside["area"] =
+        json!({"min": {"lat": 36.4, "lon": -84.5}, "max": {"lat": 36.6599, "lon": -84}});
     vec![
+        (
+            outside.to_string(),
+            "/target",
+            "outside-area",
+            "target is at lat 36.66, lon -84.15, must lie in the area, from lat 36.4, lon -84.5 to lat 36.6599, \
+             lon -84",
+        ),
         (
             wide.to_string(),
             "/area",
@@ -180,6 +191,53 @@ fn documents_across_the_antimeridian_are_read_alike() {
         accepted(&serde_json::from_str(&json::write(&there)).expect("JSON")),
         there
     );
+}
+
+/// 180 and -180 degrees are the same meridian: a flight may begin on the edge of its area there, whichever way either
+/// is written. The result has the start as it was given, and its route stays beside it.
+#[test]
+fn an_end_on_the_edge_at_the_antimeridian_may_be_written_either_way() {
+    for (west, east, away) in [(-180.0, -179.9, -179.95), (179.9, 180.0, 179.95)] {
+        for lon in [-180.0, 180.0] {
+            let flight = json!({
+                "frame": "wgs84",
+                "start": {"lat": 10.05, "lon": lon, "alt": 100}, "target": {"lat": 10.02, "lon": away, "alt": 100},
+                "area": {"min": {"lat": 10, "lon": west}, "max": {"lat": 10.1, "lon": east}},
+                "altitude": {"min": 50, "max": 300},
+                "planner": {"waypoints": 3, "population": 10, "iterations": 5, "smoothing": {"spacing": 500}},
+            });
+            let scenario = accepted(&flight);
+            let written: Value = serde_json::from_str(&json::write(&scenario)).expect("JSON");
+            assert_eq!(written["start"]["lon"], lon);
+            assert_eq!(accepted(&written), scenario);
+
+            let planned = run(&["plan", "-"], &flight.to_string());
+            let result: Value = serde_json::from_slice(&planned.stdout).expect("JSON");
+            assert_eq!(result["feasible"], true, "{result}");
+            let way = |points: &Value| -> Vec<f64> {
+                let points = points.as_array().expect("a list").iter();
+                points
+                    .map(|point| point["lon"].as_f64().expect("a number"))
+                    .collect()
+            };
+            for points in [&result["waypoints"], &result["path"]["points"]] {
+                let lons = way(points);
+                assert!((lons[0] - lon).abs() < f64::EPSILON, "{lons:?}");
+                let beside = |lon: &f64| (west - 1e-9..=east + 1e-9).contains(lon);
+                assert!(lons[1..].iter().all(beside), "{lons:?}");
+            }
+            // A map draws it on one side, in one piece.
+            let drawn = run(&["plan", "-", "--format", "geojson"], &flight.to_string());
+            let drawn: Value = serde_json::from_slice(&drawn.stdout).expect("JSON");
+            let route = &drawn["features"][0]["geometry"];
+            assert_eq!(route["type"], "LineString", "{route}");
+            let first = route["coordinates"][0][0].as_f64().expect("a number");
+            assert!(
+                (first - 180.0_f64.copysign(away)).abs() < f64::EPSILON,
+                "{route}"
+            );
+        }
+    }
 }
 
 /// Without an area, waypoints may be anywhere on the grid, and the written document is accepted unchanged.

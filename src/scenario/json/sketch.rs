@@ -82,24 +82,27 @@ impl Sketch {
     }
 
     /// The area of a document that gives none: the box around the start, the target and every threat with its soft
-    /// zone, padded on every side by a quarter of its diagonal or the room to climb, whichever is greater, within the
-    /// widest area allowed but by at least 10 m.
+    /// zone, padded on every side by a quarter of its diagonal or the room to climb, whichever is greater. Where it
+    /// would be longer than an area may be one way, it is padded less that way, but by at least 10 m.
     pub(super) fn area(&self) -> LatLonBox {
         let shrink = shrink(f64::midpoint(self.south, self.north));
         let height = (self.north - self.south) * DEGREE_M;
         let width = (self.east - self.west) * DEGREE_M * shrink;
-        let room = (FITTING * MAX_WIDTH_M - height.max(width)) / 2.0;
         let diagonal = (width * width + height * height).sqrt();
-        let padding = (diagonal / 4.0).max(self.climb_m).min(room);
-        let padding = padding.max(MIN_PADDING_M) / DEGREE_M;
+        let wanted = (diagonal / 4.0).max(self.climb_m);
+        let padding = |length: f64| {
+            let room = (FITTING * MAX_WIDTH_M - length) / 2.0;
+            wanted.min(room).max(MIN_PADDING_M) / DEGREE_M
+        };
+        let (lat, lon) = (padding(height), padding(width) / shrink);
         LatLonBox {
             min: LatLon {
-                lat: down(self.south - padding).max(-90.0),
-                lon: wrapped(down(self.reference + self.west - padding / shrink)),
+                lat: down(self.south - lat).max(-90.0),
+                lon: wrapped(down(self.reference + self.west - lon)),
             },
             max: LatLon {
-                lat: up(self.north + padding).min(90.0),
-                lon: wrapped(up(self.reference + self.east + padding / shrink)),
+                lat: up(self.north + lat).min(90.0),
+                lon: wrapped(up(self.reference + self.east + lon)),
             },
         }
     }

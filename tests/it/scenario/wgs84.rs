@@ -282,6 +282,32 @@ fn the_default_area_has_room_for_a_climb_that_is_steeper_than_the_vehicle() {
     assert!(accepted(&steep).area.diagonal() < 300.0);
 }
 
+/// A flight nearly as long as an area may be leaves no room beyond its ends, but all of it beside the route.
+#[test]
+fn the_default_area_of_a_long_flight_is_narrowed_along_it_only() {
+    let flight = |lat: f64, north: f64, east: f64| {
+        json!({
+            "frame": "wgs84",
+            "start": {"lat": lat, "lon": 8, "alt": 100}, "target": {"lat": lat + north, "lon": 8.0 + east, "alt": 100},
+            "altitude": {"min": 50, "max": 300}, "planner": {"smoothing": {"spacing": 50}},
+        })
+    };
+    // To the north and to the east; one of them fills its area.
+    for (document, along) in [
+        (flight(0.0, 1.6, 0.0), 196e3),
+        (flight(40.0, 1.71, 0.0), 196e3),
+        (flight(40.0, 1.78, 0.0), 197e3),
+        (flight(-0.1, 0.0, 1.71), 196e3),
+        (flight(60.0, 0.0, 3.42), 190e3),
+    ] {
+        let scenario = accepted(&document);
+        let size = scenario.area.max - scenario.area.min;
+        let (long, wide) = (size.max(), size.min());
+        assert!((along..200e3).contains(&long), "{document}: {size}");
+        assert!((80e3..102e3).contains(&wide), "{document}: {size}");
+    }
+}
+
 #[test]
 fn wrong_documents_in_degrees_are_refused() {
     let cases = [

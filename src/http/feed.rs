@@ -120,9 +120,13 @@ impl Feed {
             if page.forgotten > self.after {
                 return self.skip(page.forgotten).await;
             }
-            let quiet = page.events.is_empty();
+            let mut events = page.events;
+            let quiet = events.is_empty();
             self.caught_up = quiet;
-            self.take(page.events, &mut out);
+            if self.after == 0 {
+                self.show_place_in_queue(&mut events).await;
+            }
+            self.take(events, &mut out);
             if stopping && !self.over {
                 if quiet || self.last_pages == 0 {
                     // A reader who is further behind can read the rest from the next process.
@@ -174,6 +178,24 @@ impl Feed {
             id: forgotten,
             event: Event::Status(Box::new(plan)),
         }]))
+    }
+
+    /// If the plan still waits, its newest event says where it was in the queue when it got there. A new reader is shown
+    /// the record as it is now in its place; those who read it earlier have it under the same id.
+    async fn show_place_in_queue(&self, events: &mut [NumberedEvent]) {
+        let is_last_page = events.len() < PAGE;
+        let newest = events.last_mut().filter(|_| is_last_page);
+        let Some(Event::Status(shown)) = newest.map(|newest| &mut newest.event) else {
+            return;
+        };
+        if shown.status != Status::Queued {
+            return;
+        }
+        // If it has been taken off the queue meanwhile, the next event says so.
+        match self.store.get(self.id).await {
+            Ok(plan) if plan.status == Status::Queued => **shown = plan,
+            _ => {}
+        }
     }
 
     /// The plan has been removed, and its events with it: what was not read is missing. Where nothing says how the plan

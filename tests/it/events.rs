@@ -105,6 +105,38 @@ async fn a_stream_delivers_the_whole_plan_and_ends_once() {
     .await;
 }
 
+/// Where a plan was in the queue when it was accepted is of no use to those who ask later.
+#[tokio::test]
+async fn a_new_reader_of_a_queued_plan_sees_where_it_is_in_the_queue_now() {
+    for_every_backend(async |backend| {
+        let plan = Followed::on(backend).await;
+        let second = Followed {
+            address: plan.api.submit().await,
+            ..plan
+        };
+        let first_event = async || {
+            let mut stream = Stream::open(second.events("?rate=0")).await;
+            let Some(Block::Event { id, name, data }) = stream.next().await else {
+                panic!("no first event")
+            };
+            assert_eq!((id, name.as_str()), (1, "status"));
+            data
+        };
+        let shown = first_event().await;
+        assert_eq!(shown["queue_position"], 2, "{shown}");
+        second.api.store.claim().await.expect("the first plan");
+        let shown = first_event().await;
+        let record = second.api.get(&second.address).await.json();
+        assert_eq!(shown["queue_position"], 1, "{shown}");
+        assert_eq!(shown, record);
+        // Once it is running, that is the second event, and the first one says how it began.
+        second.api.store.claim().await.expect("the second plan");
+        let shown = first_event().await;
+        assert_eq!(shown["status"], "queued", "{shown}");
+    })
+    .await;
+}
+
 #[tokio::test]
 async fn a_cut_stream_resumes_at_every_event_without_loss_or_repeat() {
     for_every_backend(async |backend| {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::content::{Checked, Declaration, Identity};
 use super::{CatalogueError, files};
-use crate::terrain::dem::Format;
+use crate::terrain::dem::{DemError, Format, Lattice};
 
 /// An incoming file.
 #[derive(Debug)]
@@ -61,6 +61,11 @@ impl Staged {
             .map_err(|error| CatalogueError::unavailable("written", &self.path, error))?;
         let (dataset, declaration) = declaration.canonical().open(format, &self.path)?;
         let survey = dataset.survey()?;
+        if survey.is_empty() {
+            // It would be listed, and every plan over it refused.
+            let Lattice { columns, rows, .. } = dataset.metadata().lattice;
+            return Err(DemError::Empty { columns, rows }.into());
+        }
         Ok(Checked {
             sha256: self.sum(&declaration),
             staged: self,

@@ -81,6 +81,14 @@ pub enum DemError {
         /// Metres.
         value: f64,
     },
+    /// There is nothing in the file that could be used.
+    #[error("the file holds no elevation: none of its {columns} x {rows} samples has data")]
+    Empty {
+        /// Samples from left to right.
+        columns: usize,
+        /// From top to bottom.
+        rows: usize,
+    },
     /// No elevation is known there: it is beyond the outermost samples.
     #[error("latitude {:.6}, longitude {:.6} lies outside the elevations, which reach from latitude {:.6} to {:.6} and from longitude {:.6} to {:.6}", .at.lat, .at.lon, .south_west.lat, .north_east.lat, .south_west.lon, .north_east.lon)]
     Outside {

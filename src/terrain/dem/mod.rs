@@ -114,6 +114,14 @@ pub struct Survey {
     pub no_data_share: f64,
 }
 
+impl Survey {
+    /// Whether no sample has data.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.min > self.max
+    }
+}
+
 /// A file whose headers have been read and checked.
 #[derive(Debug, Clone)]
 pub struct Dataset {

@@ -20,7 +20,7 @@ use tokio::net::TcpStream;
 
 use super::{hill, jacksboro, kept, put, put_with};
 use crate::support::api::Api;
-use crate::support::elevations::write_tiff;
+use crate::support::elevations::{ascii_grid, write_tiff};
 use crate::support::patience::{PATIENCE, eventually, in_time};
 use crate::support::process::Service;
 use crate::support::server::Server;
@@ -118,6 +118,11 @@ fn hostile() -> Vec<Case> {
             "words for numbers",
             "",
             text.replacen("30", "xy", 1).into_bytes(),
+        ),
+        (
+            "gaps alone",
+            "",
+            ascii_grid([3, 2], [-85.0, 36.0], 0.01, |_, _| -9999.0).into_bytes(),
         ),
         (
             "no number",

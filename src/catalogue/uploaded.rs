@@ -199,13 +199,16 @@ impl Uploads for Uploaded {
                 Some((record, content))
             })
         };
-        let Some((record, content)) = known else {
-            return Err(CatalogueError::Unknown {
-                name: name.to_owned(),
-            });
+        let unknown = || CatalogueError::Unknown {
+            name: name.to_owned(),
         };
+        let (record, content) = known.ok_or_else(unknown)?;
         let path = self.content(&record.sha256);
-        let dataset = dem::open(&path, content.declared.declared())?;
+        let dataset = dem::open(&path, content.declared.declared()).map_err(|error| {
+            // It may have been deleted and swept meanwhile.
+            let is_kept = self.lock().contents.contains_key(&record.sha256);
+            if is_kept { error.into() } else { unknown() }
+        })?;
         Ok(Entry {
             name: name.to_owned(),
             sha256: Some(record.sha256),
@@ -240,10 +243,9 @@ impl Uploads for Uploaded {
         self.write(&path, &record)?;
         state.unread.remove(&path);
         state.names.insert(name, record.clone());
-        let now = Instant::now();
-        state.asked.insert(file.sha256.clone(), now);
         if let Some(before) = before {
-            state.asked.insert(before.sha256, now);
+            // A plan over the old content may be about to name it.
+            state.asked.insert(before.sha256, Instant::now());
         }
         Ok((kept, record))
     }
@@ -256,12 +258,11 @@ impl Uploads for Uploaded {
     fn remove(&self, naming: &Naming) -> Result<(), CatalogueError> {
         let name = &*naming.name;
         let mut state = self.lock();
-        let sha256 = Name::removable(state.names.get(name), naming)?.to_owned();
+        Name::removable(state.names.get(name), naming)?;
         let path = self.name(name);
         files::remove(&path)
             .map_err(|error| CatalogueError::unavailable("removed", &path, error))?;
         state.names.remove(name);
-        state.asked.insert(sha256, Instant::now());
         Ok(())
     }
 

@@ -16,7 +16,7 @@ use tokio::sync::watch;
 use tokio::task::JoinSet;
 use tracing::Instrument as _;
 
-pub use sweeper::Sweeper;
+pub use sweeper::{Sweeper, sweep_datasets};
 
 use self::planning::Thread;
 use self::run::Over;

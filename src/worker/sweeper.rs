@@ -55,8 +55,11 @@ async fn sweep(store: Arc<dyn Store>, catalogue: Arc<dyn Catalogue>, clock: Cloc
     }
 }
 
-/// Content that no name refers to is removed with the last plan over it.
-async fn sweep_datasets(
+/// Remove the content that no name refers to and no plan was planned over, unless it was used lately.
+///
+/// # Errors
+/// When the store or the catalogue cannot be reached.
+pub async fn sweep_datasets(
     store: &dyn Store,
     catalogue: &Arc<dyn Catalogue>,
 ) -> Result<(), Box<dyn Error + Send + Sync>> {

@@ -13,6 +13,7 @@ use crate::http::caller::Caller;
 use crate::http::params::{self, Params};
 use crate::http::problem::Problem;
 use crate::terrain::dem::Format;
+use crate::worker::sweep_datasets;
 
 /// Maximum length of the name that an uploader gives to a file.
 const MAX_FILENAME_CHARS: usize = 200;
@@ -93,6 +94,10 @@ async fn keep(
 ) -> Result<(Kept, Entry), Problem> {
     let sha256 = checked.sha256().to_owned();
     let room = state.rules.limits.terrains_bytes;
+    // What was deleted a moment ago must not take room.
+    if let Err(error) = sweep_datasets(&*state.store, &state.terrains.catalogue).await {
+        tracing::debug!(%error, "datasets were not swept before an upload");
+    }
     let (kept, entry) = state
         .terrains
         .ask(move |catalogue| catalogue.keep(checked, &naming, room))

@@ -3,6 +3,7 @@
 use std::io::Write as _;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 use axum::body::Body;
 use axum::http::Method;
@@ -12,13 +13,14 @@ use flate2::write::GzEncoder;
 use futures_util::StreamExt as _;
 use futures_util::future::join_all;
 use futures_util::stream;
+use noctule::catalogue::Directories;
 use noctule::http;
 use noctule::scenario::limits::Limits;
 use serde_json::json;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
-use super::{hill, jacksboro, kept, put, put_with};
+use super::{hill, jacksboro, kept, over, put, put_with};
 use crate::support::api::Api;
 use crate::support::elevations::{ascii_grid, write_tiff};
 use crate::support::patience::{PATIENCE, eventually, in_time};
@@ -31,7 +33,10 @@ fn with_limit(terrain_bytes: u64) -> Api {
 }
 
 fn with_limits(set: impl FnOnce(&mut Limits)) -> Api {
-    let mut api = Api::new();
+    limited(Api::new(), set)
+}
+
+fn limited(mut api: Api, set: impl FnOnce(&mut Limits)) -> Api {
     let mut rules = (*api.state.rules).clone();
     set(&mut rules.limits);
     api.state.rules = Arc::new(rules);
@@ -115,14 +120,14 @@ fn hostile() -> Vec<Case> {
             (text.clone() + "1 2 3\n").into_bytes(),
         ),
         (
-            "words for numbers",
-            "",
-            text.replacen("30", "xy", 1).into_bytes(),
-        ),
-        (
             "gaps alone",
             "",
             ascii_grid([3, 2], [-85.0, 36.0], 0.01, |_, _| -9999.0).into_bytes(),
+        ),
+        (
+            "words for numbers",
+            "",
+            text.replacen("30", "xy", 1).into_bytes(),
         ),
         (
             "no number",
@@ -401,4 +406,39 @@ async fn datasets_beyond_the_room_for_all_are_refused_and_leave_nothing() {
     let answer = put(&api, "/terrains/first", first).await;
     assert_eq!(answer.status, 200, "{answer:?}");
     assert_eq!(kept(&api.uploads()), [2, 2, 0]);
+}
+
+/// A deleted dataset leaves its room at once, unless a plan was planned over it.
+#[tokio::test]
+async fn a_deleted_dataset_leaves_its_room_once_no_plan_needs_it() {
+    let (first, second) = (hill(100.0), hill(250.0));
+    let room = first.len().max(second.len()) as u64;
+    let limit = |limits: &mut Limits| limits.terrains_bytes = room;
+    let api = limited(Api::new(), limit);
+    for file in [&first, &second] {
+        let answer = put(&api, "/terrains/hill", file.clone()).await;
+        assert_eq!(answer.status, 201, "{answer:?}");
+        assert_eq!(api.delete("/terrains/hill").await.status, 204);
+    }
+    assert_eq!(kept(&api.uploads()), [2, 0, 0]);
+
+    // Here nothing is kept for having been used lately.
+    let impatient = |uploads| Directories::with_grace(uploads, None, Duration::ZERO);
+    let api = limited(Api::with_catalogue(impatient), limit);
+    put(&api, "/terrains/hill", first).await;
+    let submitted = api.post("/plans", &over("hill")).await;
+    let plan = submitted.header("location");
+    let cancel = format!("{plan}/cancel");
+    let cancelled = api.send(Method::POST, &cancel, &[], "").await.json();
+    assert_eq!(cancelled["status"], "cancelled", "{cancelled}");
+    assert_eq!(api.delete("/terrains/hill").await.status, 204);
+    let refused = put(&api, "/terrains/other", second.clone()).await;
+    refused.expect_problem(413, "terrains-full");
+    let scenario = api.get(&format!("{plan}/scenario")).await.json();
+    let valid = api.post("/plans?validate_only=true", &scenario).await;
+    assert_eq!(valid.status, 200, "{valid:?}");
+    assert_eq!(api.delete(plan).await.status, 204);
+    let answer = put(&api, "/terrains/other", second).await;
+    assert_eq!(answer.status, 201, "{answer:?}");
+    assert_eq!(kept(&api.uploads()), [2, 1, 0]);
 }

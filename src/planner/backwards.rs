@@ -1,5 +1,6 @@
 //! The same search from the target to the start. Costs and limits do not depend on the direction, but starts, codings and
-//! bats do: over hills where the vehicle's limits are felt, either direction finds ways that the other misses.
+//! bats do: where the vehicle's limits are felt over hills, or it turns in wide bows, either direction finds ways that
+//! the other misses.
 
 use super::log::Log;
 use super::search::{self};
@@ -7,14 +8,21 @@ use super::{StopReason, newton, starts};
 use crate::cost::Model;
 use crate::scenario::Seeding;
 
+/// Over level ground either direction finds the same ways with sharper turns than this, degrees.
+const WIDE_TURNS_DEG: f64 = 50.0;
+
 /// Whether a search that ended with the best route of `log` is worth another in the other direction.
 pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {
     let settings = &model.scenario.planner;
     let is_guided = settings.polish && settings.seeding == Seeding::Tangent;
-    is_guided
-        && settings.warm_start.is_none()
-        && !model.scenario.terrain.is_flat()
-        && (!log.best.is_feasible() || newton::is_felt(model, &log.route))
+    let is_one_sided = || {
+        if model.scenario.terrain.is_flat() {
+            model.scenario.vehicle.max_turn_deg <= WIDE_TURNS_DEG
+        } else {
+            newton::is_felt(model, &log.route)
+        }
+    };
+    is_guided && settings.warm_start.is_none() && (!log.best.is_feasible() || is_one_sided())
 }
 
 /// Search in the other direction, and keep what is found if it is better.
@@ -37,7 +45,7 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
 mod tests {
     use super::*;
     use crate::geometry::Point3;
-    use crate::planner::tests::{hilly_scenario, mountain};
+    use crate::planner::tests::{disc, hilly_scenario, mountain, scenario as level_scenario};
     use crate::planner::{Nobody, plan};
     use crate::scenario::{Scenario, WarmStart};
 
@@ -75,8 +83,34 @@ mod tests {
         assert!((down / up - 1.0).abs() < 2e-3, "{down} {up}");
     }
 
+    /// A disc is right before one end, and the vehicle turns in wide bows: from the other end, the way that costs 2 % less
+    /// is not found.
     #[test]
-    fn level_ground_gentle_hills_and_known_routes_are_searched_once() {
+    fn wide_bows_cost_the_same_either_way() {
+        let mut scenario = level_scenario();
+        let [one, other] = [[657.68, 471.31, 100.0], [104.24, 176.39, 100.0]].map(Point3::from);
+        scenario.threats = [
+            [173.8, 267.2, 15.5, 75.5],
+            [431.6, 251.3, 27.3, 87.3],
+            [369.5, 312.7, 34.5, 94.5],
+            [85.5, 210.3, 21.0, 81.0],
+        ]
+        .map(disc)
+        .to_vec();
+        scenario.vehicle.max_turn_deg = 30.0;
+        scenario.planner.waypoints = 20;
+        scenario.planner.seeding = Seeding::Tangent;
+        scenario.planner.polish = true;
+        let [there, back] = [[one, other], [other, one]].map(|[start, target]| {
+            (scenario.start, scenario.target) = (start, target);
+            plan(&scenario, &mut Nobody, &Nobody).cost.total
+        });
+        assert!((there / back - 1.0).abs() < 1e-3, "{there} {back}");
+        assert!(there < 538.0, "{there}");
+    }
+
+    #[test]
+    fn sharp_turns_gentle_hills_and_known_routes_are_searched_once() {
         let mut scenario = mountain(200.0, true);
         let worthwhile = |scenario: &Scenario| {
             let model = Model::new(scenario);
@@ -103,5 +137,14 @@ mod tests {
         let mut log = Log::new(&model, &mut nobody, &Nobody);
         log.offer_unpriced(&outcome.waypoints);
         assert!(outcome.feasible && !is_worthwhile(&model, &log));
+
+        let mut open = level_scenario();
+        open.threats.clear();
+        open.planner.seeding = Seeding::Tangent;
+        open.planner.polish = true;
+        for (max_turn_deg, expected) in [(60.0, false), (30.0, true)] {
+            open.vehicle.max_turn_deg = max_turn_deg;
+            assert_eq!(worthwhile(&open), expected, "{max_turn_deg}");
+        }
     }
 }

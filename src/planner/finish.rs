@@ -4,10 +4,11 @@
 use super::log::Log;
 use super::newton::{self, Newton};
 use super::polish::{Polish, Steps};
+use super::price::price;
 use super::search::COARSE_STEPS;
-use super::{StopReason, same, why_stop};
+use super::{StopReason, same, starts, why_stop};
 use crate::cost::Model;
-use crate::geometry::Point3;
+use crate::geometry::{Point2, Point3};
 use crate::optimizer::Fitness;
 
 /// Maximum number of routes polished at the end that lead elsewhere than the best, unless waypoints are [`FEW`].
@@ -53,6 +54,7 @@ pub(super) fn finish(
     reason: StopReason,
     others: &[Vec<Point3>],
     beyond: &[Vec<Point3>],
+    round: &[Vec<Point2>],
     log: &mut Log,
 ) -> StopReason {
     if model.scenario.planner.polish && reason != StopReason::Converged {
@@ -69,6 +71,7 @@ pub(super) fn finish(
         if challenge(model, others, spent, log) {
             bring_home(model, &[], log);
         }
+        round_off(model, round, log);
         bring_within(model, beyond, log);
         log.is_polished = true;
     }
@@ -153,6 +156,29 @@ fn bring_home(model: &Model, others: &[Vec<Point3>], log: &mut Log) {
     log.offer(&route, fitness);
 }
 
+/// Over level ground: follow the way `round` the threats that is the best at the heights of the best route, where that is
+/// better. Its arcs have their best numbers of waypoints, while spare ones hardly come from one arc to another by
+/// themselves.
+fn round_off(model: &Model, round: &[Vec<Point2>], log: &mut Log) {
+    if !model.scenario.terrain.is_flat() || why_stop(model.scenario, log.stop).is_some() {
+        return;
+    }
+    let waypoints = model.scenario.planner.waypoints;
+    let routes = round.iter().map(|corners| {
+        let route = starts::at_heights_of(&log.route, corners);
+        let route = starts::with_waypoints(model, route, waypoints);
+        (price(model, &route), route)
+    });
+    let best = routes.min_by(|(one, _), (other, _)| one.rank(other));
+    log.evaluations += round.len() as u64;
+    if let Some((fitness, mut route)) = best
+        && fitness.beats(&log.best)
+    {
+        let fitness = polish(model, &mut route, FINE_STEPS, log);
+        log.offer(&route, fitness);
+    }
+}
+
 /// Bring routes that break limits within them: from round to round of Newton's method, breaches cost more.
 fn bring_within(model: &Model, beyond: &[Vec<Point3>], log: &mut Log) {
     for route in beyond {
@@ -183,9 +209,10 @@ pub(super) fn polish(
 mod tests {
     use super::*;
     use crate::planner::Nobody;
-    use crate::planner::price::price;
-    use crate::planner::tests::{radar, scenario};
+    use crate::planner::starts::tangents::corners;
+    use crate::planner::tests::{disc, radar, scenario};
     use crate::scenario::Scenario;
+    use crate::seeding::{Obstacles, taut_strings};
 
     /// Start and target on one level, an obstacle off to one side, and a route around it on each side: a smooth
     /// one on the long side, and one on the short side that is more expensive until it is improved.
@@ -214,7 +241,7 @@ mod tests {
         let mut nobody = Nobody;
         let mut log = Log::new(&model, &mut nobody, &Nobody);
         log.offer_unpriced(&others[0]);
-        finish(&model, StopReason::Iterations, &[], &[], &mut log);
+        finish(&model, StopReason::Iterations, &[], &[], &[], &mut log);
         assert!(log.route[2].y > 700.0, "polished, it leads as it did");
         assert!(challenge(&model, &others, 1_000, &mut log));
         assert!(log.best.is_feasible() && log.route[2].y < 400.0);
@@ -230,5 +257,36 @@ mod tests {
         log.offer_unpriced(&others[0]);
         assert!(!challenge(&model, &others, 1_000, &mut log));
         assert_eq!(log.evaluations, 1);
+    }
+
+    /// Two arcs lack a waypoint each, and spare ones lie on a leg.
+    #[test]
+    fn waypoints_come_to_the_arc_that_lacks_them() {
+        let mut scenario = scenario();
+        let at = |x| Point3::new(x, 500.0, 100.0);
+        (scenario.start, scenario.target) = (at(100.0), at(900.0));
+        scenario.threats = vec![
+            disc([350.0, 420.0, 120.0, 120.0]),
+            disc([650.0, 580.0, 120.0, 120.0]),
+        ];
+        scenario.planner.waypoints = 6;
+        let model = Model::new(&scenario);
+        let strings = taut_strings(&Obstacles::hard(&scenario, |_, _| true), 1);
+        let round = [corners(&scenario, &strings.strings[0], 6)];
+        let mut nobody = Nobody;
+        let mut log = Log::new(&model, &mut nobody, &Nobody);
+        let even = starts::at_heights_of(&[scenario.start, scenario.target], &round[0]);
+        let uneven = [&even[..3], &even[5..]].concat();
+        log.offer_unpriced(&starts::with_waypoints(&model, uneven, 6));
+        let before = log.best;
+        round_off(&model, &round, &mut log);
+        let even = price(&model, &even);
+        assert!(!before.is_feasible() || before.cost > even.cost + 0.2);
+        assert!(log.best.is_feasible() && log.best.cost < even.cost + 0.01);
+
+        // Where the best is as good, it stays.
+        let known = log.route.clone();
+        round_off(&model, &round, &mut log);
+        assert_eq!(log.route, known);
     }
 }

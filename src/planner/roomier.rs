@@ -54,7 +54,7 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
             Err(reason) => return reason,
         };
         if log.best.is_feasible() {
-            return finish(model, StopReason::Iterations, &[], &[], log);
+            return finish(model, StopReason::Iterations, &[], &[], &[], log);
         }
         failed += 1;
         if failed == MOST_FAILED {

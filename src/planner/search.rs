@@ -36,7 +36,7 @@ pub(super) fn plain(model: &Model, log: &mut Log) -> StopReason {
     let scenario = model.scenario;
     let iterations = 0..=scenario.planner.iterations;
     let (_, reason) = run(model, &mut routes, iterations, log);
-    finish(model, reason, &[], &[], log)
+    finish(model, reason, &[], &[], &[], log)
 }
 
 /// From `starts`, best first: bats around coarse routes, then around whole ones, then polish.
@@ -89,7 +89,7 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         reason = why;
     }
     elites.extend(best_starts);
-    finish(model, reason, &elites, &starts.beyond, log)
+    finish(model, reason, &elites, &starts.beyond, &starts.round, log)
 }
 
 /// The guided search of another `model` from `starts`, on behalf of the run of `log`, which counts what it prices: why it

@@ -1,6 +1,7 @@
 //! Routes to start from: along taut strings round the threats, over the ground, long enough to climb, and along a route
 //! that is already known.
 
+mod bow;
 mod climbs;
 mod contours;
 mod count;
@@ -15,11 +16,12 @@ mod levels;
 mod net;
 mod over;
 mod roadmap;
+mod round;
 mod rounded;
 mod shapes;
 mod spare;
 mod surplus;
-mod tangents;
+pub(super) mod tangents;
 mod thin;
 mod trails;
 mod ways;
@@ -30,12 +32,13 @@ pub(super) use count::with_waypoints;
 pub(super) use heap::spread;
 pub(super) use height::steepest;
 pub(super) use roadmap::is_vast;
+pub(super) use round::at_heights_of;
 
 use super::polish::{Polish, Steps};
 use super::price::price;
 use super::{Stop, same, why_stop};
 use crate::cost::Model;
-use crate::geometry::{LEVEL, Point3, Vector2};
+use crate::geometry::{LEVEL, Point2, Point3, Vector2};
 use crate::optimizer::Fitness;
 use height::{lifted, winding};
 use shapes::Shapes;
@@ -60,6 +63,8 @@ pub(super) struct Starts {
     pub(super) routes: Vec<Vec<Point3>>,
     /// Routes with the requested number of waypoints that break limits, but may become better than all others.
     pub(super) beyond: Vec<Vec<Point3>>,
+    /// Ways round the threats as seen from above, with as many corners as shorten them.
+    pub(super) round: Vec<Vec<Point2>>,
     /// Routes priced on the way.
     pub(super) evaluations: u64,
 }
@@ -107,6 +112,7 @@ fn from(
     Some(Starts {
         routes: priced.into_iter().map(|(_, route)| route).collect(),
         beyond,
+        round: shapes.round,
         evaluations,
     })
 }

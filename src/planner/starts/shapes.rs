@@ -8,7 +8,7 @@ use super::{
     ways, worth,
 };
 use crate::cost::Model;
-use crate::geometry::Point3;
+use crate::geometry::{Point2, Point3};
 use crate::optimizer::Fitness;
 use crate::planner::price::price;
 use crate::scenario::{Seeding, WarmStart};
@@ -51,6 +51,8 @@ pub(super) const MOST_COARSE: usize = 20;
 pub(super) struct Shapes {
     /// A known route first.
     pub(super) routes: Vec<Vec<Point3>>,
+    /// Round taut strings, as corners seen from above: as many as the route may have waypoints, and shorten it.
+    pub(super) round: Vec<Vec<Point2>>,
     /// Whether one was known.
     pub(super) is_known: bool,
     /// Whether soft zones are expensive, or threats many or near to each other.
@@ -75,7 +77,9 @@ impl Shapes {
             ..Self::default()
         };
         if settings.seeding == Seeding::Tangent {
-            shapes.routes.extend(along_strings(model, is_over));
+            let (along, round) = along_strings(model, is_over);
+            shapes.routes.extend(along);
+            shapes.round = round;
             // A caller who supplies a route has dealt with the hills already.
             if !shapes.is_known {
                 shapes.look_over_ground(model, is_over);
@@ -164,15 +168,21 @@ pub(super) fn bends(model: &Model, shapes: &[Vec<Point3>], hopeless: f64) -> usi
 }
 
 /// Routes with as few waypoints as each needs, along the taut strings of several scenes: round the
-/// soft zones, round the threats alone, over those that can be overflown, round steep ground.
-pub(super) fn along_strings(model: &Model, is_over: &dyn Fn() -> bool) -> Vec<Vec<Point3>> {
+/// soft zones, round the threats alone, over those that can be overflown, round steep ground. And as in
+/// [`Shapes::round`], the corners round those strings.
+pub(super) fn along_strings(
+    model: &Model,
+    is_over: &dyn Fn() -> bool,
+) -> (Vec<Vec<Point3>>, Vec<Vec<Point2>>) {
     let scenario = model.scenario;
     let everything = |_: usize, _: &Threat| true;
     let in_the_way = |_: usize, threat: &Threat| !over::passable(scenario, threat);
-    let mut shapes = Vec::new();
+    let (mut shapes, mut round) = (Vec::new(), Vec::new());
+    let waypoints = scenario.planner.waypoints;
     let mut follow = |obstacles: &Obstacles, count: usize| {
         for string in taut_strings_until(obstacles, count, is_over).strings {
             shapes.push(along(model, &string));
+            round.push(tangents::corners(scenario, &string, waypoints));
         }
     };
     follow(&Obstacles::soft(scenario, everything), STRINGS);
@@ -194,7 +204,7 @@ pub(super) fn along_strings(model: &Model, is_over: &dyn Fn() -> bool) -> Vec<Ve
     }
     // Straight ahead, for when crossing soft zones is worth it.
     shapes.push(vec![scenario.start, scenario.target]);
-    shapes
+    (shapes, round)
 }
 
 /// Routes over the ground: through a fine net only where the coarse one has none that can be flown as it is, as long

@@ -1,5 +1,6 @@
-//! Where spare waypoints of a route go: along its legs, or off one of them to the middle of the band.
+//! Where spare waypoints of a route go: along its legs, off one of them to the middle of the band, or in a bow up there.
 
+use super::bow::bent;
 use super::surplus::change;
 use super::{lifted, steepest};
 use crate::cost::{Model, metre};
@@ -13,6 +14,9 @@ const APART: f64 = 1e-4;
 /// A waypoint that costs more than this share of the direct way's fuel is put on its leg only if there is no other
 /// place.
 const DEAR: f64 = 1e-3;
+
+/// A bow is looked at where the spare waypoints are more than this share of the cost.
+const MUCH: f64 = 0.05;
 
 /// Up to this many spare waypoints may share one way to the middle of the band; over hills it leads up and down anyway.
 const SEVERAL: usize = 2;
@@ -40,14 +44,20 @@ pub(super) fn fill(model: &Model, route: Vec<Point3>, waypoints: usize) -> Vec<P
     if added <= dear(model) {
         return filled;
     }
+    let bent = (added > MUCH * price(model, &filled).cost)
+        .then(|| bent(model, &route, waypoints))
+        .flatten();
     // A waypoint that leaves its leg for the middle of the band is expensive by itself, but may make room for all
     // others.
     let raised = with_one_raised(model, route, waypoints);
-    if price(model, &raised).beats(&price(model, &filled)) {
-        raised
-    } else {
-        filled
-    }
+    let better = |one: Vec<Point3>, other: Vec<Point3>| {
+        if price(model, &other).beats(&price(model, &one)) {
+            other
+        } else {
+            one
+        }
+    };
+    std::iter::once(raised).chain(bent).fold(filled, better)
 }
 
 /// Adds each where it costs least given the route so far; returns what they add.

@@ -25,7 +25,11 @@ const STRAIGHT: f64 = 1e-9;
 ///
 /// With `k` corners an arc of angle `a` and radius `r` is flown in `2 k r tan(a / 2k)`, so that the
 /// gain of one corner more falls with each: taking the greatest gain first is optimal.
-pub(super) fn corners(scenario: &Scenario, string: &TautString, waypoints: usize) -> Vec<Point2> {
+pub(in crate::planner) fn corners(
+    scenario: &Scenario,
+    string: &TautString,
+    waypoints: usize,
+) -> Vec<Point2> {
     let arcs = arcs(string);
     let max_turn = scenario.vehicle.max_turn() * (1.0 - 1e-6);
     let mut counts: Vec<usize> = arcs

@@ -184,7 +184,7 @@ mod tests {
                     .0
                     .routes,
             );
-            let others = [others, best(&along_strings(&model, &|| false))];
+            let others = [others, best(&along_strings(&model, &|| false).0)];
             assert!(ways.is_feasible());
             let is_far_better =
                 |other: &Fitness| !other.is_feasible() || ways.cost < 0.95 * other.cost;

@@ -4,17 +4,14 @@
 
 use super::log::Log;
 use super::search::{self};
-use super::{StopReason, newton, starts};
+use super::{StopReason, is_from_scratch, newton, starts};
 use crate::cost::Model;
-use crate::scenario::Seeding;
 
 /// Over level ground either direction finds the same ways with sharper turns than this, degrees.
 const WIDE_TURNS_DEG: f64 = 50.0;
 
 /// Whether a search that ended with the best route of `log` is worth another in the other direction.
 pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {
-    let settings = &model.scenario.planner;
-    let is_guided = settings.polish && settings.seeding == Seeding::Tangent;
     let is_one_sided = || {
         if model.scenario.terrain.is_flat() {
             model.scenario.vehicle.max_turn_deg <= WIDE_TURNS_DEG
@@ -22,7 +19,7 @@ pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {
             newton::is_felt(model, &log.route)
         }
     };
-    is_guided && settings.warm_start.is_none() && (!log.best.is_feasible() || is_one_sided())
+    is_from_scratch(model.scenario) && (!log.best.is_feasible() || is_one_sided())
 }
 
 /// Search in the other direction, and keep what is found if it is better.
@@ -47,7 +44,7 @@ mod tests {
     use crate::geometry::Point3;
     use crate::planner::tests::{disc, hilly_scenario, mountain, scenario as level_scenario};
     use crate::planner::{Nobody, plan};
-    use crate::scenario::{Scenario, WarmStart};
+    use crate::scenario::{Scenario, Seeding, WarmStart};
 
     /// Evenly spaced, at the heights between start and target.
     fn straight(scenario: &Scenario) -> Vec<Point3> {

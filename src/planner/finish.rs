@@ -81,6 +81,15 @@ pub(super) fn finish(
     reason
 }
 
+/// Polish and refine `route`, and keep it if it is better than the best.
+pub(super) fn finish_from(model: &Model, mut route: Vec<Point3>, log: &mut Log) {
+    polish(model, &mut route, LAST_STEPS, log);
+    let mut newton = Newton::new(model, log.stop);
+    let fitness = newton.improve(&mut route, &[]);
+    log.evaluations += newton.evaluations;
+    log.offer(&route, fitness);
+}
+
 /// The last metres decide which of two ways is cheaper: one of the `others`, which were no better than the best before
 /// the polish, may be better after it; returns whether one is. The first of them has been polished with the best. No
 /// challenger is begun when fewer routes are left to price than the `spent` ones of that polish.

@@ -20,6 +20,7 @@ mod outcome;
 mod place;
 mod polish;
 mod price;
+mod recount;
 mod roomier;
 mod rules;
 mod search;
@@ -43,7 +44,7 @@ pub use crate::cost::CostFigures;
 use crate::cost::Model;
 use crate::geometry::Point3;
 use crate::optimizer::Objective;
-use crate::scenario::{Quadrature, Scenario};
+use crate::scenario::{Quadrature, Scenario, Seeding};
 use crate::seeding;
 use coding::Coding;
 use log::Log;
@@ -127,6 +128,9 @@ fn search_to_the_end(model: &Model, log: &mut Log) -> StopReason {
             if reason == StopReason::Iterations && backwards::is_worthwhile(model, log) {
                 reason = backwards::search(model, log);
             }
+            if reason == StopReason::Iterations && recount::is_worthwhile(model, log) {
+                reason = recount::search(model, log);
+            }
             let is_lost = reason == StopReason::Iterations && !log.best.is_feasible();
             if is_lost && model.scenario.planner.polish {
                 return roomier::search(model, log);
@@ -134,6 +138,12 @@ fn search_to_the_end(model: &Model, log: &mut Log) -> StopReason {
             reason
         }
     }
+}
+
+/// Whether all that helps may be tried: no route is given to begin with, and the plain algorithm is not asked for.
+fn is_from_scratch(scenario: &Scenario) -> bool {
+    let settings = &scenario.planner;
+    settings.polish && settings.seeding == Seeding::Tangent && settings.warm_start.is_none()
 }
 
 /// The routes of `scenario` as its algorithm sees them: positions in a box, each with its price.

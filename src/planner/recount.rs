@@ -1,0 +1,154 @@
+//! The same search with a few waypoints fewer, and with a few more. Over hills where the vehicle's limits are felt, they
+//! decide which ways are seen at all, and the best of those seen with another number may be better with this one too.
+
+use super::finish::finish_from;
+use super::log::Log;
+use super::search::aside;
+use super::{StopReason, is_from_scratch, newton, starts};
+use crate::cost::Model;
+
+/// The numbers of waypoints, as shares of the requested one.
+const SHARES: [f64; 2] = [0.8, 1.2];
+
+/// Where more waypoints than this are requested, nothing is tried: it would take long.
+const MOST: usize = 64;
+
+/// Whether a search that ended with the best route of `log` is worth others.
+pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {
+    is_from_scratch(model.scenario)
+        && !model.scenario.terrain.is_flat()
+        && model.scenario.planner.waypoints <= MOST
+        && log.best.is_feasible()
+        && newton::is_felt(model, &log.route)
+}
+
+/// Search with other numbers of waypoints, and keep what comes of the routes found if it is better.
+pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
+    // It takes as long again.
+    log.tell();
+    let waypoints = model.scenario.planner.waypoints;
+    for share in SHARES {
+        let mut scenario = model.scenario.clone();
+        scenario.planner.waypoints = part(waypoints, share);
+        let other = Model::new(&scenario);
+        let starts = starts::routes(&other, log.stop);
+        let Some((reason, best, route)) = aside(&other, starts, None, log) else {
+            continue;
+        };
+        if reason != StopReason::Iterations {
+            return reason;
+        }
+        if best.is_feasible() {
+            let route = starts::with_waypoints(model, route, waypoints);
+            finish_from(model, route, log);
+        }
+    }
+    StopReason::Iterations
+}
+
+/// Another number of waypoints than `waypoints`, unless that is 1 and the share smaller.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "about as many"
+)]
+fn part(waypoints: usize, share: f64) -> usize {
+    let part = waypoints as f64 * share;
+    let away = if share < 1.0 {
+        part.floor()
+    } else {
+        part.ceil()
+    };
+    (away as usize).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point3;
+    use crate::planner::tests::{disc, mountain, peaks, scenario};
+    use crate::planner::{Nobody, plan};
+    use crate::scenario::{AltitudeBand, Scenario, Seeding, WarmStart};
+    use crate::terrain::{Flat, Terrain};
+
+    /// Five discs among hills, flown by a vehicle that turns and climbs slowly.
+    fn slow_among_hills() -> Scenario {
+        let mut scenario = scenario();
+        scenario.start = Point3::new(429.9, 294.49, 63.1);
+        scenario.target = Point3::new(520.35, 734.98, 150.7);
+        scenario.threats = [
+            [218.5, 639.5, 68.1, 98.1],
+            [610.6, 762.5, 32.1, 62.1],
+            [141.1, 532.2, 60.0, 90.0],
+            [707.8, 141.8, 44.2, 74.2],
+            [460.7, 426.8, 58.3, 88.3],
+        ]
+        .map(disc)
+        .to_vec();
+        scenario.terrain = peaks(
+            0.0,
+            &[
+                [793.3, 435.7, 135.1, 80.1, 96.7],
+                [244.7, 656.6, 227.8, 107.7, 102.2],
+                [770.1, 397.0, 171.7, 63.8, 115.7],
+                [501.4, 293.6, 177.8, 69.7, 65.8],
+                [278.4, 650.2, 199.4, 114.0, 72.6],
+            ],
+        );
+        scenario.altitude = AltitudeBand {
+            min: 100.0,
+            max: 300.0,
+        };
+        (
+            scenario.vehicle.max_turn_deg,
+            scenario.vehicle.max_climb_deg,
+        ) = (30.0, 20.0);
+        scenario.vehicle.min_leg = 4.1;
+        scenario.planner.seeding = Seeding::Tangent;
+        scenario.planner.polish = true;
+        scenario.planner.waypoints = 10;
+        scenario
+    }
+
+    #[test]
+    fn numbers_of_waypoints_are_others() {
+        for (waypoints, expected) in [(1, [1, 2]), (2, [1, 3]), (10, [8, 12]), (64, [51, 77])] {
+            assert_eq!(SHARES.map(|share| part(waypoints, share)), expected);
+        }
+    }
+
+    /// With ten waypoints alone, the best found costs 530.
+    #[test]
+    fn a_way_seen_with_other_numbers_of_waypoints_is_flown_with_the_requested_one() {
+        let outcome = plan(&slow_among_hills(), &mut Nobody, &Nobody);
+        assert!(outcome.feasible && outcome.waypoints.len() == 12);
+        assert!(outcome.cost.total < 510.0, "{}", outcome.cost.total);
+    }
+
+    #[test]
+    fn level_ground_known_routes_and_many_waypoints_are_searched_once() {
+        let scenario = mountain(100.0, true);
+        let worthwhile = |scenario: &Scenario| {
+            let model = Model::new(scenario);
+            let mut nobody = Nobody;
+            let mut log = Log::new(&model, &mut nobody, &Nobody);
+            log.offer_unpriced(&plan(scenario, &mut Nobody, &Nobody).waypoints);
+            is_worthwhile(&model, &log)
+        };
+        assert!(worthwhile(&scenario));
+        let but = |change: fn(&mut Scenario)| {
+            let mut scenario = scenario.clone();
+            change(&mut scenario);
+            worthwhile(&scenario)
+        };
+        assert!(!but(|scenario| scenario.planner.seeding = Seeding::Random));
+        assert!(!but(|scenario| scenario.planner.polish = false));
+        assert!(!but(|scenario| {
+            scenario.planner.warm_start = Some(WarmStart::Waypoints(Vec::new()));
+        }));
+        assert!(!but(|scenario| {
+            scenario.terrain = Terrain::Flat(Flat { elevation: 0.0 });
+        }));
+        assert!(!but(|scenario| scenario.planner.waypoints = MOST + 1));
+    }
+}

@@ -47,32 +47,47 @@ const FINE_STEPS: Steps = Steps {
     ..LAST_STEPS
 };
 
+/// Where else than along its best route a search may end.
+#[derive(Default)]
+pub(super) struct Leads<'r> {
+    /// Routes that may become better once they are polished.
+    pub(super) others: &'r [Vec<Point3>],
+    /// Routes that break limits.
+    pub(super) beyond: &'r [Vec<Point3>],
+    /// Ways round the threats as seen from above.
+    pub(super) round: &'r [Vec<Point2>],
+}
+
 /// Polish the best route, which the last point of the curve shows, unless it is already good enough; the polish may make
-/// it so. One of the `others` that lead elsewhere may become better, and so may one of those `beyond` limits.
+/// it so. One of the `leads` may become better.
 pub(super) fn finish(
     model: &Model,
     reason: StopReason,
-    others: &[Vec<Point3>],
-    beyond: &[Vec<Point3>],
-    round: &[Vec<Point2>],
+    leads: &Leads,
     log: &mut Log,
 ) -> StopReason {
     if model.scenario.planner.polish && reason != StopReason::Converged {
         let mut candidates = vec![log.route.clone()];
         // Where the best so far is still a start of the search, what its bats found may be better once polished.
-        candidates.extend(others.first().filter(|other| **other != log.route).cloned());
+        candidates.extend(
+            leads
+                .others
+                .first()
+                .filter(|other| **other != log.route)
+                .cloned(),
+        );
         let before = log.evaluations;
         for mut route in candidates {
             let fitness = polish(model, &mut route, LAST_STEPS, log);
             log.offer(&route, fitness);
         }
         let spent = log.evaluations - before;
-        bring_home(model, others, log);
-        if challenge(model, others, spent, log) {
+        bring_home(model, leads.others, log);
+        if challenge(model, leads.others, spent, log) {
             bring_home(model, &[], log);
         }
-        round_off(model, round, log);
-        bring_within(model, beyond, log);
+        round_off(model, leads.round, log);
+        bring_within(model, leads.beyond, log);
         log.is_polished = true;
     }
     if reason == StopReason::Iterations && log.has_converged() {
@@ -250,7 +265,7 @@ mod tests {
         let mut nobody = Nobody;
         let mut log = Log::new(&model, &mut nobody, &Nobody);
         log.offer_unpriced(&others[0]);
-        finish(&model, StopReason::Iterations, &[], &[], &[], &mut log);
+        finish(&model, StopReason::Iterations, &Leads::default(), &mut log);
         assert!(log.route[2].y > 700.0, "polished, it leads as it did");
         assert!(challenge(&model, &others, 1_000, &mut log));
         assert!(log.best.is_feasible() && log.route[2].y < 400.0);

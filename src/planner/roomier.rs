@@ -3,7 +3,7 @@
 //! join its starts.
 
 use super::fewer::leave_out;
-use super::finish::finish;
+use super::finish::{Leads, finish};
 use super::log::Log;
 use super::search::aside;
 use super::starts::{self, Starts};
@@ -54,7 +54,7 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
             Err(reason) => return reason,
         };
         if log.best.is_feasible() {
-            return finish(model, StopReason::Iterations, &[], &[], &[], log);
+            return finish(model, StopReason::Iterations, &Leads::default(), log);
         }
         failed += 1;
         if failed == MOST_FAILED {

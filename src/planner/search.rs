@@ -1,6 +1,6 @@
 //! How a run searches: the algorithm alone, or guided by routes to start from.
 
-use super::finish::{finish, polish};
+use super::finish::{Leads, finish, polish};
 use super::log::Log;
 use super::objective::Routes;
 use super::polish::Steps;
@@ -36,7 +36,7 @@ pub(super) fn plain(model: &Model, log: &mut Log) -> StopReason {
     let scenario = model.scenario;
     let iterations = 0..=scenario.planner.iterations;
     let (_, reason) = run(model, &mut routes, iterations, log);
-    finish(model, reason, &[], &[], &[], log)
+    finish(model, reason, &Leads::default(), log)
 }
 
 /// From `starts`, best first: bats around coarse routes, then around whole ones, then polish.
@@ -89,7 +89,12 @@ pub(super) fn guided(model: &Model, starts: Starts, log: &mut Log) -> StopReason
         reason = why;
     }
     elites.extend(best_starts);
-    finish(model, reason, &elites, &starts.beyond, &starts.round, log)
+    let leads = Leads {
+        others: &elites,
+        beyond: &starts.beyond,
+        round: &starts.round,
+    };
+    finish(model, reason, &leads, log)
 }
 
 /// The guided search of another `model` from `starts`, on behalf of the run of `log`, which counts what it prices: why it

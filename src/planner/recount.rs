@@ -3,7 +3,7 @@
 
 use super::finish::finish_from;
 use super::log::Log;
-use super::search::aside;
+use super::search::aside_with;
 use super::{StopReason, is_from_scratch, newton, starts};
 use crate::cost::Model;
 
@@ -28,11 +28,8 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     log.tell();
     let waypoints = model.scenario.planner.waypoints;
     for share in SHARES {
-        let mut scenario = model.scenario.clone();
-        scenario.planner.waypoints = part(waypoints, share);
-        let other = Model::new(&scenario);
-        let starts = starts::routes(&other, log.stop);
-        let Some((reason, best, route)) = aside(&other, starts, None, log) else {
+        let found = aside_with(model, part(waypoints, share), starts::routes, log);
+        let Some((reason, best, route)) = found else {
             continue;
         };
         if reason != StopReason::Iterations {

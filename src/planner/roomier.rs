@@ -5,9 +5,8 @@
 use super::fewer::leave_out;
 use super::finish::{Leads, finish};
 use super::log::Log;
-use super::search::aside;
-use super::starts::{self, Starts};
-use super::{Stop, StopReason, why_stop};
+use super::search::{StartsOf, aside_with};
+use super::{StopReason, starts, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;
 
@@ -20,12 +19,6 @@ const ATTEMPTS: [(StartsOf, f64); 3] = [
 
 /// An attempt uses at least this many waypoints more than requested.
 const MORE: usize = 3;
-
-/// Largest population of such a search, however large a search was requested: any feasible route will do.
-const POPULATION: usize = 200;
-
-/// Largest number of iterations of such a search.
-const ITERATIONS: usize = 200;
 
 /// Where more waypoints than this are requested nothing is tried: they hardly ever lack waypoints, and removing some
 /// would take long.
@@ -64,18 +57,10 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     StopReason::Iterations
 }
 
-/// Where a search starts.
-type StartsOf = fn(&Model, &dyn Stop) -> Option<Starts>;
-
 /// A route with more waypoints that keeps every limit, if one is found.
 fn roomy(model: &Model, starts: StartsOf, times: f64, log: &mut Log) -> Option<Vec<Point3>> {
-    let mut scenario = model.scenario.clone();
-    let settings = &mut scenario.planner;
-    settings.waypoints = more(settings.waypoints, times);
-    settings.population = settings.population.min(POPULATION);
-    settings.iterations = settings.iterations.min(ITERATIONS);
-    let roomy = Model::new(&scenario);
-    let (_, best, route) = aside(&roomy, starts(&roomy, log.stop), None, log)?;
+    let waypoints = more(model.scenario.planner.waypoints, times);
+    let (_, best, route) = aside_with(model, waypoints, starts, log)?;
     best.is_feasible().then_some(route)
 }
 

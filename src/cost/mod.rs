@@ -20,8 +20,11 @@ pub use fuel::metre;
 pub use heading::turns;
 pub(crate) use threat::SHARE as THREAT_SHARE;
 
+use std::sync::{Arc, OnceLock};
+
 use crate::geometry::{Point3, Segment};
 use crate::scenario::{Quadrature, Scenario};
+use batch::Scene;
 use threat::Nearby;
 
 /// The weighted terms of Eq. 1; `total` is their sum.
@@ -45,6 +48,8 @@ pub struct Model<'s> {
     /// By how much a constraint may be missed.
     pub tolerance: Tolerance,
     zones: band::TerminalZones,
+    /// Made when the first pricer asks for it; shared by all copies of the model.
+    scene: Arc<OnceLock<Arc<Scene>>>,
 }
 
 impl<'s> Model<'s> {
@@ -55,6 +60,7 @@ impl<'s> Model<'s> {
             scenario,
             tolerance: Tolerance::of(scenario),
             zones: band::TerminalZones::of(scenario),
+            scene: Arc::default(),
         }
     }
 

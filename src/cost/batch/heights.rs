@@ -4,15 +4,13 @@
 use pulp::Simd;
 
 use super::leg::{Leg, Point};
-use super::peaks::Massif;
-use super::pyramid::Pyramid;
+use super::scene::Surface;
 use super::suspects::{Suspect, Suspects};
 use super::{PointRow, Price, Pricer};
 use crate::cost::band::Excess;
 use crate::cost::{Model, Section, Tolerance};
 use crate::geometry::lane::{Lane, Mask};
 use crate::geometry::{Point2, Segment};
-use crate::terrain::Terrain;
 
 /// What a proof may overlook, as a share of what counts as a breach.
 const OVERLOOKED: f64 = 0.5;
@@ -29,19 +27,8 @@ pub(super) struct Heights {
     ceiling: f64,
     /// What may be overlooked, metres.
     pub(super) overlooked: f64,
-    surface: Surface,
     /// The elevation below the start and below the target.
     pub(super) below_ends: [f64; 2],
-}
-
-/// The ground below.
-#[derive(Debug, Clone)]
-enum Surface {
-    Flat(f64),
-    Peaks(Massif),
-    Grid(Pyramid),
-    /// A file, which first examines blocks of itself.
-    Dem,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -98,22 +85,12 @@ impl Heights {
             ground: floors.fold(f64::NEG_INFINITY, f64::max) - slack,
             ceiling: band.max + slack,
             overlooked: slack,
-            surface: match &model.scenario.terrain {
-                Terrain::Flat(flat) => Surface::Flat(flat.elevation),
-                Terrain::Peaks(peaks) => Surface::Peaks(Massif::of(peaks)),
-                Terrain::Grid(grid) => Surface::Grid(Pyramid::of(grid)),
-                Terrain::Dem(_) => Surface::Dem,
-            },
             below_ends: ends.map(|end| model.scenario.terrain.elevation(end.xy())),
         }
     }
 }
 
 impl Heights {
-    pub(super) fn is_hilly(&self) -> bool {
-        !matches!(self.surface, Surface::Flat(_))
-    }
-
     /// Where a leg keeps its heights over its part `[t0, t1]`, being `from` and `to` at the ends of
     /// it and the curve between them, with a second derivative of so much that it sags at most by
     /// `dip` below and rises by `rise` above the line that joins these.
@@ -170,7 +147,7 @@ impl Pricer<'_> {
 
     #[inline(always)]
     fn proven_by<S: Simd>(&self, leg: &Leg<S>, ends: [Lane<S>; 2], inside: &Inside<S>) -> Mask<S> {
-        match &self.heights.surface {
+        match &self.scene.surface {
             Surface::Peaks(massif) => {
                 let strays = massif.swing.along(leg);
                 self.heights.within(ends, strays, inside, [0.0, 1.0]) & !inside.unclear
@@ -196,7 +173,7 @@ impl Pricer<'_> {
         {
             return none;
         }
-        let outlook = match &self.heights.surface {
+        let outlook = match &self.scene.surface {
             Surface::Flat(elevation) => {
                 let ends = [leg.a.z - *elevation, leg.b.z - *elevation];
                 let clear = self.heights.within(ends, [none; 2], &inside, [0.0, 1.0]);
@@ -283,7 +260,7 @@ impl Pricer<'_> {
         let overlooked = self.heights.overlooked;
         let limits = (section.floor - overlooked, section.ceiling + overlooked);
         let window = (section.t0, section.t1);
-        if let Surface::Grid(pyramid) = &self.heights.surface
+        if let Surface::Grid(pyramid) = &self.scene.surface
             && pyramid.clears(leg, window, limits)
         {
             return (0.0, 0.0);
@@ -304,7 +281,7 @@ impl Pricer<'_> {
     /// Measure all `suspects`, of which slot `k` has lane `k` of `prices` laid end to end.
     #[inline(always)]
     pub(super) fn settle<S: Simd>(&self, simd: S, suspects: &Suspects, prices: &mut [Price]) {
-        if let Surface::Peaks(massif) = &self.heights.surface {
+        if let Surface::Peaks(massif) = &self.scene.surface {
             self.measure(simd, massif, suspects, prices);
         }
     }
@@ -313,7 +290,7 @@ impl Pricer<'_> {
     #[inline(always)]
     pub(super) fn elevation<S: Simd>(&self, simd: S, part: usize, row: &PointRow) -> Lane<S> {
         let point = Point::load(simd, row, part);
-        match &self.heights.surface {
+        match &self.scene.surface {
             Surface::Flat(elevation) => point.x.with(*elevation),
             Surface::Peaks(massif) => massif.elevation(point),
             Surface::Grid(_) | Surface::Dem => point.x.map(|lane, _| {

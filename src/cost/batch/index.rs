@@ -3,7 +3,7 @@
 use crate::geometry::{Point2, Rect, Segment};
 
 /// Cells over the threats, each with the threats whose boxes it touches.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Index {
     extent: Rect,
     /// Cells per metre, east and north.

@@ -14,12 +14,15 @@ mod peaks;
 mod pyramid;
 mod rings;
 mod route;
+mod scene;
 mod stretch;
 mod suspects;
 mod swing;
 mod threats;
 
 pub use crate::geometry::lane::{LANES, Row};
+
+use std::sync::Arc;
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -29,8 +32,9 @@ use crate::geometry::lane::parts;
 use crate::scenario::Quadrature;
 use heights::Heights;
 use route::Limits;
+pub(super) use scene::Scene;
+use scene::Surface;
 use suspects::Suspects;
-use threats::Threats;
 
 /// [`LANES`] points side by side, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,7 +115,7 @@ pub struct Pricer<'s> {
     verdict: bool,
     quadrature: Quadrature,
     limits: Limits,
-    threats: Threats,
+    scene: Arc<Scene>,
     heights: Heights,
     arch: Arch,
 }
@@ -122,7 +126,10 @@ impl<'s> Pricer<'s> {
     pub fn new(model: &Model<'s>, quadrature: Quadrature, tolerance: Tolerance) -> Self {
         Self {
             limits: Limits::of(model.scenario),
-            threats: Threats::of(model.scenario),
+            scene: model
+                .scene
+                .get_or_init(|| Arc::new(Scene::of(model.scenario)))
+                .clone(),
             heights: Heights::of(model, tolerance),
             model: model.clone(),
             tolerance,
@@ -206,7 +213,7 @@ impl<'s> Pricer<'s> {
     /// Whether there are hills, above which heights take long to measure.
     #[must_use]
     pub fn is_hilly(&self) -> bool {
-        self.heights.is_hilly()
+        !matches!(self.scene.surface, Surface::Flat(_))
     }
 
     fn dispatch<const HEIGHTS: bool>(

@@ -32,7 +32,7 @@ const WIDEST: f64 = 16.0;
 const BETWEEN: f64 = 1.285;
 
 /// Mountains, made ready for lanes.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Massif {
     base: f64,
     pub(super) peaks: Vec<Mountain>,

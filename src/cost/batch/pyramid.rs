@@ -9,7 +9,7 @@ use crate::terrain::{Grid, HeightRange};
 const CUTS: u32 = 1;
 
 /// A grid's elevations by blocks of cells.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Pyramid {
     origin: Point2,
     cells_a_metre: f64,
@@ -17,7 +17,7 @@ pub(super) struct Pyramid {
     levels: Vec<Level>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 struct Level {
     columns: usize,
     rows: usize,

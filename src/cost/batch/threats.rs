@@ -20,14 +20,14 @@ const FEW_THREATS: usize = 24;
 const LARGEST_QUOTIENT: f64 = 1e18;
 
 /// The threats of a scenario, made ready for lanes.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Threats {
     all: Vec<Outline>,
     /// Set where there are many.
     index: Option<Index>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 enum Outline {
     Disc(Disc),
     Ring(Ring),
@@ -89,8 +89,8 @@ impl Pricer<'_> {
         exposure: &mut Lane<S>,
         violation: &mut Lane<S>,
     ) {
-        let Some(index) = &self.threats.index else {
-            for threat_idx in 0..self.threats.all.len() {
+        let Some(index) = &self.scene.threats.index else {
+            for threat_idx in 0..self.scene.threats.all.len() {
                 self.threat(threat_idx, leg, exposure, violation);
             }
             return;
@@ -113,7 +113,7 @@ impl Pricer<'_> {
         exposure: &mut Lane<S>,
         violation: &mut Lane<S>,
     ) {
-        match &self.threats.all[threat_idx] {
+        match &self.scene.threats.all[threat_idx] {
             Outline::Disc(disc) => self.disc(disc, leg, exposure, violation),
             Outline::Ring(ring) => self.ring(threat_idx, ring, leg, exposure, violation),
         }

@@ -189,7 +189,10 @@ impl Wall {
 
     /// A circle round its shape.
     pub(super) fn circle(&self) -> (Point2, f64) {
-        let centers = self.centers();
+        let centers = match &self.shape {
+            OutlineShape::Disc(center) => return (*center, 0.0),
+            OutlineShape::Ring(ring) => ring,
+        };
         let sum: Vector2 = centers.iter().map(|center| center.coords).sum();
         let middle = Point2::from(sum / centers.len() as f64);
         let away = centers.iter().map(|center| (center - middle).norm());

@@ -11,6 +11,10 @@ const PIECES: u32 = 24;
 
 /// Least exposure to `wall` of all legs as long as that from `from` to `at`, within `half` radians of its heading.
 pub(super) fn least(wall: &Wall, (from, at): (Point2, Point2), half: f64) -> f64 {
+    if wall.influence <= 0.0 {
+        // A side of the area's border, or a polygon without a margin.
+        return 0.0;
+    }
     let (center, radius) = wall.circle();
     let (way, between) = (at - from, center - from);
     let length = way.norm();

@@ -6,7 +6,7 @@ use super::super::wall::Wall;
 use super::exposure;
 use super::kind::End;
 use super::slopes::Slopes;
-use crate::geometry::{Point2, ring};
+use crate::geometry::{Point2, Rect, ring};
 use crate::seeding::arc::point_segment;
 use crate::seeding::outline::OutlineShape;
 
@@ -83,6 +83,7 @@ impl End<'_> {
                     OutlineShape::Disc(center) => {
                         wall.core > spread && point_segment(*center, from, to) < wall.core - spread
                     }
+                    OutlineShape::Ring(ring) if !may_meet(ring, (from, to)) => false,
                     OutlineShape::Ring(ring) => (1..=16).rev().any(|i| {
                         let point = from + (to - from) * (f64::from(i) / 16.0);
                         ring::contains(ring, point)
@@ -105,6 +106,13 @@ impl End<'_> {
         }
         sums
     }
+}
+
+/// Whether the box round a way meets the one round `ring`.
+fn may_meet(ring: &[Point2], (from, to): (Point2, Point2)) -> bool {
+    let own = Rect::around(ring.iter().copied());
+    let other = Rect::around([from, to]);
+    own.zip(other).is_some_and(|(own, other)| own.meets(&other))
 }
 
 #[cfg(test)]

@@ -8,7 +8,9 @@ mod parts;
 
 use std::io::Write as _;
 use std::net::SocketAddr;
+use std::num::NonZero;
 use std::sync::Arc;
+use std::thread::available_parallelism;
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -133,15 +135,19 @@ fn router(config: &Config, parts: Parts) -> Router {
     }
 }
 
-/// The pool's engine: reads the accepted document again, and plans it.
+/// The pool's engine: reads the accepted document again, and plans it on no more threads than there are cores.
 fn engine(rules: Arc<Rules>) -> Engine {
+    let cores = available_parallelism().map_or(1, NonZero::get);
     Arc::new(move |document, observer, stop| {
-        let scenario = json::read_accepted(document, &rules).map_err(|refusal| {
-            match refusal.unreachable_ground() {
-                Some(fault) => Unplanned::NotNow(fault.detail.clone()),
-                None => Unplanned::Failed(unread(&refusal)),
-            }
-        })?;
+        let mut scenario =
+            json::read_accepted(document, &rules).map_err(|refusal| {
+                match refusal.unreachable_ground() {
+                    Some(fault) => Unplanned::NotNow(fault.detail.clone()),
+                    None => Unplanned::Failed(unread(&refusal)),
+                }
+            })?;
+        let threads = &mut scenario.planner.threads;
+        *threads = (*threads).min(cores);
         Ok(planner::plan(&scenario, observer, stop))
     })
 }

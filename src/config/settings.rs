@@ -319,7 +319,7 @@ fn limits() -> Vec<Setting> {
             "limits.population",
             "N",
             "Members of a population",
-            1..,
+            2..,
             |c| &mut c.limits.population,
         ),
         row(

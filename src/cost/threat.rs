@@ -37,11 +37,7 @@ impl Nearby {
         let near = threats.iter().enumerate().filter(|(_, threat)| {
             let extent = threat.extent();
             // Written so that rounding errs on the side of including a threat.
-            let hair = 1e-6 * (1.0 + extent.diagonal());
-            run.min.x <= extent.max.x + hair
-                && run.max.x >= extent.min.x - hair
-                && run.min.y <= extent.max.y + hair
-                && run.max.y >= extent.min.y - hair
+            run.meets(&extent.grown(1e-6 * (1.0 + extent.diagonal())))
         });
         Self::Some(near.map(|(threat_idx, _)| threat_idx).collect())
     }

@@ -92,7 +92,7 @@ fn waypoint(delivery: &Delivery, index: usize) -> Placemark {
 }
 
 /// A wall from the threat's top down to the ground, because KML has no floating volume. A threat without top ends at
-/// the highest point of the route.
+/// the highest point of the route, or at its base where that is higher.
 fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Placemark {
     let chart = delivery.chart();
     let course = delivery.course().iter();
@@ -101,7 +101,8 @@ fn threat(delivery: &Delivery, index: usize, threat: &Threat) -> Placemark {
         .fold(f64::MIN, f64::max);
     let middle = outline::middle(threat);
     let height = |z: f64| chart.msl_m(Point3::new(middle.x, middle.y, z));
-    let top = threat.top.map_or(highest, height);
+    let base = threat.base.map_or(f64::MIN, height);
+    let top = threat.top.map_or(highest.max(base), height);
     let corner = |corner: Point2| {
         let LatLon { lat, lon } = chart.place(corner);
         Coord::new(lon, lat, Some(top))

@@ -205,9 +205,8 @@ impl Format {
             Write::Stored => Ok(input.result.to_owned()),
             Write::Plain(write) => Ok(write(&self.delivery(input, options)?, options)),
             Write::Mission { fits, write } => {
-                let delivery = self.delivery(input, options)?;
                 fits(options)?;
-                write(&delivery, options)
+                write(&self.delivery(input, options)?, options)
             }
         }
     }

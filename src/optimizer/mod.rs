@@ -35,12 +35,11 @@ impl Fitness {
         cost: f64::INFINITY,
     };
 
-    /// The total order of Deb's rule; better is `Less`.
+    /// The total order of Deb's rule; better is `Less`. What is no number is as bad as what is infinite.
     #[must_use]
     pub fn rank(&self, other: &Self) -> Ordering {
-        self.violation
-            .total_cmp(&other.violation)
-            .then(self.cost.total_cmp(&other.cost))
+        let ordered = |one: f64, other: f64| amount(one).total_cmp(&amount(other));
+        ordered(self.violation, other.violation).then(ordered(self.cost, other.cost))
     }
 
     /// Whether it is strictly better than `other`.
@@ -54,6 +53,11 @@ impl Fitness {
     pub fn is_feasible(&self) -> bool {
         self.violation <= 0.0
     }
+}
+
+/// Where it is no number, its sign, by which numbers would be ordered, differs from processor to processor.
+fn amount(value: f64) -> f64 {
+    if value.is_nan() { f64::INFINITY } else { value }
 }
 
 /// The box of allowed positions, one interval per dimension.

@@ -2,8 +2,8 @@
 //! bats do: where the vehicle's limits are felt over hills, or it turns in wide bows, either direction finds ways that
 //! the other misses.
 
+use super::aside::aside;
 use super::log::Log;
-use super::search::{self};
 use super::{StopReason, is_from_scratch, newton, starts};
 use crate::cost::Model;
 
@@ -30,7 +30,7 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     std::mem::swap(&mut scenario.start, &mut scenario.target);
     let back = Model::new(&scenario);
     let starts = starts::routes(&back, log.stop);
-    let found = search::aside(&back, starts, log.lower, log);
+    let found = aside(&back, starts, log.lower, log);
     found.map_or(StopReason::Iterations, |(reason, _, mut route)| {
         route.reverse();
         log.offer_unpriced(&route);

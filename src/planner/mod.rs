@@ -3,6 +3,7 @@
 //!
 //! Plain functions: no async, no store, no clock of their own.
 
+mod aside;
 mod backwards;
 mod beside;
 mod blocks;
@@ -58,8 +59,8 @@ pub trait Observer {
     fn incumbent(&mut self, incumbent: &Incumbent);
 }
 
-/// Tells a run when to end and what time it is; asked once an iteration, and occasionally within one whose routes take
-/// long to price.
+/// Tells a run when to end and what time it is. It is asked often, at least once an iteration, sweep or step, so both
+/// must be quick.
 pub trait Stop {
     /// Whether the run should end with the best route so far.
     fn requested(&self) -> bool;
@@ -125,6 +126,9 @@ fn search_to_the_end(model: &Model, log: &mut Log) -> StopReason {
         None => search::plain(model, log),
         Some(starts) => {
             let mut reason = search::guided(model, starts, log);
+            if reason == StopReason::Iterations && log.has_converged() {
+                reason = StopReason::Converged;
+            }
             if reason == StopReason::Iterations && backwards::is_worthwhile(model, log) {
                 reason = backwards::search(model, log);
             }

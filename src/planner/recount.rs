@@ -1,9 +1,9 @@
 //! The same search with a few waypoints fewer, and with a few more. Over hills where the vehicle's limits are felt, they
 //! decide which ways are seen at all, and the best of those seen with another number may be better with this one too.
 
+use super::aside::aside_with;
 use super::finish::finish_from;
 use super::log::Log;
-use super::search::aside_with;
 use super::{StopReason, is_from_scratch, newton, starts};
 use crate::cost::Model;
 
@@ -27,36 +27,46 @@ pub(super) fn search(model: &Model, log: &mut Log) -> StopReason {
     // It takes as long again.
     log.tell();
     let waypoints = model.scenario.planner.waypoints;
-    for share in SHARES {
-        let found = aside_with(model, part(waypoints, share), starts::routes, log);
+    for other in numbers(waypoints) {
+        let found = aside_with(model, other, starts::routes, log);
         let Some((reason, best, route)) = found else {
             continue;
         };
+        if best.is_feasible() {
+            let route = starts::with_waypoints(model, route, waypoints);
+            if reason == StopReason::Iterations {
+                finish_from(model, route, log);
+            } else {
+                log.offer_unpriced(&route);
+            }
+        }
         if reason != StopReason::Iterations {
             return reason;
         }
-        if best.is_feasible() {
-            let route = starts::with_waypoints(model, route, waypoints);
-            finish_from(model, route, log);
+        if log.has_converged() {
+            return StopReason::Converged;
         }
     }
     StopReason::Iterations
 }
 
-/// Another number of waypoints than `waypoints`, unless that is 1 and the share smaller.
+/// Other numbers of waypoints than `waypoints`, none of them 0.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "about as many"
 )]
-fn part(waypoints: usize, share: f64) -> usize {
-    let part = waypoints as f64 * share;
-    let away = if share < 1.0 {
-        part.floor()
-    } else {
-        part.ceil()
-    };
-    (away as usize).max(1)
+fn numbers(waypoints: usize) -> impl Iterator<Item = usize> {
+    let shares = SHARES.into_iter().map(move |share| {
+        let part = waypoints as f64 * share;
+        let away = if share < 1.0 {
+            part.floor()
+        } else {
+            part.ceil()
+        };
+        away as usize
+    });
+    shares.filter(|number| *number > 0)
 }
 
 #[cfg(test)]
@@ -109,8 +119,10 @@ mod tests {
 
     #[test]
     fn numbers_of_waypoints_are_others() {
-        for (waypoints, expected) in [(1, [1, 2]), (2, [1, 3]), (10, [8, 12]), (64, [51, 77])] {
-            assert_eq!(SHARES.map(|share| part(waypoints, share)), expected);
+        let expected: [(usize, &[usize]); 4] =
+            [(1, &[2]), (2, &[1, 3]), (10, &[8, 12]), (64, &[51, 77])];
+        for (waypoints, expected) in expected {
+            assert_eq!(numbers(waypoints).collect::<Vec<_>>(), expected);
         }
     }
 

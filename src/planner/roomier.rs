@@ -2,10 +2,10 @@
 //! then remove waypoints until the requested number is left. Where not even such a search finds one, ways along ledges
 //! join its starts.
 
+use super::aside::{StartsOf, aside_with};
 use super::fewer::leave_out;
 use super::finish::{Leads, finish};
 use super::log::Log;
-use super::search::{StartsOf, aside_with};
 use super::{StopReason, starts, why_stop};
 use crate::cost::Model;
 use crate::geometry::Point3;

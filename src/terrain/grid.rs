@@ -2,6 +2,8 @@
 //!
 //! The least and greatest heights of a leg above it are exact.
 
+use std::sync::Arc;
+
 use super::HeightRange;
 use super::cells::{Cells, straight_parts};
 use crate::geometry::{Point2, Rect, Segment};
@@ -18,7 +20,7 @@ pub struct Grid {
     /// Nodes from south to north, >= 2.
     pub rows: usize,
     /// `rows * columns` metres.
-    pub elevations: Vec<f64>,
+    pub elevations: Arc<[f64]>,
 }
 
 impl Grid {

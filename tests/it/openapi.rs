@@ -211,6 +211,27 @@ async fn the_reference_page_is_complete() {
     assert!(attributes("src").is_empty(), "nothing is loaded");
 }
 
+/// Each operation has a call that can be copied: with a body where it takes one, and without places to be filled in
+/// that a shell would take for patterns.
+#[tokio::test]
+async fn calls_of_the_reference_page_are_complete() {
+    let answer = Api::new().get("/docs").await;
+    let page = std::str::from_utf8(&answer.body).expect("UTF-8");
+    let calls: Vec<&str> = page.split("<pre>curl ").skip(1).collect();
+    let calls = calls
+        .iter()
+        .map(|call| call.split("</pre>").next().expect("one at least"));
+    let (mut files, mut bodies) = (0, 0);
+    for call in calls {
+        let url = call.split("&quot;").nth(1).expect("quoted");
+        assert!(!url.contains(['{', '}']), "{call}");
+        assert!(!call.contains("-d &#39;&#39;"), "{call}");
+        files += usize::from(call.contains("--data-binary @FILE"));
+        bodies += usize::from(call.contains("-d "));
+    }
+    assert_eq!((files, bodies), (1, 3));
+}
+
 /// The page's policy allows its own style and nothing else.
 #[tokio::test]
 async fn pages_load_nothing_but_their_own_style() {

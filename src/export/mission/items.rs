@@ -23,8 +23,8 @@ const FRAME_TERRAIN: u8 = 10;
 /// MAVLink's integer coordinates are in 1 / this degrees: a centimetre.
 const DEGREES: f64 = 1e7;
 
-/// Most items; item numbers have 16 bits.
-const MOST: usize = 65_535;
+/// Most items, whose numbers and count have 16 bits. `ArduPilot` counts home as one more.
+const MOST: usize = 65_534;
 
 /// A mission: where the vehicle is armed, and its commands.
 #[derive(Debug, Clone, PartialEq)]

@@ -144,22 +144,24 @@ impl<'a> Page<'a> {
         Ok(())
     }
 
-    /// An example call on a command line, with the shortest body in the description.
+    /// An example call on a command line, with the shortest body in the description; a file, where there is none.
     fn curl(&self, operation: &Operation) -> String {
         let method = match operation.method.as_str() {
             "GET" => String::new(),
             other => format!("-X {other} "),
         };
-        let url = format!("{LOCAL}{}", operation.path);
         let content = &self.resolve(&operation.about["requestBody"])["content"];
         let body = fields(content).next().map(|(media_type, content)| {
-            let bodies = fields(&content["examples"]);
-            let bodies = bodies.map(|(_, example)| example["value"].to_string());
-            let shortest = bodies.min_by_key(String::len).unwrap_or_default();
-            let quoted = shortest.replace('\'', r"'\''");
-            format!(" \\\n  -H 'content-type: {media_type}' \\\n  -d '{quoted}'")
+            let several = fields(&content["examples"]).map(|(_, example)| &example["value"]);
+            let bodies = several.chain(content.get("example")).map(Value::to_string);
+            let data = bodies.min_by_key(String::len).map_or_else(
+                || "--data-binary @FILE".to_owned(),
+                |shortest| format!("-d '{}'", shortest.replace('\'', r"'\''")),
+            );
+            format!(" \\\n  -H 'content-type: {media_type}' \\\n  {data}")
         });
-        format!("curl {method}'{url}'{}", body.unwrap_or_default())
+        let url = operation.url();
+        format!("curl {method}\"{url}\"{}", body.unwrap_or_default())
     }
 
     /// Resolve a reference within the description.
@@ -174,6 +176,27 @@ impl<'a> Page<'a> {
 }
 
 impl Operation<'_> {
+    /// Where it is, with what its parameters require: their examples, or variables of the shell.
+    fn url(&self) -> String {
+        let mut url = format!("{LOCAL}{}", self.path);
+        let required = self.parameters.iter();
+        for parameter in required.filter(|parameter| parameter["required"] == true) {
+            let name = parameter["name"].as_str().unwrap_or_default();
+            let value = match &parameter["example"] {
+                Value::Null => format!("${}", name.to_uppercase()),
+                Value::String(example) => example.clone(),
+                other => other.to_string(),
+            };
+            if parameter["in"] == "path" {
+                url = url.replace(&format!("{{{name}}}"), &value);
+            } else {
+                let separator = if url.contains('?') { '&' } else { '?' };
+                url.extend([separator.to_string(), format!("{name}={value}")]);
+            }
+        }
+        url
+    }
+
     fn has(&self, tag: &Value) -> bool {
         list(&self.about["tags"]).any(|known| *known == tag["name"])
     }

@@ -38,6 +38,9 @@ impl Newton<'_, '_> {
     ) -> Merit {
         let mut merit = self.merit(places, limits, prices);
         for _ in 0..STEPS {
+            if self.is_stopped() {
+                break;
+            }
             let equations = self.equations(places, limits, prices);
             let rules = (limits, prices);
             let Some(ratio) = self.step(&equations, places, &mut merit, rules, damping) else {

@@ -24,6 +24,9 @@ impl Newton<'_, '_> {
         // A limit that was exceeded once must not be again: from then on it is held exactly, on both sides.
         let mut held = vec![false; all.len()];
         for _ in 0..MENDS {
+            if self.is_stopped() {
+                break;
+            }
             let slopes = self.legs().slopes(places);
             self.evaluations += LEGS_EACH;
             let route = self.route(places);

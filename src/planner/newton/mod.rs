@@ -114,15 +114,18 @@ impl<'m, 's> Newton<'m, 's> {
         let (original, mut forces) = (route.clone(), Vec::new());
         let mut better = false;
         for &rate in self.effort.rates {
+            if self.is_stopped() {
+                break;
+            }
             let found = self.search(&original, rate, f64::INFINITY);
             better |= self.take(found, route, &mut best, &mut forces);
         }
-        if !better {
+        if !better && !self.is_stopped() {
             let found = self.search(&original, HIGH, f64::INFINITY);
             self.take(found, route, &mut best, &mut forces);
         }
         for other in others {
-            if self.is_spent() {
+            if self.is_over() {
                 break;
             }
             let found = self.search(other, USUAL, known(best));
@@ -139,6 +142,9 @@ impl<'m, 's> Newton<'m, 's> {
         let mut best = price(self.model, route);
         let original = route.clone();
         for rate in [USUAL, HIGH] {
+            if self.is_stopped() {
+                break;
+            }
             let found = self.search(&original, rate, f64::INFINITY);
             self.take(found, route, &mut best, &mut Vec::new());
             if best.is_feasible() {
@@ -161,7 +167,7 @@ impl<'m, 's> Newton<'m, 's> {
         while better && forces.iter().any(|force| *force > slight) {
             better = false;
             for deal in deals(self.effort, forces, route) {
-                if better || self.is_spent() {
+                if better || self.is_over() {
                     break;
                 }
                 let found = self.search(&deal, rate, known(*best));
@@ -170,10 +176,16 @@ impl<'m, 's> Newton<'m, 's> {
         }
     }
 
-    /// Whether as many routes were priced as the effort allows.
-    fn is_spent(&self) -> bool {
+    /// Whether nothing more may begin: as many routes were priced as the effort allows, or the run is to end.
+    fn is_over(&self) -> bool {
         let settings = &self.model.scenario.planner;
-        self.evaluations >= self.effort.budgets * (settings.population * settings.iterations) as u64
+        let budget = self.effort.budgets * (settings.population * settings.iterations) as u64;
+        self.evaluations >= budget || self.is_stopped()
+    }
+
+    /// Whether the run is to end.
+    fn is_stopped(&self) -> bool {
+        why_stop(self.model.scenario, self.stop).is_some()
     }
 
     /// Keep what a search `found` if it is better than the best so far, the `route`.
@@ -212,7 +224,7 @@ impl<'m, 's> Newton<'m, 's> {
             let merit = self.descend(&mut places, &limits, &prices, &mut damping);
             // What is still beyond limits makes a route cheap, and costs more from round to round.
             let is_dear = round >= self.effort.patience && merit.value > known * (1.0 + HOPE);
-            if is_dear || why_stop(self.model.scenario, self.stop).is_some() {
+            if is_dear || self.is_stopped() {
                 break;
             }
             self.feel(&limits, &places, &mut prices);

@@ -182,7 +182,9 @@ pub(super) fn along_strings(
     let mut follow = |obstacles: &Obstacles, count: usize| {
         for string in taut_strings_until(obstacles, count, is_over).strings {
             shapes.push(along(model, &string));
-            round.push(tangents::corners(scenario, &string, waypoints));
+            if scenario.terrain.is_flat() {
+                round.push(tangents::corners(scenario, &string, waypoints));
+            }
         }
     };
     follow(&Obstacles::soft(scenario, everything), STRINGS);

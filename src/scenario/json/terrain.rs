@@ -110,7 +110,7 @@ fn grid(fields: &Fields<'_>, chart: &Chart, limits: &Limits, faults: &mut Faults
         cell: cell?,
         columns: columns?,
         rows: rows?,
-        elevations: elevations?,
+        elevations: elevations?.into(),
     };
     let far = grid.extent().max;
     for (axis, end) in [("x", far.x), ("y", far.y)] {

@@ -26,7 +26,7 @@ const BETWEEN: f64 = 0.0;
 const TRIES: [(f64, f64); 2] = [(1.0, 2.0), (0.97, 1.0)];
 
 /// Share of the waypoints for which there must be room at the height.
-const LEVEL: f64 = 0.7;
+const LEVEL_SHARE: f64 = 0.7;
 
 /// Ways are longer than necessary by this share, and turns gentler.
 const SLACK: f64 = 1e-6;
@@ -92,7 +92,7 @@ impl Climb {
             .expect("two ends");
         let height = nearer + share * (middle - nearer);
         // Waypoints at that height keep their distance from each other.
-        let level = LEVEL * scenario.planner.waypoints as f64 * scenario.vehicle.min_leg;
+        let level = LEVEL_SHARE * scenario.planner.waypoints as f64 * scenario.vehicle.min_leg;
         let climb = |rise: f64| rise.abs() / steepest(scenario) * (1.0 + SLACK);
         let climbs = own.map(|own| climb(own - height));
         let direct = climb(scenario.target.z - scenario.start.z);

@@ -8,7 +8,7 @@ use super::{StopReason, is_from_scratch, newton, starts};
 use crate::cost::Model;
 
 /// Over level ground either direction finds the same ways with sharper turns than this, degrees.
-const WIDE_TURNS_DEG: f64 = 50.0;
+pub(super) const WIDE_TURNS_DEG: f64 = 50.0;
 
 /// Whether a search that ended with the best route of `log` is worth another in the other direction.
 pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {

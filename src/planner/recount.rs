@@ -1,7 +1,9 @@
-//! The same search with a few waypoints fewer, and with a few more. Over hills where the vehicle's limits are felt, they
-//! decide which ways are seen at all, and the best of those seen with another number may be better with this one too.
+//! The same search with a few waypoints fewer, and with a few more. Over hills where the limits of a vehicle that turns in
+//! wide bows are felt, they decide which ways are seen at all, and the best of those seen with another number may be
+//! better with this one too.
 
 use super::aside::aside_with;
+use super::backwards::WIDE_TURNS_DEG;
 use super::finish::finish_from;
 use super::log::Log;
 use super::{StopReason, is_from_scratch, newton, starts};
@@ -17,6 +19,7 @@ const MOST: usize = 64;
 pub(super) fn is_worthwhile(model: &Model, log: &Log) -> bool {
     is_from_scratch(model.scenario)
         && !model.scenario.terrain.is_flat()
+        && model.scenario.vehicle.max_turn_deg <= WIDE_TURNS_DEG
         && model.scenario.planner.waypoints <= MOST
         && log.best.is_feasible()
         && newton::is_felt(model, &log.route)
@@ -135,8 +138,9 @@ mod tests {
     }
 
     #[test]
-    fn level_ground_known_routes_and_many_waypoints_are_searched_once() {
-        let scenario = mountain(100.0, true);
+    fn level_ground_sharp_turns_known_routes_and_many_waypoints_are_searched_once() {
+        let mut scenario = mountain(100.0, true);
+        scenario.vehicle.max_turn_deg = WIDE_TURNS_DEG;
         let worthwhile = |scenario: &Scenario| {
             let model = Model::new(scenario);
             let mut nobody = Nobody;
@@ -159,5 +163,8 @@ mod tests {
             scenario.terrain = Terrain::Flat(Flat { elevation: 0.0 });
         }));
         assert!(!but(|scenario| scenario.planner.waypoints = MOST + 1));
+        assert!(!but(
+            |scenario| scenario.vehicle.max_turn_deg = WIDE_TURNS_DEG + 1.0
+        ));
     }
 }

@@ -13,6 +13,7 @@ use crate::geometry::geodesy::{LatLon, undulation_m};
 use crate::planner;
 use crate::scenario::limits::Limits;
 use crate::scenario::{Frame, Scenario, json};
+use crate::seeding;
 
 /// A scenario as the service would accept it.
 pub(super) fn accepted(document: &Value) -> Scenario {
@@ -57,7 +58,7 @@ fn plan(document: &Value, through: &[(f64, f64, f64)]) -> (String, String) {
         route.push(position.within(&scenario.frame).expect("of this frame"));
     }
     route.push(scenario.target);
-    let outcome = planner::so_far(&scenario, route);
+    let outcome = planner::so_far(&scenario, route, seeding::lower_bound(&scenario));
     let accepted = json::write(&scenario);
     let origin = Origin {
         plan_id: Some(Uuid::nil()),

@@ -6,6 +6,7 @@
 mod accept;
 pub mod auth;
 mod body;
+mod bounds;
 mod browser;
 mod caller;
 mod documents;
@@ -63,6 +64,7 @@ use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
 use tower_http::compression::{CompressionBody, CompressionLayer};
 
+pub use bounds::Bounds;
 pub use browser::Origins;
 pub use hosts::Hosts;
 pub use idempotency::InFlight;
@@ -103,6 +105,8 @@ pub struct Parts {
     pub capacity: Capacity,
     /// Idempotency keys that are being worked on.
     pub in_flight: InFlight,
+    /// What is proven about plans that are asked for before their end.
+    pub bounds: Bounds,
     /// The store's last answer about itself.
     pub readiness: Readiness,
     /// A request's body must be complete after this.

@@ -8,7 +8,9 @@ use super::{AppState, off_thread};
 use crate::export::document::{Convergence, Incumbent, Origin, ResultDocument};
 use crate::job::{Event, Plan};
 use crate::planner;
+use crate::scenario::Scenario;
 use crate::scenario::json::{self, Rules};
+use crate::seeding;
 
 /// Maximum number of points of the curve in it, the newest.
 const CURVE: usize = 10_000;
@@ -27,8 +29,10 @@ pub(super) async fn result(state: &AppState, plan: &Plan) -> Result<Option<Strin
         .started_ms
         .map_or(0, |began| state.clock.now_ms() - began);
     let origin = plan.origin(&scenario, run_ms.max(0) as f64);
-    let rules = state.rules.clone();
-    off_thread::run(move || measure(&scenario, &rules, best, curve, origin).map(Some)).await?
+    let (rules, bounds, id) = (state.rules.clone(), state.bounds.clone(), plan.id);
+    let lower = move |scenario: &Scenario| bounds.of(id, || seeding::lower_bound(scenario));
+    off_thread::run(move || measure(&scenario, &rules, best, lower, curve, origin).map(Some))
+        .await?
 }
 
 /// The curve of the present run, excluding an earlier one that was cut off.
@@ -57,6 +61,7 @@ fn measure(
     scenario: &str,
     rules: &Rules,
     best: Incumbent,
+    lower: impl FnOnce(&Scenario) -> f64,
     curve: Vec<Convergence>,
     origin: Origin,
 ) -> Result<String, Problem> {
@@ -75,7 +80,8 @@ fn measure(
     let route = route
         .collect::<Option<_>>()
         .expect("an incumbent is told in the frame of its scenario");
-    let outcome = planner::so_far(&scenario, route);
+    let lower = lower(&scenario);
+    let outcome = planner::so_far(&scenario, route, lower);
     let document = ResultDocument {
         stop_reason: None,
         is_final: Some(false),

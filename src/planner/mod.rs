@@ -205,6 +205,7 @@ fn why_stop(scenario: &Scenario, stop: &dyn Stop) -> Option<StopReason> {
 
 /// What a run whose best route so far is `route` would deliver if it were cancelled now; its curve
 /// and its count of evaluations are not known here. Thus it also prices and certifies a route of one's own.
+/// `lower` is what is known of the [`seeding::lower_bound`], which takes the longest; 0 is always true.
 ///
 /// `route` begins at the start and ends at the target, which is not checked; waypoints that coincide are spread along
 /// their legs.
@@ -212,8 +213,7 @@ fn why_stop(scenario: &Scenario, stop: &dyn Stop) -> Option<StopReason> {
 /// # Panics
 /// When `route` has fewer than two waypoints.
 #[must_use]
-pub fn so_far(scenario: &Scenario, route: Vec<Point3>) -> Outcome {
-    let lower = seeding::lower_bound(scenario);
+pub fn so_far(scenario: &Scenario, route: Vec<Point3>, lower: f64) -> Outcome {
     let model = Model::new(scenario);
     measured(&model, route, Vec::new(), lower, StopReason::Cancelled)
 }

@@ -172,11 +172,11 @@ fn a_stop_after_the_last_iteration_is_told() {
 fn routes_from_elsewhere_are_certified() {
     let mut scenario = scenario();
     scenario.threats.clear();
-    let straight = so_far(&scenario, route(&[]));
+    let straight = so_far(&scenario, route(&[]), 0.0);
     let path = straight.path.expect("nothing is in its way");
     assert_eq!(path.degree, 1);
     assert!((path.length - straight.legs[0].length).abs() < 1e-9);
-    let unknown = so_far(&scenario, route(&[[500.0, f64::NAN, 100.0]]));
+    let unknown = so_far(&scenario, route(&[[500.0, f64::NAN, 100.0]]), 0.0);
     assert!(!unknown.feasible && unknown.path.is_none());
 }
 

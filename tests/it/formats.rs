@@ -46,7 +46,8 @@ async fn ended(api: &Api, scenario: &Value, lat: f64, lon: f64) -> String {
         alt: 520.0,
     };
     let between = between.within(&read.frame).expect("degrees");
-    let outcome = planner::so_far(&read, vec![read.start, between, read.target]);
+    let lower = noctule::seeding::lower_bound(&read);
+    let outcome = planner::so_far(&read, vec![read.start, between, read.target], lower);
     let origin = Origin {
         plan_id: Some(lease.plan.id),
         algorithm: "tms-sba".to_owned(),

@@ -10,7 +10,7 @@ use crate::cli::access;
 use crate::config::{self, Config};
 use crate::http::auth::Access;
 use crate::http::webhook::{self, Secrets};
-use crate::http::{Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains};
+use crate::http::{Bounds, Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains};
 use crate::planner;
 use crate::store::measured::MeasuredStore;
 use crate::store::{self, SteadyClock};
@@ -71,6 +71,7 @@ pub(super) async fn open(
             queue: config.queue,
         },
         in_flight: InFlight::default(),
+        bounds: Bounds::default(),
         readiness: Readiness::default(),
         clock,
         body_timeout: config.http.body_timeout,

@@ -1,4 +1,5 @@
-//! The plans that a node knows of, indexed and counted so that each question is answered without looking at all plans.
+//! The plans that a node knows of, indexed and counted so that questions are answered without looking at all of them;
+//! except for lists by owner or status, and for the uses of datasets.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::sync::Arc;

@@ -13,7 +13,9 @@ use noctule::catalogue::Directories;
 use noctule::config::Origin;
 use noctule::http::auth::{Access, Keys, Settings};
 use noctule::http::webhook;
-use noctule::http::{self, Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains};
+use noctule::http::{
+    self, Bounds, Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains,
+};
 use noctule::planner;
 use noctule::scenario::limits::Limits;
 use noctule::store::measured::MeasuredStore;
@@ -179,6 +181,7 @@ impl Api {
             terrains: Terrains::new(catalogue),
             capacity: Capacity { workers: 2, queue },
             in_flight: InFlight::default(),
+            bounds: Bounds::default(),
             readiness: Readiness::default(),
             clock: SteadyClock::following(wall_clock()),
             body_timeout: Duration::from_secs(30),

@@ -7,7 +7,7 @@ use axum::response::{IntoResponse, Response};
 use super::caller::Caller;
 use super::params::{self, Id, NoParams, Params};
 use super::problem::Problem;
-use super::{AppState, accept, off_thread, partial, retry};
+use super::{AppState, accept, partial, retry};
 use crate::export::{self, ExportError, Format, OPTIONS, Options, ResultInput, file_name};
 use crate::job::Plan;
 
@@ -80,15 +80,15 @@ async fn written(
     } else {
         let scenario = state.store.scenario(plan.id).await?;
         let rules = state.rules.clone();
-        let write = move || {
+        let write = move |scenario: &String| {
             let input = ResultInput {
                 result: &result,
-                scenario: &scenario,
+                scenario,
                 rules: &rules,
             };
             write_first(&choices, &input)
         };
-        off_thread::run(write).await??
+        state.terrains.over(scenario, write).await??
     };
     let headers = [
         (

@@ -6,6 +6,7 @@ use axum::Json;
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::{HeaderMap, Uri};
+use bytes::Bytes;
 use serde::Serialize;
 
 use super::params::Params;
@@ -60,8 +61,10 @@ pub(super) async fn sample(
     let rows = nodes("rows")?.unwrap_or(SOME_NODES);
     let text = body::read_json(&state, &headers, body).await?;
     let rules = state.rules.clone();
-    let read = move || json::read(&text, &rules, 0).map(|read| sampled(&read, columns, rows));
-    Ok(Json(state.terrains.read(read).await??))
+    let sample = move |text: &Bytes| {
+        json::read(text, &rules, 0).map(|scenario| sampled(&scenario, columns, rows))
+    };
+    Ok(Json(state.terrains.over(text, sample).await??))
 }
 
 fn sampled(scenario: &Scenario, columns: usize, rows: usize) -> GroundDocument {

@@ -3,8 +3,8 @@
 
 use std::collections::VecDeque;
 
+use super::AppState;
 use super::problem::Problem;
-use super::{AppState, off_thread};
 use crate::export::document::{Convergence, Incumbent, Origin, ResultDocument};
 use crate::job::{Event, Plan};
 use crate::planner;
@@ -31,8 +31,9 @@ pub(super) async fn result(state: &AppState, plan: &Plan) -> Result<Option<Strin
     let origin = plan.origin(&scenario, run_ms.max(0) as f64);
     let (rules, bounds, id) = (state.rules.clone(), state.bounds.clone(), plan.id);
     let lower = move |scenario: &Scenario| bounds.of(id, || seeding::lower_bound(scenario));
-    off_thread::run(move || measure(&scenario, &rules, best, lower, curve, origin).map(Some))
-        .await?
+    let measure =
+        move |scenario: &String| measure(scenario, &rules, best, lower, curve, origin).map(Some);
+    state.terrains.over(scenario, measure).await?
 }
 
 /// The curve of the present run, excluding an earlier one that was cut off.

@@ -18,6 +18,7 @@ use crate::http::params::Params;
 use crate::http::prefer::{PREFERENCE_APPLIED, Wait};
 use crate::http::problem::Problem;
 use crate::http::status::{StatusDocument, location};
+use crate::http::terrains::may_name_a_dataset;
 use crate::http::{AppState, Phase, off_thread, retry, warm_start, webhook};
 use crate::job::{self, Idempotency, Plan, Submission};
 use crate::scenario::{Scenario, json};
@@ -237,11 +238,6 @@ async fn refusal_when_draining(state: &AppState) -> Result<Option<Problem>, Prob
 /// A document of this length, bytes, is read in less time than it takes to hand it to another thread.
 const SHORT: usize = 4_096;
 
-/// Whether reading a document may require files: escapes can hide a name. Invalid text is refused before that.
-fn may_name_a_dataset(document: &[u8]) -> bool {
-    str::from_utf8(document).is_ok_and(|text| text.contains('\\') || text.contains("dataset"))
-}
-
 /// Read a document into a submission. Most are short and name nothing that must be looked up.
 async fn accept(state: &AppState, caller: &Caller, document: Bytes) -> Result<Submission, Problem> {
     if document.len() <= SHORT && !may_name_a_dataset(&document) {
@@ -260,13 +256,8 @@ async fn accept_slowly(
     document: Bytes,
 ) -> Result<Submission, Problem> {
     let rules = state.rules.clone();
-    let reads_files = may_name_a_dataset(&document);
-    let read = move || json::read(&document, &rules, job::draw_seed());
-    let mut scenario = if reads_files {
-        state.terrains.read(read).await?
-    } else {
-        off_thread::run(read).await?
-    }?;
+    let read = move |document: &Bytes| json::read(document, &rules, job::draw_seed());
+    let mut scenario = state.terrains.over(document, read).await??;
     warm_start::resolve(state, caller, &mut scenario).await?;
     let (caller, now_ms) = (caller.clone(), state.clock.now_ms());
     off_thread::run(move || submission(scenario, caller, now_ms)).await

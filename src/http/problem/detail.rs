@@ -1,6 +1,6 @@
 //! A problem's explanation for people.
 
-use super::{A_PLACE_S, Problem};
+use super::{A_PLACE_S, Busy, Problem};
 use crate::http::auth::TooMany;
 use crate::http::head::MOST_HEADERS;
 use crate::http::prefer::MAX_WAIT_S;
@@ -99,6 +99,13 @@ impl Problem {
             }
             Self::TooManyUploads(most) => {
                 format!("{most} datasets are being uploaded, as many as may be; try again in {A_PLACE_S} s")
+            }
+            Self::Busy(what) => {
+                let what = match what {
+                    Busy::Cores => "other requests keep every core busy",
+                    Busy::Datasets => "as many requests as may be wait for datasets",
+                };
+                format!("{what}; try again in {A_PLACE_S} s")
             }
             Self::MethodNotAllowed => {
                 "the header Allow lists the methods of this resource".to_owned()

@@ -151,6 +151,11 @@ impl Problem {
                 "too-many-uploads",
                 "Too many uploads",
             ),
+            Self::Busy(_) => (
+                StatusCode::SERVICE_UNAVAILABLE,
+                "busy",
+                "The service is busy",
+            ),
             Self::NoResult { .. } => (StatusCode::CONFLICT, "no-result", "The plan has no result"),
             Self::IdempotencyInFlight => (
                 StatusCode::CONFLICT,

@@ -24,7 +24,7 @@ use crate::job::{Failure, PlanId, Status};
 use crate::scenario::json::Fault;
 use crate::store::{Tombstone, Trouble};
 
-/// When to ask again for a place among streams or uploads, seconds: how long others take is not known.
+/// When to ask again for a place among streams, uploads or others' work, seconds: how long others take is not known.
 const A_PLACE_S: u64 = 5;
 
 /// Everything for which a request can be refused.
@@ -65,6 +65,8 @@ pub(super) enum Problem {
     UploadStalled(Duration),
     /// The maximum number of datasets is being uploaded.
     TooManyUploads(usize),
+    /// The service does as much as it may at once; of what.
+    Busy(Busy),
     /// The plan was removed.
     Gone(Tombstone),
     /// The path exists, the method does not; axum adds `Allow`.
@@ -196,6 +198,15 @@ pub(super) enum Problem {
     Internal,
 }
 
+/// What there is too much of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Busy {
+    /// Work for the processor's cores.
+    Cores,
+    /// Requests that need datasets.
+    Datasets,
+}
+
 impl Problem {
     /// Nothing has the path of this address.
     pub(super) fn no_such_resource(uri: &Uri) -> Self {
@@ -220,7 +231,7 @@ impl Problem {
             | Self::RateLimited { retry_after_s }
             | Self::Draining { retry_after_s } => Some(*retry_after_s),
             Self::StoreUnavailable(_) | Self::IdempotencyInFlight => Some(1),
-            Self::TooManyStreams(_) | Self::TooManyUploads(_) => Some(A_PLACE_S),
+            Self::TooManyStreams(_) | Self::TooManyUploads(_) | Self::Busy(_) => Some(A_PLACE_S),
             _ => None,
         }
     }

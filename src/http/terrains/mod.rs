@@ -1,7 +1,8 @@
 //! Datasets: upload, list, show, delete, sample.
 //!
 //! Every dataset may be used in anybody's plans; only its uploader may change a name. Files are read and written on
-//! threads of their own, few at a time.
+//! threads of their own, few at a time. Where nodes share datasets, all of this may wait for servers, so none of it
+//! takes a place from work that computes.
 
 mod document;
 mod elevations;
@@ -16,7 +17,6 @@ use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
-use tokio::sync::Semaphore;
 
 pub(super) use elevations::elevations;
 pub(super) use receive::SLOWEST;
@@ -26,29 +26,33 @@ use document::TerrainDocument;
 
 use super::caller::Caller;
 use super::entity_tags::{EntityTags, opaque};
+use super::off_thread::Places;
 use super::params::{self, NoParams};
-use super::problem::Problem;
+use super::problem::{Busy, Problem};
 use super::{AppState, off_thread};
 use crate::catalogue::{Catalogue, CatalogueError, Claim, Entry, Expected, Naming, Tally};
 use crate::digest::sha256_hex;
 use crate::store::DatasetUse;
 use crate::terrain::is_dataset_name;
 
-/// Uploads at the same time; further ones wait, as long as a body may pause.
+/// Uploads at the same time, until they are kept; further ones wait, as long as a body may pause.
 const UPLOADS: usize = 4;
 /// Uploads whose files are read through at the same time.
 const CHECKS: usize = 2;
-/// Scenarios and samples that may read from datasets at the same time.
+/// Requests that may read from datasets at the same time.
 const READS: usize = 4;
+/// Requests that may ask for names and records at the same time.
+const RECORDS: usize = 16;
 
 /// The datasets, and limits on concurrent work with them.
 #[derive(Clone)]
 pub struct Terrains {
     /// Where they are kept.
     pub catalogue: Arc<dyn Catalogue>,
-    uploads: Arc<Semaphore>,
-    checks: Arc<Semaphore>,
-    reads: Arc<Semaphore>,
+    uploads: Places,
+    checks: Places,
+    reads: Places,
+    records: Places,
 }
 
 impl Terrains {
@@ -57,9 +61,10 @@ impl Terrains {
     pub fn new(catalogue: Arc<dyn Catalogue>) -> Self {
         Self {
             catalogue,
-            uploads: Arc::new(Semaphore::new(UPLOADS)),
-            checks: Arc::new(Semaphore::new(CHECKS)),
-            reads: Arc::new(Semaphore::new(READS)),
+            uploads: Places::new(UPLOADS, Busy::Datasets),
+            checks: Places::new(CHECKS, Busy::Datasets),
+            reads: Places::new(READS, Busy::Datasets),
+            records: Places::new(RECORDS, Busy::Datasets),
         }
     }
 
@@ -69,7 +74,7 @@ impl Terrains {
         work: impl FnOnce(&dyn Catalogue) -> Result<T, CatalogueError> + Send + 'static,
     ) -> Result<T, Problem> {
         let catalogue = self.catalogue.clone();
-        Ok(off_thread::run(move || work(&*catalogue)).await??)
+        Ok(self.records.run(move || work(&*catalogue)).await??)
     }
 
     /// How many there are, as far as is known at once; never waits behind other work.
@@ -84,24 +89,28 @@ impl Terrains {
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Problem> {
-        one_of_few(&self.reads, work).await
+        self.reads.run(work).await
+    }
+
+    /// Do work with a scenario: like other computing, unless that may need a dataset.
+    pub(super) async fn over<D: AsRef<[u8]> + Send + 'static, T: Send + 'static>(
+        &self,
+        document: D,
+        work: impl FnOnce(&D) -> T + Send + 'static,
+    ) -> Result<T, Problem> {
+        let reads_files = may_name_a_dataset(document.as_ref());
+        let work = move || work(&document);
+        if reads_files {
+            self.read(work).await
+        } else {
+            off_thread::run(work).await
+        }
     }
 }
 
-/// Do `work` on a thread of its own once there is a permit; the permit is returned when the work is done, even if
-/// nobody waits for it.
-async fn one_of_few<T: Send + 'static>(
-    permits: &Arc<Semaphore>,
-    work: impl FnOnce() -> T + Send + 'static,
-) -> Result<T, Problem> {
-    let permit = permits.clone().acquire_owned().await;
-    let permit = permit.expect("nobody closes it");
-    off_thread::run(move || {
-        let done = work();
-        drop(permit);
-        done
-    })
-    .await
+/// Whether reading a document may require files: escapes can hide a name. Invalid text is refused before that.
+pub(super) fn may_name_a_dataset(document: &[u8]) -> bool {
+    str::from_utf8(document).is_ok_and(|text| text.contains('\\') || text.contains("dataset"))
 }
 
 /// The `{name}` of the path. An invalid name refers to no dataset.
@@ -192,7 +201,10 @@ pub(super) async fn show(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let catalogue = state.terrains.catalogue.clone();
-    let entry = one_of_few(&state.terrains.checks, move || catalogue.entry(&name)).await??;
+    let entry = state
+        .terrains
+        .read(move || catalogue.entry(&name))
+        .await??;
     let content = entry.sha256.clone();
     let document = document(&state, entry).await?;
     let tag = content.map(|content| document_etag(&content, &document));

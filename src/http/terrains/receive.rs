@@ -15,6 +15,7 @@ use tokio::time::Instant;
 use crate::catalogue::Staged;
 use crate::http::AppState;
 use crate::http::body::{Coding, announced_length, broken_off};
+use crate::http::off_thread::Place;
 use crate::http::problem::Problem;
 
 /// Minimum average bytes a second: a slower sender would hold a place for nothing.
@@ -29,21 +30,19 @@ enum Piece {
     End,
 }
 
-/// The whole body, once received, as a file.
+/// The whole body, once received, as a file, and its place among the uploads.
 pub(super) async fn receive(
     state: &AppState,
     headers: &HeaderMap,
     body: Body,
-) -> Result<Staged, Problem> {
+) -> Result<(Staged, Place), Problem> {
     let (limit, timeout) = (state.rules.limits.terrain_bytes, state.body_timeout);
     let coding = Coding::of(headers)?;
     if announced_length(headers).is_some_and(|length| length > limit) {
         return Err(Problem::TerrainTooLarge(limit));
     }
-    let place = state.terrains.uploads.acquire();
-    let Ok(place) = tokio::time::timeout(timeout, place).await else {
-        return Err(Problem::TooManyUploads(super::UPLOADS));
-    };
+    let place = state.terrains.uploads.take(timeout).await;
+    let place = place.ok_or(Problem::TooManyUploads(super::UPLOADS))?;
     let staged = state.terrains.ask(move |catalogue| catalogue.stage(limit));
     let sink = Sink::new(staged.await?, coding);
     let (pieces, coming) = mpsc::channel(PIECES);
@@ -54,9 +53,8 @@ pub(super) async fn receive(
     // An upload that was cut off never sends its end marker, and is removed.
     drop(pieces);
     let written = writing.await.unwrap_or(Err(Problem::Internal));
-    drop(place);
     sent?;
-    written
+    Ok((written?, place))
 }
 
 /// Pass the body on, piece by piece.

@@ -6,10 +6,11 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
 use axum::response::Response;
 
 use super::receive::receive;
-use super::{Name, Terrains, check_name, document, etag, json, naming, one_of_few, tagged};
+use super::{Name, Terrains, check_name, document, etag, json, naming, tagged};
 use crate::catalogue::{Checked, Declaration, Entry, Kept, Naming, Staged};
 use crate::http::AppState;
 use crate::http::caller::Caller;
+use crate::http::off_thread::Place;
 use crate::http::params::{self, Params};
 use crate::http::problem::Problem;
 use crate::terrain::dem::Format;
@@ -31,9 +32,9 @@ pub(in crate::http) async fn put(
     let naming = naming(&state, name, &caller, &headers);
     // Checked first, so that no long body is sent in vain.
     permit(&state.terrains, naming.clone()).await?;
-    let staged = receive(&state, &headers, body).await?;
+    let (staged, place) = receive(&state, &headers, body).await?;
     let checked = check(&state.terrains, staged, said).await?;
-    let (kept, entry) = keep(&state, checked, naming).await?;
+    let (kept, entry) = keep(&state, &place, checked, naming).await?;
     let answer = answer(&state, entry).await?;
     Ok(match kept {
         Kept::Created => created(answer, &uri),
@@ -80,15 +81,17 @@ async fn permit(terrains: &Terrains, naming: Naming) -> Result<(), Problem> {
         .await
 }
 
-/// Read the file through.
+/// Read the file through. There are few uploads, so each waits for its turn however long that takes.
 async fn check(terrains: &Terrains, staged: Staged, said: Said) -> Result<Checked, Problem> {
+    let turn = terrains.checks.next().await;
     let check = move || staged.check(said.format, said.declaration);
-    Ok(one_of_few(&terrains.checks, check).await??)
+    Ok(turn.run(check).await??)
 }
 
-/// Store it under its name.
+/// Store it under its name, which sends it to servers where nodes share datasets.
 async fn keep(
     state: &AppState,
+    place: &Place,
     checked: Checked,
     naming: Naming,
 ) -> Result<(Kept, Entry), Problem> {
@@ -98,10 +101,9 @@ async fn keep(
     if let Err(error) = sweep_datasets(&*state.store, &state.terrains.catalogue).await {
         tracing::debug!(%error, "datasets were not swept before an upload");
     }
-    let (kept, entry) = state
-        .terrains
-        .ask(move |catalogue| catalogue.keep(checked, &naming, room))
-        .await?;
+    let catalogue = state.terrains.catalogue.clone();
+    let keep = move || catalogue.keep(checked, &naming, room);
+    let (kept, entry) = place.run(keep).await??;
     tracing::info!(name = entry.name, sha256, ?kept, "a dataset was uploaded");
     Ok((kept, entry))
 }

@@ -8,6 +8,7 @@ mod names;
 mod planning;
 mod sampling;
 mod shared;
+mod stalled;
 mod uses;
 
 use std::path::{Path, PathBuf};

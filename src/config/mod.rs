@@ -88,6 +88,8 @@ pub struct Http {
     pub head_timeout: Duration,
     /// A request's body must be complete after this; with `head_timeout`, also how long an answer may be left unread.
     pub body_timeout: Duration,
+    /// Bytes that the bodies of all requests may take at once.
+    pub bodies_bytes: usize,
     /// Connections open at once; more wait in the listener's backlog.
     pub max_connections: usize,
     /// Event streams open at once.
@@ -153,6 +155,7 @@ impl Default for Http {
         Self {
             head_timeout: Duration::from_secs(30),
             body_timeout: Duration::from_secs(30),
+            bodies_bytes: 256 << 20,
             max_connections: 20_000,
             streams: 10_000,
             streams_per_key: 1_000,

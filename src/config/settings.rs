@@ -186,6 +186,13 @@ fn http() -> Vec<Setting> {
             |c| &mut c.http.body_timeout,
         ),
         row(
+            "http.bodies_bytes",
+            "BYTES",
+            "Memory for the bodies of all requests that are being received or read; more are refused with 503 busy",
+            1 << 20..,
+            |c| &mut c.http.bodies_bytes,
+        ),
+        row(
             "http.max_connections",
             "N",
             "Connections open at once; more wait in the listener's backlog",

@@ -1,4 +1,5 @@
-//! A request body: the right media type, plain or gzip, limits on both lengths and on slowness.
+//! A request body: the right media type, plain or gzip, limits on both lengths and on slowness, and its share of what
+//! all bodies may take.
 
 use std::error::Error;
 use std::io::{self, ErrorKind, Read as _};
@@ -9,8 +10,9 @@ use axum::body::Body;
 use axum::http::{HeaderMap, header};
 use bytes::Bytes;
 use flate2::read::MultiGzDecoder;
-use http_body_util::{BodyExt, LengthLimitError, Limited};
+use http_body_util::{BodyExt as _, LengthLimitError, Limited};
 
+use super::bodies::{Bodies, Growing};
 use super::problem::Problem;
 use super::shown::Shown;
 use super::{AppState, off_thread};
@@ -57,6 +59,7 @@ pub(super) struct Announced {
     coding: Coding,
     limit: usize,
     timeout: Duration,
+    bodies: Bodies,
 }
 
 impl Announced {
@@ -78,25 +81,42 @@ impl Announced {
             coding,
             limit,
             timeout: state.body_timeout,
+            bodies: state.bodies.clone(),
         })
     }
 
     /// The whole body.
     pub(super) async fn read(&self, body: Body) -> Result<Bytes, Problem> {
         let (limit, timeout) = (self.limit, self.timeout);
-        let sent = match tokio::time::timeout(timeout, Limited::new(body, limit).collect()).await {
-            Ok(Ok(collected)) => collected.to_bytes(),
-            Ok(Err(error)) if error.is::<LengthLimitError>() => {
-                return Err(Problem::BodyTooLarge(limit));
-            }
-            Ok(Err(error)) => return Err(broken_off(&*error)),
-            Err(_) => return Err(Problem::BodyTooSlow(timeout)),
-        };
+        let sent = receive(body, limit, self.bodies.begin(limit));
+        let sent = tokio::time::timeout(timeout, sent).await;
+        let sent = sent.map_err(|_| Problem::BodyTooSlow(timeout))??;
         match self.coding {
             Coding::Plain => Ok(sent),
-            Coding::Gzip => off_thread::run(move || unpack(&sent, limit)).await?,
+            Coding::Gzip => {
+                let plain = self.bodies.begin(limit);
+                off_thread::run(move || unpack(&sent, limit, plain)).await?
+            }
         }
     }
+}
+
+/// A body as it was sent.
+async fn receive(body: Body, limit: usize, mut whole: Growing) -> Result<Bytes, Problem> {
+    let mut body = Limited::new(body, limit);
+    while let Some(frame) = body.frame().await {
+        let frame = frame.map_err(|error| {
+            if error.is::<LengthLimitError>() {
+                Problem::BodyTooLarge(limit)
+            } else {
+                broken_off(&*error)
+            }
+        })?;
+        if let Ok(piece) = frame.into_data() {
+            whole.add(&piece)?;
+        }
+    }
+    Ok(whole.whole())
 }
 
 /// Why a body did not arrive whole.
@@ -117,17 +137,24 @@ pub(super) fn broken_off(error: &(dyn Error + 'static)) -> Problem {
     }
 }
 
+/// Bytes that are unpacked at once.
+const PIECE: usize = 64 * 1024;
+
 /// Unpacks a gzip body; gives up as soon as that is longer than a body may be.
-fn unpack(packed: &[u8], limit: usize) -> Result<Bytes, Problem> {
-    let mut plain = Vec::new();
-    MultiGzDecoder::new(packed)
-        .take(limit as u64 + 1)
-        .read_to_end(&mut plain)
-        .map_err(|error| Problem::BodyNotGzip(error.to_string()))?;
-    if plain.len() > limit {
-        return Err(Problem::BodyTooLarge(limit));
+fn unpack(packed: &[u8], limit: usize, mut plain: Growing) -> Result<Bytes, Problem> {
+    let mut decoder = MultiGzDecoder::new(packed);
+    let mut piece = vec![0; PIECE];
+    loop {
+        let length = decoder.read(&mut piece);
+        let length = length.map_err(|error| Problem::BodyNotGzip(error.to_string()))?;
+        if length == 0 {
+            return Ok(plain.whole());
+        }
+        if plain.len() + length > limit {
+            return Err(Problem::BodyTooLarge(limit));
+        }
+        plain.add(&piece[..length])?;
     }
-    Ok(plain.into())
 }
 
 /// A body's content coding.
@@ -237,7 +264,8 @@ mod tests {
     #[test]
     fn a_body_is_unpacked_up_to_the_limit() {
         let check = |packed: &[u8], expected: Result<&[u8], &str>| {
-            let unpacked = unpack(packed, 1000).map_err(|problem| match problem {
+            let plain = Bodies::new(0, 1000).begin(1000);
+            let unpacked = unpack(packed, 1000, plain).map_err(|problem| match problem {
                 Problem::BodyTooLarge(1000) => "too large",
                 Problem::BodyNotGzip(_) => "not gzip",
                 _ => "another problem",

@@ -5,6 +5,7 @@
 
 mod accept;
 pub mod auth;
+mod bodies;
 mod body;
 mod bounds;
 mod browser;
@@ -64,6 +65,7 @@ use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
 use tower_http::compression::{CompressionBody, CompressionLayer};
 
+pub use bodies::Bodies;
 pub use bounds::Bounds;
 pub use browser::Origins;
 pub use hosts::Hosts;
@@ -111,6 +113,8 @@ pub struct Parts {
     pub readiness: Readiness,
     /// A request's body must be complete after this.
     pub body_timeout: Duration,
+    /// How much the bodies of all requests may take.
+    pub bodies: Bodies,
     /// The clock for timestamps and expiry of plans.
     pub clock: Arc<SteadyClock>,
     /// Who may do what.

@@ -10,7 +10,9 @@ use crate::cli::access;
 use crate::config::{self, Config};
 use crate::http::auth::Access;
 use crate::http::webhook::{self, Secrets};
-use crate::http::{Bounds, Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains};
+use crate::http::{
+    Bodies, Bounds, Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains,
+};
 use crate::planner;
 use crate::store::measured::MeasuredStore;
 use crate::store::{self, SteadyClock};
@@ -75,6 +77,7 @@ pub(super) async fn open(
         readiness: Readiness::default(),
         clock,
         body_timeout: config.http.body_timeout,
+        bodies: Bodies::new(config.http.bodies_bytes, config.limits.body_bytes),
         access,
         webhooks,
         cors,

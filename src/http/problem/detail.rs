@@ -102,8 +102,9 @@ impl Problem {
             }
             Self::Busy(what) => {
                 let what = match what {
-                    Busy::Cores => "other requests keep every core busy",
-                    Busy::Datasets => "as many requests as may be wait for datasets",
+                    Busy::Cores => "other requests keep every core busy".to_owned(),
+                    Busy::Datasets => "as many requests as may be wait for datasets".to_owned(),
+                    Busy::Bodies(most) => format!("the bodies of other requests take what they may, {most} bytes"),
                 };
                 format!("{what}; try again in {A_PLACE_S} s")
             }

@@ -205,6 +205,8 @@ pub(super) enum Busy {
     Cores,
     /// Requests that need datasets.
     Datasets,
+    /// Bodies that are being received or read; all may take this many bytes.
+    Bodies(usize),
 }
 
 impl Problem {

@@ -4,12 +4,14 @@ use std::io::Write as _;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use futures_util::StreamExt as _;
+use futures_util::stream::FuturesUnordered;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
 use super::Dice;
 use crate::support::api::Api;
-use crate::support::patience::in_time;
+use crate::support::patience::{eventually, in_time};
 use crate::support::process::Service;
 use crate::support::server::Server;
 
@@ -171,4 +173,66 @@ async fn a_gzip_bomb_of_a_gibibyte_is_refused_in_little_memory() {
     assert_eq!(answer.status(), 413);
     let grown = service.peak_rss_kib() - before;
     assert!(grown < 64 * 1024, "{grown} KiB more");
+}
+
+/// One caller who begins a body and never ends it; what the service says to that, and the connection.
+async fn begin_a_body(service: &Service, sent: &[u8]) -> (String, TcpStream) {
+    let mut stream = TcpStream::connect(service.address())
+        .await
+        .expect("connected");
+    // The service may refuse before everything is sent.
+    let _ = stream.write_all(sent).await;
+    let mut text = vec![0; 4096];
+    let length = stream.read(&mut text).await.unwrap_or(0);
+    text.truncate(length);
+    (String::from_utf8(text).expect("UTF-8"), stream)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn unfinished_bodies_take_little_memory_and_short_ones_pass() {
+    const ROOM: usize = 16 << 20;
+    /// Of one of them, what has come.
+    const HALF: usize = 4 << 20;
+    const CALLERS: usize = 64;
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let room = ROOM.to_string();
+    let limits = [
+        "--http-bodies-bytes",
+        &room,
+        "--http-body-timeout",
+        "3600",
+        "--workers",
+        "1",
+    ];
+    let service = Service::start(directory.path(), &limits);
+    let before = service.peak_rss_kib();
+    let half = post(&format!("content-length: {}", 2 * HALF), &document(HALF));
+    let mut callers: FuturesUnordered<_> = (0..CALLERS)
+        .map(|_| begin_a_body(&service, &half))
+        .collect();
+    // The others may stay, for they fit.
+    let mut refused = Vec::new();
+    for _ in 0..CALLERS - ROOM / HALF {
+        let (answer, stream) = in_time(callers.next()).await.expect("one of them");
+        assert_eq!(statuses(&answer), ["503"], "{answer}");
+        assert!(answer.contains("/problems/busy"), "{answer}");
+        assert!(answer.contains("\r\nretry-after: "), "{answer}");
+        refused.push(stream);
+    }
+    service.submit(&crate::support::scenario()).await;
+    let grown = service.peak_rss_kib() - before;
+    assert!(grown < 64 * 1024, "{grown} KiB more");
+
+    // What is broken off or read gives its room to others.
+    drop((callers, refused));
+    let long = async || {
+        let request = service.request(reqwest::Method::POST, "/plans");
+        let request = request.header("content-type", "application/json");
+        let answer = request.body(document(HALF)).send().await;
+        answer.expect("an answer").status()
+    };
+    eventually(async || long().await == 202).await;
+    for _ in 0..2 * ROOM / HALF {
+        assert_eq!(long().await, 202);
+    }
 }

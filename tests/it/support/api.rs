@@ -14,7 +14,7 @@ use noctule::config::Origin;
 use noctule::http::auth::{Access, Keys, Settings};
 use noctule::http::webhook;
 use noctule::http::{
-    self, Bounds, Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains,
+    self, Bodies, Bounds, Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains,
 };
 use noctule::planner;
 use noctule::scenario::limits::Limits;
@@ -185,6 +185,7 @@ impl Api {
             readiness: Readiness::default(),
             clock: SteadyClock::following(wall_clock()),
             body_timeout: Duration::from_secs(30),
+            bodies: Bodies::new(256 << 20, limits.body_bytes),
             access,
             webhooks: None,
             cors: Origins::new(&origins.expect("origins")),

@@ -12,7 +12,6 @@ use parking_lot::Mutex;
 use super::caller::Caller;
 use super::params;
 use super::problem::Problem;
-use crate::digest::sha256_hex;
 use crate::job::{Idempotency, Owner};
 
 const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
@@ -64,11 +63,11 @@ pub(super) struct Once {
 }
 
 impl Once {
-    /// Combines the key with the request's body.
-    pub(super) fn with(&self, body: &[u8]) -> Idempotency {
+    /// Combines the key with the checksum of the request's body.
+    pub(super) fn with(&self, body_sha256: String) -> Idempotency {
         Idempotency {
             key: self.key.1.clone(),
-            body_sha256: sha256_hex(body),
+            body_sha256,
         }
     }
 }

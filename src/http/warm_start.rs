@@ -92,13 +92,13 @@ pub(super) async fn resolve(
         }
         Err(problem) => return Err(problem),
     };
-    let route: Route = serde_json::from_str(&result).map_err(|error| {
+    let frame = scenario.frame.clone();
+    // A result may be long, and another datum needs the geoid, which takes its time.
+    let read = move || serde_json::from_str(&result).map(|route: Route| route.within(&frame));
+    let points = off_thread::run(read).await?.map_err(|error| {
         tracing::error!(warm_start_plan_id = %plan, %error, "a stored result cannot be read");
         Problem::Internal
     })?;
-    let frame = scenario.frame.clone();
-    // Another datum needs the geoid, which takes its time.
-    let points = off_thread::run(move || route.within(&frame)).await?;
     let points = points.map_err(unknown)?;
     scenario.planner.warm_start = Some(WarmStart::Waypoints(points));
     Ok(())

@@ -10,6 +10,7 @@ use bytes::Bytes;
 use futures_util::future::{BoxFuture, Either};
 
 use super::wait_for;
+use crate::digest::sha256_hex;
 use crate::http::auth::Scope;
 use crate::http::body::Announced;
 use crate::http::caller::Caller;
@@ -49,7 +50,10 @@ pub(in crate::http) fn submit(
             return Err(refusal);
         }
         let bytes = asked.announced.read(body).await?;
-        let idempotency = asked.once.as_ref().map(|once| once.with(&bytes));
+        let idempotency = match &asked.once {
+            Some(once) => Some(once.with(checksum(&bytes).await?)),
+            None => None,
+        };
         let read = match draining {
             Some(refusal) => Err(refusal),
             None => accept(&state, &caller, bytes).await,
@@ -233,6 +237,15 @@ async fn refusal_when_draining(state: &AppState) -> Result<Option<Problem>, Prob
     }
     let retry_after_s = retry::for_room(&state.store.stats().await?, state.capacity);
     Ok(Some(Problem::Draining { retry_after_s }))
+}
+
+/// The checksum of a document, off the request threads if it is long.
+async fn checksum(document: &Bytes) -> Result<String, Problem> {
+    if document.len() <= SHORT {
+        return Ok(sha256_hex(document));
+    }
+    let document = document.clone();
+    Box::pin(off_thread::run(move || sha256_hex(&document))).await
 }
 
 /// A document of this length, bytes, is read in less time than it takes to hand it to another thread.

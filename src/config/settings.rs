@@ -426,7 +426,7 @@ mod tests {
         check("workers", "4096", Ok(()));
         check("workers", "0", Err("a whole number from 1 to 4096"));
         check("workers", "2.5", Err("a whole number from 1 to 4096"));
-        check("limits.population", "-1", Err("a whole number from 1"));
+        check("limits.population", "-1", Err("a whole number from 2"));
         check("http.head_timeout", "1m", Ok(()));
         check(
             "http.head_timeout",

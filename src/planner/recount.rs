@@ -76,7 +76,7 @@ fn numbers(waypoints: usize) -> impl Iterator<Item = usize> {
 mod tests {
     use super::*;
     use crate::geometry::Point3;
-    use crate::planner::tests::{disc, mountain, peaks, scenario};
+    use crate::planner::tests::{Looks, disc, mountain, peaks, scenario};
     use crate::planner::{Nobody, plan};
     use crate::scenario::{AltitudeBand, Scenario, Seeding, WarmStart};
     use crate::terrain::{Flat, Terrain};
@@ -135,6 +135,28 @@ mod tests {
         let outcome = plan(&slow_among_hills(), &mut Nobody, &Nobody);
         assert!(outcome.feasible && outcome.waypoints.len() == 12);
         assert!(outcome.cost.total < 510.0, "{}", outcome.cost.total);
+    }
+
+    /// The first of the two searches is cut short after it has found a route.
+    #[test]
+    fn what_was_found_until_a_stop_is_kept() {
+        let scenario = slow_among_hills();
+        let model = Model::new(&scenario);
+        let step = (scenario.target - scenario.start) / 11.0;
+        let straight: Vec<Point3> = (0..=11)
+            .map(|idx| scenario.start + step * f64::from(idx))
+            .collect();
+        let found = |looks: &Looks| {
+            let mut nobody = Nobody;
+            let mut log = Log::new(&model, &mut nobody, looks);
+            log.offer_unpriced(&straight);
+            (search(&model, &mut log), log.best)
+        };
+        let looks = Looks::until(u32::MAX);
+        let (reason, best) = found(&looks);
+        assert!(reason == StopReason::Iterations && best.is_feasible());
+        let (reason, best) = found(&Looks::until(looks.count.get() / 4));
+        assert!(reason == StopReason::Cancelled && best.is_feasible());
     }
 
     #[test]

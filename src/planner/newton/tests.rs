@@ -5,7 +5,7 @@ use super::*;
 use crate::optimizer::Random;
 use crate::planner::Nobody;
 use crate::planner::polish::{Polish, Steps};
-use crate::planner::tests::{disc, hilly_scenario, radar, scenario};
+use crate::planner::tests::{Looks, disc, hilly_scenario, radar, scenario};
 use crate::scenario::{Scenario, Seeding};
 
 /// A vehicle whose turn limit is so tight that hardly anything else shapes its routes.
@@ -179,6 +179,28 @@ fn another_route_is_taken_if_it_leads_to_a_better_result() {
         |others: &[Vec<Point3>]| Newton::new(&model, &Nobody).improve(&mut left.clone(), others);
     let (alone, both) = (improved(&[]), improved(&[right]));
     assert!(both.beats(&alone), "{alone:?} {both:?}");
+}
+
+/// Neither the searches that are under way nor those that would follow go on.
+#[test]
+fn a_stop_is_heard_between_two_steps() {
+    let scenario = stiff();
+    let model = Model::new(&scenario);
+    let mut random = Random::new(3);
+    let routes: Vec<_> = (0..5)
+        .map(|_| arc(&scenario, 8, 250.0, 20.0, &mut random))
+        .collect();
+    let priced = |looks: &Looks| {
+        let mut newton = Newton::new(&model, looks);
+        newton.improve(&mut routes[0].clone(), &routes[1..]);
+        newton.evaluations
+    };
+    let looks = Looks::until(u32::MAX);
+    let all = priced(&looks);
+    let half = priced(&Looks::until(looks.count.get() / 2));
+    assert!(half > all / 5 && half < all - all / 5, "{half} of {all}");
+    let none = priced(&Looks::until(0));
+    assert!(none < 10, "{none} of {all}");
 }
 
 #[test]

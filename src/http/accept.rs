@@ -2,7 +2,7 @@
 
 use axum::http::{HeaderMap, HeaderName, header};
 
-use super::list;
+use super::header_list;
 use super::shown::Shown;
 
 /// The media type out of `offers` that the caller prefers; `None` when the caller accepts none of them.
@@ -59,14 +59,14 @@ fn liked(headers: &HeaderMap, name: HeaderName) -> Vec<(String, f64)> {
         .get_all(name)
         .iter()
         .filter_map(|value| value.to_str().ok())
-        .flat_map(|value| list::split(value, ','))
+        .flat_map(|value| header_list::split(value, ','))
         .filter_map(weighed)
         .collect()
 }
 
 /// Parses `name;q=0.5`; `None` where `q` is not a number from 0 to 1.
 fn weighed(entry: &str) -> Option<(String, f64)> {
-    let mut parts = list::split(entry, ';');
+    let mut parts = header_list::split(entry, ';');
     let name = parts.next()?.to_ascii_lowercase();
     let quality = parts
         .filter_map(|parameter| parameter.split_once('='))

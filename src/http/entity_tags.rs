@@ -6,7 +6,7 @@ use axum::extract::OptionalFromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 
-use super::list;
+use super::header_list;
 
 /// The entity tags of a header.
 pub(super) struct EntityTags(Vec<String>);
@@ -17,7 +17,7 @@ impl EntityTags {
         let mut tags = Vec::new();
         for value in headers.get_all(name) {
             let value = String::from_utf8_lossy(value.as_bytes());
-            tags.extend(list::split(&value, ',').map(str::to_owned));
+            tags.extend(header_list::split(&value, ',').map(str::to_owned));
         }
         (!tags.is_empty()).then_some(Self(tags))
     }

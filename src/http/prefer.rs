@@ -8,7 +8,7 @@ use axum::extract::OptionalFromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 
-use super::list;
+use super::header_list;
 
 const PREFER: HeaderName = HeaderName::from_static("prefer");
 pub(super) const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
@@ -27,8 +27,8 @@ impl Wait {
             .get_all(PREFER)
             .iter()
             .filter_map(|value| value.to_str().ok())
-            .flat_map(|value| list::split(value, ','))
-            .filter_map(|preference| list::split(preference, ';').next()?.split_once('='))
+            .flat_map(|value| header_list::split(value, ','))
+            .filter_map(|preference| header_list::split(preference, ';').next()?.split_once('='))
             .find(|(name, _)| name.trim().eq_ignore_ascii_case("wait"))
             .and_then(|(_, value)| seconds(value.trim().trim_matches('"')))
             .map(|seconds| Self(seconds.min(MAX_WAIT_S)))

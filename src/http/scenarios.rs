@@ -18,11 +18,7 @@ pub(super) async fn convert(
     body: Body,
 ) -> Result<Json<Conversion>, Problem> {
     let (text, syntax) = body::read_json_or_xml(&state, &headers, body).await?;
-    let limits = state.rules.limits;
-    let most = Most {
-        threats: limits.threats,
-        polygon_vertices: limits.polygon_vertices,
-    };
+    let most = Most::from(state.rules.limits);
     let conversion = off_thread::run(move || import::convert(&text, syntax, most)).await??;
     Ok(Json(conversion))
 }

@@ -190,9 +190,9 @@ pub trait Store: Send + Sync + 'static {
     async fn sweep(&self, now_ms: i64) -> Result<usize, StoreError>;
 
     /// Webhooks of ended plans that are due, at most `limit`, and of one owner at most half of it, rounded up: first the
-    /// longest due of each owner, then each owner's next, so that an owner with many does not hold up the others. A submission's webhook is due as soon as its plan
-    /// has ended: it is stored in the same step as the submission and made due in the same step as the end. It is
-    /// removed with its plan.
+    /// longest due of each owner, then each owner's next, so that an owner with many does not hold up the others. A
+    /// submission's webhook is due as soon as its plan has ended: it is stored in the same step as the submission and
+    /// made due in the same step as the end. It is removed with its plan.
     async fn due_webhooks(&self, now_ms: i64, limit: usize) -> Result<Vec<Webhook>, StoreError>;
 
     /// A plan's webhook has been tried; it is due again at `next_ms`, or done with. It is no error if it no longer

@@ -249,8 +249,8 @@ pub(super) fn delete(
     Ok(())
 }
 
-/// A write that shows whether others would succeed, and how far time has come in any case. Where one has found the disk full, it is as large as a plan: a row
-/// still fits into what is left of the log when no plan does.
+/// A write that shows whether others would succeed, and how far time has come in any case. Where one has found the disk
+/// full, it is as large as a plan: a row still fits into what is left of the log when no plan does.
 pub(super) fn touch(tx: &mut Transaction<'_>) -> Result<(), StoreError> {
     let ballast_bytes = if tx.found_full { BALLAST_BYTES } else { 0 };
     tx.connection

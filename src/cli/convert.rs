@@ -22,7 +22,11 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let text = files::read(&arguments.file)?;
     let file = arguments.file.display();
-    let most = Most::from(Limits::default());
+    let limits = Limits::default();
+    let most = Most {
+        threats: limits.threats,
+        polygon_vertices: limits.polygon_vertices,
+    };
     match import::convert(&text, Syntax::of(&text), most) {
         Ok(conversion) => {
             for assumed in &conversion.assumed {

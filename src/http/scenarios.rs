@@ -18,7 +18,11 @@ pub(super) async fn convert(
     body: Body,
 ) -> Result<Json<Conversion>, Problem> {
     let (text, syntax) = body::read_json_or_xml(&state, &headers, body).await?;
-    let most = Most::from(state.rules.limits);
+    let limits = state.rules.limits;
+    let most = Most {
+        threats: limits.threats,
+        polygon_vertices: limits.polygon_vertices,
+    };
     let conversion = off_thread::run(move || import::convert(&text, syntax, most)).await??;
     Ok(Json(conversion))
 }

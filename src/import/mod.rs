@@ -17,8 +17,6 @@ use serde::Serialize;
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::scenario::limits::Limits;
-
 /// The result of a conversion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Conversion {
@@ -56,15 +54,6 @@ pub struct Most {
     pub threats: usize,
     /// Vertices of all polygons together.
     pub polygon_vertices: usize,
-}
-
-impl From<Limits> for Most {
-    fn from(limits: Limits) -> Self {
-        Self {
-            threats: limits.threats,
-            polygon_vertices: limits.polygon_vertices,
-        }
-    }
 }
 
 /// Syntax of a file.

@@ -6,7 +6,7 @@ use crate::geometry::{Point2, Segment};
 use crate::terrain::{Grid, HeightRange};
 
 /// How often a leg is halved; one that is then not proven clear is left to the scalar code.
-const CUTS: u32 = 3;
+const CUTS: u32 = 1;
 
 /// A grid's elevations by blocks of cells.
 #[derive(Debug)]

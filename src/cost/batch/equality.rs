@@ -157,8 +157,10 @@ impl Choices {
             "altitude":{"min":0,"max":9},"area":{"min":{"x":0,"y":0},"max":{"x":1000,"y":1000}},"planner":{"algorithm":"any"}}"#;
         let mut scenario = json::read(document, &rules, 1).expect("the document has no fault");
         scenario.terrain = self.terrain();
+        // More than are examined one by one, and more than a word of a set has bits.
         let many = self.one_in(3.0);
-        let threats = (0..if many { 40 } else { 7 }).map(|_| self.threat(many));
+        let most = if self.one_in(2.0) { 40 } else { 90 };
+        let threats = (0..if many { most } else { 7 }).map(|_| self.threat(many));
         scenario.threats = threats.collect();
         scenario.altitude.min = if self.one_in(3.0) {
             0.0

@@ -1,25 +1,58 @@
 //! Which threats a leg may meet, among many.
+//!
+//! Along each axis, every cell has two sets of threats: those that begin in it or before, and those that end in it or
+//! after. A box meets the threats that begin before its end and end after its beginning along both axes. Sets are bits,
+//! in the order of the request, so that sums over threats are the same whatever else is looked up.
 
-use crate::geometry::{Point2, Rect, Segment};
+use pulp::Simd;
 
-/// Cells over the threats, each with the threats whose boxes it touches.
+use super::leg::Leg;
+use crate::geometry::Rect;
+use crate::geometry::lane::{LANES, Lane};
+
+/// Cells along an axis, a power of two.
+const CELLS: usize = 256;
+
+/// Added to a number from 0 to `CELLS`, leaves the nearest whole number in the last bits.
+const WHOLE: f64 = (1_u64 << 52) as f64;
+
+/// Threats to a word of a set.
+const WORD: usize = 64;
+
+/// The threats by what their boxes cover of either axis.
 #[derive(Debug)]
 pub(super) struct Index {
-    extent: Rect,
-    /// Cells per metre, east and north.
-    per_metre: Point2,
-    columns: usize,
-    rows: usize,
-    /// Where the threats of each cell begin in `threats`; one entry more than cells.
-    starts: Vec<u32>,
-    threats: Vec<u32>,
-    boxes: Vec<Rect>,
+    axes: [Axis; 2],
+    words: usize,
 }
 
-/// From the cell of one corner to that of the other, both included.
-struct Cells {
-    columns: std::ops::RangeInclusive<usize>,
-    rows: std::ops::RangeInclusive<usize>,
+#[derive(Debug)]
+struct Axis {
+    origin: f64,
+    per_metre: f64,
+    /// For each cell, the words of its set.
+    begun: Vec<u64>,
+    not_ended: Vec<u64>,
+}
+
+/// The sets for some legs.
+pub(super) struct Around<'a> {
+    index: &'a Index,
+    columns: Places,
+    rows: Places,
+}
+
+/// The threats of a word of a set, in order.
+pub(super) struct Near {
+    bits: u64,
+    first: usize,
+}
+
+/// Where the sets of some boxes begin, one box for each lane: those begun at their ends, and those not ended at their
+/// beginnings.
+struct Places {
+    begun: [usize; LANES],
+    not_ended: [usize; LANES],
 }
 
 impl Index {
@@ -29,127 +62,183 @@ impl Index {
         let boxes: Vec<Rect> = boxes
             .map(|extent| extent.grown(1e-6 * (1.0 + extent.diagonal())))
             .collect();
-        let corners = boxes.iter().flat_map(|extent| [extent.min, extent.max]);
-        let extent = Rect::around(corners).expect("there are threats");
-        let side = side(boxes.len());
-        let size = extent.max - extent.min;
-        let mut index = Self {
-            extent,
-            per_metre: Point2::new(side as f64 / size.x, side as f64 / size.y),
-            columns: side,
-            rows: side,
-            starts: vec![0; side * side + 1],
-            threats: Vec::new(),
-            boxes,
+        let words = boxes.len().div_ceil(WORD);
+        let x = boxes.iter().map(|extent| [extent.min.x, extent.max.x]);
+        let y = boxes.iter().map(|extent| [extent.min.y, extent.max.y]);
+        Self {
+            axes: [Axis::of(x.collect(), words), Axis::of(y.collect(), words)],
+            words,
+        }
+    }
+
+    /// The sets for the boxes of the legs.
+    #[inline(always)]
+    pub(super) fn around<S: Simd>(&self, leg: &Leg<S>) -> Around<'_> {
+        let [x, y] = &self.axes;
+        Around {
+            index: self,
+            columns: x.places(leg.a.x.min(leg.b.x), leg.a.x.max(leg.b.x), self.words),
+            rows: y.places(leg.a.y.min(leg.b.y), leg.a.y.max(leg.b.y), self.words),
+        }
+    }
+
+    /// Words of each set.
+    #[inline(always)]
+    pub(super) fn words(&self) -> usize {
+        self.words
+    }
+}
+
+impl Around<'_> {
+    /// The threats of a word whose boxes meet that of any lane's leg, and maybe some more.
+    #[inline(always)]
+    pub(super) fn near<S: Simd>(&self, word: usize) -> Near {
+        let [x, y] = &self.index.axes;
+        let mut bits = 0;
+        for lane in 0..S::F64_LANES {
+            bits |= x.begun[self.columns.begun[lane] + word]
+                & x.not_ended[self.columns.not_ended[lane] + word]
+                & y.begun[self.rows.begun[lane] + word]
+                & y.not_ended[self.rows.not_ended[lane] + word];
+        }
+        Near {
+            bits,
+            first: word * WORD,
+        }
+    }
+}
+
+impl Iterator for Near {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        if self.bits == 0 {
+            return None;
+        }
+        let threat_idx = self.first + self.bits.trailing_zeros() as usize;
+        self.bits &= self.bits - 1;
+        Some(threat_idx)
+    }
+}
+
+impl Axis {
+    /// For spans from the first to the second.
+    fn of(spans: Vec<[f64; 2]>, words: usize) -> Self {
+        let ends = || spans.iter().flatten().copied();
+        let origin = ends().fold(f64::INFINITY, f64::min);
+        let extent = ends().fold(f64::NEG_INFINITY, f64::max) - origin;
+        let mut axis = Self {
+            origin,
+            per_metre: (CELLS - 1) as f64 / extent,
+            begun: vec![0; CELLS * words],
+            not_ended: vec![0; CELLS * words],
         };
-        // Count, then fill.
-        for extent in &index.boxes {
-            for cell in index.cells(extent).iter(side) {
-                index.starts[cell + 1] += 1;
+        for (threat_idx, [from, to]) in spans.into_iter().enumerate() {
+            let (word, bit) = (threat_idx / WORD, 1 << (threat_idx % WORD));
+            for cell in axis.cell(from)..CELLS {
+                axis.begun[cell * words + word] |= bit;
+            }
+            for cell in 0..=axis.cell(to) {
+                axis.not_ended[cell * words + word] |= bit;
             }
         }
-        for cell in 0..side * side {
-            index.starts[cell + 1] += index.starts[cell];
+        axis
+    }
+
+    /// The cell of a coordinate: the nearest one beyond the ends.
+    fn cell(&self, at: f64) -> usize {
+        let cells = (at - self.origin) * self.per_metre;
+        cell(cells.clamp(0.0, (CELLS - 1) as f64) + WHOLE)
+    }
+
+    /// As `cell`, of the ends of boxes from `low` to `high`.
+    #[inline(always)]
+    fn places<S: Simd>(&self, low: Lane<S>, high: Lane<S>, words: usize) -> Places {
+        Places {
+            begun: self.place(high, words),
+            not_ended: self.place(low, words),
         }
-        let mut next = index.starts.clone();
-        index.threats = vec![0; next[side * side] as usize];
-        for (threat_idx, extent) in (0_u32..).zip(&index.boxes) {
-            for cell in index.cells(extent).iter(side) {
-                index.threats[next[cell] as usize] = threat_idx;
-                next[cell] += 1;
+    }
+
+    #[inline(always)]
+    fn place<S: Simd>(&self, at: Lane<S>, words: usize) -> [usize; LANES] {
+        let cells = (at - self.origin) * self.per_metre;
+        let last = at.with((CELLS - 1) as f64);
+        let row = (cells.clamp(at.with(0.0), last) + WHOLE).row();
+        let mut places = [0; LANES];
+        for lane in 0..S::F64_LANES {
+            places[lane] = cell(row[lane]) * words;
+        }
+        places
+    }
+}
+
+/// The whole number below `CELLS` that `WHOLE` was added to.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "the last bits are enough")]
+fn cell(whole: f64) -> usize {
+    whole.to_bits() as usize % CELLS
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use pulp::Scalar;
+
+    use super::super::PointRow;
+    use super::*;
+    use crate::geometry::{Point2, Point3};
+
+    fn rect() -> impl Strategy<Value = Rect> {
+        let side = || (-2000.0..2000.0_f64, 0.0..500.0_f64);
+        (side(), side()).prop_map(|((x, width), (y, height))| Rect {
+            min: Point2::new(x, y),
+            max: Point2::new(x + width, y + height),
+        })
+    }
+
+    fn found(index: &Index, leg: &Leg<Scalar>) -> Vec<usize> {
+        let around = index.around(leg);
+        let words = 0..index.words();
+        words.flat_map(|word| around.near::<Scalar>(word)).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn whoever_a_leg_may_meet_is_found_in_order(
+            boxes in prop::collection::vec(rect(), 1..150),
+            own in rect(),
+            far in prop::bool::ANY,
+        ) {
+            let index = Index::of(boxes.iter().copied());
+            // Beyond all of them, too.
+            let scale = if far { 10.0 } else { 1.0 };
+            let end = |at: Point2| Point3::new(scale * at.x, scale * at.y, 0.0);
+            let [a, b] = [own.min, own.max].map(|at| PointRow::splat(end(at)));
+            let leg = Leg::new(Scalar::new(), 0, [&a, &b]);
+            let found = found(&index, &leg);
+            prop_assert!(found.is_sorted_by(|one, next| one < next), "{found:?}");
+            let own = Rect { min: end(own.min).xy(), max: end(own.max).xy() };
+            for (threat, extent) in boxes.iter().enumerate() {
+                prop_assert!(!own.meets(extent) || found.contains(&threat), "{threat}");
             }
         }
-        index
     }
 
-    /// The threats whose boxes meet those of `legs`, in order, and maybe some more.
-    pub(super) fn find(&self, legs: impl Iterator<Item = Segment> + Clone, found: &mut Vec<u32>) {
-        found.clear();
-        let ends = legs.clone().flat_map(|leg| [leg.a.xy(), leg.b.xy()]);
-        let Some(around) = Rect::around(ends) else {
-            return;
-        };
-        let together = self.cells(&around).count();
-        let cells_of = |leg: Segment| self.cells(&box_of(&leg)).count();
-        // Each leg has at least one cell.
-        if together <= 2 * legs.clone().count()
-            || together <= 2 * legs.clone().map(cells_of).sum::<usize>()
-        {
-            self.find_in(&around, found);
-            if together == 1 {
-                // In order, and each only once.
-                return;
+    #[test]
+    fn what_is_far_is_left_out() {
+        let boxes = (0..100).map(|i| {
+            let min = Point2::new(f64::from(i % 10) * 100.0, f64::from(i / 10) * 100.0);
+            Rect {
+                min,
+                max: Point2::new(min.x + 40.0, min.y + 40.0),
             }
-        } else {
-            legs.for_each(|leg| self.find_in(&box_of(&leg), found));
-        }
-        if found.len() >= self.boxes.len() {
-            // So many duplicates that examining all threats is faster than sorting.
-            found.clear();
-            found.extend((0_u32..).take(self.boxes.len()));
-            return;
-        }
-        found.sort_unstable();
-        found.dedup();
+        });
+        let index = Index::of(boxes);
+        let [a, b] =
+            [[210.0, 310.0], [330.0, 410.0]].map(|[x, y]| PointRow::splat(Point3::new(x, y, 0.0)));
+        let leg = Leg::new(Scalar::new(), 0, [&a, &b]);
+        assert_eq!(found(&index, &leg), [32, 33, 42, 43]);
     }
-
-    fn find_in(&self, own: &Rect, found: &mut Vec<u32>) {
-        if !own.meets(&self.extent) {
-            return;
-        }
-        for cell in self.cells(own).iter(self.columns) {
-            let range = self.starts[cell] as usize..self.starts[cell + 1] as usize;
-            let near = self.threats[range].iter();
-            found.extend(near.filter(|threat| own.meets(&self.boxes[**threat as usize])));
-        }
-    }
-
-    fn cells(&self, of: &Rect) -> Cells {
-        let column = |x: f64| onto((x - self.extent.min.x) * self.per_metre.x, self.columns);
-        let row = |y: f64| onto((y - self.extent.min.y) * self.per_metre.y, self.rows);
-        Cells {
-            columns: column(of.min.x)..=column(of.max.x),
-            rows: row(of.min.y)..=row(of.max.y),
-        }
-    }
-}
-
-impl Cells {
-    fn count(&self) -> usize {
-        let side = |range: &std::ops::RangeInclusive<usize>| range.end() - range.start() + 1;
-        side(&self.columns) * side(&self.rows)
-    }
-
-    fn iter(self, width: usize) -> impl Iterator<Item = usize> {
-        let Self { columns, rows } = self;
-        rows.flat_map(move |row| columns.clone().map(move |column| row * width + column))
-    }
-}
-
-fn box_of(leg: &Segment) -> Rect {
-    Rect {
-        min: Point2::new(leg.a.x.min(leg.b.x), leg.a.y.min(leg.b.y)),
-        max: Point2::new(leg.a.x.max(leg.b.x), leg.a.y.max(leg.b.y)),
-    }
-}
-
-/// Cells in either direction for `count` threats: four threats to a cell, about as wide as a leg
-/// where threats are many, and not too many cells.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "the root of a count is positive and small"
-)]
-fn side(count: usize) -> usize {
-    ((0.5 * (count as f64).sqrt()) as usize).clamp(1, 64)
-}
-
-/// The cell of a coordinate in cells; beyond an edge, that of the edge.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to the cells first; what is not a number becomes 0"
-)]
-pub(super) fn onto(cells: f64, count: usize) -> usize {
-    cells.clamp(0.0, (count - 1) as f64) as usize
 }

@@ -1,7 +1,6 @@
 //! Least and greatest elevations of a grid's cells, of blocks of two by two, of four by four, and
 //! so on: most legs are proven clear of a grid by a few of them.
 
-use super::index::onto;
 use crate::geometry::{Point2, Segment};
 use crate::terrain::{Grid, HeightRange};
 
@@ -132,4 +131,14 @@ fn edge(a: f64, b: f64, end: usize) -> f64 {
     } else {
         a.max(b) + 1e-9
     }
+}
+
+/// The cell of a coordinate in cells; beyond an edge, that of the edge.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to the cells first; what is not a number becomes 0"
+)]
+fn onto(cells: f64, count: usize) -> usize {
+    cells.clamp(0.0, (count - 1) as f64) as usize
 }

@@ -4,7 +4,6 @@ use pulp::Simd;
 
 use super::leg::{Leg, Point};
 use super::suspects::Suspects;
-use super::threats::Candidates;
 use super::{PointRow, Pricer, Row};
 use crate::cost::metre;
 use crate::cost::threat::SHARE;
@@ -71,7 +70,6 @@ impl Pricer<'_> {
             dy: zero,
             level: zero,
         };
-        let mut candidates = Candidates::default();
         let [start, target] = self.heights.below_ends;
         let mut below = if HEIGHTS {
             self.elevation(simd, part, &points[0])
@@ -81,7 +79,7 @@ impl Pricer<'_> {
         for (leg_idx, rows) in points.windows(2).enumerate() {
             let leg = Leg::new(simd, part, [&rows[0], &rows[1]]);
             length = length + leg.length;
-            self.threats(&leg, &mut candidates, &mut exposure, &mut violation);
+            self.threats(&leg, &mut exposure, &mut violation);
             let free = leg_idx + 2 < points.len();
             let below_a = below;
             below = if HEIGHTS {
@@ -155,8 +153,7 @@ impl Pricer<'_> {
         let leg = Leg::new(simd, part, [a, b]);
         let (mut exposure, mut violation) = (leg.splat(0.0), leg.splat(0.0));
         if FLIGHT {
-            let mut candidates = Candidates::default();
-            self.threats(&leg, &mut candidates, &mut exposure, &mut violation);
+            self.threats(&leg, &mut exposure, &mut violation);
         }
         if HEIGHTS {
             violation = violation + self.heights(&leg, None, slot, suspects);

@@ -13,7 +13,7 @@ use crate::scenario::{Quadrature, Scenario};
 use crate::threat::{Cylinder, Shape, Threat};
 
 /// With this many threats or fewer, all are examined.
-const FEW_THREATS: usize = 24;
+const FEW_THREATS: usize = 8;
 
 /// Twice the line integral of 1 / d is a logarithm of a quotient that grows without end as the
 /// distance falls; beyond this the distance squared, its factor, is lost in rounding.
@@ -46,10 +46,6 @@ pub(super) struct Span {
     top: f64,
     limited: bool,
 }
-
-/// The threats that a walk along some legs may meet; kept from leg to leg to save its memory.
-#[derive(Debug, Default)]
-pub(super) struct Candidates(Vec<u32>);
 
 /// The part of each leg between the heights of a threat.
 #[derive(Clone, Copy)]
@@ -85,7 +81,6 @@ impl Pricer<'_> {
     pub(super) fn threats<S: Simd>(
         &self,
         leg: &Leg<S>,
-        candidates: &mut Candidates,
         exposure: &mut Lane<S>,
         violation: &mut Lane<S>,
     ) {
@@ -95,13 +90,11 @@ impl Pricer<'_> {
             }
             return;
         };
-        // In the order of the request, so that sums are the same whatever the neighbours are.
-        index.find(
-            (0..S::F64_LANES).map(|lane| leg.segment(lane)),
-            &mut candidates.0,
-        );
-        for &threat_idx in &candidates.0 {
-            self.threat(threat_idx as usize, leg, exposure, violation);
+        let around = index.around(leg);
+        for word in 0..index.words() {
+            for threat_idx in around.near::<S>(word) {
+                self.threat(threat_idx, leg, exposure, violation);
+            }
         }
     }
 

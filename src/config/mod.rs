@@ -90,6 +90,8 @@ pub struct Http {
     pub body_timeout: Duration,
     /// Bytes that the bodies of all requests may take at once.
     pub bodies_bytes: usize,
+    /// Bytes that long answers may take at once that have not been sent yet.
+    pub answers_bytes: usize,
     /// Connections open at once; more wait in the listener's backlog.
     pub max_connections: usize,
     /// Event streams open at once.
@@ -156,6 +158,7 @@ impl Default for Http {
             head_timeout: Duration::from_secs(30),
             body_timeout: Duration::from_secs(30),
             bodies_bytes: 256 << 20,
+            answers_bytes: 256 << 20,
             max_connections: 20_000,
             streams: 10_000,
             streams_per_key: 1_000,

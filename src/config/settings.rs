@@ -193,6 +193,13 @@ fn http() -> Vec<Setting> {
             |c| &mut c.http.bodies_bytes,
         ),
         row(
+            "http.answers_bytes",
+            "BYTES",
+            "Memory for long answers that have not been sent yet; more are refused with 503 busy",
+            1 << 20..,
+            |c| &mut c.http.answers_bytes,
+        ),
+        row(
             "http.max_connections",
             "N",
             "Connections open at once; more wait in the listener's backlog",

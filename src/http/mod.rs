@@ -4,12 +4,14 @@
 //! (`partial` alone asks the planner how a route would be delivered), and storage, which is behind [`Store`].
 
 mod accept;
+mod answers;
 pub mod auth;
 mod bodies;
 mod body;
 mod bounds;
 mod browser;
 mod caller;
+mod compression;
 mod documents;
 mod entity_tags;
 mod events;
@@ -53,18 +55,16 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
-use axum::body::Body;
 use axum::handler::Handler;
-use axum::http::{StatusCode, Uri, header};
-use axum::response::Response;
+use axum::http::Uri;
 use axum::routing::{self, MethodFilter, MethodRouter};
 use tokio::sync::watch;
 use tower::ServiceBuilder;
 use tower::util::MapResponseLayer;
 use tower_http::catch_panic::CatchPanicLayer;
-use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
-use tower_http::compression::{CompressionBody, CompressionLayer};
+use tower_http::compression::CompressionLayer;
 
+pub use answers::Answers;
 pub use bodies::Bodies;
 pub use bounds::Bounds;
 pub use browser::Origins;
@@ -78,6 +78,7 @@ use crate::scenario::json::Rules;
 use crate::store::{Stats, SteadyClock, Store};
 use crate::telemetry::Instruments;
 use auth::{Access, Gate, Needs, Scope};
+use compression::{note_plain, send, worth_compressing};
 use head::HeadCheck;
 use layer::Layered;
 use problem::Problem;
@@ -115,6 +116,8 @@ pub struct Parts {
     pub body_timeout: Duration,
     /// How much the bodies of all requests may take.
     pub bodies: Bodies,
+    /// How much long answers may take that have not been sent yet.
+    pub answers: Answers,
     /// The clock for timestamps and expiry of plans.
     pub clock: Arc<SteadyClock>,
     /// Who may do what.
@@ -237,7 +240,7 @@ fn assemble<T: 'static>(
     nowhere: impl Handler<T, AppState>,
 ) -> Router {
     let (access, cors) = (parts.access.clone(), parts.cors.clone());
-    let hosts = parts.hosts.clone();
+    let (hosts, answers) = (parts.hosts.clone(), parts.answers.clone());
     let instruments = parts.instruments.clone();
     let router = routes
         .into_iter()
@@ -249,50 +252,25 @@ fn assemble<T: 'static>(
         .method_not_allowed_fallback(async || Problem::MethodNotAllowed)
         .fallback(nowhere)
         .with_state(AppState(Arc::new(parts)));
-    wrap(router, &cors, hosts, instruments)
-}
-
-/// Streams are not compressed: each event must be sent at once.
-fn worth_compressing() -> impl Predicate {
-    let plain = NotForContentType::const_new;
-    SizeAbove::new(1024)
-        .and(plain("text/event-stream"))
-        .and(plain("application/x-ndjson"))
-}
-
-/// Keeps an answer's status in a place where compression leaves it alone.
-fn note_status(mut answer: Response) -> Response {
-    let status = answer.status();
-    answer.extensions_mut().insert(status);
-    answer
-}
-
-/// Only compressed answers keep a compressor, else every open stream would hold one. `CompressionLayer` answers 406
-/// after the work is done if no coding is acceptable; we send the plain answer instead.
-fn unwrap_uncompressed(mut answer: Response<CompressionBody<Body>>) -> Response {
-    if let Some(status) = answer.extensions_mut().remove::<StatusCode>() {
-        *answer.status_mut() = status;
-    }
-    let as_it_came = !answer.headers().contains_key(header::CONTENT_ENCODING);
-    answer.map(|body| {
-        if as_it_came {
-            body.into_inner()
-        } else {
-            Body::new(body)
-        }
-    })
+    wrap(router, &cors, hosts, answers, instruments)
 }
 
 /// The layers around every handler.
-fn wrap(router: Router, cors: &Origins, hosts: Hosts, instruments: Arc<Instruments>) -> Router {
+fn wrap(
+    router: Router,
+    cors: &Origins,
+    hosts: Hosts,
+    answers: Answers,
+    instruments: Arc<Instruments>,
+) -> Router {
     // The outermost first. One stack, because the router boxes each layer it is given anew for each request.
     let layers = ServiceBuilder::new()
         .layer(Layered(request_id::Assign(instruments)))
         .layer(cors.layer())
         .layer(CatchPanicLayer::custom(problem::after_panic))
-        .layer(MapResponseLayer::new(unwrap_uncompressed))
+        .layer(MapResponseLayer::new(move |answer| send(answer, &answers)))
         .layer(CompressionLayer::new().compress_when(worth_compressing()))
-        .layer(MapResponseLayer::new(note_status))
+        .layer(MapResponseLayer::new(note_plain))
         .layer(Layered(HeadCheck(hosts)));
     router.layer(layers)
 }
@@ -331,7 +309,9 @@ mod tests {
             .header("host", "localhost")
             .header("x-request-id", "caller-1")
             .body(Body::empty());
-        let answer = wrap(broken, &Origins::default(), Hosts::any(), Arc::default())
+        let answers = Answers::new(1 << 20, Duration::from_secs(60));
+        let (origins, hosts) = (Origins::default(), Hosts::any());
+        let answer = wrap(broken, &origins, hosts, answers, Arc::default())
             .oneshot(request.expect("a request"))
             .await
             .expect("an answer");

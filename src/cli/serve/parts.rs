@@ -11,7 +11,7 @@ use crate::config::{self, Config};
 use crate::http::auth::Access;
 use crate::http::webhook::{self, Secrets};
 use crate::http::{
-    Bodies, Bounds, Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains,
+    Answers, Bodies, Bounds, Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains,
 };
 use crate::planner;
 use crate::store::measured::MeasuredStore;
@@ -78,6 +78,10 @@ pub(super) async fn open(
         clock,
         body_timeout: config.http.body_timeout,
         bodies: Bodies::new(config.http.bodies_bytes, config.limits.body_bytes),
+        answers: Answers::new(
+            config.http.answers_bytes,
+            config.http.head_timeout + config.http.body_timeout,
+        ),
         access,
         webhooks,
         cors,

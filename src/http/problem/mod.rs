@@ -207,6 +207,8 @@ pub(super) enum Busy {
     Datasets,
     /// Bodies that are being received or read; all may take this many bytes.
     Bodies(usize),
+    /// Answers that have not been sent yet; all may take this many bytes.
+    Answers(usize),
 }
 
 impl Problem {

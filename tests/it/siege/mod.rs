@@ -2,6 +2,7 @@
 //!
 //! `NOCTULE_SIEGE=full` runs each at the size of docs/RELIABILITY.md, otherwise at one that fits CI.
 
+mod answers;
 mod bodies;
 mod connections;
 mod hostile;

@@ -14,7 +14,8 @@ use noctule::config::Origin;
 use noctule::http::auth::{Access, Keys, Settings};
 use noctule::http::webhook;
 use noctule::http::{
-    self, Bodies, Bounds, Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness, Terrains,
+    self, Answers, Bodies, Bounds, Capacity, Hosts, InFlight, Origins, Parts, Phase, Readiness,
+    Terrains,
 };
 use noctule::planner;
 use noctule::scenario::limits::Limits;
@@ -186,6 +187,7 @@ impl Api {
             clock: SteadyClock::following(wall_clock()),
             body_timeout: Duration::from_secs(30),
             bodies: Bodies::new(256 << 20, limits.body_bytes),
+            answers: Answers::new(256 << 20, Duration::from_secs(40)),
             access,
             webhooks: None,
             cors: Origins::new(&origins.expect("origins")),

@@ -1,0 +1,123 @@
+//! Which answers are compressed, and what is around that.
+
+use axum::body::{Body, HttpBody as _};
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse as _, Response};
+use tower_http::compression::CompressionBody;
+use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
+
+use super::answers::{Answers, PIECE};
+
+/// About what a compressor occupies, bytes: its windows and tables.
+const COMPRESSOR: u64 = 320 * 1024;
+
+/// Streams are not compressed: each event must be sent at once.
+pub(super) fn worth_compressing() -> impl Predicate {
+    let plain = NotForContentType::const_new;
+    SizeAbove::new(1024)
+        .and(plain("text/event-stream"))
+        .and(plain("application/x-ndjson"))
+}
+
+/// An answer before compression.
+#[derive(Clone, Copy)]
+struct Plain {
+    status: StatusCode,
+    length: Option<u64>,
+    /// Whether it has a coding already.
+    coded: bool,
+}
+
+fn is_coded<B>(answer: &http::Response<B>) -> bool {
+    answer.headers().contains_key(header::CONTENT_ENCODING)
+}
+
+/// Keeps what an answer is in a place where compression leaves it alone.
+pub(super) fn note_plain(mut answer: Response) -> Response {
+    let plain = Plain {
+        status: answer.status(),
+        length: answer.body().size_hint().exact(),
+        coded: is_coded(&answer),
+    };
+    answer.extensions_mut().insert(plain);
+    answer
+}
+
+/// The answer as it is sent: out of the room for answers if it occupies much of it, a refusal if there is none left.
+///
+/// Only compressed ones keep a compressor, else every open stream would hold one; where there is no room for that, the
+/// answer is plain. `CompressionLayer` answers 406 after the work is done if no coding is acceptable; we send the plain
+/// answer instead.
+pub(super) fn send(
+    mut answer: http::Response<CompressionBody<Body>>,
+    answers: &Answers,
+) -> Response {
+    let coded = is_coded(&answer);
+    let plain = answer.extensions_mut().remove::<Plain>();
+    if let Some(plain) = plain {
+        *answer.status_mut() = plain.status;
+    }
+    let length = plain.and_then(|plain| plain.length).unwrap_or(0);
+    if coded && plain.is_none_or(|plain| !plain.coded) {
+        if let Ok(place) = answers.room(length + COMPRESSOR) {
+            return answer.map(|body| place.hold(body));
+        }
+        answer.headers_mut().remove(header::CONTENT_ENCODING);
+    }
+    let answer = answer.map(CompressionBody::into_inner);
+    if length <= PIECE as u64 {
+        return answer;
+    }
+    match answers.room(length) {
+        Ok(place) => answer.map(|body| place.hold(body)),
+        Err(busy) => busy.into_response(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use axum::Router;
+    use axum::extract::Request;
+    use axum::routing::get;
+    use http_body_util::BodyExt as _;
+    use tower::ServiceBuilder;
+    use tower::ServiceExt as _;
+    use tower::util::MapResponseLayer;
+    use tower_http::compression::CompressionLayer;
+
+    use super::*;
+
+    /// What `length` letters are sent as to a caller that takes gzip.
+    async fn sent(answers: &Answers, length: usize) -> Response {
+        let answers = answers.clone();
+        let layers = ServiceBuilder::new()
+            .layer(MapResponseLayer::new(move |answer| send(answer, &answers)))
+            .layer(CompressionLayer::new().compress_when(worth_compressing()))
+            .layer(MapResponseLayer::new(note_plain));
+        let router = Router::new().route("/", get(async move || "a".repeat(length)));
+        let request = Request::get("/").header(header::ACCEPT_ENCODING, "gzip");
+        let request = request.body(Body::empty()).expect("a request");
+        let answered = router.layer(layers).oneshot(request).await;
+        answered.expect("infallible")
+    }
+
+    #[tokio::test]
+    async fn without_room_for_a_compressor_answers_are_plain_and_long_ones_refused() {
+        let answers = Answers::new(1 << 20, Duration::from_secs(60));
+        let compressed = sent(&answers, 900_000).await;
+        assert!(is_coded(&compressed));
+
+        let plain = sent(&answers, 2000).await;
+        assert_eq!((plain.status(), is_coded(&plain)), (StatusCode::OK, false));
+        let body = plain.into_body().collect().await.expect("a body");
+        assert_eq!(body.to_bytes(), "a".repeat(2000));
+        let refused = sent(&answers, 200_000).await;
+        assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
+
+        let read = compressed.into_body().collect().await.expect("a body");
+        assert!(read.to_bytes().len() < 10_000);
+        assert!(is_coded(&sent(&answers, 200_000).await));
+    }
+}

@@ -53,7 +53,8 @@ use objective::Routes;
 
 /// Follows a run. Called on the planning thread; must return quickly.
 pub trait Observer {
-    /// After each iteration, the first evaluation (iteration 0) included.
+    /// After each iteration, the first evaluation (iteration 0) included; with the number of the last one again if routes
+    /// were improved after it.
     fn iteration(&mut self, point: &ConvergencePoint);
     /// When the best route has improved.
     fn incumbent(&mut self, incumbent: &Incumbent);

@@ -33,7 +33,7 @@ pub struct Outcome {
     pub path_checks: Option<Measures>,
     /// Every constraint that the waypoints break.
     pub violations: Vec<Violation>,
-    /// One point an iteration, the first evaluation included.
+    /// One point an iteration, the first evaluation included, and one for what improved routes after the last.
     pub convergence: Vec<ConvergencePoint>,
     /// Routes priced in all.
     pub evaluations: u64,
@@ -65,10 +65,10 @@ impl StopReason {
     }
 }
 
-/// A proven lower bound on the total cost of any route for the scenario.
+/// A proven lower bound on the total cost of any feasible route for the scenario.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bound {
-    /// No route costs less.
+    /// No feasible route costs less.
     pub lower: f64,
     /// `total / lower - 1`; `None` when infeasible or when `lower` is 0.
     pub gap: Option<f64>,

@@ -1,5 +1,5 @@
 //! What can be computed from a scenario's geometry before any search: the taut strings round its obstacles, and a cost
-//! that no route can undercut.
+//! that no feasible route can undercut.
 //!
 //! Deliberately absent: routes of waypoints, and everything that a vehicle can or cannot fly.
 

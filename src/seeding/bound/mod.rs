@@ -1,4 +1,4 @@
-//! A cost that no route can undercut, with its proof in docs/BOUND.md.
+//! A cost that no feasible route can undercut, with its proof in docs/BOUND.md.
 //!
 //! Seen from above, a soft zone costs so much that going through it is never cheaper than going round it: its threat
 //! can be widened and counts as hard. The string round the widened threats, priced by its fuel, is then a lower bound

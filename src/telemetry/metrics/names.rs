@@ -71,7 +71,7 @@ impl Default for Metrics {
             evaluations: new.add("search_evaluations", "Routes priced by searches"),
             operation_times: new.family_of_times(
                 "store_operation",
-                "Time that the store took, by operation; of claim, which waits for a plan, only failures",
+                "Time that the store took, by operation; claim, which waits for a plan, is not timed",
                 store_buckets,
             ),
             operation_faults: new.add(

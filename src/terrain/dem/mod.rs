@@ -155,7 +155,7 @@ impl SampleType {
 /// An ESRI ASCII grid without `crs` is taken to be in EPSG:4326 when its extent fits into degrees.
 ///
 /// # Errors
-/// Every [`DemError`] but [`DemError::Outside`], [`DemError::NoData`] and [`DemError::Elevation`].
+/// Every [`DemError`] but [`DemError::Empty`], [`DemError::Outside`], [`DemError::NoData`] and [`DemError::Elevation`].
 pub fn open(path: &Path, declared: Declared<'_>) -> Result<Dataset, DemError> {
     let len = std::fs::metadata(path)?.len();
     let format = format(path, len, declared.format)?;

@@ -47,7 +47,7 @@ pub enum CatalogueError {
     },
     /// The file exists but cannot be used.
     #[error(transparent)]
-    Unreadable(#[from] DemError),
+    Unreadable(DemError),
     /// All uploads together would be longer than they may be.
     #[error("with this file all uploads would have more than {room} bytes")]
     Full {
@@ -91,6 +91,18 @@ impl CatalogueError {
         Self::Unavailable {
             what: "the datasets that all nodes share cannot be reached".to_owned(),
             error,
+        }
+    }
+}
+
+impl From<DemError> for CatalogueError {
+    fn from(error: DemError) -> Self {
+        match error {
+            DemError::Io(error) if DemError::is_passing(&error) => Self::Unavailable {
+                what: "a file of elevations cannot be read".to_owned(),
+                error,
+            },
+            error => Self::Unreadable(error),
         }
     }
 }

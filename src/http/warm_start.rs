@@ -13,7 +13,7 @@ use crate::geometry::Point3;
 use crate::geometry::geodesy::LatLon;
 use crate::job::PlanId;
 use crate::scenario::frame::{Datum, Frame};
-use crate::scenario::json::Fault;
+use crate::scenario::json::{Fault, MOST_M};
 use crate::scenario::{Scenario, WarmStart};
 
 /// The part of a result document that is needed here.
@@ -100,6 +100,13 @@ pub(super) async fn resolve(
         Problem::Internal
     })?;
     let points = points.map_err(unknown)?;
+    // Routes may lead further than the points of a document.
+    let within = |point: &Point3| point.iter().all(|metres| metres.abs() <= MOST_M);
+    if !points.iter().all(within) {
+        return Err(unknown(
+            "that plan's route has coordinates of more than 10,000 km",
+        ));
+    }
     scenario.planner.warm_start = Some(WarmStart::Waypoints(points));
     Ok(())
 }

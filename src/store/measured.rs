@@ -88,6 +88,10 @@ impl Store for MeasuredStore {
         self.measured("release", self.store.release(lease)).await
     }
 
+    async fn postpone(&self, lease: &Lease) -> Result<Plan, StoreError> {
+        self.measured("release", self.store.postpone(lease)).await
+    }
+
     async fn request_cancel_if(
         &self,
         id: PlanId,

@@ -97,6 +97,13 @@ pub trait Store: Send + Sync + 'static {
     /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.
     async fn release(&self, lease: &Lease) -> Result<Plan, StoreError>;
 
+    /// As [`Store::release`], for a plan that cannot be run now: it keeps its place, but those behind it go first for a
+    /// while.
+    ///
+    /// # Errors
+    /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.
+    async fn postpone(&self, lease: &Lease) -> Result<Plan, StoreError>;
+
     /// Request the end of a plan. A queued one ends at once, without a result; a running one's lease is notified;
     /// nothing changes for one that has ended.
     ///

@@ -219,6 +219,11 @@ impl Store for Reopening {
         self.heed(&store, store.release(lease).await)
     }
 
+    async fn postpone(&self, lease: &Lease) -> Result<Plan, StoreError> {
+        let store = self.store()?;
+        self.heed(&store, store.postpone(lease).await)
+    }
+
     async fn request_cancel_if(
         &self,
         id: PlanId,

@@ -44,10 +44,21 @@ pub enum DatasetError {
     },
     /// It exists but cannot be used.
     #[error("it cannot be read: {0}")]
-    Unreadable(#[from] DemError),
+    Unreadable(DemError),
     /// Whether it exists cannot be determined.
     #[error("the datasets cannot be reached: {0}")]
     Unavailable(String),
+}
+
+impl From<DemError> for DatasetError {
+    fn from(error: DemError) -> Self {
+        match &error {
+            DemError::Io(cause) if DemError::is_passing(cause) => {
+                Self::Unavailable(error.to_string())
+            }
+            _ => Self::Unreadable(error),
+        }
+    }
 }
 
 /// An empty collection.

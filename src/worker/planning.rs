@@ -17,8 +17,9 @@ use crate::job::{FailureKind, Plan};
 use crate::planner::{Outcome, Stop as _, StopReason};
 use crate::store::{Ending, Lease};
 
-/// An engine that cannot plan now is retried for this long; after that, another worker may succeed.
-const PATIENCE: Duration = Duration::from_secs(30);
+/// An engine that cannot plan now is retried for this long; after that, another plan may be possible, or another worker
+/// may succeed.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Pause between such retries, at first and at most.
 const PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(2)];
@@ -38,7 +39,16 @@ struct Task {
     scenario: Arc<str>,
     reports: Reports,
     span: Span,
-    ended: oneshot::Sender<Option<Ending>>,
+    ended: oneshot::Sender<Run>,
+}
+
+/// How a run is over.
+pub(super) enum Run {
+    Ended(Ending),
+    /// It was stopped, and its plan goes back to the queue.
+    Stopped,
+    /// Its plan cannot be planned now.
+    NotNow,
 }
 
 impl Thread {
@@ -55,12 +65,8 @@ impl Thread {
         Ok(Self { tasks })
     }
 
-    /// Plan the plan of `lease` within the caller's span. An ending of `None` means that it must go back to the queue.
-    pub(super) fn plan(
-        &self,
-        lease: &Lease,
-        reports: Reports,
-    ) -> oneshot::Receiver<Option<Ending>> {
+    /// Plan the plan of `lease` within the caller's span.
+    pub(super) fn plan(&self, lease: &Lease, reports: Reports) -> oneshot::Receiver<Run> {
         let (ended, ending) = oneshot::channel();
         let task = Task {
             plan: lease.plan.clone(),
@@ -85,7 +91,7 @@ impl Task {
         // Nobody listens when the pool was dropped.
         let _ = self
             .ended
-            .send(end.unwrap_or_else(|payload| Some(panicked(&*payload))));
+            .send(end.unwrap_or_else(|payload| Run::Ended(panicked(&*payload))));
         // Whoever is woken by the end of the events finds the ending there.
         drop(reporter);
     }
@@ -100,12 +106,7 @@ fn step_back() {
     }
 }
 
-fn plan_to_its_end(
-    engine: &Engine,
-    plan: &Plan,
-    scenario: &str,
-    reporter: &mut Reporter,
-) -> Option<Ending> {
+fn plan_to_its_end(engine: &Engine, plan: &Plan, scenario: &str, reporter: &mut Reporter) -> Run {
     let stop = reporter.stop();
     let asked = Instant::now();
     let mut pause = PAUSES[0];
@@ -118,19 +119,19 @@ fn plan_to_its_end(
         match engine(scenario, reporter, &watch) {
             Ok(outcome) => {
                 reporter.ended(&outcome);
-                return Some(ending(&outcome, plan, scenario, watch.elapsed_ms()));
+                return Run::Ended(ending(&outcome, plan, scenario, watch.elapsed_ms()));
             }
-            Err(Unplanned::Failed(failure)) => return Some(Ending::Failed(failure)),
+            Err(Unplanned::Failed(failure)) => return Run::Ended(Ending::Failed(failure)),
             Err(Unplanned::NotNow(why)) => {
                 if asked.elapsed() >= PATIENCE {
-                    tracing::warn!(why, "cannot be planned here now");
-                    return None;
+                    tracing::warn!(why, "cannot be planned now; others go first");
+                    return Run::NotNow;
                 }
                 tracing::warn!(why, "cannot be planned now; trying again");
             }
         }
         if stop.is_raised_within(pause) {
-            return None;
+            return Run::Stopped;
         }
         pause = (2 * pause).min(PAUSES[1]);
     }

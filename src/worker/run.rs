@@ -7,7 +7,7 @@ use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tracing::{Instrument as _, Span};
 
-use super::planning::Thread;
+use super::planning::{Run, Thread};
 use super::reporter::Reports;
 use super::stop::{Reason, StopFlag};
 use super::{Pause, Phase, Slot, reached};
@@ -37,8 +37,7 @@ pub(super) struct Over {
     lease: Lease,
     /// Its last events; stored with its end.
     events: Vec<Event>,
-    /// `None` when its plan goes back to the queue.
-    ending: Option<Ending>,
+    run: Run,
     span: Span,
 }
 
@@ -63,11 +62,11 @@ impl Slot {
             stop: Arc::clone(&stop),
             instruments: Arc::clone(&self.instruments),
         };
-        let ending = match self.planning(thread) {
+        let run = match self.planning(thread) {
             Ok(thread) => thread.plan(&lease, reports),
             Err(error) => {
                 tracing::error!(%error, "no thread to plan on; the plan goes back to the queue");
-                self.give_back(&lease).await;
+                self.give_back(&lease, false).await;
                 // A thread may become available soon.
                 Pause::default().wait().await;
                 return None;
@@ -80,7 +79,7 @@ impl Slot {
         if rest.is_err() {
             stop.raise(Reason::Abandoned);
         }
-        let ending = ending
+        let run = run
             .await
             .expect("the planning thread answers even when it panics");
         let rest = match rest {
@@ -89,11 +88,14 @@ impl Slot {
             // Nothing is left to conclude.
             Err(Unstored::Lost) => return None,
         };
-        let abandoned = matches!(ending, Some(Ending::Result { .. })) && stop.is_abandoned();
+        let run = match run {
+            Run::Ended(Ending::Result { .. }) if stop.is_abandoned() => Run::Stopped,
+            run => run,
+        };
         Some(Over {
             lease,
             events: rest,
-            ending: ending.filter(|_| !abandoned),
+            run,
             span: Span::current(),
         })
     }
@@ -112,13 +114,14 @@ impl Slot {
         let Over {
             lease,
             events,
-            ending,
+            run,
             span,
         } = over;
         let conclusion = async {
-            match ending {
-                Some(ending) => self.finish(&lease, events, ending).await,
-                None => self.give_back(&lease).await,
+            match run {
+                Run::Ended(ending) => self.finish(&lease, events, ending).await,
+                Run::Stopped => self.give_back(&lease, false).await,
+                Run::NotNow => self.give_back(&lease, true).await,
             }
         };
         conclusion.instrument(span).await;
@@ -164,8 +167,15 @@ impl Slot {
         }
     }
 
-    async fn give_back(&self, lease: &Lease) {
-        let release = || self.store.release(lease);
+    /// Back to the queue; with `others_first`, behind the others there for a while.
+    async fn give_back(&self, lease: &Lease, others_first: bool) {
+        let release = || {
+            if others_first {
+                self.store.postpone(lease)
+            } else {
+                self.store.release(lease)
+            }
+        };
         match self.persist("release", release).await {
             // Its end had been requested, and it has no ending of its own to wait for.
             Ok(plan) if plan.status.is_final() => self.report_end(&plan),

@@ -202,6 +202,33 @@ async fn a_write_waits_for_another_process_that_locks_the_file() {
     submit.await.unwrap();
 }
 
+/// Callers who give up and try again must not fill the memory.
+#[tokio::test(flavor = "multi_thread")]
+async fn documents_that_wait_for_a_locked_file_take_limited_memory() {
+    let directory = TempDir::new().unwrap();
+    let store = SqliteStore::open(directory.path(), options()).unwrap();
+    let person = rusqlite::Connection::open(directory.path().join("noctule.db")).unwrap();
+    person.execute_batch("BEGIN IMMEDIATE").unwrap();
+    let long = || {
+        let mut submission = submission();
+        submission.scenario = " ".repeat(24 << 20);
+        store.submit(submission)
+    };
+    let mut waiting = [long(), long()];
+    for submit in &mut waiting {
+        assert!(futures_util::FutureExt::now_or_never(submit).is_none());
+    }
+    // Their callers give up, but they have been sent.
+    drop(waiting);
+    let refused = long().await.unwrap_err();
+    assert!(matches!(refused, StoreError::Unavailable { .. }));
+    assert!(refused.to_string().contains("disk stalls"), "{refused}");
+    person.execute_batch("COMMIT").unwrap();
+    store.health().await.unwrap();
+    assert_eq!(store.stats().await.unwrap().queued, 2);
+    long().await.unwrap();
+}
+
 /// A run may begin before its claim is durable; here the claim then fails to commit.
 #[tokio::test(flavor = "multi_thread")]
 async fn an_early_lease_whose_claim_fails_is_lost() {
@@ -324,6 +351,7 @@ async fn a_write_that_fails_halfway_leaves_nothing_and_fails_no_other() {
 #[tokio::test]
 async fn a_backup_may_have_any_file_name() {
     use std::os::unix::ffi::OsStrExt as _;
+    use std::os::unix::fs::PermissionsExt as _;
 
     let directory = TempDir::new().unwrap();
     let store = SqliteStore::open(directory.path(), options()).unwrap();
@@ -333,6 +361,9 @@ async fn a_backup_may_have_any_file_name() {
     upkeep::backup(directory.path(), &copy).unwrap();
     let made: Vec<_> = copies.path().read_dir().unwrap().collect();
     assert_eq!(made.len(), 1, "{made:?}");
+    // It holds the plans of all, as the store does.
+    let mode = std::fs::metadata(&copy).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o600);
     std::fs::rename(copy, copies.path().join("noctule.db")).unwrap();
     let restored = SqliteStore::open(copies.path(), options()).unwrap();
     assert_eq!(restored.get(id).await.unwrap().status, Status::Queued);

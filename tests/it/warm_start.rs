@@ -112,6 +112,24 @@ async fn a_warm_start_from_a_plan_without_a_route_is_refused() {
     assert_eq!(answer.status, 202, "{answer:?}");
 }
 
+/// Its document could not be read again.
+#[tokio::test]
+async fn a_route_beyond_what_a_document_may_hold_is_no_start() {
+    let api = Api::new();
+    let far = api.submit().await;
+    let lease = api.store.claim().await.expect("a queued plan");
+    let mut result = worker::result(lease.plan.id, "iterations").to_json();
+    let height = r#""z":"#;
+    let at = result.find(height).expect("a height") + height.len();
+    result.insert_str(at, "10000001.0,\"was\":");
+    let ended = (Status::Succeeded, "iterations");
+    worker::finish_with(&*api.store, &lease, ended, result).await;
+    let document = from_plan(&id_of(&far));
+    let answer = api.post("/plans?validate_only=true", &document).await;
+    let problem = answer.expect_problem(422, "invalid-scenario");
+    assert_eq!(problem["errors"][0]["code"], "unknown-plan", "{problem}");
+}
+
 #[tokio::test]
 async fn an_unavailable_store_is_not_reported_as_a_fault_of_the_document() {
     let api = Api::new();

@@ -206,6 +206,35 @@ async fn a_plan_that_cannot_run_now_is_retried() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_plan_that_cannot_run_for_long_does_not_keep_others_from_running() {
+    on_every_backend(10, async |store| {
+        let others = deterministic(3);
+        let pool = pool(
+            store,
+            1,
+            Arc::new(move |scenario, observer, stop| {
+                if scenario == "away" {
+                    return Err(Unplanned::NotNow("its ground is away".to_owned()));
+                }
+                others(scenario, observer, stop)
+            }),
+        );
+        let away = [
+            submit(&**store, "away").await,
+            submit(&**store, "away").await,
+        ];
+        let other = submit(&**store, "{}").await;
+        assert_eq!(ended(&**store, other).await, Status::Succeeded);
+        for id in away {
+            let plan = store.get(id).await.unwrap();
+            assert!(!plan.status.is_final(), "it is still wanted");
+        }
+        pool.drain(Duration::ZERO).await;
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_run_that_waits_for_a_retry_can_be_cancelled_and_drained() {
     on_every_backend(10, async |store| {
         let never: Engine = Arc::new(|_, _, _| Err(Unplanned::NotNow("away".to_owned())));

@@ -21,6 +21,9 @@ use crate::http::problem::Problem;
 /// Minimum average bytes a second: a slower sender would hold a place for nothing.
 pub(in crate::http) const SLOWEST: f64 = 8.0 * 1024.0;
 
+/// By so many bytes a packed file may be longer than plain, and by a sixteenth: what is sent beyond that packs nothing.
+const WRAPPING: u64 = 1024;
+
 /// Capacity of the channel from the connection to the disk.
 const PIECES: usize = 4;
 
@@ -49,7 +52,7 @@ pub(super) async fn receive(
     let span = tracing::Span::current();
     // It mostly waits for its caller, so it must not take one of the per-core places for work.
     let writing = spawn_blocking(move || span.in_scope(|| write(sink, coming)));
-    let sent = send(body, &pieces, timeout).await;
+    let sent = send(body, &pieces, (limit, timeout)).await;
     // An upload that was cut off never sends its end marker, and is removed.
     drop(pieces);
     let written = writing.await.unwrap_or(Err(Problem::Internal));
@@ -58,7 +61,12 @@ pub(super) async fn receive(
 }
 
 /// Pass the body on, piece by piece.
-async fn send(body: Body, pieces: &mpsc::Sender<Piece>, timeout: Duration) -> Result<(), Problem> {
+async fn send(
+    body: Body,
+    pieces: &mpsc::Sender<Piece>,
+    (limit, timeout): (u64, Duration),
+) -> Result<(), Problem> {
+    let longest = limit.saturating_add(limit / 16 + WRAPPING);
     let mut frames = body.into_data_stream();
     let mut since = Instant::now();
     let mut received = 0;
@@ -70,6 +78,9 @@ async fn send(body: Body, pieces: &mpsc::Sender<Piece>, timeout: Duration) -> Re
             Ok(None) => Piece::End,
             Ok(Some(Ok(bytes))) => {
                 received += bytes.len();
+                if received as u64 > longest {
+                    return Err(Problem::TerrainTooLarge(limit));
+                }
                 Piece::Bytes(bytes)
             }
             Ok(Some(Err(error))) => return Err(broken_off(&error)),

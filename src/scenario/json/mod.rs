@@ -29,6 +29,7 @@ mod writer;
 
 pub use fault::{CODES, Fault, MAX_LISTED, MORE_FAULTS, Refusal};
 pub use parameters::{COMMON, CommonParameter, Takes};
+pub use ranges::MOST_M;
 
 use std::sync::Arc;
 

@@ -77,8 +77,11 @@ impl Display for Range {
     }
 }
 
-/// Coordinates and heights, metres: ten thousand kilometres in either direction.
-pub(super) const COORDINATE: Range = Range::closed(-1e7, 1e7);
+/// Greatest coordinate or height in either direction, metres.
+pub const MOST_M: f64 = 1e7;
+
+/// Coordinates and heights, metres.
+pub(super) const COORDINATE: Range = Range::closed(-MOST_M, MOST_M);
 /// Degrees.
 pub(super) const LATITUDE: Range = Range::closed(-90.0, 90.0);
 /// Degrees.

@@ -94,7 +94,7 @@ impl JetStream {
     /// The caller is gone. The job is put back in its place too, not only the record, so that the next claim finds it.
     async fn take_back(&self, lease: &Lease) {
         let _turn = self.turn.lock().await;
-        if let Err(error) = self.release(lease.plan.id, lease.attempt).await {
+        if let Err(error) = self.put_back(lease.plan.id, lease.attempt).await {
             let plan_id = lease.plan.id;
             tracing::warn!(%plan_id, %error, "a plan that nobody waits for goes back when its lease ends");
         }
@@ -342,10 +342,19 @@ impl JetStream {
                 Ok(None)
             }
             Err(error) => {
-                self.release(id, attempt).await?;
+                self.put_back(id, attempt).await?;
                 Err(error)
             }
         }
+    }
+
+    /// A run that nobody will do. If the servers cannot be told so, its job is no longer held, and comes again.
+    async fn put_back(&self, id: PlanId, attempt: u64) -> Result<(), StoreError> {
+        let released = self.release(id, attempt).await;
+        if released.is_err() {
+            self.leases.let_go(id, attempt);
+        }
+        released.map(drop)
     }
 
     /// End a plan that can never be run, so that those behind it are.
@@ -365,7 +374,7 @@ impl JetStream {
             // It was deleted, or ended, meanwhile.
             Err(StoreError::LeaseLost(_)) => Ok(()),
             Err(error) => {
-                self.release(id, attempt).await?;
+                self.put_back(id, attempt).await?;
                 Err(error)
             }
         }

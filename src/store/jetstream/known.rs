@@ -209,6 +209,13 @@ impl Known {
         old.take(at_most).copied().collect()
     }
 
+    /// The plans that are being run, each with the number of its last step.
+    pub(super) fn runs(&self) -> Vec<(PlanId, u64)> {
+        let running = self.running.values().flatten();
+        let last_step = |id: PlanId| self.plans.get(&id).map(|standing| (id, standing.sequence));
+        running.filter_map(|(_, id)| last_step(*id)).collect()
+    }
+
     /// Queue place of a plan, if the plan exists.
     pub(super) fn place(&self, id: PlanId) -> Option<u64> {
         self.kept(id).map(|record| record.place)

@@ -240,6 +240,12 @@ impl Store for JetStreamStore {
             .await
     }
 
+    async fn postpone(&self, lease: &Lease) -> Result<Plan, StoreError> {
+        self.open_store()?
+            .postpone(lease.plan.id, lease.attempt)
+            .await
+    }
+
     async fn request_cancel_if(
         &self,
         id: PlanId,

@@ -1,5 +1,7 @@
 //! What a plan's worker reports of its run, and how the run ends.
 
+use std::time::Duration;
+
 use async_nats::jetstream::AckKind;
 
 use super::JetStream;
@@ -14,6 +16,10 @@ use crate::store::{End, Ending, StoreError, expected};
 
 /// Maximum number of events in one step.
 const EVENTS: usize = 256;
+
+/// For so long, others go before a plan that could not be run when it was first tried; twice as long with each further
+/// try, up to 64 times, so that however many such plans there are, they leave time to others.
+const POSTPONED: Duration = Duration::from_secs(10);
 
 /// Approximate bytes of events in one step; servers accept messages of 1 MiB by default.
 const BYTES: usize = 256 << 10;
@@ -40,8 +46,15 @@ impl JetStream {
     }
 
     pub(super) async fn release(&self, id: PlanId, attempt: u64) -> Result<Plan, StoreError> {
-        let released = self.try_to_release(id, attempt).await;
+        let released = self.try_to_release(id, attempt, None).await;
         self.let_go_when_lost(id, attempt, released)
+    }
+
+    pub(super) async fn postpone(&self, id: PlanId, attempt: u64) -> Result<Plan, StoreError> {
+        let doublings = attempt.saturating_sub(1).min(6);
+        let pause = Some(POSTPONED * (1 << doublings));
+        let postponed = self.try_to_release(id, attempt, pause).await;
+        self.let_go_when_lost(id, attempt, postponed)
     }
 
     /// Nothing is held any more of a run that turns out to be no longer this node's.
@@ -191,9 +204,15 @@ impl JetStream {
         Ok(record.plan.clone())
     }
 
-    async fn try_to_release(&self, id: PlanId, attempt: u64) -> Result<Plan, StoreError> {
+    /// The job comes again after `pause`.
+    async fn try_to_release(
+        &self,
+        id: PlanId,
+        attempt: u64,
+        pause: Option<Duration>,
+    ) -> Result<Plan, StoreError> {
         let now_ms = (self.options.clock)();
-        let mut back = AckKind::Nak(None);
+        let mut back = AckKind::Nak(pause);
         let released = self
             .plans()
             .change(id, |standing| {

@@ -9,11 +9,13 @@ use super::transaction::{Effect, Transaction};
 use super::unreadable::is_the_row_s;
 use crate::store::{StoreError, lost};
 
-/// The record and document of the first plan that has both; those before it have failed. `None` when there is none.
+/// The record and document of the first plan that has both, of those that are not postponed if there are any; those
+/// before it that are unreadable have failed. `None` when there is none.
 /// Nothing of a plan has been written when reading it fails, so the transaction remains sound.
 pub(super) fn take(tx: &mut Transaction<'_>) -> Result<Option<(PlanRow, String)>, StoreError> {
     loop {
-        let row = match PlanRow::head(tx.connection)? {
+        let first = tx.postponed.first(tx.connection)?;
+        let row = match PlanRow::head(tx.connection, first)? {
             Some(Ok(row)) => row,
             Some(Err(unreadable)) => {
                 unreadable.set_aside(tx)?;

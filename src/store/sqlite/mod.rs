@@ -9,6 +9,7 @@ mod idempotency;
 mod opening;
 mod operations;
 mod packed;
+mod postponed;
 mod read;
 mod records;
 mod removal;
@@ -18,6 +19,7 @@ mod schema;
 mod tests;
 mod transaction;
 mod unreadable;
+mod unwritten;
 pub mod upkeep;
 mod webhooks;
 mod writer;
@@ -36,6 +38,7 @@ use self::opening::{Place, create_directory, lock, open_database, sync_directory
 use self::read::Readers;
 use self::records::Records;
 use self::unreadable::Passed;
+use self::unwritten::Unwritten;
 use self::writer::Writer;
 use super::changes::Changes;
 use super::{
@@ -60,6 +63,7 @@ pub struct SqliteStore {
     changes: Arc<Changes>,
     records: Arc<Records>,
     passed: Arc<Passed>,
+    unwritten: Unwritten,
     options: Options,
 }
 
@@ -133,6 +137,7 @@ impl SqliteStore {
             changes,
             records,
             passed: Arc::default(),
+            unwritten: Unwritten::new(),
             options,
         })
     }
@@ -146,8 +151,12 @@ impl SqliteStore {
 #[async_trait]
 impl Store for SqliteStore {
     async fn submit(&self, submission: Submission) -> Result<Submitted, StoreError> {
+        let share = self.unwritten.share(submission.scenario.len())?;
         self.writer
-            .change(move |tx| operations::submit(tx, &submission))
+            .change(move |tx| {
+                let _held = &share;
+                operations::submit(tx, &submission)
+            })
             .await
     }
 
@@ -191,6 +200,13 @@ impl Store for SqliteStore {
         let (id, attempt) = (lease.plan.id, lease.attempt);
         self.writer
             .change(move |tx| operations::release(tx, id, attempt))
+            .await
+    }
+
+    async fn postpone(&self, lease: &Lease) -> Result<Plan, StoreError> {
+        let (id, attempt) = (lease.plan.id, lease.attempt);
+        self.writer
+            .change(move |tx| operations::postpone(tx, id, attempt))
             .await
     }
 

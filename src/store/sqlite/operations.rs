@@ -82,6 +82,7 @@ pub(super) fn claim(tx: &mut Transaction<'_>) -> Result<Option<Lease>, StoreErro
     let Some((mut row, scenario)) = head::take(tx)? else {
         return Ok(None);
     };
+    tx.postponed.remove(row.seq);
     row.plan.start(tx.now_ms())?;
     // A claim that failed after its lease was handed out must not be mistaken for this one.
     row.attempt = row.attempt.max(tx.void_attempt) + 1;
@@ -146,6 +147,16 @@ pub(super) fn release(
     attempt: u64,
 ) -> Result<Plan, StoreError> {
     let row = leased(tx, id, attempt)?;
+    give_back(tx, row)
+}
+
+pub(super) fn postpone(
+    tx: &mut Transaction<'_>,
+    id: PlanId,
+    attempt: u64,
+) -> Result<Plan, StoreError> {
+    let row = leased(tx, id, attempt)?;
+    tx.postponed.add(row.seq);
     give_back(tx, row)
 }
 

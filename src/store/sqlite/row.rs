@@ -87,17 +87,18 @@ impl PlanRow {
         row.map(|row| row.placed(connection)).transpose()
     }
 
-    /// The row at the head of the queue, at position 1. Without the hint, the database would take the index by status
-    /// and sort the whole queue.
+    /// The first row of the queue from this one on. Without the hint, the database would take the index by status and
+    /// sort the whole queue.
     pub(super) fn head(
         connection: &Connection,
+        from: i64,
     ) -> rusqlite::Result<Option<Result<Self, Unreadable>>> {
         connection
             .prepare_cached(&format!(
-                "SELECT {COLUMNS} FROM plans INDEXED BY plans_queue WHERE status = 'queued' \
+                "SELECT {COLUMNS} FROM plans INDEXED BY plans_queue WHERE status = 'queued' AND seq >= ?1 \
                  ORDER BY seq LIMIT 1"
             ))?
-            .query_row([], Self::try_read)
+            .query_row([from], Self::try_read)
             .optional()
     }
 

@@ -4,6 +4,7 @@ use rusqlite::{Connection, params};
 use tokio::sync::watch;
 
 use super::packed;
+use super::postponed::Postponed;
 use super::row::PlanRow;
 use crate::job::{Event, Plan, PlanId};
 use crate::store::{Options, StoreError};
@@ -15,6 +16,8 @@ const BATCH: usize = 256;
 pub(super) struct Transaction<'a> {
     pub(super) connection: &'a Connection,
     pub(super) options: &'a Options,
+    /// Plans that go after the others. What is in it does no harm if the transaction fails.
+    pub(super) postponed: &'a mut Postponed,
     /// Plans queued, including changes made in this transaction.
     pub(super) queued: u64,
     /// No claim whose commit failed had a greater attempt.

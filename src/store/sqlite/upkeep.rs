@@ -1,6 +1,7 @@
 //! Operator's maintenance of the file: check for damage, and back up.
 
 use std::fs::{File, TryLockError};
+use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
 use std::path::Path;
 
 use rusqlite::types::{ToSqlOutput, ValueRef};
@@ -153,18 +154,28 @@ pub fn backup(data_dir: &Path, to: &Path) -> Result<(), StoreError> {
 }
 
 /// An empty file that no other backup is writing at the same time, until this one is dropped. What a backup that was
-/// killed has left is thrown away.
+/// killed has left is thrown away. Only its owner may read it, as with the store itself.
 fn hold(part: &Path) -> std::io::Result<File> {
+    let another = || std::io::Error::other("another backup is writing it");
     let file = File::options()
         .create(true)
         .truncate(false)
         .write(true)
+        .mode(0o600)
         .open(part)?;
     match file.try_lock() {
-        Ok(()) => file.set_len(0).map(|()| file),
-        Err(TryLockError::WouldBlock) => Err(std::io::Error::other("another backup is writing it")),
-        Err(TryLockError::Error(error)) => Err(error),
+        Ok(()) => {}
+        Err(TryLockError::WouldBlock) => return Err(another()),
+        Err(TryLockError::Error(error)) => return Err(error),
     }
+    // Another backup that was completed between opening and locking has given it its final name.
+    let named = std::fs::metadata(part).map_err(|_| another())?;
+    let held = file.metadata()?;
+    if (named.dev(), named.ino()) != (held.dev(), held.ino()) {
+        return Err(another());
+    }
+    file.set_len(0)?;
+    Ok(file)
 }
 
 /// Rename a complete file to its final name; file and name are on the disk when this returns.

@@ -14,6 +14,7 @@ use tokio::sync::{oneshot, watch};
 
 use super::claims::{Claimer, Claims, When};
 use super::opening::Place;
+use super::postponed::Postponed;
 use super::records::Records;
 use super::transaction::{Effect, Transaction};
 use super::{operations, removal};
@@ -109,6 +110,7 @@ impl Writer {
             runtime: Handle::try_current().ok(),
             waiting: VecDeque::new(),
             leases: HashMap::new(),
+            postponed: Postponed::default(),
             queued: 0,
             void_attempt: 0,
             claims_fail: false,
@@ -203,6 +205,8 @@ struct Desk {
     waiting: VecDeque<Claimer>,
     /// How each running plan's worker is told to stop.
     leases: HashMap<PlanId, watch::Sender<bool>>,
+    /// Plans that go after the others.
+    postponed: Postponed,
     /// Plans queued, as committed.
     queued: u64,
     /// The greatest attempt whose lease was handed out but whose claim was not committed.
@@ -392,6 +396,7 @@ impl Desk {
         let mut tx = Transaction {
             connection: &self.connection,
             options: &self.options,
+            postponed: &mut self.postponed,
             queued: self.queued,
             void_attempt: self.void_attempt,
             effects: Vec::new(),

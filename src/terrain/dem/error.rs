@@ -1,5 +1,7 @@
 //! What can be wrong with an elevation file or with a request for its elevations.
 
+use std::io;
+
 use super::Format;
 use crate::geometry::geodesy::LatLon;
 
@@ -8,7 +10,7 @@ use crate::geometry::geodesy::LatLon;
 pub enum DemError {
     /// The operating system's error; not a source, because the message has all of it.
     #[error("the file cannot be read: {0}")]
-    Io(std::io::Error),
+    Io(io::Error),
     /// The format is not recognised.
     #[error(
         "the file is none of GeoTIFF, ESRI ASCII grid and SRTM .hgt (1201 x 1201 or 3601 x 3601 samples)"
@@ -111,13 +113,19 @@ pub enum DemError {
     },
 }
 
-impl From<std::io::Error> for DemError {
-    fn from(error: std::io::Error) -> Self {
+impl From<io::Error> for DemError {
+    fn from(error: io::Error) -> Self {
         Self::Io(error)
     }
 }
 
 impl DemError {
+    /// Whether the file may be readable later as it is: the operating system fails, and not because there is no file.
+    #[must_use]
+    pub(crate) fn is_passing(error: &io::Error) -> bool {
+        error.raw_os_error().is_some() && error.kind() != io::ErrorKind::NotFound
+    }
+
     pub(super) fn malformed(format: Format, reason: impl Into<String>) -> Self {
         Self::Malformed {
             format,

@@ -16,7 +16,7 @@ use noctule::store::{Options, Retention, Store, StoreError};
 
 use crate::support::nats;
 use crate::support::patience::{eventually, in_time};
-use crate::support::plans::{failure, history, kind, submission};
+use crate::support::plans::{failure, history, kind, point, submission};
 use crate::support::stores::node;
 
 /// A client that is not a node.
@@ -162,6 +162,37 @@ async fn jobs_that_vanished_from_the_queue_are_put_back_once() {
         two.finish(&lease, failure().at(0)).await.unwrap();
     }
     // The servers take their time to remove what is done.
+    eventually(async || in_queue().await == 0).await;
+}
+
+/// As after a restore of the queue from another moment than the plans.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_silent_run_whose_job_vanished_is_done_again() {
+    let address = nats::address();
+    let [one, two] = [(); 2].map(|()| super::open(&address));
+    let [one, two] = [one.await, two.await];
+    let plan = one.submit(submission()).await.unwrap().plan;
+    let silent = one.claim().await.unwrap();
+    let jobs = format!("{}-jobs", nats::namespace(&address));
+    let jobs = client(&address).await.get_stream(jobs).await.unwrap();
+    jobs.purge().await.unwrap();
+    let in_queue = async || jobs.get_info().await.unwrap().state.messages;
+    eventually(async || two.get(plan.id).await.unwrap().status == Status::Running).await;
+
+    let now_ms = plan.created_ms;
+    // Its own node knows better.
+    for later_ms in [0, 119_999] {
+        two.sweep(now_ms + later_ms).await.unwrap();
+        one.sweep(now_ms + 10 * later_ms).await.unwrap();
+        assert_eq!(in_queue().await, 0);
+    }
+    two.sweep(now_ms + 120_000).await.unwrap();
+    assert_eq!(in_queue().await, 1);
+    let again = in_time(two.claim()).await.unwrap();
+    assert_eq!((again.plan.id, again.attempt), (plan.id, 2));
+    let late = one.append(&silent, vec![point(1, None)]).await;
+    assert!(matches!(late, Err(StoreError::LeaseLost(id)) if id == plan.id));
+    two.finish(&again, failure().at(0)).await.unwrap();
     eventually(async || in_queue().await == 0).await;
 }
 

@@ -5,7 +5,10 @@ use futures_util::future::join_all;
 use noctule::job::{Event, Status};
 use noctule::store::ListQuery;
 
-use crate::support::plans::{ALL, ending, history, kind, point, statuses, submission, until};
+use crate::support::patience::in_time;
+use crate::support::plans::{
+    ALL, ending, failure, history, kind, point, statuses, submission, until,
+};
 use crate::support::stores::on_every_backend;
 
 #[tokio::test(flavor = "multi_thread")]
@@ -209,6 +212,39 @@ async fn a_released_plan_keeps_its_place_and_starts_over() {
         );
         for id in ids {
             assert_eq!(store.claim().await.unwrap().plan.id, id);
+        }
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn others_go_before_a_postponed_plan() {
+    on_every_backend(10, async |store| {
+        let mut ids = Vec::new();
+        for _ in 0..4 {
+            ids.push(store.submit(submission()).await.unwrap().plan.id);
+        }
+        for id in &ids[..2] {
+            let lease = store.claim().await.unwrap();
+            assert_eq!(lease.plan.id, *id);
+            let postponed = store.postpone(&lease).await.unwrap();
+            assert_eq!(postponed, store.get(*id).await.unwrap());
+            assert_eq!(postponed.status, Status::Queued);
+            let late = store.append(&lease, vec![point(1, None)]).await;
+            assert_eq!(kind(late), Err("lease lost"));
+        }
+        assert_eq!(store.get(ids[0]).await.unwrap().queue_position, Some(1));
+        for id in [ids[2], ids[3], ids[0]] {
+            let lease = in_time(store.claim()).await.unwrap();
+            assert_eq!(lease.plan.id, id);
+            store.finish(&lease, failure().at(20_000)).await.unwrap();
+        }
+        // One that was postponed is as good as any other once it is run.
+        let last = in_time(store.claim()).await.unwrap();
+        store.release(&last).await.unwrap();
+        let behind = store.submit(submission()).await.unwrap().plan.id;
+        for id in [ids[1], behind] {
+            assert_eq!(in_time(store.claim()).await.unwrap().plan.id, id);
         }
     })
     .await;

@@ -107,6 +107,11 @@ impl Store for FaultyStore {
         self.sound.release(lease).await
     }
 
+    async fn postpone(&self, lease: &Lease) -> Result<Plan, StoreError> {
+        self.stumble()?;
+        self.sound.postpone(lease).await
+    }
+
     async fn request_cancel_if(
         &self,
         id: PlanId,

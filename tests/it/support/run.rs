@@ -37,6 +37,17 @@ pub(crate) async fn finish(store: &dyn Store, lease: &Lease, status: Status) {
         Status::Cancelled => "cancelled",
         _ => "iterations",
     };
+    let document = result(lease.plan.id, stop_reason).to_json();
+    finish_with(store, lease, (status, stop_reason), document).await;
+}
+
+/// Ends a run with this result.
+pub(crate) async fn finish_with(
+    store: &dyn Store,
+    lease: &Lease,
+    (status, stop_reason): (Status, &str),
+    document: String,
+) {
     let ending = Ending::Result {
         cancelled: status == Status::Cancelled,
         stop_reason: stop_reason.to_owned(),
@@ -44,7 +55,7 @@ pub(crate) async fn finish(store: &dyn Store, lease: &Lease, status: Status) {
         best_cost: Some(580.0),
         evaluations: 420,
         iteration: 20,
-        document: result(lease.plan.id, stop_reason).to_json(),
+        document,
     };
     store
         .finish(lease, ending.at(lease.plan.created_ms + 50))

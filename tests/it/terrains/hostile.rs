@@ -310,6 +310,50 @@ async fn a_stalled_or_trickling_upload_is_given_up() {
     nothing_comes_in(&api).await;
 }
 
+/// The system may be able to read it again, so nobody is told that the dataset is at fault.
+#[tokio::test]
+async fn a_file_that_cannot_be_read_now_is_not_called_invalid() {
+    let api = Api::new();
+    let kept = put(&api, "/terrains/hill", hill(100.0)).await.json();
+    let sum = kept["sha256"].as_str().expect("text");
+    let file = api.uploads().join("content").join(sum);
+    let aside = file.with_extension("aside");
+    std::fs::rename(&file, &aside).expect("renamed");
+    std::os::unix::fs::symlink(&file, &file).expect("a loop");
+    let answer = api.get("/terrains/hill/elevations").await;
+    answer.expect_problem(503, "store-unavailable");
+    let answer = api.post("/plans", &over("hill")).await;
+    answer.expect_problem(503, "store-unavailable");
+    std::fs::remove_file(&file).expect("removed");
+    std::fs::rename(&aside, &file).expect("renamed");
+    let answer = api.post("/plans", &over("hill")).await;
+    assert_eq!(answer.status, 202, "{answer:?}");
+}
+
+/// It would keep its place for ever.
+#[tokio::test]
+async fn a_packed_upload_that_unpacks_to_nothing_ends_at_the_limit() {
+    let mut api = Api::new();
+    let mut rules = (*api.state.rules).clone();
+    rules.limits.terrain_bytes = 100_000;
+    api.state.rules = rules.into();
+    api.router = http::router(api.state.clone());
+    let nothing = GzEncoder::new(Vec::new(), Compression::default());
+    let nothing = nothing.finish().expect("to memory").repeat(100);
+    let nothing = Bytes::from(nothing);
+    let sent = stream::repeat_with(move || Ok::<_, std::io::Error>(nothing.clone()));
+    let packed = [("content-encoding", "gzip")];
+    let answer = api.send(
+        Method::PUT,
+        "/terrains/empty",
+        &packed,
+        Body::from_stream(sent),
+    );
+    let answer = in_time(answer).await;
+    answer.expect_problem(413, "body-too-large");
+    nothing_comes_in(&api).await;
+}
+
 /// As many as may arrive at once.
 #[tokio::test]
 async fn stalled_uploads_do_not_block_other_requests() {

@@ -8,6 +8,7 @@ mod mask;
 mod place;
 mod samples;
 
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -144,7 +145,10 @@ fn tiff(path: &Path) -> Result<TiffFile, DemError> {
 /// The error as a [`DemError`], without the path.
 fn refusal(error: &TiffError) -> DemError {
     match error {
-        TiffError::Io(error, _) => malformed(format!("it cannot be read: {error}")),
+        TiffError::Io(error, _) => match error.raw_os_error() {
+            Some(code) => DemError::Io(io::Error::from_raw_os_error(code)),
+            None => malformed(format!("it cannot be read: {error}")),
+        },
         error => malformed(error.to_string()),
     }
 }

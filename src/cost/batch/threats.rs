@@ -13,7 +13,7 @@ use crate::scenario::{Quadrature, Scenario};
 use crate::threat::{Cylinder, Shape, Threat};
 
 /// With this many threats or fewer, all are examined.
-const FEW_THREATS: usize = 8;
+const FEW_THREATS: usize = 6;
 
 /// Twice the line integral of 1 / d is a logarithm of a quotient that grows without end as the
 /// distance falls; beyond this the distance squared, its factor, is lost in rounding.

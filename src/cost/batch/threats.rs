@@ -84,16 +84,30 @@ impl Pricer<'_> {
         exposure: &mut Lane<S>,
         violation: &mut Lane<S>,
     ) {
-        let Some(index) = &self.scene.threats.index else {
-            for threat_idx in 0..self.scene.threats.all.len() {
-                self.threat(threat_idx, leg, exposure, violation);
+        let threats = &self.scene.threats;
+        match &threats.index {
+            None => {
+                for threat_idx in 0..threats.all.len() {
+                    self.threat(threat_idx, leg, exposure, violation);
+                }
             }
-            return;
-        };
-        let around = index.around(leg);
-        for word in 0..index.words() {
-            for threat_idx in around.near::<S>(word) {
-                self.threat(threat_idx, leg, exposure, violation);
+            Some(Index::Few(sets)) => {
+                let places = sets.places(leg);
+                for word in 0..sets.words {
+                    for threat_idx in sets.near::<S>(&places, word) {
+                        self.threat(threat_idx, leg, exposure, violation);
+                    }
+                }
+            }
+            Some(Index::Many(many)) => {
+                let (words, places) = (many.words.places(leg), many.threats.places(leg));
+                for block in 0..many.words.words {
+                    for word in many.words.near::<S>(&words, block) {
+                        for bit in many.threats.near::<S>(&places, word) {
+                            self.threat(many.order[bit], leg, exposure, violation);
+                        }
+                    }
+                }
             }
         }
     }

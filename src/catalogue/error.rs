@@ -97,8 +97,9 @@ impl CatalogueError {
 
 impl From<DemError> for CatalogueError {
     fn from(error: DemError) -> Self {
+        let is_passing = error.is_passing();
         match error {
-            DemError::Io(error) if DemError::is_passing(&error) => Self::Unavailable {
+            DemError::Io(error) if is_passing => Self::Unavailable {
                 what: "a file of elevations cannot be read".to_owned(),
                 error,
             },

@@ -25,6 +25,10 @@ pub(super) const PIECE: usize = 16 * 1024;
 /// A caller must take so many bytes a second on average to keep an answer that others need the room of.
 const SLOWEST: f64 = 8.0 * 1024.0;
 
+/// Among an answer's extensions, marks one that occupies nothing of its own: it is a part of the program.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Constant;
+
 /// The room for all long answers.
 #[derive(Debug, Clone)]
 pub struct Answers(Arc<Room>);
@@ -84,7 +88,6 @@ impl Place {
             piece: Bytes::new(),
             share: Some(self.share),
             begun: Instant::now(),
-            taken: 0,
         }));
         let mut waiting = self.room.waiting.lock();
         let id = waiting.next;
@@ -127,15 +130,13 @@ struct Rest {
     piece: Bytes,
     /// `None` once the answer has been let go of.
     share: Option<OwnedSemaphorePermit>,
+    /// When somebody would have begun who had taken as much at the slowest pace.
     begun: Instant,
-    /// Bytes handed over.
-    taken: usize,
 }
 
 impl Rest {
     fn let_go_if_unread(&mut self, now: Instant, patience: Duration) {
-        let fair = Duration::from_secs_f64(self.taken as f64 / SLOWEST);
-        if now > self.begun + patience + fair {
+        if now > self.begun + patience {
             self.body = Body::empty();
             self.piece = Bytes::new();
             self.share = None;
@@ -165,7 +166,9 @@ impl Rest {
         if self.piece.is_empty() {
             self.piece = Bytes::new();
         }
-        self.taken += length;
+        let fair = Duration::from_secs_f64(length as f64 / SLOWEST);
+        // Whoever is fast now may not stand still for longer later.
+        self.begun = Instant::now().min(self.begun + fair);
         Poll::Ready(Some(Ok(Frame::data(piece))))
     }
 
@@ -276,8 +279,11 @@ mod tests {
         assert_eq!(next(&mut unread).await, None, "it breaks off");
         assert_eq!(next(&mut read).await, Some(PIECE));
 
-        // A pace that is too slow does not help for long.
-        tokio::time::sleep(Duration::from_secs(4)).await;
+        // A pace that is too slow does not help for long, and neither does one that was fast.
+        for _ in 0..2 {
+            assert_eq!(next(&mut read).await, Some(PIECE));
+        }
+        tokio::time::sleep(PATIENCE + Duration::from_secs(1)).await;
         assert!(held(&answers, 5 * PIECE).is_some());
         assert_eq!(next(&mut read).await, None);
     }

@@ -6,7 +6,7 @@ use axum::response::{IntoResponse as _, Response};
 use tower_http::compression::CompressionBody;
 use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
 
-use super::answers::{Answers, PIECE};
+use super::answers::{Answers, Constant, PIECE};
 
 /// About what a compressor occupies, bytes: its windows and tables.
 const COMPRESSOR: u64 = 320 * 1024;
@@ -65,7 +65,7 @@ pub(super) fn send(
         answer.headers_mut().remove(header::CONTENT_ENCODING);
     }
     let answer = answer.map(CompressionBody::into_inner);
-    if length <= PIECE as u64 {
+    if length <= PIECE as u64 || answer.extensions().get::<Constant>().is_some() {
         return answer;
     }
     match answers.room(length) {

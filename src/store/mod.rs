@@ -11,6 +11,7 @@ pub mod jetstream;
 mod lost;
 pub mod measured;
 mod options;
+mod pause;
 pub mod reopening;
 pub mod sqlite;
 
@@ -19,6 +20,7 @@ pub use end::{End, Ending};
 use error::expected;
 pub use error::{StoreError, Trouble};
 pub use options::{OnLost, Options, Retention};
+use pause::pause_after;
 
 use std::sync::Arc;
 
@@ -98,7 +100,7 @@ pub trait Store: Send + Sync + 'static {
     async fn release(&self, lease: &Lease) -> Result<Plan, StoreError>;
 
     /// As [`Store::release`], for a plan that cannot be run now: it keeps its place, but those behind it go first for a
-    /// while.
+    /// while: ten seconds after its first run, twice as long after each further one, up to 320 s.
     ///
     /// # Errors
     /// [`StoreError::LeaseLost`] when the plan is no longer this lease's to run.

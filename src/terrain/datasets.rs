@@ -52,11 +52,10 @@ pub enum DatasetError {
 
 impl From<DemError> for DatasetError {
     fn from(error: DemError) -> Self {
-        match &error {
-            DemError::Io(cause) if DemError::is_passing(cause) => {
-                Self::Unavailable(error.to_string())
-            }
-            _ => Self::Unreadable(error),
+        if error.is_passing() {
+            Self::Unavailable(error.to_string())
+        } else {
+            Self::Unreadable(error)
         }
     }
 }

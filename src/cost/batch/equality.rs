@@ -157,10 +157,16 @@ impl Choices {
             "altitude":{"min":0,"max":9},"area":{"min":{"x":0,"y":0},"max":{"x":1000,"y":1000}},"planner":{"algorithm":"any"}}"#;
         let mut scenario = json::read(document, &rules, 1).expect("the document has no fault");
         scenario.terrain = self.terrain();
-        // More than are examined one by one, and more than a word of a set has bits.
+        // So few that each is examined, and in one word of a set, in two, and in more.
         let many = self.one_in(3.0);
-        let most = if self.one_in(2.0) { 40 } else { 90 };
-        let threats = (0..if many { most } else { 7 }).map(|_| self.threat(many));
+        let count = match (many, self.one_in(2.0), self.one_in(2.0)) {
+            (false, true, _) => 5,
+            (false, false, _) => 8,
+            (true, true, true) => 40,
+            (true, true, false) => 90,
+            (true, false, _) => 180,
+        };
+        let threats = (0..count).map(|_| self.threat(many));
         scenario.threats = threats.collect();
         scenario.altitude.min = if self.one_in(3.0) {
             0.0
@@ -265,7 +271,7 @@ proptest! {
 
     #[test]
     fn lanes_agree_with_the_scalar_code(
-        choices in prop::collection::vec(0.0..1.0f64, 1500),
+        choices in prop::collection::vec(0.0..1.0f64, 5000),
     ) {
         let mut choices = Choices(choices.into_iter());
         let scenario = choices.scenario();

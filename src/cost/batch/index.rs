@@ -33,7 +33,7 @@ pub(super) enum Index {
 /// Threats in an order in which neighbours share a word.
 #[derive(Debug)]
 pub(super) struct Many {
-    /// The threat that each bit stands for. This is the order of sums, whatever else is looked up.
+    /// The threat that each bit stands for. Sums are made in this order.
     pub(super) order: Vec<usize>,
     pub(super) threats: Sets,
     /// The words by what their threats cover.
@@ -44,7 +44,7 @@ pub(super) struct Many {
 #[derive(Debug)]
 pub(super) struct Sets {
     axes: [Axis; 2],
-    pub(super) words: usize,
+    pub(super) n_words: usize,
 }
 
 #[derive(Debug)]
@@ -77,7 +77,7 @@ impl Index {
             .map(|extent| extent.grown(1e-6 * (1.0 + extent.diagonal())))
             .collect();
         let sets = Sets::of(&boxes);
-        if sets.words <= FEW_WORDS {
+        if sets.n_words <= FEW_WORDS {
             return Self::Few(sets);
         }
         let mut order: Vec<usize> = (0..boxes.len()).collect();
@@ -111,12 +111,12 @@ impl Iterator for Near {
 
 impl Sets {
     fn of(boxes: &[Rect]) -> Self {
-        let words = boxes.len().div_ceil(WORD);
+        let n_words = boxes.len().div_ceil(WORD);
         let x = boxes.iter().map(|extent| [extent.min.x, extent.max.x]);
         let y = boxes.iter().map(|extent| [extent.min.y, extent.max.y]);
         Self {
-            axes: [Axis::of(x.collect(), words), Axis::of(y.collect(), words)],
-            words,
+            axes: [x.collect(), y.collect()].map(|spans| Axis::of(spans, n_words)),
+            n_words,
         }
     }
 
@@ -137,8 +137,8 @@ impl Sets {
     pub(super) fn places<S: Simd>(&self, leg: &Leg<S>) -> [Places; 2] {
         let [x, y] = &self.axes;
         [
-            x.places(leg.a.x.min(leg.b.x), leg.a.x.max(leg.b.x), self.words),
-            y.places(leg.a.y.min(leg.b.y), leg.a.y.max(leg.b.y), self.words),
+            x.places(leg.a.x.min(leg.b.x), leg.a.x.max(leg.b.x), self.n_words),
+            y.places(leg.a.y.min(leg.b.y), leg.a.y.max(leg.b.y), self.n_words),
         ]
     }
 
@@ -162,23 +162,23 @@ impl Sets {
 
 impl Axis {
     /// For spans from the first to the second.
-    fn of(spans: Vec<[f64; 2]>, words: usize) -> Self {
+    fn of(spans: Vec<[f64; 2]>, n_words: usize) -> Self {
         let ends = || spans.iter().flatten().copied();
         let origin = ends().fold(f64::INFINITY, f64::min);
         let extent = ends().fold(f64::NEG_INFINITY, f64::max) - origin;
         let mut axis = Self {
             origin,
             per_metre: (CELLS - 1) as f64 / extent,
-            begun: vec![0; CELLS * words],
-            not_ended: vec![0; CELLS * words],
+            begun: vec![0; CELLS * n_words],
+            not_ended: vec![0; CELLS * n_words],
         };
         for (threat_idx, [from, to]) in spans.into_iter().enumerate() {
             let (word, bit) = (threat_idx / WORD, 1 << (threat_idx % WORD));
             for cell in axis.cell(from)..CELLS {
-                axis.begun[cell * words + word] |= bit;
+                axis.begun[cell * n_words + word] |= bit;
             }
             for cell in 0..=axis.cell(to) {
-                axis.not_ended[cell * words + word] |= bit;
+                axis.not_ended[cell * n_words + word] |= bit;
             }
         }
         axis
@@ -192,21 +192,21 @@ impl Axis {
 
     /// As `cell`, of the ends of boxes from `low` to `high`.
     #[inline(always)]
-    fn places<S: Simd>(&self, low: Lane<S>, high: Lane<S>, words: usize) -> Places {
+    fn places<S: Simd>(&self, low: Lane<S>, high: Lane<S>, n_words: usize) -> Places {
         Places {
-            begun: self.place(high, words),
-            not_ended: self.place(low, words),
+            begun: self.place(high, n_words),
+            not_ended: self.place(low, n_words),
         }
     }
 
     #[inline(always)]
-    fn place<S: Simd>(&self, at: Lane<S>, words: usize) -> [usize; LANES] {
+    fn place<S: Simd>(&self, at: Lane<S>, n_words: usize) -> [usize; LANES] {
         let cells = (at - self.origin) * self.per_metre;
         let last = at.with((CELLS - 1) as f64);
         let row = (cells.clamp(at.with(0.0), last) + WHOLE).row();
         let mut places = [0; LANES];
         for lane in 0..S::F64_LANES {
-            places[lane] = cell(row[lane]) * words;
+            places[lane] = cell(row[lane]) * n_words;
         }
         places
     }
@@ -245,7 +245,7 @@ mod tests {
                 .flat_map(|word| sets.near::<Scalar>(&places, *word))
                 .collect()
         };
-        let all = |sets: &Sets| members(sets, &(0..sets.words).collect::<Vec<_>>());
+        let all = |sets: &Sets| members(sets, &(0..sets.n_words).collect::<Vec<_>>());
         match index {
             Index::Few(threats) => all(threats),
             Index::Many(many) => {

@@ -93,7 +93,7 @@ impl Pricer<'_> {
             }
             Some(Index::Few(sets)) => {
                 let places = sets.places(leg);
-                for word in 0..sets.words {
+                for word in 0..sets.n_words {
                     for threat_idx in sets.near::<S>(&places, word) {
                         self.threat(threat_idx, leg, exposure, violation);
                     }
@@ -101,7 +101,7 @@ impl Pricer<'_> {
             }
             Some(Index::Many(many)) => {
                 let (words, places) = (many.words.places(leg), many.threats.places(leg));
-                for block in 0..many.words.words {
+                for block in 0..many.words.n_words {
                     for word in many.words.near::<S>(&words, block) {
                         for bit in many.threats.near::<S>(&places, word) {
                             self.threat(many.order[bit], leg, exposure, violation);

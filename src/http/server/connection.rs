@@ -23,8 +23,8 @@ use super::socket::Socket;
 use super::traffic::Traffic;
 use super::unread::Received;
 use crate::http::Phase;
-use crate::http::head;
 use crate::http::phase::stopping;
+use crate::http::{answers, head};
 
 /// How long a caller that has connected may take to send the first bytes of a request once the service stops. Bytes that
 /// are there already may take a moment to be noticed.
@@ -37,6 +37,9 @@ pub(super) const HEAD_BYTES: usize = head::MOST_BYTES;
 /// In HTTP/2 each header counts 32 bytes more than its text. What is within this and too large after all gets a better
 /// answer from [`head`] than from hyper, whose own has no body.
 const HTTP2_HEAD_BYTES: u32 = 2 * 64 * 1024;
+
+/// What HTTP/2 takes in of each answer before the system takes it: there it can no longer be let go of.
+const HTTP2_UNSENT_BYTES: usize = 4 * answers::PIECE;
 
 /// The first bytes of an HTTP/2 connection, RFC 9113 section 3.4.
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
@@ -106,6 +109,7 @@ pub(super) async fn answer(
             .timer(TokioTimer::new())
             .keep_alive_interval(times.idle)
             .max_header_list_size(HTTP2_HEAD_BYTES)
+            .max_send_buf_size(HTTP2_UNSENT_BYTES)
             .max_concurrent_streams(256);
         let connection = builder.serve_connection(socket, service);
         Box::pin(keep(connection, phase, &traffic, times, false)).await;

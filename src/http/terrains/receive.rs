@@ -21,7 +21,7 @@ use crate::http::problem::Problem;
 /// Minimum average bytes a second: a slower sender would hold a place for nothing.
 pub(in crate::http) const SLOWEST: f64 = 8.0 * 1024.0;
 
-/// By so many bytes a packed file may be longer than plain, and by a sixteenth: what is sent beyond that packs nothing.
+/// A packed file may be longer than plain by a sixteenth and this, in bytes; what is sent beyond that packs nothing.
 const WRAPPING: u64 = 1024;
 
 /// Capacity of the channel from the connection to the disk.

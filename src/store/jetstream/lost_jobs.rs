@@ -62,19 +62,24 @@ impl JetStream {
     /// Look at some of the plans that have long been waiting, in turn, and at silent runs, and put back the jobs that are
     /// missing.
     pub(super) async fn restore_jobs(&self, now_ms: i64) -> Result<(), StoreError> {
+        let mut failed = None;
         for id in self.silent_runs(now_ms) {
-            self.restore_job(id).await?;
+            let restored = self.restore_job(id).await;
+            failed = failed.or(restored.err());
         }
         let waiting = self.next_waiting(now_ms);
         let mut missing = 0;
         for id in &waiting {
-            missing += usize::from(self.restore_job(*id).await?);
+            match self.restore_job(*id).await {
+                Ok(was_missing) => missing += usize::from(was_missing),
+                Err(error) => failed = failed.or(Some(error)),
+            }
         }
         if missing > 0 && missing == waiting.len() {
             // Where all were missing there may be more: the whole queue was lost.
             self.round.lock().last = None;
         }
-        Ok(())
+        failed.map_or(Ok(()), Err)
     }
 
     fn silent_runs(&self, now_ms: i64) -> Vec<PlanId> {

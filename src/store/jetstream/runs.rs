@@ -12,14 +12,10 @@ use super::run_steps::{Appended, RunSteps};
 use super::steps::Change;
 use super::view::Standing;
 use crate::job::{Event, Plan, PlanId, Status};
-use crate::store::{End, Ending, StoreError, expected};
+use crate::store::{End, Ending, StoreError, expected, pause_after};
 
 /// Maximum number of events in one step.
 const EVENTS: usize = 256;
-
-/// For so long, others go before a plan that could not be run when it was first tried; twice as long with each further
-/// try, up to 64 times, so that however many such plans there are, they leave time to others.
-const POSTPONED: Duration = Duration::from_secs(10);
 
 /// Approximate bytes of events in one step; servers accept messages of 1 MiB by default.
 const BYTES: usize = 256 << 10;
@@ -51,8 +47,7 @@ impl JetStream {
     }
 
     pub(super) async fn postpone(&self, id: PlanId, attempt: u64) -> Result<Plan, StoreError> {
-        let doublings = attempt.saturating_sub(1).min(6);
-        let pause = Some(POSTPONED * (1 << doublings));
+        let pause = Some(pause_after(attempt));
         let postponed = self.try_to_release(id, attempt, pause).await;
         self.let_go_when_lost(id, attempt, postponed)
     }

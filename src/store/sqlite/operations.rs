@@ -156,7 +156,7 @@ pub(super) fn postpone(
     attempt: u64,
 ) -> Result<Plan, StoreError> {
     let row = leased(tx, id, attempt)?;
-    tx.postponed.add(row.seq);
+    tx.postponed.add(row.seq, attempt);
     give_back(tx, row)
 }
 

@@ -10,7 +10,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use crate::store::StoreError;
 
 /// Bytes that may wait at once.
-const ROOM: usize = 64 << 20;
+const ROOM: usize = 256 << 20;
 
 /// The room for documents that wait.
 pub(super) struct Unwritten(Arc<Semaphore>);
@@ -29,7 +29,7 @@ impl Unwritten {
         let share = self.0.clone().try_acquire_many_owned(bytes);
         share.map_err(|_| {
             StoreError::unavailable(format!(
-                "{ROOM} bytes of plans wait to be written already: the disk stalls"
+                "{ROOM} bytes of plans are waiting to be written already"
             ))
         })
     }

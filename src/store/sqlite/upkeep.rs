@@ -1,7 +1,7 @@
 //! Operator's maintenance of the file: check for damage, and back up.
 
-use std::fs::{File, TryLockError};
-use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
+use std::fs::{File, Permissions, TryLockError};
+use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _, PermissionsExt as _};
 use std::path::Path;
 
 use rusqlite::types::{ToSqlOutput, ValueRef};
@@ -174,6 +174,7 @@ fn hold(part: &Path) -> std::io::Result<File> {
     if (named.dev(), named.ino()) != (held.dev(), held.ino()) {
         return Err(another());
     }
+    file.set_permissions(Permissions::from_mode(0o600))?;
     file.set_len(0)?;
     Ok(file)
 }

@@ -122,8 +122,9 @@ impl From<io::Error> for DemError {
 impl DemError {
     /// Whether the file may be readable later as it is: the operating system fails, and not because there is no file.
     #[must_use]
-    pub(crate) fn is_passing(error: &io::Error) -> bool {
-        error.raw_os_error().is_some() && error.kind() != io::ErrorKind::NotFound
+    pub(crate) fn is_passing(&self) -> bool {
+        matches!(self, Self::Io(error)
+            if error.raw_os_error().is_some() && error.kind() != io::ErrorKind::NotFound)
     }
 
     pub(super) fn malformed(format: Format, reason: impl Into<String>) -> Self {

@@ -24,7 +24,7 @@ fn over_a_grid() -> Value {
 #[tokio::test(flavor = "multi_thread")]
 async fn unread_answers_take_little_memory_and_make_room_for_those_that_are_read() {
     const ROOM: usize = 8 << 20;
-    const ASKED: usize = 100;
+    const ASKED: usize = 40;
     let directory = tempfile::tempdir().expect("a temporary directory");
     let room = ROOM.to_string();
     let limits = [
@@ -33,7 +33,7 @@ async fn unread_answers_take_little_memory_and_make_room_for_those_that_are_read
         "--http-head-timeout",
         "1",
         "--http-body-timeout",
-        "1",
+        "5",
         "--workers",
         "1",
         "--grace",

@@ -1,24 +1,138 @@
 //! Long answers that nobody reads.
 
-use http_body_util::BodyExt as _;
+use std::io;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use bytes::Bytes;
+use http_body_util::{BodyExt as _, Empty};
+use hyper::Request;
+use hyper::client::conn::http2;
+use hyper_util::rt::{TokioExecutor, TokioIo};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::net::TcpStream;
+use tokio::task::JoinHandle;
 
 use super::still::Http2;
 use crate::support::lives::waiting;
-use crate::support::patience::eventually;
+use crate::support::patience::{eventually, in_time};
 use crate::support::process::Service;
 use crate::support::scenario;
 
-/// A scenario of more than a mebibyte.
-fn over_a_grid() -> Value {
-    const SIDE: usize = 600;
+/// A scenario of some five bytes for each node of a square grid.
+fn over_a_grid(side: usize) -> Value {
     let mut document = scenario();
     document["terrain"] = json!({
-        "kind": "grid", "origin": {"x": -2000, "y": -2000}, "cell": 10, "columns": SIDE, "rows": SIDE,
-        "elevations": vec![-0.5; SIDE * SIDE],
+        "kind": "grid", "origin": {"x": -2000, "y": -2000}, "cell": 6000 / side, "columns": side, "rows": side,
+        "elevations": vec![-0.5; side * side],
     });
     document
+}
+
+/// A connection of which nothing more is read once this is set.
+struct Deaf {
+    stream: TcpStream,
+    is_deaf: Arc<AtomicBool>,
+}
+
+impl AsyncRead for Deaf {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        if self.is_deaf.load(Ordering::Relaxed) {
+            return Poll::Pending;
+        }
+        Pin::new(&mut self.stream).poll_read(context, buffer)
+    }
+}
+
+impl AsyncWrite for Deaf {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.stream).poll_write(context, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(context)
+    }
+}
+
+/// HTTP/2 takes in what its window has room for, whether the system takes it or not.
+#[tokio::test(flavor = "multi_thread")]
+async fn wide_windows_take_no_more_memory() {
+    const ASKED: usize = 250;
+    const WIDE: u32 = 1 << 30;
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let room = (8 << 20).to_string();
+    let limits = [
+        "--http-answers-bytes",
+        &room,
+        "--workers",
+        "1",
+        "--grace",
+        "0",
+    ];
+    let service = Service::start(directory.path(), &limits);
+    waiting(&service).await;
+    let plan = service.submit(&over_a_grid(250)).await;
+    let document = service.url(&format!("{plan}/scenario"));
+
+    let is_deaf = Arc::new(AtomicBool::new(false));
+    let stream = TcpStream::connect(service.address()).await;
+    let deaf = Deaf {
+        stream: stream.expect("connected"),
+        is_deaf: is_deaf.clone(),
+    };
+    let (mut sender, connection) = http2::Builder::new(TokioExecutor::new())
+        .initial_stream_window_size(WIDE)
+        .initial_connection_window_size(WIDE)
+        .handshake(TokioIo::new(deaf))
+        .await
+        .expect("it speaks HTTP/2");
+    tokio::spawn(connection);
+    let mut ask = |uri: &str| {
+        let request = Request::get(uri).body(Empty::<Bytes>::new());
+        sender.send_request(request.expect("a request"))
+    };
+    let heard = in_time(ask(&service.url("/livez"))).await;
+    assert_eq!(heard.expect("an answer").status(), StatusCode::OK);
+
+    is_deaf.store(true, Ordering::Relaxed);
+    let before = service.peak_rss_kib();
+    let mut asked = Vec::new();
+    for _ in 0..ASKED {
+        asked.push(tokio::spawn(ask(&document)));
+        // One after the other, about: documents that are being read are not meant here.
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    eventually(async || {
+        let metrics = service.bytes("/metrics").await;
+        let metrics = String::from_utf8_lossy(&metrics).into_owned();
+        let of_route = |line: &&str| {
+            line.starts_with("noctule_http_requests_total{") && line.contains("/scenario\"")
+        };
+        let counts = metrics.lines().filter(of_route);
+        let counts = counts.filter_map(|line| line.rsplit(' ').next()?.parse::<usize>().ok());
+        counts.sum::<usize>() >= ASKED
+    })
+    .await;
+    let grown = service.peak_rss_kib() - before;
+    assert!(grown < 48 * 1024, "{grown} KiB more");
+    asked.iter().for_each(JoinHandle::abort);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -41,7 +155,7 @@ async fn unread_answers_take_little_memory_and_make_room_for_those_that_are_read
     ];
     let service = Service::start(directory.path(), &limits);
     let waiting = waiting(&service).await;
-    let plan = service.submit(&over_a_grid()).await;
+    let plan = service.submit(&over_a_grid(600)).await;
     let document = format!("{plan}/scenario");
     let length = service.bytes(&document).await.len();
     assert!(length > 1 << 20, "{length} bytes");

@@ -37,7 +37,7 @@ pub struct Answers(Arc<Room>);
 struct Room {
     free: Arc<Semaphore>,
     bytes: usize,
-    /// For so long a caller may take nothing at first.
+    /// For so long a caller may take nothing.
     patience: Duration,
     waiting: Mutex<Waiting>,
 }
@@ -50,7 +50,7 @@ struct Waiting {
 }
 
 impl Answers {
-    /// Room for `bytes`. An answer keeps its part for `patience`, and then while it is taken at a fair pace.
+    /// Room for `bytes`. An answer keeps its part while its caller is behind a fair pace by no more than `patience`.
     #[must_use]
     pub fn new(bytes: usize, patience: Duration) -> Self {
         let bytes = bytes.min(Semaphore::MAX_PERMITS);
@@ -164,6 +164,7 @@ impl Rest {
         // A copy: a part of the whole would keep all of it.
         let piece = Bytes::copy_from_slice(&self.piece.split_to(length));
         if self.piece.is_empty() {
+            // Even an empty part would.
             self.piece = Bytes::new();
         }
         let fair = Duration::from_secs_f64(length as f64 / SLOWEST);
